@@ -1,0 +1,5 @@
+"""`python -m mjxgait`: the same as the command `mjxgait`."""
+
+from mjxgait.cli import main
+
+main()

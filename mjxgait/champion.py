@@ -1,0 +1,83 @@
+"""`champion.json`: one gait, complete and readable without JAX: poses by joint name, cycle settings, gains, fitness."""
+
+import dataclasses
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mjxgait.config import ControllerConfig
+from mjxgait.creature import Creature
+from mjxgait.errors import UserError
+from mjxgait.tables import build
+
+SCHEMA = 1
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Champion:
+    """A gait.
+
+    key_poses: [K, J] rad. tuning: value of each tuning gene. fitness and terms: as evolution scored it.
+    origin: where it comes from (generation, seed, versions).
+    """
+
+    creature: str
+    digest: str
+    key_poses: np.ndarray
+    tuning: Mapping[str, float]
+    controller: ControllerConfig
+    fitness: float
+    terms: Mapping[str, float]
+    origin: Mapping[str, Any]
+
+
+def write_champion(champion: Champion, creature: Creature, path: Path) -> None:
+    """Writes the file in one go: it is either the old one or the new one."""
+    gains = zip(creature.joint_names, creature.kp, creature.kd, creature.torque_limit, strict=True)
+    document = {
+        "schema": SCHEMA,
+        "creature": champion.creature,
+        "creature_digest": champion.digest,
+        "key_poses": [dict(zip(creature.joint_names, map(float, pose), strict=True)) for pose in champion.key_poses],
+        "tuning": {name: float(value) for name, value in champion.tuning.items()},
+        "controller": dataclasses.asdict(champion.controller) | {"mirrored": creature.symmetric},
+        "gains": {name: {"kp": float(kp), "kd": float(kd), "torque_limit": float(limit)} for name, kp, kd, limit in gains},
+        "fitness": champion.fitness,
+        "terms": dict(champion.terms),
+        "origin": dict(champion.origin),
+    }
+    scratch = path.with_suffix(".tmp")
+    scratch.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
+    scratch.replace(path)
+
+
+def read_champion(path: Path, creature: Creature) -> Champion:
+    """The gait in a file, for the creature it was evolved on.
+
+    Raises:
+      UserError: the file is missing, not a champion, or of another creature.
+    """
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+        if document["schema"] != SCHEMA:
+            raise UserError(f"{path}: written with schema {document['schema']}, this version reads {SCHEMA}")
+        if document["creature_digest"] != creature.digest:
+            raise UserError(f"{path}: evolved on another body than {creature.name} as it is now; use the run's own creature folder")
+        settings = {key: value for key, value in document["controller"].items() if key != "mirrored"}
+        return Champion(
+            creature=document["creature"],
+            digest=document["creature_digest"],
+            key_poses=np.array([[pose[name] for name in creature.joint_names] for pose in document["key_poses"]]),
+            tuning=document["tuning"],
+            controller=build(ControllerConfig, settings, str(path)),
+            fitness=document["fitness"],
+            terms=document["terms"],
+            origin=document["origin"],
+        )
+    except FileNotFoundError:
+        raise UserError(f"{path}: no such file; the run has no champion yet") from None
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise UserError(f"{path}: not a champion file ({error!r})") from None

@@ -1,0 +1,260 @@
+"""Everything a run can be told, as frozen dataclasses, and how the layers of settings are laid over each other."""
+
+import dataclasses
+from collections.abc import Mapping
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import pydantic
+
+from mjxgait.errors import UserError, did_you_mean
+from mjxgait.tables import STRICT, Count, Finite, Fraction, NonNegative, Positive, Whole, build, merge, read_toml
+
+Interval = tuple[Finite, Finite]
+
+
+@dataclasses.dataclass(frozen=True)
+class TuningRanges:
+    """Where the controller's own genes may lie (docs/controller.md); equal ends fix one."""
+
+    __pydantic_config__ = STRICT
+    threshold: Interval = (0.08, 0.16)
+    period: Interval = (0.8, 0.8)
+    steer: Interval = (0.0, 2.0)
+    pitch: Interval = (0.0, 0.0)
+    pitch_rate: Interval = (0.0, 0.0)
+    roll: Interval = (0.0, 0.0)
+    roll_rate: Interval = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        for name, (low, high) in dataclasses.asdict(self).items():
+            if low > high:
+                raise ValueError(f"{name} = [{low}, {high}]: the first must not be the larger")
+
+
+@dataclasses.dataclass(frozen=True)
+class ControllerConfig:
+    """The pose tracker.
+
+    Attributes:
+      key_poses: K, poses of half a cycle (of the whole one for an unsymmetric creature).
+      interpolation: n, steps between neighbouring poses.
+      advance: the target moves on when the pose error is below the threshold, or by the clock.
+      law: stable PD, or plain PD for comparison.
+      constraint_forces: whether stable PD counts the constraint forces of the previous step, as in DART's tutorial.
+    """
+
+    __pydantic_config__ = STRICT
+    key_poses: Annotated[int, pydantic.Field(ge=2)] = 2
+    interpolation: Count = 10
+    advance: Literal["error", "clock"] = "error"
+    law: Literal["spd", "pd"] = "spd"
+    constraint_forces: bool = False
+    tuning: TuningRanges = dataclasses.field(default_factory=TuningRanges)
+
+
+@dataclasses.dataclass(frozen=True)
+class RolloutConfig:
+    """How individuals are judged.
+
+    Attributes:
+      seconds: length of an episode.
+      starts: R, episodes per individual; the first is nominal, the others are perturbed, the same for all.
+      joint_noise, velocity_noise: rad, rad/s; half widths of the uniform perturbation of the start.
+      friction: range of the factor on the floor's friction.
+      push: sudden change of the trunk's horizontal velocity at a random moment of a perturbed start, in units of sqrt(g * hip height).
+      worst: share of the worst start in the score; the mean of the starts has the rest.
+      physics: the fast step where the model allows it, or plain MJX.
+      lanes: simulations in flight per device; 0 lets the program choose.
+    """
+
+    __pydantic_config__ = STRICT
+    seconds: Positive = 6.0
+    starts: Count = 4
+    joint_noise: NonNegative = 0.05
+    velocity_noise: NonNegative = 0.1
+    friction: tuple[Positive, Positive] = (0.8, 1.2)
+    push: NonNegative = 0.1
+    worst: Fraction = 0.5
+    physics: Literal["auto", "mjx"] = "auto"
+    lanes: Whole = 0
+
+
+@dataclasses.dataclass(frozen=True)
+class Weights:
+    """Weight of each fitness term (mjxgait/fitness.py says what each measures); all but `distance` and `alive` are penalties."""
+
+    __pydantic_config__ = STRICT
+    distance: Finite = 1.0
+    alive: Finite = 1.0
+    drift: Finite = 0.5
+    fade: Finite = 0.5
+    slip: Finite = 0.5
+    clearance: Finite = 1.0
+    frequency: Finite = 1.0
+    duty: Finite = 1.0
+    airborne: Finite = 1.0
+    foot_height: Finite = 1.0
+    tilt: Finite = 1.0
+    wobble: Finite = 0.1
+    touch: Finite = 1.0
+    energy: Finite = 0.05
+    saturation: Finite = 0.5
+    limits: Finite = 0.5
+
+
+@dataclasses.dataclass(frozen=True)
+class FitnessConfig:
+    """What is wanted of a gait.
+
+    Attributes:
+      clearance: height in hip heights that each foot should reach in each stride.
+      style_ramp: generations over which the style terms (all but distance, alive, drift and foot_height) grow to their full weight.
+    """
+
+    __pydantic_config__ = STRICT
+    clearance: NonNegative = 0.08
+    style_ramp: Whole = 0
+    weights: Weights = dataclasses.field(default_factory=Weights)
+
+
+@dataclasses.dataclass(frozen=True)
+class ForcedConfig:
+    """Forced evolution: a spell of rapid mutation and newcomers when growth stalls.
+
+    Attributes:
+      window: generations over which best and mean are watched; gain: the relative growth below which both have stalled.
+      newcomers: share of new random genomes among a forced generation's offspring, the others are mutants.
+      mutations: how many times each mutant is mutated.
+      accept: quantile of the population's fitness that an offspring must reach to be taken in.
+      refresh: share of the population to replace; limit: generations a spell lasts at most.
+      patience: spells in a row without a better best after which the run stops; 0 never stops it.
+    """
+
+    __pydantic_config__ = STRICT
+    enabled: bool = True
+    window: Count = 8
+    gain: NonNegative = 0.01
+    newcomers: Fraction = 0.5
+    mutations: Count = 3
+    accept: Fraction = 0.25
+    refresh: Fraction = 0.5
+    limit: Count = 4
+    patience: Whole = 3
+
+
+@dataclasses.dataclass(frozen=True)
+class EvolutionConfig:
+    """The genetic algorithm.
+
+    Attributes:
+      population: P. generations: cap on the generations of a run. target: fitness at which a run stops.
+      growth: the population grows to this multiple of P, then is culled back to P.
+      initial: uniform draws or a Latin hypercube. selection: how parents are drawn.
+      crossover: share of offspring with two parents, the others have one. crossing: `permute` draws K poses from the parents' 2K in any
+        order; `align` leaves each pose in its place.
+      mutation: `redraw` re-draws two joints of one pose, `single` one joint, `pose` a whole pose, `gaussian` moves every joint of one pose
+        by sigma, in units of its range. mutation_rate: share of offspring mutated.
+      tuning_rate, tuning_sigma: chance that a tuning gene of a mutated offspring changes, and by how much, in units of its range.
+    """
+
+    __pydantic_config__ = STRICT
+    population: Count = 48
+    generations: Whole = 60
+    target: Finite | None = None
+    growth: Positive = 2.0
+    initial: Literal["uniform", "latin"] = "uniform"
+    selection: Literal["uniform", "rank", "tournament"] = "rank"
+    crossover: Fraction = 0.7
+    crossing: Literal["permute", "align"] = "align"
+    mutation: Literal["redraw", "single", "pose", "gaussian"] = "gaussian"
+    mutation_rate: Fraction = 0.8
+    sigma: Positive = 0.1
+    tuning_rate: Fraction = 0.3
+    tuning_sigma: Positive = 0.1
+    remove_duplicates: bool = True
+    forced: ForcedConfig = dataclasses.field(default_factory=ForcedConfig)
+
+    def __post_init__(self) -> None:
+        if self.population < 2:
+            raise ValueError("population must be at least 2: crossover needs two parents")
+        if round(self.population * (self.growth - 1)) < 1:
+            raise ValueError(f"growth = {self.growth} leaves no room for offspring; make it larger than {1 + 1 / self.population:.3g}")
+
+    @property
+    def offspring(self) -> int:
+        """Individuals evaluated per generation."""
+        return round(self.population * (self.growth - 1))
+
+
+@dataclasses.dataclass(frozen=True)
+class Config:
+    """A run's settings.
+
+    Attributes:
+      seed: Of all randomness.
+      checkpoint_every: Generations between checkpoints; the latest three stay.
+      keep_every: Checkpoints of generations that are a multiple of this are kept for good.
+    """
+
+    __pydantic_config__ = STRICT
+    seed: Whole = 0
+    checkpoint_every: Count = 1
+    keep_every: Count = 5
+    controller: ControllerConfig = dataclasses.field(default_factory=ControllerConfig)
+    rollout: RolloutConfig = dataclasses.field(default_factory=RolloutConfig)
+    fitness: FitnessConfig = dataclasses.field(default_factory=FitnessConfig)
+    evolution: EvolutionConfig = dataclasses.field(default_factory=EvolutionConfig)
+
+
+def data_folder(kind: Literal["envs", "configs"]) -> Path:
+    """Where the shipped creatures or configs lie: inside the installed package, or beside it in a checkout."""
+    package = Path(str(resources.files("mjxgait")))
+    packaged = package / "data" / kind
+    return packaged if packaged.is_dir() else package.parent / kind
+
+
+def resolve_config(creature_table: Mapping[str, Any], creature_name: str, file: Path | None = None) -> Config:
+    """The layers, each over the one before: `configs/default.toml`, the creature's `[train]`, the user's file.
+
+    Raises:
+      UserError: names the layer and the key.
+    """
+    default = data_folder("configs") / "default.toml"
+    table = read_toml(default)
+    build(Config, table, str(default))
+    layers: list[tuple[str, Mapping[str, Any]]] = [(f"{creature_name}/creature.toml: [train]", creature_table)]
+    if file is not None:
+        layers.append((str(file), read_toml(_find_config(file))))
+    for where, layer in layers:
+        table = merge(table, layer)
+        build(Config, table, where)
+    return build(Config, table, "the settings taken together")
+
+
+def _find_config(file: Path) -> Path:
+    shipped = data_folder("configs") / f"{file}.toml"
+    if not file.exists() and shipped.exists():
+        return shipped
+    if not file.exists():
+        known = [path.stem for path in data_folder("configs").glob("*.toml")]
+        raise UserError(f"{file}: no such file and no shipped config of that name; {did_you_mean(str(file), known)}")
+    return file
+
+
+def find_creature(name: str) -> Path:
+    """The folder of a shipped creature, or the folder at a path.
+
+    Raises:
+      UserError: lists the known creatures.
+    """
+    known = sorted(path.parent.name for path in data_folder("envs").glob("*/creature.toml"))
+    if name in known:
+        return data_folder("envs") / name
+    folder = Path(name)
+    if (folder / "creature.toml").is_file():
+        return folder
+    raise UserError(
+        f'unknown creature "{name}"; shipped: {", ".join(known)}; or give the path of a folder with creature.xml and creature.toml'
+    )

@@ -1,0 +1,101 @@
+"""Measurements of a MuJoCo model in its standing pose: support points, leg length, mirror map."""
+
+import mujoco
+import numpy as np
+
+from mjxgait.errors import UserError
+
+GEOM = mujoco.mjtGeom
+
+
+def support_extents(geom_type: int, size: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+    """Parameters `(r, b, e)` of a geom's support function.
+
+    How far the geom reaches from its centre in the direction `u` of its own frame is
+    `r + sum(abs(u) * b) + sqrt(sum((u * e)**2))`: a sphere, a box and an ellipsoid summed (Minkowski).
+
+    Args:
+      size: [3] MuJoCo's sizes. A mesh is measured by the box in `size`.
+
+    Returns:
+      r [], b [3], e [3] in m.
+    """
+    a, b, c = (float(s) for s in size)
+    zero = np.zeros(3)
+    match geom_type:
+        case GEOM.mjGEOM_SPHERE:
+            return a, zero, zero
+        case GEOM.mjGEOM_CAPSULE:
+            return a, np.array([0.0, 0.0, b]), zero
+        case GEOM.mjGEOM_CYLINDER:
+            return 0.0, np.array([0.0, 0.0, b]), np.array([a, a, 0.0])
+        case GEOM.mjGEOM_ELLIPSOID:
+            return 0.0, zero, np.array([a, b, c])
+        case _:
+            return 0.0, np.array([a, b, c]), zero
+
+
+def geom_reach(model: mujoco.MjModel, data: mujoco.MjData, geom: int, direction: np.ndarray) -> float:
+    """How far a geom reaches along a world direction [3], measured from the world's origin; m."""
+    r, box, ellipsoid = support_extents(model.geom_type[geom], model.geom_size[geom])
+    u = data.geom_xmat[geom].reshape(3, 3).T @ direction
+    return float(data.geom_xpos[geom] @ direction + r + np.abs(u) @ box + np.sqrt(((u * ellipsoid) ** 2).sum()))
+
+
+def ancestors(model: mujoco.MjModel, body: int) -> list[int]:
+    """The bodies from `body` up to, but without, the world."""
+    chain = []
+    while body:
+        chain.append(body)
+        body = int(model.body_parentid[body])
+    return chain
+
+
+def leg_lengths(model: mujoco.MjModel, data: mujoco.MjData, feet: list[int], joints: list[int]) -> np.ndarray:
+    """[feet] height in m of each leg's first joint above the floor; a leg is the part of the tree that leads to one foot body only."""
+    chains = {foot: ancestors(model, foot) for foot in feet}
+    lengths = []
+    for foot, chain in chains.items():
+        shared = {b for other, c in chains.items() if other != foot for b in c}
+        own = [j for j in joints if model.jnt_bodyid[j] in chain and (model.jnt_bodyid[j] not in shared or len(feet) == 1)]
+        heights = [data.xanchor[j][2] for j in own] or [data.xpos[foot][2]]
+        lengths.append(max(heights))
+    return np.array(lengths)
+
+
+def mirror_map(
+    anchors: np.ndarray, axes: np.ndarray, slides: np.ndarray, names: list[str], tolerance: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Partner joint and sign of every joint under reflection in the vertical plane through the trunk.
+
+    A rotation axis is a pseudo-vector: reflected in y it becomes `(-x, y, -z)`; a slide's direction becomes `(x, -y, z)`.
+
+    Args:
+      anchors, axes: [J, 3] in the creature's frame (forward, left, up) in the standing pose, m.
+      slides: [J] whether the joint is a slide.
+      tolerance: m, how far a mirrored anchor may be from its partner's.
+
+    Returns:
+      partner [J] and sign [J]: joint `j` of the mirror image moves as `sign[j] * partner[j]`.
+
+    Raises:
+      UserError: names the joint that has no partner.
+    """
+    image = anchors * [1, -1, 1]
+    turned = axes * np.where(slides[:, None], [1.0, -1.0, 1.0], [-1.0, 1.0, -1.0])
+    distance = np.linalg.norm(image[:, None] - anchors[None], axis=-1)
+    parallel = turned @ axes.T
+    fits = (distance < tolerance) & (np.abs(parallel) > 0.99) & (slides[:, None] == slides[None])
+    score = np.where(fits, distance + (1 - np.abs(parallel)), np.inf)
+    partner = score.argmin(axis=1)
+    for j, name in enumerate(names):
+        if not fits[j].any():
+            raise UserError(
+                f'joint "{name}" has no mirror partner: no joint has its mirrored anchor and axis; '
+                "say which in [mirror] pairs, or set symmetric = false"
+            )
+        if partner[partner[j]] != j:
+            raise UserError(
+                f'joints "{name}" and "{names[partner[j]]}" are not each other\'s mirror image; say which are in [mirror] pairs'
+            )
+    return partner, np.sign(parallel[np.arange(len(names)), partner]).astype(int)

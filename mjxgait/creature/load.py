@@ -1,0 +1,307 @@
+"""Loads a creature folder: every fact that the other rooms need, checked, in one frozen value."""
+
+import dataclasses
+import fnmatch
+import hashlib
+from collections.abc import Mapping
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from mjxgait.creature import geometry
+from mjxgait.creature.settings import CreatureSettings, JointException
+from mjxgait.errors import UserError, did_you_mean
+from mjxgait.tables import build, read_toml
+
+HINGE, SLIDE = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
+FLOOR = "floor"
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Creature:
+    """The static facts of a body. Joints are the actuated ones, in the model's order.
+
+    files: name and text of each file, as read. model: the body as its file describes it.
+    forward, left, up: [3] unit vectors in the trunk's frame.
+    stand_qpos: [nq], stand_pos: [3] m and stand_rot: [3, 3] of the trunk; the standing pose.
+    joint_names: [J]; qpos_adr, dof_adr: [J]; stand, pose_low, pose_high, joint_low, joint_high: [J] rad.
+    kp, kd, torque_limit: [J] N·m/rad, N·m·s/rad, N·m. partner, sign: [J] mirror map.
+    steer_bend, steer_stride, balance_pitch, balance_roll: [J] weights (docs/controller.md).
+    watched: [G] geom ids, the foot geoms first; foot_of: [F] which foot each foot geom belongs to; foot_names: one per foot.
+    ground: ids of the other geoms that may touch the floor.
+    hip_height: m, mean leg length. body_length: m. mass: kg.
+    """
+
+    settings: CreatureSettings
+    files: Mapping[str, str]
+    model: mujoco.MjModel
+    trunk: int
+    forward: np.ndarray
+    left: np.ndarray
+    up: np.ndarray
+    stand_qpos: np.ndarray
+    stand_pos: np.ndarray
+    stand_rot: np.ndarray
+    joint_names: tuple[str, ...]
+    qpos_adr: np.ndarray
+    dof_adr: np.ndarray
+    stand: np.ndarray
+    pose_low: np.ndarray
+    pose_high: np.ndarray
+    joint_low: np.ndarray
+    joint_high: np.ndarray
+    kp: np.ndarray
+    kd: np.ndarray
+    torque_limit: np.ndarray
+    partner: np.ndarray
+    sign: np.ndarray
+    steer_bend: np.ndarray
+    steer_stride: np.ndarray
+    balance_pitch: np.ndarray
+    balance_roll: np.ndarray
+    watched: np.ndarray
+    foot_of: np.ndarray
+    foot_names: tuple[str, ...]
+    ground: np.ndarray
+    hip_height: float
+    body_length: float
+    mass: float
+
+    @property
+    def name(self) -> str:
+        """The name in `creature.toml`."""
+        return self.settings.creature.name
+
+    @property
+    def stand_height(self) -> float:
+        """Height of the standing trunk in m."""
+        return float(self.stand_pos[2])
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether poses are mirrored."""
+        return self.settings.mirror.symmetric
+
+    @property
+    def digest(self) -> str:
+        """Hash of the files that define the body; the README does not count."""
+        text = "\0".join(f"{name}\0{self.files[name]}" for name in sorted(self.files))
+        return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+    @property
+    def evolution_model(self) -> mujoco.MjModel:
+        """The model with contacts on feet and ground geoms only: where any other touch ends the episode, its force never matters."""
+        if not self.settings.termination.touch:
+            return self.model
+        model = mujoco.MjModel.from_xml_string(self.files["creature.xml"])
+        allowed = {*self.watched[: len(self.foot_of)], *self.ground, model.geom(FLOOR).id}
+        silent = [g for g in range(model.ngeom) if g not in allowed]
+        model.geom_contype[silent] = 0
+        model.geom_conaffinity[silent] = 0
+        return model
+
+
+def load_creature(folder: Path) -> Creature:
+    """The creature in a folder that holds `creature.xml` and `creature.toml`.
+
+    Raises:
+      UserError: names the file and the element that is wrong, and the way out.
+    """
+    toml, xml = folder / "creature.toml", folder / "creature.xml"
+    settings = build(CreatureSettings, read_toml(toml), str(toml))
+    try:
+        files = {path.name: path.read_text(encoding="utf-8") for path in (toml, xml)}
+        model = mujoco.MjModel.from_xml_string(files["creature.xml"])
+    except OSError as error:
+        raise UserError(f"{xml}: cannot be read ({error.strerror})") from None
+    except (ValueError, UnicodeDecodeError) as error:
+        raise UserError(f"{xml}: not a model that MuJoCo can load ({' '.join(str(error).split())})") from None
+    try:
+        return _assemble(settings, files, model)
+    except UserError as error:
+        raise UserError(f"{folder}: {error}") from None
+
+
+def _assemble(settings: CreatureSettings, files: Mapping[str, str], model: mujoco.MjModel) -> Creature:
+    trunk = _id(model, mujoco.mjtObj.mjOBJ_BODY, settings.creature.trunk, "creature.trunk")
+    data = _standing(model, settings.creature.keyframe)
+    axes = _trunk_axes(data.xmat[trunk].reshape(3, 3), np.array(settings.creature.forward))
+    joints = [j for j in range(model.njnt) if model.jnt_type[j] in (HINGE, SLIDE) and model.jnt_bodyid[j] != trunk]
+    if not joints:
+        raise UserError("the model has no hinge joint below its trunk, so there is nothing to move")
+    names = [model.joint(j).name for j in joints]
+    qpos_adr, dof_adr = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
+    stand = data.qpos[qpos_adr]
+    values = _joint_values(settings, names)
+    joint_range = np.where((model.jnt_range[joints] == 0).all(1, keepdims=True), [-np.inf, np.inf], model.jnt_range[joints])
+    feet, feet_geoms = _feet(model, settings.creature.feet)
+    ground = np.array([_id(model, mujoco.mjtObj.mjOBJ_GEOM, g, "creature.ground") for g in settings.creature.ground], dtype=int)
+    partner, sign = _mirror(model, data, settings, joints, names, axes)
+    world = data.xmat[trunk].reshape(3, 3) @ axes.T
+    creature = Creature(
+        settings=settings,
+        files=files,
+        model=model,
+        trunk=trunk,
+        forward=axes[0],
+        left=axes[1],
+        up=axes[2],
+        stand_qpos=data.qpos.copy(),
+        stand_pos=data.xpos[trunk].copy(),
+        stand_rot=data.xmat[trunk].reshape(3, 3).copy(),
+        joint_names=tuple(names),
+        qpos_adr=qpos_adr,
+        dof_adr=dof_adr,
+        stand=stand,
+        pose_low=np.maximum(stand + np.radians(values["range"][:, 0]), joint_range[:, 0]),
+        pose_high=np.minimum(stand + np.radians(values["range"][:, 1]), joint_range[:, 1]),
+        joint_low=joint_range[:, 0],
+        joint_high=joint_range[:, 1],
+        kp=values["kp"],
+        kd=values["kd"],
+        torque_limit=values["torque_limit"],
+        partner=partner,
+        sign=sign,
+        steer_bend=_weights(settings.steering.bend, names, "steering.bend"),
+        steer_stride=_weights(settings.steering.stride, names, "steering.stride"),
+        balance_pitch=_weights(settings.balance.pitch, names, "balance.pitch"),
+        balance_roll=_weights(settings.balance.roll, names, "balance.roll"),
+        watched=np.array([*feet_geoms, *_forbidden(model, feet_geoms, ground)], dtype=int),
+        foot_of=np.array([feet.index(model.geom_bodyid[g]) for g in feet_geoms]),
+        foot_names=tuple(model.body(b).name for b in feet),
+        ground=ground,
+        hip_height=float(geometry.leg_lengths(model, data, feet, joints).mean()),
+        body_length=settings.creature.body_length or _body_length(model, data, world[:, 0]),
+        mass=float(model.body_mass.sum()),
+    )
+    _check(creature, data)
+    return creature
+
+
+def _id(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str, key: str) -> int:
+    found = mujoco.mj_name2id(model, kind, name)
+    if found < 0:
+        count = {mujoco.mjtObj.mjOBJ_BODY: model.nbody, mujoco.mjtObj.mjOBJ_GEOM: model.ngeom}[kind]
+        known = [n for i in range(count) if (n := mujoco.mj_id2name(model, kind, i))]
+        raise UserError(f'{key} = "{name}" is not in creature.xml; {did_you_mean(name, known)}')
+    return found
+
+
+def _standing(model: mujoco.MjModel, keyframe: str) -> mujoco.MjData:
+    key = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, keyframe)
+    if key < 0:
+        raise UserError(f'creature.xml has no keyframe "{keyframe}" for the standing pose; add <keyframe><key name="{keyframe}" qpos=.../>')
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, key)
+    mujoco.mj_forward(model, data)
+    return data
+
+
+def _trunk_axes(rotation: np.ndarray, forward: np.ndarray) -> np.ndarray:
+    """Rows forward, left, up in the trunk's frame: forward as given, up as near to the world's as it can be in the standing pose."""
+    world_up = rotation.T @ [0.0, 0.0, 1.0]
+    up = world_up - forward * (world_up @ forward) / max(forward @ forward, 1e-9)
+    if np.linalg.norm(up) < 0.3 or np.linalg.norm(forward) < 1e-6:
+        raise UserError(
+            f"creature.forward = {forward.tolist()} points up or down in the standing pose; name the axis the creature walks along"
+        )
+    up, forward = up / np.linalg.norm(up), forward / np.linalg.norm(forward)
+    return np.stack([forward, np.cross(up, forward), up])
+
+
+def _joint_values(settings: CreatureSettings, names: list[str]) -> dict[str, np.ndarray]:
+    rows = [dataclasses.asdict(settings.joints) for _ in names]
+    for exception in settings.joint:
+        for i in _matching(exception.match, names, "joint.match"):
+            rows[i].update({k: v for k, v in dataclasses.asdict(exception).items() if v is not None and k != "match"})
+    fields = {field.name for field in dataclasses.fields(JointException)} - {"match"}
+    return {key: np.array([row[key] for row in rows], dtype=float) for key in fields}
+
+
+def _matching(pattern: str, names: list[str], key: str) -> list[int]:
+    found = [i for i, name in enumerate(names) if fnmatch.fnmatchcase(name, pattern)]
+    if not found:
+        raise UserError(f'creature.toml: {key}: no joint matches "{pattern}"; {did_you_mean(pattern, names)}')
+    return found
+
+
+def _weights(table: Mapping[str, float], names: list[str], key: str) -> np.ndarray:
+    weights = np.zeros(len(names))
+    for pattern, weight in table.items():
+        weights[_matching(pattern, names, key)] = weight
+    return weights
+
+
+def _feet(model: mujoco.MjModel, names: tuple[str, ...]) -> tuple[list[int], list[int]]:
+    """Foot bodies, and foot geoms in the order of their feet; geoms on one body are one foot."""
+    if not names:
+        raise UserError("creature.feet is empty; name the geoms that step on the floor")
+    geoms = [_id(model, mujoco.mjtObj.mjOBJ_GEOM, name, "creature.feet") for name in names]
+    bodies = list(dict.fromkeys(int(model.geom_bodyid[g]) for g in geoms))
+    return bodies, sorted(geoms, key=lambda g: bodies.index(int(model.geom_bodyid[g])))
+
+
+def _forbidden(model: mujoco.MjModel, feet: list[int], ground: np.ndarray) -> list[int]:
+    floor = _id(model, mujoco.mjtObj.mjOBJ_GEOM, FLOOR, "the floor")
+    colliding = [g for g in range(model.ngeom) if model.geom_contype[g] or model.geom_conaffinity[g]]
+    return [g for g in colliding if g not in {floor, *feet, *ground.tolist()} and model.geom_bodyid[g] != 0]
+
+
+def _mirror(
+    model, data, settings: CreatureSettings, joints: list[int], names: list[str], axes: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    everyone = np.arange(len(joints))
+    if not settings.mirror.symmetric:
+        return everyone, np.ones(len(joints), dtype=int)
+    overridden = {pair.joint: pair for pair in settings.mirror.pairs}
+    for pair in settings.mirror.pairs:
+        for name in (pair.joint, pair.partner):
+            if name not in names:
+                raise UserError(f'mirror.pairs: no joint is called "{name}"; {did_you_mean(name, names)}')
+    frame = axes @ data.xmat[model.body(settings.creature.trunk).id].reshape(3, 3).T
+    trunk_pos = data.xpos[model.body(settings.creature.trunk).id]
+    found = np.array([names[j] not in overridden for j in everyone])
+    keep = everyone[found]
+    partner, sign = everyone.copy(), np.ones(len(joints), dtype=int)
+    chosen = [joints[j] for j in keep]
+    anchors, directions = (data.xanchor[chosen] - trunk_pos) @ frame.T, data.xaxis[chosen] @ frame.T
+    near = 0.02 * float(np.ptp(data.xanchor[joints], axis=0).max() + 0.05)
+    local, local_sign = geometry.mirror_map(anchors, directions, model.jnt_type[chosen] == SLIDE, [names[j] for j in keep], near)
+    partner[keep], sign[keep] = keep[local], local_sign
+    for name, pair in overridden.items():
+        partner[names.index(name)], sign[names.index(name)] = names.index(pair.partner), pair.sign
+    _check_names(names, partner)
+    return partner, sign
+
+
+def _check_names(names: list[str], partner: np.ndarray) -> None:
+    """The geometry and the names must not contradict each other."""
+    for name, other in zip(names, (names[p] for p in partner), strict=True):
+        swapped = name.replace("left", "\0").replace("right", "left").replace("\0", "right")
+        if swapped in names and swapped != other:
+            raise UserError(
+                f'joint "{name}" mirrors to "{other}" by its geometry but to "{swapped}" by its name; settle it in [mirror] pairs'
+            )
+
+
+def _body_length(model: mujoco.MjModel, data: mujoco.MjData, forward: np.ndarray) -> float:
+    parts = [g for g in range(model.ngeom) if model.geom_bodyid[g] != 0]
+    front = max(geometry.geom_reach(model, data, g, forward) for g in parts)
+    return front + max(geometry.geom_reach(model, data, g, -forward) for g in parts)
+
+
+def _check(creature: Creature, data: mujoco.MjData) -> None:
+    """Refuses an empty pose range and gains outside SPD's stable region `h² kp < (4 I + 2 h kd) / 3` (docs/controller.md)."""
+    model, h = creature.model, creature.model.opt.timestep
+    mass = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, mass)
+    inertia = 1 / np.diag(np.linalg.inv(mass))[creature.dof_adr]
+    for j, name in enumerate(creature.joint_names):
+        if creature.pose_low[j] > creature.pose_high[j]:
+            raise UserError(f'joint "{name}": its pose range lies outside its range in creature.xml; widen one of them')
+        if h * h * creature.kp[j] >= (4 * inertia[j] + 2 * h * creature.kd[j]) / 3:
+            need = (1.5 * h * h * creature.kp[j] - 2 * inertia[j]) / h
+            raise UserError(
+                f'joint "{name}": kp = {creature.kp[j]:g} is unstable at a time step of {h:g} s; raise kd to {need:.3g} or lower kp'
+            )

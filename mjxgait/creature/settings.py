@@ -1,0 +1,115 @@
+"""`creature.toml`: what a body needs said that its model file cannot say (docs/creature.md)."""
+
+import dataclasses
+from typing import Annotated, Any, Literal
+
+import pydantic
+
+from mjxgait.tables import STRICT, Finite, NonNegative, Positive
+
+Pattern = str
+Degrees = tuple[Finite, Finite]
+
+
+@dataclasses.dataclass(frozen=True)
+class Identity:
+    """The names of the parts."""
+
+    __pydantic_config__ = STRICT
+    name: str
+    trunk: str
+    feet: tuple[str, ...]
+    description: str = ""
+    forward: tuple[Finite, Finite, Finite] = (1.0, 0.0, 0.0)
+    ground: tuple[str, ...] = ()
+    keyframe: str = "stand"
+    body_length: Positive | None = None
+
+
+@dataclasses.dataclass(frozen=True)
+class JointSettings:
+    """Gains in N·m/rad and N·m·s/rad, torque limit in N·m, pose range in degrees about the standing angle."""
+
+    __pydantic_config__ = STRICT
+    kp: Positive
+    kd: NonNegative
+    torque_limit: Positive
+    range: Degrees = (-45.0, 45.0)
+
+
+@dataclasses.dataclass(frozen=True)
+class JointException:
+    """Settings of the joints whose name matches a shell pattern; what is None stays as it is for all joints."""
+
+    __pydantic_config__ = STRICT
+    match: Pattern
+    kp: Positive | None = None
+    kd: NonNegative | None = None
+    torque_limit: Positive | None = None
+    range: Degrees | None = None
+
+
+@dataclasses.dataclass(frozen=True)
+class MirrorPair:
+    """A correction of the mirror map: `joint` in the mirror image is `sign * partner`."""
+
+    __pydantic_config__ = STRICT
+    joint: str
+    partner: str
+    sign: Literal[-1, 1] = 1
+
+
+@dataclasses.dataclass(frozen=True)
+class Mirror:
+    """Whether the body has a left and a right that mirror each other."""
+
+    __pydantic_config__ = STRICT
+    symmetric: bool = True
+    pairs: tuple[MirrorPair, ...] = ()
+
+
+@dataclasses.dataclass(frozen=True)
+class Steering:
+    """Weights per joint pattern of the steering correction."""
+
+    __pydantic_config__ = STRICT
+    bend: dict[Pattern, Finite] = dataclasses.field(default_factory=dict)
+    stride: dict[Pattern, Finite] = dataclasses.field(default_factory=dict)
+
+
+@dataclasses.dataclass(frozen=True)
+class Balance:
+    """Weights per joint pattern of the balance corrections."""
+
+    __pydantic_config__ = STRICT
+    pitch: dict[Pattern, Finite] = dataclasses.field(default_factory=dict)
+    roll: dict[Pattern, Finite] = dataclasses.field(default_factory=dict)
+
+
+@dataclasses.dataclass(frozen=True)
+class Termination:
+    """When an episode has failed: trunk's up axis against the world's, trunk height in standing heights, a touch."""
+
+    __pydantic_config__ = STRICT
+    min_up: Annotated[float, pydantic.Field(ge=-1, le=1)] = 0.5
+    height: tuple[NonNegative, Positive] = (0.5, 1.5)
+    touch: bool = True
+
+    def __post_init__(self) -> None:
+        if self.height[0] >= self.height[1]:
+            raise ValueError(f"height = {list(self.height)}: the first must be the smaller")
+
+
+@dataclasses.dataclass(frozen=True)
+class CreatureSettings:
+    """The whole of `creature.toml`."""
+
+    __pydantic_config__ = STRICT
+    creature: Identity
+    joints: JointSettings
+    joint: tuple[JointException, ...] = ()
+    mirror: Mirror = dataclasses.field(default_factory=Mirror)
+    steering: Steering = dataclasses.field(default_factory=Steering)
+    balance: Balance = dataclasses.field(default_factory=Balance)
+    termination: Termination = dataclasses.field(default_factory=Termination)
+    train: dict[str, Any] = dataclasses.field(default_factory=dict)

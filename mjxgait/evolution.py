@@ -1,0 +1,333 @@
+"""The genetic algorithm: one generation as a pure function of its state, whatever a genome drives.
+
+A run begins with a population that nobody has judged (`seeding`): the first call judges it, so that the physics is traced and compiled
+once. Forced evolution (Wilson) is another way to fill the same offspring slots, chosen by a flag in the state.
+"""
+
+import dataclasses
+from collections.abc import Callable
+from enum import IntEnum
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+
+from mjxgait.config import EvolutionConfig
+from mjxgait.types import pytree
+from mjxgait.variation import Variation, first_occurrence
+
+
+class Origin(IntEnum):
+    """How an individual came to be."""
+
+    INITIAL = 0
+    CROSSOVER = 1
+    MUTATION = 2
+    NEWCOMER = 3
+
+
+@pytree
+class Judged:
+    """The verdict on N genomes. terms: [N, R, F]; failed: [N, R] whether the episode ended early; sim_steps, computed_steps: []."""
+
+    terms: jax.Array
+    failed: jax.Array
+    sim_steps: jax.Array
+    computed_steps: jax.Array
+
+
+@pytree
+class EvolutionState:
+    """Everything that the next generation reads. The population is sorted, best first, once it has been judged.
+
+    genomes: leaves [P, ...]. terms: [P, R, F]. fitness: [P]. born: [P] generation of birth. origin: [P] an `Origin`.
+    key: of all coming randomness. generation: [] -1 while seeding. seeded: [] how many of the initial population have been judged.
+    best_history, mean_history: [W] of the latest generations, newest last. quiet: [] generations since the last spell.
+    forced: [] whether the next generation is forced. spell_age, refreshed: [] of the current spell.
+    spell_best: [] best fitness when the last spell began. barren: [] spells in a row that began without a better best than the one before.
+    """
+
+    genomes: Any
+    terms: jax.Array
+    fitness: jax.Array
+    born: jax.Array
+    origin: jax.Array
+    key: jax.Array
+    generation: jax.Array
+    seeded: jax.Array
+    best_history: jax.Array
+    mean_history: jax.Array
+    quiet: jax.Array
+    forced: jax.Array
+    spell_age: jax.Array
+    refreshed: jax.Array
+    spell_best: jax.Array
+    barren: jax.Array
+
+
+@pytree
+class GenerationMetrics:
+    """What there is to tell of a generation; scalars but for best_terms [F], the mean over starts of the best individual's terms.
+
+    unique: different genomes. spread: mean standard deviation of a gene. failures: how many of the offspring's episodes ended early.
+    """
+
+    generation: jax.Array
+    best: jax.Array
+    mean: jax.Array
+    median: jax.Array
+    lower_quartile: jax.Array
+    upper_quartile: jax.Array
+    worst: jax.Array
+    unique: jax.Array
+    spread: jax.Array
+    forced: jax.Array
+    failures: jax.Array
+    episodes: jax.Array
+    evaluations: jax.Array
+    sim_steps: jax.Array
+    computed_steps: jax.Array
+    best_terms: jax.Array
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Evolution:
+    """The algorithm with its parts. judge: genomes -> Judged. rank: terms [..., R, F], generation [] -> fitness [...], higher is better."""
+
+    config: EvolutionConfig
+    variation: Variation
+    judge: Callable[[Any], Judged]
+    rank: Callable[[jax.Array, jax.Array], jax.Array]
+
+    def init(self, key: jax.Array, starts: int, terms: int) -> EvolutionState:
+        """The state before anybody has been judged."""
+        key, key_create = jax.random.split(key)
+        count, window = self.config.population, self.config.forced.window
+        integer = jnp.zeros((), jnp.int32)
+        return EvolutionState(
+            genomes=self.variation.create(key_create, count),
+            terms=jnp.zeros((count, starts, terms)),
+            fitness=jnp.full(count, -jnp.inf),
+            born=jnp.zeros(count, jnp.int32),
+            origin=jnp.full(count, int(Origin.INITIAL), jnp.int32),
+            key=key,
+            generation=jnp.int32(-1),
+            seeded=integer,
+            best_history=jnp.full(window + 1, -jnp.inf),
+            mean_history=jnp.full(window + 1, -jnp.inf),
+            quiet=integer,
+            forced=jnp.zeros((), bool),
+            spell_age=integer,
+            refreshed=integer,
+            spell_best=jnp.float32(-jnp.inf),
+            barren=integer,
+        )
+
+    def step(self, state: EvolutionState) -> tuple[EvolutionState, GenerationMetrics]:
+        """One generation: offspring, their judgement, survival, and the decision whether the next one is forced."""
+        key, key_offspring = jax.random.split(state.key)
+        seeding = state.seeded < self.config.population
+        offspring, origin = self._offspring(key_offspring, state, seeding)
+        judged = self.judge(offspring)
+        generation = jnp.where(seeding, jnp.where(self._filled(state), 0, -1), state.generation + 1)
+        grown = self._survive(state, offspring, judged.terms, origin, generation)
+        planted = self._plant(state, judged.terms, generation)
+        state = jax.tree.map(lambda a, b: jnp.where(seeding, a, b), _without_key(planted), _without_key(grown))
+        forced = state.forced
+        state = self._decide(dataclasses.replace(state, key=key, generation=generation))
+        return state, self._metrics(state, judged, forced)
+
+    def _filled(self, state: EvolutionState) -> jax.Array:
+        return state.seeded + self.config.offspring >= self.config.population
+
+    def _offspring(self, key: jax.Array, state: EvolutionState, seeding: jax.Array) -> tuple[Any, jax.Array]:
+        """Genomes [M, ...] and their origins [M]: the unjudged initial population, forced ones, or children."""
+        key_children, key_forced = jax.random.split(key)
+        places = state.seeded + jnp.arange(self.config.offspring)
+        initial = jax.tree.map(lambda leaf: leaf[places % self.config.population], state.genomes)
+        children, child_origin = self._children(key_children, state)
+        forced, forced_origin = self._forced(key_forced, state)
+
+        def pick(first: jax.Array, second: jax.Array, third: jax.Array) -> jax.Array:
+            return jnp.where(seeding, first, jnp.where(state.forced, second, third))
+
+        return jax.tree.map(pick, initial, forced, children), pick(jnp.zeros_like(child_origin), forced_origin, child_origin)
+
+    def _children(self, key: jax.Array, state: EvolutionState) -> tuple[Any, jax.Array]:
+        config, count = self.config, self.config.offspring
+        key_parents, key_cross, key_whether, key_mutate, key_mutated = jax.random.split(key, 5)
+        mothers, fathers = parents(key_parents, count, config.population, config.selection)
+        mother, father = (jax.tree.map(lambda leaf, i=i: leaf[i], state.genomes) for i in (mothers, fathers))
+        crossed = jax.vmap(self.variation.cross)(jax.random.split(key_cross, count), mother, father)
+        crosses = jax.random.bernoulli(key_whether, config.crossover, (count,))
+        child = _pick(crosses, crossed, mother)
+        mutated = jax.vmap(self.variation.mutate)(jax.random.split(key_mutate, count), child)
+        # A child of one parent that is not mutated would be a duplicate, unless the algorithm knows no mutation at all.
+        mutates = jax.random.bernoulli(key_mutated, config.mutation_rate, (count,)) | (~crosses & (config.mutation_rate > 0))
+        origin = jnp.where(crosses, int(Origin.CROSSOVER), int(Origin.MUTATION))
+        return _pick(mutates, mutated, child), origin
+
+    def _forced(self, key: jax.Array, state: EvolutionState) -> tuple[Any, jax.Array]:
+        config, count = self.config.forced, self.config.offspring
+        key_create, key_parents, *key_mutations = jax.random.split(key, 2 + config.mutations)
+        newcomers = round(config.newcomers * count)
+        chosen = jax.random.randint(key_parents, (count,), 0, self.config.population)
+        mutants = jax.tree.map(lambda leaf: leaf[chosen], state.genomes)
+        for key_mutation in key_mutations:
+            mutants = jax.vmap(self.variation.mutate)(jax.random.split(key_mutation, count), mutants)
+        is_new = jnp.arange(count) < newcomers
+        created = self.variation.create(key_create, count)
+        return _pick(is_new, created, mutants), jnp.where(is_new, int(Origin.NEWCOMER), int(Origin.MUTATION))
+
+    def _plant(self, state: EvolutionState, terms: jax.Array, generation: jax.Array) -> EvolutionState:
+        """The initial population with the verdict on its next members in their places."""
+        places = state.seeded + jnp.arange(self.config.offspring)
+        terms = state.terms.at[places].set(terms, mode="drop")
+        seeded = jnp.minimum(state.seeded + self.config.offspring, self.config.population)
+        judged = jnp.arange(self.config.population) < seeded
+        fitness = jnp.where(judged, self.rank(terms, jnp.maximum(generation, 0)), -jnp.inf)
+        order = jnp.where(self._filled(state), jnp.argsort(-fitness, stable=True), jnp.arange(self.config.population))
+        planted = dataclasses.replace(state, terms=terms, fitness=fitness, seeded=seeded)
+        return _reordered(planted, order)
+
+    def _survive(self, state: EvolutionState, offspring: Any, terms: jax.Array, origin: jax.Array, generation: jax.Array) -> EvolutionState:
+        """The P best of the grown population, without duplicates; in a forced generation what was fit enough goes before the old."""
+        count, born = self.config.population, jnp.full(self.config.offspring, generation)
+        pool = jax.tree.map(
+            lambda a, b: jnp.concatenate([a, b]),
+            (state.genomes, state.terms, state.born, state.origin),
+            (offspring, terms, born, origin),
+        )
+        fitness = self.rank(pool[1], generation)
+        fresh = jnp.arange(fitness.shape[0]) >= count
+        distinct = first_occurrence(pool[0]) if self.config.remove_duplicates else jnp.ones_like(fresh)
+        admitted = self._admitted(state, fitness, fresh & distinct)
+        tier = jnp.where(state.forced & fresh, jnp.where(admitted, 2, 0), jnp.where(distinct, 1, 0))
+        # The best is never lost, whatever the tiers say.
+        tier = jnp.where((jnp.arange(fitness.shape[0]) == jnp.argmax(fitness)) & distinct, 3, tier)
+        kept = jnp.lexsort((-fitness, -tier))[:count]
+        kept = kept[jnp.argsort(-fitness[kept], stable=True)]
+        genomes, terms, born, origin = jax.tree.map(lambda leaf: leaf[kept], pool)
+        refreshed = state.refreshed + jnp.where(state.forced, jnp.sum(admitted), 0)
+        return dataclasses.replace(
+            state,
+            genomes=genomes,
+            terms=terms,
+            born=born,
+            origin=origin,
+            fitness=fitness[kept],
+            refreshed=refreshed.astype(jnp.int32),
+        )
+
+    def _admitted(self, state: EvolutionState, fitness: jax.Array, candidates: jax.Array) -> jax.Array:
+        """Which of the candidates [P + M] a forced generation takes in: fit enough, best first, as many as the spell has room for."""
+        old = jnp.sort(fitness[: self.config.population])
+        enough = old[int(self.config.forced.accept * (self.config.population - 1))]
+        fit = candidates & (fitness >= enough) & jnp.isfinite(fitness)
+        place = jnp.argsort(jnp.argsort(jnp.where(fit, -fitness, jnp.inf), stable=True))
+        return fit & (place < self._room() - state.refreshed)
+
+    def _room(self) -> int:
+        return min(max(round(self.config.forced.refresh * self.config.population), 1), self.config.population - 1)
+
+    def _decide(self, state: EvolutionState) -> EvolutionState:
+        """Begins a spell of forced evolution when best and mean have stalled over the window; ends it when it has done its work."""
+        config = self.config.forced
+        best, mean = state.fitness[0], _finite_mean(state.fitness)
+        bests, means = jnp.append(state.best_history[1:], best), jnp.append(state.mean_history[1:], mean)
+        age = jnp.where(state.forced, state.spell_age + 1, 0)
+        ends = state.forced & ((age >= config.limit) | (state.refreshed >= self._room()))
+        quiet = jnp.where(state.forced | (state.generation <= 0), 0, state.quiet + 1)
+        stalled = (quiet >= config.window) & ~_grown(bests, config.gain) & ~_grown(means, config.gain)
+        begins = stalled & ~state.forced & config.enabled
+        first = ~jnp.isfinite(state.spell_best)
+        pays = first | _grown(jnp.stack([state.spell_best, best]), config.gain)
+        return dataclasses.replace(
+            state,
+            best_history=bests,
+            mean_history=means,
+            quiet=quiet,
+            forced=begins | (state.forced & ~ends),
+            spell_age=jnp.where(begins, 0, age).astype(jnp.int32),
+            refreshed=jnp.where(begins, 0, state.refreshed).astype(jnp.int32),
+            spell_best=jnp.where(begins, best, state.spell_best),
+            barren=jnp.where(begins, jnp.where(pays, 0, state.barren + 1), state.barren).astype(jnp.int32),
+        )
+
+    def _metrics(self, state: EvolutionState, judged: Judged, forced: jax.Array) -> GenerationMetrics:
+        quartiles = jnp.percentile(
+            jnp.where(jnp.isfinite(state.fitness), state.fitness, jnp.nan), jnp.array([25, 50, 75]), method="nearest"
+        )
+        spreads = [jnp.mean(jnp.std(leaf, axis=0)) for leaf in jax.tree.leaves(state.genomes)]
+        return GenerationMetrics(
+            generation=state.generation,
+            best=state.fitness[0],
+            mean=_finite_mean(state.fitness),
+            median=quartiles[1],
+            lower_quartile=quartiles[0],
+            upper_quartile=quartiles[2],
+            worst=state.fitness[-1],
+            unique=jnp.sum(first_occurrence(state.genomes)),
+            spread=sum(spreads, jnp.zeros(())) / len(spreads),
+            forced=forced,
+            failures=jnp.sum(judged.failed),
+            episodes=jnp.int32(judged.failed.size),
+            evaluations=jnp.int32(self.config.offspring),
+            sim_steps=judged.sim_steps,
+            computed_steps=judged.computed_steps,
+            best_terms=jnp.mean(state.terms[0], axis=0),
+        )
+
+
+def parents(key: jax.Array, count: int, population: int, selection: str) -> tuple[jax.Array, jax.Array]:
+    """Places [count] of mothers and fathers in a population sorted best first; never the same individual twice.
+
+    `uniform` draws all alike; `rank` falls linearly to zero with rank (Baker 1985, pressure 2); `tournament` takes the better of two.
+    """
+    key_mother, key_father = jax.random.split(key)
+
+    def draw(key: jax.Array, among: int) -> jax.Array:
+        if selection == "uniform":
+            return jax.random.randint(key, (count,), 0, among)
+        if selection == "tournament":
+            return jnp.min(jax.random.randint(key, (count, 2), 0, among), axis=1)
+        return jnp.floor(among * (1 - jnp.sqrt(1 - jax.random.uniform(key, (count,))))).astype(jnp.int32)
+
+    mothers, others = draw(key_mother, population), draw(key_father, population - 1)
+    return mothers, others + (others >= mothers)
+
+
+def stop_reason(state: EvolutionState, config: EvolutionConfig) -> str | None:
+    """Why a run is over after this generation, in words; None while it goes on. Reads the state on the host."""
+    if config.target is not None and float(state.fitness[0]) >= config.target:
+        return f"the target fitness of {config.target:g} is reached"
+    if config.forced.enabled and config.forced.patience and int(state.barren) >= config.forced.patience:
+        return f"forced evolution no longer pays: {int(state.barren)} spells in a row without growth"
+    if int(state.generation) >= config.generations:
+        return f"all {config.generations} generations are done"
+    return None
+
+
+def _grown(history: jax.Array, gain: float) -> jax.Array:
+    return history[-1] - history[0] > gain * jnp.maximum(jnp.abs(history[0]), 1.0)
+
+
+def _finite_mean(values: jax.Array) -> jax.Array:
+    finite = jnp.isfinite(values)
+    return jnp.where(jnp.any(finite), jnp.sum(jnp.where(finite, values, 0.0)) / jnp.maximum(jnp.sum(finite), 1), -jnp.inf)
+
+
+def _pick(condition: jax.Array, yes: Any, no: Any) -> Any:
+    """Row by row [M] from one or the other pytree of leaves [M, ...]."""
+    return jax.tree.map(lambda a, b: jnp.where(condition.reshape(-1, *[1] * (a.ndim - 1)), a, b), yes, no)
+
+
+def _reordered(state: EvolutionState, order: jax.Array) -> EvolutionState:
+    rows = (state.genomes, state.terms, state.fitness, state.born, state.origin)
+    genomes, terms, fitness, born, origin = jax.tree.map(lambda leaf: leaf[order], rows)
+    return dataclasses.replace(state, genomes=genomes, terms=terms, fitness=fitness, born=born, origin=origin)
+
+
+def _without_key(state: EvolutionState) -> EvolutionState:
+    """Typed keys cannot be chosen between with `where`; the caller sets the next one."""
+    return dataclasses.replace(state, key=jnp.zeros(()))

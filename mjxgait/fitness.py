@@ -1,0 +1,73 @@
+"""From the tally of an episode to named fitness terms, and from terms to one number. Higher is better."""
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import optax
+
+from mjxgait.config import FitnessConfig, Weights
+from mjxgait.creature import Creature
+from mjxgait.tally import Tally
+
+TERMS = tuple(field.name for field in dataclasses.fields(Weights))
+REWARDS = ("distance", "alive")
+STYLE = tuple(name for name in TERMS if name not in (*REWARDS, "drift", "foot_height"))
+"""The terms that may ramp in: what makes a gait good to look at once there is one."""
+
+
+def stride_limit(mass: float) -> float:
+    """Hz; 1.2 times the trot-gallop transition frequency of an animal of this mass, `4.48 m^-0.14` (Heglund, Taylor & McMahon 1974)."""
+    return 1.2 * 4.48 * mass**-0.14
+
+
+def fitness_terms(creature: Creature, step: float, horizon: int, tally: Tally) -> jax.Array:
+    """The terms [F] of one episode in the order of `TERMS`, each without unit and before its weight.
+
+    Every penalty is at least zero and every sum ended with the creature's life, so an individual that has died gains nothing more.
+
+    Args:
+      step: s. horizon: T, steps of a full episode.
+    """
+    lived = jnp.maximum(tally.steps, 1)
+    length = creature.body_length
+    moved = jnp.maximum(tally.forward, 0.25 * length)
+    strides = jnp.maximum(tally.strides, 1)
+    rate = tally.strides / (jnp.maximum(tally.stride_steps, 1) * step)
+    duty = tally.contact / lived
+    second_half = tally.forward - tally.forward_half
+    values = {
+        "distance": tally.forward / length,
+        "alive": tally.steps / horizon,
+        "drift": jnp.abs(tally.left) / length + jnp.abs(jnp.sin(0.5 * tally.heading)),
+        "fade": jnp.maximum(tally.forward_half - second_half, 0.0) / length,
+        "slip": tally.slip / length,
+        "clearance": jnp.where(tally.strides > 1, tally.shortfall / jnp.maximum(strides - 1, 1), 1.0),
+        "frequency": jnp.maximum(rate / stride_limit(creature.mass) - 0.9, 0.0),
+        "duty": jnp.mean(jnp.maximum(duty - 0.85, 0.0) + jnp.maximum(0.2 - duty, 0.0)) / 0.15,
+        "airborne": tally.airborne / lived,
+        "foot_height": jnp.maximum(tally.foot_height / lived / creature.hip_height - 0.25, 0.0),
+        "tilt": tally.tilt / lived,
+        "wobble": jnp.sqrt(tally.wobble / lived + 1e-12),
+        "touch": tally.touch / lived,
+        "energy": tally.work / (creature.mass * 9.81 * moved),
+        "saturation": tally.saturation / lived,
+        "limits": tally.limits / lived,
+    }
+    return jnp.stack([values[name] for name in TERMS])
+
+
+def weight_vector(config: FitnessConfig, generation: jax.Array) -> jax.Array:
+    """Signed weights [F] at a generation []: penalties negative, style terms ramped in by an optax schedule."""
+    base = jnp.array([getattr(config.weights, name) * (1 if name in REWARDS else -1) for name in TERMS], jnp.float32)
+    if not config.style_ramp:
+        return base
+    ramp = optax.linear_schedule(0.0, 1.0, config.style_ramp)(generation)
+    return jnp.where(jnp.array([name in STYLE for name in TERMS]), base * ramp, base)
+
+
+def score(terms: jax.Array, weights: jax.Array, worst: float) -> jax.Array:
+    """Fitness [...] of terms [..., R, F]: a mix of the worst start and the mean of the starts. Not finite scores as -inf."""
+    starts = terms @ weights
+    value = worst * jnp.min(starts, axis=-1) + (1 - worst) * jnp.mean(starts, axis=-1)
+    return jnp.where(jnp.isfinite(value), value, -jnp.inf)

@@ -1,0 +1,60 @@
+"""The run folder: what lies where, how it is made and opened."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from mjxgait.config import Config
+from mjxgait.creature import Creature, load_creature
+from mjxgait.errors import UserError
+from mjxgait.tables import build, dump_toml, read_toml
+
+CONFIG, CREATURE, METRICS, CHAMPION, PLOT = "config.toml", "creature", "metrics.jsonl", "champion.json", "fitness.png"
+
+
+def create_run(folder: Path, creature: Creature, config: Config) -> None:
+    """Makes the run folder with the exact creature and settings.
+
+    Raises:
+      UserError: the folder holds something already, or cannot be written.
+    """
+    try:
+        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+            holds = "another run" if (folder / CONFIG).exists() else "something else"
+            raise UserError(f"{folder}: holds {holds}; name another folder with --out, or go on with --resume {folder}")
+        (folder / CREATURE).mkdir(parents=True, exist_ok=True)
+        for name, text in creature.files.items():
+            (folder / CREATURE / name).write_text(text, encoding="utf-8")
+        (folder / CONFIG).write_text(dump_toml(config), encoding="utf-8")
+    except OSError as error:
+        raise UserError(f"{folder}: cannot be written ({error.strerror})") from None
+
+
+def open_run(folder: Path) -> tuple[Creature, Config]:
+    """The creature and the settings of a run folder.
+
+    Raises:
+      UserError: it is not a run folder.
+    """
+    if not (folder / CONFIG).is_file():
+        raise UserError(f"{folder}: not a run folder (it has no {CONFIG})")
+    return load_creature(folder / CREATURE), build(Config, read_toml(folder / CONFIG), str(folder / CONFIG))
+
+
+def read_metrics(path: Path) -> list[dict[str, Any]]:
+    """The lines of a `metrics.jsonl`; a last line that was cut off by a kill is left out."""
+    lines = []
+    for text in path.read_text(encoding="utf-8").splitlines() if path.exists() else []:
+        try:
+            lines.append(json.loads(text))
+        except json.JSONDecodeError:
+            break
+    return lines
+
+
+def truncate_metrics(path: Path, generation: int) -> None:
+    """Takes out the lines after a generation, as a resumed run will write them again."""
+    kept = [line for line in read_metrics(path) if line["generation"] <= generation]
+    scratch = path.with_suffix(".tmp")
+    scratch.write_text("".join(json.dumps(line) + "\n" for line in kept), encoding="utf-8")
+    scratch.replace(path)

@@ -1,0 +1,146 @@
+"""From a genome to the target pose of each moment: mirroring, interpolation, corrections, advance (docs/controller.md).
+
+Every function is for one creature; the rollout maps them over its lanes.
+"""
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from mjxgait.config import ControllerConfig, TuningRanges
+from mjxgait.creature import Creature
+from mjxgait.types import Sensed, pytree
+
+TUNING = tuple(field.name for field in dataclasses.fields(TuningRanges))
+THRESHOLD, PERIOD, STEER, PITCH, PITCH_RATE, ROLL, ROLL_RATE = range(len(TUNING))
+MAX_CORRECTION = 0.5
+"""rad, or relative stride length: the most that one correction may change the target."""
+
+
+@pytree
+class Genome:
+    """The evolvable values. key_poses: [..., K, J] rad; tuning: [..., E] in the order of `TUNING`."""
+
+    key_poses: jax.Array
+    tuning: jax.Array
+
+
+@pytree
+class GaitState:
+    """Where the controller is in its cycle: position [] in steps of interpolation, time [] s."""
+
+    position: jax.Array
+    time: jax.Array
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class PoseTracker:
+    """A controller: the cycle of key poses of one creature.
+
+    The rollout needs three things of any controller: `prepare` (genome to what an episode keeps), `init` and `target`.
+    """
+
+    creature: Creature
+    config: ControllerConfig
+    step: float
+
+    @property
+    def poses_per_cycle(self) -> int:
+        """C: twice K for a mirrored creature."""
+        return self.config.key_poses * (2 if self.creature.symmetric else 1)
+
+    @property
+    def positions(self) -> int:
+        """S: positions in a cycle."""
+        return self.poses_per_cycle * self.config.interpolation
+
+    def bounds(self) -> tuple[Genome, Genome]:
+        """Lowest and highest genome: key_poses [K, J], tuning [E]."""
+        ranges = np.array([getattr(self.config.tuning, name) for name in TUNING])
+        shape = (self.config.key_poses, len(self.creature.joint_names))
+
+        def genome(pose: np.ndarray, tuning: np.ndarray) -> Genome:
+            return Genome(jnp.asarray(np.broadcast_to(pose, shape), jnp.float32), jnp.asarray(tuning, jnp.float32))
+
+        return genome(self.creature.pose_low, ranges[:, 0]), genome(self.creature.pose_high, ranges[:, 1])
+
+    def prepare(self, genome: Genome) -> Genome:
+        """The genome with its key poses [K, J] replaced by the whole cycle [C, J]."""
+        return dataclasses.replace(genome, key_poses=pose_cycle(self.creature, genome.key_poses))
+
+    def init(self) -> GaitState:
+        """The state at the start of an episode."""
+        return GaitState(position=jnp.zeros((), jnp.int32), time=jnp.zeros((), jnp.float32))
+
+    def target(self, cycle: Genome, state: GaitState, sensed: Sensed) -> tuple[jax.Array, GaitState, jax.Array]:
+        """Target pose [J] of this moment, the state of the next, and whether a stride has just been completed []."""
+        creature = self.creature
+        target = interpolate(cycle.key_poses, state.position, self.config.interpolation)
+        target = target + corrections(creature, cycle.tuning, target, sensed)
+        target = jnp.clip(target, creature.joint_low.astype(np.float32), creature.joint_high.astype(np.float32))
+        time = state.time + self.step
+        if self.config.advance == "clock":
+            position = jnp.floor(self.positions * time / cycle.tuning[PERIOD]).astype(jnp.int32) % self.positions
+        else:
+            reached = jnp.mean((target - sensed.joint_pos) ** 2) < cycle.tuning[THRESHOLD] ** 2
+            position = (state.position + reached) % self.positions
+        return target, GaitState(position, time), position < state.position
+
+
+def pose_cycle(creature: Creature, key_poses: jax.Array) -> jax.Array:
+    """The closed cycle [C, J]: the key poses [K, J] and, for a symmetric creature, their mirror images."""
+    if not creature.symmetric:
+        return key_poses
+    return jnp.concatenate([key_poses, creature.sign.astype(np.float32) * key_poses[:, creature.partner]])
+
+
+def interpolate(cycle: jax.Array, position: jax.Array, n: int) -> jax.Array:
+    """Target pose [J] at a position [] of the cycle [C, J] with n steps between neighbours.
+
+    A weighted sum over all poses instead of two look-ups: with lanes innermost a look-up would be a gather per lane.
+    """
+    poses = np.arange(cycle.shape[0])
+    ahead = (position / n - poses) % cycle.shape[0]
+    behind = (poses - position / n) % cycle.shape[0]
+    weight = jnp.maximum(0.0, 1.0 - jnp.minimum(ahead, behind))
+    return jnp.sum(weight[:, None] * cycle, axis=0)
+
+
+def heading_error(creature: Creature, sensed: Sensed) -> tuple[jax.Array, jax.Array, jax.Array]:
+    """Forward [3] and left [3] of the trunk in the world, and its heading [] in rad, left of the start's forward."""
+    forward, left = (sensed.trunk_rot @ axis.astype(np.float32) for axis in (creature.forward, creature.left))
+    start_forward, start_left = start_axes(creature)
+    return forward, left, jnp.arctan2(forward @ start_left, forward @ start_forward)
+
+
+def corrections(creature: Creature, tuning: jax.Array, target: jax.Array, sensed: Sensed) -> jax.Array:
+    """Change [J] of the target pose by steering and balance; zero where the genes are zero."""
+    forward, left, heading = heading_error(creature, sensed)
+    offset = (sensed.trunk_pos - start_position(creature)) @ start_axes(creature)[1]
+    steer = _clip(tuning[STEER] * (heading + offset / (2 * creature.body_length)))
+    pitch, roll = -jnp.arcsin(jnp.clip(forward[2], -1, 1)), jnp.arcsin(jnp.clip(left[2], -1, 1))
+    pitch = _clip(tuning[PITCH] * pitch + tuning[PITCH_RATE] * (sensed.trunk_angvel @ left))
+    roll = _clip(tuning[ROLL] * roll + tuning[ROLL_RATE] * (sensed.trunk_angvel @ forward))
+    bend, stride, on_pitch, on_roll, stand = (
+        value.astype(np.float32)
+        for value in (creature.steer_bend, creature.steer_stride, creature.balance_pitch, creature.balance_roll, creature.stand)
+    )
+    return (target - stand) * steer * stride + steer * bend + pitch * on_pitch + roll * on_roll
+
+
+def start_axes(creature: Creature) -> tuple[np.ndarray, np.ndarray]:
+    """Horizontal unit vectors [3] forward and left of the nominal standing pose, in the world."""
+    forward = (creature.stand_rot @ creature.forward) * [1, 1, 0]
+    forward = forward / np.linalg.norm(forward)
+    return forward.astype(np.float32), np.cross([0, 0, 1], forward).astype(np.float32)
+
+
+def start_position(creature: Creature) -> np.ndarray:
+    """[3] m, where the trunk stands at the start."""
+    return creature.stand_pos.astype(np.float32)
+
+
+def _clip(correction: jax.Array) -> jax.Array:
+    return jnp.clip(correction, -MAX_CORRECTION, MAX_CORRECTION)

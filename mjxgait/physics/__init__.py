@@ -1,0 +1,21 @@
+"""Batched rigid-body physics behind the `Plant` protocol."""
+
+from typing import Literal
+
+from mjxgait.creature import Creature
+from mjxgait.errors import UserError
+from mjxgait.physics.layout import sense_layout
+from mjxgait.physics.plain import mjx_plant
+from mjxgait.types import Plant
+
+
+def make_plant(creature: Creature, physics: Literal["auto", "mjx"]) -> tuple[Plant, int]:
+    """The plant of a creature, and how many lanes per device suit it.
+
+    Raises:
+      UserError: MJX does not support something in the model; in its words.
+    """
+    try:
+        return mjx_plant(creature.evolution_model, sense_layout(creature)), 16
+    except NotImplementedError as error:
+        raise UserError(f"{creature.name}: creature.xml uses what MJX does not support: {error}") from None

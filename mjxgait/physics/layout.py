@@ -1,0 +1,22 @@
+"""Which parts of a model are sensed."""
+
+import dataclasses
+
+import numpy as np
+
+from mjxgait.creature import Creature
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class SenseLayout:
+    """trunk: body id. qpos_adr, dof_adr: [J] addresses of the actuated joints. watched: [G] geom ids."""
+
+    trunk: int
+    qpos_adr: np.ndarray
+    dof_adr: np.ndarray
+    watched: np.ndarray
+
+
+def sense_layout(creature: Creature) -> SenseLayout:
+    """The layout of a creature."""
+    return SenseLayout(creature.trunk, creature.qpos_adr, creature.dof_adr, creature.watched)

@@ -1,0 +1,174 @@
+"""Simulates many episodes: a fixed number of lanes per device, each taking the next waiting episode when its own has ended.
+
+Cost follows the steps that creatures live, memory the number of lanes, whatever the population and the length of the episode.
+"""
+
+import dataclasses
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.sharding import Mesh, PartitionSpec
+
+from mjxgait import spd
+from mjxgait.creature import Creature
+from mjxgait.gait import PoseTracker
+from mjxgait.starts import Starts
+from mjxgait.tally import Judge, Reason, Tally
+from mjxgait.types import BodyState, Plant, pytree
+
+CHECK_EVERY = 16
+"""Steps between two looks at which lanes are free: a look costs about as much as a step."""
+AXIS = "lanes"
+
+
+@pytree
+class Episodes:
+    """All episodes of a generation: tally with leaves [N, R, ...], and the steps computed [] for them, those of idle lanes included."""
+
+    tally: Tally
+    computed_steps: jax.Array
+
+
+@pytree
+class Lane:
+    """One simulation in flight. job: [] place in the device's queue; cycle and control: the controller's own; push as in `Starts`."""
+
+    job: jax.Array
+    body: BodyState
+    cycle: Any
+    control: Any
+    tally: Tally
+    push: jax.Array
+    push_step: jax.Array
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Simulator:
+    """Everything static about the episodes of one creature. steps: T per episode; lanes: L per device; mesh: the devices."""
+
+    creature: Creature
+    plant: Plant
+    tracker: PoseTracker
+    judge: Judge
+    steps: int
+    lanes: int
+    mesh: Mesh
+
+    def simulate(self, genomes: Any, starts: Starts) -> Episodes:
+        """Every genome (leaves [N, ...]) on every start [R]; the order of results is the order of the genomes."""
+        individuals, count = jax.tree.leaves(genomes)[0].shape[0], starts.friction.shape[0]
+        total, devices = individuals * count, self.mesh.size
+        queue = -(-total // devices)
+        jobs = jnp.arange(queue * devices, dtype=jnp.int32).reshape(queue, devices).T.reshape(-1)
+        run = jax.shard_map(
+            partial(self._run_queue, total=total),
+            mesh=self.mesh,
+            in_specs=(PartitionSpec(AXIS), PartitionSpec(), PartitionSpec()),
+            out_specs=PartitionSpec(AXIS),
+            check_vma=False,
+        )
+        tally, computed = run(jobs, genomes, starts)
+
+        def in_order(leaf: jax.Array) -> jax.Array:
+            by_device = leaf.reshape(devices, queue, *leaf.shape[1:])
+            return jnp.swapaxes(by_device, 0, 1).reshape(-1, *leaf.shape[1:])[:total].reshape(individuals, count, *leaf.shape[1:])
+
+        return Episodes(jax.tree.map(in_order, tally), jnp.sum(computed))
+
+    def _run_queue(self, jobs: jax.Array, genomes: Any, starts: Starts, *, total: int) -> tuple[Tally, jax.Array]:
+        """Works off one device's queue of jobs [Q]: tally with leaves [Q, ...], and the computed steps [1]."""
+        queue = jobs.shape[0]
+        lanes = min(self.lanes, queue)
+        waiting = jnp.sum(jobs < total)
+
+        def fresh(places: jax.Array) -> Lane:
+            job = jnp.where(places < waiting, places, queue)
+            lane = jax.vmap(partial(self._fresh_lane, genomes, starts))(job, jobs[jnp.minimum(places, queue - 1)])
+            return jax.tree.map(lambda leaf: jnp.moveaxis(leaf, 0, self.plant.lane_axis), lane)
+
+        def store(results: Tally, place: jax.Array, tally: Tally) -> Tally:
+            return jax.tree.map(
+                lambda rows, leaf: rows.at[place].set(jnp.moveaxis(leaf, self.plant.lane_axis, 0), mode="drop"), results, tally
+            )
+
+        def body(carry: tuple[Lane, Tally, jax.Array, jax.Array]) -> tuple[Lane, Tally, jax.Array, jax.Array]:
+            lane, results, taken, rounds = carry
+            lane = jax.lax.fori_loop(0, CHECK_EVERY, lambda _, lane: self._step(lane), lane)
+            done = (lane.tally.steps >= self.steps) | (lane.tally.reason != Reason.FINISHED)
+            results = store(results, jnp.where(done, lane.job, queue), lane.tally)
+            lane = self._per_lane(_choose)(done, fresh(taken + jnp.cumsum(done) - 1), lane)
+            return lane, results, taken + jnp.sum(done), rounds + 1
+
+        results = jax.tree.map(lambda leaf: jnp.zeros((queue, *leaf.shape), leaf.dtype), self.judge.init())
+        carry = (fresh(jnp.arange(lanes)), results, jnp.int32(lanes), jnp.int32(0))
+        _, results, _, rounds = jax.lax.while_loop(lambda carry: jnp.any(carry[0].job < queue), body, carry)
+        return results, (rounds * (CHECK_EVERY * lanes))[None]
+
+    def _fresh_lane(self, genomes: Any, starts: Starts, job: jax.Array, episode: jax.Array) -> Lane:
+        """The lane at the start of an episode []: genome `episode // R` on start `episode % R`."""
+        count = starts.friction.shape[0]
+        start = jax.tree.map(lambda leaf: leaf[episode % count], starts)
+        still = jnp.zeros_like(start.qvel)
+        return Lane(
+            job=job,
+            body=BodyState(start.qpos, start.qvel, warmstart=still, constraint_force=still, friction=start.friction),
+            cycle=self.tracker.prepare(jax.tree.map(lambda leaf: leaf[episode // count], genomes)),
+            control=self.tracker.init(),
+            tally=self.judge.init(),
+            push=start.push,
+            push_step=start.push_step,
+        )
+
+    def _step(self, lane: Lane) -> Lane:
+        """All lanes one control step on. A lane whose episode has ended moves on too, but its tally stands still."""
+        body = self._per_lane(_push)(lane)
+        sensed, workings = self.plant.forward(body)
+        target, control, stride = self._per_lane(self.tracker.target)(lane.cycle, lane.control, sensed)
+        torque = self._torque(body, sensed, workings, target)
+        tally = self._per_lane(self._judge)(lane.tally, sensed, torque, stride)
+        body = self.plant.advance(body, workings, self._per_lane(self._lift)(torque))
+        return dataclasses.replace(lane, body=body, control=control, tally=tally)
+
+    def _torque(self, body: BodyState, sensed: Any, workings: Any, target: jax.Array) -> jax.Array:
+        """Joint torques of the law in the config, [J] per lane."""
+        creature, config, step = self.creature, self.tracker.config, self.tracker.step
+        kp, kd, limit = (value.astype(np.float32) for value in (creature.kp, creature.kd, creature.torque_limit))
+        horizon = step if config.law == "spd" else 0.0
+        force = self._per_lane(lambda q, v, goal: spd.pd_force(q, v, goal, kp, kd, horizon))(sensed.joint_pos, sensed.joint_vel, target)
+        if config.law == "pd":
+            return self._per_lane(lambda f: jnp.clip(f, -limit, limit))(force)
+        total = self._per_lane(self._lift)(force) - sensed.bias
+        if config.constraint_forces:
+            total = total + body.constraint_force
+        acceleration = self.plant.solve_damped(workings, self._lift(jnp.asarray(step * kd)), total)
+        return self._per_lane(lambda f, a: spd.limited_torque(f, a[creature.dof_adr], kd, step, limit))(force, acceleration)
+
+    def _judge(self, tally: Tally, sensed: Any, torque: jax.Array, stride: jax.Array) -> Tally:
+        going = (tally.reason == Reason.FINISHED) & (tally.steps < self.steps)
+        reason = self.judge.examine(sensed)
+        updated = self.judge.update(tally, sensed, torque, stride)
+        kept = dataclasses.replace(tally, reason=jnp.where(going, reason, tally.reason))
+        return _choose(going & (reason == Reason.FINISHED), updated, kept)
+
+    def _lift(self, joints: jax.Array) -> jax.Array:
+        """Joint values [J] at their places among the degrees of freedom [nv], zero elsewhere."""
+        adr, nv = self.creature.dof_adr, self.creature.model.nv
+        if np.array_equal(adr, np.arange(adr[0], adr[0] + len(adr))):
+            return jnp.pad(joints, (adr[0], nv - adr[-1] - 1))
+        return jnp.zeros(nv, joints.dtype).at[adr].set(joints)
+
+    def _per_lane(self, function: Callable[..., Any]) -> Callable[..., Any]:
+        return jax.vmap(function, in_axes=self.plant.lane_axis, out_axes=self.plant.lane_axis)
+
+
+def _choose(condition: jax.Array, yes: Any, no: Any) -> Any:
+    return jax.tree.map(partial(jnp.where, condition), yes, no)
+
+
+def _push(lane: Lane) -> BodyState:
+    now = lane.tally.steps == lane.push_step
+    return dataclasses.replace(lane.body, qvel=lane.body.qvel + jnp.where(now, lane.push, 0.0))

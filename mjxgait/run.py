@@ -1,0 +1,123 @@
+"""The host loop around the jitted generation: it counts, logs, checkpoints and stops."""
+
+import dataclasses
+import importlib.metadata
+import json
+import platform
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import jax
+import numpy as np
+
+from mjxgait.champion import write_champion
+from mjxgait.checkpoint import Checkpoints, disk_errors
+from mjxgait.config import Config
+from mjxgait.creature import Creature
+from mjxgait.evolution import EvolutionState, GenerationMetrics, stop_reason
+from mjxgait.experiment import Experiment, build_experiment
+from mjxgait.fitness import TERMS
+from mjxgait.folder import CHAMPION, METRICS, PLOT, read_metrics, truncate_metrics
+from mjxgait.screen import Screen
+
+
+def train(folder: Path, creature: Creature, config: Config, screen: Screen, resume: bool = False, generation: int | None = None) -> bool:
+    """Runs, or goes on with, the evolution in a run folder; returns whether it came to its end.
+
+    Args:
+      resume: go on from a checkpoint, the latest or that of `generation`.
+    """
+    experiment = build_experiment(creature, config)
+    checkpoints = Checkpoints(folder, config.keep_every)
+    if resume:
+        state = checkpoints.restore(jax.eval_shape(experiment.init), creature.digest, generation)
+        truncate_metrics(folder / METRICS, int(state.generation))
+    else:
+        state = jax.jit(experiment.init)()
+    with screen.compiling(creature.name, experiment):
+        step = experiment.compile()
+    began = time.perf_counter()
+    try:
+        with _interruptible() as interrupted:
+            reason = _evolve(folder, experiment, step, experiment.place(state), checkpoints, screen, interrupted)
+    finally:
+        screen.close()
+        checkpoints.close()
+    lines = read_metrics(folder / METRICS)
+    if lines:
+        from mjxgait.viewing.curves import plot_fitness  # matplotlib is slow to import, and nothing needed it until now
+
+        plot_fitness(lines, folder / PLOT)
+        screen.report(folder, reason or "interrupted", lines[-1], time.perf_counter() - began, interrupted=reason is None)
+    return reason is not None
+
+
+def _evolve(
+    folder: Path,
+    experiment: Experiment,
+    step: jax.stages.Compiled,
+    state: EvolutionState,
+    checkpoints: Checkpoints,
+    screen: Screen,
+    interrupted: threading.Event,
+) -> str | None:
+    """Generation after generation; returns why it ended, None when the user interrupted it."""
+    config, creature = experiment.config, experiment.creature
+    while (reason := stop_reason(state, config.evolution)) is None and not interrupted.is_set():
+        began = time.perf_counter()
+        state, metrics = step(state)
+        metrics = jax.device_get(metrics)
+        if metrics.generation < 0:
+            continue
+        line = metrics_line(metrics, time.perf_counter() - began)
+        # The log first: a kill before the checkpoint leaves a line too many, which a resumed run takes out.
+        with disk_errors(folder), (folder / METRICS).open("a", encoding="utf-8") as log:
+            log.write(json.dumps(line) + "\n")
+        if np.isfinite(metrics.best):
+            with disk_errors(folder):
+                write_champion(experiment.champion(state, metrics, versions()), creature, folder / CHAMPION)
+        last = interrupted.is_set() or stop_reason(state, config.evolution) is not None
+        if last or int(metrics.generation) % config.checkpoint_every == 0:
+            checkpoints.save(state, creature.name, creature.digest)
+        screen.generation(line, config.evolution.generations)
+    return reason
+
+
+def metrics_line(metrics: GenerationMetrics, seconds: float) -> dict[str, Any]:
+    """What `metrics.jsonl` holds of one generation; numbers that are not finite become null."""
+    line = {field.name: getattr(metrics, field.name).item() for field in dataclasses.fields(metrics) if field.name != "best_terms"}
+    line["forced"] = bool(line["forced"])
+    line |= {"steps_per_second": round(line["sim_steps"] / seconds), "wall_s": round(seconds, 4)}
+    line |= {f"term_{name}": float(value) for name, value in zip(TERMS, metrics.best_terms, strict=True)}
+    return {key: value if np.isfinite(value) else None for key, value in line.items()}
+
+
+def versions() -> dict[str, str]:
+    """Of everything that decides what a run computes."""
+    packages = ("mjxgait", "jax", "jaxlib", "mujoco", "mujoco-mjx")
+    return {"python": platform.python_version()} | {name: importlib.metadata.version(name) for name in packages}
+
+
+@contextmanager
+def _interruptible() -> Iterator[threading.Event]:
+    """The event is set by the first Ctrl-C; the second one interrupts at once."""
+    event = threading.Event()
+    if threading.current_thread() is not threading.main_thread():
+        yield event
+        return
+
+    def on_interrupt(*_: object) -> None:
+        if event.is_set():
+            raise KeyboardInterrupt
+        event.set()
+
+    before = signal.signal(signal.SIGINT, on_interrupt)
+    try:
+        yield event
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -1,0 +1,85 @@
+"""What a run says while it works: a live line in a terminal, one plain line per generation elsewhere."""
+
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.status import Status
+from rich.table import Table
+
+from mjxgait.folder import CHAMPION, CONFIG, CREATURE, METRICS, PLOT
+
+
+class Screen:
+    """Prints the progress of one run."""
+
+    def __init__(self, console: Console | None = None) -> None:
+        self.console = console or Console(highlight=False, soft_wrap=True)
+        self._status: Status | None = None
+        self._walls: list[float] = []
+
+    @contextmanager
+    def compiling(self, what: str, experiment: Any) -> Iterator[None]:
+        """Says that the program is being compiled, with the time it takes."""
+        config = experiment.config
+        self.console.print(
+            f"{what}: population {config.evolution.population}, {config.rollout.starts} starts of {config.rollout.seconds:g} s, "
+            f"seed {config.seed}"
+        )
+        began = time.perf_counter()
+        if self.console.is_terminal:
+            columns = (SpinnerColumn(), TextColumn("Compiling…"), TimeElapsedColumn())
+            with Progress(*columns, console=self.console, transient=True) as progress:
+                progress.add_task("compile")
+                yield
+        else:
+            self.console.print("Compiling…")
+            yield
+        self.console.print(f"Compiled in {time.perf_counter() - began:.1f} s")
+
+    def generation(self, line: Mapping[str, Any], last: int) -> None:
+        """Shows a generation; see `metrics_line`. last: the generation at which the run ends at the latest."""
+        self._walls = [*self._walls[-4:], line["wall_s"]]
+        left = (last - line["generation"]) * sum(self._walls) / len(self._walls)
+        best, mean = (f"{line[key]:.3f}" if line[key] is not None else "none" for key in ("best", "mean"))
+        episodes = max(line["episodes"], 1)
+        text = (
+            f"generation {line['generation']:>3}/{last}  best {best}  mean {mean}  "
+            f"alive {1 - line['failures'] / episodes:>4.0%}  {line['steps_per_second']:>7,} steps/s  {left:>3.0f} s left"
+            + ("  forced evolution" if line["forced"] else "")
+        )
+        if self.console.is_terminal:
+            if self._status is None:
+                self._status = self.console.status(text)
+                self._status.start()
+            self._status.update(text)
+        else:
+            self.console.print(text)
+
+    def close(self) -> None:
+        """Ends the live line, if there is one."""
+        if self._status:
+            self._status.stop()
+            self._status = None
+
+    def report(self, folder: Path, why: str, last: Mapping[str, Any], seconds: float, interrupted: bool) -> None:
+        """The table at the end: how it went and where everything is. last: the last line of the metrics."""
+        self.close()
+        self.console.print(f"{why[0].upper()}{why[1:]}; {seconds:.0f} s.")
+        table = Table(box=None, show_header=False, pad_edge=False)
+        rows = {
+            "best fitness": f"{last['best']:.3f} in generation {last['generation']}",
+            "forward": f"{last['term_distance']:.2f} body lengths per episode, mean of the starts",
+            "champion": str(folder / CHAMPION),
+            "metrics": f"{folder / METRICS}, {folder / PLOT}",
+            "settings": f"{folder / CONFIG}, {folder / CREATURE}/",
+        }
+        for name, value in rows.items():
+            table.add_row(name, value)
+        self.console.print(table)
+        if interrupted:
+            self.console.print(f"To go on: mjxgait train --resume {folder}")

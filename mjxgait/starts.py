@@ -1,0 +1,66 @@
+"""The starts on which every individual is judged: the first nominal, the others perturbed."""
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+
+from mjxgait.config import RolloutConfig
+from mjxgait.creature import Creature
+from mjxgait.types import pytree
+
+NEVER = -1
+
+
+@pytree
+class Starts:
+    """Initial states and disturbances.
+
+    qpos: [R, nq]. qvel: [R, nv]. friction: [R] factor on the floor's friction.
+    push: [R, nv] added to qvel at step push_step [R] (never when it is `NEVER`).
+    """
+
+    qpos: jax.Array
+    qvel: jax.Array
+    friction: jax.Array
+    push: jax.Array
+    push_step: jax.Array
+
+
+def draw_starts(key: jax.Array, creature: Creature, config: RolloutConfig) -> Starts:
+    """R starts; the same key gives the same starts. Perturbations are uniform within the half widths of the config."""
+    count = config.starts
+    key_pos, key_vel, key_friction, key_direction, key_moment = jax.random.split(key, 5)
+    perturbed = (jnp.arange(count) > 0)[:, None]
+    joints = len(creature.joint_names)
+    qpos = jnp.tile(jnp.asarray(creature.stand_qpos, jnp.float32), (count, 1))
+    noise = perturbed * config.joint_noise * jax.random.uniform(key_pos, (count, joints), minval=-1.0)
+    spin = perturbed * config.velocity_noise * jax.random.uniform(key_vel, (count, joints), minval=-1.0)
+    friction = jax.random.uniform(key_friction, (count,), minval=config.friction[0], maxval=config.friction[1])
+    angle = jax.random.uniform(key_direction, (count,), maxval=2 * jnp.pi)
+    direction = perturbed * jnp.stack([jnp.cos(angle), jnp.sin(angle)], axis=1)
+    speed = config.push * float(np.sqrt(-creature.model.opt.gravity[2] * creature.hip_height))
+    steps = round(config.seconds / creature.model.opt.timestep)
+    moment = jax.random.randint(key_moment, (count,), steps // 4, max(3 * steps // 4, steps // 4 + 1))
+    return Starts(
+        qpos=qpos.at[:, creature.qpos_adr].add(noise),
+        qvel=jnp.zeros((count, creature.model.nv)).at[:, creature.dof_adr].set(spin),
+        friction=jnp.where(perturbed[:, 0], friction, 1.0),
+        push=speed * direction @ _horizontal_dofs(creature),
+        push_step=jnp.where(perturbed[:, 0], moment, NEVER),
+    )
+
+
+def _horizontal_dofs(creature: Creature) -> jax.Array:
+    """[2, nv] generalised velocity of the trunk moving at 1 m/s along the world's x and y; zero where the root cannot move so."""
+    model = creature.model
+    moves = np.zeros((2, model.nv))
+    for joint in range(model.njnt):
+        if model.jnt_bodyid[joint] != creature.trunk:
+            continue
+        dof = model.jnt_dofadr[joint]
+        if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE:
+            moves[:, dof : dof + 2] = np.eye(2)
+        elif model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE:
+            moves[:, dof] = model.jnt_axis[joint][:2]
+    return jnp.asarray(moves, jnp.float32)

@@ -1,0 +1,94 @@
+"""Strict reading of TOML tables into frozen dataclasses: unknown keys, wrong types and bad ranges are named, none is dropped in silence."""
+
+import dataclasses
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, TypeVar
+
+import pydantic
+import tomli_w
+
+from mjxgait.errors import UserError, did_you_mean
+
+T = TypeVar("T")
+Table = Mapping[str, Any]
+
+Positive = Annotated[float, pydantic.Field(gt=0, allow_inf_nan=False)]
+NonNegative = Annotated[float, pydantic.Field(ge=0, allow_inf_nan=False)]
+Fraction = Annotated[float, pydantic.Field(ge=0, le=1)]
+Finite = Annotated[float, pydantic.Field(allow_inf_nan=False)]
+Count = Annotated[int, pydantic.Field(ge=1)]
+Whole = Annotated[int, pydantic.Field(ge=0)]
+
+STRICT = pydantic.ConfigDict(extra="forbid")
+"""What a dataclass read by `build` names as its `__pydantic_config__`."""
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """The table in a TOML file; UserError names the file and the line of what is wrong."""
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise UserError(f"{path}: no such file") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise UserError(f"{path}: cannot be read ({error})") from None
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise UserError(f"{path}: not valid TOML ({error})") from None
+
+
+def dump_toml(value: Any) -> str:
+    """TOML text of a dataclass; keys that are None are left out."""
+    return tomli_w.dumps(_without_none(dataclasses.asdict(value)))
+
+
+def merge(base: Table, over: Table) -> dict[str, Any]:
+    """`base` with the keys of `over` laid on top, table by table."""
+    merged = dict(base)
+    for key, value in over.items():
+        old = merged.get(key)
+        merged[key] = merge(old, value) if isinstance(old, Mapping) and isinstance(value, Mapping) else value
+    return merged
+
+
+def build(cls: type[T], table: Table, where: str) -> T:
+    """`cls` (a dataclass, nested ones included) from a table.
+
+    Args:
+      where: what to call the source in errors, such as `configs/mine.toml`.
+
+    Raises:
+      UserError: names the first key that is unknown, missing, of a wrong type or out of range, and what it may be.
+    """
+    try:
+        return pydantic.TypeAdapter(cls).validate_python(dict(table))
+    except pydantic.ValidationError as error:
+        raise UserError(f"{where}: {_sentence(cls, error.errors(include_url=False)[0])}") from None
+
+
+def _sentence(cls: type, problem: Mapping[str, Any]) -> str:
+    *parents, last = (str(part) for part in problem["loc"]) if problem["loc"] else [""]
+    key = ".".join([*parents, last])
+    match problem["type"]:
+        case "unexpected_keyword_argument":
+            return f'unknown key "{key}"; {did_you_mean(last, _keys(cls, parents))}'
+        case "missing":
+            return f'the key "{key}" is missing'
+        case "value_error":
+            return f"{key}: {problem['ctx']['error']}" if key else str(problem["ctx"]["error"])
+        case _:
+            return f"{key} = {problem['input']!r}: {problem['msg'].lower()}"
+
+
+def _keys(cls: type, parents: list[str]) -> list[str]:
+    """Names of the fields of the dataclass at a dotted place within `cls`."""
+    for name in parents:
+        fields = {field.name: field for field in dataclasses.fields(cls)}
+        if name in fields:
+            inner = fields[name].type
+            cls = next((t for t in (inner, *getattr(inner, "__args__", ())) if dataclasses.is_dataclass(t)), cls)  # type: ignore[assignment]
+    return [field.name for field in dataclasses.fields(cls)]
+
+
+def _without_none(table: Table) -> dict[str, Any]:
+    return {k: _without_none(v) if isinstance(v, Mapping) else v for k, v in table.items() if v is not None}

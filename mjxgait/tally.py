@@ -1,0 +1,148 @@
+"""What an episode leaves behind: running sums, updated once per step for one creature, from which fitness is computed."""
+
+import dataclasses
+from enum import IntEnum
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from mjxgait.creature import Creature
+from mjxgait.gait import start_axes, start_position
+from mjxgait.types import Sensed, pytree
+
+CONTACT_GAP = 0.002
+"""m; a foot nearer to the floor than this is in contact. A resting foot sinks in by about a millimetre."""
+
+
+class Reason(IntEnum):
+    """Why an episode ended."""
+
+    FINISHED = 0
+    TIPPED = 1
+    TOO_LOW = 2
+    TOO_HIGH = 3
+    TOUCHED = 4
+    NONFINITE = 5
+
+
+@pytree
+class Tally:
+    """Sums over the steps that a creature was up. `F` here counts feet, not their geoms.
+
+    steps: [] steps survived. reason: [] why the episode ended. forward, left: [] m from the start to the latest position.
+    forward_half: [] m, `forward` at half time. heading: [] rad.
+    strides: [] completed cycles. stride_steps: [] steps up to the last completion.
+    shortfall: [] missing foot clearance, share of the wanted, summed over strides. peak: [F] m, highest in this stride.
+    contact: [F] steps in contact. slip: [] m, mean over feet. airborne: [] steps without any foot on the floor.
+    foot_height: [] m·steps, mean height of the feet. foot_pos: [F, 2], foot_down: [F] of the previous step.
+    tilt: [] of 1 - up.z. wobble: [] (rad/s)² of the trunk. touch: [] steps on which another part touches.
+    work: [] J, positive. saturation, limits: [] share of joints at their torque limit, beyond their pose range.
+    """
+
+    steps: jax.Array
+    reason: jax.Array
+    forward: jax.Array
+    left: jax.Array
+    forward_half: jax.Array
+    heading: jax.Array
+    strides: jax.Array
+    stride_steps: jax.Array
+    shortfall: jax.Array
+    peak: jax.Array
+    contact: jax.Array
+    slip: jax.Array
+    airborne: jax.Array
+    foot_height: jax.Array
+    foot_pos: jax.Array
+    foot_down: jax.Array
+    tilt: jax.Array
+    wobble: jax.Array
+    touch: jax.Array
+    work: jax.Array
+    saturation: jax.Array
+    limits: jax.Array
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Judge:
+    """Keeps the tally of one creature's episodes. clearance: m wanted of each foot per stride. half_time: step."""
+
+    creature: Creature
+    step: float
+    clearance: float
+    half_time: int
+
+    def init(self) -> Tally:
+        """The empty tally."""
+        feet = len(self.creature.foot_names)
+        values = {field.name: jnp.zeros(()) for field in dataclasses.fields(Tally)}
+        counts = {name: jnp.zeros((), jnp.int32) for name in ("steps", "reason", "strides", "stride_steps")}
+        per_foot = {name: jnp.zeros(feet) for name in ("peak", "contact", "foot_down")}
+        return Tally(**(values | counts | per_foot | {"foot_pos": jnp.zeros((feet, 2))}))
+
+    def examine(self, sensed: Sensed) -> jax.Array:
+        """The reason [] to end the episode at this moment; `FINISHED` while all is well."""
+        limits = self.creature.settings.termination
+        up = (sensed.trunk_rot @ self.creature.up.astype(np.float32))[2]
+        height = sensed.trunk_pos[2] / self.creature.stand_height
+        reason = jnp.zeros((), jnp.int32)
+        if limits.touch:
+            reason = jnp.where(self._touches(sensed), Reason.TOUCHED, reason)
+        reason = jnp.where(height > limits.height[1], Reason.TOO_HIGH, reason)
+        reason = jnp.where(height < limits.height[0], Reason.TOO_LOW, reason)
+        reason = jnp.where(up < limits.min_up, Reason.TIPPED, reason)
+        finite = jnp.isfinite(jnp.sum(sensed.joint_vel) + jnp.sum(sensed.trunk_pos) + jnp.sum(sensed.trunk_rot) + jnp.sum(sensed.bias))
+        return jnp.where(finite, reason, Reason.NONFINITE).astype(jnp.int32)
+
+    def update(self, tally: Tally, sensed: Sensed, torque: jax.Array, stride: jax.Array) -> Tally:
+        """The tally after one more step. torque: [J] N·m; stride: [] whether the controller completed its cycle."""
+        creature = self.creature
+        start_forward, start_left = start_axes(creature)
+        moved = sensed.trunk_pos - start_position(creature)
+        forward_axis = sensed.trunk_rot @ creature.forward.astype(np.float32)
+        up = (sensed.trunk_rot @ creature.up.astype(np.float32))[2]
+        low, pos = self._feet(sensed)
+        down = (low < CONTACT_GAP).astype(jnp.float32)
+        peak = jnp.maximum(tally.peak, low)
+        missing = jnp.mean(jnp.clip(1.0 - peak / max(self.clearance, 1e-6), 0.0, 1.0))
+        slid = jnp.linalg.norm(pos - tally.foot_pos, axis=1) * down * tally.foot_down
+        first = tally.strides == 0
+        outside = (sensed.joint_pos < creature.pose_low.astype(np.float32)) | (sensed.joint_pos > creature.pose_high.astype(np.float32))
+        steps = tally.steps + 1
+        forward = moved @ start_forward
+        return Tally(
+            steps=steps,
+            reason=tally.reason,
+            forward=forward,
+            left=moved @ start_left,
+            forward_half=jnp.where(steps <= self.half_time, forward, tally.forward_half),
+            heading=jnp.arctan2(forward_axis @ start_left, forward_axis @ start_forward),
+            strides=tally.strides + stride,
+            stride_steps=jnp.where(stride, steps, tally.stride_steps),
+            shortfall=tally.shortfall + jnp.where(stride & ~first, missing, 0.0),
+            peak=jnp.where(stride, low, peak),
+            contact=tally.contact + down,
+            slip=tally.slip + jnp.mean(slid),
+            airborne=tally.airborne + (jnp.max(down) == 0.0),
+            foot_height=tally.foot_height + jnp.mean(low),
+            foot_pos=pos,
+            foot_down=down,
+            tilt=tally.tilt + 1.0 - up,
+            wobble=tally.wobble + sensed.trunk_angvel @ sensed.trunk_angvel,
+            touch=tally.touch + self._touches(sensed),
+            work=tally.work + jnp.sum(jnp.maximum(torque * sensed.joint_vel, 0.0)) * self.step,
+            saturation=tally.saturation + jnp.mean(jnp.abs(torque) >= creature.torque_limit.astype(np.float32)),
+            limits=tally.limits + jnp.mean(outside),
+        )
+
+    def _touches(self, sensed: Sensed) -> jax.Array:
+        others = sensed.geom_low[len(self.creature.foot_of) :]
+        return jnp.min(others, initial=1.0) < 0.0
+
+    def _feet(self, sensed: Sensed) -> tuple[jax.Array, jax.Array]:
+        """Lowest point [F] of each foot and its horizontal position [F, 2], the mean of its geoms."""
+        groups = [np.flatnonzero(self.creature.foot_of == foot) for foot in range(len(self.creature.foot_names))]
+        low = jnp.stack([jnp.min(sensed.geom_low[g[0] : g[-1] + 1]) for g in groups])
+        pos = jnp.stack([jnp.mean(sensed.geom_pos[g[0] : g[-1] + 1, :2], axis=0) for g in groups])
+        return low, pos

@@ -1,0 +1,82 @@
+"""Shapes and the pytrees that rooms hand to each other.
+
+Letters used in every shape: `P` population, `N` individuals being evaluated, `R` starts per individual, `L` lanes (simulations in
+flight), `K` key poses, `J` actuated joints, `G` watched geoms (the `F` feet first), `E` tuning genes, `nq nv` as in MuJoCo.
+"""
+
+import dataclasses
+from typing import Any, Protocol, TypeVar, dataclass_transform
+
+import jax
+
+T = TypeVar("T")
+
+
+@dataclass_transform(frozen_default=True)
+def pytree(cls: type[T]) -> type[T]:
+    """Makes a class a frozen dataclass that JAX treats as a pytree."""
+    return jax.tree_util.register_dataclass(dataclasses.dataclass(frozen=True)(cls))
+
+
+@pytree
+class BodyState:
+    """All that the physics carries from one step to the next.
+
+    qpos: [nq] m, rad, unit quaternion.
+    qvel: [nv] m/s, rad/s.
+    warmstart: [nv] previous acceleration, where the contact solver starts.
+    constraint_force: [nv] N, N·m; generalised force of the previous contact solve.
+    friction: [] factor on the floor's sliding friction.
+    """
+
+    qpos: jax.Array
+    qvel: jax.Array
+    warmstart: jax.Array
+    constraint_force: jax.Array
+    friction: jax.Array
+
+
+@pytree
+class Sensed:
+    """What a controller and the fitness may know of one moment.
+
+    joint_pos, joint_vel: [J] rad, rad/s.
+    bias: [nv] Coriolis and gravity less passive forces (`C` of stable PD).
+    trunk_pos: [3] m, body origin. trunk_rot: [3, 3], columns are the trunk's axes in the world.
+    trunk_vel: [3] m/s of the body origin, trunk_angvel: [3] rad/s; both in the world frame.
+    geom_pos: [G, 3] m, centres of the watched geoms. geom_low: [G] m, height of their lowest points above the floor.
+    """
+
+    joint_pos: jax.Array
+    joint_vel: jax.Array
+    bias: jax.Array
+    trunk_pos: jax.Array
+    trunk_rot: jax.Array
+    trunk_vel: jax.Array
+    trunk_angvel: jax.Array
+    geom_pos: jax.Array
+    geom_low: jax.Array
+
+
+class Plant(Protocol):
+    """Batched physics of one creature, one step split around the controller.
+
+    Every array has one more axis than documented on the state: the lanes, at position `lane_axis` (0 in front, -1 innermost).
+    """
+
+    @property
+    def lane_axis(self) -> int:
+        """Where the axis of the lanes is."""
+        ...
+
+    def forward(self, state: BodyState) -> tuple[Sensed, Any]:
+        """Position and velocity dependent terms of the current state, and the plant's own workings for the two calls below."""
+        ...
+
+    def solve_damped(self, workings: Any, damping: jax.Array, force: jax.Array) -> jax.Array:
+        """Accelerations `(M + diag(damping))^-1 force`; damping `[nv]` is shared by all lanes, force `[nv]` per lane."""
+        ...
+
+    def advance(self, state: BodyState, workings: Any, torque: jax.Array) -> BodyState:
+        """The state one `sim_dt` later under applied generalised forces `torque` `[nv]`; friction passes through."""
+        ...

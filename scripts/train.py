@@ -1,0 +1,7 @@
+"""Evolves a walk: `python scripts/train.py --env tall_quadruped`. The same as `mjxgait train`."""
+
+import sys
+
+from mjxgait.cli import main
+
+main(["train", *sys.argv[1:]])
