@@ -2,6 +2,7 @@
 
 import argparse
 import dataclasses
+import importlib
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -23,6 +24,7 @@ Evolve a stable walk for any creature.
 
   train    evolve a walk: mjxgait train --env tall_quadruped
   envs     list the shipped creatures and configs
+  inspect  tell what a run or a checkpoint holds: mjxgait inspect RUN
 
 `mjxgait SUBCOMMAND --help` tells the options of each."""
 
@@ -91,7 +93,16 @@ def envs_command(arguments: Sequence[str]) -> int:
     return 0
 
 
-COMMANDS: dict[str, Callable[[Sequence[str]], int]] = {"train": train_command, "envs": envs_command}
+def _in_its_module(name: str) -> Callable[[Sequence[str]], int]:
+    """A subcommand in mjxgait/commands/, imported only when it is called."""
+    return lambda arguments: getattr(importlib.import_module(f"mjxgait.commands.{name}"), f"{name}_command")(arguments)
+
+
+COMMANDS: dict[str, Callable[[Sequence[str]], int]] = {
+    "train": train_command,
+    "envs": envs_command,
+    "inspect": _in_its_module("inspect"),
+}
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

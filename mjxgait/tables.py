@@ -21,6 +21,7 @@ Finite = Annotated[float, pydantic.Field(allow_inf_nan=False)]
 Count = Annotated[int, pydantic.Field(ge=1)]
 Whole = Annotated[int, pydantic.Field(ge=0)]
 
+UNKNOWN = "unexpected_keyword_argument"
 STRICT = pydantic.ConfigDict(extra="forbid")
 """What a dataclass read by `build` names as its `__pydantic_config__`."""
 
@@ -63,14 +64,17 @@ def build(cls: type[T], table: Table, where: str) -> T:
     try:
         return pydantic.TypeAdapter(cls).validate_python(dict(table))
     except pydantic.ValidationError as error:
-        raise UserError(f"{where}: {_sentence(cls, error.errors(include_url=False)[0])}") from None
+        problems = error.errors(include_url=False)
+        # A misspelt key is also a missing one: the misspelling is what the user can mend.
+        problems.sort(key=lambda problem: problem["type"] != UNKNOWN)
+        raise UserError(f"{where}: {_sentence(cls, problems[0])}") from None
 
 
 def _sentence(cls: type, problem: Mapping[str, Any]) -> str:
     *parents, last = (str(part) for part in problem["loc"]) if problem["loc"] else [""]
     key = ".".join([*parents, last])
     match problem["type"]:
-        case "unexpected_keyword_argument":
+        case _ if problem["type"] == UNKNOWN:
             return f'unknown key "{key}"; {did_you_mean(last, _keys(cls, parents))}'
         case "missing":
             return f'the key "{key}" is missing'

@@ -249,28 +249,26 @@ def _forbidden(model: mujoco.MjModel, feet: list[int], ground: np.ndarray) -> li
 
 
 def _mirror(
-    model, data, settings: CreatureSettings, joints: list[int], names: list[str], axes: np.ndarray
+    model: mujoco.MjModel, data: mujoco.MjData, settings: CreatureSettings, joints: list[int], names: list[str], axes: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    everyone = np.arange(len(joints))
+    """Partner [J] and sign [J]: those that the file states, the others from the geometry; without symmetry everyone is their own."""
+    partner, sign = np.arange(len(joints)), np.ones(len(joints), dtype=int)
     if not settings.mirror.symmetric:
-        return everyone, np.ones(len(joints), dtype=int)
-    overridden = {pair.joint: pair for pair in settings.mirror.pairs}
+        return partner, sign
     for pair in settings.mirror.pairs:
         for name in (pair.joint, pair.partner):
             if name not in names:
                 raise UserError(f'mirror.pairs: no joint is called "{name}"; {did_you_mean(name, names)}')
-    frame = axes @ data.xmat[model.body(settings.creature.trunk).id].reshape(3, 3).T
-    trunk_pos = data.xpos[model.body(settings.creature.trunk).id]
-    found = np.array([names[j] not in overridden for j in everyone])
-    keep = everyone[found]
-    partner, sign = everyone.copy(), np.ones(len(joints), dtype=int)
-    chosen = [joints[j] for j in keep]
-    anchors, directions = (data.xanchor[chosen] - trunk_pos) @ frame.T, data.xaxis[chosen] @ frame.T
-    near = 0.02 * float(np.ptp(data.xanchor[joints], axis=0).max() + 0.05)
-    local, local_sign = geometry.mirror_map(anchors, directions, model.jnt_type[chosen] == SLIDE, [names[j] for j in keep], near)
-    partner[keep], sign[keep] = keep[local], local_sign
-    for name, pair in overridden.items():
-        partner[names.index(name)], sign[names.index(name)] = names.index(pair.partner), pair.sign
+        partner[names.index(pair.joint)], sign[names.index(pair.joint)] = names.index(pair.partner), pair.sign
+    stated = {pair.joint for pair in settings.mirror.pairs}
+    free = np.array([i for i, name in enumerate(names) if name not in stated], dtype=int)
+    if len(free):
+        trunk, chosen = model.body(settings.creature.trunk).id, [joints[i] for i in free]
+        frame = axes @ data.xmat[trunk].reshape(3, 3).T
+        anchors, directions = (data.xanchor[chosen] - data.xpos[trunk]) @ frame.T, data.xaxis[chosen] @ frame.T
+        near = 0.02 * float(np.ptp(data.xanchor[joints], axis=0).max() + 0.05)
+        found, sign[free] = geometry.mirror_map(anchors, directions, model.jnt_type[chosen] == SLIDE, [names[i] for i in free], near)
+        partner[free] = free[found]
     _check_names(names, partner)
     return partner, sign
 

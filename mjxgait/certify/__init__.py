@@ -1,0 +1,7 @@
+"""The stable-walk certificate, in NumPy and C MuJoCo, free of JAX (docs/certificate.md)."""
+
+from mjxgait.certify.certificate import Certificate, certify, distance, push_ladder, record, survival
+from mjxgait.certify.config import CertificateConfig
+from mjxgait.certify.criteria import Criterion, Measure
+
+__all__ = ["Certificate", "CertificateConfig", "Criterion", "Measure", "certify", "distance", "push_ladder", "record", "survival"]

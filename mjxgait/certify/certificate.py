@@ -1,0 +1,185 @@
+"""The stable-walk certificate: examines a champion in C MuJoCo, free of JAX."""
+
+import concurrent.futures
+import dataclasses
+import itertools
+import json
+import time
+from typing import Any
+
+import numpy as np
+
+from mjxgait.certify import criteria, describe
+from mjxgait.certify.config import CertificateConfig
+from mjxgait.certify.criteria import Criterion
+from mjxgait.certify.measure import Recording, measure
+from mjxgait.certify.simulate import simulate
+from mjxgait.certify.starts import Starts, join, nominal_starts, perturbed_starts, pushed_starts
+from mjxgait.champion import Champion
+from mjxgait.creature import Creature
+
+SCHEMA = 1
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Certificate:
+    """The verdict. report: the numbers without a threshold. seconds: that the examination took."""
+
+    creature: str
+    digest: str
+    criteria: tuple[Criterion, ...]
+    report: dict[str, Any]
+    config: CertificateConfig
+    seconds: float
+
+    @property
+    def passed(self) -> bool:
+        """Whether all criteria pass."""
+        return all(c.passed for c in self.criteria)
+
+    @property
+    def margin(self) -> float:
+        """That of the worst criterion, by which candidates are ranked; positive when all pass."""
+        return min(c.margin for c in self.criteria)
+
+    def rows(self) -> list[tuple[str, str, str, str, str]]:
+        """A table: criterion, measure, value, threshold, verdict."""
+        return [
+            (f"{c.number} {c.name}", m.name, f"{m.value:.3g}", f"{m.sense} {m.threshold:g}", "pass" if m.passed else "FAIL")
+            for c in self.criteria
+            for m in c.measures
+        ]
+
+    def to_json(self) -> str:
+        """The text of `certificate.json`; numbers that are not finite become null."""
+        document = {
+            "schema": SCHEMA,
+            "creature": self.creature,
+            "creature_digest": self.digest,
+            "passed": self.passed,
+            "margin": self.margin,
+            "criteria": [
+                {
+                    "number": c.number,
+                    "name": c.name,
+                    "passed": c.passed,
+                    "margin": c.margin,
+                    "measures": [_entry(m) for m in c.measures],
+                }
+                for c in self.criteria
+            ],
+            "report": self.report,
+            "config": dataclasses.asdict(self.config),
+            "seconds": round(self.seconds, 2),
+        }
+        return json.dumps(_finite(document), indent=2, allow_nan=False) + "\n"
+
+
+def certify(creature: Creature, champion: Champion, config: CertificateConfig | None = None, threads: int = 0) -> Certificate:
+    """Examines a champion against all eight criteria."""
+    config = config or CertificateConfig()
+    began = time.perf_counter()
+    with concurrent.futures.ThreadPoolExecutor(2) as pool:
+        later = pool.submit(record, creature, champion, config.seconds, 2, threads)
+        ladder = pool.submit(push_ladder, creature, champion, config, threads)
+        outcome = simulate(creature, champion, _starts(creature, config), config.seconds, record=1, fall=config.upright, threads=threads)
+        whole, halved = measure(creature, champion, outcome.trajectory), later.result()
+    started, pushed = outcome.stayed_up[1 : 1 + config.starts.count].mean(), outcome.stayed_up[1 + config.starts.count :].mean()
+    window = whole.window(config.warmup)
+    judged = (
+        *criteria.basic(whole, config),
+        criteria.starts(started, config),
+        criteria.pushes(pushed, config),
+        criteria.half_step(whole, halved, config),
+        criteria.gait(window, config.gait),
+        criteria.physics(window, config.physics),
+    )
+    shares = ladder.result() | {0.0: float(outcome.stayed_up[0]), config.pushes.speed: float(pushed)}
+    report = describe.describe(window, config.gait.clearance) | {
+        "push_survival": {f"{speed:g}": share for speed, share in sorted(shares.items())},
+        "push_that_fells_half": half_point(shares),
+    }
+    return Certificate(creature.name, creature.digest, judged, report, config, time.perf_counter() - began)
+
+
+def record(creature: Creature, champion: Champion, seconds: float, refine: int = 1, threads: int = 0) -> Recording:
+    """The undisturbed walk, measured."""
+    outcome = simulate(creature, champion, nominal_starts(creature, 1), seconds, record=1, refine=refine, threads=threads)
+    return measure(creature, champion, outcome.trajectory)
+
+
+def survival(creature: Creature, champion: Champion, starts: int = 64, seconds: float = 22.0, seed: int = 0, threads: int = 0) -> float:
+    """Share of perturbed starts that are up to the end and have moved forward."""
+    disturbed = perturbed_starts(creature, starts, np.random.default_rng(seed))
+    outcome = simulate(creature, champion, disturbed, seconds, threads=threads)
+    return float((outcome.stayed_up & (outcome.travel[:, 0] > 0)).mean())
+
+
+def distance(creature: Creature, champion: Champion, seconds: float) -> float:
+    """Forward way in m of the undisturbed walk, up to its end or its fall."""
+    return float(simulate(creature, champion, nominal_starts(creature, 1), seconds).travel[0, 0])
+
+
+def push_ladder(creature: Creature, champion: Champion, config: CertificateConfig, threads: int = 0) -> dict[float, float]:
+    """Share that stays up after each of the larger pushes, whose speeds are in units of sqrt(g * hip height)."""
+    settings = config.pushes
+    rng = np.random.default_rng([config.seed, 2])
+    begin, end = settings.window[0], min(settings.window[0] + 2.0, settings.window[1])
+    seconds = min(end + settings.ladder_seconds, config.seconds)
+    groups = [pushed_starts(creature, settings.ladder_count, rng, s * _unit_speed(creature), (begin, end)) for s in settings.ladder]
+    outcome = simulate(creature, champion, join(*groups), seconds, fall=config.upright, threads=threads)
+    return dict(zip(settings.ladder, map(float, outcome.stayed_up.reshape(len(groups), -1).mean(1)), strict=True))
+
+
+def half_point(shares: dict[float, float]) -> float | None:
+    """Where the share of survivors first comes down to a half, between the pushes tried; None when it never does."""
+    steps = sorted(shares.items())
+    for (s0, share0), (s1, share1) in itertools.pairwise(steps):
+        if share0 > 0.5 >= share1:
+            return s0 + (share0 - 0.5) / (share0 - share1) * (s1 - s0)
+    return 0.0 if steps[0][1] <= 0.5 else None
+
+
+def _starts(creature: Creature, config: CertificateConfig) -> Starts:
+    """The undisturbed one, the perturbed ones and the pushed ones, in this order."""
+    noise, push = config.starts, config.pushes
+    return join(
+        nominal_starts(creature, 1),
+        perturbed_starts(
+            creature,
+            noise.count,
+            np.random.default_rng([config.seed, 0]),
+            noise.joints,
+            noise.velocities,
+            noise.friction,
+            noise.masses,
+        ),
+        pushed_starts(creature, push.count, np.random.default_rng([config.seed, 1]), push.speed * _unit_speed(creature), push.window),
+    )
+
+
+def _unit_speed(creature: Creature) -> float:
+    return float(np.sqrt(-creature.model.opt.gravity[2] * creature.hip_height))
+
+
+def _entry(measure: criteria.Measure) -> dict[str, Any]:
+    return {
+        "name": measure.name,
+        "value": measure.value,
+        "sense": measure.sense,
+        "threshold": measure.threshold,
+        "passed": measure.passed,
+        "margin": measure.margin,
+    }
+
+
+def _finite(value: Any) -> Any:
+    match value:
+        case dict():
+            return {k: _finite(v) for k, v in value.items()}
+        case list() | tuple():
+            return [_finite(v) for v in value]
+        case float() if not np.isfinite(value):
+            return None
+        case _:
+            return value

@@ -1,0 +1,116 @@
+"""What the certificate demands: the eight criteria, one table each, with the defaults. The first table is `simulate.Fall`."""
+
+import dataclasses
+
+from mjxgait.certify.simulate import Fall
+from mjxgait.tables import STRICT, Count, Fraction, NonNegative, Positive, Whole
+
+
+@dataclasses.dataclass(frozen=True)
+class ProgressConfig:
+    """2. strides: least number. speed: body lengths/s. drift: over distance. second_half: its speed over the first half's."""
+
+    __pydantic_config__ = STRICT
+    strides: Count = 8
+    speed: NonNegative = 0.5
+    drift: Positive = 0.25
+    second_half: Positive = 0.8
+
+
+@dataclasses.dataclass(frozen=True)
+class PeriodConfig:
+    """3. autocorrelation: least, at the stride period. variation: largest coefficient of variation of the stride period."""
+
+    __pydantic_config__ = STRICT
+    autocorrelation: Fraction = 0.8
+    variation: Positive = 0.1
+
+
+@dataclasses.dataclass(frozen=True)
+class StartsConfig:
+    """4. Half widths of the noise: joints in rad, velocities in rad/s, masses as a share. friction: range of the factor."""
+
+    __pydantic_config__ = STRICT
+    count: Count = 64
+    joints: NonNegative = 0.05
+    velocities: NonNegative = 0.1
+    friction: tuple[Positive, Positive] = (0.8, 1.2)
+    masses: Fraction = 0.05
+    upright: Fraction = 0.9
+
+
+@dataclasses.dataclass(frozen=True)
+class PushesConfig:
+    """5. Speeds in units of sqrt(g * hip height).
+
+    Attributes:
+      count, speed: pushes and their size. window: s, when a push may come. upright: share that must stay up to the end.
+      ladder: larger pushes, tried to find the one that fells half. ladder_count: at each. ladder_seconds: s to fall after a push.
+    """
+
+    __pydantic_config__ = STRICT
+    count: Count = 64
+    speed: NonNegative = 0.1
+    window: tuple[NonNegative, Positive] = (2.0, 10.0)
+    upright: Fraction = 0.8
+    ladder: tuple[Positive, ...] = (0.2, 0.3, 0.4, 0.6, 0.8)
+    ladder_count: Count = 16
+    ladder_seconds: Positive = 5.0
+
+
+@dataclasses.dataclass(frozen=True)
+class HalfStepConfig:
+    """6. distance: largest relative change of the distance when the time step is halved."""
+
+    __pydantic_config__ = STRICT
+    distance: Positive = 0.2
+
+
+@dataclasses.dataclass(frozen=True)
+class GaitConfig:
+    """7. What makes a gait.
+
+    Attributes:
+      frequency: largest stride frequency, in units of 4.48 m^-0.14 Hz. stride_length: least, in hip heights.
+      clearance: least, in hip heights. slip: largest, over the distance. duty_factor: range.
+    """
+
+    __pydantic_config__ = STRICT
+    frequency: Positive = 1.2
+    stride_length: Positive = 0.5
+    clearance: Positive = 0.03
+    slip: Positive = 0.15
+    duty_factor: tuple[Fraction, Fraction] = (0.15, 0.9)
+
+
+@dataclasses.dataclass(frozen=True)
+class PhysicsConfig:
+    """8. joint_speed: rad/s. body_speed: sqrt(g * hip height). penetration: hip heights. torque: torque limits."""
+
+    __pydantic_config__ = STRICT
+    joint_speed: Positive = 20.0
+    body_speed: Positive = 3.0
+    penetration: Positive = 0.05
+    torque: Positive = 1.0
+
+
+@dataclasses.dataclass(frozen=True)
+class CertificateConfig:
+    """The examination. seconds: of each simulation; warmup: s at its start that do not count. seed: of starts and pushes."""
+
+    __pydantic_config__ = STRICT
+    seconds: Positive = 22.0
+    warmup: NonNegative = 2.0
+    seed: Whole = 0
+    upright: Fall = dataclasses.field(default_factory=Fall)
+    progress: ProgressConfig = dataclasses.field(default_factory=ProgressConfig)
+    period: PeriodConfig = dataclasses.field(default_factory=PeriodConfig)
+    starts: StartsConfig = dataclasses.field(default_factory=StartsConfig)
+    pushes: PushesConfig = dataclasses.field(default_factory=PushesConfig)
+    half_step: HalfStepConfig = dataclasses.field(default_factory=HalfStepConfig)
+    gait: GaitConfig = dataclasses.field(default_factory=GaitConfig)
+    physics: PhysicsConfig = dataclasses.field(default_factory=PhysicsConfig)
+
+    def __post_init__(self) -> None:
+        if self.warmup >= self.seconds:
+            raise ValueError(f"warmup = {self.warmup}: must be shorter than seconds = {self.seconds}")

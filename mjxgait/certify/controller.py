@@ -1,0 +1,125 @@
+"""The controller of docs/controller.md in NumPy and float64, written from that page alone and for many simulations at once.
+
+Letters: `S` simulations, `J` actuated joints, `C` poses in the cycle, `nv` degrees of freedom.
+"""
+
+import dataclasses
+
+import mujoco
+import numpy as np
+
+from mjxgait.champion import Champion
+from mjxgait.creature import Creature
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Senses:
+    """What the controller reads of the current state.
+
+    joint_pos: [S, J] rad. velocity: [S, nv] m/s, rad/s.
+    trunk_pos: [S, 3] m. trunk_rot: [S, 3, 3], columns are the trunk's axes in the world. trunk_angvel: [S, 3] rad/s, world frame.
+    mass_matrix: [S, nv, nv]. bias: [S, nv], Coriolis and gravity less passive forces.
+    constraint_force: [S, nv], of the previous step's solve.
+    """
+
+    joint_pos: np.ndarray
+    velocity: np.ndarray
+    trunk_pos: np.ndarray
+    trunk_rot: np.ndarray
+    trunk_angvel: np.ndarray
+    mass_matrix: np.ndarray
+    bias: np.ndarray
+    constraint_force: np.ndarray
+
+
+class Controller:
+    """Tracks a champion's pose cycle.
+
+    It holds constants only; the positions in the cycle are the caller's.
+    """
+
+    def __init__(self, creature: Creature, champion: Champion) -> None:
+        self.creature = creature
+        self.settings = champion.controller
+        self.tuning = champion.tuning
+        self.cycle = pose_cycle(champion.key_poses, creature)
+        self.length = len(self.cycle) * champion.controller.interpolation
+        data = mujoco.MjData(creature.model)
+        data.qpos[:] = creature.stand_qpos
+        mujoco.mj_kinematics(creature.model, data)
+        rot = data.xmat[creature.trunk].reshape(3, 3)
+        self.start = data.xpos[creature.trunk].copy()
+        self.start_forward = _horizontal(rot @ creature.forward)
+        self.start_left = _horizontal(rot @ creature.left)
+
+    def planned(self, position: np.ndarray) -> np.ndarray:
+        """Uncorrected target [S, J] in rad at cycle positions [S]."""
+        a, step = np.divmod(position, self.settings.interpolation)
+        f = (step / self.settings.interpolation)[:, None]
+        return (1 - f) * self.cycle[a] + f * self.cycle[(a + 1) % len(self.cycle)]
+
+    def target(self, position: np.ndarray, senses: Senses, heading: float | None = None) -> np.ndarray:
+        """Target [S, J] in rad with steering and balance, within the joints' ranges; `heading` is the commanded one in rad."""
+        creature = self.creature
+        steer, pitch, roll = (part[:, None] for part in self.corrections(senses, heading))
+        stretched = creature.stand + (self.planned(position) - creature.stand) * (1 + steer * creature.steer_stride)
+        target = stretched + steer * creature.steer_bend + pitch * creature.balance_pitch + roll * creature.balance_roll
+        return np.clip(target, creature.joint_low, creature.joint_high)
+
+    def corrections(self, senses: Senses, heading: float | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """`u`, `p` and `r` of docs/controller.md, [S] each."""
+        creature, gain = self.creature, self.tuning
+        forward, left = senses.trunk_rot @ creature.forward, senses.trunk_rot @ creature.left
+        wrong = np.arctan2(forward @ self.start_left, forward @ self.start_forward)
+        if heading is None:
+            wrong = wrong + (senses.trunk_pos - self.start) @ self.start_left / (2 * creature.body_length)
+        else:
+            wrong = wrong - heading
+        nose_down = -np.arcsin(np.clip(forward[:, 2], -1, 1))
+        right_down = np.arcsin(np.clip(left[:, 2], -1, 1))
+        pitch = gain["pitch"] * nose_down + gain["pitch_rate"] * (senses.trunk_angvel * left).sum(1)
+        roll = gain["roll"] * right_down + gain["roll_rate"] * (senses.trunk_angvel * forward).sum(1)
+        return np.clip(gain["steer"] * wrong, -0.5, 0.5), np.clip(pitch, -0.5, 0.5), np.clip(roll, -0.5, 0.5)
+
+    def torque(self, target: np.ndarray, senses: Senses, time_step: float) -> np.ndarray:
+        """Joint torques [S, J] in N·m that pull towards the target [S, J]; stable PD (Tan, Liu & Turk 2011) or plain PD."""
+        creature = self.creature
+        v = senses.velocity[:, creature.dof_adr]
+        if self.settings.law == "pd":
+            wanted = -creature.kp * (senses.joint_pos - target) - creature.kd * v
+        else:
+            spring_damper = -creature.kp * (senses.joint_pos + time_step * v - target) - creature.kd * v
+            acceleration = self._predicted_acceleration(spring_damper, senses, time_step)
+            wanted = spring_damper - time_step * creature.kd * acceleration
+        return np.clip(wanted, -creature.torque_limit, creature.torque_limit)
+
+    def _predicted_acceleration(self, spring_damper: np.ndarray, senses: Senses, time_step: float) -> np.ndarray:
+        """Of the actuated joints [S, J], with the damping of the coming step taken implicitly."""
+        dof = self.creature.dof_adr
+        force = -senses.bias
+        if self.settings.constraint_forces:
+            force = force + senses.constraint_force
+        force[:, dof] += spring_damper
+        damped = senses.mass_matrix.copy()
+        damped[:, dof, dof] += time_step * self.creature.kd
+        return np.linalg.solve(damped, force[..., None])[:, dof, 0]
+
+    def advance(self, position: np.ndarray, target: np.ndarray, joint_pos: np.ndarray, next_time: float) -> np.ndarray:
+        """Positions [S] at the next control step, which starts at `next_time` in s; target, joint_pos [S, J]: of this step."""
+        if self.settings.advance == "clock":
+            # The nudge keeps a position that is whole in exact arithmetic from being rounded down.
+            return np.full_like(position, int(self.length * next_time / self.tuning["period"] + 1e-6) % self.length)
+        error = np.sqrt(((target - joint_pos) ** 2).mean(1))
+        return np.where(error < self.tuning["threshold"], (position + 1) % self.length, position)
+
+
+def pose_cycle(key_poses: np.ndarray, creature: Creature) -> np.ndarray:
+    """[C, J] rad: the key poses [K, J], followed by their mirror images where the creature is symmetric."""
+    if not creature.symmetric:
+        return key_poses
+    return np.concatenate([key_poses, creature.sign * key_poses[:, creature.partner]])
+
+
+def _horizontal(vector: np.ndarray) -> np.ndarray:
+    flat = vector * [1.0, 1.0, 0.0]
+    return flat / np.linalg.norm(flat)

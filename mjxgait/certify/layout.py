@@ -1,0 +1,53 @@
+"""Where things lie in a MuJoCo model, and how low they reach."""
+
+import mujoco
+import numpy as np
+
+from mjxgait.creature.geometry import support_extents
+
+
+class Layout:
+    """Indices: the free root, and row and column of each stored entry of the mass matrix (its lower triangle)."""
+
+    def __init__(self, model: mujoco.MjModel) -> None:
+        free = model.jnt_type == mujoco.mjtJoint.mjJNT_FREE
+        self.root_qpos = int(model.jnt_qposadr[free][0])
+        self.root_dof = int(model.jnt_dofadr[free][0])
+        self.mass_row = np.repeat(np.arange(model.nv), model.M_rownnz)
+        self.mass_column = model.M_colind.copy()
+
+    def dense(self, lower: np.ndarray) -> np.ndarray:
+        """Mass matrices [S, nv, nv] from their stored entries [S, nM]."""
+        size = int(self.mass_row[-1]) + 1
+        full = np.zeros((len(lower), size, size))
+        full[:, self.mass_row, self.mass_column] = lower
+        full[:, self.mass_column, self.mass_row] = lower
+        return full
+
+
+class LowestPoint:
+    """The lowest points of some geoms above the floor, exact for MuJoCo's primitive shapes."""
+
+    def __init__(self, model: mujoco.MjModel, geoms: np.ndarray) -> None:
+        self.geoms = geoms
+        self.floor = float(model.geom("floor").pos[2])
+        extents = [support_extents(int(model.geom_type[g]), model.geom_size[g]) for g in geoms]
+        self.radius = np.array([r for r, _, _ in extents])
+        self.box = np.array([b for _, b, _ in extents]).reshape(-1, 3)
+        self.ellipsoid = np.array([e for _, _, e in extents]).reshape(-1, 3)
+
+    def heights(self, xpos: np.ndarray, xmat: np.ndarray) -> np.ndarray:
+        """[S, geoms] m, from all geoms' positions [S, ngeom, 3] and rotations [S, ngeom, 9]."""
+        down = np.abs(xmat[:, self.geoms, 6:])
+        reach = self.radius + (down * self.box).sum(2) + np.sqrt(((down * self.ellipsoid) ** 2).sum(2))
+        return xpos[:, self.geoms, 2] - reach - self.floor
+
+    def lowest(self, xpos: np.ndarray, xmat: np.ndarray) -> np.ndarray:
+        """[S] m, the least of `heights`; infinite where there is no geom."""
+        return self.heights(xpos, xmat).min(1, initial=np.inf)
+
+
+def colliding_geoms(model: mujoco.MjModel) -> np.ndarray:
+    """Ids of the moving geoms that can touch something."""
+    solid = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
+    return np.flatnonzero(solid & (model.geom_bodyid != 0))

@@ -1,0 +1,194 @@
+"""From a recorded trajectory to what the criteria need: contacts, slip, clearance, power.
+
+Letters: `T` frames, `J` actuated joints, `N` feet, `B` bodies.
+"""
+
+import dataclasses
+
+import mujoco
+import numpy as np
+
+from mjxgait.certify.controller import Controller
+from mjxgait.certify.layout import LowestPoint
+from mjxgait.certify.simulate import Trajectory, examined_model
+from mjxgait.champion import Champion
+from mjxgait.creature import Creature
+
+CARRIES = 1e-3
+"""Share of the body weight from which a foot counts as in contact; less is the solver's residue."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Dimensions:
+    """The sizes against which a gait is judged, in m, kg, m/s².
+
+    torque_limit: N·m per joint. foot_places: forward and left of the trunk when standing, in m per foot.
+    crawler: whether other parts than feet may touch the floor.
+    """
+
+    stand_height: float
+    hip_height: float
+    body_length: float
+    mass: float
+    gravity: float
+    torque_limit: tuple[float, ...]
+    foot_names: tuple[str, ...]
+    foot_places: tuple[tuple[float, float], ...]
+    crawler: bool = False
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Recording:
+    """One simulation, frame by frame.
+
+    time_step: s. cycle_length: positions in the pose cycle. position: [T] in the pose cycle.
+    trunk_pos: [T, 3] m along the start's forward, left and up. trunk_up: [T] trunk's up axis . world up. pitch, roll: [T] rad.
+    joint_pos, joint_vel, torque: [T, J] rad, rad/s, N·m.
+    foot_force: [T, N] N, normal. foot_slip: [T, N] m/s, tangential, of the foot's material at the contact; 0 without contact.
+    foot_height: [T, N] m, lowest point above the floor.
+    touch: [T] whether a part that is neither foot nor ground contact touches the floor.
+    penetration: [T] m, of the deepest contact. body_speed: [T] m/s, of the fastest body's centre of mass.
+    """
+
+    dimensions: Dimensions
+    time_step: float
+    cycle_length: int
+    position: np.ndarray
+    trunk_pos: np.ndarray
+    trunk_up: np.ndarray
+    pitch: np.ndarray
+    roll: np.ndarray
+    joint_pos: np.ndarray
+    joint_vel: np.ndarray
+    torque: np.ndarray
+    foot_force: np.ndarray
+    foot_slip: np.ndarray
+    foot_height: np.ndarray
+    touch: np.ndarray
+    penetration: np.ndarray
+    body_speed: np.ndarray
+
+    @property
+    def contact(self) -> np.ndarray:
+        """[T, N] whether the foot carries weight."""
+        return self.foot_force > CARRIES * self.dimensions.mass * self.dimensions.gravity
+
+    def window(self, begin: float, end: float = np.inf) -> "Recording":
+        """The frames from `begin` to `end` in s."""
+        frames = slice(round(begin / self.time_step), None if np.isinf(end) else round(end / self.time_step))
+        arrays = {f.name: getattr(self, f.name)[frames] for f in dataclasses.fields(self) if isinstance(getattr(self, f.name), np.ndarray)}
+        return dataclasses.replace(self, **arrays)
+
+
+def dimensions(creature: Creature) -> Dimensions:
+    """The sizes of a creature."""
+    model = creature.model
+    data = mujoco.MjData(model)
+    data.qpos[:] = creature.stand_qpos
+    mujoco.mj_kinematics(model, data)
+    axes = data.xmat[creature.trunk].reshape(3, 3) @ np.stack([creature.forward, creature.left], 1)
+    feet = creature.watched[: len(creature.foot_of)]
+    places = (data.geom_xpos[feet] - data.xpos[creature.trunk]) @ axes
+    middles = [places[creature.foot_of == n].mean(0) for n in range(len(creature.foot_names))]
+    return Dimensions(
+        stand_height=creature.stand_height,
+        hip_height=creature.hip_height,
+        body_length=creature.body_length,
+        mass=creature.mass,
+        gravity=float(-model.opt.gravity[2]),
+        torque_limit=tuple(map(float, creature.torque_limit)),
+        foot_names=creature.foot_names,
+        foot_places=tuple((float(forward), float(left)) for forward, left in middles),
+        crawler=len(creature.ground) > 0,
+    )
+
+
+def measure(creature: Creature, champion: Champion, trajectory: Trajectory, row: int = 0) -> Recording:
+    """Looks at one undisturbed simulation again: every stored frame is given to C MuJoCo, whose contacts are then read.
+
+    Frames after a simulation blew up are NaN, which no criterion accepts.
+    """
+    controller = Controller(creature, champion)
+    qpos, qvel, torque = trajectory.qpos[row], trajectory.qvel[row], trajectory.torque[row]
+    sight = _Sight(creature, len(qpos))
+    for k in range(len(qpos)):
+        if not (np.isfinite(qpos[k]).all() and np.isfinite(qvel[k]).all()):
+            break
+        sight.look(k, qpos[k], qvel[k], torque[k])
+    forward, left, up = (sight.trunk_rot @ axis for axis in (creature.forward, creature.left, creature.up))
+    moved = sight.trunk_pos - controller.start * [1, 1, 0]
+    return Recording(
+        dimensions=dimensions(creature),
+        time_step=trajectory.time_step,
+        cycle_length=controller.length,
+        position=trajectory.position[row],
+        trunk_pos=np.stack([moved @ controller.start_forward, moved @ controller.start_left, moved[:, 2]], 1),
+        trunk_up=up[:, 2],
+        pitch=-np.arcsin(np.clip(forward[:, 2], -1, 1)),
+        roll=np.arcsin(np.clip(left[:, 2], -1, 1)),
+        joint_pos=qpos[:, creature.qpos_adr],
+        joint_vel=qvel[:, creature.dof_adr],
+        torque=torque,
+        foot_force=sight.foot_force,
+        foot_slip=sight.foot_slip,
+        foot_height=sight.foot_height,
+        touch=sight.touch,
+        penetration=sight.penetration,
+        body_speed=sight.body_speed,
+    )
+
+
+class _Sight:
+    """Reads frames from an MjData; NaN (or a touch) where it has not looked."""
+
+    def __init__(self, creature: Creature, frames: int) -> None:
+        self.creature, self.model = creature, examined_model(creature)
+        self.data = mujoco.MjData(self.model)
+        feet = len(creature.foot_names)
+        foot_geoms = creature.watched[: len(creature.foot_of)]
+        self.reach = LowestPoint(self.model, foot_geoms)
+        self.foot_of_geom = np.full(self.model.ngeom, -1)
+        self.foot_of_geom[foot_geoms] = creature.foot_of
+        self.may_touch = np.isin(np.arange(self.model.ngeom), [*foot_geoms, *creature.ground])
+        self.floor = self.model.geom("floor").id
+        self.trunk_pos, self.trunk_rot = np.full((frames, 3), np.nan), np.full((frames, 3, 3), np.nan)
+        self.foot_force, self.foot_slip, self.foot_height = (np.full((frames, feet), np.nan) for _ in range(3))
+        self.touch, self.penetration, self.body_speed = np.ones(frames, bool), np.full(frames, np.nan), np.full(frames, np.nan)
+
+    def look(self, k: int, qpos: np.ndarray, qvel: np.ndarray, torque: np.ndarray) -> None:
+        data, creature = self.data, self.creature
+        data.qpos[:], data.qvel[:] = qpos, qvel
+        data.qfrc_applied[creature.dof_adr] = torque
+        mujoco.mj_forward(self.model, data)
+        self.trunk_pos[k], self.trunk_rot[k] = data.xpos[creature.trunk], data.xmat[creature.trunk].reshape(3, 3)
+        heights = self.reach.heights(data.geom_xpos[None], data.geom_xmat[None])[0]
+        self.foot_height[k] = [heights[creature.foot_of == n].min() for n in range(len(creature.foot_names))]
+        self.body_speed[k] = np.linalg.norm(_velocity(data, data.xipos, np.arange(self.model.nbody))[1:], axis=1).max()
+        self._contacts(k)
+
+    def _contacts(self, k: int) -> None:
+        data, contact = self.data, self.data.contact
+        self.foot_force[k] = self.foot_slip[k] = self.touch[k] = self.penetration[k] = 0
+        on_floor = (contact.geom == self.floor).any(1)
+        if not on_floor.any():
+            return
+        geom = contact.geom[on_floor].sum(1) - self.floor
+        self.penetration[k] = max(0.0, -contact.dist[on_floor].min())
+        self.touch[k] = (~self.may_touch[geom]).any()
+        velocity = _velocity(data, contact.pos[on_floor], self.model.geom_bodyid[geom])
+        # On a horizontal floor the tangential part is the horizontal one.
+        slip = np.hypot(velocity[:, 0], velocity[:, 1])
+        force = np.zeros(6)
+        for i, foot, speed in zip(np.flatnonzero(on_floor), self.foot_of_geom[geom], slip, strict=True):
+            if foot >= 0:
+                mujoco.mj_contactForce(self.model, data, i, force)
+                self.foot_force[k, foot] += force[0]
+                self.foot_slip[k, foot] += force[0] * speed
+        carrying = self.foot_force[k] > 0
+        self.foot_slip[k, carrying] /= self.foot_force[k, carrying]
+
+
+def _velocity(data: mujoco.MjData, points: np.ndarray, body: np.ndarray) -> np.ndarray:
+    """World velocities [P, 3] of the material points [P, 3] of bodies [P]; `cvel` is that at the tree's centre of mass."""
+    spin, slide = data.cvel[body, :3], data.cvel[body, 3:]
+    return slide + np.cross(spin, points - data.subtree_com[data.model.body_rootid[body]])

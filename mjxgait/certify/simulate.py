@@ -1,0 +1,271 @@
+"""Runs many simulations of one champion on C MuJoCo under the NumPy controller.
+
+Letters: `S` simulations, `R` recorded ones (the first of the `S`), `T` control steps, `J` actuated joints, `nq nv` as in MuJoCo.
+"""
+
+import concurrent.futures
+import copy
+import dataclasses
+import os
+from typing import Annotated
+
+import mujoco
+import numpy as np
+import pydantic
+from mujoco.batch import Batch
+
+from mjxgait.certify.controller import Controller, Senses
+from mjxgait.certify.layout import Layout, LowestPoint, colliding_geoms
+from mjxgait.certify.starts import Starts
+from mjxgait.champion import Champion
+from mjxgait.creature import Creature
+from mjxgait.tables import STRICT, NonNegative, Positive
+
+VELOCITY_STAGE = int(mujoco.mjtStage.mjSTAGE_VEL)
+
+BLOWN_UP = 1e4
+"""m/s or rad/s, from which a simulation is stopped: beyond any walk, and before MuJoCo itself complains in a log file."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Fall:
+    """When a creature is down; criterion 1.
+
+    min_up: least product of the trunk's up axis with the world's. height: range of the trunk's height in standing heights.
+    touch: whether a part that is neither foot nor ground contact is down when it touches the floor.
+    """
+
+    __pydantic_config__ = STRICT
+    min_up: Annotated[float, pydantic.Field(ge=-1, le=1)] = 0.5
+    height: tuple[NonNegative, Positive] = (0.5, 1.5)
+    touch: bool = True
+
+    def __post_init__(self) -> None:
+        if not self.height[0] < 1 < self.height[1]:
+            raise ValueError(f"height = {list(self.height)}: must be a range around 1, the standing height")
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Trajectory:
+    """Everything needed to look at the recorded simulations again; frames are control steps, before their torque acts.
+
+    time_step: s between frames. qpos: [R, T, nq]. qvel: [R, T, nv]. torque: [R, T, J] N·m. position: [R, T] in the pose cycle.
+    A simulation that blew up is NaN from there on.
+    """
+
+    time_step: float
+    qpos: np.ndarray
+    qvel: np.ndarray
+    torque: np.ndarray
+    position: np.ndarray
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Outcome:
+    """What became of the simulations.
+
+    fell: [S] s, infinite for those that stayed up. travel: [S, 2] m along the start's forward and left until the end or the fall.
+    """
+
+    fell: np.ndarray
+    travel: np.ndarray
+    trajectory: Trajectory
+
+    @property
+    def stayed_up(self) -> np.ndarray:
+        """[S] whether never down."""
+        return np.isinf(self.fell)
+
+
+def examined_model(creature: Creature, refine: int = 1) -> mujoco.MjModel:
+    """The creature's own body with a converged contact solver, and its time step divided by `refine`."""
+    model = copy.copy(creature.model)
+    model.opt.iterations, model.opt.ls_iterations = 100, 50
+    model.opt.tolerance = 1e-8
+    model.opt.timestep = creature.model.opt.timestep / refine
+    # A simulation that blows up must not be put back on its feet in silence.
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    return model
+
+
+def simulate(
+    creature: Creature,
+    champion: Champion,
+    starts: Starts,
+    seconds: float,
+    *,
+    record: int = 0,
+    refine: int = 1,
+    heading: np.ndarray | None = None,
+    fall: Fall | None = None,
+    threads: int = 0,
+) -> Outcome:
+    """Simulates the champion from every start.
+
+    Args:
+      record: R, how many of the first simulations to record; these run to the end even after a fall, the others stop there.
+      refine: physics steps per control step. The torque is renewed at each, the position in the cycle at control steps only.
+      heading: [T] rad, commanded heading at each control step; None walks straight ahead.
+      threads: 0 takes the machine's cores. The result does not depend on it.
+    """
+    threads = threads or _cores()
+    # Dealt out like cards, so that each thread gets its share of every kind of start.
+    shares = [np.arange(i, len(starts), threads) for i in range(min(threads, len(starts)))]
+    steps = round(seconds / creature.model.opt.timestep)
+    fall = fall or Fall()
+
+    def run(share: np.ndarray) -> Outcome:
+        return _Run(creature, champion, starts.rows(share), int((share < record).sum()), refine, fall).to_the_end(steps, heading)
+
+    with concurrent.futures.ThreadPoolExecutor(len(shares)) as pool:
+        parts = list(pool.map(run, shares))
+    order = np.argsort(np.concatenate(shares))
+    kept = np.argsort(np.concatenate([share[share < record] for share in shares]))
+    fields = ("qpos", "qvel", "torque", "position")
+    return Outcome(
+        fell=np.concatenate([p.fell for p in parts])[order],
+        travel=np.concatenate([p.travel for p in parts])[order],
+        trajectory=Trajectory(
+            creature.model.opt.timestep, *(np.concatenate([getattr(p.trajectory, f) for p in parts])[kept] for f in fields)
+        ),
+    )
+
+
+class _Run:
+    """The simulations of one thread, of which the first `record` are recorded."""
+
+    def __init__(self, creature: Creature, champion: Champion, starts: Starts, record: int, refine: int, fall: Fall) -> None:
+        self.creature, self.starts, self.record, self.refine, self.fall = creature, starts, record, refine, fall
+        self.controller = Controller(creature, champion)
+        self.model = examined_model(creature, refine)
+        self.batch = _batch(creature, self.model, starts)
+        self.layout = Layout(self.model)
+        self.solid = LowestPoint(self.model, colliding_geoms(self.model))
+        self.forbidden = LowestPoint(self.model, creature.watched[len(creature.foot_of) :])
+        bind = self.batch.bind
+        self.qpos, self.qvel, self.applied = bind("qpos"), bind("qvel"), bind("qfrc_applied")
+        self.xpos, self.xmat, self.mass = bind("xpos"), bind("xmat"), bind("M")
+        self.bias, self.passive, self.constraint = bind("qfrc_bias"), bind("qfrc_passive"), bind("qfrc_constraint")
+        self.geom_xpos, self.geom_xmat = bind("geom_xpos"), bind("geom_xmat")
+        self._lift()
+        self.position = np.zeros(len(starts), dtype=int)
+        self.last_force = np.zeros_like(self.qvel)
+
+    def to_the_end(self, steps: int, heading: np.ndarray | None) -> Outcome:
+        """Steps until the end, leaving out what has fallen and is not recorded."""
+        count, time_step = len(self.starts), self.creature.model.opt.timestep
+        fell = np.full(count, np.inf)
+        travel = np.zeros((count, 2))
+        running = np.arange(count)
+        film = self._empty_film(steps)
+        for k in range(steps):
+            if not len(running):
+                break
+            self._push(running, k)
+            commanded = None if heading is None else float(heading[k])
+            self._control_step(running, k, commanded, film)
+            travel[running] = self._travel(running)
+            down = running[self._down(running)]
+            fell[down] = np.minimum(fell[down], (k + 1) * time_step)
+            if len(down):
+                running = running[self._sane(running) & ((running < self.record) | np.isinf(fell[running]))]
+        return Outcome(fell, travel, film)
+
+    def _control_step(self, running: np.ndarray, k: int, heading: float | None, film: Trajectory) -> None:
+        kept = running[running < self.record]
+        film.qpos[kept, k], film.qvel[kept, k] = self.qpos[kept], self.qvel[kept]
+        film.position[kept, k] = self.position[kept]
+        target, reached, torque = self._physics_step(running, heading)
+        film.torque[kept, k] = torque[: len(kept)]
+        for _ in range(self.refine - 1):
+            self._physics_step(running, heading)
+        self.position[running] = self.controller.advance(self.position[running], target, reached, (k + 1) * film.time_step)
+
+    def _physics_step(self, running: np.ndarray, heading: float | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Target, joint positions before the step, and torque, [running, J] each."""
+        senses = self._senses(running)
+        target = self.controller.target(self.position[running], senses, heading)
+        torque = self.controller.torque(target, senses, self.model.opt.timestep)
+        self.applied[running[:, None], self.creature.dof_adr] = torque
+        self.batch.step(running, stage=VELOCITY_STAGE)
+        self.last_force[running] = self.constraint[running]
+        return target, senses.joint_pos, torque
+
+    def _senses(self, running: np.ndarray) -> Senses:
+        """M and bias belong to the current state: each step ends with the velocity stage of the new one."""
+        creature = self.creature
+        velocity = self.qvel[running]
+        rot = self.xmat[running, creature.trunk].reshape(-1, 3, 3)
+        return Senses(
+            joint_pos=self.qpos[running[:, None], creature.qpos_adr],
+            velocity=velocity,
+            trunk_pos=self.xpos[running, creature.trunk],
+            trunk_rot=rot,
+            # A free joint's angular velocity is in the body's own frame.
+            trunk_angvel=(rot * velocity[:, None, self.layout.root_dof + 3 : self.layout.root_dof + 6]).sum(2),
+            mass_matrix=self.layout.dense(self.mass[running]),
+            bias=self.bias[running] - self.passive[running],
+            constraint_force=self.last_force[running],
+        )
+
+    def _lift(self) -> None:
+        """Raises each start until no part is deeper in the floor than when standing; else joint noise would begin with a kick."""
+        self.batch.forward(stage=VELOCITY_STAGE)
+        standing = mujoco.MjData(self.model)
+        standing.qpos[:] = self.creature.stand_qpos
+        mujoco.mj_kinematics(self.model, standing)
+        usual = self.solid.lowest(standing.geom_xpos[None], standing.geom_xmat[None])
+        self.qpos[:, self.layout.root_qpos + 2] += np.maximum(usual - self.solid.lowest(self.geom_xpos, self.geom_xmat), 0)
+        self.batch.forward(stage=VELOCITY_STAGE)
+
+    def _push(self, running: np.ndarray, k: int) -> None:
+        time_step = self.creature.model.opt.timestep
+        pushed = running[np.floor(self.starts.push_time[running] / time_step) == k]
+        if len(pushed):
+            self.qvel[pushed, self.layout.root_dof : self.layout.root_dof + 2] += self.starts.push[pushed]
+            self.batch.forward(pushed, stage=VELOCITY_STAGE)
+
+    def _travel(self, running: np.ndarray) -> np.ndarray:
+        moved = self.xpos[running, self.creature.trunk] - self.controller.start
+        return np.stack([moved @ self.controller.start_forward, moved @ self.controller.start_left], 1)
+
+    def _sane(self, running: np.ndarray) -> np.ndarray:
+        return (np.abs(self.qvel[running]) < BLOWN_UP).all(1)
+
+    def _down(self, running: np.ndarray) -> np.ndarray:
+        """Negated comparisons, so that a simulation that is NaN counts as down."""
+        trunk = self.creature.trunk
+        up = self.xmat[running, trunk].reshape(-1, 3, 3)[:, 2] @ self.creature.up
+        height = self.xpos[running, trunk, 2] / self.creature.stand_height
+        fine = self._sane(running) & (up > self.fall.min_up) & (height > self.fall.height[0]) & (height < self.fall.height[1])
+        if self.fall.touch:
+            fine &= self.forbidden.lowest(self.geom_xpos[running], self.geom_xmat[running]) > 0
+        return ~fine
+
+    def _empty_film(self, steps: int) -> Trajectory:
+        def blank(width: int) -> np.ndarray:
+            return np.full((self.record, steps, width), np.nan)
+
+        position = np.zeros((self.record, steps), dtype=int)
+        time_step = self.creature.model.opt.timestep
+        return Trajectory(time_step, blank(self.model.nq), blank(self.model.nv), blank(len(self.creature.dof_adr)), position)
+
+
+def _cores() -> int:
+    """That this process may use; a container often has fewer than the machine."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _batch(creature: Creature, model: mujoco.MjModel, starts: Starts) -> Batch:
+    """The simulations at their starts."""
+    batch = Batch(model, len(starts), 1, persistent=True)
+    batch.expand("geom_friction")[:, :, 0] *= starts.friction[:, None]
+    batch.expand("body_mass")[:] *= starts.mass
+    batch.expand("body_inertia")[:] *= starts.mass[:, :, None]
+    batch.set_const()
+    batch.reset(stage=int(mujoco.mjtStage.mjSTAGE_NONE))
+    qpos = batch.bind("qpos")
+    qpos[:] = creature.stand_qpos
+    qpos[:, creature.qpos_adr] += starts.joint_offset
+    batch.bind("qvel")[:, creature.dof_adr] = starts.joint_velocity
+    return batch

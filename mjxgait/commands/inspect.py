@@ -1,0 +1,68 @@
+"""`mjxgait inspect`: what a checkpoint, a run or a folder of runs holds."""
+
+import dataclasses
+import json
+import logging
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import tyro
+from rich.console import Console
+
+from mjxgait.errors import UserError
+
+PIPED_WIDTH = 160
+
+
+@dataclasses.dataclass(frozen=True)
+class InspectOptions:
+    """Tell what a checkpoint holds, without compiling or simulating.
+
+    Attributes:
+      path: Run folder, one of its checkpoints, or a folder full of runs.
+      generation: The checkpoint of this generation instead of the latest.
+      individual: Everything about one member of the population; 1 is the best.
+      diff: Two runs or checkpoints to compare.
+      json: Print JSON for programs.
+    """
+
+    path: tyro.conf.Positional[Path | None] = None
+    generation: int | None = None
+    individual: int | None = None
+    diff: tuple[Path, Path] | None = None
+    json: bool = False
+
+
+def inspect_command(arguments: Sequence[str]) -> int:
+    """Returns the exit code."""
+    options = tyro.cli(InspectOptions, args=list(arguments), prog="mjxgait inspect")
+    # Reading needs no accelerator, and a broken one must not be in the way. Before anything imports JAX.
+    os.environ.setdefault("JAX_PLATFORMS", "cpu")
+    from mjxgait import inspect
+
+    # Orbax warns of files that a part of a checkpoint never has.
+    logging.getLogger("absl").setLevel(logging.ERROR)
+    console = Console(highlight=False, width=None if sys.stdout.isatty() else PIPED_WIDTH)
+
+    def tell(found: Any, show: Any) -> int:
+        if options.json:
+            print(json.dumps(found, indent=2, allow_nan=False))
+        else:
+            show(found, console)
+        return 0
+
+    if options.diff:
+        if options.path is not None or options.generation is not None or options.individual is not None:
+            raise UserError("--diff takes two runs or checkpoints (such as RUN/checkpoints/5) and nothing else but --json")
+        return tell(inspect.differences(*map(inspect.read_snapshot, options.diff)), inspect.print_differences)
+    if options.path is None:
+        raise UserError("name a run folder, a checkpoint, or a folder full of runs: mjxgait inspect runs/tall_quadruped-seed0")
+    if runs := inspect.runs_in(options.path):
+        return tell(inspect.list_runs(runs), inspect.print_runs)
+    snapshot = inspect.read_snapshot(options.path, options.generation)
+    if options.individual is not None:
+        return tell(inspect.individual_facts(snapshot, options.individual), inspect.print_individual)
+    return tell(inspect.facts(snapshot), inspect.print_facts)

@@ -1,0 +1,171 @@
+"""The NumPy controller against docs/controller.md, by hand."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from certify_made_up import make_champion
+
+from mjxgait.certify.controller import Controller, Senses, pose_cycle
+
+
+def rotation(axis, angle):
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array(
+        {"x": [[1, 0, 0], [0, c, -s], [0, s, c]], "y": [[c, 0, s], [0, 1, 0], [-s, 0, c]], "z": [[c, -s, 0], [s, c, 0], [0, 0, 1]]}[axis]
+    )
+
+
+def senses(creature, rot=None, pos=(0.0, 0.0, 0.3035), angvel=(0.0, 0.0, 0.0), seed=None, count=1):
+    """A state; standing still unless a seed draws joints, velocities and dynamics."""
+    nv, joints = creature.model.nv, len(creature.stand)
+    rng = np.random.default_rng(seed)
+    draw = (lambda *shape: rng.normal(0, 0.3, shape)) if seed is not None else (lambda *shape: np.zeros(shape))
+    root = draw(count, nv, nv)
+    return Senses(
+        joint_pos=creature.stand + draw(count, joints),
+        velocity=draw(count, nv),
+        trunk_pos=np.tile(pos, (count, 1)),
+        trunk_rot=np.tile(np.eye(3) if rot is None else rot, (count, 1, 1)),
+        trunk_angvel=np.tile(angvel, (count, 1)),
+        mass_matrix=root @ root.swapaxes(1, 2) + np.eye(nv),
+        bias=draw(count, nv),
+        constraint_force=draw(count, nv),
+    )
+
+
+def poses(creature, count=2):
+    return np.random.default_rng(5).uniform(-0.4, 0.4, (count, len(creature.stand)))
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_the_cycle_passes_through_the_key_poses_and_their_mirror_images(tiny, count):
+    key_poses = poses(tiny, count)
+    control = Controller(tiny, make_champion(tiny, key_poses, interpolation=7))
+    assert control.length == 2 * count * 7
+    at_poses = control.planned(np.arange(2 * count) * 7)
+    mirrored = np.array([[tiny.sign[j] * pose[tiny.partner[j]] for j in range(8)] for pose in key_poses])
+    np.testing.assert_array_equal(at_poses, [*key_poses, *mirrored])
+
+
+def test_mirroring_swaps_left_and_right(tiny):
+    names = list(tiny.joint_names)
+    pose = np.zeros((1, 8))
+    pose[0, names.index("front_left_hip")], pose[0, names.index("hind_right_knee")] = 0.3, -0.2
+    image = pose_cycle(pose, tiny)[1]
+    assert image[names.index("front_right_hip")] == 0.3
+    assert image[names.index("hind_left_knee")] == -0.2
+    assert np.count_nonzero(image) == 2
+
+
+def test_a_roll_joint_changes_sign_in_the_mirror(tiny):
+    rolling = dataclasses.replace(tiny, sign=-tiny.sign)
+    np.testing.assert_array_equal(pose_cycle(np.full((1, 8), 0.1), rolling)[1], np.full(8, -0.1))
+
+
+def test_between_poses_the_target_is_linear_and_the_cycle_closes(tiny):
+    key_poses = poses(tiny)
+    control = Controller(tiny, make_champion(tiny, key_poses, interpolation=10))
+    cycle = pose_cycle(key_poses, tiny)
+    np.testing.assert_allclose(control.planned(np.array([3]))[0], 0.7 * cycle[0] + 0.3 * cycle[1], atol=1e-15)
+    np.testing.assert_allclose(control.planned(np.array([39]))[0], 0.1 * cycle[3] + 0.9 * cycle[0], atol=1e-15)
+
+
+def test_an_unsymmetric_creature_is_not_mirrored(tiny):
+    settings = dataclasses.replace(tiny.settings, mirror=dataclasses.replace(tiny.settings.mirror, symmetric=False))
+    lopsided = dataclasses.replace(tiny, settings=settings)
+    assert len(pose_cycle(poses(tiny), lopsided)) == 2
+
+
+def test_heading_to_the_left_and_being_on_the_left_are_positive(tiny):
+    control = Controller(tiny, make_champion(tiny, tuning={"steer": 0.5}))
+    assert control.corrections(senses(tiny, rotation("z", 0.3)))[0] == pytest.approx(0.15)
+    on_the_left = senses(tiny, pos=(4.0, 0.2, 0.3))
+    assert control.corrections(on_the_left)[0] == pytest.approx(0.5 * 0.2 / (2 * tiny.body_length))
+    assert control.corrections(on_the_left, heading=0.1)[0] == pytest.approx(-0.05)
+    assert control.corrections(senses(tiny, rotation("z", 3.0)))[0] == pytest.approx(0.5)
+
+
+def test_nose_down_and_right_side_down_are_positive(tiny):
+    still = make_champion(tiny, tuning={"pitch": 1.0, "roll": 2.0})
+    _, pitch, roll = Controller(tiny, still).corrections(senses(tiny, rotation("y", 0.2)))
+    assert (pitch, roll) == (pytest.approx(0.2), pytest.approx(0.0))
+    _, pitch, roll = Controller(tiny, still).corrections(senses(tiny, rotation("x", 0.2)))
+    assert (pitch, roll) == (pytest.approx(0.0), pytest.approx(0.4))
+
+
+def test_rates_are_positive_when_the_angles_grow(tiny):
+    swinging = make_champion(tiny, tuning={"pitch_rate": 0.1, "roll_rate": 0.2})
+    turned = rotation("z", 1.0)
+    _, pitch, roll = Controller(tiny, swinging).corrections(senses(tiny, turned, angvel=turned @ [0.7, 0.5, 9.0]))
+    assert (pitch, roll) == (pytest.approx(0.05), pytest.approx(0.14))
+
+
+def test_the_corrected_target_is_the_sum_on_the_page(tiny):
+    key_poses = poses(tiny)
+    champion = make_champion(tiny, key_poses, {"steer": 1.0, "pitch": 1.0, "roll": 1.0})
+    stand = np.full(8, 0.05)
+    creature = dataclasses.replace(tiny, stand=stand)
+    rot = rotation("z", 0.1) @ rotation("y", 0.2)
+    u, p, r = (float(part[0]) for part in Controller(creature, champion).corrections(senses(creature, rot)))
+    target = Controller(creature, champion).target(np.array([0]), senses(creature, rot))[0]
+    for j in range(8):
+        want = stand[j] + (key_poses[0, j] - stand[j]) * (1 + u * creature.steer_stride[j])
+        want += u * creature.steer_bend[j] + p * creature.balance_pitch[j] + r * creature.balance_roll[j]
+        assert target[j] == pytest.approx(want, abs=1e-14)
+
+
+def test_the_target_keeps_to_the_joint_ranges(tiny):
+    control = Controller(tiny, make_champion(tiny, np.full((2, 8), 3.0)))
+    np.testing.assert_array_equal(control.target(np.array([0]), senses(tiny))[0], tiny.joint_high)
+
+
+@pytest.mark.parametrize("constraint_forces", [False, True])
+def test_stable_pd_against_the_dense_formula(tiny, constraint_forces):
+    control = Controller(tiny, make_champion(tiny, constraint_forces=constraint_forces))
+    h, nv = 0.005, tiny.model.nv
+    state = senses(tiny, seed=1, count=3)
+    target = np.random.default_rng(2).normal(0, 0.2, (3, 8))
+    got = control.torque(target, state, h)
+    for s in range(3):
+        kp, kd, q, wish = (np.zeros(nv) for _ in range(4))
+        kp[tiny.dof_adr], kd[tiny.dof_adr] = tiny.kp, tiny.kd
+        q[tiny.dof_adr], wish[tiny.dof_adr] = state.joint_pos[s], target[s]
+        p = -kp * (q + h * state.velocity[s] - wish)
+        d = -kd * state.velocity[s]
+        force = p + d - state.bias[s] + (state.constraint_force[s] if constraint_forces else 0)
+        acc = np.linalg.inv(state.mass_matrix[s] + h * np.diag(kd)) @ force
+        want = np.clip((p + d - h * kd * acc)[tiny.dof_adr], -tiny.torque_limit, tiny.torque_limit)
+        np.testing.assert_allclose(got[s], want, atol=1e-9)
+
+
+def test_stable_pd_predicts_the_acceleration_that_its_own_torque_makes(tiny):
+    loose = dataclasses.replace(tiny, torque_limit=np.full(8, 1e9))
+    state, target, h = senses(tiny, seed=3), np.full((1, 8), 0.1), 0.005
+    torque = Controller(loose, make_champion(loose)).torque(target, state, h)[0]
+    force = -state.bias[0]
+    force[tiny.dof_adr] += torque
+    acc = np.linalg.solve(state.mass_matrix[0], force)[tiny.dof_adr]
+    v = state.velocity[0, tiny.dof_adr]
+    np.testing.assert_allclose(torque, -tiny.kp * (state.joint_pos[0] + h * v - target[0]) - tiny.kd * (v + h * acc), rtol=1e-9)
+
+
+def test_plain_pd(tiny):
+    state, target = senses(tiny, seed=4), np.full((1, 8), 0.1)
+    want = -tiny.kp * (state.joint_pos - target) - tiny.kd * state.velocity[:, tiny.dof_adr]
+    got = Controller(tiny, make_champion(tiny, law="pd")).torque(target, state, 0.005)
+    np.testing.assert_allclose(got, np.clip(want, -12, 12))
+
+
+def test_the_position_moves_on_when_the_pose_error_is_below_the_threshold(tiny):
+    control = Controller(tiny, make_champion(tiny, tuning={"threshold": 0.12}))
+    off = np.zeros((3, 8))
+    off[0], off[1], off[2, 0] = 0.119, 0.121, 0.12 * np.sqrt(8) * 0.99
+    np.testing.assert_array_equal(control.advance(np.array([39, 39, 5]), off, np.zeros((3, 8)), 0.005), [0, 39, 6])
+
+
+def test_the_clock_moves_on_whatever_the_error(tiny):
+    control = Controller(tiny, make_champion(tiny, tuning={"period": 0.8}, advance="clock"))
+    far = np.ones((1, 8))
+    at = [int(control.advance(np.array([0]), far, 0 * far, k * 0.005)[0]) for k in (0, 3, 4, 80, 159, 160, 164)]
+    assert at == [0, 0, 1, 20, 39, 0, 1]

@@ -1,0 +1,216 @@
+"""The simulator: right rows, no leaks, the same as a plain loop over MuJoCo, and what is measured from it."""
+
+import subprocess
+import sys
+
+import mujoco
+import numpy as np
+import pytest
+from certify_made_up import make_champion
+
+from mjxgait.certify import distance, record, survival
+from mjxgait.certify.controller import Controller, Senses
+from mjxgait.certify.measure import measure
+from mjxgait.certify.simulate import Fall, examined_model, simulate
+from mjxgait.certify.starts import join, nominal_starts, perturbed_starts, pushed_starts
+
+SECONDS = 1.5
+
+
+@pytest.fixture(scope="module")
+def mixed(tiny):
+    """Perturbed starts that are pushed as well, and two that must fall early."""
+    rng = np.random.default_rng(3)
+    noisy = perturbed_starts(tiny, 4, rng, friction=(0.3, 1.5), mass=0.3)
+    noisy.push_time[:] = [0.2, 0.503, 0.9, np.inf]
+    noisy.push[:] = rng.normal(0, 0.3, (4, 2))
+    return join(noisy, pushed_starts(tiny, 2, rng, 6.0, (0.1, 0.3)), perturbed_starts(tiny, 2, rng))
+
+
+@pytest.fixture(scope="module")
+def outcome(tiny, trotter, mixed):
+    return simulate(tiny, trotter, mixed, SECONDS, record=len(mixed), threads=1)
+
+
+def plain_loop(creature, champion, starts, row, seconds):
+    """One simulation on an MjData with a model of its own, nothing shared with the batch; returns the states before each step."""
+    model = examined_model(creature)
+    model.geom_friction[:, 0] *= starts.friction[row]
+    model.body_mass[:] *= starts.mass[row]
+    model.body_inertia[:] *= starts.mass[row][:, None]
+    data = mujoco.MjData(model)
+    mujoco.mj_setConst(model, data)
+    mujoco.mj_resetData(model, data)
+    control, position, states = Controller(creature, champion), np.zeros(1, int), []
+    data.qpos[:] = creature.stand_qpos
+    mujoco.mj_kinematics(model, data)
+    feet = creature.watched[:4]
+    usual = data.geom_xpos[feet, 2].min()
+    data.qpos[creature.qpos_adr] += starts.joint_offset[row]
+    mujoco.mj_kinematics(model, data)
+    data.qpos[2] += max(0.0, usual - data.geom_xpos[feet, 2].min())
+    data.qvel[creature.dof_adr] = starts.joint_velocity[row]
+    mass = np.zeros((model.nv, model.nv))
+    for k in range(round(seconds / model.opt.timestep)):
+        if int(np.floor(min(starts.push_time[row], 1e6) / model.opt.timestep)) == k:
+            data.qvel[:2] += starts.push[row]
+        states.append(np.concatenate([data.qpos, data.qvel]))
+        last = data.qfrc_constraint.copy()
+        mujoco.mj_step1(model, data)
+        mujoco.mj_fullM(model, data, mass)
+        rot = data.xmat[creature.trunk].reshape(3, 3)
+        senses = Senses(
+            data.qpos[None, creature.qpos_adr],
+            data.qvel[None],
+            data.xpos[None, creature.trunk],
+            rot[None],
+            (rot @ data.qvel[3:6])[None],
+            mass[None],
+            (data.qfrc_bias - data.qfrc_passive)[None],
+            last[None],
+        )
+        target = control.target(position, senses)
+        data.qfrc_applied[creature.dof_adr] = control.torque(target, senses, model.opt.timestep)[0]
+        position = control.advance(position, target, senses.joint_pos.copy(), (k + 1) * model.opt.timestep)
+        mujoco.mj_step2(model, data)
+    return np.array(states)
+
+
+@pytest.mark.parametrize("row", [0, 1, 2, 3, 7])
+@pytest.mark.parametrize("advance", ["clock", "error"])
+def test_friction_mass_noise_and_push_reach_the_right_simulation(tiny, trotter, mixed, row, advance):
+    champion = make_champion(
+        tiny, trotter.key_poses, {"steer": 1.0, "roll": 0.3, "pitch_rate": 0.1}, advance=advance, constraint_forces=True
+    )
+    film = simulate(tiny, champion, mixed, 1.0, record=len(mixed)).trajectory
+    want = plain_loop(tiny, champion, mixed, row, 1.0)
+    got = np.concatenate([film.qpos[row], film.qvel[row]], 1)
+    np.testing.assert_allclose(got, want, atol=1e-9)
+
+
+def test_rows_do_not_leak_and_threads_do_not_matter(tiny, trotter, mixed, outcome):
+    three = simulate(tiny, trotter, mixed, SECONDS, record=len(mixed), threads=3)
+    np.testing.assert_array_equal(three.trajectory.qpos, outcome.trajectory.qpos)
+    np.testing.assert_array_equal(three.fell, outcome.fell)
+    for row in range(len(mixed)):
+        alone = simulate(tiny, trotter, mixed.rows(slice(row, row + 1)), SECONDS, record=1)
+        np.testing.assert_array_equal(alone.trajectory.qpos[0], outcome.trajectory.qpos[row])
+
+
+def test_leaving_out_the_fallen_changes_nothing_for_the_others(tiny, trotter, mixed, outcome):
+    dropped = simulate(tiny, trotter, mixed, SECONDS, threads=1)
+    assert 2 <= np.isfinite(dropped.fell).sum() < len(mixed)
+    np.testing.assert_array_equal(dropped.fell, outcome.fell)
+    standing = dropped.stayed_up
+    np.testing.assert_array_equal(dropped.travel[standing], outcome.travel[standing])
+
+
+def test_the_same_again_is_the_same(tiny, trotter, mixed, outcome):
+    again = simulate(tiny, trotter, mixed, SECONDS, record=len(mixed), threads=1)
+    np.testing.assert_array_equal(again.trajectory.qpos, outcome.trajectory.qpos)
+    np.testing.assert_array_equal(again.trajectory.torque, outcome.trajectory.torque)
+
+
+def test_a_standing_creature_stands(tiny):
+    champion = make_champion(tiny)
+    assert simulate(tiny, champion, perturbed_starts(tiny, 6, np.random.default_rng(0)), 2.0).stayed_up.all()
+    assert abs(distance(tiny, champion, 2.0)) < 0.02
+
+
+def test_a_standing_creature_is_carried_by_its_feet_and_does_not_slide(tiny):
+    recording = record(tiny, make_champion(tiny), 2.0).window(1.0)
+    assert recording.foot_force.sum(1) == pytest.approx(tiny.mass * 9.81, rel=0.01)
+    assert recording.contact.all()
+    assert not recording.touch.any()
+    assert recording.foot_slip.max() < 5e-3
+    assert np.abs(recording.foot_height).max() < 2e-3
+    assert recording.trunk_up == pytest.approx(1.0, abs=1e-3)
+
+
+def test_a_walk_survives_and_gets_on(tiny, trotter):
+    assert distance(tiny, trotter, 4.0) > 0.8
+    assert survival(tiny, trotter, starts=6, seconds=4.0) == 1.0
+
+
+def test_slip_is_that_of_the_material_at_the_contact(tiny, trotter):
+    """Against the Jacobian of the contact point."""
+    outcome = simulate(tiny, trotter, nominal_starts(tiny, 1), 1.0, record=1)
+    recording = record(tiny, trotter, 1.0)
+    model, data = examined_model(tiny), mujoco.MjData(examined_model(tiny))
+    jac, seen = np.zeros((3, model.nv)), 0
+    for k in range(0, 200, 7):
+        data.qpos[:], data.qvel[:] = outcome.trajectory.qpos[0, k], outcome.trajectory.qvel[0, k]
+        mujoco.mj_forward(model, data)
+        for contact in data.contact:
+            foot = list(tiny.watched[:4]).index(max(contact.geom))
+            mujoco.mj_jac(model, data, jac, None, contact.pos, model.geom_bodyid[max(contact.geom)])
+            if recording.contact[k, foot]:
+                assert recording.foot_slip[k, foot] == pytest.approx(np.linalg.norm((jac @ data.qvel)[:2]), abs=1e-9)
+                seen += 1
+    assert seen > 20
+
+
+def test_the_recording_looks_along_the_start(tiny, trotter):
+    outcome = simulate(tiny, trotter, nominal_starts(tiny, 1), 2.0, record=1)
+    recording = record(tiny, trotter, 2.0)
+    np.testing.assert_allclose(recording.trunk_pos[:, :2], outcome.trajectory.qpos[0, :, :2], atol=1e-12)
+    np.testing.assert_array_equal(recording.joint_pos, outcome.trajectory.qpos[0][:, tiny.qpos_adr])
+    assert np.abs(recording.torque).max() <= 12.0
+    assert recording.touch.sum() == 0
+
+
+def test_half_the_time_step_has_the_same_frames_and_nearly_the_same_walk(tiny, trotter):
+    whole, halved = record(tiny, trotter, 2.0), record(tiny, trotter, 2.0, refine=2)
+    assert halved.time_step == whole.time_step
+    np.testing.assert_array_equal(halved.position, whole.position)
+    assert halved.trunk_pos[-1, 0] == pytest.approx(whole.trunk_pos[-1, 0], rel=0.5)
+    assert not np.array_equal(halved.joint_pos, whole.joint_pos)
+
+
+def test_a_commanded_heading_turns_the_walk(tiny, trotter):
+    steps = round(3.0 / 0.005)
+    ways = [
+        simulate(tiny, trotter, nominal_starts(tiny, 1), 3.0, record=1, heading=np.full(steps, turn)).trajectory.qpos[0, :, 1]
+        for turn in (-0.5, 0.5)
+    ]
+    assert not np.allclose(*ways)
+
+
+def test_what_lies_on_its_belly_is_down_though_upright(tiny):
+    flat = make_champion(tiny, np.tile([1.0, 1.4], (2, 4)))
+    starts = nominal_starts(tiny, 1)
+    outcome = simulate(tiny, flat, starts, 1.5, record=1)
+    assert np.isfinite(outcome.fell[0])
+    assert simulate(tiny, flat, starts, 1.5, fall=Fall(height=(0.01, 1.5), touch=False)).stayed_up[0]
+
+
+def test_a_simulation_that_blows_up_is_down_and_does_not_come_back(tiny, trotter, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    starts = join(nominal_starts(tiny, 1), pushed_starts(tiny, 1, np.random.default_rng(0), 1e6, (0.2, 0.2)))
+    outcome = simulate(tiny, trotter, starts, 0.6, record=2, threads=1)
+    assert outcome.stayed_up.tolist() == [True, False]
+    assert np.isfinite(outcome.trajectory.qpos[0]).all()
+    assert np.isnan(outcome.trajectory.qpos[1, -1]).all()
+    recording = measure(tiny, trotter, outcome.trajectory, row=1)
+    assert np.isnan(recording.trunk_up[-1])
+    assert recording.touch[-1]
+    # MuJoCo leaves a log where it is run when it meets numbers that are not finite.
+    assert not list(tmp_path.iterdir())
+
+
+def test_perturbations_stay_within_their_bounds(tiny):
+    starts = perturbed_starts(tiny, 500, np.random.default_rng(0))
+    assert np.abs(starts.joint_offset).max() == pytest.approx(0.05, rel=0.01)
+    assert np.abs(starts.joint_velocity).max() == pytest.approx(0.1, rel=0.01)
+    assert (starts.friction.min(), starts.friction.max()) == (pytest.approx(0.8, abs=0.01), pytest.approx(1.2, abs=0.01))
+    assert (starts.mass.min(), starts.mass.max()) == (pytest.approx(0.95, abs=0.001), pytest.approx(1.05, abs=0.001))
+    pushed = pushed_starts(tiny, 64, np.random.default_rng(0), 0.3, (2.0, 10.0))
+    assert np.linalg.norm(pushed.push, axis=1) == pytest.approx(0.3)
+    assert np.abs(pushed.push.mean(0)).max() < 0.02
+    assert pushed.push_time.min() >= 2.0
+    assert pushed.push_time.max() <= 10.0
+
+
+def test_the_examiner_never_imports_jax():
+    code = "import mjxgait.certify, sys; sys.exit(any(name.split('.')[0] in ('jax', 'jaxlib', 'mjx') for name in sys.modules))"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -1,0 +1,178 @@
+"""`mjxgait inspect` tells what a checkpoint holds, quickly, and says clearly what is wrong with one that is not whole."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from inspection_made_up import FORCED, LAST, POPULATION
+
+from mjxgait.cli import main
+from mjxgait.inspect import facts, individual_facts, read_snapshot
+
+
+def tell(capsys, *arguments):
+    """Exit code and what was printed."""
+    with pytest.raises(SystemExit) as ended:
+        main(["inspect", *map(str, arguments)])
+    said = capsys.readouterr()
+    return ended.value.code, said.out + said.err
+
+
+def test_reads_in_under_three_seconds_where_other_devices_are(finished_run):
+    began = time.perf_counter()
+    done = subprocess.run(
+        [sys.executable, "-m", "mjxgait", "inspect", str(finished_run), "--json"],
+        env=os.environ | {"XLA_FLAGS": "--xla_force_host_platform_device_count=3"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert time.perf_counter() - began < 3.0 * (2 if "PYTEST_XDIST_WORKER" in os.environ else 1)
+    assert json.loads(done.stdout)["generation"] == LAST
+
+
+def test_tells_what_it_is(finished_run):
+    found = facts(read_snapshot(finished_run))
+    assert (found["creature"], found["seed"], found["generation"], found["intact"]) == ("tall_quadruped", 11, LAST, True)
+    assert found["settings_changed"]["evolution.population"]["here"] == POPULATION
+    assert "controller.law" not in found["settings_changed"]
+    assert found["versions"] == {"jax": "9.9"}
+    assert found["ended"] == f"all {LAST} generations are done"
+    assert found["checkpoints"][-1] == LAST
+    assert found["bytes"] > 1000
+
+
+def test_contributions_of_the_terms_add_up_to_the_fitness(finished_run):
+    for row in facts(read_snapshot(finished_run))["population"]:
+        assert sum(row["contributions"].values()) == pytest.approx(row["fitness"], abs=1e-5)
+
+
+def test_population_tells_age_and_kind(finished_run):
+    rows = facts(read_snapshot(finished_run))["population"]
+    assert [row["kind"] for row in rows[:4]] == ["crossover", "mutation", "newcomer", "initial"]
+    assert {row["age"] for row in rows} == {1}
+    assert [row["rank"] for row in rows] == list(range(1, POPULATION + 1))
+
+
+def test_diversity_is_the_spread_in_degrees(finished_run):
+    found = facts(read_snapshot(finished_run))["diversity"]
+    assert found["unique"] == POPULATION
+    assert set(np.round(list(found["spread_deg"].values()), 3)) == {round(np.arange(POPULATION).std(), 3)}
+
+
+def test_forced_spells_are_told(finished_run):
+    (spell,) = facts(read_snapshot(finished_run))["forced_spells"]
+    assert (spell["first"], spell["last"]) == (FORCED, FORCED)
+    assert spell["best_after"] > spell["best_before"]
+
+
+def test_an_earlier_generation_and_one_individual(finished_run):
+    early = read_snapshot(finished_run, 1)
+    assert early.generation == 1
+    assert [line["generation"] for line in early.lines] == [0, 1]
+    second = individual_facts(early, 2)
+    moved = second["key_poses_deg"][0]["spine_yaw"] - individual_facts(early, 1)["key_poses_deg"][0]["spine_yaw"]
+    assert moved == pytest.approx(1.0, abs=1e-4)
+
+
+def test_a_checkpoint_folder_names_itself(finished_run):
+    assert read_snapshot(finished_run / "checkpoints" / "2").generation == 2
+
+
+def test_difference_of_two_checkpoints(finished_run, capsys):
+    code, said = tell(capsys, "--diff", finished_run / "checkpoints" / "2", finished_run, "--json")
+    found = json.loads(said)
+    assert code == 0
+    assert found["settings"] == {}
+    assert found["champion_moved_deg"]["spine_yaw"] == pytest.approx([1.0, 1.0], abs=1e-4)
+    assert found["same_individuals"] == POPULATION - 1
+    code, said = tell(capsys, "--diff", finished_run / "checkpoints" / "2", finished_run)
+    assert code == 0
+    assert "+1.0" in said
+
+
+def test_everything_can_be_printed(finished_run, capsys):
+    code, said = tell(capsys, finished_run)
+    assert code == 0
+    for word in ("tall_quadruped, generation 3 of 3", "seed", "intact", "newcomer", "spine_yaw", "forced evolution in generations 2 to 2"):
+        assert word in said
+    assert "…" not in said
+    code, said = tell(capsys, finished_run, "--individual", 2)
+    assert "individual 2" in said
+    assert code == 0
+
+
+def test_a_folder_of_runs_has_one_line_each(run, capsys):
+    broken = shutil.copytree(run, run.parent / "broken")
+    shutil.rmtree(broken / "checkpoints")
+    code, said = tell(capsys, run.parent)
+    assert code == 0
+    assert "3/3" in said
+    assert "cannot be read" in said
+    assert "no checkpoint yet" in said
+
+
+def test_a_run_killed_half_way_is_read_up_to_its_latest_checkpoint(run, capsys):
+    shutil.rmtree(run / "checkpoints" / str(LAST))
+    (run / "checkpoints" / f"{LAST}.orbax-checkpoint-tmp").mkdir()
+    log = run / "metrics.jsonl"
+    log.write_text(log.read_text()[:-30])
+    code, said = tell(capsys, run)
+    assert code == 0
+    assert "not finished" in said
+
+
+@pytest.mark.parametrize(
+    ("damage", "words"),
+    [
+        (lambda run: shutil.rmtree(run / "checkpoints"), "no checkpoint yet"),
+        (lambda run: (run / "config.toml").unlink(), "neither a run folder"),
+        (lambda run: (run / "config.toml").write_text("seed = ["), "not valid TOML"),
+        (lambda run: (run / "checkpoints" / str(LAST) / "manifest" / "metadata").write_text("{"), "damaged"),
+        (lambda run: (run / "creature" / "creature.toml").open("a").write("\n# another body\n"), "another body"),
+    ],
+)
+def test_damaged_and_foreign_folders_end_with_a_sentence(run, capsys, damage, words):
+    damage(run)
+    code, said = tell(capsys, run)
+    assert code == 2
+    assert words in said
+    assert str(run) in said
+
+
+def test_damaged_values_are_noticed_and_the_newest_intact_one_is_named(run, capsys):
+    for file in (run / "checkpoints" / str(LAST) / "state").rglob("d/*"):
+        content = bytearray(file.read_bytes())
+        content[len(content) // 2] ^= 255
+        file.write_bytes(content)
+    code, said = tell(capsys, run)
+    assert code == 2
+    assert f"--generation {LAST - 1}" in said
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--generation", 99], "no checkpoint of generation 99; there are"),
+        (["--individual", 99], "ranks 1 to"),
+        (["--individual", 0], "ranks 1 to"),
+    ],
+)
+def test_what_is_not_there_is_said(finished_run, capsys, arguments, words):
+    code, said = tell(capsys, finished_run, *arguments)
+    assert code == 2
+    assert words in said
+
+
+def test_a_folder_that_is_nothing_of_ours(tmp_path, capsys):
+    code, said = tell(capsys, tmp_path)
+    assert code == 2
+    assert "neither a run folder" in said
+    code, said = tell(capsys, tmp_path / "missing")
+    assert code == 2
+    assert "no such folder" in said

@@ -1,0 +1,170 @@
+"""The genetic algorithm on a toy problem without physics: find the centre of a box."""
+
+import dataclasses
+import itertools
+from collections.abc import Callable
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from mjxgait.config import EvolutionConfig, ForcedConfig
+from mjxgait.evolution import Evolution, EvolutionState, GenerationMetrics, Judged, Origin, parents, stop_reason
+from mjxgait.gait import Genome
+from mjxgait.variation import Box, pose_variation
+
+K, J = 2, 3
+BOX = Box(Genome(-jnp.ones((K, J)), jnp.zeros(1)), Genome(jnp.ones((K, J)), jnp.zeros(1)))
+
+
+def near_zero(genomes: Genome) -> jax.Array:
+    return -jnp.sum(genomes.key_poses**2, axis=(1, 2))
+
+
+def toy(value: Callable[[Genome], jax.Array] = near_zero, **settings) -> Evolution:
+    def judge(genomes: Genome) -> Judged:
+        terms = value(genomes)[:, None, None]
+        return Judged(terms=terms, failed=~jnp.isfinite(terms[..., 0]), sim_steps=jnp.int32(0), computed_steps=jnp.int32(0))
+
+    def rank(terms: jax.Array, generation: jax.Array) -> jax.Array:
+        return jnp.where(jnp.isfinite(terms[..., 0, 0]), terms[..., 0, 0], -jnp.inf)
+
+    config = dataclasses.replace(EvolutionConfig(population=20, generations=30), **settings)
+    return Evolution(config, pose_variation(BOX, config), judge, rank)
+
+
+def run(evolution: Evolution, generations: int = 30, seed: int = 0) -> list[tuple[EvolutionState, GenerationMetrics]]:
+    state, step = evolution.init(jax.random.key(seed), 1, 1), jax.jit(evolution.step)
+    history = []
+    while len(history) < generations:
+        state, metrics = step(state)
+        if state.generation >= 0:
+            history.append((state, metrics))
+    return history
+
+
+def test_the_best_never_falls_and_the_algorithm_finds_the_optimum():
+    best = [float(metrics.best) for _, metrics in run(toy(), 60)]
+    assert all(later >= earlier for earlier, later in itertools.pairwise(best))
+    assert best[-1] > -0.1 > best[0]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_best_survives_forced_evolution_too(seed: int):
+    forced = ForcedConfig(window=1, gain=10.0, refresh=1.0, patience=0)
+    best = [float(metrics.best) for _, metrics in run(toy(forced=forced), 30, seed)]
+    assert all(later >= earlier for earlier, later in itertools.pairwise(best))
+
+
+def test_the_population_is_sorted_and_without_duplicates():
+    for state, metrics in run(toy(mutation_rate=0.2, crossover=1.0)):
+        assert np.all(np.diff(state.fitness) <= 0)
+        assert np.allclose(near_zero(state.genomes), state.fitness)
+        assert int(metrics.unique) == 20
+
+
+def test_duplicates_fill_the_population_when_they_may_stay():
+    last = run(toy(remove_duplicates=False, crossover=0.0, mutation_rate=0.0), 20)[-1][1]
+    assert int(last.unique) < 20
+
+
+@pytest.mark.parametrize("growth", [1.2, 1.5, 2.0, 3.0])
+def test_everybody_of_the_initial_population_is_judged_before_generation_zero(growth: float):
+    evolution = toy(growth=growth)
+    created = evolution.init(jax.random.key(0), 1, 1)
+    first = run(evolution, 1)[0][0]
+    assert int(first.generation) == 0
+    assert np.allclose(first.fitness, np.sort(near_zero(created.genomes))[::-1])
+    assert (first.origin == Origin.INITIAL).all()
+
+
+def test_an_individual_that_cannot_be_judged_loses_and_poisons_nobody():
+    def sometimes(genomes: Genome) -> jax.Array:
+        return jnp.where(genomes.key_poses[:, 0, 0] > 0.3, jnp.nan, near_zero(genomes))
+
+    for state, metrics in run(toy(sometimes), 10)[1:]:
+        assert np.isfinite(state.fitness).all()
+        assert np.isfinite(metrics.mean)
+        assert (state.genomes.key_poses[:, 0, 0] <= 0.3).all()
+
+
+def test_a_population_without_one_good_individual_recovers():
+    def rarely(genomes: Genome) -> jax.Array:
+        return jnp.where(genomes.key_poses[:, 0, 0] < 0.99, jnp.nan, near_zero(genomes))
+
+    history = run(toy(rarely, population=8, mutation="pose"), 80)
+    assert not np.isfinite(history[0][1].best)
+    assert np.isfinite(history[-1][1].best)
+
+
+def flat(genomes: Genome) -> jax.Array:
+    return jnp.zeros(genomes.key_poses.shape[0])
+
+
+def test_stagnation_starts_a_spell_that_refreshes_and_ends():
+    forced = ForcedConfig(window=3, newcomers=0.25, refresh=0.5, limit=2, patience=0)
+    history = run(toy(flat, forced=forced), 16)
+    flags = [bool(metrics.forced) for _, metrics in history]
+    assert flags[:4] == [False] * 4
+    assert flags[4]
+    assert not all(flags[4:7])
+    before, after = history[3][0], history[4][0]
+    assert int(after.refreshed) == 10
+    newborn = after.born == 4
+    assert int(newborn.sum()) == 10
+    assert set(np.asarray(after.origin)[newborn].tolist()) == {Origin.NEWCOMER, Origin.MUTATION}
+    assert float(after.fitness[0]) >= float(before.fitness[0])
+
+
+def test_growth_keeps_forced_evolution_away():
+    forced = ForcedConfig(window=2, gain=0.0, patience=0)
+    assert not any(bool(metrics.forced) for _, metrics in run(toy(forced=forced), 12))
+
+
+def test_unfit_newcomers_are_not_taken_in():
+    forced = ForcedConfig(window=1, gain=10.0, newcomers=1.0, accept=1.0, patience=0)
+    for (before, _), (after, metrics) in zip(history := run(toy(forced=forced), 12), history[1:], strict=False):
+        if metrics.forced:
+            taken = np.asarray(after.born == after.generation)
+            assert (np.asarray(after.fitness)[taken] >= float(before.fitness[0])).all()
+
+
+def test_a_run_stops_when_forced_evolution_no_longer_pays():
+    forced = ForcedConfig(window=2, limit=1, patience=2)
+    evolution = toy(flat, forced=forced)
+    reasons = [stop_reason(state, evolution.config) for state, _ in run(evolution, 25)]
+    assert next(reason for reason in reasons if reason).startswith("forced evolution no longer pays")
+
+
+def test_a_run_stops_at_the_target_and_at_the_cap():
+    state = run(toy(), 1)[0][0]
+    assert "target" in stop_reason(state, EvolutionConfig(target=-100.0))
+    assert "all 0 generations" in stop_reason(state, EvolutionConfig(generations=0))
+    assert stop_reason(state, EvolutionConfig(target=100.0)) is None
+
+
+@pytest.mark.parametrize("selection", ["uniform", "rank", "tournament"])
+def test_parents_are_two_and_the_better_are_drawn_more_often(selection: str):
+    mothers, fathers = parents(jax.random.key(0), 20_000, 10, selection)
+    assert (mothers != fathers).all()
+    counts = np.bincount(np.asarray(mothers), minlength=10) / 20_000
+    expected = np.full(10, 0.1) if selection == "uniform" else (19 - 2 * np.arange(10)) / 100
+    assert np.allclose(counts, expected, atol=0.01)
+
+
+def test_one_generation_is_traced_once():
+    traces = []
+
+    def counted(genomes: Genome) -> jax.Array:
+        traces.append(1)
+        return near_zero(genomes)
+
+    run(toy(counted), 10)
+    assert len(traces) == 1
+
+
+def test_the_same_seed_gives_the_same_run_and_another_seed_another():
+    one, same, other = (run(toy(), 5, seed)[-1][0].genomes.key_poses for seed in (1, 1, 2))
+    assert np.array_equal(one, same)
+    assert not np.array_equal(one, other)

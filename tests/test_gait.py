@@ -1,0 +1,146 @@
+"""The pose cycle against its specification, docs/controller.md."""
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from helpers import small_config
+
+from mjxgait.config import ControllerConfig
+from mjxgait.creature import Creature
+from mjxgait.gait import (
+    PERIOD,
+    PITCH,
+    ROLL,
+    STEER,
+    THRESHOLD,
+    TUNING,
+    GaitState,
+    Genome,
+    PoseTracker,
+    corrections,
+    interpolate,
+    pose_cycle,
+)
+from mjxgait.types import Sensed
+
+
+def random_poses(creature: Creature, count: int = 3) -> np.ndarray:
+    return np.random.default_rng(1).uniform(creature.pose_low, creature.pose_high, (count, len(creature.joint_names))).astype(np.float32)
+
+
+def sensed(creature: Creature, joints: np.ndarray, rotation: np.ndarray | None = None, offset: float = 0.0) -> Sensed:
+    nothing = jnp.zeros(3)
+    return Sensed(
+        joint_pos=jnp.asarray(joints, jnp.float32),
+        joint_vel=jnp.zeros(len(joints)),
+        bias=jnp.zeros(creature.model.nv),
+        trunk_pos=jnp.asarray([*creature.stand_pos, 0, offset, 0], jnp.float32),
+        trunk_rot=jnp.asarray(np.eye(3) if rotation is None else rotation, jnp.float32),
+        trunk_vel=nothing,
+        trunk_angvel=nothing,
+        geom_pos=jnp.zeros((len(creature.watched), 3)),
+        geom_low=jnp.zeros(len(creature.watched)),
+    )
+
+
+def turned(axis: int, angle: float) -> np.ndarray:
+    """Rotation about the world's x, y or z axis."""
+    i, j = [(1, 2), (2, 0), (0, 1)][axis]
+    rotation = np.eye(3)
+    rotation[[i, j], [i, j]] = np.cos(angle)
+    rotation[i, j], rotation[j, i] = -np.sin(angle), np.sin(angle)
+    return rotation
+
+
+def tracker(creature: Creature, **settings) -> PoseTracker:
+    return PoseTracker(creature, dataclasses.replace(ControllerConfig(key_poses=3, interpolation=4), **settings), 0.005)
+
+
+def tuning(**genes: float) -> jax.Array:
+    values = dict.fromkeys(TUNING, 0.0) | {"threshold": 0.1, "period": 0.8} | genes
+    return jnp.array([values[name] for name in TUNING])
+
+
+def test_the_cycle_is_exact_at_the_key_poses_and_their_mirror_images(shipped: Creature):
+    poses = random_poses(shipped)
+    cycle = pose_cycle(shipped, jnp.asarray(poses))
+    mirrored = shipped.sign * poses[:, shipped.partner]
+    for i, pose in enumerate([*poses, *mirrored]):
+        assert np.allclose(interpolate(cycle, jnp.int32(i * 4), 4), pose, atol=1e-6)
+
+
+def test_the_cycle_is_periodic_and_linear_between_neighbours(stool: Creature):
+    cycle = pose_cycle(stool, jnp.asarray(random_poses(stool)))
+    for s in range(24):
+        a, f = s // 4, (s % 4) / 4
+        expected = (1 - f) * np.asarray(cycle[a]) + f * np.asarray(cycle[(a + 1) % 6])
+        assert np.allclose(interpolate(cycle, jnp.int32(s), 4), expected, atol=1e-6)
+        assert np.allclose(interpolate(cycle, jnp.int32(s + 24), 4), expected, atol=1e-5)
+
+
+def test_an_unsymmetric_creature_is_not_mirrored(stool: Creature):
+    settings = dataclasses.replace(stool.settings, mirror=dataclasses.replace(stool.settings.mirror, symmetric=False))
+    lopsided = dataclasses.replace(stool, settings=settings)
+    assert pose_cycle(lopsided, jnp.asarray(random_poses(stool))).shape == (3, 4)
+    assert tracker(lopsided).positions == 12
+
+
+def test_a_blocked_creature_stays_and_a_following_one_moves_on(stool: Creature):
+    control = tracker(stool)
+    cycle = control.prepare(Genome(jnp.asarray(random_poses(stool)), tuning(threshold=0.1)))
+    target = np.asarray(cycle.key_poses[0])
+    _, blocked, _ = control.target(cycle, control.init(), sensed(stool, target + 0.11))
+    _, moved, stride = control.target(cycle, control.init(), sensed(stool, target + 0.09))
+    assert (int(blocked.position), int(moved.position), bool(stride)) == (0, 1, False)
+
+
+def test_a_stride_is_completed_when_the_cycle_begins_anew(stool: Creature):
+    control = tracker(stool)
+    cycle = control.prepare(Genome(jnp.asarray(random_poses(stool)), tuning(threshold=9.0)))
+    state, strides = control.init(), []
+    for _ in range(48):
+        _, state, stride = control.target(cycle, state, sensed(stool, stool.stand))
+        strides.append(bool(stride))
+    assert [i for i, stride in enumerate(strides) if stride] == [23, 47]
+
+
+def test_the_clock_moves_on_whatever_the_creature_does(stool: Creature):
+    control = tracker(stool, advance="clock")
+    cycle = control.prepare(Genome(jnp.asarray(random_poses(stool)), tuning(period=0.8)))
+    state = GaitState(jnp.int32(0), jnp.float32(0.395))
+    _, state, _ = control.target(cycle, state, sensed(stool, stool.stand + 1))
+    assert int(state.position) == 12
+
+
+@pytest.mark.parametrize(
+    ("gene", "rotation", "offset", "expected"),
+    [
+        (STEER, turned(2, 0.2), 0.0, ("steer_bend", 0.2)),
+        (STEER, None, 0.1, ("steer_bend", 0.1)),
+        (PITCH, turned(1, 0.2), 0.0, ("balance_pitch", 0.2)),
+        (ROLL, turned(0, 0.2), 0.0, ("balance_roll", 0.2)),
+        (STEER, turned(2, 2.0), 0.0, ("steer_bend", 0.5)),
+    ],
+    ids=["turned left", "left of the line", "nose down", "right side down", "never more than half a radian"],
+)
+def test_signs_of_the_corrections(stool: Creature, gene: int, rotation: np.ndarray | None, offset: float, expected: tuple[str, float]):
+    weight = {expected[0]: np.array([1.0, 0, 0, 0])}
+    creature = dataclasses.replace(stool, **weight, body_length=0.5)
+    genes = jnp.zeros(len(TUNING)).at[gene].set(1.0)
+    change = corrections(creature, genes, jnp.asarray(stool.stand, jnp.float32), sensed(stool, stool.stand, rotation, offset))
+    assert np.allclose(change, [expected[1], 0, 0, 0], atol=1e-5)
+
+
+def test_without_genes_there_is_no_correction(shipped: Creature):
+    tipped = sensed(shipped, shipped.stand, turned(0, 0.3) @ turned(2, 0.4), 0.3)
+    assert not np.any(corrections(shipped, tuning(), jnp.asarray(shipped.stand + 0.2, jnp.float32), tipped))
+
+
+def test_genes_and_bounds_have_the_order_of_the_config(stool: Creature):
+    low, high = PoseTracker(stool, small_config().controller, 0.005).bounds()
+    assert (TUNING[THRESHOLD], TUNING[PERIOD], TUNING[STEER]) == ("threshold", "period", "steer")
+    assert np.allclose(low.key_poses, stool.pose_low)
+    assert bool(jnp.all(low.tuning <= high.tuning))

@@ -1,0 +1,81 @@
+"""The operators: offspring stay inside the box, and their genes come from where the operator says."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from mjxgait import variation
+from mjxgait.config import EvolutionConfig
+from mjxgait.gait import Genome
+from mjxgait.variation import Box, first_occurrence, pose_variation
+
+K, J, E = 3, 5, 7
+BOX = Box(
+    Genome(-jnp.ones((K, J)) * jnp.arange(1, J + 1), jnp.zeros(E)),
+    Genome(jnp.ones((K, J)) * jnp.arange(1, J + 1), jnp.ones(E).at[0].set(0.0)),
+)
+
+
+def keys(count: int) -> jax.Array:
+    return jax.random.split(jax.random.key(0), count)
+
+
+def inside(genomes: Genome) -> bool:
+    pairs = zip(jax.tree.leaves(BOX.low), jax.tree.leaves(genomes), jax.tree.leaves(BOX.high), strict=True)
+    return all(bool(jnp.all((low <= leaf) & (leaf <= high))) for low, leaf, high in pairs)
+
+
+@pytest.mark.parametrize("initial", ["uniform", "latin"])
+def test_initial_genomes_fill_the_box(initial: str):
+    genomes = pose_variation(BOX, EvolutionConfig(initial=initial)).create(jax.random.key(1), 200)
+    assert genomes.key_poses.shape == (200, K, J)
+    assert inside(genomes)
+    share = (genomes.key_poses - BOX.low.key_poses) / (BOX.high.key_poses - BOX.low.key_poses)
+    assert np.allclose(jnp.mean(share, axis=0), 0.5, atol=0.1)
+    assert np.allclose(jnp.std(share, axis=0), 12**-0.5, atol=0.05)
+
+
+def test_a_latin_hypercube_has_one_value_in_each_slice():
+    genomes = variation.latin_hypercube(jax.random.key(1), BOX, 50)
+    share = (genomes.key_poses - BOX.low.key_poses) / (BOX.high.key_poses - BOX.low.key_poses)
+    slices = np.sort(np.floor(np.asarray(share).reshape(50, -1) * 50), axis=0)
+    assert (slices == np.arange(50)[:, None]).all()
+
+
+@pytest.mark.parametrize("crossing", ["permute", "align"])
+def test_every_pose_of_a_child_is_one_of_a_parent(crossing: str):
+    mother, father = (jax.tree.map(lambda leaf: leaf[0], variation.uniform(key, BOX, 1)) for key in keys(2))
+    cross = pose_variation(BOX, EvolutionConfig(crossing=crossing)).cross
+    children = jax.vmap(cross, in_axes=(0, None, None))(keys(100), mother, father)
+    both = np.concatenate([mother.key_poses, father.key_poses])
+    places = np.array([[np.flatnonzero((both == pose).all(axis=1))[0] for pose in child] for child in np.asarray(children.key_poses)])
+    assert set(places.ravel()) == set(range(2 * K))
+    if crossing == "permute":
+        assert all(len(set(row)) == K for row in places)
+    else:
+        assert (places % K == np.arange(K)).all()
+    assert np.all((children.tuning == mother.tuning) | (children.tuning == father.tuning))
+
+
+@pytest.mark.parametrize(("mutation", "changed"), [("redraw", 2), ("single", 1), ("pose", J), ("gaussian", J)])
+def test_mutation_changes_one_pose_and_as_many_joints_as_its_kind_says(mutation: str, changed: int):
+    genome = Genome(jnp.zeros((K, J)), jnp.full(E, 0.5).at[0].set(0.0))
+    mutate = pose_variation(BOX, EvolutionConfig(mutation=mutation, tuning_rate=0.0)).mutate
+    mutants = jax.vmap(mutate, in_axes=(0, None))(keys(100), genome)
+    differs = np.asarray(mutants.key_poses != genome.key_poses)
+    assert (differs.any(axis=2).sum(axis=1) == 1).all()
+    assert (differs.sum(axis=(1, 2)) == changed).all()
+    assert inside(mutants)
+    assert np.all(mutants.tuning == genome.tuning)
+
+
+def test_mutation_never_leaves_the_box():
+    edge = BOX.high
+    mutate = pose_variation(BOX, EvolutionConfig(sigma=3.0, tuning_rate=1.0, tuning_sigma=3.0)).mutate
+    assert inside(jax.vmap(mutate, in_axes=(0, None))(keys(200), edge))
+
+
+def test_duplicates_are_all_but_the_first_of_equal_genomes():
+    rows = jnp.array([[1.0, 2], [3, 4], [1, 2], [1, 2.0001], [3, 4], [1, 2]])
+    assert first_occurrence({"a": rows[:, :1], "b": rows[:, 1:]}).tolist() == [True, True, False, True, False, False]
