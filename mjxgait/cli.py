@@ -1,157 +1,44 @@
 """The command line: `mjxgait SUBCOMMAND`; `scripts/*.py` are thin over it."""
 
-import argparse
-import dataclasses
 import importlib
 import sys
-from collections.abc import Callable, Sequence
-from pathlib import Path
-from typing import Annotated
+from collections.abc import Sequence
 
-import tyro
+from mjxgait.errors import INTERRUPTED, UserError, did_you_mean
 
-from mjxgait.config import Config, data_folder, find_creature, resolve_config
-from mjxgait.creature import Creature, load_creature
-from mjxgait.errors import UserError, did_you_mean
-from mjxgait.folder import create_run, open_run
-from mjxgait.tables import build, merge
-
-INTERRUPTED = 130
+COMMANDS = {
+    "train": "evolve a walk: mjxgait train --env tall_quadruped",
+    "certify": "examine a champion in C MuJoCo: mjxgait certify RUN",
+    "inspect": "tell what a run or a checkpoint holds: mjxgait inspect RUN",
+    "plot": "draw a run: fitness, footfalls, joints, a filmstrip: mjxgait plot RUN",
+    "render": "make a video of a walk or a race: mjxgait render RUN --out walk.webp",
+    "envs": "list the shipped creatures and configs",
+}
+"""Each lives in mjxgait/commands/<name>.py as `<name>_command` and is imported only when it is called."""
 
 USAGE = """usage: mjxgait SUBCOMMAND [options]
 
 Evolve a stable walk for any creature.
 
-  train    evolve a walk: mjxgait train --env tall_quadruped
-  envs     list the shipped creatures and configs
-  inspect  tell what a run or a checkpoint holds: mjxgait inspect RUN
+{commands}
 
 `mjxgait SUBCOMMAND --help` tells the options of each."""
 
 
-@dataclasses.dataclass(frozen=True)
-class TrainOptions:
-    """Evolve a walk for a creature.
-
-    Settings come in layers, each over the one before: configs/default.toml, the creature's own [train] table, the file of --config, and
-    the options given here. Every key of the config is an option.
-
-    Attributes:
-      env: Name of a shipped creature, or path of a creature folder.
-      config: TOML file with settings, or the name of a shipped config such as wilson.
-      out: Folder for the run; by default a new one under runs/.
-      resume: Run folder to go on with; its own creature and settings are used, only --generations and --evolution.target may differ.
-      generation: With --resume: the checkpoint to go on from instead of the latest.
-      population: Short for --evolution.population.
-      generations: Short for --evolution.generations.
-      settings: The config, key by key.
-    """
-
-    env: str = "tall_quadruped"
-    config: str | None = None
-    out: Path | None = None
-    resume: Path | None = None
-    generation: int | None = None
-    population: int | None = None
-    generations: int | None = None
-    settings: Annotated[Config, tyro.conf.arg(name="")] = dataclasses.field(default_factory=Config)
-
-
-@dataclasses.dataclass(frozen=True)
-class _NoOptions:
-    """List the shipped creatures and configs."""
-
-
-def train_command(arguments: Sequence[str]) -> int:
-    """`mjxgait train`; returns the exit code."""
-    creature, default = _layers(arguments)
-    options = tyro.cli(TrainOptions, args=list(arguments), prog="mjxgait train", default=TrainOptions(settings=default))
-    config = _settings(options)
-    from mjxgait import run  # JAX takes a second to import: only once the options are known to be good
-    from mjxgait.experiment import prepare_devices
-    from mjxgait.screen import Screen
-
-    if options.resume:
-        if _without_ends(config) != _without_ends(default):
-            raise UserError(f"{options.resume}: a resumed run keeps its settings; only --generations and --evolution.target may differ")
-        folder = options.resume
-    else:
-        folder = options.out or _new_folder(creature.name, config.seed)
-        create_run(folder, creature, config)
-    prepare_devices()
-    ended = run.train(folder, creature, config, Screen(), resume=options.resume is not None, generation=options.generation)
-    return 0 if ended else INTERRUPTED
-
-
-def envs_command(arguments: Sequence[str]) -> int:
-    """`mjxgait envs`; returns the exit code."""
-    tyro.cli(_NoOptions, args=list(arguments), prog="mjxgait envs")
-    for folder in sorted(data_folder("envs").glob("*/creature.toml")):
-        print(f"{folder.parent.name:20} {load_creature(folder.parent).settings.creature.description}")
-    for file in sorted(data_folder("configs").glob("*.toml")):
-        print(f"{file.stem:20} {file.read_text(encoding='utf-8').splitlines()[0].lstrip('# ')}")
-    return 0
-
-
-def _in_its_module(name: str) -> Callable[[Sequence[str]], int]:
-    """A subcommand in mjxgait/commands/, imported only when it is called."""
-    return lambda arguments: getattr(importlib.import_module(f"mjxgait.commands.{name}"), f"{name}_command")(arguments)
-
-
-COMMANDS: dict[str, Callable[[Sequence[str]], int]] = {
-    "train": train_command,
-    "envs": envs_command,
-    "inspect": _in_its_module("inspect"),
-}
-
-
 def main(arguments: Sequence[str] | None = None) -> None:
     """The console command. Exit codes: 0 done, 2 a mistake in what was given, 130 interrupted."""
-    name, *rest = [*(sys.argv[1:] if arguments is None else arguments), ""]
-    rest = rest[:-1]
-    if name in ("", "-h", "--help"):
-        print(USAGE)
-        sys.exit(0 if name else 2)
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    if not given or given[0] in ("-h", "--help"):
+        print(USAGE.format(commands="\n".join(f"  {name:8} {what}" for name, what in COMMANDS.items())))
+        sys.exit(0 if given else 2)
     try:
-        if name not in COMMANDS:
-            raise UserError(f'unknown subcommand "{name}"; {did_you_mean(name, COMMANDS)}')
-        sys.exit(COMMANDS[name](rest))
+        if given[0] not in COMMANDS:
+            raise UserError(f'unknown subcommand "{given[0]}"; {did_you_mean(given[0], COMMANDS)}')
+        module = importlib.import_module(f"mjxgait.commands.{given[0]}")
+        sys.exit(getattr(module, f"{given[0]}_command")(given[1:]))
     except UserError as error:
         print(f"mjxgait: {error}", file=sys.stderr)
         sys.exit(2)
     except KeyboardInterrupt:
         print("mjxgait: interrupted", file=sys.stderr)
         sys.exit(INTERRUPTED)
-
-
-def _layers(arguments: Sequence[str]) -> tuple[Creature, Config]:
-    """The creature and the settings below the options: they decide what the options' defaults are."""
-    early = argparse.ArgumentParser(add_help=False, allow_abbrev=False, exit_on_error=False)
-    for name in ("--env", "--config", "--resume"):
-        early.add_argument(name, nargs="?")
-    try:
-        given, _ = early.parse_known_args(list(arguments))
-    except argparse.ArgumentError as error:
-        raise UserError(str(error)) from None
-    if given.resume:
-        return open_run(Path(given.resume))
-    creature = load_creature(find_creature(given.env or TrainOptions.env))
-    return creature, resolve_config(creature.settings.train, creature.name, Path(given.config) if given.config else None)
-
-
-def _settings(options: TrainOptions) -> Config:
-    """The config with the short options laid over it, checked again: the options are typed but their ranges are not."""
-    short = {"population": options.population, "generations": options.generations}
-    table = {"evolution": {key: value for key, value in short.items() if value is not None}}
-    return build(Config, merge(dataclasses.asdict(options.settings), table), "the options")
-
-
-def _without_ends(config: Config) -> Config:
-    """The settings that decide what a generation computes."""
-    return dataclasses.replace(config, evolution=dataclasses.replace(config.evolution, generations=0, target=None))
-
-
-def _new_folder(creature: str, seed: int) -> Path:
-    """The first folder under runs/ that is not there yet."""
-    names = (f"{creature}-seed{seed}{suffix}" for suffix in ("", *(f"-{i}" for i in range(2, 10_000))))
-    return next(folder for name in names if not (folder := Path("runs") / name).exists())

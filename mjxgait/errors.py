@@ -4,6 +4,10 @@ import difflib
 from collections.abc import Iterable
 
 
+INTERRUPTED = 130
+"""Exit code of a run that the user interrupted."""
+
+
 class UserError(Exception):
     """A mistake in what the user gave: one sentence that names the thing and the way out. The command line exits with code 2."""
 

@@ -9,7 +9,8 @@ from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import UserError
 from mjxgait.tables import build, dump_toml, read_toml
 
-CONFIG, CREATURE, METRICS, CHAMPION, PLOT = "config.toml", "creature", "metrics.jsonl", "champion.json", "fitness.png"
+CONFIG, CREATURE, METRICS, CHAMPION = "config.toml", "creature", "metrics.jsonl", "champion.json"
+CERTIFICATE, PLOT = "certificate.json", "fitness.png"
 
 
 def create_run(folder: Path, creature: Creature, config: Config) -> None:

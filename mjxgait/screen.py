@@ -11,6 +11,7 @@ from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.status import Status
 from rich.table import Table
 
+from mjxgait.certify import Certificate
 from mjxgait.folder import CHAMPION, CONFIG, CREATURE, METRICS, PLOT
 
 
@@ -65,6 +66,18 @@ class Screen:
         if self._status:
             self._status.stop()
             self._status = None
+
+    def certificate(self, certificate: Certificate) -> None:
+        """The verdict, measure by measure."""
+        table = Table(*("criterion", "measure", "value", "threshold", ""), box=None, pad_edge=False)
+        for row in certificate.rows():
+            table.add_row(*row, style="bold" if row[-1] == "FAIL" else None)
+        self.console.print(table)
+        verdict = "Certified: it walks" if certificate.passed else "Not certified"
+        report = certificate.report
+        self.console.print(
+            f"{verdict} (margin {certificate.margin:.2f}). {report['gait']}, {report['speed']:.2f} m/s; {certificate.seconds:.0f} s."
+        )
 
     def report(self, folder: Path, why: str, last: Mapping[str, Any], seconds: float, interrupted: bool) -> None:
         """The table at the end: how it went and where everything is. last: the last line of the metrics."""

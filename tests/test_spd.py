@@ -40,7 +40,8 @@ def moment(stool: Creature) -> dict[str, np.ndarray]:
 def test_agrees_with_the_paper_in_float64(stool: Creature, moment: dict, force: float, limit: float):
     constraint = force * np.linspace(-1, 1, stool.model.nv)
     target = np.array([0.3, -0.2, 0.1, 0.4])
-    arguments = (moment["mass"], moment["bias"], moment["q"], moment["v"], target, stool.kp, stool.kd, np.full(4, limit), 0.005, stool.dof_adr)
+    state, limits = (moment["mass"], moment["bias"], moment["q"], moment["v"]), np.full(4, limit)
+    arguments = (*state, target, stool.kp, stool.kd, limits, 0.005, stool.dof_adr)
     torque = stable_pd(*(jnp.asarray(a) for a in arguments), constraint)
     assert np.allclose(torque, reference(*arguments, constraint), rtol=2e-4, atol=2e-4)
 

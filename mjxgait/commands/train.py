@@ -1,0 +1,97 @@
+"""`mjxgait train`: evolve a walk."""
+
+import argparse
+import dataclasses
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from mjxgait.config import Config, find_creature, resolve_config
+from mjxgait.creature import Creature, load_creature
+from mjxgait.errors import INTERRUPTED, UserError
+from mjxgait.folder import create_run, open_run
+from mjxgait.tables import build, merge
+
+
+@dataclasses.dataclass(frozen=True)
+class TrainOptions:
+    """Evolve a walk for a creature.
+
+    Settings come in layers, each over the one before: configs/default.toml, the creature's own [train] table, the file of --config, and
+    the options given here. Every key of the config is an option.
+
+    Attributes:
+      env: Name of a shipped creature, or path of a creature folder.
+      config: TOML file with settings, or the name of a shipped config such as wilson.
+      out: Folder for the run; by default a new one under runs/.
+      resume: Run folder to go on with; its own creature and settings are used, only --generations and --evolution.target may differ.
+      generation: With --resume: the checkpoint to go on from instead of the latest.
+      population: Short for --evolution.population.
+      generations: Short for --evolution.generations.
+      settings: The config, key by key.
+    """
+
+    env: str = "tall_quadruped"
+    config: str | None = None
+    out: Path | None = None
+    resume: Path | None = None
+    generation: int | None = None
+    population: int | None = None
+    generations: int | None = None
+    settings: Annotated[Config, tyro.conf.arg(name="")] = dataclasses.field(default_factory=Config)
+
+
+def train_command(arguments: Sequence[str]) -> int:
+    """Returns the exit code."""
+    creature, default = _layers(arguments)
+    options = tyro.cli(TrainOptions, args=list(arguments), prog="mjxgait train", default=TrainOptions(settings=default))
+    config = _settings(options)
+    from mjxgait import run  # JAX takes a second to import: only once the options are known to be good
+    from mjxgait.experiment import prepare_devices
+    from mjxgait.screen import Screen
+
+    if options.resume:
+        if _without_ends(config) != _without_ends(default):
+            raise UserError(f"{options.resume}: a resumed run keeps its settings; only --generations and --evolution.target may differ")
+        folder = options.resume
+    else:
+        folder = options.out or _new_folder(creature.name, config.seed)
+        create_run(folder, creature, config)
+    prepare_devices()
+    ended = run.train(folder, creature, config, Screen(), resume=options.resume is not None, generation=options.generation)
+    return 0 if ended else INTERRUPTED
+
+
+def _layers(arguments: Sequence[str]) -> tuple[Creature, Config]:
+    """The creature and the settings below the options: they decide what the options' defaults are."""
+    early = argparse.ArgumentParser(add_help=False, allow_abbrev=False, exit_on_error=False)
+    for name in ("--env", "--config", "--resume"):
+        early.add_argument(name, nargs="?")
+    try:
+        given, _ = early.parse_known_args(list(arguments))
+    except argparse.ArgumentError as error:
+        raise UserError(str(error)) from None
+    if given.resume:
+        return open_run(Path(given.resume))
+    creature = load_creature(find_creature(given.env or TrainOptions.env))
+    return creature, resolve_config(creature.settings.train, creature.name, Path(given.config) if given.config else None)
+
+
+def _settings(options: TrainOptions) -> Config:
+    """The config with the short options laid over it, checked again: the options are typed but their ranges are not."""
+    short = {"population": options.population, "generations": options.generations}
+    table = {"evolution": {key: value for key, value in short.items() if value is not None}}
+    return build(Config, merge(dataclasses.asdict(options.settings), table), "the options")
+
+
+def _without_ends(config: Config) -> Config:
+    """The settings that decide what a generation computes."""
+    return dataclasses.replace(config, evolution=dataclasses.replace(config.evolution, generations=0, target=None))
+
+
+def _new_folder(creature: str, seed: int) -> Path:
+    """The first folder under runs/ that is not there yet."""
+    names = (f"{creature}-seed{seed}{suffix}" for suffix in ("", *(f"-{i}" for i in range(2, 10_000))))
+    return next(folder for name in names if not (folder := Path("runs") / name).exists())

@@ -1,0 +1,148 @@
+"""Checkpoints: whole or refused, each refusal with a way out."""
+
+import dataclasses
+import json
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from test_evolution import toy
+
+from mjxgait.checkpoint import FOLDER, Checkpoints
+from mjxgait.errors import UserError
+from mjxgait.evolution import EvolutionState
+
+DIGEST = "0123456789abcdef"
+
+
+@pytest.fixture(scope="module")
+def evolution():
+    return toy()
+
+
+@pytest.fixture(scope="module")
+def states(evolution) -> list[EvolutionState]:
+    """The states of generations 0 to 6."""
+    state, step = evolution.init(jax.random.key(0), 1, 1), jax.jit(evolution.step)
+    found = []
+    for _ in range(7):
+        state, _ = step(state)
+        found.append(state)
+    return found
+
+
+@pytest.fixture
+def run(tmp_path: Path, states: list[EvolutionState]) -> Path:
+    """A run folder with the checkpoints of generations 0 to 6, of which every third is kept."""
+    checkpoints = Checkpoints(tmp_path, keep_every=3)
+    for state in states:
+        checkpoints.save(state, "toy", DIGEST)
+    checkpoints.close()
+    return tmp_path
+
+
+def restore(run: Path, evolution, digest: str = DIGEST, **where) -> EvolutionState:
+    return Checkpoints(run).restore(jax.eval_shape(lambda: evolution.init(jax.random.key(0), 1, 1)), digest, **where)
+
+
+def test_the_latest_three_and_every_third_are_kept(run: Path):
+    assert Checkpoints(run).generations() == [0, 3, 4, 5, 6]
+
+
+def test_what_comes_back_is_what_was_saved_to_the_bit(run: Path, states: list[EvolutionState], evolution):
+    for wanted, generation in ((states[6], None), (states[3], 3)):
+        found = restore(run, evolution, generation=generation)
+        for a, b in zip(jax.tree.leaves(found), jax.tree.leaves(wanted), strict=True):
+            if jnp.issubdtype(a.dtype, jax.dtypes.prng_key):
+                a, b = jax.random.key_data(a), jax.random.key_data(b)
+            assert a.dtype == b.dtype
+            assert np.array_equal(a, b)
+
+
+def test_the_restored_key_goes_on_where_the_saved_one_was(run: Path, states: list[EvolutionState], evolution):
+    step = jax.jit(evolution.step)
+    assert np.array_equal(step(restore(run, evolution))[0].fitness, step(states[6])[0].fitness)
+
+
+def corrupt(run: Path, generation: int) -> None:
+    """Flips bytes in the middle of the largest file of a checkpoint."""
+    largest = max((run / FOLDER / str(generation) / "state").rglob("*"), key=lambda path: path.stat().st_size if path.is_file() else 0)
+    data = bytearray(largest.read_bytes())
+    middle = len(data) // 2
+    data[middle : middle + 16] = bytes(16 * [255])
+    largest.write_bytes(data)
+
+
+def test_a_damaged_checkpoint_is_refused_and_the_newest_intact_one_offered(run: Path, evolution):
+    corrupt(run, 6)
+    corrupt(run, 5)
+    with pytest.raises(UserError, match=r"checkpoints/6: the checkpoint is damaged .*generation 4 is intact: add --generation 4"):
+        restore(run, evolution)
+
+
+def test_a_cut_off_checkpoint_is_refused(run: Path, evolution):
+    for path in (run / FOLDER / "6" / "state").rglob("*"):
+        if path.is_file():
+            path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    with pytest.raises(UserError, match="damaged"):
+        restore(run, evolution)
+
+
+def test_values_changed_by_hand_are_noticed(run: Path, evolution):
+    """Even where the storage format has no reason to complain: the manifest knows the values."""
+    manifest = run / FOLDER / "6" / "manifest" / "metadata"
+    manifest.write_text(json.dumps(json.loads(manifest.read_text()) | {"arrays": "0" * 64}))
+    with pytest.raises(UserError, match="not those that were written"):
+        restore(run, evolution)
+
+
+def test_another_body_is_refused(run: Path, evolution):
+    with pytest.raises(UserError, match="belongs to another body than toy as it is now"):
+        restore(run, evolution, digest="f" * 16)
+
+
+def test_another_schema_is_refused(run: Path, evolution):
+    manifest = run / FOLDER / "6" / "manifest" / "metadata"
+    manifest.write_text(json.dumps(json.loads(manifest.read_text()) | {"schema": 99}))
+    with pytest.raises(UserError, match="written with schema 99, this version reads 1"):
+        restore(run, evolution)
+
+
+def test_other_settings_are_refused_with_the_array_that_differs(run: Path):
+    with pytest.raises(UserError, match=r"does not fit the settings of this run: born is \(\(20,\), 'int32'\)"):
+        restore(run, toy(population=12))
+
+
+def test_a_generation_that_is_not_there_lists_those_that_are(run: Path, evolution):
+    with pytest.raises(UserError, match="no checkpoint of generation 2; there are 0, 3, 4, 5, 6"):
+        restore(run, evolution, generation=2)
+
+
+def test_a_run_without_checkpoints_says_so(tmp_path: Path, evolution):
+    with pytest.raises(UserError, match="no checkpoint to resume from"):
+        restore(tmp_path, evolution)
+
+
+def test_a_half_written_checkpoint_does_not_count(run: Path, evolution):
+    """A kill during a save leaves a temporary folder, which is not a checkpoint."""
+    (run / FOLDER / "7.orbax-checkpoint-tmp-123").mkdir()
+    assert Checkpoints(run).generations()[-1] == 6
+    assert int(restore(run, evolution).generation) == 6
+
+
+def test_a_disk_that_refuses_is_one_sentence(tmp_path: Path, states: list[EvolutionState], monkeypatch: pytest.MonkeyPatch):
+    checkpoints = Checkpoints(tmp_path)
+
+    def full(*_: object, **__: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(checkpoints._manager, "save", full)
+    with pytest.raises(UserError, match="No space left on device.*make room and go on with --resume"):
+        checkpoints.save(states[0], "toy", DIGEST)
+
+
+def test_a_state_is_a_pytree_that_holds_everything(states: list[EvolutionState]):
+    assert {field.name for field in dataclasses.fields(EvolutionState)} >= {"key", "genomes", "terms", "forced", "best_history"}
+    assert all(hasattr(leaf, "dtype") for leaf in jax.tree.leaves(states[0]))

@@ -1,0 +1,202 @@
+"""Episodes on lanes: the verdict on a genome depends on nothing but the genome and the start."""
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+import pytest
+from helpers import small_config
+
+from mjxgait.config import Config
+from mjxgait.creature import Creature
+from mjxgait.experiment import Experiment, build_experiment
+from mjxgait.fitness import REWARDS, TERMS, fitness_terms, score, stride_limit, weight_vector
+from mjxgait.gait import Genome
+from mjxgait.rollout import Episodes
+from mjxgait.starts import NEVER, Starts, draw_starts
+from mjxgait.tally import Reason
+from mjxgait.variation import Box, uniform
+
+
+def genomes(experiment: Experiment, count: int, seed: int = 0) -> Genome:
+    return uniform(jax.random.key(seed), Box(*experiment.simulator.tracker.bounds()), count)
+
+
+def with_lanes(experiment: Experiment, lanes: int, devices: int) -> Experiment:
+    mesh = jax.sharding.Mesh(np.array(jax.devices()[:devices]), ("lanes",))
+    return dataclasses.replace(experiment, simulator=dataclasses.replace(experiment.simulator, lanes=lanes, mesh=mesh))
+
+
+def simulate(experiment: Experiment, population: Genome, starts: Starts | None = None) -> Episodes:
+    return jax.device_get(jax.jit(experiment.simulator.simulate)(population, starts or experiment.starts))
+
+
+@pytest.fixture(scope="module")
+def experiment(stool: Creature) -> Experiment:
+    return build_experiment(stool, small_config(rollout={"lanes": 3}))
+
+
+@pytest.fixture(scope="module")
+def episodes(experiment: Experiment) -> Episodes:
+    return simulate(experiment, genomes(experiment, 7))
+
+
+def test_every_genome_is_judged_on_every_start(experiment: Experiment, episodes: Episodes):
+    assert episodes.tally.steps.shape == (7, 2)
+    assert (episodes.tally.steps > 0).all()
+    finished = episodes.tally.reason == Reason.FINISHED
+    assert (episodes.tally.steps[finished] == experiment.simulator.steps).all()
+    assert episodes.computed_steps >= episodes.tally.steps.sum()
+
+
+@pytest.mark.parametrize(("lanes", "devices"), [(1, 1), (5, 2), (64, 1)])
+def test_results_do_not_depend_on_lanes_or_devices(experiment: Experiment, episodes: Episodes, lanes: int, devices: int):
+    """Other batch sizes may round differently in float32; half a second of simulation keeps that below a tenth of a millimetre."""
+    other = simulate(with_lanes(experiment, lanes, devices), genomes(experiment, 7))
+    assert np.allclose(other.tally.forward, episodes.tally.forward, atol=1e-4)
+    assert (other.tally.steps == episodes.tally.steps).all()
+
+
+def test_the_order_of_results_is_the_order_of_the_genomes(experiment: Experiment, episodes: Episodes):
+    backwards = simulate(experiment, jax.tree.map(lambda leaf: leaf[::-1], genomes(experiment, 7)))
+    assert np.allclose(backwards.tally.forward[::-1], episodes.tally.forward, atol=1e-4)
+
+
+def test_a_bad_individual_does_not_touch_its_neighbours(experiment: Experiment, episodes: Episodes):
+    population = genomes(experiment, 7)
+    poisoned = dataclasses.replace(population, key_poses=population.key_poses.at[3].set(jnp.nan))
+    found = simulate(experiment, poisoned)
+    assert (found.tally.reason[3] == Reason.NONFINITE).all()
+    others = [0, 1, 2, 4, 5, 6]
+    assert np.allclose(found.tally.forward[others], episodes.tally.forward[others], atol=1e-4)
+
+
+def test_not_finite_means_the_lowest_score(experiment: Experiment):
+    population = genomes(experiment, 7)
+    poisoned = dataclasses.replace(population, key_poses=population.key_poses.at[2].set(jnp.nan))
+    judged = jax.jit(experiment.evolution.judge)(poisoned)
+    fitness = experiment.evolution.rank(judged.terms, jnp.int32(0))
+    assert np.isneginf(fitness[2])
+    assert np.isfinite(np.delete(fitness, 2)).all()
+
+
+def start_at(experiment: Experiment, height: float = 0.0, roll: float = 0.0) -> Starts:
+    """The starts with the trunk moved up and rolled over."""
+    starts = experiment.starts
+    qpos = starts.qpos.at[:, 2].add(height).at[:, 3:5].set(jnp.array([np.cos(roll / 2), np.sin(roll / 2)]))
+    return dataclasses.replace(starts, qpos=qpos)
+
+
+@pytest.mark.parametrize(
+    ("start", "reason"),
+    [
+        ({"height": 1.0, "roll": 2.5}, Reason.TIPPED),
+        ({"height": 0.3}, Reason.TOO_HIGH),
+        ({"height": -0.2}, Reason.TOO_LOW),
+        ({"height": -0.1}, Reason.TOUCHED),
+    ],
+)
+def test_an_episode_ends_at_once_and_says_why(experiment: Experiment, start: dict, reason: Reason):
+    found = simulate(experiment, genomes(experiment, 7), start_at(experiment, **start)).tally
+    assert (found.reason == reason).all()
+    assert (found.steps == 0).all()
+    assert (found.forward == 0).all()
+
+
+def test_death_freezes_the_tally(experiment: Experiment, stool: Creature):
+    """A longer episode adds nothing to an individual that has died."""
+    long = build_experiment(stool, small_config(rollout={"lanes": 3, "seconds": 0.8}))
+    population = genomes(long, 7)
+    starts = dataclasses.replace(experiment.starts, qvel=experiment.starts.qvel.at[:, 3].set(10.0))
+    first, second = simulate(experiment, population, starts).tally, simulate(long, population, starts).tally
+    died = np.asarray(first.reason != Reason.FINISHED)
+    assert died.any()
+    for before, after in zip(jax.tree.leaves(first), jax.tree.leaves(second), strict=True):
+        assert np.allclose(np.asarray(before)[died], np.asarray(after)[died], rtol=1e-3, atol=1e-4)
+
+
+def test_the_first_start_is_nominal_and_the_others_are_not(stool: Creature):
+    config = small_config(rollout={"starts": 5, "seconds": 2.0})
+    starts = draw_starts(jax.random.key(3), stool, config.rollout)
+    assert np.allclose(starts.qpos[0], stool.stand_qpos)
+    assert not starts.qvel[0].any()
+    assert float(starts.friction[0]) == 1.0
+    assert int(starts.push_step[0]) == NEVER
+    noise = np.asarray(starts.qpos[1:, stool.qpos_adr] - stool.stand)
+    assert 0.02 < np.abs(noise).max() <= 0.05
+    assert np.allclose(np.linalg.norm(starts.push[1:, :2], axis=1), 0.1 * np.sqrt(9.81 * stool.hip_height))
+    assert ((starts.push_step[1:] >= 100) & (starts.push_step[1:] < 300)).all()
+    assert len(set(np.asarray(starts.friction[1:]).tolist())) == 4
+
+
+def standing_terms(experiment: Experiment) -> dict[str, float]:
+    """The terms of an individual whose key poses are the standing pose."""
+    still = genomes(experiment, 7)
+    poses = jnp.broadcast_to(jnp.asarray(experiment.creature.stand, jnp.float32), still.key_poses.shape)
+    tally = jax.tree.map(lambda leaf: leaf[0, 0], simulate(experiment, dataclasses.replace(still, key_poses=poses)).tally)
+    terms = fitness_terms(experiment.creature, 0.005, experiment.simulator.steps, tally)
+    return dict(zip(TERMS, np.asarray(terms).tolist(), strict=True))
+
+
+def test_terms_of_one_that_stands_still(experiment: Experiment):
+    terms = standing_terms(experiment)
+    assert terms["alive"] == 1.0
+    assert terms["clearance"] == pytest.approx(1.0)
+    assert terms["duty"] == pytest.approx(1.0, abs=0.05)
+    for name in ("distance", "drift", "fade", "slip", "airborne", "foot_height", "tilt", "touch", "saturation", "limits"):
+        assert terms[name] == pytest.approx(0.0, abs=0.02), name
+
+
+def test_score_mixes_the_worst_start_and_the_mean():
+    terms = jnp.array([[[1.0], [3.0]]])
+    assert float(score(terms, jnp.ones(1), 0.0)[0]) == 2.0
+    assert float(score(terms, jnp.ones(1), 1.0)[0]) == 1.0
+    assert float(score(terms, jnp.ones(1), 0.5)[0]) == 1.5
+
+
+def test_penalties_are_negative_and_style_ramps_in():
+    config = small_config(fitness={"style_ramp": 10}).fitness
+    at = {generation: dict(zip(TERMS, np.asarray(weight_vector(config, jnp.int32(generation))).tolist(), strict=True)) for generation in (0, 5, 10)}
+    assert all(at[10][name] <= 0 for name in TERMS if name not in REWARDS)
+    assert at[0]["slip"] == 0.0
+    assert at[5]["slip"] == pytest.approx(0.5 * at[10]["slip"])
+    assert at[0]["distance"] == at[10]["distance"] > 0
+
+
+def test_the_stride_limit_of_a_dog():
+    assert stride_limit(20.0) == pytest.approx(3.53, abs=0.01)
+
+
+def test_mjx_agrees_with_c_mujoco(shipped: Creature):
+    """The same controlled motion, 60 steps through touchdown, in float32 MJX and in float64 C MuJoCo."""
+    config = Config()
+    experiment = build_experiment(shipped, dataclasses.replace(config, rollout=dataclasses.replace(config.rollout, physics="mjx")))
+    model = shipped.evolution_model
+    data = mujoco.MjData(model)
+    data.qpos[:] = shipped.stand_qpos
+    plant = experiment.simulator.plant
+    state = jax.tree.map(lambda leaf: leaf[None], _at_rest(shipped))
+    torque = np.zeros((1, model.nv), np.float32)
+
+    def advance(state, torque):
+        sensed, workings = plant.forward(state)
+        return plant.advance(state, workings, torque), sensed
+
+    step = jax.jit(advance)
+    rng = np.random.default_rng(0)
+    for k in range(60):
+        if k % 10 == 0:
+            torque[0, shipped.dof_adr] = rng.uniform(-0.1, 0.1, len(shipped.dof_adr)) * shipped.torque_limit
+        data.qfrc_applied[:] = torque[0]
+        state, _ = step(state, torque)
+        mujoco.mj_step(model, data)
+    assert np.allclose(state.qpos[0], data.qpos, atol=5e-3)
+
+
+def _at_rest(creature: Creature):
+    from mjxgait.types import BodyState
+
+    still = jnp.zeros(creature.model.nv)
+    return BodyState(jnp.asarray(creature.stand_qpos, jnp.float32), still, still, still, jnp.ones(()))
