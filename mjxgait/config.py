@@ -70,12 +70,12 @@ class RolloutConfig:
     """
 
     __pydantic_config__ = STRICT
-    seconds: Positive = 6.0
-    starts: Count = 4
+    seconds: Positive = 8.0
+    starts: Count = 6
     joint_noise: NonNegative = 0.05
     velocity_noise: NonNegative = 0.1
     friction: tuple[Positive, Positive] = (0.8, 1.2)
-    push: NonNegative = 0.1
+    push: NonNegative = 0.15
     worst: Fraction = 0.5
     physics: Literal["auto", "mjx"] = "auto"
     lanes: Whole = 0
@@ -88,12 +88,12 @@ class Weights:
     __pydantic_config__ = STRICT
     distance: Finite = 1.0
     alive: Finite = 1.0
-    drift: Finite = 0.5
+    drift: Finite = 1.0
     fade: Finite = 0.5
-    slip: Finite = 0.5
-    clearance: Finite = 1.0
-    frequency: Finite = 1.0
-    duty: Finite = 1.0
+    slip: Finite = 10.0
+    clearance: Finite = 3.0
+    frequency: Finite = 4.0
+    duty: Finite = 2.0
     airborne: Finite = 1.0
     foot_height: Finite = 1.0
     tilt: Finite = 1.0
@@ -109,12 +109,17 @@ class FitnessConfig:
     """What is wanted of a gait.
 
     Attributes:
+      speed: body lengths per second up to which faster is better; beyond it a metre counts a tenth, so that a gait gets steadier and not
+        only faster. 0 sets no limit.
       clearance: height in hip heights that each foot should reach in each stride.
+      frequency: share of the highest stride frequency of an animal of this mass up to which a gait is not hasty.
       style_ramp: generations over which the style terms (all but distance, alive, drift and foot_height) grow to their full weight.
     """
 
     __pydantic_config__ = STRICT
-    clearance: NonNegative = 0.08
+    speed: NonNegative = 1.0
+    clearance: NonNegative = 0.12
+    frequency: NonNegative = 0.7
     style_ramp: Whole = 0
     weights: Weights = dataclasses.field(default_factory=Weights)
 

@@ -89,7 +89,7 @@ def build_experiment(creature: Creature, config: Config) -> Experiment:
 
     def judge(genomes: Genome) -> Judged:
         episodes = simulator.simulate(genomes, starts)
-        terms = jax.vmap(jax.vmap(partial(fitness_terms, creature, simulator.tracker.step, simulator.steps)))(episodes.tally)
+        terms = jax.vmap(jax.vmap(partial(fitness_terms, creature, config.fitness, simulator.tracker.step, simulator.steps)))(episodes.tally)
         broken = episodes.tally.reason == Reason.NONFINITE
         return Judged(
             terms=jnp.where(broken[..., None], jnp.nan, terms),

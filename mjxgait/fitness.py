@@ -13,7 +13,7 @@ from mjxgait.tally import Tally
 TERMS = tuple(field.name for field in dataclasses.fields(Weights))
 REWARDS = ("distance", "alive")
 STYLE = tuple(name for name in TERMS if name not in (*REWARDS, "drift", "foot_height"))
-"""The terms that may ramp in: what makes a gait good to look at once there is one."""
+"""What makes a gait good to look at once there is one: counted in proportion to the walk that there is, and may ramp in over generations."""
 
 
 def stride_limit(mass: float) -> float:
@@ -21,7 +21,7 @@ def stride_limit(mass: float) -> float:
     return 1.2 * 4.48 * mass**-0.14
 
 
-def fitness_terms(creature: Creature, step: float, horizon: int, tally: Tally) -> jax.Array:
+def fitness_terms(creature: Creature, config: FitnessConfig, step: float, horizon: int, tally: Tally) -> jax.Array:
     """The terms [F] of one episode in the order of `TERMS`, each without unit and before its weight.
 
     Every penalty is at least zero and every sum ended with the creature's life, so an individual that has died gains nothing more.
@@ -37,13 +37,13 @@ def fitness_terms(creature: Creature, step: float, horizon: int, tally: Tally) -
     duty = tally.contact / lived
     second_half = tally.forward - tally.forward_half
     values = {
-        "distance": tally.forward / length,
+        "distance": _counted(tally.forward / length, config.speed * horizon * step),
         "alive": tally.steps / horizon,
         "drift": jnp.abs(tally.left) / length + jnp.abs(jnp.sin(0.5 * tally.heading)),
         "fade": jnp.maximum(tally.forward_half - second_half, 0.0) / length,
-        "slip": tally.slip / length,
+        "slip": jnp.max(tally.slip) / moved,
         "clearance": jnp.where(tally.strides > 1, tally.shortfall / jnp.maximum(strides - 1, 1), 1.0),
-        "frequency": jnp.maximum(rate / stride_limit(creature.mass) - 0.9, 0.0),
+        "frequency": jnp.maximum(rate / stride_limit(creature.mass) - config.frequency, 0.0),
         "duty": jnp.mean(jnp.maximum(duty - 0.85, 0.0) + jnp.maximum(0.2 - duty, 0.0)) / 0.15,
         "airborne": tally.airborne / lived,
         "foot_height": jnp.maximum(tally.foot_height / lived / creature.hip_height - 0.25, 0.0),
@@ -54,7 +54,15 @@ def fitness_terms(creature: Creature, step: float, horizon: int, tally: Tally) -
         "saturation": tally.saturation / lived,
         "limits": tally.limits / lived,
     }
-    return jnp.stack([values[name] for name in TERMS])
+    # Style counts as far as there is a walk: a creature that has yet to learn walking must not be punished for trying.
+    enough = config.speed * horizon * step
+    walked = jnp.clip(tally.forward / length / enough, 0.0, 1.0) if enough else 1.0
+    return jnp.stack([values[name] * (walked if name in STYLE else 1.0) for name in TERMS])
+
+
+def _counted(distance: jax.Array, enough: float) -> jax.Array:
+    """Distance in body lengths, of which what lies beyond `enough` counts a tenth."""
+    return jnp.minimum(distance, enough) + 0.1 * jnp.maximum(distance - enough, 0.0) if enough else distance
 
 
 def weight_vector(config: FitnessConfig, generation: jax.Array) -> jax.Array:

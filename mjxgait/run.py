@@ -34,10 +34,12 @@ def train(folder: Path, creature: Creature, config: Config, screen: Screen, resu
     """
     experiment = build_experiment(creature, config)
     checkpoints = Checkpoints(folder, config.keep_every)
-    if resume:
+    # A run that was killed before its first checkpoint begins anew: it will do what it would have done.
+    if resume and (checkpoints.generations() or generation is not None):
         state = checkpoints.restore(jax.eval_shape(experiment.init), creature.digest, generation)
         truncate_metrics(folder / METRICS, int(state.generation))
     else:
+        truncate_metrics(folder / METRICS, -1)
         state = jax.jit(experiment.init)()
     with screen.compiling(creature.name, experiment):
         step = experiment.compile()

@@ -34,7 +34,7 @@ class Tally:
     forward_half: [] m, `forward` at half time. heading: [] rad.
     strides: [] completed cycles. stride_steps: [] steps up to the last completion.
     shortfall: [] missing foot clearance, share of the wanted, summed over strides. peak: [F] m, highest in this stride.
-    contact: [F] steps in contact. slip: [] m, mean over feet. airborne: [] steps without any foot on the floor.
+    contact: [F] steps in contact. slip: [F] m slid while in contact. airborne: [] steps without any foot on the floor.
     foot_height: [] m·steps, mean height of the feet. foot_pos: [F, 2], foot_down: [F] of the previous step.
     tilt: [] of 1 - up.z. wobble: [] (rad/s)² of the trunk. touch: [] steps on which another part touches.
     work: [] J, positive. saturation, limits: [] share of joints at their torque limit, beyond their pose range.
@@ -78,7 +78,7 @@ class Judge:
         feet = len(self.creature.foot_names)
         values = {field.name: jnp.zeros(()) for field in dataclasses.fields(Tally)}
         counts = {name: jnp.zeros((), jnp.int32) for name in ("steps", "reason", "strides", "stride_steps")}
-        per_foot = {name: jnp.zeros(feet) for name in ("peak", "contact", "foot_down")}
+        per_foot = {name: jnp.zeros(feet) for name in ("peak", "contact", "slip", "foot_down")}
         return Tally(**(values | counts | per_foot | {"foot_pos": jnp.zeros((feet, 2))}))
 
     def examine(self, sensed: Sensed) -> jax.Array:
@@ -123,7 +123,7 @@ class Judge:
             shortfall=tally.shortfall + jnp.where(stride & ~first, missing, 0.0),
             peak=jnp.where(stride, low, peak),
             contact=tally.contact + down,
-            slip=tally.slip + jnp.mean(slid),
+            slip=tally.slip + slid,
             airborne=tally.airborne + (jnp.max(down) == 0.0),
             foot_height=tally.foot_height + jnp.mean(low),
             foot_pos=pos,

@@ -136,7 +136,7 @@ def standing_terms(experiment: Experiment) -> dict[str, float]:
     still = genomes(experiment, 7)
     poses = jnp.broadcast_to(jnp.asarray(experiment.creature.stand, jnp.float32), still.key_poses.shape)
     tally = jax.tree.map(lambda leaf: leaf[0, 0], simulate(experiment, dataclasses.replace(still, key_poses=poses)).tally)
-    terms = fitness_terms(experiment.creature, 0.005, experiment.simulator.steps, tally)
+    terms = fitness_terms(experiment.creature, experiment.config.fitness, 0.005, experiment.simulator.steps, tally)
     return dict(zip(TERMS, np.asarray(terms).tolist(), strict=True))
 
 

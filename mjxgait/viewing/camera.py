@@ -1,0 +1,54 @@
+"""A camera with parallel rays: lengths along the floor stay true, so the scale in the picture can be measured with."""
+
+import dataclasses
+
+import numpy as np
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Camera:
+    """Looks at a creature from its right side, a little from the front and from above, so that it walks to the right.
+
+    centre: [3] m, in the middle of the picture. forward: [2] unit, the creature's way. scale: pixels/m. width, height: pixels.
+    azimuth: rad, from the side towards the front. elevation: rad.
+    """
+
+    centre: np.ndarray
+    forward: np.ndarray
+    scale: float
+    width: int
+    height: int
+    azimuth: float = np.radians(22.0)
+    elevation: float = np.radians(16.0)
+
+    @property
+    def axes(self) -> np.ndarray:
+        """[3, 3] unit rows: right in the picture, up in the picture, into the scene."""
+        forward = np.append(self.forward, 0.0)
+        left = np.cross(UP, forward)
+        right = np.cos(self.azimuth) * forward + np.sin(self.azimuth) * left
+        flat = np.cross(UP, right)
+        into = np.cos(self.elevation) * flat - np.sin(self.elevation) * UP
+        return np.stack([right, np.cross(right, into), into])
+
+    def pixels(self, points: np.ndarray) -> np.ndarray:
+        """[..., 2] pixels (right, down) of world points [..., 3] m."""
+        across = (points - self.centre) @ self.axes[:2].T * [self.scale, -self.scale]
+        return across + np.array([self.width, self.height]) / 2
+
+    def depth(self, points: np.ndarray) -> np.ndarray:
+        """[...] m into the scene, of world points [..., 3]."""
+        return (points - self.centre) @ self.axes[2]
+
+    def rays(self, columns: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        """[rows, columns, 3] world points in the plane of the picture, through the middles of pixels."""
+        right, up, _ = self.axes
+        a = (columns + 0.5 - self.width / 2) / self.scale
+        b = -(rows + 0.5 - self.height / 2) / self.scale
+        return self.centre + a[None, :, None] * right + b[:, None, None] * up
+
+    def enlarged(self, factor: int) -> "Camera":
+        """The same view in a picture that has more pixels."""
+        return dataclasses.replace(self, scale=self.scale * factor, width=self.width * factor, height=self.height * factor)
