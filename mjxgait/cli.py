@@ -14,6 +14,7 @@ COMMANDS = {
     "render": "make a video of a walk or a race: mjxgait render RUN --out walk.webp",
     "export": "write a walk as an animation file: mjxgait export RUN --out walk.glb",
     "share": "write one offline page of a walk in 3D: mjxgait share RUN --out walk.html",
+    "view": "watch a run as it learns on a local page: mjxgait view RUN",
     "envs": "list the shipped creatures and configs",
 }
 """Each lives in mjxgait/commands/<name>.py as `<name>_command` and is imported only when it is called."""

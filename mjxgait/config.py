@@ -113,7 +113,7 @@ class FitnessConfig:
         only faster. 0 sets no limit.
       clearance: height in hip heights that each foot should reach in each stride.
       frequency: share of the highest stride frequency of an animal of this mass up to which a gait is not hasty.
-      style_ramp: generations over which the style terms (all but distance, alive, drift and foot_height) grow to their full weight.
+      style_ramp: generations over which the style terms (all but distance, alive and foot_height) grow to their full weight.
     """
 
     __pydantic_config__ = STRICT
@@ -156,11 +156,11 @@ class EvolutionConfig:
     Attributes:
       population: P. generations: cap on the generations of a run. target: fitness at which a run stops.
       growth: the population grows to this multiple of P, then is culled back to P.
-      initial: uniform draws or a Latin hypercube. selection: how parents are drawn.
+      initial: uniform draws or a Latin hypercube, over the middle `initial_spread` of each gene's range. selection: how parents are drawn.
       crossover: share of offspring with two parents, the others have one. crossing: `permute` draws K poses from the parents' 2K in any
         order; `align` leaves each pose in its place.
       mutation: `redraw` re-draws two joints of one pose, `single` one joint, `pose` a whole pose, `gaussian` moves every joint of one pose
-        by sigma, in units of its range. mutation_rate: share of offspring mutated.
+        by sigma, in units of its range, `mixed` is one or the other of the first and the last. mutation_rate: share of offspring mutated.
       tuning_rate, tuning_sigma: chance that a tuning gene of a mutated offspring changes, and by how much, in units of its range.
     """
 
@@ -170,12 +170,13 @@ class EvolutionConfig:
     target: Finite | None = None
     growth: Positive = 2.0
     initial: Literal["uniform", "latin"] = "uniform"
+    initial_spread: Fraction = 0.6
     selection: Literal["uniform", "rank", "tournament"] = "rank"
     crossover: Fraction = 0.7
     crossing: Literal["permute", "align"] = "align"
-    mutation: Literal["redraw", "single", "pose", "gaussian"] = "gaussian"
+    mutation: Literal["redraw", "single", "pose", "gaussian", "mixed"] = "mixed"
     mutation_rate: Fraction = 0.8
-    sigma: Positive = 0.1
+    sigma: Positive = 0.12
     tuning_rate: Fraction = 0.3
     tuning_sigma: Positive = 0.1
     remove_duplicates: bool = True

@@ -12,7 +12,7 @@ from mjxgait.tally import Tally
 
 TERMS = tuple(field.name for field in dataclasses.fields(Weights))
 REWARDS = ("distance", "alive")
-STYLE = tuple(name for name in TERMS if name not in (*REWARDS, "drift", "foot_height"))
+STYLE = tuple(name for name in TERMS if name not in (*REWARDS, "foot_height"))
 """What makes a gait good to look at once there is one: counted in proportion to the walk that there is, and may ramp in over generations."""
 
 

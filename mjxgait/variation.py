@@ -38,6 +38,7 @@ class Variation:
 def pose_variation(box: Box, config: EvolutionConfig) -> Variation:
     """The operators of a genome of key poses and tuning, as chosen in the config."""
     create = uniform if config.initial == "uniform" else latin_hypercube
+    middle = narrowed(box, config.initial_spread)
     poses_of = permuted_poses if config.crossing == "permute" else aligned_poses
 
     def cross(key: jax.Array, mother: Any, father: Any) -> Any:
@@ -56,7 +57,16 @@ def pose_variation(box: Box, config: EvolutionConfig) -> Variation:
         tuning = jittered(key_tuning, genome.tuning, low.tuning, high.tuning, config.tuning_rate, config.tuning_sigma)
         return dataclasses.replace(genome, key_poses=poses, tuning=tuning)
 
-    return Variation(create=lambda key, count: create(key, box, count), cross=cross, mutate=mutate)
+    return Variation(create=lambda key, count: create(key, middle, count), cross=cross, mutate=mutate)
+
+
+def narrowed(box: Box, share: float) -> Box:
+    """The middle of a box, `share` of its width in every gene."""
+
+    def edge(near: Any, far: Any) -> Any:
+        return jax.tree.map(lambda a, b: a + 0.5 * (1 - share) * (b - a), near, far)
+
+    return Box(edge(box.low, box.high), edge(box.high, box.low))
 
 
 def uniform(key: jax.Array, box: Box, count: int) -> Any:
@@ -90,15 +100,17 @@ def aligned_poses(key: jax.Array, mother: jax.Array, father: jax.Array) -> jax.A
 
 def mutated_poses(key: jax.Array, poses: jax.Array, low: jax.Array, high: jax.Array, kind: str, sigma: float) -> jax.Array:
     """Key poses [K, J] with a change in one of them; see `EvolutionConfig.mutation` for the kinds. Never leaves the box."""
-    key_pose, key_joint, key_value = jax.random.split(key, 3)
+    key_pose, key_joint, key_value, key_kind = jax.random.split(key, 4)
     count, joints = poses.shape
     here = jnp.arange(count) == jax.random.randint(key_pose, (), 0, count)
     order = jax.random.permutation(key_joint, jnp.arange(joints))
-    chosen = {"redraw": order < 2, "single": order < 1, "pose": order >= 0, "gaussian": order >= 0}[kind]
-    if kind == "gaussian":
-        value = poses + sigma * (high - low) * jax.random.normal(key_value, poses.shape)
-    else:
-        value = low + (high - low) * jax.random.uniform(key_value, poses.shape)
+    chosen = {"redraw": order < 2, "single": order < 1, "pose": order >= 0, "gaussian": order >= 0, "mixed": order < 2}[kind]
+    moved = poses + sigma * (high - low) * jax.random.normal(key_value, poses.shape)
+    drawn = low + (high - low) * jax.random.uniform(key_value, poses.shape)
+    value = moved if kind == "gaussian" else drawn
+    if kind == "mixed":
+        gaussian = jax.random.bernoulli(key_kind)
+        value, chosen = jnp.where(gaussian, moved, drawn), gaussian | chosen
     return jnp.clip(jnp.where(here[:, None] & chosen, value, poses), low, high)
 
 

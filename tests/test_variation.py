@@ -28,7 +28,7 @@ def inside(genomes: Genome) -> bool:
 
 @pytest.mark.parametrize("initial", ["uniform", "latin"])
 def test_initial_genomes_fill_the_box(initial: str):
-    genomes = pose_variation(BOX, EvolutionConfig(initial=initial)).create(jax.random.key(1), 200)
+    genomes = pose_variation(BOX, EvolutionConfig(initial=initial, initial_spread=1.0)).create(jax.random.key(1), 200)
     assert genomes.key_poses.shape == (200, K, J)
     assert inside(genomes)
     share = (genomes.key_poses - BOX.low.key_poses) / (BOX.high.key_poses - BOX.low.key_poses)

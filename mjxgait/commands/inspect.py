@@ -2,7 +2,6 @@
 
 import dataclasses
 import json
-import logging
 import os
 import sys
 from collections.abc import Sequence
@@ -43,8 +42,6 @@ def inspect_command(arguments: Sequence[str]) -> int:
     os.environ.setdefault("JAX_PLATFORMS", "cpu")
     from mjxgait import inspect
 
-    # Orbax warns of files that a part of a checkpoint never has.
-    logging.getLogger("absl").setLevel(logging.ERROR)
     console = Console(highlight=False, width=None if sys.stdout.isatty() else PIPED_WIDTH)
 
     def tell(found: Any, show: Any) -> int:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 
 from mjxgait.viewing.style import ACCENT, DARK, MIDDLE, PALE, Figures, figure
@@ -60,7 +61,8 @@ def draw_terms(axes: Axes, lines: Lines, weights: Mapping[str, np.ndarray]) -> N
                 axes.fill_between(generation, base, base + part, facecolor=grey, hatch=hatch, edgecolor="0.15", linewidth=0.4, label=label)
                 label = "_"
         above, below = above + gain, below + loss
-    axes.plot(generation, above + below, color=ACCENT, linewidth=2, label="sum")
+    outline = [withStroke(linewidth=5, foreground="white")]
+    axes.plot(generation, above + below, color=DARK, linewidth=2, label="sum", path_effects=outline)
     axes.axhline(0, color=DARK, linewidth=0.8)
     axes.set(ylabel="weight times term", title="what the terms give to the best individual (mean of its starts)")
     _label_generations(axes, generation)

@@ -5,7 +5,7 @@ import shutil
 
 import numpy as np
 import pytest
-from inspection_made_up import FORCED, LAST, POPULATION, make_state
+from inspection.made_up import FORCED, LAST, POPULATION, make_state
 
 from mjxgait.champion import Champion, write_champion
 from mjxgait.checkpoint import Checkpoints

@@ -2,14 +2,14 @@
 
 import json
 import os
+import resource
 import shutil
 import subprocess
 import sys
-import time
 
 import numpy as np
 import pytest
-from inspection_made_up import FORCED, LAST, POPULATION
+from inspection.made_up import FORCED, LAST, POPULATION
 
 from mjxgait.cli import main
 from mjxgait.inspect import facts, individual_facts, read_snapshot
@@ -24,7 +24,8 @@ def tell(capsys, *arguments):
 
 
 def test_reads_in_under_three_seconds_where_other_devices_are(finished_run):
-    began = time.perf_counter()
+    """Time of the processor, so that a busy machine does not fail the test."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
     done = subprocess.run(
         [sys.executable, "-m", "mjxgait", "inspect", str(finished_run), "--json"],
         env=os.environ | {"XLA_FLAGS": "--xla_force_host_platform_device_count=3"},
@@ -32,7 +33,8 @@ def test_reads_in_under_three_seconds_where_other_devices_are(finished_run):
         text=True,
         check=True,
     )
-    assert time.perf_counter() - began < 3.0 * (2 if "PYTEST_XDIST_WORKER" in os.environ else 1)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    assert (after.ru_utime + after.ru_stime) - (before.ru_utime + before.ru_stime) < 3.0
     assert json.loads(done.stdout)["generation"] == LAST
 
 

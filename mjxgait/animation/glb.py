@@ -1,0 +1,218 @@
+"""A walk as a GLB file: one skin whose joints are the creature's bodies, rigidly weighted, animated by key frames.
+
+glTF is Y-up with +Z forward and +X left, quaternions are (x, y, z, w), colours linear. Letters: `F` key frames, `B` joints of the skin
+(the root on the floor, then the bodies), `V` vertices.
+"""
+
+import dataclasses
+from collections.abc import Sequence
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pygltflib as gltf  # type: ignore[import-untyped]
+
+from mjxgait.animation.buffer import Buffer
+from mjxgait.animation.loop import WalkLoop
+from mjxgait.animation.surface import geom_surface
+from mjxgait.errors import UserError
+from mjxgait.viewing.painter import geom_colours, seen_geoms
+
+STILL = 1e-6
+"""m or unit quaternion; what moves less is not animated."""
+ROUGHNESS = 0.75
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Skeleton:
+    """The joints of the skin in glTF's axes.
+
+    names: [B]. parent: [B] place of the parent, -1 for the root. bodies: [B] MuJoCo's body, 0 (the world) for the root.
+    """
+
+    names: tuple[str, ...]
+    parent: tuple[int, ...]
+    bodies: tuple[int, ...]
+
+
+def export_glb(loop: WalkLoop, path: Path, travelling: bool = False) -> None:
+    """Writes the loop; see `build_glb`.
+
+    Raises:
+      UserError: the file cannot be written.
+    """
+    try:
+        path.write_bytes(build_glb(loop, travelling))
+    except OSError as error:
+        raise UserError(f"{path}: cannot be written ({error.strerror})") from None
+
+
+def build_glb(loop: WalkLoop, travelling: bool = False) -> bytes:
+    """The bytes of the file. travelling: the root moves forward at an even speed; otherwise the creature walks in place."""
+    creature = loop.walk.creature
+    skeleton = skeleton_of(creature.model, creature.trunk)
+    axes = gltf_axes(loop.walk.forward)
+    document = gltf.GLTF2(asset=gltf.Asset(version="2.0", generator="mjxgait"))
+    buffer = Buffer(document)
+    rest_pos, rest_quat = local_poses(creature.model, skeleton, _standing(loop)[None], axes)
+    _add_joints(document, skeleton, rest_pos[0], rest_quat[0])
+    _add_mesh(document, buffer, creature.model, skeleton, axes, _standing(loop))
+    _add_skin(document, buffer, creature.model, skeleton, axes, _standing(loop))
+    _add_animation(document, buffer, loop, skeleton, axes, travelling)
+    name = creature.name
+    document.nodes.append(gltf.Node(name=name, mesh=0, skin=0))
+    document.scenes = [gltf.Scene(name=name, nodes=[0, len(document.nodes) - 1])]
+    document.scene = 0
+    document.extras = {"strides": loop.strides, "speed_m_per_s": loop.speed, "frames_per_s": loop.rate, "travelling": travelling}
+    buffer.close()
+    return b"".join(document.save_to_bytes())
+
+
+def skeleton_of(model: mujoco.MjModel, trunk: int) -> Skeleton:
+    """The bodies of the tree that begins at the trunk, below a root that stays on the floor."""
+    bodies = [0, *(b for b in range(1, model.nbody) if model.body_rootid[b] == model.body_rootid[trunk])]
+    parents = (-1, *(bodies.index(int(model.body_parentid[b])) for b in bodies[1:]))
+    return Skeleton(("root", *(model.body(b).name or f"body_{b}" for b in bodies[1:])), parents, tuple(bodies))
+
+
+def gltf_axes(forward: np.ndarray) -> np.ndarray:
+    """[3, 3] that turns MuJoCo's world into glTF's: left to +X, up to +Y, forward [2] to +Z."""
+    way = np.append(forward, 0.0)
+    return np.stack([np.cross([0.0, 0.0, 1.0], way), [0.0, 0.0, 1.0], way])
+
+
+def local_poses(model: mujoco.MjModel, skeleton: Skeleton, qpos: np.ndarray, axes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Each joint against its parent: positions [F, B, 3] m and quaternions [F, B, 4] (x, y, z, w), in glTF's axes."""
+    pos, rot = _world_poses(model, skeleton, qpos, axes)
+    local_pos, quat = pos.copy(), np.zeros((*pos.shape[:2], 4))
+    for b, parent in enumerate(skeleton.parent):
+        turned = rot[:, b]
+        if parent >= 0:
+            back = rot[:, parent].transpose(0, 2, 1)
+            local_pos[:, b] = (back @ (pos[:, b] - pos[:, parent])[..., None])[..., 0]
+            turned = back @ turned
+        quat[:, b] = _quaternions(turned)
+    return local_pos, quat
+
+
+def _world_poses(model: mujoco.MjModel, skeleton: Skeleton, qpos: np.ndarray, axes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    data = mujoco.MjData(model)
+    pos, rot = [], []
+    for row in qpos:
+        data.qpos[:] = row
+        mujoco.mj_kinematics(model, data)
+        pos.append(data.xpos[list(skeleton.bodies)] @ axes.T)
+        rot.append(axes @ data.xmat[list(skeleton.bodies)].reshape(-1, 3, 3) @ axes.T)
+    return np.array(pos), np.array(rot)
+
+
+def _quaternions(rotations: np.ndarray) -> np.ndarray:
+    """[F, 4] (x, y, z, w) of rotations [F, 3, 3], neighbours on the same side of the sphere so that they can be interpolated."""
+    quats = np.zeros((len(rotations), 4))
+    for i, rotation in enumerate(rotations):
+        quat = np.zeros(4)
+        mujoco.mju_mat2Quat(quat, np.ascontiguousarray(rotation).ravel())
+        quats[i] = np.roll(quat, -1)
+        if i and quats[i] @ quats[i - 1] < 0:
+            quats[i] *= -1
+    return quats
+
+
+def _standing(loop: WalkLoop) -> np.ndarray:
+    """The standing pose [nq] above the origin."""
+    creature = loop.walk.creature
+    qpos = creature.stand_qpos.copy()
+    place = int(creature.model.jnt_qposadr[creature.model.body_jntadr[creature.trunk]])
+    qpos[place : place + 2] = 0.0
+    return qpos
+
+
+def _add_joints(document: gltf.GLTF2, skeleton: Skeleton, pos: np.ndarray, quat: np.ndarray) -> None:
+    for b, name in enumerate(skeleton.names):
+        children = [c for c, parent in enumerate(skeleton.parent) if parent == b]
+        node = gltf.Node(name=name, translation=pos[b].tolist(), rotation=quat[b].tolist())
+        if children:
+            node.children = children
+        document.nodes.append(node)
+
+
+def _add_mesh(document: gltf.GLTF2, buffer: Buffer, model: mujoco.MjModel, skeleton: Skeleton, axes: np.ndarray, stand: np.ndarray) -> None:
+    """One primitive and material per colour, in the standing pose."""
+    data = mujoco.MjData(model)
+    data.qpos[:] = stand
+    mujoco.mj_kinematics(model, data)
+    colours = geom_colours(model)
+    geoms = [int(g) for g in seen_geoms(model) if int(model.geom_bodyid[g]) in skeleton.bodies]
+    primitives = []
+    for colour in dict.fromkeys(tuple(colours[g]) for g in geoms):
+        parts = []
+        for g in (g for g in geoms if tuple(colours[g]) == colour):
+            points, normals, faces = geom_surface(model, g)
+            turn = axes @ data.geom_xmat[g].reshape(3, 3)
+            joint = skeleton.bodies.index(int(model.geom_bodyid[g]))
+            parts.append((points @ turn.T + axes @ data.geom_xpos[g], normals @ turn.T, faces, np.full(len(points), joint)))
+        primitives.append(_primitive(buffer, parts, len(document.materials)))
+        document.materials.append(_material(np.array(colour)))
+    document.meshes.append(gltf.Mesh(name="body", primitives=primitives))
+
+
+def _primitive(buffer: Buffer, parts: Sequence[tuple[np.ndarray, ...]], material: int) -> gltf.Primitive:
+    """parts: points [V, 3], normals [V, 3], triangles [F, 3] and joint [V] of each shape."""
+    firsts = np.cumsum([0, *(len(part[0]) for part in parts)])
+    points, normals, joints = (np.concatenate([part[i] for part in parts]) for i in (0, 1, 3))
+    faces = np.concatenate([part[2] + first for part, first in zip(parts, firsts[:-1], strict=True)])
+    places = np.zeros((len(points), 4), np.uint16 if joints.max() > 255 else np.uint8)
+    places[:, 0] = joints
+    weights = np.tile(np.array([255, 0, 0, 0], np.uint8), (len(points), 1))
+    indices = faces.astype(np.uint16 if len(points) < 0xFFFF else np.uint32)
+    return gltf.Primitive(
+        attributes=gltf.Attributes(
+            POSITION=buffer.add(points.astype(np.float32), gltf.ARRAY_BUFFER, bounds=True),
+            NORMAL=buffer.add(_unit(normals), gltf.ARRAY_BUFFER),
+            JOINTS_0=buffer.add(places, gltf.ARRAY_BUFFER),
+            WEIGHTS_0=buffer.add(weights, gltf.ARRAY_BUFFER, normalized=True),
+        ),
+        indices=buffer.add(indices.reshape(-1), gltf.ELEMENT_ARRAY_BUFFER),
+        material=material,
+    )
+
+
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    return (vectors / np.linalg.norm(vectors, axis=1, keepdims=True)).astype(np.float32)
+
+
+def _material(colour: np.ndarray) -> gltf.Material:
+    """From sRGB [4] to the linear colours of glTF."""
+    rgb = np.where(colour[:3] <= 0.04045, colour[:3] / 12.92, ((colour[:3] + 0.055) / 1.055) ** 2.4)
+    look = gltf.PbrMetallicRoughness(baseColorFactor=[*map(float, rgb), float(colour[3])], metallicFactor=0.0, roughnessFactor=ROUGHNESS)
+    return gltf.Material(pbrMetallicRoughness=look, alphaMode="BLEND" if colour[3] < 1 else "OPAQUE")
+
+
+def _add_skin(document: gltf.GLTF2, buffer: Buffer, model: mujoco.MjModel, skeleton: Skeleton, axes: np.ndarray, stand: np.ndarray) -> None:
+    pos, rot = _world_poses(model, skeleton, stand[None], axes)
+    inverse = np.zeros((len(skeleton.names), 4, 4))
+    inverse[:, :3, :3] = rot[0].transpose(0, 2, 1)
+    inverse[:, :3, 3] = -(inverse[:, :3, :3] @ pos[0][..., None])[..., 0]
+    inverse[:, 3, 3] = 1.0
+    # glTF stores matrices column by column.
+    columns = inverse.transpose(0, 2, 1).reshape(-1, 16).astype(np.float32)
+    document.skins.append(
+        gltf.Skin(name="skeleton", joints=list(range(len(skeleton.names))), skeleton=0, inverseBindMatrices=buffer.add(columns))
+    )
+
+
+def _add_animation(document: gltf.GLTF2, buffer: Buffer, loop: WalkLoop, skeleton: Skeleton, axes: np.ndarray, travelling: bool) -> None:
+    pos, quat = local_poses(loop.walk.creature.model, skeleton, loop.qpos, axes)
+    if travelling:
+        pos[:, 0] = np.linspace(0, 1, len(pos))[:, None] * [0.0, 0.0, loop.advance]
+    animation = gltf.Animation(name="walk")
+    times = buffer.add(loop.times.astype(np.float32), bounds=True)
+    rest = document.nodes
+    for b in range(len(skeleton.names)):
+        for path, values, usual in (("translation", pos[:, b], rest[b].translation), ("rotation", quat[:, b], rest[b].rotation)):
+            if np.abs(values - usual).max() > STILL:
+                target = gltf.AnimationChannelTarget(node=b, path=path)
+                animation.channels.append(gltf.AnimationChannel(sampler=len(animation.samplers), target=target))
+                output = buffer.add(values.astype(np.float32))
+                animation.samplers.append(gltf.AnimationSampler(input=times, output=output, interpolation="LINEAR"))
+    document.animations.append(animation)

@@ -1,0 +1,43 @@
+"""`mjxgait export`: the champion's walk as an animation file."""
+
+import dataclasses
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Literal
+
+import tyro
+
+from mjxgait.errors import UserError
+
+
+@dataclasses.dataclass(frozen=True)
+class ExportOptions:
+    """Write the champion's walk as a GLB: one skin with animated joints, a loop without a seam. Units m, Y up, forward +Z.
+
+    Attributes:
+      run: Run folder.
+      out: File to write, ending with .glb.
+      rate: Key frames per second.
+      travelling: The root moves forward; otherwise the creature walks in place.
+    """
+
+    run: tyro.conf.Positional[Path]
+    out: Path
+    rate: Literal[24, 30, 60] = 30
+    travelling: bool = False
+
+
+def export_command(arguments: Sequence[str]) -> int:
+    """Returns the exit code."""
+    options = tyro.cli(ExportOptions, args=list(arguments), prog="mjxgait export")
+    from mjxgait.animation import export_glb, walk_loop
+    from mjxgait.viewing.cast import LOOP_SECONDS, champion_of
+
+    if options.out.suffix.lower() != ".glb":
+        raise UserError(f'{options.out}: cannot write "{options.out.suffix}"; end the name with .glb')
+    loop = walk_loop(champion_of(options.run, LOOP_SECONDS).walk, options.rate)
+    export_glb(loop, options.out, options.travelling)
+    size = options.out.stat().st_size / 1024
+    strides = "1 stride" if loop.strides == 1 else f"{loop.strides} strides"
+    print(f"{options.out} ({size:,.0f} KiB): {strides}, {loop.times[-1]:.2f} s at {loop.rate} frames/s, {loop.speed:.2f} m/s")
+    return 0

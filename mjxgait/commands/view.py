@@ -1,0 +1,43 @@
+"""`mjxgait view`: a local page that shows a run as it learns."""
+
+import contextlib
+import dataclasses
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import tyro
+
+
+@dataclasses.dataclass(frozen=True)
+class ViewOptions:
+    """Show a run, finished or still learning, on a page that only this machine can reach.
+
+    Attributes:
+      run: Run folder.
+      port: Port on 127.0.0.1; by default the first free one from 8765 on.
+    """
+
+    run: tyro.conf.Positional[Path]
+    port: int | None = None
+
+
+def view_command(arguments: Sequence[str]) -> int:
+    """Returns the exit code; runs until interrupted."""
+    options = tyro.cli(ViewOptions, args=list(arguments), prog="mjxgait view")
+    from mjxgait.viewing.live import serve
+
+    serve(options.run, options.port, ready=lambda address: print(f"{address} (only from this machine; Ctrl-C ends it)", flush=True))
+    return 0
+
+
+@contextlib.contextmanager
+def following(run: Path) -> Iterator[None]:
+    """Shows a run as long as the block lasts, in a process of its own that prints its address; if it fails, the block goes on."""
+    viewer = subprocess.Popen([sys.executable, "-m", "mjxgait", "view", str(run)], stdin=subprocess.DEVNULL)
+    try:
+        yield
+    finally:
+        viewer.terminate()
+        viewer.wait()

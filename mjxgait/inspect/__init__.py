@@ -1,0 +1,21 @@
+"""What a checkpoint holds, read without compiling or simulating anything (docs/seeing.md)."""
+
+from mjxgait.inspect.difference import differences, print_differences
+from mjxgait.inspect.facts import facts, individual_facts
+from mjxgait.inspect.runs import list_runs, print_runs, runs_in
+from mjxgait.inspect.snapshot import Snapshot, read_snapshot
+from mjxgait.inspect.text import print_facts, print_individual
+
+__all__ = [
+    "Snapshot",
+    "differences",
+    "facts",
+    "individual_facts",
+    "list_runs",
+    "print_differences",
+    "print_facts",
+    "print_individual",
+    "print_runs",
+    "read_snapshot",
+    "runs_in",
+]

@@ -1,0 +1,174 @@
+"""From a snapshot to plain values: what `--json` prints and what the tables are made of. Angles in degrees."""
+
+import dataclasses
+import datetime
+import itertools
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+
+from mjxgait.config import TuningRanges, resolve_config
+from mjxgait.errors import UserError
+from mjxgait.evolution import Origin
+from mjxgait.fitness import TERMS, weight_vector
+from mjxgait.inspect.snapshot import Snapshot
+
+TUNING = tuple(field.name for field in dataclasses.fields(TuningRanges))
+KINDS = {Origin.INITIAL: "initial", Origin.CROSSOVER: "crossover", Origin.MUTATION: "mutation", Origin.NEWCOMER: "newcomer"}
+
+
+def facts(snapshot: Snapshot) -> dict[str, Any]:
+    """Everything there is to tell of a checkpoint."""
+    return {
+        "run": str(snapshot.run),
+        "creature": snapshot.creature.name,
+        "creature_digest": snapshot.creature.digest,
+        "generation": snapshot.generation,
+        "generations": snapshot.config.evolution.generations,
+        "ended": snapshot.ended,
+        "checkpoints": list(snapshot.generations),
+        "intact": True,
+        "schema": snapshot.manifest.schema,
+        "seed": snapshot.config.seed,
+        "random_key": {"kind": snapshot.manifest.key_impl, "data": snapshot.arrays["key"].tolist()},
+        "written": datetime.datetime.fromtimestamp(snapshot.written, datetime.UTC).isoformat(timespec="seconds"),
+        "bytes": snapshot.size,
+        "versions": dict(snapshot.versions),
+        "settings_changed": settings_changed(snapshot),
+        "fitness": fitness_summary(snapshot.fitness),
+        "history": [{key: line[key] for key in ("generation", "best", "mean", "forced")} for line in snapshot.lines],
+        "forced_spells": forced_spells(snapshot.lines),
+        "population": population(snapshot),
+        "diversity": diversity(snapshot),
+        "champion": individual_facts(snapshot, 1),
+    }
+
+
+def settings_changed(snapshot: Snapshot) -> dict[str, dict[str, Any]]:
+    """The settings that differ from configs/default.toml, by dotted key: the default and this run's."""
+    default = flat(dataclasses.asdict(resolve_config({}, snapshot.creature.name)))
+    mine = flat(dataclasses.asdict(snapshot.config))
+    return {key: {"default": default[key], "here": mine[key]} for key in mine if mine[key] != default[key]}
+
+
+def flat(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """The leaves of nested tables by dotted key; tuples as lists, as TOML and JSON have them."""
+    leaves: dict[str, Any] = {}
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            leaves |= flat(value, f"{prefix}{key}.")
+        else:
+            leaves[prefix + key] = list(value) if isinstance(value, tuple) else value
+    return leaves
+
+
+def fitness_summary(fitness: np.ndarray) -> dict[str, Any]:
+    """Best, quartiles, mean and worst of those that have a finite fitness [P], and how many have none."""
+    finite = fitness[np.isfinite(fitness)]
+    if not len(finite):
+        return {
+            "best": None,
+            "upper_quartile": None,
+            "median": None,
+            "lower_quartile": None,
+            "worst": None,
+            "mean": None,
+            "broken": len(fitness),
+        }
+    best, upper, median, lower, worst = np.percentile(finite, [100, 75, 50, 25, 0])
+    names = {"best": best, "upper_quartile": upper, "median": median, "lower_quartile": lower, "worst": worst, "mean": finite.mean()}
+    return {name: float(value) for name, value in names.items()} | {"broken": len(fitness) - len(finite)}
+
+
+def forced_spells(lines: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Each unbroken row of forced generations: first and last, and best fitness before and after."""
+    spells = []
+    for forced, group in itertools.groupby(range(len(lines)), key=lambda i: bool(lines[i]["forced"])):
+        places = list(group)
+        if forced:
+            before, after = lines[max(places[0] - 1, 0)], lines[places[-1]]
+            spells.append(
+                {
+                    "first": lines[places[0]]["generation"],
+                    "last": after["generation"],
+                    "best_before": before["best"],
+                    "best_after": after["best"],
+                    "mean_before": before["mean"],
+                    "mean_after": after["mean"],
+                }
+            )
+    return spells
+
+
+def contributions(snapshot: Snapshot) -> np.ndarray:
+    """[P, F] what each term gives to or takes from the fitness of each individual; a row's sum is its fitness."""
+    terms = np.asarray(snapshot.arrays["terms"], float)
+    weights = np.asarray(weight_vector(snapshot.config.fitness, jnp.int32(snapshot.generation)), float)
+    worst = snapshot.config.rollout.worst
+    scores = terms @ weights
+    lowest = np.argmin(np.where(np.isnan(scores), -np.inf, scores), axis=1)
+    return (worst * terms[np.arange(len(terms)), lowest] + (1 - worst) * terms.mean(1)) * weights
+
+
+def population(snapshot: Snapshot) -> list[dict[str, Any]]:
+    """One row per individual, best first."""
+    parts = contributions(snapshot)
+    arrays = snapshot.arrays
+    return [
+        {
+            "rank": i + 1,
+            "fitness": number(arrays["fitness"][i]),
+            "born": int(arrays["born"][i]),
+            "age": snapshot.generation - int(arrays["born"][i]),
+            "kind": KINDS[Origin(int(arrays["origin"][i]))],
+            "contributions": {name: number(value) for name, value in zip(TERMS, parts[i], strict=True)},
+        }
+        for i in range(len(parts))
+    ]
+
+
+def diversity(snapshot: Snapshot) -> dict[str, Any]:
+    """How many genomes differ, and per joint the standard deviation over the population, mean of the key poses."""
+    genomes = np.concatenate([snapshot.key_poses.reshape(len(snapshot.fitness), -1), snapshot.tuning], axis=1)
+    spread = np.degrees(snapshot.key_poses.std(axis=0).mean(axis=0))
+    room = np.degrees(snapshot.creature.pose_high - snapshot.creature.pose_low)
+    return {
+        "individuals": len(genomes),
+        "unique": len(np.unique(genomes, axis=0)),
+        "spread_deg": _by_joint(snapshot, spread),
+        "spread_of_range": _by_joint(snapshot, spread / np.maximum(room, 1e-9)),
+        "tuning_spread": dict(zip(TUNING, map(float, snapshot.tuning.std(axis=0)), strict=True)),
+    }
+
+
+def individual_facts(snapshot: Snapshot, rank: int) -> dict[str, Any]:
+    """One member of the population; rank 1 is the best.
+
+    Raises:
+      UserError: the population is smaller.
+    """
+    if not 1 <= rank <= len(snapshot.fitness):
+        raise UserError(f"{snapshot.run}: no individual {rank}; the population has ranks 1 to {len(snapshot.fitness)}")
+    i = rank - 1
+    terms = np.asarray(snapshot.arrays["terms"][i], float)
+    return population(snapshot)[i] | {
+        "terms": {name: [number(value) for value in column] for name, column in zip(TERMS, terms.T, strict=True)},
+        "tuning": dict(zip(TUNING, map(float, snapshot.tuning[i]), strict=True)),
+        "key_poses_deg": [_by_joint(snapshot, np.degrees(pose)) for pose in snapshot.key_poses[i]],
+        "range_deg": {
+            name: [math.degrees(low), math.degrees(high)]
+            for name, low, high in zip(snapshot.creature.joint_names, snapshot.creature.pose_low, snapshot.creature.pose_high, strict=True)
+        },
+    }
+
+
+def number(value: Any) -> float | None:
+    """A number that JSON can hold; None for what is not finite."""
+    return float(value) if np.isfinite(value) else None
+
+
+def _by_joint(snapshot: Snapshot, values: Iterable[float]) -> dict[str, float]:
+    return dict(zip(snapshot.creature.joint_names, map(float, values), strict=True))

@@ -1,0 +1,204 @@
+"""One checkpoint read back as NumPy arrays, whatever devices wrote it, together with the run it belongs to.
+
+Letters: `P` individuals, `R` starts, `F` fitness terms, `K` key poses, `J` joints, `E` tuning genes.
+"""
+
+import contextlib
+import dataclasses
+import json
+import logging
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
+
+import jax
+import numpy as np
+import orbax.checkpoint as ocp
+
+from mjxgait.checkpoint import FOLDER, SCHEMA, Manifest, _hash
+from mjxgait.config import Config
+from mjxgait.creature import Creature
+from mjxgait.errors import UserError
+from mjxgait.evolution import EvolutionState, stop_reason
+from mjxgait.folder import CHAMPION, CONFIG, METRICS, open_run, read_metrics
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Snapshot:
+    """A checkpoint that is whole, and its run.
+
+    arrays: of the state, by dotted name. lines: of the metrics, up to this generation. generations: there are checkpoints of.
+    versions: of the packages that wrote the run's champion. written: s since the epoch. size: bytes on disk.
+    """
+
+    run: Path
+    manifest: Manifest
+    creature: Creature
+    config: Config
+    arrays: Mapping[str, np.ndarray]
+    lines: Sequence[Mapping[str, Any]]
+    generations: Sequence[int]
+    versions: Mapping[str, str]
+    written: float
+    size: int
+
+    @property
+    def generation(self) -> int:
+        """That the checkpoint was written after."""
+        return self.manifest.generation
+
+    @property
+    def key_poses(self) -> np.ndarray:
+        """[P, K, J] rad, best individual first."""
+        return self.arrays["genomes.key_poses"]
+
+    @property
+    def tuning(self) -> np.ndarray:
+        """[P, E] in the order of the config's tuning ranges."""
+        return self.arrays["genomes.tuning"]
+
+    @property
+    def fitness(self) -> np.ndarray:
+        """[P], best first."""
+        return self.arrays["fitness"]
+
+    @property
+    def ended(self) -> str | None:
+        """Why the run is over at this checkpoint; None when it was to go on."""
+        return stop_reason(cast(EvolutionState, SimpleNamespace(**self.arrays)), self.config.evolution)
+
+
+def read_snapshot(path: Path, generation: int | None = None) -> Snapshot:
+    """The checkpoint of a run folder (the latest, or that of `generation`), or the one at a path.
+
+    Raises:
+      UserError: not a run or checkpoint, or a damaged or foreign one; says which and names the newest that is intact.
+    """
+    run, generation = _locate(path, generation)
+    creature, config = open_run(run)
+    known = checkpoint_generations(run)
+    if not known:
+        raise UserError(f"{run}: no checkpoint yet; the run ended before its first generation was done")
+    wanted = known[-1] if generation is None else generation
+    if wanted not in known:
+        raise UserError(f"{run}: no checkpoint of generation {wanted}; there are {', '.join(map(str, known))}")
+    folder = run / FOLDER / str(wanted)
+    try:
+        manifest, arrays = _read(folder)
+    except _Damaged as damage:
+        raise UserError(f"{folder}: the checkpoint is damaged ({damage}); {_way_out(run, known, wanted)}") from None
+    _check_owner(folder, manifest, arrays, creature, config)
+    files = [file for file in folder.rglob("*") if file.is_file()]
+    return Snapshot(
+        run=run,
+        manifest=manifest,
+        creature=creature,
+        config=config,
+        arrays=arrays,
+        lines=_lines(run / METRICS, wanted),
+        generations=known,
+        versions=_versions(run),
+        written=folder.stat().st_mtime,
+        size=sum(file.stat().st_size for file in files),
+    )
+
+
+def checkpoint_generations(run: Path) -> list[int]:
+    """The generations a run has complete checkpoints of, oldest first; one that was being written when the run was killed is left out."""
+    folder = run / FOLDER
+    return sorted(int(entry.name) for entry in folder.iterdir() if entry.name.isdigit()) if folder.is_dir() else []
+
+
+def _lines(path: Path, last: int) -> list[dict[str, Any]]:
+    """The metrics up to a generation; none where the file is not one of ours: the checkpoint is still worth telling of."""
+    try:
+        return [line for line in read_metrics(path) if line["generation"] <= last]
+    except (OSError, UnicodeDecodeError, TypeError, KeyError):
+        return []
+
+
+def _locate(path: Path, generation: int | None) -> tuple[Path, int | None]:
+    """The run folder, and the generation that the path itself names."""
+    if not path.exists():
+        raise UserError(f"{path}: no such folder")
+    if (path / CONFIG).is_file():
+        return path, generation
+    path = path.resolve()
+    if path.name == FOLDER and (path.parent / CONFIG).is_file():
+        return path.parent, generation
+    if path.name.isdigit() and path.parent.name == FOLDER:
+        run = path.parent.parent
+        if not (run / CONFIG).is_file():
+            raise UserError(f"{path}: a checkpoint without its run; keep {CONFIG} and the creature folder beside {FOLDER}/")
+        if generation is not None and generation != int(path.name):
+            raise UserError(f"{path}: is generation {path.name}; for generation {generation} name the run folder {run}")
+        return run, int(path.name)
+    raise UserError(f"{path}: neither a run folder (it has no {CONFIG}) nor one of its checkpoints; `mjxgait train` makes one")
+
+
+class _Damaged(Exception):
+    """A checkpoint that cannot be read, or whose values are not those that were written."""
+
+
+def _read(folder: Path) -> tuple[Manifest, dict[str, np.ndarray]]:
+    try:
+        manifest = Manifest(**json.loads((folder / "manifest" / "metadata").read_text(encoding="utf-8")))
+        if manifest.schema != SCHEMA:
+            raise UserError(f"{folder}: written with schema {manifest.schema}, this version reads {SCHEMA}; use the version that wrote it")
+        with _quiet(), ocp.Checkpointer(ocp.PyTreeCheckpointHandler()) as reader:
+            where = (folder / "state").resolve()
+            names = reader.metadata(where).item_metadata.tree
+            # As NumPy arrays: nothing of the devices that wrote it has to be here.
+            kinds = jax.tree.map(lambda _: ocp.RestoreArgs(restore_type=np.ndarray), names)
+            arrays = reader.restore(where, args=ocp.args.PyTreeRestore(restore_args=kinds))
+    except UserError:
+        raise
+    except Exception as error:  # Orbax raises many kinds on a broken folder
+        reason = (str(error).strip().splitlines() or [type(error).__name__])[0]
+        raise _Damaged(reason if len(reason) < 120 else reason[:117] + "...") from None
+    if _hash(arrays) != manifest.arrays:
+        raise _Damaged("its values are not those that were written")
+    return manifest, arrays
+
+
+@contextlib.contextmanager
+def _quiet() -> Iterator[None]:
+    """Without Orbax's warning of a file that a part of a checkpoint never has."""
+    log = logging.getLogger("absl")
+    before = log.level
+    log.setLevel(logging.ERROR)
+    try:
+        yield
+    finally:
+        log.setLevel(before)
+
+
+def _way_out(run: Path, known: Sequence[int], damaged: int) -> str:
+    for generation in reversed(known):
+        if generation == damaged:
+            continue
+        try:
+            _read(run / FOLDER / str(generation))
+        except (_Damaged, UserError):
+            continue
+        return f"the newest intact one is of generation {generation}: add --generation {generation}"
+    return "no other one is intact"
+
+
+def _check_owner(folder: Path, manifest: Manifest, arrays: Mapping[str, np.ndarray], creature: Creature, config: Config) -> None:
+    if manifest.creature_digest != creature.digest:
+        raise UserError(f"{folder}: was written for another body ({manifest.creature}) than the creature folder of this run holds")
+    shape = (config.evolution.population, config.controller.key_poses, len(creature.joint_names))
+    if arrays["genomes.key_poses"].shape != shape:
+        raise UserError(
+            f"{folder}: holds key poses of shape {arrays['genomes.key_poses'].shape}, this run's {CONFIG} asks for {shape}; "
+            "one of the two is from another run"
+        )
+
+
+def _versions(run: Path) -> dict[str, str]:
+    try:
+        return dict(json.loads((run / CHAMPION).read_text(encoding="utf-8"))["origin"]["versions"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return {}

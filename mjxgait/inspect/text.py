@@ -1,0 +1,165 @@
+"""The tables that `mjxgait inspect` prints."""
+
+import datetime
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+BLOCKS = "▁▂▃▄▅▆▇█"
+WIDEST = 60
+"""Characters of a sparkline; longer histories are thinned."""
+
+
+def print_facts(facts: Mapping[str, Any], console: Console) -> None:
+    """All about one checkpoint; see `facts`."""
+    _print_identity(facts, console)
+    _print_settings(facts["settings_changed"], console)
+    _print_history(facts, console)
+    _print_population(facts["population"], console)
+    _print_joints(facts["champion"], facts["diversity"], console)
+
+
+def print_individual(individual: Mapping[str, Any], console: Console) -> None:
+    """All about one member of a population; see `individual_facts`."""
+    console.print(
+        f"[bold]individual {individual['rank']}[/]: fitness {show(individual['fitness'])}, "
+        f"{individual['kind']}, born in generation {individual['born']}"
+    )
+    starts = len(next(iter(individual["terms"].values())))
+    table = titled_table("fitness terms, one column per start (the first is undisturbed)", console)
+    for heading in ("term", *(f"start {i + 1}" for i in range(starts)), "gives"):
+        table.add_column(heading, justify="left" if heading == "term" else "right")
+    for name, values in individual["terms"].items():
+        table.add_row(name, *map(show, values), show(individual["contributions"][name], sign=True))
+    console.print(table)
+    _print_joints(individual, None, console)
+
+
+def sparkline(values: Sequence[float | None], low: float, high: float) -> str:
+    """One character per value, by its height between low and high; a space where there is none."""
+    room = max(high - low, 1e-9)
+
+    def block(value: float | None) -> str:
+        return " " if value is None else BLOCKS[min(max(int((value - low) / room * len(BLOCKS)), 0), len(BLOCKS) - 1)]
+
+    return "".join(map(block, values))
+
+
+def show(value: float | None, sign: bool = False) -> str:
+    """A number in a table."""
+    if value is None:
+        return "none"
+    text = f"{value:+.2f}" if sign else f"{value:.3f}"
+    return "0" if float(text) == 0 else text
+
+
+def titled_table(title: str, console: Console) -> Table:
+    """Prints a heading and returns the empty table to print below it."""
+    console.print(f"\n[bold]{title}[/]")
+    return Table(box=None, pad_edge=False)
+
+
+def print_pairs(rows: Mapping[str, str], console: Console) -> None:
+    """Names and values in two columns."""
+    table = Table(box=None, show_header=False, pad_edge=False)
+    table.add_column(no_wrap=True)
+    table.add_column(overflow="fold")
+    for name, value in rows.items():
+        table.add_row(name, value)
+    console.print(table)
+
+
+def ago(written: str) -> str:
+    """How long before now, of an ISO time, in the largest unit that fits."""
+    seconds = (datetime.datetime.now(datetime.UTC) - datetime.datetime.fromisoformat(written)).total_seconds()
+    for unit, length in (("day", 86400), ("hour", 3600), ("minute", 60)):
+        if (count := int(seconds // length)) >= 1:
+            return f"{count} {unit}{'s' if count > 1 else ''} ago"
+    return "just now"
+
+
+def _print_identity(facts: Mapping[str, Any], console: Console) -> None:
+    state = facts["ended"] or "not finished: `mjxgait train --resume` goes on from the latest checkpoint"
+    versions = ", ".join(f"{name} {version}" for name, version in facts["versions"].items())
+    size, key = f"{facts['bytes'] / 1024:,.0f} KiB", " ".join(f"{word:08x}" for word in facts["random_key"]["data"])
+    console.print(f"[bold]{facts['creature']}[/], generation {facts['generation']} of {facts['generations']}")
+    fitness = facts["fitness"]
+    rows = {
+        "run": facts["run"],
+        "state": state,
+        "checkpoint": f"intact, schema {facts['schema']}, {size}, written {ago(facts['written'])} ({facts['written']})",
+        "generations kept": ", ".join(map(str, facts["checkpoints"])),
+        "seed": f"{facts['seed']} ({facts['random_key']['kind']} key now {key})",
+        "body": facts["creature_digest"],
+        "versions": versions or "unknown: the run has no champion.json",
+        "fitness": ", ".join(f"{name.replace('_', ' ')} {show(value)}" for name, value in fitness.items() if name != "broken")
+        + (f"; {fitness['broken']} without a finite one" if fitness["broken"] else ""),
+        "genomes": f"{facts['diversity']['unique']} different of {facts['diversity']['individuals']}",
+    }
+    print_pairs(rows, console)
+
+
+def _print_settings(changed: Mapping[str, Any], console: Console) -> None:
+    if not changed:
+        console.print("\nAll settings are those of configs/default.toml.")
+        return
+    table = titled_table("settings that differ from configs/default.toml", console)
+    for heading in ("key", "default", "here"):
+        table.add_column(heading)
+    for key, values in changed.items():
+        table.add_row(key, str(values["default"]), str(values["here"]))
+    console.print(table)
+
+
+def _print_history(facts: Mapping[str, Any], console: Console) -> None:
+    history = facts["history"]
+    if not history:
+        console.print("\nNo history: metrics.jsonl is missing or damaged.")
+        return
+    stride = -(-len(history) // WIDEST)
+    thinned = history[::-1][::stride][::-1]
+    values = [line[key] for line in thinned for key in ("best", "mean") if line[key] is not None]
+    low, high = min(values, default=0.0), max(values, default=0.0)
+    forced = [any(line["forced"] for line in history[max(i - stride + 1, 0) : i + 1]) for i in range(len(history))][::-1][::stride][::-1]
+    console.print(
+        f"\n[bold]history[/] of generations {history[0]['generation']} to {history[-1]['generation']}, fitness {low:.2f} to {high:.2f}"
+    )
+    for key in ("best", "mean"):
+        console.print(f"{key:7} {sparkline([line[key] for line in thinned], low, high)}")
+    if any(forced):
+        console.print(f"forced  {''.join('^' if f else ' ' for f in forced)}".rstrip())
+    for spell in facts["forced_spells"]:
+        console.print(
+            f"forced evolution in generations {spell['first']} to {spell['last']}: best {show(spell['best_before'])} to "
+            f"{show(spell['best_after'])}, mean {show(spell['mean_before'])} to {show(spell['mean_after'])}"
+        )
+
+
+def _print_population(rows: Sequence[Mapping[str, Any]], console: Console) -> None:
+    weight = {name: sum(abs(row["contributions"][name] or 0.0) for row in rows) for name in rows[0]["contributions"]}
+    # As many terms as the line has room for, those that matter most first.
+    main = sorted((name for name in weight if weight[name]), key=lambda name: -weight[name])[: max((console.width - 42) // 10, 1)]
+    table = titled_table("population; what each term gives to the fitness (--individual N tells all of one)", console)
+    for heading in ("rank", "fitness", "age", "kind", *main, "others"):
+        table.add_column(heading, justify="left" if heading == "kind" else "right", no_wrap=True)
+    for row in rows:
+        others = sum(value or 0.0 for name, value in row["contributions"].items() if name not in main)
+        given = [show(row["contributions"][name], sign=True) for name in main]
+        table.add_row(str(row["rank"]), show(row["fitness"]), str(row["age"]), row["kind"], *given, show(others, sign=True))
+    console.print(table)
+
+
+def _print_joints(individual: Mapping[str, Any], diversity: Mapping[str, Any] | None, console: Console) -> None:
+    """Key poses by joint; with the diversity also how far the population is spread."""
+    poses = individual["key_poses_deg"]
+    who = "champion" if individual["rank"] == 1 else f"individual {individual['rank']}"
+    table = titled_table(f"{who}: key poses in degrees", console)
+    for heading in ("joint", "may lie in", *(f"pose {k + 1}" for k in range(len(poses))), *(["spread", "of range"] if diversity else [])):
+        table.add_column(heading, justify="left" if heading == "joint" else "right")
+    for joint, (low, high) in individual["range_deg"].items():
+        spread = [f"{diversity['spread_deg'][joint]:.1f}", f"{diversity['spread_of_range'][joint]:.0%}"] if diversity else []
+        table.add_row(joint, f"{low:.0f} .. {high:.0f}", *(f"{pose[joint]:.1f}" for pose in poses), *spread)
+    console.print(table)
+    console.print("tuning: " + ", ".join(f"{name} {value:.3g}" for name, value in individual["tuning"].items()))

@@ -1,0 +1,107 @@
+"""Pictures by MuJoCo's own renderer where GL works, which a process of its own finds out."""
+
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+from PIL import Image, ImageDraw
+
+from mjxgait.errors import UserError
+from mjxgait.viewing.floor import band_lines, number_bands
+from mjxgait.viewing.painter import lamp_direction
+from mjxgait.viewing.stage import Stage
+
+WORKER = "mjxgait.viewing.gl_worker"
+OFF = ("disable", "disabled", "off", "false", "0")
+"""Values of MUJOCO_GL that ask for no GL."""
+PATIENCE = 60.0
+"""s that a first picture may take."""
+
+
+def working_backend(stage: Stage, wanted: str | None = None) -> tuple[str | None, str]:
+    """The GL backend that can draw this stage, or None; and a sentence that says what was tried.
+
+    Args:
+      wanted: the value of MUJOCO_GL: the only backend to try, or that there is to be none.
+    """
+    if wanted and wanted.lower() in OFF:
+        return None, f"drawn without GL, as MUJOCO_GL={wanted} says"
+    candidates = [wanted] if wanted else ["egl", "osmesa"] if sys.platform == "linux" else ["default"]
+    reasons = []
+    for backend in candidates:
+        with tempfile.TemporaryDirectory() as folder:
+            try:
+                done = subprocess.run(_command(stage, [0], Path(folder)), env=_environment(backend), capture_output=True, timeout=PATIENCE)
+            except subprocess.TimeoutExpired:
+                reasons.append(f"{backend}: no picture in {PATIENCE:g} s")
+                continue
+        if done.returncode == 0 and len(done.stdout) == 3 * stage.width * stage.height and any(done.stdout):
+            return backend, f"drawn by MuJoCo with {backend}"
+        lines = done.stderr.decode(errors="replace").strip().splitlines()
+        reasons.append(f"{backend}: {lines[-1][:100] if lines else f'ended with code {done.returncode}'}")
+    return None, f"drawn without GL, as it does not work here ({'; '.join(reasons)})"
+
+
+def gl_pictures(stage: Stage, frames: Sequence[int], backend: str) -> Iterator[Image.Image]:
+    """The moments of these frames.
+
+    Raises:
+      UserError: the renderer stopped half way.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        command = _command(stage, frames, Path(folder))
+        worker = subprocess.Popen(command, env=_environment(backend), stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+        assert worker.stdout is not None
+        try:
+            for frame in frames:
+                raw = worker.stdout.read(3 * stage.width * stage.height)
+                if len(raw) < 3 * stage.width * stage.height:
+                    raise UserError(f"the GL renderer ({backend}) stopped in the middle; add --renderer painter")
+                picture = Image.frombytes("RGB", (stage.width, stage.height), raw)
+                number_bands(ImageDraw.Draw(picture), stage.camera(frame), stage.origin)
+                yield picture
+        finally:
+            worker.kill()
+            worker.wait()
+            worker.stdout.close()
+
+
+def scene_file(stage: Stage, frames: Sequence[int], path: Path) -> None:
+    """Writes all that the worker needs: poses [F, N, nq] with each creature in its lane, and the camera of every frame."""
+    cameras = [stage.camera(frame) for frame in frames]
+    first = cameras[0]
+    into, creature = first.axes[2], stage.walks[0].creature
+    place = int(creature.model.jnt_qposadr[creature.model.body_jntadr[creature.trunk]])
+    poses = np.array([[walk.qpos[min(frame, len(walk.qpos) - 1)] for walk in stage.walks] for frame in frames])
+    poses[..., place : place + 3] += stage.lanes
+    numbers = {int(n) for camera in (first, cameras[-1]) for n in band_lines(camera, stage.origin)[0]}
+    step = band_lines(first, stage.origin)[1]
+    dark = [n for n in range(min(numbers), max(numbers)) if n % 2]
+    np.savez(
+        path,
+        xml=np.array(creature.files["creature.xml"]),
+        size=np.array([stage.width, stage.height]),
+        extent=np.array(stage.height / first.scale),
+        view=np.array([np.degrees(np.arctan2(into[1], into[0])), -np.degrees(first.elevation), 20 * creature.body_length]),
+        centre=np.array([camera.centre for camera in cameras]),
+        qpos=poses,
+        bands=np.array([stage.origin + (n + 0.5) * step * stage.forward for n in dark]),
+        band_width=np.array(step),
+        forward=stage.forward,
+        lamp=lamp_direction(stage.forward),
+    )
+
+
+def _command(stage: Stage, frames: Sequence[int], folder: Path) -> list[str]:
+    path = folder / "scene.npz"
+    scene_file(stage, frames, path)
+    return [sys.executable, "-m", WORKER, str(path)]
+
+
+def _environment(backend: str) -> dict[str, str]:
+    chosen = {} if backend == "default" else {"MUJOCO_GL": backend, "PYOPENGL_PLATFORM": backend}
+    return {key: value for key, value in os.environ.items() if key != "MUJOCO_GL"} | chosen

@@ -1,0 +1,142 @@
+"""One HTML file that plays a walk in 3D by double click: nothing in it asks the network for anything."""
+
+import base64
+import html
+import json
+import math
+import string
+from collections.abc import Iterable, Sequence
+from importlib import resources
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+from mjxgait.animation import WalkLoop, build_glb, walk_loop
+from mjxgait.champion import Champion, read_champion
+from mjxgait.creature import Creature
+from mjxgait.errors import UserError
+from mjxgait.folder import CERTIFICATE, CHAMPION, METRICS, open_run, read_metrics
+from mjxgait.viewing.curves import draw_fitness
+from mjxgait.viewing.gaitplots import gait_figures
+from mjxgait.viewing.style import Figures, figure
+from mjxgait.viewing.walk import Walk, record_walk
+
+SECONDS = 12.0
+"""Of the walk from which the loop and the curves are taken."""
+RATE = 30
+
+
+def write_page(run: Path, out: Path) -> None:
+    """Writes the page of a run's champion.
+
+    Raises:
+      UserError: no run, no champion, no steady stride, or the file cannot be written.
+    """
+    creature, _ = open_run(run)
+    champion = read_champion(run / CHAMPION, creature)
+    walk = record_walk(creature, champion, SECONDS)
+    page = build_page(walk, walk_loop(walk, RATE), _sections(run, creature, champion, walk))
+    try:
+        out.write_text(page, encoding="utf-8")
+    except OSError as error:
+        raise UserError(f"{out}: cannot be written ({error.strerror})") from None
+
+
+def build_page(walk: Walk, loop: WalkLoop, sections: str) -> str:
+    """The text of the page; sections: HTML below the walk."""
+    web = resources.files("mjxgait.viewing") / "web"
+    # Without the reference to a source map, which a browser's tools would ask for.
+    viewer = (web / "model-viewer.min.js").read_text(encoding="utf-8").rsplit("//# sourceMappingURL", 1)[0]
+    stride = loop.times[-1] / loop.strides
+    lead = (
+        f"{loop.speed:.2f} m/s, {loop.speed / walk.creature.body_length:.2f} body lengths per second; "
+        f"a stride takes {stride:.2f} s and leads {loop.advance / loop.strides:.2f} m forward."
+    )
+    return string.Template((web / "page.html").read_text(encoding="utf-8")).substitute(
+        title=html.escape(walk.creature.name.replace("_", " ")),
+        lead=html.escape(lead),
+        glb=base64.b64encode(build_glb(loop)).decode("ascii"),
+        viewer=viewer.replace("</script", "<\\/script"),
+        sections=sections,
+    )
+
+
+def _sections(run: Path, creature: Creature, champion: Champion, walk: Walk) -> str:
+    lines = read_metrics(run / METRICS)
+    fitness: Figures = {"fitness": ((8, 4.0), lambda drawing: draw_fitness(drawing.subplots(), lines))} if lines else {}
+    parts = ["<h2>The walk</h2>", *_images(gait_figures(walk), creature)]
+    if fitness:
+        parts += ["<h2>How it was learnt</h2>", *_images(fitness, creature)]
+    parts += ["<h2>Certificate</h2>", certificate_table(run)]
+    parts += ["<h2>Where it comes from</h2>", _origin(creature, champion)]
+    return "\n".join(parts)
+
+
+def _images(figures: Figures, creature: Creature) -> Iterable[str]:
+    for name, (size, compose) in figures.items():
+        with figure(size) as drawing:
+            compose(drawing)
+            file = BytesIO()
+            drawing.savefig(file, format="svg", metadata={"Date": None})
+        data = base64.b64encode(file.getvalue()).decode("ascii")
+        yield f'<img alt="{html.escape(name)} of the {html.escape(creature.name)}" src="data:image/svg+xml;base64,{data}">'
+
+
+def certificate_table(run: Path) -> str:
+    """The criteria as a table, or why there is none."""
+    file, champion = run / CERTIFICATE, run / CHAMPION
+    if not file.exists():
+        return "<p>Not examined: <code>mjxgait certify</code> does it.</p>"
+    if file.stat().st_mtime < champion.stat().st_mtime:
+        return "<p>Examined before the champion last changed: <code>mjxgait certify</code> does it again.</p>"
+    try:
+        document = json.loads(file.read_text(encoding="utf-8"))
+        rows = [
+            [
+                f"{c['number']} {c['name']}",
+                m["name"],
+                _show(m["value"]),
+                f"{m['sense']} {m['threshold']:g}",
+                "pass" if m["passed"] else "fails",
+            ]
+            for c in document["criteria"]
+            for m in c["measures"]
+        ]
+        verdict = "All criteria pass." if document["passed"] else "Not all criteria pass."
+    except (OSError, ValueError, KeyError, TypeError):
+        raise UserError(f"{file}: not a certificate; `mjxgait certify {run}` writes it anew") from None
+    return f"<p>{verdict}</p>" + _table(("criterion", "measure", "value", "wanted", "verdict"), rows)
+
+
+def _origin(creature: Creature, champion: Champion) -> str:
+    origin = champion.origin
+    rows = [
+        ["creature", f"{creature.name} (body {creature.digest}), {creature.mass:.1f} kg, {len(creature.joint_names)} joints"],
+        ["fitness", f"{champion.fitness:.3f}"],
+        ["found in generation", str(origin.get("born", "unknown"))],
+        ["seed", str(origin.get("seed", "unknown"))],
+        ["versions", ", ".join(f"{name} {version}" for name, version in origin.get("versions", {}).items()) or "unknown"],
+    ]
+    return _table((), rows)
+
+
+def _table(heading: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    def cell(text: str) -> str:
+        # In a table with a heading numbers stand under each other.
+        kind = ' class="fails"' if text == "fails" else ' class="number"' if heading and _is_number(text) else ""
+        return f"<td{kind}>{html.escape(text)}</td>"
+
+    head = f"<tr>{''.join(f'<th>{html.escape(h)}</th>' for h in heading)}</tr>" if heading else ""
+    body = "".join("<tr>" + "".join(map(cell, row)) + "</tr>" for row in rows)
+    return f"<table>{head}{body}</table>"
+
+
+def _is_number(text: str) -> bool:
+    try:
+        return math.isfinite(float(text))
+    except ValueError:
+        return False
+
+
+def _show(value: Any) -> str:
+    return "none" if value is None else f"{value:.3g}"

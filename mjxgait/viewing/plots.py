@@ -1,0 +1,55 @@
+"""All plots of a run, as PNG and SVG: the one function that the end of training and `mjxgait plot` call."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import jax.numpy as jnp
+import numpy as np
+
+from mjxgait.champion import read_champion
+from mjxgait.config import Config
+from mjxgait.errors import UserError
+from mjxgait.fitness import TERMS, weight_vector
+from mjxgait.folder import CHAMPION, METRICS, open_run, read_metrics
+from mjxgait.viewing.curves import Lines, progress_figures
+from mjxgait.viewing.filmstrip import draw_filmstrip
+from mjxgait.viewing.gaitplots import gait_figures
+from mjxgait.viewing.style import FORMATS, figure, save
+from mjxgait.viewing.walk import record_walk
+
+PLOTS = "plots"
+SECONDS = 10.0
+"""Of the walk that the plots show."""
+
+
+def plot_run(run: Path, out: Path | None = None, formats: Sequence[str] = FORMATS) -> list[Path]:
+    """Writes every plot there is something to draw for into RUN/plots (or `out`); returns the files.
+
+    Raises:
+      UserError: not a run folder, nothing to plot yet, or the folder cannot be written.
+    """
+    creature, config = open_run(run)
+    lines = read_metrics(run / METRICS)
+    if not lines:
+        raise UserError(f"{run}: nothing to plot; the run ended before its first generation was done")
+    out = out or run / PLOTS
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UserError(f"{out}: cannot be written ({error.strerror})") from None
+    figures = dict(progress_figures(lines, _weights(config, lines)))
+    if (run / CHAMPION).exists():
+        walk = record_walk(creature, read_champion(run / CHAMPION, creature), SECONDS)
+        figures |= dict(gait_figures(walk)) | {"filmstrip": ((12, 4.8), lambda drawing: draw_filmstrip(drawing, walk))}
+    files = []
+    for name, (size, compose) in figures.items():
+        with figure(size) as drawing:
+            compose(drawing)
+            files += save(drawing, out / name, formats)
+    return files
+
+
+def _weights(config: Config, lines: Lines) -> dict[str, np.ndarray]:
+    """Signed weight of each term, [generations]."""
+    rows = np.array([weight_vector(config.fitness, jnp.int32(line["generation"])) for line in lines])
+    return dict(zip(TERMS, rows.T, strict=True))

@@ -1,0 +1,52 @@
+"""How all plots look: line styles and hatches carry the meaning, so that they can be read in grey."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+from matplotlib.figure import Figure
+
+Figures = Mapping[str, tuple[tuple[float, float], Callable[[Figure], None]]]
+"""By file name: size in inches, and what draws on the figure."""
+FORMATS = ("png", "svg")
+SETTINGS = {
+    "font.size": 10,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.titlesize": 11,
+    "axes.titlelocation": "left",
+    "axes.grid": True,
+    "grid.color": "0.9",
+    "grid.linewidth": 0.6,
+    "axes.axisbelow": True,
+    "legend.frameon": False,
+    "hatch.linewidth": 0.5,
+    "savefig.dpi": 120,
+    "svg.hashsalt": "mjxgait",
+}
+DARK, MIDDLE, PALE = "0.1", "0.45", "0.85"
+ACCENT = "tab:orange"
+
+
+@contextmanager
+def figure(size: tuple[float, float]) -> Iterator[Figure]:
+    """An empty figure of this size in inches, closed at the end."""
+    with plt.rc_context(SETTINGS):
+        drawing = plt.figure(figsize=size, layout="constrained")
+        try:
+            yield drawing
+        finally:
+            plt.close(drawing)
+
+
+def save(drawing: Figure, path: Path, formats: Sequence[str] = FORMATS) -> list[Path]:
+    """Writes the figure once per format beside each other; path: without a suffix."""
+    files = [path.with_name(f"{path.name}.{kind}") for kind in formats]
+    for file in files:
+        # Without the date, the same plot is the same file.
+        drawing.savefig(file, metadata={"Date": None} if file.suffix == ".svg" else None)
+    return files

@@ -1,0 +1,149 @@
+"""Moving pictures: one champion, or several walks as a race, written as WebP, GIF, MP4 or PNG."""
+
+import dataclasses
+import itertools
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import Image, ImageDraw
+
+from mjxgait.errors import UserError
+from mjxgait.viewing.floor import DARK_INK, font
+from mjxgait.viewing.gl import gl_pictures
+from mjxgait.viewing.stage import Stage
+from mjxgait.viewing.walk import Walk
+
+FORMATS = (".webp", ".gif", ".mp4", ".png")
+PAPER = (255, 255, 255, 200)
+LABEL_GAP = 8
+"""Pixels between a creature and its label."""
+GIF_HUNDREDTHS = 100
+"""A GIF counts the time of a frame in hundredths of a second."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Runner:
+    """A walk and what is written above it; empty for a walk that is shown alone."""
+
+    walk: Walk
+    label: str = ""
+
+
+def moving_pictures(
+    runners: Sequence[Runner], stage: Stage, fps: int, slow: float = 1.0, backend: str | None = None
+) -> Iterator[Image.Image]:
+    """The frames of a video. slow: how many times slower than life. backend: of GL; None draws without."""
+    step = runners[0].walk.time_step
+    count = max(int(stage.frames * step * slow * fps), 1)
+    frames = [min(round(i / fps / slow / step), stage.frames - 1) for i in range(count)]
+    pictures = gl_pictures(stage, frames, backend) if backend else stage.pictures(frames)
+    for frame, picture in zip(frames, pictures, strict=True):
+        write_captions(picture, stage, runners, frame, slow)
+        yield picture
+
+
+def write_captions(picture: Image.Image, stage: Stage, runners: Sequence[Runner], frame: int, slow: float = 1.0) -> None:
+    """Name, speed and time; in a race also who is who."""
+    draw = ImageDraw.Draw(picture, "RGBA")
+    size = max(stage.height // 20, 13)
+    lead = runners[0].walk
+    name = lead.creature.name.replace("_", " ")
+    time = f"{frame * lead.time_step:.1f} s" + (f"  (slowed {slow:g} times)" if slow != 1 else "")
+    draw.text((12, 10), name, fill=DARK_INK, font=font(size))
+    draw.text((stage.width - 12, 10), time, fill=DARK_INK, font=font(size), anchor="ra")
+    if len(runners) == 1:
+        draw.text((12, 14 + size), condition(lead, frame), fill=DARK_INK, font=font(round(0.8 * size)))
+        return
+    for place, runner in reversed(list(enumerate(runners))):
+        x, y = stage.behind(frame, place) - [LABEL_GAP, 0]
+        text = f"{runner.label}: {condition(runner.walk, frame)}"
+        letters = font(round(0.7 * size))
+        box = draw.textbbox((x, y), text, font=letters, anchor="rm")
+        # Whoever has been left behind keeps a label at the edge.
+        shift = max(8 - box[0], 0) + min(stage.width - 8 - box[2], 0)
+        draw.rectangle((box[0] - 4 + shift, box[1] - 3, box[2] + 4 + shift, box[3] + 3), fill=PAPER)
+        draw.text((x + shift, y), text, fill=DARK_INK, font=letters, anchor="rm")
+
+
+def condition(walk: Walk, frame: int) -> str:
+    """The mean forward speed of the last second, or that it fell."""
+    if frame * walk.time_step >= walk.fell:
+        return f"fell at {walk.fell:.1f} s"
+    frame = min(frame, len(walk.qpos) - 1)
+    before = max(frame - round(1.0 / walk.time_step), 0)
+    if frame == before:
+        return "0.00 m/s"
+    moved = (walk.trunk_pos[frame] - walk.trunk_pos[before])[:2] @ walk.forward
+    return f"{moved / ((frame - before) * walk.time_step):.2f} m/s"
+
+
+def write_video(pictures: Iterable[Image.Image], path: Path, fps: int) -> None:
+    """Writes the frames in the format that the name of the file asks for.
+
+    Raises:
+      UserError: another format, MP4 without the extra, or a file that cannot be written.
+    """
+    try:
+        match path.suffix.lower():
+            case ".mp4":
+                _write_mp4(pictures, path, fps)
+            case ".webp":
+                _write_webp(list(pictures), path, fps)
+            case ".gif":
+                _write_gif(list(pictures), path, fps)
+            case other:
+                raise UserError(f'{path}: cannot write "{other}"; end the name with {", ".join(FORMATS)}')
+    except OSError as error:
+        raise UserError(f"{path}: cannot be written ({error.strerror or error})") from None
+
+
+def require_writer(path: Path) -> None:
+    """Says before the long work whether the file can be written.
+
+    Raises:
+      UserError: see `write_video`.
+    """
+    if path.suffix.lower() not in FORMATS:
+        raise UserError(f'{path}: cannot write "{path.suffix}"; end the name with {", ".join(FORMATS)}')
+    if not path.absolute().parent.is_dir():
+        raise UserError(f"{path}: the folder {path.parent} does not exist")
+    if path.suffix.lower() == ".mp4":
+        _import_av(path)
+
+
+def _write_webp(pictures: list[Image.Image], path: Path, fps: int) -> None:
+    pictures[0].save(path, save_all=True, append_images=pictures[1:], duration=round(1000 / fps), loop=0, quality=75, method=3)
+
+
+def _write_gif(pictures: list[Image.Image], path: Path, fps: int) -> None:
+    # One palette for all, so that still parts do not flicker.
+    samples = pictures[:: max(len(pictures) // 6, 1)]
+    joined = Image.fromarray(np.concatenate([np.asarray(sample) for sample in samples]))
+    palette = joined.quantize(128, method=Image.Quantize.MEDIANCUT)
+    frames = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
+    duration = 10 * max(round(GIF_HUNDREDTHS / fps), 2)
+    frames[0].save(path, save_all=True, append_images=frames[1:], duration=duration, loop=0, optimize=False)
+
+
+def _write_mp4(pictures: Iterable[Image.Image], path: Path, fps: int) -> None:
+    av = _import_av(path)
+    frames = iter(pictures)
+    first = next(frames)
+    # H.264 wants even sizes.
+    width, height = first.width // 2 * 2, first.height // 2 * 2
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("libx264", rate=fps)
+        stream.width, stream.height, stream.pix_fmt, stream.options = width, height, "yuv420p", {"crf": "20"}
+        for picture in itertools.chain([first], frames):
+            container.mux(stream.encode(av.VideoFrame.from_image(picture.crop((0, 0, width, height)))))
+        container.mux(stream.encode())
+
+
+def _import_av(path: Path) -> Any:
+    try:
+        import av
+    except ImportError:
+        raise UserError(f'{path}: MP4 needs the extra: pip install "mjxgait[video]"; WebP and GIF need nothing') from None
+    return av

@@ -1,0 +1,131 @@
+"""A champion's undisturbed walk, simulated once in C MuJoCo: what every picture, video and animation is made of.
+
+Letters: `T` frames (control steps), `J` joints, `G` geoms, `nq` as in MuJoCo.
+"""
+
+import dataclasses
+from functools import cached_property
+
+import mujoco
+import numpy as np
+
+from mjxgait.certify.controller import Controller, Senses
+from mjxgait.certify.criteria import stride_starts
+from mjxgait.certify.measure import Recording, measure
+from mjxgait.certify.simulate import Trajectory, simulate
+from mjxgait.certify.starts import nominal_starts
+from mjxgait.champion import Champion
+from mjxgait.creature import Creature
+
+WARMUP = 2.0
+"""s until a gait has settled; strides are taken from after it where there are enough."""
+AFTERMATH = 0.7
+"""s that are still shown after a fall."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Walk:
+    """One walk. qpos: [T, nq]. fell: s, infinite when it stayed up. It ends with the time asked for, or soon after the fall."""
+
+    creature: Creature
+    champion: Champion
+    trajectory: Trajectory
+    fell: float
+
+    @property
+    def time_step(self) -> float:
+        """Between frames, s."""
+        return self.trajectory.time_step
+
+    @property
+    def qpos(self) -> np.ndarray:
+        """[T, nq] m, quaternions, rad."""
+        return self.trajectory.qpos[0]
+
+    @property
+    def seconds(self) -> float:
+        """Length of the walk."""
+        return len(self.qpos) * self.time_step
+
+    @cached_property
+    def recording(self) -> Recording:
+        """What a look at every frame measured."""
+        return measure(self.creature, self.champion, self.trajectory)
+
+    @cached_property
+    def forward(self) -> np.ndarray:
+        """[2] horizontal unit vector, in the world, in which the creature starts out."""
+        axis = (self.creature.stand_rot @ self.creature.forward)[:2]
+        return axis / np.linalg.norm(axis)
+
+    @cached_property
+    def trunk_pos(self) -> np.ndarray:
+        """[T, 3] m in the world."""
+        return self.body_poses()[0][:, self.creature.trunk]
+
+    def stride_frames(self) -> np.ndarray:
+        """Frames at which a stride begins, while the creature is up."""
+        starts = stride_starts(self.recording)
+        return starts[starts * self.time_step < self.fell]
+
+    def steady_strides(self, count: int) -> tuple[int, int] | None:
+        """First and last frame of `count` strides in a row whose durations are nearest to the usual; None when there are not so many."""
+        starts = self.stride_frames()
+        settled = starts[starts * self.time_step >= WARMUP]
+        starts = settled if len(settled) > count else starts
+        if len(starts) <= count:
+            return None
+        lengths = starts[count:] - starts[:-count]
+        chosen = int(np.argmin(np.abs(lengths - np.median(lengths))))
+        return int(starts[chosen]), int(starts[chosen + count])
+
+    def body_poses(self, frames: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """World positions [T, nbody, 3] m and rotations [T, nbody, 3, 3] of the bodies."""
+        return _poses(self.creature.model, self.qpos if frames is None else self.qpos[frames], ("xpos", "xmat"))
+
+    def geom_poses(self, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """World positions [T, G, 3] m and rotations [T, G, 3, 3] of the geoms at some frames."""
+        return _poses(self.creature.model, self.qpos[frames], ("geom_xpos", "geom_xmat"))
+
+    def targets(self) -> np.ndarray:
+        """[T, J] rad that the joints were pulled to, steering and balance included."""
+        pos, rot = self.body_poses()
+        trunk, unused = self.creature.trunk, np.zeros(0)
+        root = int(self.creature.model.jnt_dofadr[self.creature.model.body_jntadr[trunk]])
+        velocity = self.trajectory.qvel[0]
+        senses = Senses(
+            joint_pos=unused,
+            velocity=velocity,
+            trunk_pos=pos[:, trunk],
+            trunk_rot=rot[:, trunk],
+            # A free joint's angular velocity is in the body's own frame.
+            trunk_angvel=(rot[:, trunk] * velocity[:, None, root + 3 : root + 6]).sum(2),
+            mass_matrix=unused,
+            bias=unused,
+            constraint_force=unused,
+        )
+        return Controller(self.creature, self.champion).target(self.trajectory.position[0], senses)
+
+
+def record_walk(creature: Creature, champion: Champion, seconds: float) -> Walk:
+    """Simulates the champion on an even floor, without noise or pushes."""
+    outcome = simulate(creature, champion, nominal_starts(creature, 1), seconds, record=1, threads=1)
+    film, fell = outcome.trajectory, float(outcome.fell[0])
+    finite = np.isfinite(film.qpos[0]).all(1) & np.isfinite(film.qvel[0]).all(1)
+    last = len(finite) if finite.all() else int(np.argmin(finite))
+    last = min(last, round((fell + AFTERMATH) / film.time_step)) if np.isfinite(fell) else last
+    # One that blew up at once is shown standing.
+    frames = np.minimum(np.arange(max(last, 2)), max(last, 1) - 1)
+    kept = {name: getattr(film, name)[:, frames] for name in ("qpos", "qvel", "torque", "position")}
+    return Walk(creature, champion, dataclasses.replace(film, **kept), fell)
+
+
+def _poses(model: mujoco.MjModel, qpos: np.ndarray, names: tuple[str, str]) -> tuple[np.ndarray, np.ndarray]:
+    data = mujoco.MjData(model)
+    where, how = ([] for _ in names)
+    for row in qpos:
+        data.qpos[:] = row
+        mujoco.mj_kinematics(model, data)
+        where.append(getattr(data, names[0]).copy())
+        how.append(getattr(data, names[1]).reshape(-1, 3, 3).copy())
+    return np.array(where), np.array(how)

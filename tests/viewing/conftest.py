@@ -1,0 +1,27 @@
+"""A run of the smallest creature, and a browser."""
+
+import pytest
+from viewing.browser import launch
+from viewing.made_up import treading, write_run
+
+from mjxgait.viewing.walk import record_walk
+
+
+@pytest.fixture(scope="session")
+def stool_walk(stool):
+    return record_walk(stool, treading(stool), 5.0)
+
+
+@pytest.fixture(scope="session")
+def stool_run(stool, tmp_path_factory):
+    return write_run(tmp_path_factory.mktemp("runs") / "stool", stool, treading(stool))
+
+
+@pytest.fixture(scope="session")
+def browser():
+    """Headless Chromium; needs the apt package chromium and the Python package playwright."""
+    playwright = pytest.importorskip("playwright.sync_api", reason="needs the Python package playwright")
+    with playwright.sync_playwright() as play:
+        chromium = launch(play)
+        yield chromium
+        chromium.close()

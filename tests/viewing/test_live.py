@@ -1,0 +1,140 @@
+"""`mjxgait view`: a page on this machine that follows a run. The browser test needs Chromium (apt: chromium) and playwright."""
+
+import json
+import os
+import subprocess
+import sys
+import threading
+import time
+import urllib.error
+import urllib.request
+
+import pytest
+from viewing.browser import canvas, is_blank, wait_until, watched_tab
+from viewing.made_up import falling, metrics_line, treading, write_run
+
+from mjxgait.champion import write_champion
+from mjxgait.commands.view import following
+from mjxgait.errors import UserError
+from mjxgait.folder import CHAMPION, METRICS
+from mjxgait.viewing.live import HERE, SHARE, Watcher, open_server
+
+
+@pytest.fixture
+def run(stool, tmp_path):
+    return write_run(tmp_path / "run", stool, generations=2)
+
+
+@pytest.fixture
+def site(run):
+    """A watcher that looks when told to, and the address of its page."""
+    watcher = Watcher(run)
+    server = open_server(watcher, 0)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    yield watcher, f"http://{HERE}:{server.server_port}"
+    server.shutdown()
+    server.server_close()
+
+
+def improve(run, creature, champion):
+    """As a training does: the champion is replaced, and the log grows."""
+    write_champion(champion, creature, run / CHAMPION)
+    with (run / METRICS).open("a") as log:
+        log.write(json.dumps(metrics_line(2)) + "\n")
+
+
+def get(address, **headers):
+    with urllib.request.urlopen(urllib.request.Request(address, headers=headers), timeout=10) as answer:
+        return answer.read()
+
+
+def test_it_follows_the_run(site, run, stool):
+    watcher, address = site
+    watcher.look()
+    assert json.loads(get(f"{address}/state.json"))["version"] == 0
+    improve(run, stool, treading(stool))
+    watcher.look()
+    state = json.loads(get(f"{address}/state.json"))
+    assert state["version"] == 1
+    assert [line["generation"] for line in state["history"]] == [0, 1, 2]
+    assert get(f"{address}/walk.glb")[:4] == b"glTF"
+    watcher.look()
+    assert json.loads(get(f"{address}/state.json"))["version"] == 1
+
+
+def test_a_champion_that_falls_is_shown_falling(tmp_path):
+    from mjxgait.config import find_creature
+    from mjxgait.creature import load_creature
+
+    creature = load_creature(find_creature("tall_quadruped"))
+    watcher = Watcher(write_run(tmp_path / "run", creature, falling(creature)))
+    watcher.look()
+    assert "falls after" in watcher.shown.what
+    assert watcher.shown.glb
+
+
+def test_looking_takes_a_small_share_of_a_core(run, stool):
+    watcher = Watcher(run)
+    improve(run, stool, treading(stool))
+    began = time.process_time()
+    pause = watcher.look()
+    work = time.process_time() - began
+    assert work / (work + pause) < 1.1 * SHARE
+    assert SHARE <= 0.05
+
+
+def test_only_this_machine_can_reach_it(site):
+    _, address = site
+    with pytest.raises(urllib.error.HTTPError, match="403"):
+        get(f"{address}/state.json", Host="evil.example")
+    for path in ("/../config.toml", "/config.toml", "/walk.glb"):
+        with pytest.raises(urllib.error.HTTPError, match="404"):
+            get(address + path)
+
+
+def test_a_port_that_is_taken_is_said(site, run):
+    _, address = site
+    with pytest.raises(UserError, match="taken by another program"):
+        open_server(Watcher(run), int(address.rsplit(":", 1)[1]))
+
+
+def test_the_command_tells_its_address_and_ends(run):
+    viewer = subprocess.Popen([sys.executable, "-m", "mjxgait", "view", str(run)], stdout=subprocess.PIPE, text=True)
+    try:
+        said = viewer.stdout.readline()
+        assert said.startswith(f"http://{HERE}:")
+        assert json.loads(get(said.split()[0] + "/state.json"))["name"] == "stool"
+    finally:
+        viewer.send_signal(2)
+        assert viewer.wait(timeout=10) == 130 or os.name == "nt"
+        viewer.stdout.close()
+
+
+def test_a_training_can_be_followed(run, capfd):
+    with following(run):
+        end = time.monotonic() + 20
+        said = ""
+        while "http" not in said and time.monotonic() < end:
+            time.sleep(0.1)
+            said += capfd.readouterr().out
+        address = said.split()[0]
+        assert get(address)
+    with pytest.raises(urllib.error.URLError):
+        get(address)
+
+
+def test_the_page_shows_the_best_and_the_curve_grows(browser, site, run, stool):
+    watcher, address = site
+    improve(run, stool, treading(stool, degrees=12.0))
+    watcher.look()
+    tab, wrong, asked = watched_tab(browser, address)
+    assert not is_blank(canvas(tab))
+    assert "generation" in tab.inner_text("#what")
+    before = tab.inner_html("#curve")
+    improve(run, stool, treading(stool, degrees=8.0))
+    watcher.look()
+    wait_until(tab, "document.getElementById('walk').src.includes('version=2') && document.getElementById('walk').loaded")
+    assert tab.inner_html("#curve") != before
+    assert not is_blank(canvas(tab))
+    assert wrong == []
+    assert [url for url in asked if not url.startswith((address, "data:", "blob:"))] == []

@@ -1,0 +1,119 @@
+"""`mjxgait share`: one file that plays by double click and asks the network for nothing.
+
+The browser tests need Chromium (apt: chromium) and the Python package playwright.
+"""
+
+import json
+import os
+
+import numpy as np
+import pytest
+from viewing.browser import canvas, is_blank, watched_tab
+from viewing.made_up import treading, write_run
+
+from mjxgait.cli import main
+from mjxgait.errors import UserError
+from mjxgait.folder import CERTIFICATE
+from mjxgait.viewing.page import certificate_table
+
+CERTIFIED = {
+    "passed": False,
+    "criteria": [
+        {
+            "number": 7,
+            "name": "gait",
+            "measures": [{"name": "slip <or> slide", "value": None, "sense": "<=", "threshold": 0.15, "passed": False}],
+        }
+    ],
+}
+
+
+def share(run, out):
+    with pytest.raises(SystemExit) as ended:
+        main(["share", str(run), "--out", str(out)])
+    return ended.value.code
+
+
+@pytest.fixture(scope="module")
+def page(stool, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("page")
+    run = write_run(folder / "run", stool, treading(stool, degrees=12.0))
+    assert share(run, folder / "walk.html") == 0
+    return folder / "walk.html"
+
+
+@pytest.fixture(scope="module")
+def opened(browser, page):
+    """The page, open and loaded, with what went wrong and what it asked for."""
+    return watched_tab(browser, page.as_uri())
+
+
+def test_the_canvas_shows_a_creature_that_moves(opened):
+    tab, _, _ = opened
+    first = canvas(tab)
+    assert not is_blank(first)
+    assert tab.evaluate("walk.availableAnimations") == ["walk"]
+    for _ in range(20):
+        tab.wait_for_timeout(130)
+        if np.abs(canvas(tab) - first).mean() > 0.1:
+            return
+    pytest.fail("the creature stands still")
+
+
+def test_nothing_goes_wrong_and_nobody_else_is_asked(opened):
+    _, wrong, asked = opened
+    assert wrong == []
+    assert [url for url in asked if not url.startswith(("file:", "data:", "blob:"))] == []
+
+
+def test_it_can_be_stopped_and_slowed(opened):
+    tab, _, _ = opened
+    tab.click("text=half")
+    assert tab.evaluate("walk.timeScale") == 0.5
+    tab.click("#play")
+    assert tab.evaluate("walk.paused")
+    assert tab.inner_text("#play") == "Play"
+
+
+def test_a_blank_canvas_would_be_noticed(browser, page, tmp_path):
+    """The test above can fail."""
+    text = page.read_text(encoding="utf-8")
+    start = text.index("base64,", text.index("data:model/gltf-binary")) + len("base64,")
+    end = text.index('"', start)
+    (tmp_path / "broken.html").write_text(text[:start] + text[end:], encoding="utf-8")
+    tab = browser.new_page()
+    tab.goto((tmp_path / "broken.html").as_uri())
+    tab.wait_for_timeout(1500)
+    assert not tab.evaluate("document.getElementById('walk').loaded")
+    assert is_blank(canvas(tab))
+
+
+def test_the_page_names_no_place_outside_itself(page):
+    text = page.read_text(encoding="utf-8")
+    own = text[: text.index('<script type="module">')]
+    assert "default-src 'none'" in own
+    for reference in ('src="http', 'href="http', "@import", 'src="//', "url(http"):
+        assert reference not in own
+    assert "sourceMappingURL" not in text
+    assert len(text) < 4_000_000
+
+
+def test_the_certificate_is_shown_as_long_as_it_is_this_champions(stool, tmp_path):
+    run = write_run(tmp_path / "run", stool, treading(stool))
+    assert "Not examined" in certificate_table(run)
+    (run / CERTIFICATE).write_text(json.dumps(CERTIFIED))
+    assert "Not all criteria pass." in certificate_table(run)
+    assert "slip &lt;or&gt; slide" in certificate_table(run)
+    os.utime(run / CERTIFICATE, (0, 0))
+    assert "before the champion last changed" in certificate_table(run)
+    (run / CERTIFICATE).write_text("[]")
+    with pytest.raises(UserError, match="not a certificate"):
+        certificate_table(run)
+
+
+def test_what_cannot_be_is_said(stool, stool_run, tmp_path, capsys):
+    assert share(stool_run, tmp_path / "walk.pdf") == 2
+    assert share(stool_run, tmp_path / "missing" / "walk.html") == 2
+    assert share(tmp_path, tmp_path / "walk.html") == 2
+    assert share(write_run(tmp_path / "run", stool), tmp_path / "walk.html") == 2
+    assert "no champion yet" in capsys.readouterr().err
