@@ -71,7 +71,7 @@ class RolloutConfig:
 
     __pydantic_config__ = STRICT
     seconds: Positive = 8.0
-    starts: Count = 6
+    starts: Count = 8
     joint_noise: NonNegative = 0.05
     velocity_noise: NonNegative = 0.1
     friction: tuple[Positive, Positive] = (0.8, 1.2)
@@ -87,7 +87,7 @@ class Weights:
 
     __pydantic_config__ = STRICT
     distance: Finite = 1.0
-    alive: Finite = 1.0
+    alive: Finite = 0.0
     drift: Finite = 1.0
     fade: Finite = 0.5
     slip: Finite = 10.0
@@ -165,7 +165,7 @@ class EvolutionConfig:
     """
 
     __pydantic_config__ = STRICT
-    population: Count = 48
+    population: Count = 64
     generations: Whole = 60
     target: Finite | None = None
     growth: Positive = 2.0
@@ -195,6 +195,20 @@ class EvolutionConfig:
 
 
 @dataclasses.dataclass(frozen=True)
+class ExaminationConfig:
+    """The examination in C MuJoCo that ends a run.
+
+    Attributes:
+      candidates: so many of the best, different from each other, are examined at most, until one passes; 0 leaves the examination out.
+      difference: in units of each gene's range, root mean square; what counts as different.
+    """
+
+    __pydantic_config__ = STRICT
+    candidates: Whole = 4
+    difference: NonNegative = 0.02
+
+
+@dataclasses.dataclass(frozen=True)
 class Config:
     """A run's settings.
 
@@ -212,6 +226,7 @@ class Config:
     rollout: RolloutConfig = dataclasses.field(default_factory=RolloutConfig)
     fitness: FitnessConfig = dataclasses.field(default_factory=FitnessConfig)
     evolution: EvolutionConfig = dataclasses.field(default_factory=EvolutionConfig)
+    examination: ExaminationConfig = dataclasses.field(default_factory=ExaminationConfig)
 
 
 def data_folder(kind: Literal["envs", "configs"]) -> Path:

@@ -12,7 +12,7 @@ from jax.sharding import Mesh, NamedSharding, PartitionSpec
 from mjxgait.champion import Champion
 from mjxgait.config import Config
 from mjxgait.creature import Creature
-from mjxgait.evolution import Evolution, EvolutionState, GenerationMetrics, Judged
+from mjxgait.evolution import Evolution, EvolutionState, Judged
 from mjxgait.fitness import TERMS, fitness_terms, score, weight_vector
 from mjxgait.gait import TUNING, Genome, PoseTracker
 from mjxgait.physics import make_plant
@@ -47,11 +47,23 @@ class Experiment:
         key = jax.random.fold_in(jax.random.key(self.config.seed), 0)
         return self.evolution.init(key, self.config.rollout.starts, len(TERMS))
 
+    def candidates(self, state: EvolutionState) -> list[int]:
+        """Ranks of the best individuals that differ from each other, as many as the config asks for; best first."""
+        low, high = self.simulator.tracker.bounds()
+        genes = jax.tree.map(lambda leaf, a, b: np.asarray((leaf - a) / jnp.maximum(b - a, 1e-9)), state.genomes, low, high)
+        rows = np.concatenate([leaf.reshape(leaf.shape[0], -1) for leaf in jax.tree.leaves(genes)], axis=1)
+        chosen: list[int] = []
+        for rank in np.flatnonzero(np.isfinite(state.fitness)):
+            apart = np.sqrt(np.mean((rows[chosen] - rows[rank]) ** 2, axis=1))
+            if (apart > self.config.examination.difference).all() and len(chosen) < self.config.examination.candidates:
+                chosen.append(int(rank))
+        return chosen
+
     def compile(self) -> jax.stages.Compiled:
         """The generation as one compiled program: state -> (state, metrics)."""
         everywhere = self._everywhere
         program = jax.jit(self.evolution.step, in_shardings=everywhere, out_shardings=everywhere)
-        return program.lower(jax.eval_shape(self.init)).compile()
+        return program.lower(jax.eval_shape(self.init)).compile(compiler_options=_compiler_options())
 
     def place(self, state: EvolutionState) -> EvolutionState:
         """The state on all devices, where the compiled program wants it."""
@@ -61,18 +73,19 @@ class Experiment:
     def _everywhere(self) -> NamedSharding:
         return NamedSharding(self.simulator.mesh, PartitionSpec())
 
-    def champion(self, state: EvolutionState, metrics: GenerationMetrics, versions: dict[str, str]) -> Champion:
-        """The best individual of a state."""
-        best = jax.tree.map(lambda leaf: np.asarray(leaf[0]), state.genomes)
-        origin = {"generation": int(state.generation), "born": int(state.born[0]), "seed": self.config.seed, "versions": versions}
+    def champion(self, state: EvolutionState, versions: dict[str, str], rank: int = 0) -> Champion:
+        """An individual of a state; rank 0 is the best."""
+        best = jax.tree.map(lambda leaf: np.asarray(leaf[rank]), state.genomes)
+        terms = np.asarray(state.terms[rank]).mean(axis=0)
+        origin = {"generation": int(state.generation), "born": int(state.born[rank]), "seed": self.config.seed, "versions": versions}
         return Champion(
             creature=self.creature.name,
             digest=self.creature.digest,
             key_poses=best.key_poses,
             tuning=dict(zip(TUNING, map(float, best.tuning), strict=True)),
             controller=self.config.controller,
-            fitness=float(state.fitness[0]),
-            terms=dict(zip(TERMS, map(float, metrics.best_terms), strict=True)),
+            fitness=float(state.fitness[rank]),
+            terms=dict(zip(TERMS, map(float, terms), strict=True)),
             origin=origin,
         )
 
@@ -103,6 +116,11 @@ def build_experiment(creature: Creature, config: Config) -> Experiment:
 
     evolution = Evolution(config.evolution, pose_variation(box, config.evolution), judge, rank)
     return Experiment(creature, config, simulator, evolution, starts)
+
+
+def _compiler_options() -> dict[str, int]:
+    """The fast plant gains a third from the widest vectors, which XLA's CPU compiler does not use by itself."""
+    return {"xla_cpu_prefer_vector_width": 512} if jax.default_backend() == "cpu" else {}
 
 
 def _simulator(creature: Creature, config: Config) -> Simulator:

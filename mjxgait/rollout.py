@@ -105,8 +105,12 @@ class Simulator:
 
         results = jax.tree.map(lambda leaf: jnp.zeros((queue, *leaf.shape), leaf.dtype), self.judge.init())
         carry = (fresh(jnp.arange(lanes)), results, jnp.int32(lanes), jnp.int32(0))
-        _, results, _, rounds = jax.lax.while_loop(lambda carry: jnp.any(carry[0].job < queue), body, carry)
-        return results, (rounds * (CHECK_EVERY * lanes))[None]
+        # Not a while_loop: XLA's CPU compiler aborts on the fast plant's kernels in a loop whose length it does not know. Whenever a lane
+        # is free it takes a job, so this many rounds always suffice (Graham 1966); what is left of them costs next to nothing.
+        longest = -(-self.steps // CHECK_EVERY) + 1
+        most = -(-queue * longest // lanes) + longest
+        carry = jax.lax.fori_loop(0, most, lambda _, carry: jax.lax.cond(jnp.any(carry[0].job < queue), body, lambda same: same, carry), carry)
+        return carry[1], (carry[3] * (CHECK_EVERY * lanes))[None]
 
     def _fresh_lane(self, genomes: Any, starts: Starts, job: jax.Array, episode: jax.Array) -> Lane:
         """The lane at the start of an episode []: genome `episode // R` on start `episode % R`."""

@@ -15,14 +15,15 @@ from typing import Any
 import jax
 import numpy as np
 
-from mjxgait.champion import write_champion
+from mjxgait.certify import Certificate, certify
+from mjxgait.champion import Champion, write_champion
 from mjxgait.checkpoint import Checkpoints, disk_errors
 from mjxgait.config import Config
 from mjxgait.creature import Creature
 from mjxgait.evolution import EvolutionState, GenerationMetrics, stop_reason
 from mjxgait.experiment import Experiment, build_experiment
 from mjxgait.fitness import TERMS
-from mjxgait.folder import CHAMPION, METRICS, PLOT, read_metrics, truncate_metrics
+from mjxgait.folder import CERTIFICATE, CHAMPION, METRICS, PLOT, read_metrics, truncate_metrics
 from mjxgait.screen import Screen
 
 
@@ -46,10 +47,12 @@ def train(folder: Path, creature: Creature, config: Config, screen: Screen, resu
     began = time.perf_counter()
     try:
         with _interruptible() as interrupted:
-            reason = _evolve(folder, experiment, step, experiment.place(state), checkpoints, screen, interrupted)
+            state, reason = _evolve(folder, experiment, step, experiment.place(state), checkpoints, screen, interrupted)
     finally:
         screen.close()
         checkpoints.close()
+    if reason is not None:
+        _examine(folder, experiment, state, screen)
     lines = read_metrics(folder / METRICS)
     if lines:
         from mjxgait.viewing.curves import plot_fitness  # matplotlib is slow to import, and nothing needed it until now
@@ -67,8 +70,8 @@ def _evolve(
     checkpoints: Checkpoints,
     screen: Screen,
     interrupted: threading.Event,
-) -> str | None:
-    """Generation after generation; returns why it ended, None when the user interrupted it."""
+) -> tuple[EvolutionState, str | None]:
+    """Generation after generation; returns the last state and why it ended, None when the user interrupted it."""
     config, creature = experiment.config, experiment.creature
     while (reason := stop_reason(state, config.evolution)) is None and not interrupted.is_set():
         began = time.perf_counter()
@@ -82,12 +85,29 @@ def _evolve(
             log.write(json.dumps(line) + "\n")
         if np.isfinite(metrics.best):
             with disk_errors(folder):
-                write_champion(experiment.champion(state, metrics, versions()), creature, folder / CHAMPION)
+                write_champion(experiment.champion(state, versions()), creature, folder / CHAMPION)
         last = interrupted.is_set() or stop_reason(state, config.evolution) is not None
         if last or int(metrics.generation) % config.checkpoint_every == 0:
             checkpoints.save(state, creature.name, creature.digest)
         screen.generation(line, config.evolution.generations)
-    return reason
+    return state, reason
+
+
+def _examine(folder: Path, experiment: Experiment, state: EvolutionState, screen: Screen) -> None:
+    """Makes the first of the best few that passes the examination the champion; if none does, the one that comes nearest."""
+    found: list[tuple[Certificate, Champion]] = []
+    for rank in experiment.candidates(state):
+        screen.console.print("Examining in C MuJoCo…" if not found else "Examining the next best…")
+        champion = experiment.champion(state, versions(), rank)
+        found.append((certify(experiment.creature, champion), champion))
+        if found[-1][0].passed:
+            break
+    if found:
+        certificate, champion = max(found, key=lambda pair: (pair[0].passed, pair[0].margin))
+        with disk_errors(folder):
+            write_champion(champion, experiment.creature, folder / CHAMPION)
+            (folder / CERTIFICATE).write_text(certificate.to_json(), encoding="utf-8")
+        screen.certificate(certificate)
 
 
 def metrics_line(metrics: GenerationMetrics, seconds: float) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from mjxgait.champion import read_champion
 from mjxgait.creature import load_creature
 from mjxgait.folder import open_run, read_metrics
 
-SMALL = ["--env", str(STOOL), "--population", "8", "--generations", "7", "--rollout.seconds", "0.4", "--rollout.starts", "2", "--seed", "5"]
+SMALL = ["--env", str(STOOL), "--population", "8", "--generations", "7", "--rollout.seconds", "0.4", "--rollout.starts", "2", "--seed", "5", "--examination.candidates", "0"]
 
 
 def command(*arguments: object) -> list[str]:

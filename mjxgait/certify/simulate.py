@@ -104,7 +104,7 @@ def simulate(
 
     Args:
       record: R, how many of the first simulations to record; these run to the end even after a fall, the others stop there.
-      refine: physics steps per control step. The torque is renewed at each, the position in the cycle at control steps only.
+      refine: physics steps per control step: the controller stays what it was, its torque is held in between.
       heading: [T] rad, commanded heading at each control step; None walks straight ahead.
       threads: 0 takes the machine's cores. The result does not depend on it.
     """
@@ -178,14 +178,14 @@ class _Run:
         target, reached, torque = self._physics_step(running, heading)
         film.torque[kept, k] = torque[: len(kept)]
         for _ in range(self.refine - 1):
-            self._physics_step(running, heading)
+            self.batch.step(running, stage=VELOCITY_STAGE)
         self.position[running] = self.controller.advance(self.position[running], target, reached, (k + 1) * film.time_step)
 
     def _physics_step(self, running: np.ndarray, heading: float | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Target, joint positions before the step, and torque, [running, J] each."""
         senses = self._senses(running)
         target = self.controller.target(self.position[running], senses, heading)
-        torque = self.controller.torque(target, senses, self.model.opt.timestep)
+        torque = self.controller.torque(target, senses, self.creature.model.opt.timestep)
         self.applied[running[:, None], self.creature.dof_adr] = torque
         self.batch.step(running, stage=VELOCITY_STAGE)
         self.last_force[running] = self.constraint[running]

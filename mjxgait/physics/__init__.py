@@ -4,6 +4,7 @@ from typing import Literal
 
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
+from mjxgait.physics.fast import UnsupportedModel, fast_plant
 from mjxgait.physics.layout import sense_layout
 from mjxgait.physics.plain import mjx_plant
 from mjxgait.types import Plant
@@ -15,7 +16,13 @@ def make_plant(creature: Creature, physics: Literal["auto", "mjx"]) -> tuple[Pla
     Raises:
       UserError: MJX does not support something in the model; in its words.
     """
+    model, layout = creature.evolution_model, sense_layout(creature)
+    if physics == "auto":
+        try:
+            return fast_plant(model, layout), 64
+        except UnsupportedModel:
+            pass
     try:
-        return mjx_plant(creature.evolution_model, sense_layout(creature)), 16
+        return mjx_plant(model, layout), 16
     except NotImplementedError as error:
         raise UserError(f"{creature.name}: creature.xml uses what MJX does not support: {error}") from None

@@ -1,0 +1,148 @@
+"""Arithmetic over lanes, with the numbers of the model folded in while tracing.
+
+All arrays have the lanes last, so that every operation is a contiguous vector instruction. A `Scalar` is an array ([L], or [n, L] for n
+bodies at once), or a Python number where all lanes share it: the many zeros and ones of a model then cost nothing. Three scalars make
+a `Vector`; `turn` and `plus` also serve vectors that are one array [3, L].
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+Scalar = Any
+"""float | jax.Array"""
+Vector = tuple[Scalar, Scalar, Scalar]
+Constants = tuple[float, float, float]
+Matrix = tuple[Constants, Constants, Constants]
+"""Three columns."""
+Pin = Callable[[Any], Any]
+
+
+def constant(value: float) -> float:
+    """A model number as a Python float; values within rounding of -1, 0 and 1 become exact, so that they fold."""
+    nearest = float(round(float(value)))
+    return nearest if abs(value - nearest) < 1e-12 and abs(nearest) <= 1 else float(value)
+
+
+def constants(values: np.ndarray) -> Any:
+    """Nested tuples of constants, the last axis innermost."""
+    return tuple(constants(v) for v in values) if np.ndim(values) else constant(float(values))
+
+
+def rotation(quat: Sequence[Any]) -> tuple[tuple[Any, Any, Any], ...]:
+    """Columns of the rotation matrix of a unit quaternion (w, x, y, z)."""
+    w, x, y, z = quat
+    return (
+        (1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)),
+        (2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)),
+        (2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)),
+    )
+
+
+def columns(quat: np.ndarray) -> Matrix:
+    """Columns of the rotation matrix of a constant unit quaternion."""
+    return constants(np.array(rotation([float(q) for q in quat])))
+
+
+def _is(number: Scalar, value: float) -> bool:
+    return isinstance(number, float) and number == value
+
+
+def mul(a: Scalar, b: Scalar) -> Scalar:
+    """Product; constants 0, 1 and -1 cost nothing."""
+    if _is(a, 0.0) or _is(b, 0.0):
+        return 0.0
+    if _is(a, 1.0) or _is(b, 1.0):
+        return b if _is(a, 1.0) else a
+    if _is(a, -1.0) or _is(b, -1.0):
+        return -b if _is(a, -1.0) else -a
+    return a * b
+
+
+def add(*terms: Scalar) -> Scalar:
+    """Sum without the zeros."""
+    counted = [t for t in terms if not _is(t, 0.0)]
+    return total(counted) if counted else 0.0
+
+
+def total(terms: Sequence[Any]) -> Any:
+    """Sum of one or more terms, in their order."""
+    result = terms[0]
+    for term in terms[1:]:
+        result = result + term
+    return result
+
+
+def sub(a: Scalar, b: Scalar) -> Scalar:
+    """Difference."""
+    return a if _is(b, 0.0) else -b if _is(a, 0.0) else a - b
+
+
+def dot(a: Sequence[Scalar], b: Sequence[Scalar]) -> Scalar:
+    """Inner product of two sequences of equal length."""
+    return add(*(mul(x, y) for x, y in zip(a, b, strict=True)))
+
+
+def cross(a: Vector, b: Vector) -> Vector:
+    """Vector product."""
+    return (
+        sub(mul(a[1], b[2]), mul(a[2], b[1])),
+        sub(mul(a[2], b[0]), mul(a[0], b[2])),
+        sub(mul(a[0], b[1]), mul(a[1], b[0])),
+    )
+
+
+def plus(a: Sequence[Scalar], b: Sequence[Scalar]) -> Any:
+    """Sum of vectors."""
+    return tuple(add(x, y) for x, y in zip(a, b, strict=True))
+
+
+def minus(a: Sequence[Scalar], b: Sequence[Scalar]) -> Any:
+    """Difference of vectors."""
+    return tuple(sub(x, y) for x, y in zip(a, b, strict=True))
+
+
+def scale(s: Scalar, a: Sequence[Scalar]) -> Any:
+    """Vector times scalar."""
+    return tuple(mul(s, x) for x in a)
+
+
+def turn(matrix: Sequence[Any], vector: Sequence[Scalar]) -> Any:
+    """Matrix times vector, the matrix given by three columns, each an array [3, L]."""
+    return dot(matrix, vector)
+
+
+def axes(array: jax.Array) -> Vector:
+    """Components of vectors stored together: [n, 3, L] to three [n, L]."""
+    return array[:, 0], array[:, 1], array[:, 2]
+
+
+def parts(vector: Any) -> Vector:
+    """Components of an array [3, L] or of zero."""
+    return (0.0, 0.0, 0.0) if isinstance(vector, float) else (vector[0], vector[1], vector[2])
+
+
+def pinned_by(lanes: jax.Array) -> Pin:
+    """A function that makes XLA compute and store the values of a pytree once, instead of once per use.
+
+    XLA's fusion copies cheap producers into each consumer: along a kinematic chain the copies multiply. It never copies a division, and a
+    division by one that the compiler cannot know to be one changes nothing else. (`optimization_barrier` is removed before fusion on CPU.)
+    lanes: any finite [L] array.
+    """
+    one = lanes * 0.0 + 1.0
+    return lambda tree: jax.tree.map(lambda x: x if isinstance(x, float) else x / one, tree)
+
+
+def table(vectors: Sequence[Any], like: jax.Array) -> Any:
+    """Vectors [3, L], some of them constants ([3] or zero), as one array [n, 3, L]; [n, 3, 1] in NumPy if all are constants."""
+    if all(not isinstance(v, jax.Array) for v in vectors):
+        return np.array([np.broadcast_to(v, 3) for v in vectors], like.dtype)[:, :, None]
+    shape = (3, like.shape[-1])
+
+    def full(vector: Any) -> jax.Array:
+        return vector if isinstance(vector, jax.Array) else jnp.broadcast_to(np.reshape(np.broadcast_to(vector, 3), (3, 1)), shape)
+
+    return jnp.stack([full(v) for v in vectors])

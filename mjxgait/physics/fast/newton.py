@@ -1,0 +1,201 @@
+"""Newton's method for MuJoCo's contact problem.
+
+The acceleration a minimises `(a - a_smooth)^T M (a - a_smooth) / 2 + sum over rows of D (J a - reference)^2 / 2 where that is negative`
+(Todorov 2014; MuJoCo documentation, "Computation", "Optimization algorithms"). It is piecewise quadratic and convex: Newton with an
+exact line search ends after a few steps. The Hessian `M + J^T D J` has the tree's sparsity, see `treematrix`.
+"""
+
+import dataclasses
+from collections.abc import Sequence
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from mjxgait.physics.fast.constraints import Constraints
+from mjxgait.physics.fast.lanes import Pin
+from mjxgait.physics.fast.treematrix import Rows, factor, multiply, solve
+
+Lanes = jax.Array
+Edges = list[jax.Array]
+"""One value per constraint row: four arrays [C, L] of the contacts' edges, and one [M, L] of the limits."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Problem:
+    """mass: rows of M. force: [nv] list of [L], M a_smooth."""
+
+    mass: Rows
+    force: list[Lanes]
+    smooth: list[Lanes]
+    constraints: Constraints
+    pin: Pin
+
+
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass(frozen=True)
+class Iterate:
+    """acceleration a and M a, lists of nv [L]; residuals: J a - reference of contacts' three directions [C, L] and of limits [M, L]."""
+
+    acceleration: list[Lanes]
+    inertial: list[Lanes]
+    residuals: tuple[jax.Array, ...]
+
+
+def constrained_acceleration(problem: Problem, guess: Sequence[Lanes] | None) -> tuple[list[Lanes], list[Lanes]]:
+    """Acceleration and generalised constraint force, lists of nv [L]; guess: the previous step's acceleration, None for no warm start."""
+    structure = problem.constraints.structure
+    iterate = Iterate(problem.smooth, problem.force, _residuals(problem, problem.smooth))
+    if guess is not None:
+        inertial = problem.pin(multiply(structure.pattern, problem.mass, guess))
+        warm = Iterate(list(guess), inertial, _residuals(problem, guess))
+        better = problem.pin(jnp.where(_cost(problem, warm) < _cost(problem, iterate), 1.0, 0.0)) > 0.5
+        iterate = problem.pin(jax.tree.map(lambda a, b: jnp.where(better, a, b), warm, iterate))
+    iterate = _minimised(problem, iterate)
+    return iterate.acceleration, _constraint_force(problem, iterate)
+
+
+def _minimised(problem: Problem, start: Iterate) -> Iterate:
+    """Newton steps until no lane's active rows change any more (the step before was then exact), or the model's number of iterations."""
+    limit = problem.constraints.structure.iterations
+    if limit == 1:
+        return _improved(problem, start)
+
+    def unfinished(carry: tuple[Iterate, Lanes, jax.Array]) -> jax.Array:
+        return (carry[2] < limit) & jnp.any(carry[1] > 0)
+
+    def body(carry: tuple[Iterate, Lanes, jax.Array]) -> tuple[Iterate, Lanes, jax.Array]:
+        at, going, count = carry
+        new = _improved(problem, at)
+        # A finished lane stands still, so that its result does not depend on its neighbours.
+        kept = jax.tree.map(lambda b, a: jnp.where(going > 0, b, a), new, at)
+        return kept, _switched(problem, at, kept), count + 1
+
+    return jax.lax.while_loop(unfinished, body, (start, jnp.ones_like(start.acceleration[0]), jnp.int32(0)))[0]
+
+
+def _switched(problem: Problem, before: Iterate, after: Iterate) -> Lanes:
+    """Per lane how many rows became active or inactive."""
+    c = problem.constraints
+    pairs = zip(_edges(c, before.residuals), _edges(c, after.residuals), _weights(c), strict=True)
+    return _total([jnp.where(((a < 0) != (b < 0)) & (w > 0), 1.0, 0.0) for a, b, w in pairs])
+
+
+def _residuals(problem: Problem, acceleration: Sequence[Lanes]) -> tuple[jax.Array, ...]:
+    c = problem.constraints
+    contact = tuple(a - r for a, r in zip(c.along(acceleration, problem.pin), c.reference, strict=True)) if c.rows else c.reference
+    limit = c.limited(acceleration) - c.limit_reference if c.structure.limits else c.limit_reference
+    return problem.pin((*contact, limit))
+
+
+def _edges(c: Constraints, values: Sequence[jax.Array]) -> Edges:
+    """From the three directions of the contacts to the four edges of the pyramid."""
+    normal, first, second, limit = values
+    return [normal + c.friction * first, normal - c.friction * first, normal + c.friction * second, normal - c.friction * second, limit]
+
+
+def _weights(c: Constraints) -> Edges:
+    return [c.weight] * 4 + [c.limit_weight]
+
+
+def _total(parts: Sequence[jax.Array]) -> Lanes:
+    """Sum over all rows of all arrays [n, L]."""
+    rows = [part[n] for part in parts for n in range(part.shape[0])]
+    return sum(rows[1:], rows[0])
+
+
+def _dot(a: Sequence[Lanes], b: Sequence[Lanes]) -> Lanes:
+    terms = [x * y for x, y in zip(a, b, strict=True)]
+    return sum(terms[1:], terms[0])
+
+
+def _minus(a: Sequence[Lanes], b: Sequence[Lanes]) -> list[Lanes]:
+    return [x - y for x, y in zip(a, b, strict=True)]
+
+
+def _cost(problem: Problem, at: Iterate) -> Lanes:
+    c = problem.constraints
+    gauss = _dot(_minus(at.inertial, problem.force), _minus(at.acceleration, problem.smooth))
+    rows = [w * jnp.square(jnp.minimum(r, 0.0)) for w, r in zip(_weights(c), _edges(c, at.residuals), strict=True)]
+    return 0.5 * (gauss + _total(rows))
+
+
+def _constraint_force(problem: Problem, at: Iterate) -> list[Lanes]:
+    """J^T f with f = -D times the negative residuals."""
+    c = problem.constraints
+    f = [-w * jnp.minimum(r, 0.0) for w, r in zip(_weights(c), _edges(c, at.residuals), strict=True)]
+    sideways = (c.friction * (f[0] - f[1]), c.friction * (f[2] - f[3]))
+    normal, first, second, limit = problem.pin((f[0] + f[1] + f[2] + f[3], *sideways, c.sign * f[4]))
+    terms: list[list[Lanes]] = [[] for _ in problem.force]
+    for n, chain in enumerate(c.chains):
+        for position, k in enumerate(chain):
+            row = [direction[position] for direction in c.rows[n]]
+            terms[k].append(row[0] * normal[n] + row[1] * first[n] + row[2] * second[n])
+    for n, bound in enumerate(c.structure.limits):
+        terms[bound.dof].append(limit[n])
+    return problem.pin([sum(t[1:], t[0]) if t else jnp.zeros_like(problem.force[0]) for t in terms])
+
+
+def _improved(problem: Problem, at: Iterate) -> Iterate:
+    """One Newton step with exact line search."""
+    c, pin = problem.constraints, problem.pin
+    pattern = c.structure.pattern
+    uphill = _minus(_minus(at.inertial, problem.force), _constraint_force(problem, at))
+    step = solve(pattern, factor(pattern, _hessian(problem, at)), [-g for g in uphill])
+    inertial = pin(multiply(pattern, problem.mass, step))
+    change = (*(c.along(step, pin) if c.rows else c.reference), c.limited(step) if c.structure.limits else c.limit_reference)
+    length = _line_search(problem, at, step, inertial, change)
+
+    def moved(values: Sequence[jax.Array], changes: Sequence[jax.Array]) -> list[jax.Array]:
+        return pin([v + length * d for v, d in zip(values, changes, strict=True)])
+
+    return Iterate(moved(at.acceleration, step), moved(at.inertial, inertial), tuple(moved(at.residuals, change)))
+
+
+def _hessian(problem: Problem, at: Iterate) -> Rows:
+    """Rows of M + J^T D J over the rows that are active."""
+    c, pin = problem.constraints, problem.pin
+    d = [jnp.where(r < 0, w, 0.0) for w, r in zip(_weights(c), _edges(c, at.residuals), strict=True)]
+    mu = c.friction
+    mixed, squares = (mu * (d[0] - d[1]), mu * (d[2] - d[3])), (mu * mu * (d[0] + d[1]), mu * mu * (d[2] + d[3]))
+    nn, n1, n2, t1, t2, limit = pin((d[0] + d[1] + d[2] + d[3], *mixed, *squares, d[4]))
+    rows = list(problem.mass)
+    for n, chain in enumerate(c.chains):
+        normal, first, second = c.rows[n]
+        weighted = pin((nn[n] * normal + n1[n] * first + n2[n] * second, n1[n] * normal + t1[n] * first, n2[n] * normal + t2[n] * second))
+        for position, k in enumerate(chain):
+            upto = position + 1
+            for part, row in zip(weighted, (normal, first, second), strict=True):
+                rows[k] = rows[k] + part[position] * row[:upto]
+    for n, bound in enumerate(c.structure.limits):
+        last = np.zeros((rows[bound.dof].shape[0], 1), limit.dtype)
+        last[-1] = 1.0
+        rows[bound.dof] = rows[bound.dof] + last * limit[n]
+    return tuple(rows)
+
+
+def _line_search(problem: Problem, at: Iterate, step: Sequence[Lanes], inertial: Sequence[Lanes], change: Sequence[jax.Array]) -> Lanes:
+    """The length [L] that minimises the cost along a step: Newton on its derivative, which grows piecewise linearly, kept in a bracket."""
+    c, pin = problem.constraints, problem.pin
+    slope = pin(_dot(step, _minus(at.inertial, problem.force)))
+    curvature = pin(_dot(step, inertial))
+    residuals, changes, weights = _edges(c, at.residuals), _edges(c, change), _weights(c)
+
+    def derivatives(length: Lanes) -> tuple[Lanes, Lanes]:
+        pulls, stiffs = [], []
+        for r, d, w in zip(residuals, changes, weights, strict=True):
+            now = r + length * d
+            pulls.append(w * d * jnp.minimum(now, 0.0))
+            stiffs.append(jnp.where(now < 0, w * d * d, 0.0))
+        return slope + length * curvature + _total(pulls), curvature + _total(stiffs)
+
+    def narrowed(_: int, bracket: tuple[Lanes, Lanes, Lanes]) -> tuple[Lanes, Lanes, Lanes]:
+        low, high, length = bracket
+        first, second = pin(derivatives(length))
+        low, high = jnp.where(first < 0, length, low), jnp.where(first < 0, high, length)
+        newton = length - first / jnp.maximum(second, np.finfo(slope.dtype).tiny)
+        middle = jnp.where(high < jnp.inf, 0.5 * (low + high), 2.0 * length)
+        return low, high, pin(jnp.where((newton >= low) & (newton <= high), newton, middle))
+
+    bracket = (jnp.zeros_like(slope), jnp.full_like(slope, jnp.inf), jnp.ones_like(slope))
+    return jax.lax.fori_loop(0, c.structure.line_iterations, narrowed, bracket)[2]
