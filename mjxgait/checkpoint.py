@@ -51,7 +51,7 @@ class Checkpoints:
     def save(self, state: EvolutionState, creature: str, digest: str) -> None:
         """Starts to write the state; an earlier write that failed is reported now."""
         arrays = _by_name(state)
-        manifest = Manifest(SCHEMA, creature, digest, int(state.generation), _hash(arrays), str(jax.random.key_impl(state.key)))
+        manifest = Manifest(SCHEMA, creature, digest, int(state.generation), array_hash(arrays), str(jax.random.key_impl(state.key)))
         args = ocp.args.Composite(state=ocp.args.StandardSave(arrays), manifest=ocp.args.JsonSave(dataclasses.asdict(manifest)))
         with disk_errors(self._folder):
             self._manager.save(manifest.generation, args=args, force=True)
@@ -115,7 +115,7 @@ class Checkpoints:
             raise
         except Exception as error:
             raise _Damaged(_first_line(error)) from None
-        if _hash(arrays) != manifest.arrays:
+        if array_hash(arrays) != manifest.arrays:
             raise _Damaged("its values are not those that were written")
         state = jax.tree.unflatten(jax.tree.structure(abstract), [arrays[name] for name in target])
         return dataclasses.replace(state, key=jax.random.wrap_key_data(state.key, impl=manifest.key_impl))
@@ -133,7 +133,8 @@ def _by_name(state: EvolutionState) -> dict[str, Any]:
     return {jax.tree_util.keystr(path, simple=True, separator="."): leaf for path, leaf in leaves}
 
 
-def _hash(arrays: dict[str, Any]) -> str:
+def array_hash(arrays: dict[str, Any]) -> str:
+    """Hash of named arrays: their names, types, shapes and values."""
     digest = hashlib.sha256()
     for name in sorted(arrays):
         value = np.asarray(arrays[name])

@@ -1,6 +1,8 @@
 """The command line: `mjxgait SUBCOMMAND`; `scripts/*.py` are thin over it."""
 
 import importlib
+import keyword
+import os
 import sys
 from collections.abc import Sequence
 
@@ -15,9 +17,12 @@ COMMANDS = {
     "export": "write a walk as an animation file: mjxgait export RUN --out walk.glb",
     "share": "write one offline page of a walk in 3D: mjxgait share RUN --out walk.html",
     "view": "watch a run as it learns on a local page: mjxgait view RUN",
+    "import": "make a creature folder from a model file: mjxgait import robot.urdf --out envs/mine",
+    "check": "validate a creature folder and draw it: mjxgait check envs/mine",
+    "bench": "measure the speed against C MuJoCo and DART: mjxgait bench --json FILE",
     "envs": "list the shipped creatures and configs",
 }
-"""Each lives in mjxgait/commands/<name>.py as `<name>_command` and is imported only when it is called."""
+"""Each lives in mjxgait/commands/<name>.py (`import` in import_.py) as `<name>_command` and is imported only when it is called."""
 
 USAGE = """usage: mjxgait SUBCOMMAND [options]
 
@@ -37,11 +42,15 @@ def main(arguments: Sequence[str] | None = None) -> None:
     try:
         if given[0] not in COMMANDS:
             raise UserError(f'unknown subcommand "{given[0]}"; {did_you_mean(given[0], COMMANDS)}')
-        module = importlib.import_module(f"mjxgait.commands.{given[0]}")
+        module = importlib.import_module(f"mjxgait.commands.{given[0] + '_' * keyword.iskeyword(given[0])}")
         sys.exit(getattr(module, f"{given[0]}_command")(given[1:]))
     except UserError as error:
         print(f"mjxgait: {error}", file=sys.stderr)
         sys.exit(2)
+    except BrokenPipeError:
+        # Whoever read the output has closed it, as `head` does; Python must not complain about the rest when it ends.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)
     except KeyboardInterrupt:
         print("mjxgait: interrupted", file=sys.stderr)
         sys.exit(INTERRUPTED)

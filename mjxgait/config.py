@@ -94,7 +94,7 @@ class Weights:
     clearance: Finite = 3.0
     frequency: Finite = 4.0
     duty: Finite = 2.0
-    airborne: Finite = 1.0
+    airborne: Finite = 3.0
     foot_height: Finite = 1.0
     tilt: Finite = 1.0
     wobble: Finite = 0.1
@@ -109,8 +109,8 @@ class FitnessConfig:
     """What is wanted of a gait.
 
     Attributes:
-      speed: body lengths per second up to which faster is better; beyond it a metre counts a tenth, so that a gait gets steadier and not
-        only faster. 0 sets no limit.
+      speed: body lengths per second up to which faster is better; beyond it distance counts a fiftieth, so that a gait gets steadier and
+        not faster. 0 sets no limit.
       clearance: height in hip heights that each foot should reach in each stride.
       frequency: share of the highest stride frequency of an animal of this mass up to which a gait is not hasty.
       style_ramp: generations over which the style terms (all but distance, alive and foot_height) grow to their full weight.

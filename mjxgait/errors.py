@@ -3,7 +3,6 @@
 import difflib
 from collections.abc import Iterable
 
-
 INTERRUPTED = 130
 """Exit code of a run that the user interrupted."""
 

@@ -13,7 +13,7 @@ from mjxgait.champion import Champion
 from mjxgait.config import Config
 from mjxgait.creature import Creature
 from mjxgait.evolution import Evolution, EvolutionState, Judged
-from mjxgait.fitness import TERMS, fitness_terms, score, weight_vector
+from mjxgait.fitness import TERMS, fitness_terms, forward_distance, score, weight_vector
 from mjxgait.gait import TUNING, Genome, PoseTracker
 from mjxgait.physics import make_plant
 from mjxgait.rollout import AXIS, Simulator
@@ -77,7 +77,17 @@ class Experiment:
         """An individual of a state; rank 0 is the best."""
         best = jax.tree.map(lambda leaf: np.asarray(leaf[rank]), state.genomes)
         terms = np.asarray(state.terms[rank]).mean(axis=0)
-        origin = {"generation": int(state.generation), "born": int(state.born[rank]), "seed": self.config.seed, "versions": versions}
+        nominal = forward_distance(
+            self.creature, self.config.fitness, self.config.rollout.seconds, float(state.terms[rank, 0, TERMS.index("distance")])
+        )
+        origin = {
+            "generation": int(state.generation),
+            "born": int(state.born[rank]),
+            "seed": self.config.seed,
+            "nominal_forward": nominal,
+            "nominal_seconds": self.config.rollout.seconds,
+            "versions": versions,
+        }
         return Champion(
             creature=self.creature.name,
             digest=self.creature.digest,
@@ -102,7 +112,9 @@ def build_experiment(creature: Creature, config: Config) -> Experiment:
 
     def judge(genomes: Genome) -> Judged:
         episodes = simulator.simulate(genomes, starts)
-        terms = jax.vmap(jax.vmap(partial(fitness_terms, creature, config.fitness, simulator.tracker.step, simulator.steps)))(episodes.tally)
+        terms = jax.vmap(jax.vmap(partial(fitness_terms, creature, config.fitness, simulator.tracker.step, simulator.steps)))(
+            episodes.tally
+        )
         broken = episodes.tally.reason == Reason.NONFINITE
         return Judged(
             terms=jnp.where(broken[..., None], jnp.nan, terms),
@@ -118,9 +130,9 @@ def build_experiment(creature: Creature, config: Config) -> Experiment:
     return Experiment(creature, config, simulator, evolution, starts)
 
 
-def _compiler_options() -> dict[str, int]:
+def _compiler_options() -> dict[str, str | bool]:
     """The fast plant gains a third from the widest vectors, which XLA's CPU compiler does not use by itself."""
-    return {"xla_cpu_prefer_vector_width": 512} if jax.default_backend() == "cpu" else {}
+    return {"xla_cpu_prefer_vector_width": "512"} if jax.default_backend() == "cpu" else {}
 
 
 def _simulator(creature: Creature, config: Config) -> Simulator:

@@ -13,7 +13,10 @@ from mjxgait.tally import Tally
 TERMS = tuple(field.name for field in dataclasses.fields(Weights))
 REWARDS = ("distance", "alive")
 STYLE = tuple(name for name in TERMS if name not in (*REWARDS, "foot_height"))
-"""What makes a gait good to look at once there is one: counted in proportion to the walk that there is, and may ramp in over generations."""
+"""What makes a gait good to look at: counted in proportion to the walk that there is, and may ramp in over generations."""
+
+BEYOND = 0.02
+"""What a body length counts that goes beyond the wanted speed."""
 
 
 def stride_limit(mass: float) -> float:
@@ -44,7 +47,7 @@ def fitness_terms(creature: Creature, config: FitnessConfig, step: float, horizo
         "slip": jnp.max(tally.slip) / moved,
         "clearance": jnp.where(tally.strides > 1, tally.shortfall / jnp.maximum(strides - 1, 1), 1.0),
         "frequency": jnp.maximum(rate / stride_limit(creature.mass) - config.frequency, 0.0),
-        "duty": jnp.mean(jnp.maximum(duty - 0.85, 0.0) + jnp.maximum(0.2 - duty, 0.0)) / 0.15,
+        "duty": jnp.max(jnp.maximum(duty - 0.8, 0.0) + jnp.maximum(0.25 - duty, 0.0)) / 0.2,
         "airborne": tally.airborne / lived,
         "foot_height": jnp.maximum(tally.foot_height / lived / creature.hip_height - 0.25, 0.0),
         "tilt": tally.tilt / lived,
@@ -61,8 +64,15 @@ def fitness_terms(creature: Creature, config: FitnessConfig, step: float, horizo
 
 
 def _counted(distance: jax.Array, enough: float) -> jax.Array:
-    """Distance in body lengths, of which what lies beyond `enough` counts a tenth."""
-    return jnp.minimum(distance, enough) + 0.1 * jnp.maximum(distance - enough, 0.0) if enough else distance
+    """Distance in body lengths, of which what lies beyond `enough` counts little."""
+    return jnp.minimum(distance, enough) + BEYOND * jnp.maximum(distance - enough, 0.0) if enough else distance
+
+
+def forward_distance(creature: Creature, config: FitnessConfig, horizon_seconds: float, term: float) -> float:
+    """Metres forward that a `distance` term stands for."""
+    enough = config.speed * horizon_seconds
+    lengths = enough + (term - enough) / BEYOND if enough and term > enough else term
+    return lengths * creature.body_length
 
 
 def weight_vector(config: FitnessConfig, generation: jax.Array) -> jax.Array:

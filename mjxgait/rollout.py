@@ -109,7 +109,9 @@ class Simulator:
         # is free it takes a job, so this many rounds always suffice (Graham 1966); what is left of them costs next to nothing.
         longest = -(-self.steps // CHECK_EVERY) + 1
         most = -(-queue * longest // lanes) + longest
-        carry = jax.lax.fori_loop(0, most, lambda _, carry: jax.lax.cond(jnp.any(carry[0].job < queue), body, lambda same: same, carry), carry)
+        carry = jax.lax.fori_loop(
+            0, most, lambda _, carry: jax.lax.cond(jnp.any(carry[0].job < queue), body, lambda same: same, carry), carry
+        )
         return carry[1], (carry[3] * (CHECK_EVERY * lanes))[None]
 
     def _fresh_lane(self, genomes: Any, starts: Starts, job: jax.Array, episode: jax.Array) -> Lane:

@@ -25,4 +25,3 @@ def stool() -> Creature:
 def shipped(request: pytest.FixtureRequest) -> Creature:
     """Each creature that the program ships."""
     return load_creature(data_folder("envs") / request.param)
-

@@ -139,7 +139,7 @@ def test_a_disk_that_refuses_is_one_sentence(tmp_path: Path, states: list[Evolut
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(checkpoints._manager, "save", full)
-    with pytest.raises(UserError, match="No space left on device.*make room and go on with --resume"):
+    with pytest.raises(UserError, match=r"No space left on device.*make room and go on with --resume"):
         checkpoints.save(states[0], "toy", DIGEST)
 
 

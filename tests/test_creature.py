@@ -87,7 +87,7 @@ def test_a_capsule_reaches_its_radius_beyond_its_ends():
         ("creature.toml", "kp = 40.0", "kp = 40000.0", "unstable at a time step of 0.005 s; raise kd to"),
         ("creature.toml", "range = [-40, 40]", "range = [70, 80]", "pose range lies outside its range"),
         ("creature.toml", 'trunk = "trunk"', 'trunk = "trunk"\nforward = [0, 0, 1]', "points up or down"),
-        ("creature.toml", "[joints]", '[steering]\nbend = { spine = 1.0 }\n\n[joints]', 'no joint matches "spine"'),
+        ("creature.toml", "[joints]", "[steering]\nbend = { spine = 1.0 }\n\n[joints]", 'no joint matches "spine"'),
         ("creature.xml", '<key name="stand"', '<key name="sit"', 'no keyframe "stand"'),
         ("creature.xml", 'name="floor"', 'name="ground"', 'the floor = "floor" is not in creature.xml'),
         ("creature.xml", "</worldbody>", "</worldbod>", "not a model that MuJoCo can load"),

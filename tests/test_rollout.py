@@ -144,7 +144,7 @@ def test_terms_of_one_that_stands_still(experiment: Experiment):
     terms = standing_terms(experiment)
     assert terms["alive"] == 1.0
     assert terms["clearance"] == pytest.approx(1.0)
-    assert terms["duty"] == pytest.approx(1.0, abs=0.05)
+    assert terms["duty"] == pytest.approx(1.0, abs=0.1)
     for name in ("distance", "drift", "fade", "slip", "airborne", "foot_height", "tilt", "touch", "saturation", "limits"):
         assert terms[name] == pytest.approx(0.0, abs=0.02), name
 
@@ -158,7 +158,8 @@ def test_score_mixes_the_worst_start_and_the_mean():
 
 def test_penalties_are_negative_and_style_ramps_in():
     config = small_config(fitness={"style_ramp": 10}).fitness
-    at = {generation: dict(zip(TERMS, np.asarray(weight_vector(config, jnp.int32(generation))).tolist(), strict=True)) for generation in (0, 5, 10)}
+    vectors = {generation: np.asarray(weight_vector(config, jnp.int32(generation))).tolist() for generation in (0, 5, 10)}
+    at = {generation: dict(zip(TERMS, vector, strict=True)) for generation, vector in vectors.items()}
     assert all(at[10][name] <= 0 for name in TERMS if name not in REWARDS)
     assert at[0]["slip"] == 0.0
     assert at[5]["slip"] == pytest.approx(0.5 * at[10]["slip"])

@@ -1,7 +1,9 @@
 """`mjxgait train`: evolve a walk."""
 
 import argparse
+import contextlib
 import dataclasses
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
@@ -23,13 +25,15 @@ class TrainOptions:
     the options given here. Every key of the config is an option.
 
     Attributes:
-      env: Name of a shipped creature, or path of a creature folder.
+      env: Name of a shipped creature, path of a creature folder, or a model file (MJCF or URDF) to import on the fly.
       config: TOML file with settings, or the name of a shipped config such as wilson.
       out: Folder for the run; by default a new one under runs/.
       resume: Run folder to go on with; its own creature and settings are used, only --generations and --evolution.target may differ.
       generation: With --resume: the checkpoint to go on from instead of the latest.
       population: Short for --evolution.population.
       generations: Short for --evolution.generations.
+      view: Show the best of each generation walking on a page that only this machine can reach.
+      plots: Draw all plots of the run when it has ended (`mjxgait plot`).
       settings: The config, key by key.
     """
 
@@ -40,6 +44,8 @@ class TrainOptions:
     generation: int | None = None
     population: int | None = None
     generations: int | None = None
+    view: bool = False
+    plots: bool = True
     settings: Annotated[Config, tyro.conf.arg(name="")] = dataclasses.field(default_factory=Config)
 
 
@@ -49,8 +55,10 @@ def train_command(arguments: Sequence[str]) -> int:
     options = tyro.cli(TrainOptions, args=list(arguments), prog="mjxgait train", default=TrainOptions(settings=default))
     config = _settings(options)
     from mjxgait import run  # JAX takes a second to import: only once the options are known to be good
+    from mjxgait.commands.view import following
     from mjxgait.experiment import prepare_devices
     from mjxgait.screen import Screen
+    from mjxgait.viewing.plots import PLOTS, plot_run
 
     if options.resume:
         if _without_ends(config) != _without_ends(default):
@@ -60,7 +68,11 @@ def train_command(arguments: Sequence[str]) -> int:
         folder = options.out or _new_folder(creature.name, config.seed)
         create_run(folder, creature, config)
     prepare_devices()
-    ended = run.train(folder, creature, config, Screen(), resume=options.resume is not None, generation=options.generation)
+    with following(folder) if options.view else contextlib.nullcontext():
+        ended = run.train(folder, creature, config, Screen(), resume=options.resume is not None, generation=options.generation)
+    if ended and options.plots:
+        plot_run(folder)
+        print(f"plots         {folder / PLOTS}/")
     return 0 if ended else INTERRUPTED
 
 
@@ -75,8 +87,23 @@ def _layers(arguments: Sequence[str]) -> tuple[Creature, Config]:
         raise UserError(str(error)) from None
     if given.resume:
         return open_run(Path(given.resume))
-    creature = load_creature(find_creature(given.env or TrainOptions.env))
+    creature = _creature(given.env or TrainOptions.env)
     return creature, resolve_config(creature.settings.train, creature.name, Path(given.config) if given.config else None)
+
+
+def _creature(env: str) -> Creature:
+    """The creature of a name or folder; a model file (MJCF or URDF) is imported on the fly."""
+    path = Path(env)
+    if not path.is_file():
+        return load_creature(find_creature(env))
+    from mjxgait.importing import import_model
+
+    imported = import_model(path)
+    print(imported.notes.text())
+    with tempfile.TemporaryDirectory() as folder:  # the run folder keeps the creature
+        for name, text in imported.files.items():
+            (Path(folder) / name).write_text(text, encoding="utf-8")
+        return load_creature(Path(folder))
 
 
 def _settings(options: TrainOptions) -> Config:

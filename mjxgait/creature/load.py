@@ -277,7 +277,7 @@ def _check_names(names: list[str], partner: np.ndarray) -> None:
     """The geometry and the names must not contradict each other."""
     for name, other in zip(names, (names[p] for p in partner), strict=True):
         swapped = name.replace("left", "\0").replace("right", "left").replace("\0", "right")
-        if swapped in names and swapped != other:
+        if swapped != name and swapped in names and swapped != other:
             raise UserError(
                 f'joint "{name}" mirrors to "{other}" by its geometry but to "{swapped}" by its name; settle it in [mirror] pairs'
             )

@@ -16,7 +16,7 @@ import jax
 import numpy as np
 import orbax.checkpoint as ocp
 
-from mjxgait.checkpoint import FOLDER, SCHEMA, Manifest, _hash
+from mjxgait.checkpoint import FOLDER, SCHEMA, Manifest, array_hash
 from mjxgait.config import Config
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
@@ -157,7 +157,7 @@ def _read(folder: Path) -> tuple[Manifest, dict[str, np.ndarray]]:
     except Exception as error:  # Orbax raises many kinds on a broken folder
         reason = (str(error).strip().splitlines() or [type(error).__name__])[0]
         raise _Damaged(reason if len(reason) < 120 else reason[:117] + "...") from None
-    if _hash(arrays) != manifest.arrays:
+    if array_hash(arrays) != manifest.arrays:
         raise _Damaged("its values are not those that were written")
     return manifest, arrays
 

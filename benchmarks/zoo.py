@@ -1,0 +1,78 @@
+"""Trains creatures over seeds, each in a process of its own, and prints a table of what C MuJoCo says of the champions.
+
+    python benchmarks/zoo.py --env tall_quadruped short_quadruped --seeds 0 1 2 3 4 --config default --out runs/zoo
+
+A run that is there already is not repeated. Columns: whether the champion is certified and the margin of its worst criterion; which
+criteria fail; speed over the certificate's 20 s; body lengths per second from the nominal start over evolution's own episode, in the simulation
+that evolved it and in C MuJoCo; share of 64 perturbed starts, which evolution never saw, that are up and forward after an episode and after
+22 s; generations; wall time of the whole command, start-up, compilation and examination included.
+"""
+
+import argparse
+import json
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+from mjxgait.certify import distance, survival
+from mjxgait.champion import read_champion
+from mjxgait.folder import CERTIFICATE, CHAMPION, METRICS, open_run, read_metrics
+
+HEADER = ("creature", "seed", "certified", "margin", "fails", "speed", "evolved", "in C", "up, episode", "up, 22 s", "gait", "gens", "wall")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--env", nargs="+", default=["tall_quadruped", "short_quadruped", "crab", "duck", "alien"])
+    parser.add_argument("--seeds", nargs="+", type=int, default=[0, 1, 2, 3, 4])
+    parser.add_argument("--config", default=None)
+    parser.add_argument("--out", type=Path, default=Path("runs/zoo"))
+    options = parser.parse_args()
+    print(*HEADER, sep=" | ")
+    for name in options.env:
+        for seed in options.seeds:
+            folder = options.out / f"{name}-{seed}"
+            wall = train(folder, name, seed, options.config)
+            print(*row(folder, seed, wall), sep=" | ", flush=True)
+
+
+def train(folder: Path, name: str, seed: int, config: str | None) -> float:
+    """Wall time of the run in s; the one noted beside it when it is there already."""
+    note = folder.with_suffix(".wall")
+    if not note.exists():
+        command = [sys.executable, "-m", "mjxgait", "train", "--env", name, "--seed", str(seed), "--out", str(folder)]
+        began = time.perf_counter()
+        subprocess.run(command + (["--config", config] if config else []), check=True, stdout=subprocess.DEVNULL)
+        note.write_text(str(time.perf_counter() - began))
+    return float(note.read_text())
+
+
+def row(folder: Path, seed: int, wall: float) -> list[str]:
+    """What the run folder and two more looks in C MuJoCo say."""
+    creature, _ = open_run(folder)
+    champion = read_champion(folder / CHAMPION, creature)
+    certificate = json.loads((folder / CERTIFICATE).read_text())
+    seconds = champion.origin["nominal_seconds"]
+    evolved, examined = champion.origin["nominal_forward"], distance(creature, champion, seconds)
+    starts = next(c for c in certificate["criteria"] if c["number"] == 4)["measures"][0]["value"]
+    margin = certificate["margin"]
+    return [
+        creature.name,
+        str(seed),
+        "yes" if certificate["passed"] else "no",
+        "none" if margin is None else f"{margin:.2f}",
+        " ".join(str(c["number"]) for c in certificate["criteria"] if not c["passed"]) or "-",
+        f"{certificate['report']['speed_body_lengths'] or 0:.2f}",
+        f"{evolved / creature.body_length / seconds:.2f}",
+        f"{examined / creature.body_length / seconds:.2f} ({examined / evolved - 1:+.0%})",
+        f"{survival(creature, champion, seconds=seconds, seed=1):.0%}",
+        f"{starts:.0%}",
+        str(certificate["report"]["gait"]),
+        str(read_metrics(folder / METRICS)[-1]["generation"]),
+        f"{wall:.0f} s",
+    ]
+
+
+if __name__ == "__main__":
+    main()
