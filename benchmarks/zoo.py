@@ -3,9 +3,9 @@
     python benchmarks/zoo.py --env tall_quadruped short_quadruped --seeds 0 1 2 3 4 --config default --out runs/zoo
 
 A run that is there already is not repeated. Columns: whether the champion is certified and the margin of its worst criterion; which
-criteria fail; speed over the certificate's 20 s; body lengths per second from the nominal start over evolution's own episode, in the simulation
-that evolved it and in C MuJoCo; share of 64 perturbed starts, which evolution never saw, that are up and forward after an episode and after
-22 s; generations; wall time of the whole command, start-up, compilation and examination included.
+criteria fail; speed over the certificate's 20 s; body lengths per second from the nominal start over evolution's own episode, in the
+simulation that evolved it and in C MuJoCo; share of 64 perturbed starts, which evolution never saw, that are up and forward after an episode
+and after 22 s; generations; wall time of the whole command, start-up, compilation and examination included.
 """
 
 import argparse
@@ -27,21 +27,23 @@ def main() -> None:
     parser.add_argument("--env", nargs="+", default=["tall_quadruped", "short_quadruped", "crab", "duck", "alien"])
     parser.add_argument("--seeds", nargs="+", type=int, default=[0, 1, 2, 3, 4])
     parser.add_argument("--config", default=None)
+    parser.add_argument("--candidates", type=int, default=4, help="how many of the best are examined at most")
     parser.add_argument("--out", type=Path, default=Path("runs/zoo"))
     options = parser.parse_args()
     print(*HEADER, sep=" | ")
     for name in options.env:
         for seed in options.seeds:
             folder = options.out / f"{name}-{seed}"
-            wall = train(folder, name, seed, options.config)
+            wall = train(folder, name, seed, options.config, options.candidates)
             print(*row(folder, seed, wall), sep=" | ", flush=True)
 
 
-def train(folder: Path, name: str, seed: int, config: str | None) -> float:
+def train(folder: Path, name: str, seed: int, config: str | None, candidates: int) -> float:
     """Wall time of the run in s; the one noted beside it when it is there already."""
     note = folder.with_suffix(".wall")
     if not note.exists():
-        command = [sys.executable, "-m", "mjxgait", "train", "--env", name, "--seed", str(seed), "--out", str(folder)]
+        command = [sys.executable, "-m", "mjxgait", "train", "--env", name, "--seed", str(seed), "--out", str(folder), "--no-plots"]
+        command += ["--examination.candidates", str(candidates)]
         began = time.perf_counter()
         subprocess.run(command + (["--config", config] if config else []), check=True, stdout=subprocess.DEVNULL)
         note.write_text(str(time.perf_counter() - began))

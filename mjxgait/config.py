@@ -117,7 +117,7 @@ class FitnessConfig:
     """
 
     __pydantic_config__ = STRICT
-    speed: NonNegative = 1.0
+    speed: NonNegative = 0.9
     clearance: NonNegative = 0.12
     frequency: NonNegative = 0.7
     style_ramp: Whole = 0

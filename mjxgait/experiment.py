@@ -75,14 +75,18 @@ class Experiment:
 
     def champion(self, state: EvolutionState, versions: dict[str, str], rank: int = 0) -> Champion:
         """An individual of a state; rank 0 is the best."""
-        best = jax.tree.map(lambda leaf: np.asarray(leaf[rank]), state.genomes)
-        terms = np.asarray(state.terms[rank]).mean(axis=0)
+        # One transfer instead of one per array: it happens in every generation.
+        genomes, every_term, fitness, born, generation = jax.device_get(
+            (state.genomes, state.terms, state.fitness, state.born, state.generation)
+        )
+        best = jax.tree.map(lambda leaf: leaf[rank], genomes)
+        terms = every_term[rank].mean(axis=0)
         nominal = forward_distance(
-            self.creature, self.config.fitness, self.config.rollout.seconds, float(state.terms[rank, 0, TERMS.index("distance")])
+            self.creature, self.config.fitness, self.config.rollout.seconds, float(every_term[rank, 0, TERMS.index("distance")])
         )
         origin = {
-            "generation": int(state.generation),
-            "born": int(state.born[rank]),
+            "generation": int(generation),
+            "born": int(born[rank]),
             "seed": self.config.seed,
             "nominal_forward": nominal,
             "nominal_seconds": self.config.rollout.seconds,
@@ -94,7 +98,7 @@ class Experiment:
             key_poses=best.key_poses,
             tuning=dict(zip(TUNING, map(float, best.tuning), strict=True)),
             controller=self.config.controller,
-            fitness=float(state.fitness[rank]),
+            fitness=float(fitness[rank]),
             terms=dict(zip(TERMS, map(float, terms), strict=True)),
             origin=origin,
         )

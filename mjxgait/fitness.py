@@ -36,7 +36,8 @@ def fitness_terms(creature: Creature, config: FitnessConfig, step: float, horizo
     length = creature.body_length
     moved = jnp.maximum(tally.forward, 0.25 * length)
     strides = jnp.maximum(tally.strides, 1)
-    rate = tally.strides / (jnp.maximum(tally.stride_steps, 1) * step)
+    # Several swings in one cycle of poses must not hide a buzz.
+    rate = jnp.maximum(tally.strides / jnp.maximum(tally.stride_steps, 1), jnp.mean(tally.swings) / lived) / step
     duty = tally.contact / lived
     second_half = tally.forward - tally.forward_half
     values = {

@@ -1,6 +1,7 @@
 """The host loop around the jitted generation: it counts, logs, checkpoints and stops."""
 
 import dataclasses
+import functools
 import importlib.metadata
 import json
 import platform
@@ -119,6 +120,7 @@ def metrics_line(metrics: GenerationMetrics, seconds: float) -> dict[str, Any]:
     return {key: value if np.isfinite(value) else None for key, value in line.items()}
 
 
+@functools.cache
 def versions() -> dict[str, str]:
     """Of everything that decides what a run computes."""
     packages = ("mjxgait", "jax", "jaxlib", "mujoco", "mujoco-mjx")

@@ -14,6 +14,9 @@ from mjxgait.types import Sensed, pytree
 CONTACT_GAP = 0.002
 """m; a foot nearer to the floor than this is in contact. A resting foot sinks in by about a millimetre."""
 
+SWING = 0.03
+"""Hip heights; a foot that rises less has not left the floor, it has trembled. The certificate counts swings alike."""
+
 
 class Reason(IntEnum):
     """Why an episode ended."""
@@ -33,6 +36,7 @@ class Tally:
     steps: [] steps survived. reason: [] why the episode ended. forward, left: [] m from the start to the latest position.
     forward_half: [] m, `forward` at half time. heading: [] rad.
     strides: [] completed cycles. stride_steps: [] steps up to the last completion.
+    swings: [F] completed swings, swinging: [F] whether in one: a swing rises above `SWING` and comes down to half of it.
     shortfall: [] missing foot clearance, share of the wanted, summed over strides. peak: [F] m, highest in this stride.
     contact: [F] steps in contact. slip: [F] m slid while in contact. airborne: [] steps without any foot on the floor.
     foot_height: [] m·steps, mean height of the feet. foot_pos: [F, 2], foot_down: [F] of the previous step.
@@ -48,6 +52,8 @@ class Tally:
     heading: jax.Array
     strides: jax.Array
     stride_steps: jax.Array
+    swings: jax.Array
+    swinging: jax.Array
     shortfall: jax.Array
     peak: jax.Array
     contact: jax.Array
@@ -78,7 +84,7 @@ class Judge:
         feet = len(self.creature.foot_names)
         values = {field.name: jnp.zeros(()) for field in dataclasses.fields(Tally)}
         counts = {name: jnp.zeros((), jnp.int32) for name in ("steps", "reason", "strides", "stride_steps")}
-        per_foot = {name: jnp.zeros(feet) for name in ("peak", "contact", "slip", "foot_down")}
+        per_foot = {name: jnp.zeros(feet) for name in ("swings", "swinging", "peak", "contact", "slip", "foot_down")}
         return Tally(**(values | counts | per_foot | {"foot_pos": jnp.zeros((feet, 2))}))
 
     def examine(self, sensed: Sensed) -> jax.Array:
@@ -107,6 +113,8 @@ class Judge:
         peak = jnp.maximum(tally.peak, low)
         missing = jnp.mean(jnp.clip(1.0 - peak / max(self.clearance, 1e-6), 0.0, 1.0))
         slid = jnp.linalg.norm(pos - tally.foot_pos, axis=1) * down * tally.foot_down
+        rise = SWING * creature.hip_height
+        swinging = jnp.where(low > rise, 1.0, jnp.where(low < 0.5 * rise, 0.0, tally.swinging))
         first = tally.strides == 0
         outside = (sensed.joint_pos < creature.pose_low.astype(np.float32)) | (sensed.joint_pos > creature.pose_high.astype(np.float32))
         steps = tally.steps + 1
@@ -120,6 +128,8 @@ class Judge:
             heading=jnp.arctan2(forward_axis @ start_left, forward_axis @ start_forward),
             strides=tally.strides + stride,
             stride_steps=jnp.where(stride, steps, tally.stride_steps),
+            swings=tally.swings + jnp.maximum(tally.swinging - swinging, 0.0),
+            swinging=swinging,
             shortfall=tally.shortfall + jnp.where(stride & ~first, missing, 0.0),
             peak=jnp.where(stride, low, peak),
             contact=tally.contact + down,

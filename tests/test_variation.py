@@ -70,6 +70,22 @@ def test_mutation_changes_one_pose_and_as_many_joints_as_its_kind_says(mutation:
     assert np.all(mutants.tuning == genome.tuning)
 
 
+def test_mixed_mutation_is_the_one_kind_or_the_other():
+    genome = Genome(jnp.zeros((K, J)), jnp.zeros(E))
+    mutate = pose_variation(BOX, EvolutionConfig(mutation="mixed", tuning_rate=0.0)).mutate
+    differs = np.asarray(jax.vmap(mutate, in_axes=(0, None))(keys(200), genome).key_poses != 0)
+    counts = np.bincount(differs.sum(axis=(1, 2)), minlength=J + 1)
+    assert counts[2] + counts[J] == 200
+    assert 70 < counts[2] < 130
+
+
+def test_the_initial_spread_is_the_middle_of_each_range():
+    genomes = pose_variation(BOX, EvolutionConfig(initial_spread=0.5)).create(jax.random.key(1), 500)
+    reach = np.abs(genomes.key_poses).max(axis=0) / BOX.high.key_poses
+    assert ((reach > 0.45) & (reach <= 0.5)).all()
+    assert float(genomes.tuning[:, 1:].min()) >= 0.25
+
+
 def test_mutation_never_leaves_the_box():
     edge = BOX.high
     mutate = pose_variation(BOX, EvolutionConfig(sigma=3.0, tuning_rate=1.0, tuning_sigma=3.0)).mutate

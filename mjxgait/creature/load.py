@@ -3,6 +3,7 @@
 import dataclasses
 import fnmatch
 import hashlib
+import re
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -16,6 +17,11 @@ from mjxgait.tables import build, read_toml
 
 HINGE, SLIDE = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
 FLOOR = "floor"
+NOT_ALONE = re.compile(
+    r"<\s*(!DOCTYPE|!ENTITY|include|plugin|extension|replicate|composite|flexcomp|attach|model|size)\b|[\s\"'](file\w*|\w+dir)\s*="
+)
+MOST_TEXT = 8_000_000
+"""Characters of a file."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -112,15 +118,25 @@ def load_creature(folder: Path) -> Creature:
     settings = build(CreatureSettings, read_toml(toml), str(toml))
     try:
         files = {path.name: path.read_text(encoding="utf-8") for path in (toml, xml)}
+        _check_alone(xml, files["creature.xml"])
         model = mujoco.MjModel.from_xml_string(files["creature.xml"])
     except OSError as error:
         raise UserError(f"{xml}: cannot be read ({error.strerror})") from None
-    except (ValueError, UnicodeDecodeError) as error:
+    except (ValueError, UnicodeDecodeError, mujoco.FatalError) as error:
         raise UserError(f"{xml}: not a model that MuJoCo can load ({' '.join(str(error).split())})") from None
     try:
         return _assemble(settings, files, model)
     except UserError as error:
         raise UserError(f"{folder}: {error}") from None
+
+
+def _check_alone(path: Path, text: str) -> None:
+    """A body may come from a stranger: it refers to no other file, runs no plugin, and does not multiply itself."""
+    if len(text) > MOST_TEXT:
+        raise UserError(f"{path}: larger than {MOST_TEXT // 1_000_000} MB; a creature is smaller")
+    if found := NOT_ALONE.search(text):
+        what = found.group(1) or found.group(2)
+        raise UserError(f'{path}: "{what}" is not allowed here: the file must hold the whole body; `mjxgait import` makes such a file')
 
 
 def _assemble(settings: CreatureSettings, files: Mapping[str, str], model: mujoco.MjModel) -> Creature:

@@ -1,0 +1,165 @@
+"""The contest: every contestant on the same work, turn by turn in one run, so that what else the machine does falls on all alike."""
+
+import dataclasses
+import importlib.metadata
+import importlib.util
+import json
+import time
+from collections.abc import Callable
+from pathlib import Path
+from statistics import median
+from typing import Any, Protocol
+
+import numpy as np
+
+from mjxgait.bench.limits import distance_to_limit, step_cost
+from mjxgait.bench.machine import machine_facts, measured_peak
+from mjxgait.bench.ours import Ours, as_workload, half_and_half
+from mjxgait.bench.overhead import overhead
+from mjxgait.bench.workers import Workers, cores
+from mjxgait.bench.workload import Lap, Workload
+from mjxgait.config import Config
+
+DART_STRIDE = 4
+"""DART is so much slower that it is given every fourth genome only."""
+PACKAGES = ("mjxgait", "jax", "jaxlib", "mujoco", "mujoco-mjx", "numpy", "dartpy")
+
+
+class Contestant(Protocol):
+    """Whoever can pass over a workload."""
+
+    def lap(self) -> Lap:
+        """One pass."""
+        ...
+
+
+def contest(folder: Path, config: Config, rounds: int, generations: int, say: Callable[[str], None]) -> dict[str, Any]:
+    """Everything that the benchmark finds out, ready for JSON.
+
+    Args:
+      rounds: passes of each contestant. generations: how long the walkers of the workload have evolved.
+    """
+    facts = machine_facts()
+    say("compiling")
+    ours = Ours(folder, config)
+    say(f"evolving {generations} generations for the workload")
+    early = ours.useful_share()
+    ours.take(half_and_half(ours, generations))
+    work = as_workload(folder, ours.experiment, ours.first.genomes)
+    say("starting the other contestants")
+    peers, left_out = _peers(work)
+    try:
+        laps = _interleave({"ours": ours, **peers}, rounds, say)
+    finally:
+        for peer in peers.values():
+            peer.close()
+    share = ours.useful_share()
+    say("timing what a generation does besides simulating")
+    besides = overhead(ours)
+    say("counting operations, measuring the cores")
+    # By processor time, as if no other work had taken turns: the peaks are the best of short tries and hardly see it either.
+    computed = cores() / (median(lap.processor / lap.steps for lap in laps["ours"]) * share)
+    cost, peak = step_cost(ours.experiment), measured_peak()
+    return {
+        **_ratios(laps),
+        "creature_steps_per_second": {name: _spread([lap.rate for lap in entry]) for name, entry in laps.items()},
+        "processor_us_per_step": {name: _spread([1e6 * lap.processor / lap.steps for lap in entry]) for name, entry in laps.items()},
+        "useful_share": {"initial_population": early, "workload": share},
+        "startup_s": {"ours": ours.startup, **{name: peer.startup for name, peer in peers.items()}},
+        "compile_s": {"ours": ours.compile},
+        "limit": {"cost_per_step": cost, "peak": peak, **distance_to_limit(cost, peak, computed)},
+        "overhead": besides,
+        "left_out": left_out,
+        "workload": _described(work, ours, rounds, generations),
+        "laps": {name: [dataclasses.asdict(lap) for lap in entry] for name, entry in laps.items()},
+        "machine": facts,
+        "versions": _versions(),
+        "date": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
+    }
+
+
+def append_history(result: dict[str, Any], file: Path) -> None:
+    """One line with the figures that a regression would show in."""
+    kept = (
+        "date",
+        "ratio_over_mujoco_c",
+        "ratio_over_dart",
+        "creature_steps_per_second",
+        "processor_us_per_step",
+        "compile_s",
+        "useful_share",
+        "machine",
+        "versions",
+    )
+    file.parent.mkdir(parents=True, exist_ok=True)
+    with file.open("a", encoding="utf-8") as history:
+        history.write(json.dumps({key: result[key] for key in kept}) + "\n")
+
+
+def _peers(work: Workload) -> tuple[dict[str, Workers], dict[str, str]]:
+    """Contestants by name, and why one was left out."""
+    from mjxgait.bench.mujoco_peer import MujocoPeer
+
+    peers, left_out = {"mujoco_c": Workers(MujocoPeer, work)}, {}
+    if importlib.util.find_spec("dartpy") is None:
+        left_out["dart"] = "dartpy is not installed; install the extra mjxgait[peers]"
+    else:
+        from mjxgait.bench.dart_peer import DartPeer
+
+        peers["dart"] = Workers(DartPeer, work.every(DART_STRIDE))
+        peers["dart_one_core"] = Workers(DartPeer, work.every(2 * DART_STRIDE), count=1)
+    return peers, left_out
+
+
+def _interleave(contestants: dict[str, Contestant], rounds: int, say: Callable[[str], None]) -> dict[str, list[Lap]]:
+    """Turn by turn; the first turn of each only warms up."""
+    laps: dict[str, list[Lap]] = {name: [] for name in contestants}
+    for turn in range(rounds + 1):
+        for name, contestant in contestants.items():
+            lap = contestant.lap()
+            if turn:
+                laps[name].append(lap)
+        said = "  ".join(f"{name} {entry[-1].rate:,.0f}/s" for name, entry in laps.items() if entry)
+        say(f"round {turn} of {rounds}: {said or 'warm-up'}")
+    return laps
+
+
+def _ratios(laps: dict[str, list[Lap]]) -> dict[str, Any]:
+    """Medians over the rounds of our rate over theirs in the same round, and their spread; None for who was left out."""
+    result: dict[str, Any] = {"ratio_over_mujoco_c": None, "ratio_over_dart": None}
+    spread = {}
+    for name, theirs in laps.items():
+        if name != "ours":
+            ratios = [a.rate / b.rate for a, b in zip(laps["ours"], theirs, strict=True)]
+            result[f"ratio_over_{name}"], spread[name] = median(ratios), _spread(ratios)
+    return result | {"ratio_spread": spread}
+
+
+def _spread(values: list[float]) -> dict[str, float]:
+    low, quarter, middle, three_quarters, high = np.percentile(values, [0, 25, 50, 75, 100])
+    return {"median": middle, "lower_quartile": quarter, "upper_quartile": three_quarters, "lowest": low, "highest": high}
+
+
+def _described(work: Workload, ours: Ours, rounds: int, generations: int) -> dict[str, Any]:
+    option = ours.experiment.creature.evolution_model.opt
+    return {
+        "creature": ours.experiment.creature.name,
+        "genomes": len(work.key_poses),
+        "starts": len(work.qpos),
+        "episode_steps": work.steps,
+        "lanes_per_device": ours.experiment.simulator.lanes,
+        "solver_iterations": int(option.iterations),
+        "line_search_iterations": int(option.ls_iterations),
+        "evolved_generations": generations,
+        "rounds": rounds,
+    }
+
+
+def _versions() -> dict[str, str]:
+    found = {}
+    for package in PACKAGES:
+        try:
+            found[package] = importlib.metadata.version(package)
+        except importlib.metadata.PackageNotFoundError:
+            continue
+    return found

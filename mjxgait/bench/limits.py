@@ -1,0 +1,57 @@
+"""How far the step is from what the cores can do: operations and bytes counted in the compiled step, against a measured peak."""
+
+from functools import partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+
+from mjxgait.bench.flops import count_flops
+from mjxgait.experiment import Experiment
+from mjxgait.rollout import Lane
+
+
+def step_cost(experiment: Experiment) -> dict[str, float]:
+    """Per creature and step, controller and tally included.
+
+    flops_asked: floating-point operations of the program as written. flops: of the compiled one as XLA counts them, which computes
+    some values twice rather than storing them. bytes: read and written by the compiled kernels, mostly in the cache. state_bytes: what
+    a simulation carries from step to step.
+    """
+    simulator, lanes = experiment.simulator, experiment.simulator.lanes
+    lane = jax.eval_shape(partial(_lanes, experiment, lanes))
+    # The one look under the rollout's bonnet: its loop around the step would hide the step's own cost.
+    compiled = jax.jit(simulator._step).lower(lane).compile().cost_analysis() or {}
+    state = sum(leaf.size * leaf.dtype.itemsize for leaf in jax.tree.leaves(lane))
+    costs = {
+        "flops_asked": count_flops(simulator._step, lane),
+        "flops": compiled.get("flops", float("nan")),
+        "transcendentals": compiled.get("transcendentals", float("nan")),
+        "bytes": compiled.get("bytes accessed", float("nan")),
+        "state_bytes": float(state),
+    }
+    return {name: value / lanes for name, value in costs.items()}
+
+
+def distance_to_limit(cost: dict[str, float], peak: dict[str, float], computed_rate: float) -> dict[str, Any]:
+    """Shares of the measured peaks that `computed_rate` creature-steps per second use; 1 would be the machine's limit."""
+    bound = {
+        "flops": peak["flops"] / cost["flops_asked"],
+        "cache_bytes": peak["cache_bytes"] / cost["bytes"],
+        "memory_bytes": peak["memory_bytes"] / (2 * cost["state_bytes"]),
+    }
+    return {
+        "computed_steps_per_second": computed_rate,
+        "bound_steps_per_second": bound,
+        "share_of_bound": {name: computed_rate / limit for name, limit in bound.items()},
+    }
+
+
+def _lanes(experiment: Experiment, lanes: int) -> Lane:
+    """Simulations at the start, as many as a device holds."""
+    simulator = experiment.simulator
+    low, _ = simulator.tracker.bounds()
+    genomes = jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], low)
+    jobs = jnp.zeros(lanes, jnp.int32)
+    lane = jax.vmap(partial(simulator._fresh_lane, genomes, experiment.starts))(jobs, jobs)
+    return jax.tree.map(lambda leaf: jnp.moveaxis(leaf, 0, simulator.plant.lane_axis), lane)

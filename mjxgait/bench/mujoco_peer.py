@@ -1,0 +1,201 @@
+"""C MuJoCo by hand: `mujoco.batch` with the controller of docs/controller.md vectorised in NumPy.
+
+Written for speed: each simulation keeps its MjData, so that the step ends with the velocity stage of the new state and nothing is computed
+twice; an ended simulation takes the next episode at once, and none is stepped when no episode is left; arrays are indexed only then.
+It keeps no tally but the distance, so it does less than what it is compared with.
+"""
+
+from typing import Any
+
+import mujoco
+import numpy as np
+from mujoco.batch import Batch
+
+from mjxgait.bench.workload import Workload
+from mjxgait.certify.layout import Layout, LowestPoint
+from mjxgait.creature import Creature
+
+VELOCITY_STAGE = int(mujoco.mjtStage.mjSTAGE_VEL)
+LANES = 128
+"""Simulations per core: fewer pay more for NumPy's calls, more leave the cache."""
+
+
+class MujocoPeer:
+    """One core's share of a workload: the episodes `first`, `first + stride`, ..."""
+
+    def __init__(self, workload: Workload, first: int, stride: int, lanes: int = LANES) -> None:
+        if workload.config.controller.law != "spd" or workload.config.controller.constraint_forces:
+            raise ValueError("the peer knows stable PD without constraint forces only")
+        self.work, self.creature = workload, workload.creature()
+        self.jobs = np.arange(first, workload.episodes, stride)
+        self.lanes = min(lanes, len(self.jobs))
+        self.model = _quiet(self.creature.evolution_model)
+        self.batch = Batch(self.model, self.lanes, 1, persistent=True)
+        self.friction = self.batch.expand("geom_friction")
+        self.usual_friction = self.model.geom_friction[:, 0].copy()
+        bind = self.batch.bind
+        self.qpos, self.qvel, self.warmstart, self.applied = bind("qpos"), bind("qvel"), bind("qacc_warmstart"), bind("qfrc_applied")
+        self.xpos, self.xmat, self.mass, self.bias = bind("xpos"), bind("xmat"), bind("M"), bind("qfrc_bias")
+        self.geom_xpos, self.geom_xmat = bind("geom_xpos"), bind("geom_xmat")
+        self.passive = bind("qfrc_passive") if _has_passive(self.model) else None
+        self.forbidden = LowestPoint(self.model, self.creature.watched[len(self.creature.foot_of) :])
+        self.law = Law(self.creature, workload)
+        self.damped = DampedSolve(self.model, self.creature)
+
+    def lap(self) -> tuple[int, float]:
+        """Useful steps, and the sum over episodes of the distance forward in m."""
+        self.job = np.zeros(self.lanes, int)
+        self.position = np.zeros(self.lanes, int)
+        self.steps = np.zeros(self.lanes, int)
+        self.moved = np.zeros(self.lanes)
+        self.taken, total, forward = 0, 0, 0.0
+        self._refill(np.arange(self.lanes))
+        rows: Any = slice(None)
+        while True:
+            self._push(rows)
+            ended = (self._down(rows) | (self.steps[rows] >= self.work.steps)).nonzero()[0]
+            if len(ended):
+                ended = ended if isinstance(rows, slice) else rows[ended]
+                total, forward = total + int(self.steps[ended].sum()), forward + float(self.moved[ended].sum())
+                idle = ended[self._refill(ended) :]
+                if len(idle):
+                    rows = np.setdiff1d(np.arange(self.lanes)[rows], idle)
+                if not isinstance(rows, slice) and not len(rows):
+                    return total, forward
+                continue
+            self._step(rows)
+
+    def _step(self, rows: Any) -> None:
+        """One control step of the simulations in `rows`."""
+        creature, law, genome = self.creature, self.law, self.job[rows] // len(self.work.qpos)
+        pos, rot = self.xpos[rows, creature.trunk], self.xmat[rows, creature.trunk].reshape(-1, 3, 3)
+        q, v = self.qpos[rows][:, law.qpos], self.qvel[rows]
+        self.moved[rows] = (pos - law.start) @ law.forward
+        self.steps[rows] += 1
+        target = law.target(genome, self.position[rows], pos, rot, v)
+        bias = self.bias[rows] if self.passive is None else self.bias[rows] - self.passive[rows]
+        force = law.kp * (target - q - law.step * v[:, law.dof]) - law.kd * v[:, law.dof]
+        pushed = -bias
+        pushed[:, law.dof] += force
+        acceleration = self.damped.solve(self.mass[rows], pushed)[:, law.dof]
+        self.applied[rows, law.dof] = np.clip(force - law.step * law.kd * acceleration, -creature.torque_limit, creature.torque_limit)
+        self.position[rows] = law.advance(genome, self.position[rows], target, q, self.steps[rows])
+        self.batch.step(None if isinstance(rows, slice) else rows, stage=VELOCITY_STAGE)
+
+    def _refill(self, rows: np.ndarray) -> int:
+        """Starts waiting episodes in the first of `rows`; how many there were."""
+        rows = rows[: len(self.jobs) - self.taken]
+        if not len(rows):
+            return 0
+        self.job[rows] = self.jobs[self.taken : self.taken + len(rows)]
+        self.taken += len(rows)
+        start = self.job[rows] % len(self.work.qpos)
+        self.qpos[rows], self.qvel[rows] = self.work.qpos[start], self.work.qvel[start]
+        self.warmstart[rows], self.applied[rows] = 0.0, 0.0
+        self.friction[rows, :, 0] = self.usual_friction * self.work.friction[start, None]
+        self.position[rows] = self.steps[rows] = self.moved[rows] = 0
+        self.batch.forward(rows, stage=VELOCITY_STAGE)
+        return len(rows)
+
+    def _push(self, rows: Any) -> None:
+        start = self.job[rows] % len(self.work.qpos)
+        now = (self.steps[rows] == self.work.push_step[start]).nonzero()[0]
+        if len(now):
+            lanes = np.arange(self.lanes)[rows][now]
+            self.qvel[lanes] += self.work.push[start[now]]
+            self.batch.forward(lanes, stage=VELOCITY_STAGE)
+
+    def _down(self, rows: Any) -> np.ndarray:
+        """The rules of `mjxgait.tally`. Negated comparisons: what is not a number is down."""
+        creature, limits = self.creature, self.creature.settings.termination
+        up = self.xmat[rows, creature.trunk, 6:] @ creature.up
+        height = self.xpos[rows, creature.trunk, 2] / creature.stand_height
+        fine = (up >= limits.min_up) & (height >= limits.height[0]) & (height <= limits.height[1])
+        if limits.touch:
+            fine &= self.forbidden.lowest(self.geom_xpos[rows], self.geom_xmat[rows]) >= 0
+        return ~fine
+
+
+class Law:
+    """The pose tracker's side of the controller for many simulations at once; constants are looked up here, once."""
+
+    def __init__(self, creature: Creature, workload: Workload) -> None:
+        self.creature, settings = creature, workload.config.controller
+        self.cycle, self.tuning = workload.cycles(creature), workload.tuning
+        self.step, self.kp, self.kd = float(creature.model.opt.timestep), creature.kp, creature.kd
+        self.qpos, self.dof = _span(creature.qpos_adr), _span(creature.dof_adr)
+        self.interpolation, self.by_clock = settings.interpolation, settings.advance == "clock"
+        self.poses = self.cycle.shape[1]
+        self.length = self.poses * settings.interpolation
+        self.root = Layout(creature.model).root_dof + 3
+        self.start = creature.stand_pos
+        self.forward, self.left = (_horizontal(creature.stand_rot @ axis) for axis in (creature.forward, creature.left))
+        self.axes = np.stack([creature.forward, creature.left], 1)
+        self.balances = any(np.any(self.tuning[name]) for name in ("pitch", "pitch_rate", "roll", "roll_rate"))
+
+    def target(self, genome: np.ndarray, position: np.ndarray, pos: np.ndarray, rot: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Corrected target [S, J] in rad."""
+        creature, gain = self.creature, self.tuning
+        a, step = np.divmod(position, self.interpolation)
+        here = self.cycle[genome, a]
+        target = here + (step / self.interpolation)[:, None] * (self.cycle[genome, (a + 1) % self.poses] - here)
+        axes = rot @ self.axes
+        forward = axes[:, :, 0]
+        wrong = np.arctan2(forward @ self.left, forward @ self.forward) + (pos - self.start) @ self.left / (2 * creature.body_length)
+        steer = np.clip(gain["steer"][genome] * wrong, -0.5, 0.5)[:, None]
+        target += steer * (creature.steer_bend + creature.steer_stride * (target - creature.stand))
+        if self.balances:
+            spin = (rot @ v[:, self.root : self.root + 3, None])[:, None, :, 0] @ axes
+            lean = np.arcsin(np.clip(axes[:, 2], -1, 1))
+            pitch = np.clip(gain["pitch_rate"][genome] * spin[:, 0, 1] - gain["pitch"][genome] * lean[:, 0], -0.5, 0.5)
+            roll = np.clip(gain["roll_rate"][genome] * spin[:, 0, 0] + gain["roll"][genome] * lean[:, 1], -0.5, 0.5)
+            target += pitch[:, None] * creature.balance_pitch + roll[:, None] * creature.balance_roll
+        return np.clip(target, creature.joint_low, creature.joint_high, out=target)
+
+    def advance(self, genome: np.ndarray, position: np.ndarray, target: np.ndarray, q: np.ndarray, steps: np.ndarray) -> np.ndarray:
+        """Positions in the cycle [S] at the next step."""
+        if self.by_clock:
+            return (self.length * steps * self.step / self.tuning["period"][genome] + 1e-6).astype(int) % self.length
+        error = target - q
+        reached = np.einsum("sj,sj->s", error, error) < error.shape[1] * self.tuning["threshold"][genome] ** 2
+        return (position + reached) % self.length
+
+
+class DampedSolve:
+    """`(M + h diag(kd))^-1 force` through LAPACK, the dense matrices gathered from MuJoCo's stored entries in one look-up."""
+
+    def __init__(self, model: mujoco.MjModel, creature: Creature) -> None:
+        layout = Layout(model)
+        entry = np.full((model.nv, model.nv), model.nC)
+        entry[layout.mass_row, layout.mass_column] = entry[layout.mass_column, layout.mass_row] = np.arange(model.nC)
+        self.entry, self.size = entry.ravel(), model.nv
+        self.damping = np.zeros(model.nC)
+        self.damping[entry[creature.dof_adr, creature.dof_adr]] = float(creature.model.opt.timestep) * creature.kd
+
+    def solve(self, mass: np.ndarray, force: np.ndarray) -> np.ndarray:
+        """Accelerations [S, nv] of stored entries [S, nC] and forces [S, nv]."""
+        stored = np.zeros((len(mass), mass.shape[1] + 1))
+        np.add(mass, self.damping, out=stored[:, :-1])
+        dense = stored.take(self.entry, axis=1).reshape(-1, self.size, self.size)
+        return np.linalg.solve(dense, force[..., None])[..., 0]
+
+
+def _quiet(model: mujoco.MjModel) -> mujoco.MjModel:
+    """A simulation that blows up must end, not begin anew; and islands cost more than they save on one creature."""
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET) | int(mujoco.mjtDisableBit.mjDSBL_ISLAND)
+    model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+    return model
+
+
+def _has_passive(model: mujoco.MjModel) -> bool:
+    return bool(np.any(model.dof_damping) or np.any(model.jnt_stiffness) or model.opt.density or model.opt.viscosity)
+
+
+def _span(adr: np.ndarray) -> Any:
+    """Addresses as a slice where they are neighbours: a view instead of a copy."""
+    return slice(int(adr[0]), int(adr[-1]) + 1) if np.array_equal(adr, np.arange(adr[0], adr[0] + len(adr))) else adr
+
+
+def _horizontal(vector: np.ndarray) -> np.ndarray:
+    flat = vector * [1.0, 1.0, 0.0]
+    return flat / np.linalg.norm(flat)

@@ -1,0 +1,87 @@
+"""This project as a contestant: the compiled generation that a run calls, genetic algorithm, fitness and all."""
+
+import dataclasses
+import time
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from mjxgait.bench.workload import Lap, Workload
+from mjxgait.config import Config
+from mjxgait.creature import load_creature
+from mjxgait.evolution import EvolutionState
+from mjxgait.experiment import Experiment, build_experiment, prepare_devices
+from mjxgait.fitness import TERMS, forward_distance
+from mjxgait.gait import TUNING, Genome
+
+
+class Ours:
+    """One creature's run. startup, trace and compile: s. laps judge the genomes that `take` was given."""
+
+    def __init__(self, folder: Path, config: Config) -> None:
+        began = time.perf_counter()
+        prepare_devices()
+        self.folder, self.experiment = folder, build_experiment(load_creature(folder), config)
+        self.first: EvolutionState = jax.jit(self.experiment.init)()
+        self.startup = time.perf_counter() - began
+        began = time.perf_counter()
+        self.step = self.experiment.compile()
+        self.compile = time.perf_counter() - began
+        self.first = self.experiment.place(self.first)
+
+    def evolved(self, generations: int) -> EvolutionState:
+        """The state after some generations."""
+        state = self.first
+        for _ in range(generations + 1):
+            state, _ = self.step(state)
+        return state
+
+    def take(self, genomes: Genome) -> None:
+        """Makes these [P] the population that laps judge: a state that nobody has judged yet."""
+        if self.experiment.config.evolution.offspring != self.experiment.config.evolution.population:
+            raise ValueError("laps need growth = 2: as many are judged in a generation as there are in the population")
+        self.first = self.experiment.place(dataclasses.replace(self.first, genomes=genomes))
+
+    def lap(self) -> Lap:
+        """One generation, in which everyone is judged on all starts."""
+        began, worked = time.perf_counter(), time.process_time()
+        state, metrics = jax.block_until_ready(self.step(self.first))
+        seconds, processor = time.perf_counter() - began, time.process_time() - worked
+        return Lap(seconds, int(metrics.sim_steps), self._mean_forward(state), processor)
+
+    def _mean_forward(self, state: EvolutionState) -> float:
+        """m, over all episodes."""
+        creature, config = self.experiment.creature, self.experiment.config
+        distances = np.asarray(state.terms[..., TERMS.index("distance")]).ravel()
+        return float(np.nanmean([forward_distance(creature, config.fitness, config.rollout.seconds, float(d)) for d in distances]))
+
+    def useful_share(self) -> float:
+        """Of all computed steps, how many were lived, in the generation that a lap computes."""
+        _, metrics = self.step(self.first)
+        return float(metrics.sim_steps) / float(metrics.computed_steps)
+
+
+def half_and_half(ours: Ours, generations: int) -> Genome:
+    """The better half of an evolved population and half of the initial one: good walkers and early deaths alike."""
+    half = ours.experiment.config.evolution.population // 2
+    evolved, initial = ours.evolved(generations).genomes, ours.first.genomes
+    return jax.tree.map(lambda a, b: jnp.concatenate([a[:half], b[: b.shape[0] - half]]), evolved, initial)
+
+
+def as_workload(folder: Path, experiment: Experiment, genomes: Genome) -> Workload:
+    """The same genomes and starts in NumPy."""
+    starts, tuning = jax.device_get(experiment.starts), np.asarray(genomes.tuning, float)
+    return Workload(
+        folder=folder,
+        config=experiment.config,
+        key_poses=np.asarray(genomes.key_poses, float),
+        tuning={name: tuning[:, i] for i, name in enumerate(TUNING)},
+        qpos=np.asarray(starts.qpos, float),
+        qvel=np.asarray(starts.qvel, float),
+        friction=np.asarray(starts.friction, float),
+        push=np.asarray(starts.push, float),
+        push_step=np.asarray(starts.push_step),
+        steps=experiment.simulator.steps,
+    )

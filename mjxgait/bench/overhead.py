@@ -1,0 +1,87 @@
+"""What a generation costs besides the simulations: the genetic algorithm's operators, and the host's bookkeeping."""
+
+import dataclasses
+import io
+import tempfile
+import threading
+import time
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+from rich.console import Console
+
+from mjxgait import run
+from mjxgait.bench.ours import Ours
+from mjxgait.checkpoint import Checkpoints
+from mjxgait.evolution import EvolutionState, Judged
+from mjxgait.experiment import Experiment
+from mjxgait.fitness import TERMS
+from mjxgait.screen import Screen
+
+REPEATS = 30
+
+
+def overhead(ours: Ours, generations: int = 8) -> dict[str, float]:
+    """Seconds per generation and shares of it: the operators, which are part of the compiled program, then what the host does: the
+    checkpoint, and all else (metrics, champion, screen).
+    """
+    operators = _operators(ours.experiment)
+    whole, compiled, checkpoint = _host_loop(ours, generations)
+    parts = {"operators": operators, "checkpoint": checkpoint, "log": whole - compiled - checkpoint}
+    shares = {f"{name}_share": seconds / whole for name, seconds in parts.items()}
+    return {"generation_s": whole, **{f"{name}_s": seconds for name, seconds in parts.items()}, **shares}
+
+
+def _operators(experiment: Experiment) -> float:
+    """Of a generation whose judge answers at once."""
+    rollout, count = experiment.config.rollout, experiment.config.evolution.offspring
+
+    def stub(genomes: Any) -> Judged:
+        terms = jnp.mean(genomes.key_poses, axis=(1, 2))[:, None, None] * jnp.ones((1, rollout.starts, len(TERMS)))
+        return Judged(terms, jnp.zeros((count, rollout.starts), bool), jnp.int32(1), jnp.int32(1))
+
+    step = jax.jit(dataclasses.replace(experiment.evolution, judge=stub).step)
+    state, _ = step(jax.jit(experiment.init)())
+    times = []
+    for _ in range(REPEATS):
+        began = time.perf_counter()
+        state, _ = jax.block_until_ready(step(state))
+        times.append(time.perf_counter() - began)
+    return median(times)
+
+
+class _TimedCheckpoints(Checkpoints):
+    """Knows how long its saves have held up the run; what it writes in the background does not count."""
+
+    seconds = 0.0
+
+    def save(self, *args: Any) -> None:
+        began = time.perf_counter()
+        super().save(*args)
+        self.seconds += time.perf_counter() - began
+
+
+def _host_loop(ours: Ours, generations: int) -> tuple[float, float, float]:
+    """Seconds altogether, within the compiled generation, and in saving checkpoints, per generation of a run's own loop."""
+    inside: list[float] = []
+
+    def step(state: EvolutionState) -> Any:
+        began = time.perf_counter()
+        result = jax.block_until_ready(ours.step(state))
+        inside.append(time.perf_counter() - began)
+        return result
+
+    config = dataclasses.replace(ours.experiment.config.evolution, generations=generations)
+    experiment = dataclasses.replace(ours.experiment, config=dataclasses.replace(ours.experiment.config, evolution=config))
+    with tempfile.TemporaryDirectory() as folder:
+        checkpoints = _TimedCheckpoints(Path(folder), experiment.config.keep_every)
+        screen = Screen(Console(file=io.StringIO()))
+        began = time.perf_counter()
+        run._evolve(Path(folder), experiment, step, ours.first, checkpoints, screen, threading.Event())  # type: ignore[arg-type]
+        whole = time.perf_counter() - began
+        screen.close()
+        checkpoints.close()
+    return whole / len(inside), sum(inside) / len(inside), checkpoints.seconds / len(inside)

@@ -1,0 +1,70 @@
+"""The work that every contestant is given: the same genomes on the same starts, in plain NumPy.
+
+Letters: `N` genomes, `R` starts, `K` key poses, `C` poses in a cycle, `J` actuated joints, `nq nv` as in MuJoCo.
+"""
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+
+from mjxgait.certify.controller import pose_cycle
+from mjxgait.config import Config
+from mjxgait.creature import Creature, load_creature
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Workload:
+    """N * R episodes of one creature; episode `e` is genome `e // R` on start `e % R`.
+
+    key_poses: [N, K, J]. tuning: name to [N]. qpos: [R, nq]. qvel: [R, nv]. friction: [R].
+    push: [R, nv], added to qvel at step push_step [R]. steps: T, of a full episode.
+    """
+
+    folder: Path
+    config: Config
+    key_poses: np.ndarray
+    tuning: dict[str, np.ndarray]
+    qpos: np.ndarray
+    qvel: np.ndarray
+    friction: np.ndarray
+    push: np.ndarray
+    push_step: np.ndarray
+    steps: int
+
+    @property
+    def episodes(self) -> int:
+        """N * R."""
+        return len(self.key_poses) * len(self.qpos)
+
+    def creature(self) -> Creature:
+        """Loaded anew: a creature does not travel to another process."""
+        return load_creature(self.folder)
+
+    def cycles(self, creature: Creature) -> np.ndarray:
+        """[N, C, J] rad, the whole pose cycle of each genome."""
+        return np.stack([pose_cycle(poses, creature) for poses in self.key_poses])
+
+    def every(self, stride: int) -> "Workload":
+        """Every `stride`-th genome, for a contestant that would take too long over all."""
+        tuning = {name: values[::stride] for name, values in self.tuning.items()}
+        return dataclasses.replace(self, key_poses=self.key_poses[::stride], tuning=tuning)
+
+
+@dataclasses.dataclass(frozen=True)
+class Lap:
+    """One pass over a workload.
+
+    seconds: of wall time. processor: s of all cores, which other work on the machine changes little. steps: useful ones, of creatures
+    still up. forward: m, mean over episodes.
+    """
+
+    seconds: float
+    steps: int
+    forward: float
+    processor: float = 0.0
+
+    @property
+    def rate(self) -> float:
+        """Useful creature-steps per second."""
+        return self.steps / self.seconds

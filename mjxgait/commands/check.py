@@ -1,0 +1,44 @@
+"""`mjxgait check`: validate a creature folder and draw it."""
+
+import dataclasses
+from collections.abc import Sequence
+from pathlib import Path
+
+import tyro
+
+from mjxgait.config import find_creature, resolve_config
+from mjxgait.creature import load_creature
+from mjxgait.errors import UserError
+
+
+@dataclasses.dataclass(frozen=True)
+class CheckOptions:
+    """Validate a creature folder, let it stand for two seconds, and draw it with its feet, axes and mirror pairs marked.
+
+    Attributes:
+      env: Creature folder, or the name of a shipped creature.
+      out: The picture; by default <name>-check.png in the folder where you are.
+    """
+
+    env: tyro.conf.Positional[str]
+    out: Path | None = None
+
+
+def check_command(arguments: Sequence[str]) -> int:
+    """Returns the exit code: 0 also for a creature that does not stand, as long as it is valid."""
+    options = tyro.cli(CheckOptions, args=list(arguments), prog="mjxgait check")
+    folder = Path(options.env)
+    creature = load_creature(folder if folder.is_dir() else find_creature(options.env))
+    resolve_config(creature.settings.train, creature.name)
+    from mjxgait.importing.portrait import facts, portrait
+
+    out = options.out or Path(f"{creature.name}-check.png")
+    if out.suffix.lower() != ".png":
+        raise UserError(f"{out}: the picture is a PNG; name it something.png")
+    print("\n".join(facts(creature)))
+    try:
+        portrait(creature).save(out)
+    except OSError as error:
+        raise UserError(f"{out}: cannot be written ({error.strerror})") from None
+    print(f"wrote {out}")
+    return 0

@@ -1,0 +1,145 @@
+"""How strong the joints are and how far they swing, and which of them steer and balance. `J` active joints."""
+
+import dataclasses
+
+import mujoco
+import numpy as np
+
+from mjxgait.importing.body import Puppet
+from mjxgait.importing.notes import Notes, listed
+from mjxgait.importing.soles import Stance
+
+GRAVITY = 9.81
+STIFFNESS, LEAST_STIFFNESS, MOST_STIFFNESS = 12.0, 2.5, 6.0
+"""kp in units of weight times hip height: the first shared among the feet, within the other two."""
+STRENGTH, LEAST_STRENGTH, MOST_STRENGTH = 2.0, 0.5, 1.0
+"""Torque limit, likewise."""
+DAMPING = 0.015
+"""kd in units of kp, s. Stable PD needs 0.0075 at a step of 5 ms."""
+LEAST_INERTIA = 2.0
+"""Of a joint, in units of time step times kd. Stable PD does not know what the floor holds, and so gives way by I / (I + h kd)."""
+RANGES = {"stride": 40.0, "lift": 40.0, "side": 15.0, "twist": 12.0, "ankle": 25.0, "spine": 15.0, "other": 20.0}
+"""deg to both sides of the standing angle, by what a joint does."""
+ROLES = ("stride", "side", "lift")
+
+
+@dataclasses.dataclass(eq=False)
+class Drive:
+    """role: of each joint. kp, kd, torque: [J]. ranges: [J, 2] deg. The dicts map joint names to weights (docs/controller.md)."""
+
+    role: list[str]
+    kp: np.ndarray
+    kd: np.ndarray
+    torque: np.ndarray
+    ranges: np.ndarray
+    bend: dict[str, float] = dataclasses.field(default_factory=dict)
+    stride: dict[str, float] = dataclasses.field(default_factory=dict)
+    pitch: dict[str, float] = dataclasses.field(default_factory=dict)
+    roll: dict[str, float] = dataclasses.field(default_factory=dict)
+
+
+def plan_drive(puppet: Puppet, q: np.ndarray, stance: Stance, planar: bool, notes: Notes) -> Drive:
+    """The drive of a body that faces +x in its standing pose [J]."""
+    feet = len(puppet.feet)
+    weight = puppet.mass * GRAVITY * stance.hip
+    kp = np.full(len(q), weight * float(np.clip(STIFFNESS / feet, LEAST_STIFFNESS, MOST_STIFFNESS)))
+    own = weight * float(np.clip(STRENGTH / feet, LEAST_STRENGTH, MOST_STRENGTH))
+    stated = np.array([joint.effort for joint in puppet.joints])
+    # The file's number is taken where it is one that a walk could need; 0 and 1000 N·m often only mean "not known".
+    torque = np.where(np.isfinite(stated) & (stated > 0.15 * own), np.minimum(stated, 3 * own), own)
+    roles, moves = _roles(puppet, q, stance)
+    drive = Drive(roles, kp, DAMPING * kp, torque, _ranges(puppet, q, roles))
+    _add_armature(puppet, drive, notes)
+    notes.guess(
+        "kp, kd", f"{kp[0]:.3g}, {drive.kd[0]:.3g}", "medium", f"weight {puppet.mass * GRAVITY:.3g} N times hip height {stance.hip:.3g} m"
+    )
+    used = np.isfinite(stated) & (torque == stated)
+    notes.guess("torque_limit", f"{torque.min():.3g} to {torque.max():.3g}", "high" if used.all() else "medium",
+                f"stated for {used.sum()} of {len(q)} joints; else from weight times hip height")  # fmt: skip
+    notes.guess("range", "by what each joint does", "low", "45 degrees and less, within the file's limits")
+    if not planar:
+        _steering(puppet, stance, drive, moves)
+    _balance(puppet, stance, drive, moves, planar)
+    return drive
+
+
+def _add_armature(puppet: Puppet, drive: Drive, notes: Notes) -> None:
+    """Gives light joints the rotor inertia that a motor of such strength has, so that stable PD can hold the weight with them."""
+    mujoco.mj_forward(puppet.model, puppet.data)
+    mass = np.zeros((puppet.model.nv, puppet.model.nv))
+    mujoco.mj_fullM(puppet.model, puppet.data, mass)
+    own = 1 / np.diag(np.linalg.inv(mass))[6:]
+    least = LEAST_INERTIA * puppet.model.opt.timestep * drive.kd
+    raised = []
+    for joint, has, wants in zip(puppet.joints, own, least, strict=True):
+        if has < wants:
+            joint.armature += float(wants - has)
+            raised.append(joint.name)
+    if raised:
+        notes.change(
+            f"armature of {listed(raised)} raised to {float(least.max()):.2g} kg m² or less",
+            "lighter joints cannot hold the weight with stable PD",
+        )
+
+
+def _roles(puppet: Puppet, q: np.ndarray, stance: Stance) -> tuple[list[str], np.ndarray]:
+    """What each joint does, and the mean way [J, 3] m/rad that it moves its feet."""
+    soles = puppet.sole_points(*puppet.pose(q))
+    middles = [sole[sole[:, 2] < sole[:, 2].min() + 0.03 * stance.hip].mean(0) for sole in soles]
+    moves = np.array([puppet.jacobian(f, middle) for f, middle in enumerate(middles)])
+    carried = np.abs(moves).sum(2) > 0
+    mean = moves.sum(0) / np.maximum(carried.sum(0), 1)[:, None]
+    axes = np.abs(puppet.data.xaxis[1:])
+    roles = []
+    for j in range(len(q)):
+        size = float(np.linalg.norm(mean[j]))
+        legs = [f for f in range(len(puppet.feet)) if j in puppet.leg(f)]
+        if not legs:
+            roles.append("other")
+        elif len(legs) > 1:
+            roles.append("spine")
+        elif size < 0.2 * stance.hip:
+            roles.append("ankle" if axes[j][1] > 0.7 else "twist")
+        else:
+            roles.append(ROLES[int((np.abs(mean[j]) * [1.3, 1.0, 1.0]).argmax())])  # a tie is a stride
+    return roles, mean
+
+
+def _ranges(puppet: Puppet, q: np.ndarray, roles: list[str]) -> np.ndarray:
+    """[J, 2] deg about the standing angle, within the limits."""
+    half = np.array([RANGES[role] for role in roles])
+    low = np.maximum(-half, np.degrees(np.where(np.isfinite(puppet.low), puppet.low, -1e3) - q))
+    high = np.minimum(half, np.degrees(np.where(np.isfinite(puppet.high), puppet.high, 1e3) - q))
+    return np.stack([np.minimum(low, 0.0), np.maximum(high, 0.0)], 1)
+
+
+def _steering(puppet: Puppet, stance: Stance, drive: Drive, moves: np.ndarray) -> None:
+    """Left legs stride longer than right ones; a yaw joint between fore and hind legs bends."""
+    for f in range(len(puppet.feet)):
+        side = float(puppet.data.xpos[puppet.feet[f][0] + 1][1])
+        own = [j for j in puppet.leg(f) if drive.role[j] == "stride"]
+        if own and abs(side) > 0.02 * stance.hip:
+            drive.stride[puppet.names[own[0]]] = 0.5 if side > 0 else -0.5
+    spine = [j for j, role in enumerate(drive.role) if role == "spine" and abs(puppet.data.xaxis[j + 1][2]) > 0.7]
+    behind = [j for j in spine if puppet.data.xanchor[j + 1][0] < puppet.data.xpos[1][0]]
+    if behind:
+        # The hind part swings to the left with positive yaw about -z, which curves the body to the right.
+        drive.bend[puppet.names[behind[0]]] = 0.5 * float(np.sign(puppet.data.xaxis[behind[0] + 1][2]))
+
+
+def _balance(puppet: Puppet, stance: Stance, drive: Drive, moves: np.ndarray, planar: bool) -> None:
+    """Nose down: front feet push down, hind feet give way, toes press; right side down: the feet go right, under the fall."""
+    middle = np.mean([puppet.data.xpos[g[0] + 1][0] for g in puppet.feet])
+    for f, group in enumerate(puppet.feet):
+        leg, ahead = puppet.leg(f), float(puppet.data.xpos[group[0] + 1][0] - middle)
+        sides = [j for j in leg if drive.role[j] == "side"]
+        if sides and not planar:
+            drive.roll[puppet.names[sides[0]]] = -float(np.sign(moves[sides[0]][1]))
+        ankles = [j for j in leg if drive.role[j] == "ankle"]
+        if len(puppet.feet) <= 2 and ankles:
+            drive.pitch[puppet.names[ankles[-1]]] = float(np.sign(puppet.data.xaxis[ankles[-1] + 1][1]))
+        elif abs(ahead) > 0.2 * stance.hip:
+            own = [j for j in leg if drive.role[j] in ("lift", "stride")]
+            if own:
+                j = max(own, key=lambda j: abs(float(moves[j][2])))
+                drive.pitch[puppet.names[j]] = -float(np.sign(moves[j][2]) * np.sign(ahead))

@@ -1,0 +1,74 @@
+"""Lets a creature stand in C MuJoCo with stable PD, and tells whether it does."""
+
+import dataclasses
+
+import mujoco
+import numpy as np
+
+SECONDS = 2.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Held:
+    """up: least product of the trunk's upright axis with the world's. height: least, in standing heights. moved: m. sag: rad.
+
+    speed: rad/s, root mean square of the joints at the end. touched: a part that touched the floor and may not, or "".
+    """
+
+    up: float
+    height: float
+    moved: float
+    sag: float
+    speed: float
+    touched: str
+
+    @property
+    def stands(self) -> bool:
+        """Whether it stayed up, on its feet, and came to rest."""
+        return self.up > 0.85 and self.height > 0.75 and not self.touched and self.speed < 1.0
+
+    @property
+    def score(self) -> float:
+        """For the better of several that do not stand, or do: larger is better."""
+        return 2 * self.stands + self.up + self.height - self.sag - 0.2 * min(self.speed, 5.0) - bool(self.touched)
+
+
+def hold(
+    model: mujoco.MjModel, qpos: np.ndarray, kp: np.ndarray, kd: np.ndarray, limit: np.ndarray, feet: set[str], seconds: float = SECONDS
+) -> Held:
+    """Stands for some seconds with targets at the joint angles of qpos [nq]. kp, kd, limit: [J]. feet: names of geoms that may touch."""
+    data = mujoco.MjData(model)
+    data.qpos[:] = qpos
+    mujoco.mj_forward(model, data)
+    up_axis, start = data.xmat[1].reshape(3, 3).T @ [0.0, 0.0, 1.0], data.xpos[1].copy()
+    step, target, mass = model.opt.timestep, qpos[7:].copy(), np.zeros((model.nv, model.nv))
+    up, height, touched = 1.0, 1.0, ""
+    for _ in range(round(seconds / step)):
+        mujoco.mj_step1(model, data)
+        mujoco.mj_fullM(model, data, mass)
+        spring = -kp * (data.qpos[7:] + step * data.qvel[6:] - target) - kd * data.qvel[6:]
+        force = data.qfrc_passive - data.qfrc_bias
+        force[6:] += spring
+        damped = mass.copy()
+        damped[range(6, model.nv), range(6, model.nv)] += step * kd
+        acceleration = np.linalg.solve(damped, force)
+        data.qfrc_applied[6:] = np.clip(spring - step * kd * acceleration[6:], -limit, limit)
+        mujoco.mj_step2(model, data)
+        if not np.isfinite(data.qpos).all() or np.abs(data.qvel).max() > 1e3:
+            return Held(-1.0, 0.0, 0.0, 9.0, 9.0, touched)
+        up = min(up, float((data.xmat[1].reshape(3, 3) @ up_axis)[2]))
+        height = min(height, float(data.xpos[1][2] / max(start[2], 1e-9)))
+        touched = touched or _touching(model, data, feet)
+        if up < 0.3:
+            break
+    error = data.qpos[7:] - target
+    moved = float(np.linalg.norm(data.xpos[1][:2] - start[:2]))
+    return Held(up, height, moved, float(np.sqrt((error**2).mean())), float(np.sqrt((data.qvel[6:] ** 2).mean())), touched)
+
+
+def _touching(model: mujoco.MjModel, data: mujoco.MjData, feet: set[str]) -> str:
+    for geom in {int(g) for contact in data.contact for g in contact.geom}:
+        name = model.geom(geom).name
+        if name != "floor" and name not in feet:
+            return str(model.body(int(model.geom_bodyid[geom])).name)
+    return ""

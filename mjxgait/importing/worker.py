@@ -1,0 +1,153 @@
+"""Compiles a cleaned model: in this process, or in one of its own that may use only so much time and memory."""
+
+import json
+import pickle
+import re
+import subprocess
+import sys
+import warnings
+import xml.etree.ElementTree as ET
+
+import mujoco
+import numpy as np
+
+from mjxgait.errors import UserError
+
+SECONDS = 60
+MEMORY = 6 * 2**30
+"""bytes of address space of the compiling process."""
+MOST_REPAIRS = 40
+OPTIONAL = ("actuator", "sensor", "keyframe", "tendon", "contact")
+"""Sections that may be left out when the model does not compile with them."""
+UNKNOWN_ATTRIBUTE = re.compile(r"unrecognized attribute: '([^']+)'.*?Element '([^']+)'", re.DOTALL)
+ASSET = re.compile(r"asset[0-9]+\.(?:stl|obj|msh)|(?<=')asset[0-9]+(?=')")
+
+
+def compile_apart(tree: ET.Element, assets: dict[str, bytes]) -> tuple[mujoco.MjModel, list[tuple[str, str]]]:
+    """`compile_here` in a process of its own, which cannot take this one down.
+
+    Raises:
+      UserError: it does not compile, or takes too long or too much memory.
+    """
+    order = pickle.dumps((ET.tostring(tree), assets))
+    try:
+        done = subprocess.run([sys.executable, "-m", __name__], input=order, capture_output=True, timeout=SECONDS, check=False)
+    except subprocess.TimeoutExpired:
+        raise UserError(
+            f"MuJoCo did not compile the model within {SECONDS} s; simplify its meshes or take out what is not its body"
+        ) from None
+    head, _, body = done.stdout.partition(b"\n")
+    if done.returncode or not head:
+        raise UserError("MuJoCo ended abnormally or ran out of memory while it compiled the model; simplify its meshes")
+    answer = json.loads(head)
+    if "error" in answer:
+        raise UserError(answer["error"])
+    return mujoco.MjModel.from_binary_path("model.mjb", {"model.mjb": body}), [(w, y) for w, y in answer["changes"]]
+
+
+def compile_here(tree: ET.Element, assets: dict[str, bytes]) -> tuple[mujoco.MjModel, list[tuple[str, str]]]:
+    """The compiled model, and what had to be left out for it to compile, with the reasons.
+
+    Raises:
+      UserError: with MuJoCo's own words.
+    """
+    changes: list[tuple[str, str]] = []
+    left_out = list(OPTIONAL)
+    for _ in range(MOST_REPAIRS):
+        try:
+            spec = mujoco.MjSpec.from_string(ET.tostring(tree, encoding="unicode"), assets=assets)
+            spec.compiler.fusestatic = False
+            spec.compiler.discardvisual = False
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # about the file's style
+                return spec.compile(), changes
+        except (ValueError, TypeError, RuntimeError, mujoco.FatalError) as error:
+            message = " ".join(str(error).split())
+        if not _repair(tree, message, changes, left_out):
+            raise UserError(f"MuJoCo cannot read the model: {message[:400]}")
+    raise UserError(f"MuJoCo cannot read the model after {MOST_REPAIRS} repairs: {message[:400]}")
+
+
+def _repair(tree: ET.Element, message: str, changes: list[tuple[str, str]], left_out: list[str]) -> bool:
+    """Changes the tree so that this message may not come again; False when nothing is left to try."""
+    if found := UNKNOWN_ATTRIBUTE.search(message):
+        name, tag = found.groups()
+        hit = [e for e in tree.iter(tag) if name in e.attrib]
+        for element in hit:
+            del element.attrib[name]
+        changes.append((f'attribute "{name}" of <{tag}> dropped', "this version of MuJoCo does not know it"))
+        return bool(hit)
+    if any(word in message for word in ("inertia must satisfy", "mass and inertia of moving bodies", "inertia must be positive")):
+        compiler = _compiler(tree)
+        if compiler.get("boundmass"):
+            return False
+        compiler.attrib.update(balanceinertia="true", boundmass="1e-4", boundinertia="1e-6")
+        changes.append(("masses and inertias raised to 1e-4 kg and 1e-6 kg m² and balanced where they were less", message[:160]))
+        return True
+    if (found := ASSET.search(message)) and _drop_mesh(tree, found.group()):
+        changes.append((f"a mesh and its shapes dropped ({found.group()})", message[:160]))
+        return True
+    if "mesh" in message and ("volume" in message or "orientation" in message or "inertia" in message):
+        meshes = [m for m in tree.iter("mesh") if m.get("inertia") != "convex"]
+        if meshes and tree.tag != "robot":
+            for mesh in meshes:
+                mesh.set("inertia", "convex")
+            changes.append(("mesh inertias taken from the convex hulls", message[:160]))
+            return True
+    while left_out:
+        section = left_out.pop(0)
+        parts = tree.findall(section)
+        for part in parts:
+            tree.remove(part)
+        if parts:
+            changes.append((f"<{section}> dropped", f"the model does not compile with it: {message[:160]}"))
+            return True
+    return False
+
+
+def _drop_mesh(tree: ET.Element, key: str) -> bool:
+    """Takes out the meshes of an asset and the shapes that use them; False when there are none."""
+    stem = key.split(".")[0]
+    gone = {m.get("name") for m in tree.iter("mesh") if m.get("file", "").split(".")[0] == stem}
+    hit = False
+    for parent in list(tree.iter()):
+        for child in list(parent):
+            mesh = child.find("geometry/mesh")
+            of_urdf = mesh is not None and mesh.get("filename", "").split(".")[0] == stem
+            of_mjcf = (child.tag == "mesh" and child.get("name") in gone) or (child.tag == "geom" and child.get("mesh") in gone)
+            if of_urdf or of_mjcf:
+                parent.remove(child)
+                hit = True
+    return hit
+
+
+def _compiler(tree: ET.Element) -> ET.Element:
+    home = tree
+    if tree.tag == "robot":
+        home = tree.find("mujoco")  # type: ignore[assignment]
+    found = home.findall("compiler")
+    return found[-1] if found else ET.SubElement(home, "compiler")
+
+
+def _serve() -> None:
+    """Reads an order from standard input and answers on standard output."""
+    try:
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+        resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
+    except (ImportError, ValueError, OSError):  # not on every system
+        pass
+    text, assets = pickle.loads(sys.stdin.buffer.read())  # written by compile_apart
+    try:
+        model, changes = compile_here(ET.fromstring(text), assets)
+    except (UserError, MemoryError) as error:
+        sys.stdout.buffer.write(json.dumps({"error": str(error) or "out of memory while compiling the model"}).encode() + b"\n")
+        return
+    buffer = np.empty(mujoco.mj_sizeModel(model), np.uint8)
+    mujoco.mj_saveModel(model, None, buffer)
+    sys.stdout.buffer.write(json.dumps({"changes": changes}).encode() + b"\n" + buffer.tobytes())
+
+
+if __name__ == "__main__":
+    _serve()

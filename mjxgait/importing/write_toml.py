@@ -1,0 +1,84 @@
+"""Writes creature.toml: the guesses, each with its confidence beside it."""
+
+import json
+
+import numpy as np
+
+from mjxgait.importing.drive import Drive
+from mjxgait.importing.notes import Notes
+
+KEYS = {"forward": "forward", "feet": "feet", "trunk": "trunk"}
+
+
+def creature_toml(
+    name: str,
+    origin: str,
+    trunk: str,
+    forward: np.ndarray,
+    feet: list[str],
+    joints: list[str],
+    drive: Drive,
+    mirror: tuple[bool, dict[str, tuple[str, int]]],
+    notes: Notes,
+) -> str:
+    """The text of creature.toml.
+
+    Args:
+      origin: the model file's name. forward: [3] in the trunk's frame. feet: names of geoms.
+      mirror: whether it is symmetric, and stated pairs: joint to partner and sign.
+    """
+    symmetric, pairs = mirror
+    remark = {guess.what: f"  # {guess.confidence}: {guess.reason}" for guess in notes.guesses}
+    kp, kd, torque, ranges = (np.round(v, 4) for v in (drive.kp, drive.kd, drive.torque, drive.ranges))
+    lines = [
+        f"# Made by `mjxgait import` from {origin}. The words after each guess say how sure it is; change what is wrong.",
+        f"# `mjxgait check` draws it. Mass, inertias, joint axes and positions in creature.xml are those of {origin}.",
+        "[creature]",
+        f"name = {_quoted(name)}",
+        f"description = {_quoted(f'imported from {origin}: {len(joints)} joints')}",
+        f"trunk = {_quoted(trunk)}{remark.get('trunk', '')}",
+        f"forward = {[round(float(v), 6) + 0.0 for v in forward]}{remark.get('forward', '')}",
+        f"feet = [{', '.join(_quoted(foot) for foot in feet)}]{remark.get('feet', '')}",
+        'keyframe = "stand"',
+        "",
+        "[joints]",
+        f"kp = {_usual(kp)}{remark.get('kp, kd', '')}",
+        f"kd = {_usual(kd)}",
+        f"torque_limit = {_usual(torque)}{remark.get('torque_limit', '')}",
+        "range = [-40, 40]",
+        "",
+    ]
+    for j, joint in enumerate(joints):
+        low, high = (round(float(v), 1) for v in ranges[j])
+        lines += ["[[joint]]", f"match = {_quoted(joint)}", f"range = [{low}, {high}]  # low: what it does: {drive.role[j]}"]
+        if torque[j] != _usual(torque):
+            lines.append(f"torque_limit = {float(torque[j])}")
+        if kp[j] != _usual(kp):
+            lines += [f"kp = {float(kp[j])}", f"kd = {float(kd[j])}"]
+        lines.append("")
+    lines += ["[mirror]", f"symmetric = {json.dumps(symmetric)}{remark.get('mirror', '')}"]
+    rows = [f"    {{ joint = {_quoted(a)}, partner = {_quoted(b)}, sign = {sign} }}," for a, (b, sign) in pairs.items()]
+    lines += ["pairs = [", *rows, "]", ""] if rows else ["pairs = []", ""]
+    lines += [
+        "[steering]  # low: from which way each joint moves its foot",
+        f"bend = {_table(drive.bend)}",
+        f"stride = {_table(drive.stride)}",
+        "",
+    ]
+    lines += ["[balance]  # low: likewise", f"pitch = {_table(drive.pitch)}", f"roll = {_table(drive.roll)}", ""]
+    lines += ["[termination]", "min_up = 0.5", "height = [0.5, 1.5]", "touch = true", "", "[train]", ""]
+    return "\n".join(lines)
+
+
+def _usual(values: np.ndarray) -> float:
+    """The commonest value."""
+    found, counts = np.unique(values, return_counts=True)
+    return float(found[counts.argmax()])
+
+
+def _quoted(text: str) -> str:
+    return json.dumps(text)
+
+
+def _table(weights: dict[str, float]) -> str:
+    return "{ " + ", ".join(f"{_quoted(k)} = {v}" for k, v in weights.items()) + " }" if weights else "{}"

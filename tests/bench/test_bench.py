@@ -1,0 +1,143 @@
+"""The contestants do the same work, and the report says so in the agreed words."""
+
+import dataclasses
+import importlib.util
+import json
+import subprocess
+import sys
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+import pytest
+
+from mjxgait.bench import contest
+from mjxgait.bench.flops import count_flops
+from mjxgait.bench.mujoco_peer import DampedSolve, Law, MujocoPeer
+from mjxgait.bench.scaling import draw
+from mjxgait.bench.workload import Lap, Workload
+from mjxgait.certify.controller import Controller, Senses
+from mjxgait.champion import Champion
+from mjxgait.config import Config, ControllerConfig, find_creature
+from mjxgait.creature import load_creature
+
+NEEDS_DART = pytest.mark.skipif(importlib.util.find_spec("dartpy") is None, reason="dartpy is not installed")
+TUNING = {"threshold": 0.12, "period": 0.8, "steer": 0.7, "pitch": 0.3, "pitch_rate": 0.05, "roll": 0.4, "roll_rate": 0.02}
+
+
+@pytest.fixture(scope="module")
+def creature():
+    return load_creature(find_creature("tall_quadruped"))
+
+
+@pytest.fixture
+def workload(creature):
+    rng = np.random.default_rng(0)
+    genomes, starts, nv = 3, 2, creature.model.nv
+    poses = creature.stand + 0.1 * rng.normal(size=(genomes, 2, len(creature.stand)))
+    qpos = np.tile(creature.stand_qpos, (starts, 1))
+    qpos[1, creature.qpos_adr] += 0.02
+    return Workload(
+        folder=find_creature("tall_quadruped"),
+        config=Config(controller=ControllerConfig(constraint_forces=False)),
+        key_poses=poses,
+        tuning={name: np.full(genomes, value) for name, value in TUNING.items()},
+        qpos=qpos,
+        qvel=np.zeros((starts, nv)),
+        friction=np.ones(starts),
+        push=np.zeros((starts, nv)),
+        push_step=np.array([-1, 10]),
+        steps=40,
+    )
+
+
+def test_the_law_is_the_examiners(creature, workload):
+    rng, count = np.random.default_rng(1), 5
+    champion = Champion("", "", workload.key_poses[1], TUNING, workload.config.controller, 0.0, {}, {})
+    turn = np.linalg.qr(rng.normal(size=(count, 3, 3)))[0]
+    rot = turn * np.sign(np.linalg.det(turn))[:, None, None]
+    v, pos = rng.normal(size=(count, creature.model.nv)), rng.normal(size=(count, 3))
+    spin = (rot @ v[:, 3:6, None])[..., 0]
+    senses = Senses(creature.stand + v[:, 6:] * 0.1, v, pos, rot, spin, *([np.zeros(0)] * 3))
+    position, genome = np.arange(count) * 7, np.full(count, 1)
+    law, examiner = Law(creature, workload), Controller(creature, champion)
+    target = law.target(genome, position, pos, rot, v)
+    np.testing.assert_allclose(target, examiner.target(position, senses), atol=1e-12)
+    expected = examiner.advance(position, target, senses.joint_pos, 0.0)
+    np.testing.assert_array_equal(law.advance(genome, position, target, senses.joint_pos, position), expected)
+
+
+def test_the_solve_is_a_solve(creature):
+    model = creature.evolution_model
+    data = mujoco.MjData(model)
+    data.qpos[:] = creature.stand_qpos
+    mujoco.mj_forward(model, data)
+    dense = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, dense)
+    dense[creature.dof_adr, creature.dof_adr] += model.opt.timestep * creature.kd
+    force = np.arange(model.nv, dtype=float)
+    found = DampedSolve(model, creature).solve(data.M[None], force[None])[0]
+    np.testing.assert_allclose(found, np.linalg.solve(dense, force), rtol=1e-8)
+
+
+def test_lanes_change_nothing(workload):
+    few, many = MujocoPeer(workload, 0, 1, lanes=2).lap(), MujocoPeer(workload, 0, 1, lanes=6).lap()
+    assert few[0] == many[0] == workload.episodes * workload.steps
+    assert few[1] == pytest.approx(many[1])
+
+
+def test_the_fallen_make_room(workload):
+    low = dataclasses.replace(workload, qpos=workload.qpos * np.where(np.arange(workload.qpos.shape[1]) == 2, 0.3, 1.0))
+    assert MujocoPeer(low, 0, 1, lanes=2).lap() == (0, 0.0)
+
+
+@NEEDS_DART
+def test_dart_walks_the_same_way_for_a_while(workload):
+    from mjxgait.bench.dart_peer import DartPeer
+
+    steps, forward = DartPeer(workload, 0, 1).lap()
+    peer_steps, peer_forward = MujocoPeer(workload, 0, 1).lap()
+    assert steps == peer_steps
+    assert forward / 6 == pytest.approx(peer_forward / 6, abs=0.03)
+
+
+def test_ratios_are_medians_of_rounds():
+    laps = {"ours": [Lap(1.0, n, 0.0) for n in (10, 20, 60)], "mujoco_c": [Lap(1.0, 10, 0.0)] * 3}
+    found = contest._ratios(laps)
+    assert found["ratio_over_mujoco_c"] == 2.0
+    assert found["ratio_over_dart"] is None
+    assert found["ratio_spread"]["mujoco_c"]["highest"] == 6.0
+
+
+def test_flops_of_loops_and_products():
+    x = jnp.ones((4, 3))
+    assert count_flops(lambda a: a @ a.T + 1.0, x) == 2 * 16 * 3 + 16
+    assert count_flops(lambda a: jax.lax.fori_loop(0, 5, lambda _, b: b * 2.0, a), x) == 60
+
+
+def test_the_curves_are_drawn(tmp_path):
+    point = {"population": 32, "lanes": 64, "useful_steps_per_second": 1.0, "computed_steps_per_second": 2.0, "memory_mib": 3.0}
+    draw({"population": [point], "lanes": [point]}, tmp_path / "curves.png")
+    assert (tmp_path / "curves.png").stat().st_size > 1000
+
+
+def test_history_has_a_line_per_run(tmp_path):
+    result = dict.fromkeys(("date", "ratio_over_mujoco_c", "ratio_over_dart", "creature_steps_per_second", "processor_us_per_step"), 1)
+    result |= dict.fromkeys(("compile_s", "useful_share", "machine", "versions", "laps"), 2)
+    for _ in range(2):
+        contest.append_history(result, tmp_path / "new" / "history.jsonl")
+    lines = [json.loads(line) for line in (tmp_path / "new" / "history.jsonl").read_text(encoding="utf-8").splitlines()]
+    assert len(lines) == 2
+    assert "laps" not in lines[0]
+
+
+@pytest.mark.slow
+def test_the_command_writes_the_ratios(tmp_path):
+    file = tmp_path / "bench.json"
+    arguments = ["bench", "--json", str(file), "--rounds", "1", "--generations", "1", "--population", "8"]
+    subprocess.run([sys.executable, "-m", "mjxgait", *arguments], check=True, capture_output=True)
+    found = json.loads(file.read_text(encoding="utf-8"))
+    assert found["ratio_over_mujoco_c"] > 0
+    assert found["laps"]["ours"][0]["steps"] == pytest.approx(found["laps"]["mujoco_c"][0]["steps"], rel=0.1)
+    assert (found["ratio_over_dart"] is None) == ("dart" in found["left_out"])

