@@ -4,8 +4,8 @@
 
 A run that is there already is not repeated. Columns: whether the champion is certified and the margin of its worst criterion; which
 criteria fail; speed over the certificate's 20 s; body lengths per second from the nominal start over evolution's own episode, in the
-simulation that evolved it and in C MuJoCo; share of 64 perturbed starts, which evolution never saw, that are up and forward after an episode
-and after 22 s; generations; wall time of the whole command, start-up, compilation and examination included.
+simulation that evolved it and in C MuJoCo; share of 64 perturbed starts, which evolution never saw, that are up and forward after an
+episode and after 22 s; generations; wall time of the whole command, start-up, compilation and examination included.
 """
 
 import argparse
