@@ -12,7 +12,7 @@ from helpers import small_config
 from mjxgait.config import Config
 from mjxgait.creature import Creature
 from mjxgait.experiment import Experiment, build_experiment
-from mjxgait.fitness import REWARDS, TERMS, fitness_terms, score, stride_limit, weight_vector
+from mjxgait.fitness import BEYOND, REWARDS, TERMS, fitness_terms, forward_distance, score, stride_limit, weight_vector
 from mjxgait.gait import Genome
 from mjxgait.rollout import Episodes
 from mjxgait.starts import NEVER, Starts, draw_starts
@@ -109,7 +109,8 @@ def test_death_freezes_the_tally(experiment: Experiment, stool: Creature):
     """A longer episode adds nothing to an individual that has died."""
     long = build_experiment(stool, small_config(rollout={"lanes": 3, "seconds": 0.8}))
     population = genomes(long, 7)
-    starts = dataclasses.replace(experiment.starts, qvel=experiment.starts.qvel.at[:, 3].set(10.0))
+    leaning = start_at(experiment, height=0.1, roll=0.9)
+    starts = dataclasses.replace(leaning, qvel=leaning.qvel.at[:, 3].set(6.0))
     first, second = simulate(experiment, population, starts).tally, simulate(long, population, starts).tally
     died = np.asarray(first.reason != Reason.FINISHED)
     assert died.any()
@@ -126,7 +127,7 @@ def test_the_first_start_is_nominal_and_the_others_are_not(stool: Creature):
     assert int(starts.push_step[0]) == NEVER
     noise = np.asarray(starts.qpos[1:, stool.qpos_adr] - stool.stand)
     assert 0.02 < np.abs(noise).max() <= 0.05
-    assert np.allclose(np.linalg.norm(starts.push[1:, :2], axis=1), 0.1 * np.sqrt(9.81 * stool.hip_height))
+    assert np.allclose(np.linalg.norm(starts.push[1:, :2], axis=1), config.rollout.push * np.sqrt(9.81 * stool.hip_height))
     assert ((starts.push_step[1:] >= 100) & (starts.push_step[1:] < 300)).all()
     assert len(set(np.asarray(starts.friction[1:]).tolist())) == 4
 
@@ -143,10 +144,27 @@ def standing_terms(experiment: Experiment) -> dict[str, float]:
 def test_terms_of_one_that_stands_still(experiment: Experiment):
     terms = standing_terms(experiment)
     assert terms["alive"] == 1.0
-    assert terms["clearance"] == pytest.approx(1.0)
-    assert terms["duty"] == pytest.approx(1.0, abs=0.1)
-    for name in ("distance", "drift", "fade", "slip", "airborne", "foot_height", "tilt", "touch", "saturation", "limits"):
+    for name in set(TERMS) - {"alive"}:
         assert terms[name] == pytest.approx(0.0, abs=0.02), name
+
+
+def test_style_counts_in_proportion_to_the_walk(experiment: Experiment):
+    """A foot that never leaves the floor costs nothing while there is no walk, and the whole of its weight at the wanted speed."""
+    creature, config, horizon = experiment.creature, experiment.config.fitness, experiment.simulator.steps
+    enough = config.speed * horizon * 0.005 * creature.body_length
+    for share in (0.0, 0.5, 1.0):
+        tally = dataclasses.replace(experiment.simulator.judge.init(), steps=jnp.int32(horizon), forward=jnp.float32(share * enough))
+        terms = fitness_terms(creature, config, 0.005, horizon, tally)
+        assert float(terms[TERMS.index("clearance")]) == pytest.approx(share, abs=1e-5)
+
+
+def test_beyond_the_wanted_speed_distance_counts_little(experiment: Experiment):
+    creature, config, horizon = experiment.creature, experiment.config.fitness, experiment.simulator.steps
+    lengths = config.speed * horizon * 0.005
+    tally = dataclasses.replace(experiment.simulator.judge.init(), forward=jnp.float32(3 * lengths * creature.body_length))
+    term = float(fitness_terms(creature, config, 0.005, horizon, tally)[TERMS.index("distance")])
+    assert term == pytest.approx(lengths * (1 + 2 * BEYOND), rel=1e-5)
+    assert forward_distance(creature, config, horizon * 0.005, term) == pytest.approx(3 * lengths * creature.body_length, rel=1e-4)
 
 
 def test_score_mixes_the_worst_start_and_the_mean():
