@@ -10,6 +10,7 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
+from mjxgait.creature.geometry import ancestors
 from mjxgait.errors import UserError
 from mjxgait.importing.notes import Notes, listed
 from mjxgait.importing.parts import FREE, HINGE, SLIDE, Shape, read_shapes
@@ -66,7 +67,7 @@ def find_anatomy(
     """
     _check_size(model)
     root = _root(model)
-    bodies = [b for b in range(1, model.nbody) if root in _chain(model, b)]
+    bodies = [b for b in range(1, model.nbody) if root in ancestors(model, b)]
     scale = _scale(model, bodies, notes)
     qpos = reference_pose(model)
     axis = _up_axis(model, bodies, root, qpos, up, notes)
@@ -103,20 +104,12 @@ def _check_size(model: mujoco.MjModel) -> None:
         raise UserError("the model has numbers that are infinite, not a number or absurdly large; correct them in the file")
 
 
-def _chain(model: mujoco.MjModel, body: int) -> list[int]:
-    chain = []
-    while body:
-        chain.append(body)
-        body = int(model.body_parentid[body])
-    return chain
-
-
 def _root(model: mujoco.MjModel) -> int:
     """The body whose subtree has the most joints, then the most mass; a chain of bodies that only carry root slides is passed over."""
     tops = [b for b in range(1, model.nbody) if model.body_parentid[b] == 0]
 
     def weight(top: int) -> tuple[int, float]:
-        inside = [b for b in range(1, model.nbody) if top in _chain(model, b)]
+        inside = [b for b in range(1, model.nbody) if top in ancestors(model, b)]
         return sum(int(model.body_jntnum[b]) for b in inside), float(model.body_subtreemass[top])
 
     if not tops:
@@ -184,7 +177,7 @@ def _up_axis(model: mujoco.MjModel, bodies: list[int], root: int, qpos: np.ndarr
     data.qpos[:] = qpos
     mujoco.mj_kinematics(model, data)
     leaves = [b for b in bodies if not (model.body_parentid == b).any()]
-    hips = [next((b for b in reversed(_chain(model, leaf)) if b != root and root in _chain(model, b)), leaf) for leaf in leaves]
+    hips = [next((b for b in reversed(ancestors(model, leaf)) if b != root and root in ancestors(model, b)), leaf) for leaf in leaves]
     below = (data.xpos[hips] - data.xpos[leaves]).mean(0) if leaves else np.zeros(3)
     if below[1] > 1.3 * abs(below[2]) and below[1] > abs(below[0]):
         notes.change("turned so that z is up", "the limbs end below the trunk along y, not along z")
@@ -250,7 +243,7 @@ def _followers(model: mujoco.MjModel) -> set[int]:
 
 def _segment(model: mujoco.MjModel, body: int, movers: set[int]) -> int:
     """The nearest body up the tree, itself included, that has an active joint; the root where there is none."""
-    for b in _chain(model, body):
+    for b in ancestors(model, body):
         if b in movers:
             return b
     return -1
@@ -266,7 +259,7 @@ def _legs(model: mujoco.MjModel, anatomy: Anatomy, movable: list[int]) -> list[i
     segments: dict[int, list[int]] = {}
     for b in anatomy.bodies:
         segments.setdefault(_segment(model, b, movers), []).append(b)
-    ends = [b for b in movers if not any(c != b and b in _chain(model, c) for c in movers)]
+    ends = [b for b in movers if not any(c != b and b in ancestors(model, c) for c in movers)]
     floor = min(anatomy.low(model, inside) for inside in segments.values())
     top = max(float(anatomy.xpos[b][2]) for b in anatomy.bodies)
     span = float(np.ptp(anatomy.xpos[anatomy.bodies], axis=0).max())
@@ -286,7 +279,7 @@ def _legs(model: mujoco.MjModel, anatomy: Anatomy, movable: list[int]) -> list[i
 
 
 def _below(model: mujoco.MjModel, anatomy: Anatomy, body: int) -> list[int]:
-    return [b for b in anatomy.bodies if body in _chain(model, b)]
+    return [b for b in anatomy.bodies if body in ancestors(model, b)]
 
 
 def lowered_limbs(model: mujoco.MjModel, anatomy: Anatomy, movable: list[int]) -> np.ndarray:
@@ -295,8 +288,8 @@ def lowered_limbs(model: mujoco.MjModel, anatomy: Anatomy, movable: list[int]) -
     data.qpos[:] = anatomy.qpos
     up = anatomy.xrot[anatomy.root] @ _world_rotation(model, anatomy.qpos, anatomy.root).T
     movers = {int(model.jnt_bodyid[j]) for j in movable}
-    for end in (b for b in movers if not any(c != b and b in _chain(model, c) for c in movers)):
-        joints = [j for j in movable if int(model.jnt_bodyid[j]) in _chain(model, end) and int(model.jnt_type[j]) == HINGE]
+    for end in (b for b in movers if not any(c != b and b in ancestors(model, c) for c in movers)):
+        joints = [j for j in movable if int(model.jnt_bodyid[j]) in ancestors(model, end) and int(model.jnt_type[j]) == HINGE]
         adr = model.jnt_qposadr[joints]
         limits = np.array([model.jnt_range[j] if model.jnt_range[j][0] < model.jnt_range[j][1] else (-1.6, 1.6) for j in joints])
         low, high = np.maximum(limits[:, 0], data.qpos[adr] - 2.0), np.minimum(limits[:, 1], data.qpos[adr] + 2.0)
@@ -326,7 +319,7 @@ def _without_toes(model: mujoco.MjModel, anatomy: Anatomy, ends: list[int], move
     result: list[int] = []
     for end in ends:
         parent = _segment(model, int(model.body_parentid[end]), movers)
-        brothers = [e for e in ends if parent > 0 and parent in _chain(model, e)]
+        brothers = [e for e in ends if parent > 0 and parent in ancestors(model, e)]
         near = len(brothers) > 1 and np.ptp(anatomy.xpos[brothers], axis=0).max() < 0.1 * span
         chosen = parent if near else end
         if chosen not in result:
@@ -351,7 +344,7 @@ def _is_wheel(model: mujoco.MjModel, anatomy: Anatomy, body: int) -> bool:
 
 def _choose_joints(model: mujoco.MjModel, anatomy: Anatomy, movable: list[int], keep: Sequence[str], notes: Notes) -> None:
     """Active are the joints between the trunk and a foot, and those that the user keeps."""
-    on_legs = {b for foot in anatomy.feet for b in _chain(model, foot)}
+    on_legs = {b for foot in anatomy.feet for b in ancestors(model, foot)}
     frozen = []
     for j in movable:
         wanted = any(fnmatch.fnmatchcase(model.joint(j).name, pattern) for pattern in keep)
@@ -367,7 +360,7 @@ def _choose_joints(model: mujoco.MjModel, anatomy: Anatomy, movable: list[int], 
 
 def _check_loops(model: mujoco.MjModel, anatomy: Anatomy) -> None:
     """Refuses a loop that a moving joint is part of."""
-    moved = {b for b in anatomy.bodies if any(int(model.jnt_bodyid[j]) in _chain(model, b) for j in anatomy.active)}
+    moved = {b for b in anatomy.bodies if any(int(model.jnt_bodyid[j]) in ancestors(model, b) for j in anatomy.active)}
     for e in range(model.neq):
         if int(model.eq_type[e]) not in (int(mujoco.mjtEq.mjEQ_CONNECT), int(mujoco.mjtEq.mjEQ_WELD)):
             continue
