@@ -43,7 +43,7 @@ def write_champion(champion: Champion, creature: Creature, path: Path) -> None:
         "creature_digest": champion.digest,
         "key_poses": [dict(zip(creature.joint_names, map(float, pose), strict=True)) for pose in champion.key_poses],
         "tuning": {name: float(value) for name, value in champion.tuning.items()},
-        "controller": dataclasses.asdict(champion.controller) | {"mirrored": creature.symmetric},
+        "controller": dataclasses.asdict(champion.controller) | {"mirrored": creature.symmetric and champion.controller.mirror},
         "gains": {name: {"kp": float(kp), "kd": float(kd), "torque_limit": float(limit)} for name, kp, kd, limit in gains},
         "fitness": champion.fitness,
         "terms": dict(champion.terms),

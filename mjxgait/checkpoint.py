@@ -49,9 +49,11 @@ class Checkpoints:
         return sorted(self._manager.all_steps())
 
     def save(self, state: EvolutionState, creature: str, digest: str) -> None:
-        """Starts to write the state; an earlier write that failed is reported now."""
+        """Starts to write the state, of one run or of several side by side; an earlier write that failed is reported now."""
         arrays = _by_name(state)
-        manifest = Manifest(SCHEMA, creature, digest, int(state.generation), array_hash(arrays), str(jax.random.key_impl(state.key)))
+        manifest = Manifest(
+            SCHEMA, creature, digest, int(np.max(state.generation)), array_hash(arrays), str(jax.random.key_impl(state.key))
+        )
         args = ocp.args.Composite(state=ocp.args.StandardSave(arrays), manifest=ocp.args.JsonSave(dataclasses.asdict(manifest)))
         with disk_errors(self._folder):
             self._manager.save(manifest.generation, args=args, force=True)

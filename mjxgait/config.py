@@ -11,7 +11,20 @@ import pydantic
 from mjxgait.errors import UserError, did_you_mean
 from mjxgait.tables import STRICT, Count, Finite, Fraction, NonNegative, Positive, Whole, build, merge, read_toml
 
-Interval = tuple[Finite, Finite]
+SHAPE = "shape"
+"""Marks what decides the shape of the compiled program; every other number or choice is a value that the program is handed."""
+
+HOST = "host"
+"""Marks what only the host reads, never the compiled program."""
+
+
+def _ordered(interval: tuple[float, float]) -> tuple[float, float]:
+    if interval[0] > interval[1]:
+        raise ValueError(f"[{interval[0]}, {interval[1]}]: the first must not be the larger")
+    return interval
+
+
+Interval = Annotated[tuple[Finite, Finite], pydantic.AfterValidator(_ordered)]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -27,11 +40,6 @@ class TuningRanges:
     roll: Interval = (0.0, 0.0)
     roll_rate: Interval = (0.0, 0.0)
 
-    def __post_init__(self) -> None:
-        for name, (low, high) in dataclasses.asdict(self).items():
-            if low > high:
-                raise ValueError(f"{name} = [{low}, {high}]: the first must not be the larger")
-
 
 @dataclasses.dataclass(frozen=True)
 class ControllerConfig:
@@ -39,18 +47,23 @@ class ControllerConfig:
 
     Attributes:
       key_poses: K, poses of half a cycle (of the whole one for an unsymmetric creature).
+      mirror: whether the other half of a symmetric creature's cycle is the mirror image; else the K poses are the whole cycle.
       interpolation: n, steps between neighbouring poses.
       advance: the target moves on when the pose error is below the threshold, or by the clock.
       law: stable PD, or plain PD for comparison.
       constraint_forces: whether stable PD counts the constraint forces of the previous step, as in DART's tutorial.
+      stiffness, damping: factors on the creature's kp and kd.
     """
 
     __pydantic_config__ = STRICT
-    key_poses: Annotated[int, pydantic.Field(ge=2)] = 2
+    key_poses: Annotated[int, pydantic.Field(ge=2), SHAPE] = 2
+    mirror: bool = True
     interpolation: Count = 10
     advance: Literal["error", "clock"] = "error"
     law: Literal["spd", "pd"] = "spd"
     constraint_forces: bool = False
+    stiffness: Positive = 1.0
+    damping: Positive = 1.0
     tuning: TuningRanges = dataclasses.field(default_factory=TuningRanges)
 
 
@@ -64,21 +77,23 @@ class RolloutConfig:
       joint_noise, velocity_noise: rad, rad/s; half widths of the uniform perturbation of the start.
       friction: range of the factor on the floor's friction.
       push: sudden change of the trunk's horizontal velocity at a random moment of a perturbed start, in units of sqrt(g * hip height).
+      terminate: whether an episode ends when the creature falls (creature.toml, [termination]).
       worst: share of the worst start in the score; the mean of the starts has the rest.
       physics: the fast step where the model allows it, or plain MJX.
       lanes: simulations in flight per device; 0 lets the program choose.
     """
 
     __pydantic_config__ = STRICT
-    seconds: Positive = 8.0
-    starts: Count = 8
+    seconds: Annotated[Positive, SHAPE] = 8.0
+    starts: Annotated[Count, SHAPE] = 8
     joint_noise: NonNegative = 0.05
     velocity_noise: NonNegative = 0.1
     friction: tuple[Positive, Positive] = (0.8, 1.2)
     push: NonNegative = 0.15
+    terminate: bool = True
     worst: Fraction = 0.5
-    physics: Literal["auto", "mjx"] = "auto"
-    lanes: Whole = 0
+    physics: Annotated[Literal["auto", "mjx"], SHAPE] = "auto"
+    lanes: Annotated[Whole, SHAPE] = 0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -139,14 +154,14 @@ class ForcedConfig:
 
     __pydantic_config__ = STRICT
     enabled: bool = True
-    window: Count = 8
+    window: Annotated[Count, SHAPE] = 8
     gain: NonNegative = 0.01
     newcomers: Fraction = 0.5
-    mutations: Count = 3
+    mutations: Annotated[Count, SHAPE] = 3
     accept: Fraction = 0.25
     refresh: Fraction = 0.5
     limit: Count = 4
-    patience: Whole = 3
+    patience: Annotated[Whole, HOST] = 3
 
 
 @dataclasses.dataclass(frozen=True)
@@ -156,25 +171,28 @@ class EvolutionConfig:
     Attributes:
       population: P. generations: cap on the generations of a run. target: fitness at which a run stops.
       growth: the population grows to this multiple of P, then is culled back to P.
+      pose_range: share of each joint's pose range, about its middle, in which key poses lie.
       initial: uniform draws or a Latin hypercube, over the middle `initial_spread` of each gene's range. selection: how parents are drawn.
       crossover: share of offspring with two parents, the others have one. crossing: `permute` draws K poses from the parents' 2K in any
         order; `align` leaves each pose in its place.
       mutation: `redraw` re-draws two joints of one pose, `single` one joint, `pose` a whole pose, `gaussian` moves every joint of one pose
-        by sigma, in units of its range, `mixed` is one or the other of the first and the last. mutation_rate: share of offspring mutated.
+        by sigma, in units of its range, `mixed` is one or the other of the first and the last. `bit` and `byte` read the value of one joint
+        as 8 bits over its range and flip one of them, or re-draw all eight, as classic GAs do. mutation_rate: share of offspring mutated.
       tuning_rate, tuning_sigma: chance that a tuning gene of a mutated offspring changes, and by how much, in units of its range.
     """
 
     __pydantic_config__ = STRICT
-    population: Count = 64
-    generations: Whole = 60
-    target: Finite | None = None
-    growth: Positive = 2.0
+    population: Annotated[Count, SHAPE] = 64
+    generations: Annotated[Whole, HOST] = 60
+    target: Annotated[Finite | None, HOST] = None
+    growth: Annotated[Positive, SHAPE] = 2.0
+    pose_range: Annotated[float, pydantic.Field(gt=0, le=1)] = 1.0
     initial: Literal["uniform", "latin"] = "uniform"
     initial_spread: Fraction = 0.6
     selection: Literal["uniform", "rank", "tournament"] = "rank"
     crossover: Fraction = 0.7
     crossing: Literal["permute", "align"] = "align"
-    mutation: Literal["redraw", "single", "pose", "gaussian", "mixed"] = "mixed"
+    mutation: Literal["redraw", "single", "pose", "gaussian", "mixed", "bit", "byte"] = "mixed"
     mutation_rate: Fraction = 0.8
     sigma: Positive = 0.12
     tuning_rate: Fraction = 0.3
@@ -204,8 +222,8 @@ class ExaminationConfig:
     """
 
     __pydantic_config__ = STRICT
-    candidates: Whole = 4
-    difference: NonNegative = 0.02
+    candidates: Annotated[Whole, HOST] = 4
+    difference: Annotated[NonNegative, HOST] = 0.02
 
 
 @dataclasses.dataclass(frozen=True)
@@ -219,9 +237,9 @@ class Config:
     """
 
     __pydantic_config__ = STRICT
-    seed: Whole = 0
-    checkpoint_every: Count = 1
-    keep_every: Count = 5
+    seed: Annotated[Whole, HOST] = 0
+    checkpoint_every: Annotated[Count, HOST] = 1
+    keep_every: Annotated[Count, HOST] = 5
     controller: ControllerConfig = dataclasses.field(default_factory=ControllerConfig)
     rollout: RolloutConfig = dataclasses.field(default_factory=RolloutConfig)
     fitness: FitnessConfig = dataclasses.field(default_factory=FitnessConfig)

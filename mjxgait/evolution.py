@@ -13,6 +13,7 @@ import jax
 import jax.numpy as jnp
 
 from mjxgait.config import EvolutionConfig
+from mjxgait.hyper import chosen
 from mjxgait.types import pytree
 from mjxgait.variation import Variation, first_occurrence
 
@@ -90,13 +91,24 @@ class GenerationMetrics:
     best_terms: jax.Array
 
 
+@pytree
+class Proposal:
+    """What a generation wants judged. key: of the next generation. offspring: leaves [M, ...]; origin: [M]."""
+
+    key: jax.Array
+    offspring: Any
+    origin: jax.Array
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class Evolution:
-    """The algorithm with its parts. judge: genomes -> Judged. rank: terms [..., R, F], generation [] -> fitness [...], higher is better."""
+    """The algorithm with its parts, around whoever judges: `propose`, then `absorb` the verdict.
+
+    config: plain or traced. rank: terms [..., R, F], generation [] -> fitness [...], higher is better.
+    """
 
     config: EvolutionConfig
     variation: Variation
-    judge: Callable[[Any], Judged]
     rank: Callable[[jax.Array, jax.Array], jax.Array]
 
     def init(self, key: jax.Array, starts: int, terms: int) -> EvolutionState:
@@ -123,19 +135,25 @@ class Evolution:
             barren=integer,
         )
 
-    def step(self, state: EvolutionState) -> tuple[EvolutionState, GenerationMetrics]:
-        """One generation: offspring, their judgement, survival, and the decision whether the next one is forced."""
+    def propose(self, state: EvolutionState) -> Proposal:
+        """The offspring of a generation."""
         key, key_offspring = jax.random.split(state.key)
-        seeding = state.seeded < self.config.population
-        offspring, origin = self._offspring(key_offspring, state, seeding)
-        judged = self.judge(offspring)
+        offspring, origin = self._offspring(key_offspring, state, self._seeding(state))
+        return Proposal(key, offspring, origin)
+
+    def absorb(self, state: EvolutionState, proposal: Proposal, judged: Judged) -> tuple[EvolutionState, GenerationMetrics]:
+        """The rest of a generation: survival, and the decision whether the next one is forced."""
+        seeding = self._seeding(state)
         generation = jnp.where(seeding, jnp.where(self._filled(state), 0, -1), state.generation + 1)
-        grown = self._survive(state, offspring, judged.terms, origin, generation)
+        grown = self._survive(state, proposal.offspring, judged.terms, proposal.origin, generation)
         planted = self._plant(state, judged.terms, generation)
         state = jax.tree.map(lambda a, b: jnp.where(seeding, a, b), _without_key(planted), _without_key(grown))
         forced = state.forced
-        state = self._decide(dataclasses.replace(state, key=key, generation=generation))
+        state = self._decide(dataclasses.replace(state, key=proposal.key, generation=generation))
         return state, self._metrics(state, judged, forced)
+
+    def _seeding(self, state: EvolutionState) -> jax.Array:
+        return state.seeded < self.config.population
 
     def _filled(self, state: EvolutionState) -> jax.Array:
         return state.seeded + self.config.offspring >= self.config.population
@@ -170,9 +188,9 @@ class Evolution:
     def _forced(self, key: jax.Array, state: EvolutionState) -> tuple[Any, jax.Array]:
         config, count = self.config.forced, self.config.offspring
         key_create, key_parents, *key_mutations = jax.random.split(key, 2 + config.mutations)
-        newcomers = round(config.newcomers * count)
-        chosen = jax.random.randint(key_parents, (count,), 0, self.config.population)
-        mutants = jax.tree.map(lambda leaf: leaf[chosen], state.genomes)
+        newcomers = jnp.round(config.newcomers * count)
+        drawn = jax.random.randint(key_parents, (count,), 0, self.config.population)
+        mutants = jax.tree.map(lambda leaf: leaf[drawn], state.genomes)
         for key_mutation in key_mutations:
             mutants = jax.vmap(self.variation.mutate)(jax.random.split(key_mutation, count), mutants)
         is_new = jnp.arange(count) < newcomers
@@ -200,7 +218,7 @@ class Evolution:
         )
         fitness = self.rank(pool[1], generation)
         fresh = jnp.arange(fitness.shape[0]) >= count
-        distinct = first_occurrence(pool[0]) if self.config.remove_duplicates else jnp.ones_like(fresh)
+        distinct = first_occurrence(pool[0]) | jnp.logical_not(self.config.remove_duplicates)
         admitted = self._admitted(state, fitness, fresh & distinct)
         tier = jnp.where(state.forced & fresh, jnp.where(admitted, 2, 0), jnp.where(distinct, 1, 0))
         # The best is never lost, whatever the tiers say.
@@ -222,13 +240,13 @@ class Evolution:
     def _admitted(self, state: EvolutionState, fitness: jax.Array, candidates: jax.Array) -> jax.Array:
         """Which of the candidates [P + M] a forced generation takes in: fit enough, best first, as many as the spell has room for."""
         old = jnp.sort(fitness[: self.config.population])
-        enough = old[int(self.config.forced.accept * (self.config.population - 1))]
+        enough = old[jnp.floor(self.config.forced.accept * jnp.float32(self.config.population - 1)).astype(jnp.int32)]
         fit = candidates & (fitness >= enough) & jnp.isfinite(fitness)
         place = jnp.argsort(jnp.argsort(jnp.where(fit, -fitness, jnp.inf), stable=True))
         return fit & (place < self._room() - state.refreshed)
 
-    def _room(self) -> int:
-        return min(max(round(self.config.forced.refresh * self.config.population), 1), self.config.population - 1)
+    def _room(self) -> jax.Array:
+        return jnp.clip(jnp.round(self.config.forced.refresh * jnp.float32(self.config.population)), 1, self.config.population - 1)
 
     def _decide(self, state: EvolutionState) -> EvolutionState:
         """Begins a spell of forced evolution when best and mean have stalled over the window; ends it when it has done its work."""
@@ -279,7 +297,7 @@ class Evolution:
         )
 
 
-def parents(key: jax.Array, count: int, population: int, selection: str) -> tuple[jax.Array, jax.Array]:
+def parents(key: jax.Array, count: int, population: int, selection: Any) -> tuple[jax.Array, jax.Array]:
     """Places [count] of mothers and fathers in a population sorted best first; never the same individual twice.
 
     `uniform` draws all alike; `rank` falls linearly to zero with rank (Baker 1985, pressure 2); `tournament` takes the better of two.
@@ -287,11 +305,10 @@ def parents(key: jax.Array, count: int, population: int, selection: str) -> tupl
     key_mother, key_father = jax.random.split(key)
 
     def draw(key: jax.Array, among: int) -> jax.Array:
-        if selection == "uniform":
-            return jax.random.randint(key, (count,), 0, among)
-        if selection == "tournament":
-            return jnp.min(jax.random.randint(key, (count, 2), 0, among), axis=1)
-        return jnp.floor(among * (1 - jnp.sqrt(1 - jax.random.uniform(key, (count,))))).astype(jnp.int32)
+        uniformly = jax.random.randint(key, (count,), 0, among)
+        best_of_two = jnp.min(jax.random.randint(key, (count, 2), 0, among), axis=1)
+        by_rank = jnp.floor(among * (1 - jnp.sqrt(1 - jax.random.uniform(key, (count,))))).astype(jnp.int32)
+        return jnp.where(chosen(selection, "uniform"), uniformly, jnp.where(chosen(selection, "tournament"), best_of_two, by_rank))
 
     mothers, others = draw(key_mother, population), draw(key_father, population - 1)
     return mothers, others + (others >= mothers)
@@ -308,7 +325,7 @@ def stop_reason(state: EvolutionState, config: EvolutionConfig) -> str | None:
     return None
 
 
-def _grown(history: jax.Array, gain: float) -> jax.Array:
+def _grown(history: jax.Array, gain: jax.Array | float) -> jax.Array:
     return history[-1] - history[0] > gain * jnp.maximum(jnp.abs(history[0]), 1.0)
 
 

@@ -2,7 +2,9 @@
 
 import dataclasses
 import os
-from functools import partial
+from collections.abc import Callable, Sequence
+from functools import cached_property, partial
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -12,14 +14,20 @@ from jax.sharding import Mesh, NamedSharding, PartitionSpec
 from mjxgait.champion import Champion
 from mjxgait.config import Config
 from mjxgait.creature import Creature
-from mjxgait.evolution import Evolution, EvolutionState, Judged
+from mjxgait.errors import UserError
+from mjxgait.evolution import Evolution, EvolutionState, GenerationMetrics, Judged, Proposal
 from mjxgait.fitness import TERMS, fitness_terms, forward_distance, score, weight_vector
 from mjxgait.gait import TUNING, Genome, PoseTracker
+from mjxgait.hyper import traced
 from mjxgait.physics import make_plant
-from mjxgait.rollout import AXIS, Simulator
+from mjxgait.rollout import AXIS, Episodes, Simulator
 from mjxgait.starts import Starts, draw_starts
-from mjxgait.tally import Judge, Reason
+from mjxgait.tally import Judge, Reason, Tally
+from mjxgait.types import pytree
 from mjxgait.variation import Box, pose_variation
+
+Step = Callable[[EvolutionState], tuple[EvolutionState, GenerationMetrics]]
+"""A compiled generation."""
 
 
 def prepare_devices() -> None:
@@ -32,6 +40,14 @@ def prepare_devices() -> None:
         jax.config.update("jax_persistent_cache_min_compile_time_secs", 1.0)
 
 
+@pytree
+class Row:
+    """What tells one evolution run from another in the same compiled program: its traced settings, and its starts [R]."""
+
+    settings: Config
+    starts: Starts
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class Experiment:
     """One creature under one config: the pure functions of a run. The starts follow from the seed, the same in every generation."""
@@ -39,17 +55,41 @@ class Experiment:
     creature: Creature
     config: Config
     simulator: Simulator
-    evolution: Evolution
-    starts: Starts
+    row: Row
+
+    @property
+    def starts(self) -> Starts:
+        """The starts [R] on which everybody is judged."""
+        return self.row.starts
 
     def init(self) -> EvolutionState:
         """The state of generation -1: a population that nobody has judged."""
-        key = jax.random.fold_in(jax.random.key(self.config.seed), 0)
-        return self.evolution.init(key, self.config.rollout.starts, len(TERMS))
+        return _initial(self.simulator, self.row.settings, jax.random.fold_in(jax.random.key(self.config.seed), 0))
+
+    def simulate(self, genomes: Genome, starts: Starts | None = None) -> Episodes:
+        """Genomes [N, ...] on the starts [R] of this run or on others: episodes with leaves [N, R, ...]."""
+        rows = _lone((genomes, starts or self.starts, self.row.settings))
+        episodes = self.simulator.simulate(*rows)
+        return Episodes(_only(episodes.tally), episodes.computed_steps)
+
+    def judge(self, genomes: Genome) -> Judged:
+        """The verdict on genomes [N, ...]."""
+        episodes = self.simulate(genomes)
+        return _verdict(self.simulator, self.row.settings, episodes.tally, episodes.computed_steps)
+
+    def compile(self) -> Step:
+        """The generation as one compiled program."""
+        batch = Batch((self,))
+        step = batch.compile()
+
+        def alone(state: EvolutionState) -> tuple[EvolutionState, GenerationMetrics]:
+            return _only(step(_lone(state)))
+
+        return alone
 
     def candidates(self, state: EvolutionState) -> list[int]:
         """Ranks of the best individuals that differ from each other, as many as the config asks for; best first."""
-        low, high = self.simulator.tracker.bounds()
+        low, high = self.simulator.tracker.bounds(self.config.controller)
         genes = jax.tree.map(lambda leaf, a, b: np.asarray((leaf - a) / jnp.maximum(b - a, 1e-9)), state.genomes, low, high)
         rows = np.concatenate([leaf.reshape(leaf.shape[0], -1) for leaf in jax.tree.leaves(genes)], axis=1)
         chosen: list[int] = []
@@ -59,19 +99,9 @@ class Experiment:
                 chosen.append(int(rank))
         return chosen
 
-    def compile(self) -> jax.stages.Compiled:
-        """The generation as one compiled program: state -> (state, metrics)."""
-        everywhere = self._everywhere
-        program = jax.jit(self.evolution.step, in_shardings=everywhere, out_shardings=everywhere)
-        return program.lower(jax.eval_shape(self.init)).compile(compiler_options=_compiler_options())
-
     def place(self, state: EvolutionState) -> EvolutionState:
         """The state on all devices, where the compiled program wants it."""
-        return jax.device_put(state, self._everywhere)
-
-    @property
-    def _everywhere(self) -> NamedSharding:
-        return NamedSharding(self.simulator.mesh, PartitionSpec())
+        return jax.device_put(state, _everywhere(self.simulator))
 
     def champion(self, state: EvolutionState, versions: dict[str, str], rank: int = 0) -> Champion:
         """An individual of a state; rank 0 is the best."""
@@ -104,34 +134,128 @@ class Experiment:
         )
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
+class Batch:
+    """Evolution runs of one creature, side by side as rows `B` of one computation: they share the lanes and are compiled once."""
+
+    experiments: tuple[Experiment, ...]
+
+    @cached_property
+    def rows(self) -> Row:
+        """Settings and starts, leaves [B, ...]."""
+        return _stack([experiment.row for experiment in self.experiments])
+
+    def init(self) -> EvolutionState:
+        """The states before anybody has been judged, leaves [B, ...]."""
+        return _stack([experiment.init() for experiment in self.experiments])
+
+    def abstract(self) -> EvolutionState:
+        """Shapes and types of the states."""
+        count, one = len(self.experiments), jax.eval_shape(self.experiments[0].init)
+        return jax.tree.map(lambda leaf: jax.ShapeDtypeStruct((count, *leaf.shape), leaf.dtype), one)
+
+    def compile(self) -> Step:
+        """A generation of all rows as one compiled program: states and metrics have leaves [B, ...]."""
+        simulator = self.experiments[0].simulator
+        everywhere = _everywhere(simulator)
+        program = jax.jit(partial(_generation, simulator), in_shardings=everywhere, out_shardings=everywhere)
+        rows = jax.device_put(self.rows, everywhere)
+        return partial(program.lower(rows, self.abstract()).compile(compiler_options=_compiler_options()), rows)
+
+    def place(self, states: EvolutionState) -> EvolutionState:
+        """The states on all devices, where the compiled program wants them."""
+        return jax.device_put(states, _everywhere(self.experiments[0].simulator))
+
+
 def build_experiment(creature: Creature, config: Config) -> Experiment:
-    """Joins the rooms: creature and config to simulator, starts and evolution.
+    """Joins the rooms: creature and config to simulator, settings and starts.
 
     Raises:
       UserError: the physics does not support the creature's model.
     """
-    simulator = _simulator(creature, config)
-    starts = draw_starts(jax.random.fold_in(jax.random.key(config.seed), 1), creature, config.rollout)
-    box = Box(*simulator.tracker.bounds())
+    return _experiment(creature, config, _simulator(creature, config))
 
-    def judge(genomes: Genome) -> Judged:
-        episodes = simulator.simulate(genomes, starts)
-        terms = jax.vmap(jax.vmap(partial(fitness_terms, creature, config.fitness, simulator.tracker.step, simulator.steps)))(
-            episodes.tally
-        )
-        broken = episodes.tally.reason == Reason.NONFINITE
-        return Judged(
-            terms=jnp.where(broken[..., None], jnp.nan, terms),
-            failed=episodes.tally.reason != Reason.FINISHED,
-            sim_steps=jnp.sum(episodes.tally.steps),
-            computed_steps=episodes.computed_steps,
-        )
+
+def build_batch(creature: Creature, configs: Sequence[Config]) -> Batch:
+    """Runs of one creature whose configs differ in nothing that shapes the program.
+
+    Raises:
+      UserError: two configs need different programs, or the physics does not support the creature's model.
+    """
+    if len({jax.tree.structure(traced(config)) for config in configs}) != 1:
+        raise UserError("these settings need programs of different shapes: run them in batches of their own")
+    simulator = _simulator(creature, configs[0])
+    return Batch(tuple(_experiment(creature, config, simulator) for config in configs))
+
+
+def evolution_of(simulator: Simulator, settings: Config) -> Evolution:
+    """The genetic algorithm under settings, plain or traced."""
+    box = Box(*simulator.tracker.bounds(settings.controller))
 
     def rank(terms: jax.Array, generation: jax.Array) -> jax.Array:
-        return score(terms, weight_vector(config.fitness, generation), config.rollout.worst)
+        return score(terms, weight_vector(settings.fitness, generation), settings.rollout.worst)
 
-    evolution = Evolution(config.evolution, pose_variation(box, config.evolution), judge, rank)
-    return Experiment(creature, config, simulator, evolution, starts)
+    return Evolution(settings.evolution, pose_variation(box, settings.evolution), rank)
+
+
+@partial(jax.jit, static_argnums=0)
+def _initial(simulator: Simulator, settings: Config, key: jax.Array) -> EvolutionState:
+    """The same compiled function for every run, alone or beside others, so that they begin with the same bits."""
+    return evolution_of(simulator, settings).init(key, settings.rollout.starts, len(TERMS))
+
+
+def _generation(simulator: Simulator, rows: Row, states: EvolutionState) -> tuple[EvolutionState, GenerationMetrics]:
+    """One generation of all rows [B]. Row by row but for the simulations, so that a row's numbers do not depend on its neighbours."""
+
+    def propose(pair: tuple[Row, EvolutionState]) -> Proposal:
+        row, state = pair
+        return evolution_of(simulator, row.settings).propose(state)
+
+    def absorb(of_row: tuple[Row, EvolutionState, Proposal, Tally, jax.Array]) -> tuple[EvolutionState, GenerationMetrics]:
+        row, state, proposal, tally, computed = of_row
+        return evolution_of(simulator, row.settings).absorb(state, proposal, _verdict(simulator, row.settings, tally, computed))
+
+    proposals = jax.lax.map(propose, (rows, states))
+    episodes = simulator.simulate(proposals.offspring, rows.starts, rows.settings)
+    lived = jnp.sum(episodes.tally.steps, axis=(1, 2))
+    # Idle lanes are nobody's: each row bears a part of them in proportion to the steps that it lived.
+    computed = jnp.round(episodes.computed_steps * (lived / jnp.maximum(jnp.sum(lived), 1))).astype(jnp.int32)
+    return jax.lax.map(absorb, (rows, states, proposals, episodes.tally, computed))
+
+
+def _verdict(simulator: Simulator, settings: Config, tally: Tally, computed_steps: jax.Array) -> Judged:
+    """Terms and outcome of one row's episodes; tally with leaves [N, R, ...]."""
+    terms_of = partial(fitness_terms, simulator.creature, settings.fitness, simulator.tracker.step, simulator.steps)
+    terms = jax.vmap(jax.vmap(terms_of))(tally)
+    return Judged(
+        terms=jnp.where((tally.reason == Reason.NONFINITE)[..., None], jnp.nan, terms),
+        failed=tally.reason != Reason.FINISHED,
+        sim_steps=jnp.sum(tally.steps),
+        computed_steps=computed_steps,
+    )
+
+
+def _experiment(creature: Creature, config: Config, simulator: Simulator) -> Experiment:
+    starts = draw_starts(jax.random.fold_in(jax.random.key(config.seed), 1), creature, config.rollout)
+    return Experiment(creature, config, simulator, Row(traced(config), starts))
+
+
+def _everywhere(simulator: Simulator) -> NamedSharding:
+    return NamedSharding(simulator.mesh, PartitionSpec())
+
+
+def _lone(tree: Any) -> Any:
+    """One row [1, ...] of everything."""
+    return jax.tree.map(lambda leaf: leaf[None], tree)
+
+
+def _only(tree: Any) -> Any:
+    """The only row of everything."""
+    return jax.tree.map(lambda leaf: leaf[0], tree)
+
+
+def _stack(trees: Sequence[Any]) -> Any:
+    return jax.tree.map(lambda *leaves: jnp.stack(leaves), *trees)
 
 
 def _compiler_options() -> dict[str, str | bool]:
@@ -146,8 +270,8 @@ def _simulator(creature: Creature, config: Config) -> Simulator:
     return Simulator(
         creature=creature,
         plant=plant,
-        tracker=PoseTracker(creature, config.controller, step),
-        judge=Judge(creature, step, config.fitness.clearance * creature.hip_height, steps // 2),
+        tracker=PoseTracker(creature, step),
+        judge=Judge(creature, step, steps // 2),
         steps=steps,
         lanes=config.rollout.lanes or lanes,
         mesh=Mesh(np.array(jax.devices()), (AXIS,)),

@@ -25,7 +25,7 @@ def stride_limit(mass: float) -> float:
 
 
 def fitness_terms(creature: Creature, config: FitnessConfig, step: float, horizon: int, tally: Tally) -> jax.Array:
-    """The terms [F] of one episode in the order of `TERMS`, each without unit and before its weight.
+    """The terms [F] of one episode in the order of `TERMS`, each without unit and before its weight. The config may be traced.
 
     Every penalty is at least zero and every sum ended with the creature's life, so an individual that has died gains nothing more.
 
@@ -40,8 +40,9 @@ def fitness_terms(creature: Creature, config: FitnessConfig, step: float, horizo
     rate = jnp.maximum(tally.strides / jnp.maximum(tally.stride_steps, 1), jnp.mean(tally.swings) / lived) / step
     duty = tally.contact / lived
     second_half = tally.forward - tally.forward_half
+    enough = _enough(config.speed, horizon * step)
     values = {
-        "distance": _counted(tally.forward / length, config.speed * horizon * step),
+        "distance": _counted(tally.forward / length, enough),
         "alive": tally.steps / horizon,
         "drift": jnp.abs(tally.left) / length + jnp.abs(jnp.sin(0.5 * tally.heading)),
         "fade": jnp.maximum(tally.forward_half - second_half, 0.0) / length,
@@ -59,14 +60,18 @@ def fitness_terms(creature: Creature, config: FitnessConfig, step: float, horizo
         "limits": tally.limits / lived,
     }
     # Style counts as far as there is a walk: a creature that has yet to learn walking must not be punished for trying.
-    enough = config.speed * horizon * step
-    walked = jnp.clip(tally.forward / length / enough, 0.0, 1.0) if enough else 1.0
+    walked = jnp.where(jnp.isfinite(enough), jnp.clip(tally.forward / length / enough, 0.0, 1.0), 1.0)
     return jnp.stack([values[name] * (walked if name in STYLE else 1.0) for name in TERMS])
 
 
-def _counted(distance: jax.Array, enough: float) -> jax.Array:
+def _enough(speed: jax.Array | float, seconds: float) -> jax.Array:
+    """Body lengths up to which more is better; infinite where no speed is wanted."""
+    return jnp.where(jnp.asarray(speed) > 0, speed * seconds, jnp.inf)
+
+
+def _counted(distance: jax.Array, enough: jax.Array) -> jax.Array:
     """Distance in body lengths, of which what lies beyond `enough` counts little."""
-    return jnp.minimum(distance, enough) + BEYOND * jnp.maximum(distance - enough, 0.0) if enough else distance
+    return jnp.minimum(distance, enough) + BEYOND * jnp.maximum(distance - enough, 0.0)
 
 
 def forward_distance(creature: Creature, config: FitnessConfig, horizon_seconds: float, term: float) -> float:
@@ -78,15 +83,14 @@ def forward_distance(creature: Creature, config: FitnessConfig, horizon_seconds:
 
 def weight_vector(config: FitnessConfig, generation: jax.Array) -> jax.Array:
     """Signed weights [F] at a generation []: penalties negative, style terms ramped in by an optax schedule."""
-    base = jnp.array([getattr(config.weights, name) * (1 if name in REWARDS else -1) for name in TERMS], jnp.float32)
-    if not config.style_ramp:
-        return base
-    ramp = optax.linear_schedule(0.0, 1.0, config.style_ramp)(generation)
+    base = jnp.stack([jnp.float32(getattr(config.weights, name) * (1 if name in REWARDS else -1)) for name in TERMS])
+    grown = optax.linear_schedule(0.0, 1.0, 1)(generation / jnp.maximum(config.style_ramp, 1))
+    ramp = jnp.where(jnp.asarray(config.style_ramp) > 0, grown, 1.0)
     return jnp.where(jnp.array([name in STYLE for name in TERMS]), base * ramp, base)
 
 
-def score(terms: jax.Array, weights: jax.Array, worst: float) -> jax.Array:
+def score(terms: jax.Array, weights: jax.Array, worst: jax.Array | float) -> jax.Array:
     """Fitness [...] of terms [..., R, F]: a mix of the worst start and the mean of the starts. Not finite scores as -inf."""
-    starts = terms @ weights
+    starts = jnp.sum(terms * weights, axis=-1)
     value = worst * jnp.min(starts, axis=-1) + (1 - worst) * jnp.mean(starts, axis=-1)
     return jnp.where(jnp.isfinite(value), value, -jnp.inf)

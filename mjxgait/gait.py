@@ -11,6 +11,7 @@ import numpy as np
 
 from mjxgait.config import ControllerConfig, TuningRanges
 from mjxgait.creature import Creature
+from mjxgait.hyper import chosen
 from mjxgait.types import Sensed, pytree
 
 TUNING = tuple(field.name for field in dataclasses.fields(TuningRanges))
@@ -28,6 +29,21 @@ class Genome:
 
 
 @pytree
+class PoseCycle:
+    """What an episode keeps of a genome and the settings.
+
+    poses: [C, J] rad, of which the first `count` [] are the cycle. tuning: [E]. interpolation: [] steps between neighbours.
+    clocked: [] whether the clock moves the target on.
+    """
+
+    poses: jax.Array
+    tuning: jax.Array
+    count: jax.Array
+    interpolation: jax.Array
+    clocked: jax.Array
+
+
+@pytree
 class GaitState:
     """Where the controller is in its cycle: position [] in steps of interpolation, time [] s."""
 
@@ -39,53 +55,43 @@ class GaitState:
 class PoseTracker:
     """A controller: the cycle of key poses of one creature.
 
-    The rollout needs three things of any controller: `prepare` (genome to what an episode keeps), `init` and `target`.
+    The rollout needs three things of any controller: `prepare` (genome and settings to what an episode keeps), `init` and `target`.
     """
 
     creature: Creature
-    config: ControllerConfig
     step: float
 
-    @property
-    def poses_per_cycle(self) -> int:
-        """C: twice K for a mirrored creature."""
-        return self.config.key_poses * (2 if self.creature.symmetric else 1)
-
-    @property
-    def positions(self) -> int:
-        """S: positions in a cycle."""
-        return self.poses_per_cycle * self.config.interpolation
-
-    def bounds(self) -> tuple[Genome, Genome]:
+    def bounds(self, config: ControllerConfig) -> tuple[Genome, Genome]:
         """Lowest and highest genome: key_poses [K, J], tuning [E]."""
-        ranges = np.array([getattr(self.config.tuning, name) for name in TUNING])
-        shape = (self.config.key_poses, len(self.creature.joint_names))
+        low, high = (jnp.stack([jnp.float32(getattr(config.tuning, name)[end]) for name in TUNING]) for end in (0, 1))
+        shape = (config.key_poses, len(self.creature.joint_names))
 
-        def genome(pose: np.ndarray, tuning: np.ndarray) -> Genome:
-            return Genome(jnp.asarray(np.broadcast_to(pose, shape), jnp.float32), jnp.asarray(tuning, jnp.float32))
+        def genome(pose: np.ndarray, tuning: jax.Array) -> Genome:
+            return Genome(jnp.asarray(np.broadcast_to(pose, shape), jnp.float32), tuning)
 
-        return genome(self.creature.pose_low, ranges[:, 0]), genome(self.creature.pose_high, ranges[:, 1])
+        return genome(self.creature.pose_low, low), genome(self.creature.pose_high, high)
 
-    def prepare(self, genome: Genome) -> Genome:
-        """The genome with its key poses [K, J] replaced by the whole cycle [C, J]."""
-        return dataclasses.replace(genome, key_poses=pose_cycle(self.creature, genome.key_poses))
+    def prepare(self, genome: Genome, config: ControllerConfig) -> PoseCycle:
+        """The whole cycle of a genome [K, J] under the settings, plain or traced."""
+        poses = pose_cycle(self.creature, genome.key_poses)
+        count = jnp.where(config.mirror, poses.shape[0], config.key_poses)
+        return PoseCycle(poses, genome.tuning, count, jnp.int32(config.interpolation), chosen(config.advance, "clock"))
 
     def init(self) -> GaitState:
         """The state at the start of an episode."""
         return GaitState(position=jnp.zeros((), jnp.int32), time=jnp.zeros((), jnp.float32))
 
-    def target(self, cycle: Genome, state: GaitState, sensed: Sensed) -> tuple[jax.Array, GaitState, jax.Array]:
+    def target(self, cycle: PoseCycle, state: GaitState, sensed: Sensed) -> tuple[jax.Array, GaitState, jax.Array]:
         """Target pose [J] of this moment, the state of the next, and whether a stride has just been completed []."""
         creature = self.creature
-        target = interpolate(cycle.key_poses, state.position, self.config.interpolation)
+        target = interpolate(cycle.poses, state.position, cycle.interpolation, cycle.count)
         target = target + corrections(creature, cycle.tuning, target, sensed)
         target = jnp.clip(target, creature.joint_low.astype(np.float32), creature.joint_high.astype(np.float32))
         time = state.time + self.step
-        if self.config.advance == "clock":
-            position = jnp.floor(self.positions * time / cycle.tuning[PERIOD]).astype(jnp.int32) % self.positions
-        else:
-            reached = jnp.mean((target - sensed.joint_pos) ** 2) < cycle.tuning[THRESHOLD] ** 2
-            position = (state.position + reached) % self.positions
+        positions = cycle.count * cycle.interpolation
+        reached = jnp.mean((target - sensed.joint_pos) ** 2) < cycle.tuning[THRESHOLD] ** 2
+        by_clock = jnp.floor(positions * time / cycle.tuning[PERIOD]).astype(jnp.int32)
+        position = jnp.where(cycle.clocked, by_clock, state.position + reached) % positions
         return target, GaitState(position, time), position < state.position
 
 
@@ -96,16 +102,16 @@ def pose_cycle(creature: Creature, key_poses: jax.Array) -> jax.Array:
     return jnp.concatenate([key_poses, creature.sign.astype(np.float32) * key_poses[:, creature.partner]])
 
 
-def interpolate(cycle: jax.Array, position: jax.Array, n: int) -> jax.Array:
-    """Target pose [J] at a position [] of the cycle [C, J] with n steps between neighbours.
+def interpolate(poses: jax.Array, position: jax.Array, n: jax.Array | int, count: jax.Array | int) -> jax.Array:
+    """Target pose [J] at a position [] of a cycle with n steps between neighbours: the first `count` [] of the poses [C, J].
 
     A weighted sum over all poses instead of two look-ups: with lanes innermost a look-up would be a gather per lane.
     """
-    poses = np.arange(cycle.shape[0])
-    ahead = (position / n - poses) % cycle.shape[0]
-    behind = (poses - position / n) % cycle.shape[0]
-    weight = jnp.maximum(0.0, 1.0 - jnp.minimum(ahead, behind))
-    return jnp.sum(weight[:, None] * cycle, axis=0)
+    places = np.arange(poses.shape[0])
+    ahead = (position / n - places) % count
+    behind = (places - position / n) % count
+    weight = jnp.where(places < count, jnp.maximum(0.0, 1.0 - jnp.minimum(ahead, behind)), 0.0)
+    return jnp.sum(weight[:, None] * poses, axis=0)
 
 
 def heading_error(creature: Creature, sensed: Sensed) -> tuple[jax.Array, jax.Array, jax.Array]:

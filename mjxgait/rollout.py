@@ -1,6 +1,7 @@
 """Simulates many episodes: a fixed number of lanes per device, each taking the next waiting episode when its own has ended.
 
-Cost follows the steps that creatures live, memory the number of lanes, whatever the population and the length of the episode.
+Cost follows the steps that creatures live, memory the number of lanes, whatever the population and the length of the episode. The episodes
+may belong to several evolution runs, the rows `B` of every array here, each with its own starts and settings: they share the lanes.
 """
 
 import dataclasses
@@ -12,10 +13,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.sharding import Mesh, PartitionSpec
+from jax.typing import ArrayLike
 
 from mjxgait import spd
+from mjxgait.config import Config
 from mjxgait.creature import Creature
 from mjxgait.gait import PoseTracker
+from mjxgait.hyper import chosen
 from mjxgait.starts import Starts
 from mjxgait.tally import Judge, Reason, Tally
 from mjxgait.types import BodyState, Plant, pytree
@@ -27,10 +31,26 @@ AXIS = "lanes"
 
 @pytree
 class Episodes:
-    """All episodes of a generation: tally with leaves [N, R, ...], and the steps computed [] for them, those of idle lanes included."""
+    """All episodes of a generation: tally with leaves [B, N, R, ...], and the steps computed [] for them, those of idle lanes included."""
 
     tally: Tally
     computed_steps: jax.Array
+
+
+@pytree
+class Rules:
+    """What the settings say about an episode; all [].
+
+    stable: stable PD, else plain PD. constraint_forces: whether it counts them. stiffness, damping: factors on kp and kd.
+    terminate: whether a fall ends the episode. clearance: m wanted of each foot in each stride.
+    """
+
+    stable: jax.Array
+    constraint_forces: jax.Array
+    stiffness: jax.Array
+    damping: jax.Array
+    terminate: jax.Array
+    clearance: jax.Array
 
 
 @pytree
@@ -42,6 +62,7 @@ class Lane:
     cycle: Any
     control: Any
     tally: Tally
+    rules: Rules
     push: jax.Array
     push_step: jax.Array
 
@@ -58,28 +79,31 @@ class Simulator:
     lanes: int
     mesh: Mesh
 
-    def simulate(self, genomes: Any, starts: Starts) -> Episodes:
-        """Every genome (leaves [N, ...]) on every start [R]; the order of results is the order of the genomes."""
-        individuals, count = jax.tree.leaves(genomes)[0].shape[0], starts.friction.shape[0]
-        total, devices = individuals * count, self.mesh.size
+    def simulate(self, genomes: Any, starts: Starts, settings: Config) -> Episodes:
+        """Every genome (leaves [B, N, ...]) on every start [B, R] of its row, under the row's traced settings, leaves [B, ...].
+
+        The order of results is the order of the genomes.
+        """
+        shape = (*jax.tree.leaves(genomes)[0].shape[:2], starts.friction.shape[1])
+        total, devices = int(np.prod(shape)), self.mesh.size
         queue = -(-total // devices)
         jobs = jnp.arange(queue * devices, dtype=jnp.int32).reshape(queue, devices).T.reshape(-1)
         run = jax.shard_map(
             partial(self._run_queue, total=total),
             mesh=self.mesh,
-            in_specs=(PartitionSpec(AXIS), PartitionSpec(), PartitionSpec()),
+            in_specs=(PartitionSpec(AXIS), PartitionSpec(), PartitionSpec(), PartitionSpec()),
             out_specs=PartitionSpec(AXIS),
             check_vma=False,
         )
-        tally, computed = run(jobs, genomes, starts)
+        tally, computed = run(jobs, genomes, starts, settings)
 
         def in_order(leaf: jax.Array) -> jax.Array:
             by_device = leaf.reshape(devices, queue, *leaf.shape[1:])
-            return jnp.swapaxes(by_device, 0, 1).reshape(-1, *leaf.shape[1:])[:total].reshape(individuals, count, *leaf.shape[1:])
+            return jnp.swapaxes(by_device, 0, 1).reshape(-1, *leaf.shape[1:])[:total].reshape(*shape, *leaf.shape[1:])
 
         return Episodes(jax.tree.map(in_order, tally), jnp.sum(computed))
 
-    def _run_queue(self, jobs: jax.Array, genomes: Any, starts: Starts, *, total: int) -> tuple[Tally, jax.Array]:
+    def _run_queue(self, jobs: jax.Array, genomes: Any, starts: Starts, settings: Config, *, total: int) -> tuple[Tally, jax.Array]:
         """Works off one device's queue of jobs [Q]: tally with leaves [Q, ...], and the computed steps [1]."""
         queue = jobs.shape[0]
         lanes = min(self.lanes, queue)
@@ -87,7 +111,7 @@ class Simulator:
 
         def fresh(places: jax.Array) -> Lane:
             job = jnp.where(places < waiting, places, queue)
-            lane = jax.vmap(partial(self._fresh_lane, genomes, starts))(job, jobs[jnp.minimum(places, queue - 1)])
+            lane = jax.vmap(partial(self._fresh_lane, genomes, starts, settings))(job, jobs[jnp.minimum(places, queue - 1)])
             return jax.tree.map(lambda leaf: jnp.moveaxis(leaf, 0, self.plant.lane_axis), lane)
 
         def store(results: Tally, place: jax.Array, tally: Tally) -> Tally:
@@ -114,19 +138,33 @@ class Simulator:
         )
         return carry[1], (carry[3] * (CHECK_EVERY * lanes))[None]
 
-    def _fresh_lane(self, genomes: Any, starts: Starts, job: jax.Array, episode: jax.Array) -> Lane:
-        """The lane at the start of an episode []: genome `episode // R` on start `episode % R`."""
-        count = starts.friction.shape[0]
-        start = jax.tree.map(lambda leaf: leaf[episode % count], starts)
+    def _fresh_lane(self, genomes: Any, starts: Starts, settings: Config, job: jax.Array, episode: jax.Array) -> Lane:
+        """The lane at the start of an episode []: of row, genome and start, the start changes fastest."""
+        count, individuals = starts.friction.shape[1], jax.tree.leaves(genomes)[0].shape[1]
+        row, individual = episode // (individuals * count), episode // count % individuals
+        start = jax.tree.map(lambda leaf: leaf[row, episode % count], starts)
+        mine = jax.tree.map(lambda leaf: leaf[row], settings)
         still = jnp.zeros_like(start.qvel)
         return Lane(
             job=job,
             body=BodyState(start.qpos, start.qvel, warmstart=still, constraint_force=still, friction=start.friction),
-            cycle=self.tracker.prepare(jax.tree.map(lambda leaf: leaf[episode // count], genomes)),
+            cycle=self.tracker.prepare(jax.tree.map(lambda leaf: leaf[row, individual], genomes), mine.controller),
             control=self.tracker.init(),
             tally=self.judge.init(),
+            rules=self._rules(mine),
             push=start.push,
             push_step=start.push_step,
+        )
+
+    def _rules(self, settings: Config) -> Rules:
+        law = settings.controller
+        return Rules(
+            stable=chosen(law.law, "spd"),
+            constraint_forces=jnp.asarray(law.constraint_forces),
+            stiffness=jnp.asarray(law.stiffness, jnp.float32),
+            damping=jnp.asarray(law.damping, jnp.float32),
+            terminate=jnp.asarray(settings.rollout.terminate),
+            clearance=jnp.asarray(settings.fitness.clearance * self.creature.hip_height, jnp.float32),
         )
 
     def _step(self, lane: Lane) -> Lane:
@@ -134,38 +172,41 @@ class Simulator:
         body = self._per_lane(_push)(lane)
         sensed, workings = self.plant.forward(body)
         target, control, stride = self._per_lane(self.tracker.target)(lane.cycle, lane.control, sensed)
-        torque = self._torque(body, sensed, workings, target)
-        tally = self._per_lane(self._judge)(lane.tally, sensed, torque, stride)
+        torque = self._torque(lane.rules, body, sensed, workings, target)
+        tally = self._per_lane(self._judge)(lane.rules, lane.tally, sensed, torque, stride)
         body = self.plant.advance(body, workings, self._per_lane(self._lift)(torque))
         return dataclasses.replace(lane, body=body, control=control, tally=tally)
 
-    def _torque(self, body: BodyState, sensed: Any, workings: Any, target: jax.Array) -> jax.Array:
-        """Joint torques of the law in the config, [J] per lane."""
-        creature, config, step = self.creature, self.tracker.config, self.tracker.step
-        kp, kd, limit = (value.astype(np.float32) for value in (creature.kp, creature.kd, creature.torque_limit))
-        horizon = step if config.law == "spd" else 0.0
-        force = self._per_lane(lambda q, v, goal: spd.pd_force(q, v, goal, kp, kd, horizon))(sensed.joint_pos, sensed.joint_vel, target)
-        if config.law == "pd":
-            return self._per_lane(lambda f: jnp.clip(f, -limit, limit))(force)
-        total = self._per_lane(self._lift)(force) - sensed.bias
-        if config.constraint_forces:
-            total = total + body.constraint_force
-        acceleration = self.plant.solve_damped(workings, self._lift(jnp.asarray(step * kd)), total)
-        return self._per_lane(lambda f, a: spd.limited_torque(f, a[creature.dof_adr], kd, step, limit))(force, acceleration)
+    def _torque(self, rules: Rules, body: BodyState, sensed: Any, workings: Any, target: jax.Array) -> jax.Array:
+        """Joint torques, [J] per lane. Plain PD is stable PD that looks no step ahead."""
+        creature, step = self.creature, self.tracker.step
+        limit = creature.torque_limit.astype(np.float32)
 
-    def _judge(self, tally: Tally, sensed: Any, torque: jax.Array, stride: jax.Array) -> Tally:
+        def pull(rules: Rules, pos: jax.Array, vel: jax.Array, goal: jax.Array) -> tuple[jax.Array, jax.Array, jax.Array]:
+            kp, kd = creature.kp.astype(np.float32) * rules.stiffness, creature.kd.astype(np.float32) * rules.damping
+            ahead = jnp.where(rules.stable, step, 0.0)
+            return spd.pd_force(pos, vel, goal, kp, kd, ahead), ahead * kd, self._lift(step * kd)
+
+        force, braked, damping = self._per_lane(pull)(rules, sensed.joint_pos, sensed.joint_vel, target)
+        pushed = jnp.where(rules.constraint_forces, 1.0, 0.0)
+        total = self._per_lane(lambda f, c, on, bias: self._lift(f) + on * c - bias)(force, body.constraint_force, pushed, sensed.bias)
+        acceleration = self.plant.solve_damped(workings, damping, total)
+        return self._per_lane(lambda f, a, b: spd.limited_torque(f, a[creature.dof_adr], b, limit))(force, acceleration, braked)
+
+    def _judge(self, rules: Rules, tally: Tally, sensed: Any, torque: jax.Array, stride: jax.Array) -> Tally:
         going = (tally.reason == Reason.FINISHED) & (tally.steps < self.steps)
-        reason = self.judge.examine(sensed)
-        updated = self.judge.update(tally, sensed, torque, stride)
+        found = self.judge.examine(sensed)
+        reason = jnp.where(rules.terminate | (found == Reason.NONFINITE), found, Reason.FINISHED)
+        updated = self.judge.update(tally, sensed, torque, stride, rules.clearance)
         kept = dataclasses.replace(tally, reason=jnp.where(going, reason, tally.reason))
         return _choose(going & (reason == Reason.FINISHED), updated, kept)
 
-    def _lift(self, joints: jax.Array) -> jax.Array:
+    def _lift(self, joints: ArrayLike) -> jax.Array:
         """Joint values [J] at their places among the degrees of freedom [nv], zero elsewhere."""
         adr, nv = self.creature.dof_adr, self.creature.model.nv
         if np.array_equal(adr, np.arange(adr[0], adr[0] + len(adr))):
-            return jnp.pad(joints, (adr[0], nv - adr[-1] - 1))
-        return jnp.zeros(nv, joints.dtype).at[adr].set(joints)
+            return jnp.pad(jnp.asarray(joints), (adr[0], nv - adr[-1] - 1))
+        return jnp.zeros(nv, jnp.float32).at[adr].set(joints)
 
     def _per_lane(self, function: Callable[..., Any]) -> Callable[..., Any]:
         return jax.vmap(function, in_axes=self.plant.lane_axis, out_axes=self.plant.lane_axis)

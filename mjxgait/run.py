@@ -22,7 +22,7 @@ from mjxgait.checkpoint import Checkpoints, disk_errors
 from mjxgait.config import Config
 from mjxgait.creature import Creature
 from mjxgait.evolution import EvolutionState, GenerationMetrics, stop_reason
-from mjxgait.experiment import Experiment, build_experiment
+from mjxgait.experiment import Experiment, Step, build_experiment
 from mjxgait.fitness import TERMS
 from mjxgait.folder import CERTIFICATE, CHAMPION, METRICS, PLOT, read_metrics, truncate_metrics
 from mjxgait.screen import Screen
@@ -42,12 +42,12 @@ def train(folder: Path, creature: Creature, config: Config, screen: Screen, resu
         truncate_metrics(folder / METRICS, int(state.generation))
     else:
         truncate_metrics(folder / METRICS, -1)
-        state = jax.jit(experiment.init)()
+        state = experiment.init()
     with screen.compiling(creature.name, experiment):
         step = experiment.compile()
     began = time.perf_counter()
     try:
-        with _interruptible() as interrupted:
+        with interruptible() as interrupted:
             state, reason = _evolve(folder, experiment, step, experiment.place(state), checkpoints, screen, interrupted)
     finally:
         screen.close()
@@ -66,7 +66,7 @@ def train(folder: Path, creature: Creature, config: Config, screen: Screen, resu
 def _evolve(
     folder: Path,
     experiment: Experiment,
-    step: jax.stages.Compiled,
+    step: Step,
     state: EvolutionState,
     checkpoints: Checkpoints,
     screen: Screen,
@@ -128,7 +128,7 @@ def versions() -> dict[str, str]:
 
 
 @contextmanager
-def _interruptible() -> Iterator[threading.Event]:
+def interruptible() -> Iterator[threading.Event]:
     """The event is set by the first Ctrl-C; the second one interrupts at once."""
     event = threading.Event()
     if threading.current_thread() is not threading.main_thread():

@@ -9,14 +9,17 @@ import jax.numpy as jnp
 from jax.typing import ArrayLike
 
 
-def pd_force(pos: jax.Array, vel: jax.Array, target: jax.Array, kp: ArrayLike, kd: ArrayLike, step: float) -> jax.Array:
+def pd_force(pos: jax.Array, vel: jax.Array, target: jax.Array, kp: ArrayLike, kd: ArrayLike, step: ArrayLike) -> jax.Array:
     """Spring and damper at the end of the coming step: `-kp (q + h v - target) - kd v`; all [J], step in s (0 gives plain PD); N·m."""
     return -jnp.asarray(kp) * (pos + step * vel - target) - jnp.asarray(kd) * vel
 
 
-def limited_torque(force: jax.Array, acceleration: jax.Array, kd: ArrayLike, step: float, limit: ArrayLike) -> jax.Array:
-    """The torque [J], `force - h kd acc`, clamped to the limit: clamping comes last, or the damping would be that of a stronger joint."""
-    return jnp.clip(force - step * jnp.asarray(kd) * acceleration, -jnp.asarray(limit), jnp.asarray(limit))
+def limited_torque(force: jax.Array, acceleration: jax.Array, brake: ArrayLike, limit: ArrayLike) -> jax.Array:
+    """The torque [J], `force - brake acc` with `brake = h kd`, clamped to the limit.
+
+    Clamping comes last, or the damping would be that of a stronger joint.
+    """
+    return jnp.clip(force - jnp.asarray(brake) * acceleration, -jnp.asarray(limit), jnp.asarray(limit))
 
 
 def stable_pd(
@@ -45,4 +48,4 @@ def stable_pd(
     full = jnp.zeros_like(bias).at[dofs].set(force) - bias + constraint
     damped = mass.at[dofs, dofs].add(step * kd)
     acceleration = jax.scipy.linalg.solve(damped, full, assume_a="pos")[dofs]
-    return limited_torque(force, acceleration, kd, step, limit)
+    return limited_torque(force, acceleration, step * kd, limit)

@@ -72,11 +72,10 @@ class Tally:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Judge:
-    """Keeps the tally of one creature's episodes. clearance: m wanted of each foot per stride. half_time: step."""
+    """Keeps the tally of one creature's episodes. half_time: step."""
 
     creature: Creature
     step: float
-    clearance: float
     half_time: int
 
     def init(self) -> Tally:
@@ -101,8 +100,12 @@ class Judge:
         finite = jnp.isfinite(jnp.sum(sensed.joint_vel) + jnp.sum(sensed.trunk_pos) + jnp.sum(sensed.trunk_rot) + jnp.sum(sensed.bias))
         return jnp.where(finite, reason, Reason.NONFINITE).astype(jnp.int32)
 
-    def update(self, tally: Tally, sensed: Sensed, torque: jax.Array, stride: jax.Array) -> Tally:
-        """The tally after one more step. torque: [J] N·m; stride: [] whether the controller completed its cycle."""
+    def update(self, tally: Tally, sensed: Sensed, torque: jax.Array, stride: jax.Array, clearance: jax.Array) -> Tally:
+        """The tally after one more step.
+
+        Args:
+          torque: [J] N·m. stride: [] whether the controller completed its cycle. clearance: [] m wanted of each foot per stride.
+        """
         creature = self.creature
         start_forward, start_left = start_axes(creature)
         moved = sensed.trunk_pos - start_position(creature)
@@ -111,7 +114,7 @@ class Judge:
         low, pos = self._feet(sensed)
         down = (low < CONTACT_GAP).astype(jnp.float32)
         peak = jnp.maximum(tally.peak, low)
-        missing = jnp.mean(jnp.clip(1.0 - peak / max(self.clearance, 1e-6), 0.0, 1.0))
+        missing = jnp.mean(jnp.clip(1.0 - peak / jnp.maximum(clearance, 1e-6), 0.0, 1.0))
         slid = jnp.linalg.norm(pos - tally.foot_pos, axis=1) * down * tally.foot_down
         rise = SWING * creature.hip_height
         swinging = jnp.where(low > rise, 1.0, jnp.where(low < 0.5 * rise, 0.0, tally.swinging))

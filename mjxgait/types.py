@@ -74,7 +74,7 @@ class Plant(Protocol):
         ...
 
     def solve_damped(self, workings: Any, damping: jax.Array, force: jax.Array) -> jax.Array:
-        """Accelerations `(M + diag(damping))^-1 force`; damping `[nv]` is shared by all lanes, force `[nv]` per lane."""
+        """Accelerations `(M + diag(damping))^-1 force`; damping and force: `[nv]` per lane."""
         ...
 
     def advance(self, state: BodyState, workings: Any, torque: jax.Array) -> BodyState:

@@ -6,12 +6,14 @@ Functions for one genome, mapped over the offspring where they are called. A gen
 import dataclasses
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 
 from mjxgait.config import EvolutionConfig
+from mjxgait.hyper import chosen
 from mjxgait.types import pytree
 
 
@@ -36,17 +38,25 @@ class Variation:
 
 
 def pose_variation(box: Box, config: EvolutionConfig) -> Variation:
-    """The operators of a genome of key poses and tuning, as chosen in the config."""
-    create = uniform if config.initial == "uniform" else latin_hypercube
+    """The operators of a genome of key poses and tuning, as chosen in the config, which may be plain or traced.
+
+    All options of a choice are computed and one is taken: they cost next to nothing beside the simulations.
+    """
+    poses = narrowed(box, config.pose_range)
+    box = Box(*(dataclasses.replace(edge, key_poses=part.key_poses) for edge, part in ((box.low, poses.low), (box.high, poses.high))))
     middle = narrowed(box, config.initial_spread)
-    poses_of = permuted_poses if config.crossing == "permute" else aligned_poses
+
+    def create(key: jax.Array, count: int) -> Any:
+        uniformly = chosen(config.initial, "uniform")
+        return jax.tree.map(partial(jnp.where, uniformly), uniform(key, middle, count), latin_hypercube(key, middle, count))
 
     def cross(key: jax.Array, mother: Any, father: Any) -> Any:
         key_poses, key_tuning = jax.random.split(key)
+        permuted, aligned = (f(key_poses, mother.key_poses, father.key_poses) for f in (permuted_poses, aligned_poses))
         from_mother = jax.random.bernoulli(key_tuning, 0.5, mother.tuning.shape)
         return dataclasses.replace(
             mother,
-            key_poses=poses_of(key_poses, mother.key_poses, father.key_poses),
+            key_poses=jnp.where(chosen(config.crossing, "permute"), permuted, aligned),
             tuning=jnp.where(from_mother, mother.tuning, father.tuning),
         )
 
@@ -57,10 +67,10 @@ def pose_variation(box: Box, config: EvolutionConfig) -> Variation:
         tuning = jittered(key_tuning, genome.tuning, low.tuning, high.tuning, config.tuning_rate, config.tuning_sigma)
         return dataclasses.replace(genome, key_poses=poses, tuning=tuning)
 
-    return Variation(create=lambda key, count: create(key, middle, count), cross=cross, mutate=mutate)
+    return Variation(create=create, cross=cross, mutate=mutate)
 
 
-def narrowed(box: Box, share: float) -> Box:
+def narrowed(box: Box, share: jax.Array | float) -> Box:
     """The middle of a box, `share` of its width in every gene."""
 
     def edge(near: Any, far: Any) -> Any:
@@ -98,23 +108,31 @@ def aligned_poses(key: jax.Array, mother: jax.Array, father: jax.Array) -> jax.A
     return jnp.where(jax.random.bernoulli(key, 0.5, (mother.shape[0], 1)), mother, father)
 
 
-def mutated_poses(key: jax.Array, poses: jax.Array, low: jax.Array, high: jax.Array, kind: str, sigma: float) -> jax.Array:
+def mutated_poses(key: jax.Array, poses: jax.Array, low: jax.Array, high: jax.Array, kind: Any, sigma: jax.Array | float) -> jax.Array:
     """Key poses [K, J] with a change in one of them; see `EvolutionConfig.mutation` for the kinds. Never leaves the box."""
     key_pose, key_joint, key_value, key_kind = jax.random.split(key, 4)
     count, joints = poses.shape
     here = jnp.arange(count) == jax.random.randint(key_pose, (), 0, count)
     order = jax.random.permutation(key_joint, jnp.arange(joints))
-    chosen = {"redraw": order < 2, "single": order < 1, "pose": order >= 0, "gaussian": order >= 0, "mixed": order < 2}[kind]
+    moves = chosen(kind, "gaussian") | (chosen(kind, "mixed") & jax.random.bernoulli(key_kind))
+    coded, code = chosen(kind, "bit") | chosen(kind, "byte"), eight_bits(poses, low, high)
+    flipped = code ^ jnp.where(chosen(kind, "bit"), 1 << jax.random.randint(key_kind, (), 0, 8), jax.random.randint(key_kind, (), 0, 256))
     moved = poses + sigma * (high - low) * jax.random.normal(key_value, poses.shape)
     drawn = low + (high - low) * jax.random.uniform(key_value, poses.shape)
-    value = moved if kind == "gaussian" else drawn
-    if kind == "mixed":
-        gaussian = jax.random.bernoulli(key_kind)
-        value, chosen = jnp.where(gaussian, moved, drawn), gaussian | chosen
-    return jnp.clip(jnp.where(here[:, None] & chosen, value, poses), low, high)
+    value = jnp.where(moves, moved, jnp.where(coded, low + flipped / 255 * (high - low), drawn))
+    every = moves | chosen(kind, "pose")
+    joints_changed = jnp.where(every, joints, jnp.where(coded | chosen(kind, "single"), 1, 2))
+    return jnp.clip(jnp.where(here[:, None] & (order < joints_changed), value, poses), low, high)
 
 
-def jittered(key: jax.Array, values: jax.Array, low: jax.Array, high: jax.Array, rate: float, sigma: float) -> jax.Array:
+def eight_bits(values: jax.Array, low: jax.Array, high: jax.Array) -> jax.Array:
+    """The nearest of 256 levels between low and high, as integers."""
+    return jnp.round(255 * jnp.clip((values - low) / jnp.maximum(high - low, 1e-9), 0.0, 1.0)).astype(jnp.int32)
+
+
+def jittered(
+    key: jax.Array, values: jax.Array, low: jax.Array, high: jax.Array, rate: jax.Array | float, sigma: jax.Array | float
+) -> jax.Array:
     """Values [E], each moved with probability `rate` by a Gaussian of `sigma` ranges; never leaves the box."""
     key_which, key_by = jax.random.split(key)
     moved = values + sigma * (high - low) * jax.random.normal(key_by, values.shape)

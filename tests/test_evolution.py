@@ -22,19 +22,28 @@ def near_zero(genomes: Genome) -> jax.Array:
     return -jnp.sum(genomes.key_poses**2, axis=(1, 2))
 
 
-def toy(value: Callable[[Genome], jax.Array] = near_zero, **settings) -> Evolution:
-    def judge(genomes: Genome) -> Judged:
-        terms = value(genomes)[:, None, None]
-        return Judged(terms=terms, failed=~jnp.isfinite(terms[..., 0]), sim_steps=jnp.int32(0), computed_steps=jnp.int32(0))
+@dataclasses.dataclass(frozen=True, eq=False)
+class Toy(Evolution):
+    """An evolution with a judge of its own."""
 
+    value: Callable[[Genome], jax.Array] = near_zero
+
+    def step(self, state: EvolutionState) -> tuple[EvolutionState, GenerationMetrics]:
+        proposal = self.propose(state)
+        terms = self.value(proposal.offspring)[:, None, None]
+        judged = Judged(terms=terms, failed=~jnp.isfinite(terms[..., 0]), sim_steps=jnp.int32(0), computed_steps=jnp.int32(0))
+        return self.absorb(state, proposal, judged)
+
+
+def toy(value: Callable[[Genome], jax.Array] = near_zero, **settings) -> Toy:
     def rank(terms: jax.Array, generation: jax.Array) -> jax.Array:
         return jnp.where(jnp.isfinite(terms[..., 0, 0]), terms[..., 0, 0], -jnp.inf)
 
     config = dataclasses.replace(EvolutionConfig(population=20, generations=30), **settings)
-    return Evolution(config, pose_variation(BOX, config), judge, rank)
+    return Toy(config, pose_variation(BOX, config), rank, value)
 
 
-def run(evolution: Evolution, generations: int = 30, seed: int = 0) -> list[tuple[EvolutionState, GenerationMetrics]]:
+def run(evolution: Toy, generations: int = 30, seed: int = 0) -> list[tuple[EvolutionState, GenerationMetrics]]:
     state, step = evolution.init(jax.random.key(seed), 1, 1), jax.jit(evolution.step)
     history = []
     while len(history) < generations:

@@ -6,7 +6,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from helpers import small_config
 
 from mjxgait.config import ControllerConfig
 from mjxgait.creature import Creature
@@ -55,8 +54,12 @@ def turned(axis: int, angle: float) -> np.ndarray:
     return rotation
 
 
-def tracker(creature: Creature, **settings) -> PoseTracker:
-    return PoseTracker(creature, dataclasses.replace(ControllerConfig(key_poses=3, interpolation=4), **settings), 0.005)
+def tracker(creature: Creature) -> PoseTracker:
+    return PoseTracker(creature, 0.005)
+
+
+def settings(**keys) -> ControllerConfig:
+    return dataclasses.replace(ControllerConfig(key_poses=3, interpolation=4), **keys)
 
 
 def tuning(**genes: float) -> jax.Array:
@@ -69,7 +72,7 @@ def test_the_cycle_is_exact_at_the_key_poses_and_their_mirror_images(shipped: Cr
     cycle = pose_cycle(shipped, jnp.asarray(poses))
     mirrored = shipped.sign * poses[:, shipped.partner]
     for i, pose in enumerate([*poses, *mirrored]):
-        assert np.allclose(interpolate(cycle, jnp.int32(i * 4), 4), pose, atol=1e-6)
+        assert np.allclose(interpolate(cycle, jnp.int32(i * 4), 4, 6), pose, atol=1e-6)
 
 
 def test_the_cycle_is_periodic_and_linear_between_neighbours(stool: Creature):
@@ -77,21 +80,31 @@ def test_the_cycle_is_periodic_and_linear_between_neighbours(stool: Creature):
     for s in range(24):
         a, f = s // 4, (s % 4) / 4
         expected = (1 - f) * np.asarray(cycle[a]) + f * np.asarray(cycle[(a + 1) % 6])
-        assert np.allclose(interpolate(cycle, jnp.int32(s), 4), expected, atol=1e-6)
-        assert np.allclose(interpolate(cycle, jnp.int32(s + 24), 4), expected, atol=1e-5)
+        assert np.allclose(interpolate(cycle, jnp.int32(s), 4, 6), expected, atol=1e-6)
+        assert np.allclose(interpolate(cycle, jnp.int32(s + 24), 4, 6), expected, atol=1e-5)
 
 
 def test_an_unsymmetric_creature_is_not_mirrored(stool: Creature):
-    settings = dataclasses.replace(stool.settings, mirror=dataclasses.replace(stool.settings.mirror, symmetric=False))
-    lopsided = dataclasses.replace(stool, settings=settings)
-    assert pose_cycle(lopsided, jnp.asarray(random_poses(stool))).shape == (3, 4)
-    assert tracker(lopsided).positions == 12
+    alone = dataclasses.replace(stool.settings.mirror, symmetric=False)
+    lopsided = dataclasses.replace(stool, settings=dataclasses.replace(stool.settings, mirror=alone))
+    cycle = tracker(lopsided).prepare(Genome(jnp.asarray(random_poses(stool)), tuning()), settings())
+    assert cycle.poses.shape == (3, 4)
+    assert int(cycle.count) == 3
+
+
+def test_without_the_mirror_the_key_poses_are_the_whole_cycle(stool: Creature):
+    poses = random_poses(stool)
+    cycle = tracker(stool).prepare(Genome(jnp.asarray(poses), tuning(threshold=9.0)), settings(mirror=False))
+    for s in range(24):
+        a, f = (s // 4) % 3, (s % 4) / 4
+        expected = (1 - f) * poses[a] + f * poses[(a + 1) % 3]
+        assert np.allclose(interpolate(cycle.poses, jnp.int32(s), 4, cycle.count), expected, atol=1e-6)
 
 
 def test_a_blocked_creature_stays_and_a_following_one_moves_on(stool: Creature):
     control = tracker(stool)
-    cycle = control.prepare(Genome(jnp.asarray(random_poses(stool)), tuning(threshold=0.1)))
-    target = np.asarray(cycle.key_poses[0])
+    cycle = control.prepare(Genome(jnp.asarray(random_poses(stool)), tuning(threshold=0.1)), settings())
+    target = np.asarray(cycle.poses[0])
     _, blocked, _ = control.target(cycle, control.init(), sensed(stool, target + 0.11))
     _, moved, stride = control.target(cycle, control.init(), sensed(stool, target + 0.09))
     assert (int(blocked.position), int(moved.position), bool(stride)) == (0, 1, False)
@@ -99,7 +112,7 @@ def test_a_blocked_creature_stays_and_a_following_one_moves_on(stool: Creature):
 
 def test_a_stride_is_completed_when_the_cycle_begins_anew(stool: Creature):
     control = tracker(stool)
-    cycle = control.prepare(Genome(jnp.asarray(random_poses(stool)), tuning(threshold=9.0)))
+    cycle = control.prepare(Genome(jnp.asarray(random_poses(stool)), tuning(threshold=9.0)), settings())
     state, strides = control.init(), []
     for _ in range(48):
         _, state, stride = control.target(cycle, state, sensed(stool, stool.stand))
@@ -108,8 +121,8 @@ def test_a_stride_is_completed_when_the_cycle_begins_anew(stool: Creature):
 
 
 def test_the_clock_moves_on_whatever_the_creature_does(stool: Creature):
-    control = tracker(stool, advance="clock")
-    cycle = control.prepare(Genome(jnp.asarray(random_poses(stool)), tuning(period=0.8)))
+    control = tracker(stool)
+    cycle = control.prepare(Genome(jnp.asarray(random_poses(stool)), tuning(period=0.8)), settings(advance="clock"))
     state = GaitState(jnp.int32(0), jnp.float32(0.395))
     _, state, _ = control.target(cycle, state, sensed(stool, stool.stand + 1))
     assert int(state.position) == 12
@@ -140,7 +153,7 @@ def test_without_genes_there_is_no_correction(shipped: Creature):
 
 
 def test_genes_and_bounds_have_the_order_of_the_config(stool: Creature):
-    low, high = PoseTracker(stool, small_config().controller, 0.005).bounds()
+    low, high = tracker(stool).bounds(settings(key_poses=2))
     assert (TUNING[THRESHOLD], TUNING[PERIOD], TUNING[STEER]) == ("threshold", "period", "steer")
     assert np.allclose(low.key_poses, stool.pose_low)
     assert bool(jnp.all(low.tuning <= high.tuning))

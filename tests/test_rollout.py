@@ -11,7 +11,7 @@ from helpers import small_config
 
 from mjxgait.config import Config
 from mjxgait.creature import Creature
-from mjxgait.experiment import Experiment, build_experiment
+from mjxgait.experiment import Experiment, build_experiment, evolution_of
 from mjxgait.fitness import BEYOND, REWARDS, TERMS, fitness_terms, forward_distance, score, stride_limit, weight_vector
 from mjxgait.gait import Genome
 from mjxgait.rollout import Episodes
@@ -21,7 +21,7 @@ from mjxgait.variation import Box, uniform
 
 
 def genomes(experiment: Experiment, count: int, seed: int = 0) -> Genome:
-    return uniform(jax.random.key(seed), Box(*experiment.simulator.tracker.bounds()), count)
+    return uniform(jax.random.key(seed), Box(*experiment.simulator.tracker.bounds(experiment.config.controller)), count)
 
 
 def with_lanes(experiment: Experiment, lanes: int, devices: int) -> Experiment:
@@ -30,7 +30,7 @@ def with_lanes(experiment: Experiment, lanes: int, devices: int) -> Experiment:
 
 
 def simulate(experiment: Experiment, population: Genome, starts: Starts | None = None) -> Episodes:
-    return jax.device_get(jax.jit(experiment.simulator.simulate)(population, starts or experiment.starts))
+    return jax.device_get(jax.jit(experiment.simulate)(population, starts))
 
 
 @pytest.fixture(scope="module")
@@ -76,8 +76,8 @@ def test_a_bad_individual_does_not_touch_its_neighbours(experiment: Experiment, 
 def test_not_finite_means_the_lowest_score(experiment: Experiment):
     population = genomes(experiment, 7)
     poisoned = dataclasses.replace(population, key_poses=population.key_poses.at[2].set(jnp.nan))
-    judged = jax.jit(experiment.evolution.judge)(poisoned)
-    fitness = experiment.evolution.rank(judged.terms, jnp.int32(0))
+    judged = jax.jit(experiment.judge)(poisoned)
+    fitness = evolution_of(experiment.simulator, experiment.config).rank(judged.terms, jnp.int32(0))
     assert np.isneginf(fitness[2])
     assert np.isfinite(np.delete(fitness, 2)).all()
 

@@ -49,7 +49,7 @@ def test_agrees_with_the_paper_in_float64(stool: Creature, moment: dict, force: 
 def test_the_limit_comes_last():
     """The damping that counts is that of the limited torque, so clamping before it would be another controller."""
     force = pd_force(np.array([0.0]), np.array([0.0]), np.array([1.0]), np.array([100.0]), np.array([1.0]), 0.01)
-    assert float(limited_torque(force, np.array([2000.0]), np.array([1.0]), 0.01, np.array([50.0]))[0]) == 50.0
+    assert float(limited_torque(force, np.array([2000.0]), np.array([0.01]), np.array([50.0]))[0]) == 50.0
 
 
 def stand(creature: Creature, stable: bool, kp: float, kd: float, h: float) -> float:

@@ -50,8 +50,9 @@ def distance_to_limit(cost: dict[str, float], peak: dict[str, float], computed_r
 def _lanes(experiment: Experiment, lanes: int) -> Lane:
     """Simulations at the start, as many as a device holds."""
     simulator = experiment.simulator
-    low, _ = simulator.tracker.bounds()
-    genomes = jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], low)
+    low, _ = simulator.tracker.bounds(experiment.config.controller)
+    genomes = jax.tree.map(lambda leaf: leaf[None, None], low)
+    starts, settings = jax.tree.map(lambda leaf: leaf[None], (experiment.row.starts, experiment.row.settings))
     jobs = jnp.zeros(lanes, jnp.int32)
-    lane = jax.vmap(partial(simulator._fresh_lane, genomes, experiment.starts))(jobs, jobs)
+    lane = jax.vmap(partial(simulator._fresh_lane, genomes, starts, settings))(jobs, jobs)
     return jax.tree.map(lambda leaf: jnp.moveaxis(leaf, 0, simulator.plant.lane_axis), lane)

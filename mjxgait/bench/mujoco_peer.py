@@ -24,8 +24,13 @@ class MujocoPeer:
     """One core's share of a workload: the episodes `first`, `first + stride`, ..."""
 
     def __init__(self, workload: Workload, first: int, stride: int, lanes: int = LANES) -> None:
-        if workload.config.controller.law != "spd" or workload.config.controller.constraint_forces:
-            raise ValueError("the peer knows stable PD without constraint forces only")
+        controller = workload.config.controller
+        if (
+            controller.law != "spd"
+            or controller.constraint_forces
+            or (controller.mirror, controller.stiffness, controller.damping) != (True, 1, 1)
+        ):
+            raise ValueError("the peer knows mirrored poses and stable PD with the gains of the creature only")
         self.work, self.creature = workload, workload.creature()
         self.jobs = np.arange(first, workload.episodes, stride)
         self.lanes = min(lanes, len(self.jobs))

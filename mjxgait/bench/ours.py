@@ -24,7 +24,7 @@ class Ours:
         began = time.perf_counter()
         prepare_devices()
         self.folder, self.experiment = folder, build_experiment(load_creature(folder), config)
-        self.first: EvolutionState = jax.jit(self.experiment.init)()
+        self.first: EvolutionState = self.experiment.init()
         self.startup = time.perf_counter() - began
         began = time.perf_counter()
         self.step = self.experiment.compile()

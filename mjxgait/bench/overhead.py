@@ -16,8 +16,8 @@ from rich.console import Console
 from mjxgait import run
 from mjxgait.bench.ours import Ours
 from mjxgait.checkpoint import Checkpoints
-from mjxgait.evolution import EvolutionState, Judged
-from mjxgait.experiment import Experiment
+from mjxgait.evolution import EvolutionState, GenerationMetrics, Judged
+from mjxgait.experiment import Experiment, evolution_of
 from mjxgait.fitness import TERMS
 from mjxgait.screen import Screen
 
@@ -43,8 +43,14 @@ def _operators(experiment: Experiment) -> float:
         terms = jnp.mean(genomes.key_poses, axis=(1, 2))[:, None, None] * jnp.ones((1, rollout.starts, len(TERMS)))
         return Judged(terms, jnp.zeros((count, rollout.starts), bool), jnp.int32(1), jnp.int32(1))
 
-    step = jax.jit(dataclasses.replace(experiment.evolution, judge=stub).step)
-    state, _ = step(jax.jit(experiment.init)())
+    evolution = evolution_of(experiment.simulator, experiment.row.settings)
+
+    @jax.jit
+    def step(state: EvolutionState) -> tuple[EvolutionState, GenerationMetrics]:
+        proposal = evolution.propose(state)
+        return evolution.absorb(state, proposal, stub(proposal.offspring))
+
+    state, _ = step(experiment.init())
     times = []
     for _ in range(REPEATS):
         began = time.perf_counter()
@@ -80,7 +86,7 @@ def _host_loop(ours: Ours, generations: int) -> tuple[float, float, float]:
         checkpoints = _TimedCheckpoints(Path(folder), experiment.config.keep_every)
         screen = Screen(Console(file=io.StringIO()))
         began = time.perf_counter()
-        run._evolve(Path(folder), experiment, step, ours.first, checkpoints, screen, threading.Event())  # type: ignore[arg-type]
+        run._evolve(Path(folder), experiment, step, ours.first, checkpoints, screen, threading.Event())
         whole = time.perf_counter() - began
         screen.close()
         checkpoints.close()

@@ -42,7 +42,8 @@ class Controller:
         self.creature = creature
         self.settings = champion.controller
         self.tuning = champion.tuning
-        self.cycle = pose_cycle(champion.key_poses, creature)
+        self.cycle = pose_cycle(champion.key_poses, creature) if champion.controller.mirror else champion.key_poses
+        self.kp, self.kd = champion.controller.stiffness * creature.kp, champion.controller.damping * creature.kd
         self.length = len(self.cycle) * champion.controller.interpolation
         data = mujoco.MjData(creature.model)
         data.qpos[:] = creature.stand_qpos
@@ -86,11 +87,11 @@ class Controller:
         creature = self.creature
         v = senses.velocity[:, creature.dof_adr]
         if self.settings.law == "pd":
-            wanted = -creature.kp * (senses.joint_pos - target) - creature.kd * v
+            wanted = -self.kp * (senses.joint_pos - target) - self.kd * v
         else:
-            spring_damper = -creature.kp * (senses.joint_pos + time_step * v - target) - creature.kd * v
+            spring_damper = -self.kp * (senses.joint_pos + time_step * v - target) - self.kd * v
             acceleration = self._predicted_acceleration(spring_damper, senses, time_step)
-            wanted = spring_damper - time_step * creature.kd * acceleration
+            wanted = spring_damper - time_step * self.kd * acceleration
         return np.clip(wanted, -creature.torque_limit, creature.torque_limit)
 
     def _predicted_acceleration(self, spring_damper: np.ndarray, senses: Senses, time_step: float) -> np.ndarray:
@@ -101,7 +102,7 @@ class Controller:
             force = force + senses.constraint_force
         force[:, dof] += spring_damper
         damped = senses.mass_matrix.copy()
-        damped[:, dof, dof] += time_step * self.creature.kd
+        damped[:, dof, dof] += time_step * self.kd
         return np.linalg.solve(damped, force[..., None])[:, dof, 0]
 
     def advance(self, position: np.ndarray, target: np.ndarray, joint_pos: np.ndarray, next_time: float) -> np.ndarray:

@@ -41,11 +41,11 @@ class MjxPlant:
     def solve_damped(self, workings: Any, damping: jax.Array, force: jax.Array) -> jax.Array:
         """See `Plant.solve_damped`."""
 
-        def solve(data: mjx.Data, rhs: jax.Array) -> jax.Array:
+        def solve(data: mjx.Data, damping: jax.Array, rhs: jax.Array) -> jax.Array:
             mass = mjx.full_m(self.model, data) + jnp.diag(damping)
             return jax.scipy.linalg.cho_solve(jax.scipy.linalg.cho_factor(mass), rhs)
 
-        return jax.vmap(solve)(workings, force)
+        return jax.vmap(solve)(workings, damping, force)
 
     def advance(self, state: BodyState, workings: Any, torque: jax.Array) -> BodyState:
         """See `Plant.advance`."""

@@ -1,0 +1,84 @@
+"""The config as the compiled program reads it: a pytree whose leaves are its numbers and choices.
+
+Its structure is what decides the shape of the program: two configs of the same structure run in the same compiled program, and many of
+them can be stacked and run side by side. Nothing is compiled anew because a weight or a rate has changed.
+"""
+
+import dataclasses
+from typing import Any, Literal, get_args, get_origin, get_type_hints
+
+import jax
+import jax.numpy as jnp
+
+from mjxgait.config import HOST, SHAPE, Config
+from mjxgait.types import pytree
+
+
+@pytree
+class Choice:
+    """One of some named options, as the program sees it: index: []."""
+
+    index: jax.Array
+    options: tuple[str, ...] = dataclasses.field(metadata={"static": True})
+
+
+def chosen(value: Any, option: str) -> jax.Array:
+    """Whether [] a choice of the config, plain or traced, is this option."""
+    if isinstance(value, Choice):
+        return value.index == value.options.index(option)
+    return jnp.asarray(value == option)
+
+
+def traced(config: Config) -> Config:
+    """The config with arrays as numbers and `Choice` as choices; what only the host reads is at its default."""
+    return _traced(config)
+
+
+def _traced(config: Any) -> Any:
+    values = {}
+    for field, hint, role in _fields(type(config)):
+        value = getattr(config, field.name)
+        if dataclasses.is_dataclass(value):
+            values[field.name] = _traced(value)
+        elif role is HOST:
+            values[field.name] = field.default
+        elif role is SHAPE:
+            values[field.name] = value
+        else:
+            values[field.name] = _leaf(value, hint)
+    return type(config)(**values)
+
+
+def _leaf(value: Any, hint: Any) -> Any:
+    if isinstance(value, tuple):
+        return tuple(jnp.float32(end) for end in value)
+    if isinstance(value, str):
+        options = get_args(hint)
+        return Choice(jnp.int32(options.index(value)), options)
+    plain = get_args(hint)[0] if hasattr(hint, "__metadata__") else hint
+    return jnp.asarray(value, {bool: jnp.bool_, int: jnp.int32}.get(plain, jnp.float32))
+
+
+def _fields(cls: type) -> list[tuple[Any, Any, str]]:
+    """Each field of a config class with its type and its role: `SHAPE`, `HOST`, or empty for a value of the program."""
+    hints = get_type_hints(cls, include_extras=True)
+    rows = []
+    for field in dataclasses.fields(cls):
+        hint = hints[field.name]
+        marks = [mark for mark in getattr(hint, "__metadata__", ()) if mark in (SHAPE, HOST)] if get_origin(hint) is not Literal else []
+        rows.append((field, hint, marks[0] if marks else ""))
+    return rows
+
+
+def _register(cls: type) -> None:
+    """Makes a config class, and those within it, pytrees."""
+    roles = {field.name: role for field, _, role in _fields(cls)}
+    for field in dataclasses.fields(cls):
+        inner: Any = get_type_hints(cls)[field.name]
+        if isinstance(inner, type) and dataclasses.is_dataclass(inner):
+            _register(inner)
+    data = [name for name, role in roles.items() if not role]
+    jax.tree_util.register_dataclass(cls, data_fields=data, meta_fields=[name for name, role in roles.items() if role])
+
+
+_register(Config)

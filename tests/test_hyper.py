@@ -1,0 +1,105 @@
+"""The config as the compiled program reads it, and runs side by side in one program."""
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from helpers import small_config
+
+from mjxgait.config import Config, EvolutionConfig
+from mjxgait.creature import Creature
+from mjxgait.errors import UserError
+from mjxgait.experiment import build_batch, build_experiment
+from mjxgait.hyper import chosen, traced
+
+
+def shape(**tables: dict) -> object:
+    return jax.tree.structure(traced(small_config(**tables)))
+
+
+@pytest.mark.parametrize(
+    "tables",
+    [
+        {"evolution": {"mutation_rate": 0.1, "mutation": "bit", "generations": 7, "remove_duplicates": False}},
+        {"evolution": {"forced": {"enabled": False, "patience": 9}}},
+        {"controller": {"law": "pd", "advance": "clock", "mirror": False, "stiffness": 2.0}},
+        {"rollout": {"terminate": False, "push": 0.0, "worst": 0.0}},
+        {"fitness": {"speed": 0.0, "weights": {"slip": 3.0}}},
+    ],
+    ids=["evolution", "forced", "controller", "rollout", "fitness"],
+)
+def test_numbers_and_switches_do_not_shape_the_program(tables: dict):
+    assert shape(**tables) == shape()
+
+
+@pytest.mark.parametrize(
+    "tables",
+    [
+        {"controller": {"key_poses": 3}},
+        {"evolution": {"population": 8}},
+        {"evolution": {"growth": 1.5}},
+        {"rollout": {"starts": 3}},
+        {"rollout": {"seconds": 0.6}},
+    ],
+    ids=["key poses", "population", "growth", "starts", "seconds"],
+)
+def test_sizes_shape_the_program(tables: dict):
+    assert shape(**tables) != shape()
+
+
+def test_a_choice_is_known_plain_and_traced():
+    config = dataclasses.replace(Config(), evolution=EvolutionConfig(mutation="bit"))
+    for kind in (config.evolution.mutation, traced(config).evolution.mutation):
+        assert bool(chosen(kind, "bit"))
+        assert not bool(chosen(kind, "byte"))
+
+
+VARIANTS = {
+    "as it is": {},
+    "another seed": {"seed": 5},
+    "plain PD": {"controller": {"law": "pd"}},
+    "bit flips by the clock": {"controller": {"advance": "clock"}, "evolution": {"mutation": "bit", "selection": "tournament"}},
+}
+
+
+def variant(tables: dict) -> Config:
+    """A config with the lanes of one that runs alone, so that rounding is the same."""
+    seed = tables.get("seed", 0)
+    return dataclasses.replace(small_config(**{name: table for name, table in tables.items() if name != "seed"}), seed=seed)
+
+
+def test_a_row_equals_the_run_that_runs_alone_to_the_bit(stool: Creature):
+    configs = [variant(tables) for tables in VARIANTS.values()]
+    batch = build_batch(stool, configs)
+    step, states = batch.compile(), batch.place(batch.init())
+    for _ in range(3):
+        states, metrics = step(states)
+    for row, config in enumerate(configs):
+        alone = build_experiment(stool, config)
+        step_alone, state = alone.compile(), alone.place(alone.init())
+        for _ in range(3):
+            state, metrics_alone = step_alone(state)
+        assert np.array_equal(state.fitness, states.fitness[row])
+        assert np.array_equal(state.genomes.key_poses, states.genomes.key_poses[row])
+        assert float(metrics_alone.best) == float(metrics.best[row])
+        assert int(metrics_alone.sim_steps) == int(metrics.sim_steps[row])
+
+
+def test_a_row_that_goes_non_finite_does_not_touch_the_others(stool: Creature):
+    batch = build_batch(stool, [variant({}), variant({"seed": 1})])
+    step, states = batch.compile(), batch.init()
+    poisoned = dataclasses.replace(
+        states, genomes=dataclasses.replace(states.genomes, key_poses=states.genomes.key_poses.at[1].set(jnp.nan))
+    )
+    sound, _ = step(batch.place(states))
+    mixed, metrics = step(batch.place(poisoned))
+    assert np.array_equal(sound.fitness[0], mixed.fitness[0])
+    assert not np.isfinite(metrics.best[1])
+
+
+def test_one_program_serves_every_value(stool: Creature):
+    """Settings that differ in values only are rows of one program, compiled once; those that shape it are refused with a sentence."""
+    with pytest.raises(UserError, match="different shapes"):
+        build_batch(stool, [small_config(), small_config(controller={"key_poses": 3})])
