@@ -20,6 +20,7 @@ COMMANDS = {
     "import": "make a creature folder from a model file: mjxgait import robot.urdf --out envs/mine",
     "check": "validate a creature folder and draw it: mjxgait check envs/mine",
     "bench": "measure the speed against C MuJoCo and DART: mjxgait bench --json FILE",
+    "ablate": "compare settings over seeds, with error bars: mjxgait ablate forced_evolution --out DIR",
     "envs": "list the shipped creatures and configs",
 }
 """Each lives in mjxgait/commands/<name>.py (`import` in import_.py) as `<name>_command` and is imported only when it is called."""

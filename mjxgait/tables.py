@@ -94,5 +94,11 @@ def _keys(cls: type, parents: list[str]) -> list[str]:
     return [field.name for field in dataclasses.fields(cls)]
 
 
-def _without_none(table: Table) -> dict[str, Any]:
-    return {k: _without_none(v) if isinstance(v, Mapping) else v for k, v in table.items() if v is not None}
+def _without_none(value: Any) -> Any:
+    match value:
+        case Mapping():
+            return {key: _without_none(inner) for key, inner in value.items() if inner is not None}
+        case list() | tuple():
+            return [_without_none(inner) for inner in value]
+        case _:
+            return value

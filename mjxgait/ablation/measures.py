@@ -1,0 +1,108 @@
+"""One number per run and measure: from its log, and from C MuJoCo, where all variants are judged alike whatever they evolved for."""
+
+import dataclasses
+import json
+import math
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mjxgait.ablation.plan import Plan, Run
+from mjxgait.ablation.rows import GROUPS, champion_path
+from mjxgait.certify import certify
+from mjxgait.certify.simulate import simulate
+from mjxgait.certify.starts import join, nominal_starts, perturbed_starts
+from mjxgait.champion import Champion, read_champion
+from mjxgait.checkpoint import disk_errors
+from mjxgait.creature import Creature
+from mjxgait.folder import METRICS, read_metrics
+
+MEASURED = "measured.jsonl"
+SECONDS, STARTS, SEED = 22.0, 16, 1000
+"""Of the walk that judges every champion: perturbed as in the certificate, from starts that no evolution has seen."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Result:
+    """What became of a run.
+
+    walk: body lengths per second covered before the fall or the end, mean over unseen perturbed starts. up: share of them that stay up.
+    certified: whether the champion passes the whole certificate; None when nobody asked. fitness: best at the end. area: mean of the
+    best over the generations. generations: until the best reached the study's threshold, one more than there were if it never did.
+    steps: creature-steps that the run lived. finite: whether it found anybody who could be judged.
+    """
+
+    variant: str
+    seed: int
+    walk: float
+    up: float
+    certified: bool | None
+    fitness: float
+    area: float
+    generations: int
+    steps: int
+    finite: bool
+
+    def value(self, measure: str) -> float:
+        """Of a measure, as a number."""
+        return float(getattr(self, measure) or 0.0)
+
+
+def read_logs(folder: Path) -> list[dict[str, Any]]:
+    """Every generation of every run that a study has logged so far."""
+    files = sorted((folder / GROUPS).glob(f"*/{METRICS}"), key=lambda file: int(file.parent.name))
+    return [line for file in files for line in read_metrics(file)]
+
+
+def measure(folder: Path, creature: Creature, plan: Plan, tell: Callable[[int, int], None]) -> list[Result]:
+    """The result of every run, in the order of the plan. What has been measured before is not measured again."""
+    known = {(line["variant"], line["seed"]): Result(**line) for line in _measured(folder)}
+    lines: dict[tuple[str, int], list[dict[str, Any]]] = {}
+    for line in read_logs(folder):
+        lines.setdefault((line["variant"], line["seed"]), []).append(line)
+    for number, run in enumerate(plan.runs):
+        place = (run.variant, run.seed)
+        if place in known:
+            continue
+        tell(number, len(plan.runs))
+        known[place] = _result(creature, plan, run, lines[place], champion_path(folder, plan, run))
+        with disk_errors(folder), (folder / MEASURED).open("a", encoding="utf-8") as log:
+            log.write(json.dumps(dataclasses.asdict(known[place])) + "\n")
+    return [known[run.variant, run.seed] for run in plan.runs]
+
+
+def _measured(folder: Path) -> list[dict[str, Any]]:
+    return read_metrics(folder / MEASURED)
+
+
+def _result(creature: Creature, plan: Plan, run: Run, lines: Sequence[Mapping[str, Any]], path: Path) -> Result:
+    champion = read_champion(path, creature)
+    best = [-math.inf if line["best"] is None else line["best"] for line in lines]
+    finite = math.isfinite(best[-1])
+    walk, up, nominal = _walk(creature, champion) if finite else (0.0, 0.0, 0.0)
+    threshold = plan.study.threshold
+    reached = [i for i, value in enumerate(best) if threshold is not None and value >= threshold]
+    # One that falls or lags this far behind the speed that the certificate asks for cannot pass, so the long examination is spared.
+    worth = nominal > 0.4
+    return Result(
+        variant=run.variant,
+        seed=run.seed,
+        walk=walk,
+        up=up,
+        certified=(worth and certify(creature, champion).passed) if plan.study.certify else None,
+        fitness=best[-1] if finite else -1e9,
+        area=float(np.mean([value for value in best if math.isfinite(value)])) if finite else -1e9,
+        generations=reached[0] if reached else run.generations + 1,
+        steps=sum(line["sim_steps"] for line in lines),
+        finite=finite,
+    )
+
+
+def _walk(creature: Creature, champion: Champion) -> tuple[float, float, float]:
+    """Mean speed and share up over the unseen starts, and the speed from the undisturbed start (0 if it falls)."""
+    starts = join(nominal_starts(creature, 1), perturbed_starts(creature, STARTS, np.random.default_rng(SEED)))
+    outcome = simulate(creature, champion, starts, SECONDS)
+    speed = outcome.travel[:, 0] / creature.body_length / SECONDS
+    return float(speed[1:].mean()), float(outcome.stayed_up[1:].mean()), float(speed[0] * outcome.stayed_up[0])

@@ -1,0 +1,119 @@
+"""Comparisons of samples of runs, with error bars. Values: [S], one per seed; higher is better.
+
+Follows Agarwal et al. 2021, "Deep reinforcement learning at the edge of the statistical precipice": interquartile means, intervals
+instead of points, probability of improvement. All random draws are from a fixed seed: the same values give the same numbers.
+"""
+
+import dataclasses
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from scipy import stats
+
+RESAMPLES = 9999
+CONFIDENCE = 0.95
+
+
+@dataclasses.dataclass(frozen=True)
+class Estimate:
+    """A value with its 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Comparison:
+    """A variant against the base.
+
+    difference: of interquartile means. improvement: probability that a run of the variant beats one of the base.
+    p: of a permutation test of the difference. corrected: p after Holm's correction for all comparisons of the study.
+    """
+
+    difference: Estimate
+    improvement: Estimate
+    p: float
+    corrected: float
+
+
+def interquartile_mean(values: np.ndarray, axis: int = -1) -> np.ndarray:
+    """Mean of the middle half."""
+    return np.asarray(stats.trim_mean(values, 0.25, axis=axis))
+
+
+def estimate(values: np.ndarray) -> Estimate:
+    """Interquartile mean with its bias-corrected and accelerated bootstrap interval (Efron 1987)."""
+    return _bootstrap((values,), interquartile_mean, paired=False)
+
+
+def compare(base: np.ndarray, variants: Sequence[np.ndarray], paired: bool) -> list[Comparison]:
+    """Each variant against the base; paired: whether the i-th values of both come from the same seed."""
+    rows = [
+        (_difference(base, values, paired), improvement(base, values, paired), permutation_p(base, values, paired)) for values in variants
+    ]
+    corrected = holm([p for *_, p in rows])
+    return [Comparison(*row, after) for row, after in zip(rows, corrected, strict=True)]
+
+
+def improvement(base: np.ndarray, values: np.ndarray, paired: bool = False) -> Estimate:
+    """Probability that a run of the variant is better than one of the base; ties count half (Mann & Whitney's U over all pairs)."""
+
+    def better(a: np.ndarray, b: np.ndarray, axis: int = -1) -> np.ndarray:
+        a, b = np.moveaxis(a, axis, -1), np.moveaxis(b, axis, -1)
+        sign = np.sign(b[..., None, :] - a[..., :, None])
+        return np.asarray(0.5 + 0.5 * sign.mean(axis=(-1, -2)))
+
+    return _bootstrap((base, values), better, paired)
+
+
+def permutation_p(base: np.ndarray, values: np.ndarray, paired: bool) -> float:
+    """Chance of a difference as large, either way, if the variant did nothing: labels swapped within seeds, or anyhow when unpaired."""
+    kind = "samples" if paired else "independent"
+    rng = np.random.default_rng(0)
+    result = stats.permutation_test((base, values), _gap, permutation_type=kind, vectorized=True, n_resamples=RESAMPLES, rng=rng)
+    return float(result.pvalue)
+
+
+def holm(ps: Sequence[float]) -> list[float]:
+    """p values corrected for their number (Holm 1979)."""
+    order = np.argsort(ps, kind="stable")
+    scaled = [min(1.0, (len(ps) - rank) * ps[i]) for rank, i in enumerate(order)]
+    corrected = np.empty(len(ps))
+    corrected[order] = np.maximum.accumulate(scaled) if len(ps) else []
+    return [float(p) for p in corrected]
+
+
+def share(successes: int, count: int) -> Estimate:
+    """A share with its Wilson score interval (Wilson 1927)."""
+    interval = stats.binomtest(successes, count).proportion_ci(CONFIDENCE, method="wilson")
+    return Estimate(successes / count, float(interval.low), float(interval.high))
+
+
+def _gap(base: np.ndarray, values: np.ndarray, axis: int = -1) -> np.ndarray:
+    return interquartile_mean(values, axis) - interquartile_mean(base, axis)
+
+
+def _difference(base: np.ndarray, values: np.ndarray, paired: bool) -> Estimate:
+    return _bootstrap((base, values), _gap, paired)
+
+
+def _bootstrap(samples: tuple[np.ndarray, ...], statistic: Callable[..., np.ndarray], paired: bool) -> Estimate:
+    """BCa where it is defined, percentiles where it is not (many equal values)."""
+    value = float(statistic(*samples, axis=-1))
+    for method in ("BCa", "percentile"):
+        with np.errstate(all="ignore"):
+            found = stats.bootstrap(
+                samples,
+                statistic,
+                vectorized=True,
+                paired=paired,
+                n_resamples=RESAMPLES,
+                confidence_level=CONFIDENCE,
+                method=method,
+                rng=np.random.default_rng(0),
+                batch=500,
+            ).confidence_interval
+        if np.isfinite([found.low, found.high]).all():
+            break
+    return Estimate(value, float(found.low), float(found.high))

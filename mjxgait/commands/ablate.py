@@ -1,0 +1,153 @@
+"""`mjxgait ablate`: compare variants of the settings over seeds, with error bars."""
+
+import dataclasses
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import tyro
+
+from mjxgait.config import find_creature
+from mjxgait.creature import Creature, load_creature
+from mjxgait.errors import INTERRUPTED, UserError
+from mjxgait.folder import CREATURE
+from mjxgait.tables import build, dump_toml, read_toml
+
+STUDY = "study.toml"
+OVER = ("env", "seeds", "first_seed", "generations", "config")
+"""Options that lie over keys of the study of the same name."""
+EXPECTED_SPEED = 0.8e6
+"""Creature-steps per second of two cores; only for the estimate."""
+
+
+@dataclasses.dataclass(frozen=True)
+class AblateOptions:
+    """Run a study: variants times seeds, side by side, with a report (docs/ablations.md).
+
+    Writes report.md, report.html, results.csv and generations.parquet into the folder of the study.
+
+    Attributes:
+      study: File of a study, or the name of a shipped one; with --resume it is not needed.
+      out: Folder for the study; by default one under runs/.
+      env: Another creature than the study names.
+      seeds: Another number of seeds.
+      first_seed: Another first seed.
+      generations: Another number of generations.
+      config: Another base config: a TOML file, or the name of a shipped one.
+      resume: Folder of a study to go on with, as it was.
+      hours: Refuse a study that would take longer than this.
+      dry_run: Only say what would be run, and how long it would take.
+    """
+
+    study: tyro.conf.Positional[Path | None] = None
+    out: Path | None = None
+    env: str | None = None
+    seeds: int | None = None
+    first_seed: int | None = None
+    generations: int | None = None
+    config: str | None = None
+    resume: Path | None = None
+    hours: float = 12.0
+    dry_run: bool = False
+
+
+def ablate_command(arguments: Sequence[str]) -> int:
+    """Returns the exit code."""
+    options = tyro.cli(AblateOptions, args=list(arguments), prog="mjxgait ablate")
+    from mjxgait.ablation.measures import measure, read_logs
+    from mjxgait.ablation.plan import make_plan, read_study
+    from mjxgait.ablation.report import write_report
+
+    folder = options.resume or options.out or Path("runs") / f"ablate-{options.study.stem if options.study else ''}"
+    if options.resume:
+        study, creature = _open(folder)
+    else:
+        if options.study is None:
+            raise UserError("name the file of a study, such as: mjxgait ablate forced_evolution --out runs/forced")
+        over = {name: getattr(options, name) for name in OVER}
+        study = read_study(options.study, over)
+        creature = load_creature(find_creature(study.env))
+    plan = make_plan(study, creature, str(options.study or folder / STUDY))
+    from mjxgait.ablation.rows import groups, run_study  # JAX takes a second to import: only once the study is known to be good
+    from mjxgait.experiment import prepare_devices
+
+    prepare_devices()
+    hours = _hours(plan.upper_bound(creature), len(parts := groups(plan)))
+    print(
+        f"{len(plan.variants)} variants × {study.seeds} seeds = {len(plan.runs)} runs in {len(parts)} "
+        f"program{'s' if len(parts) > 1 else ''}; at most {plan.upper_bound(creature) / 1e6:.0f} M creature-steps, "
+        f"about {_duration(3600 * hours)} at most on two cores"
+    )
+    if hours > options.hours:
+        raise UserError(f"this study may take {hours:.0f} hours; take fewer --seeds or --generations, or allow it with --hours {hours:.0f}")
+    if options.dry_run:
+        return 0
+    if not options.resume:
+        _create(folder, study, creature)
+    screen = _Progress()
+    if not run_study(folder, creature, plan, screen.generation):
+        print(f"interrupted; go on with: mjxgait ablate --resume {folder}")
+        return INTERRUPTED
+    results = measure(folder, creature, plan, screen.measuring)
+    command = shlex.join(["mjxgait", "ablate", *_repeatable(options)])
+    report = write_report(folder, plan, results, read_logs(folder), command)
+    print(report.read_text(encoding="utf-8"))
+    print(f"report        {report}, {report.with_suffix('.html')}")
+    return 0
+
+
+class _Progress:
+    """Plain lines; time left from the generations so far."""
+
+    def generation(self, group: int, count: int, news: dict[str, Any]) -> None:
+        where = f"program {group + 1} of {count}" if count > 1 else "all runs"
+        if "compiling" in news:
+            print(f"{where}: compiling for {news['compiling']} runs side by side", flush=True)
+            return
+        left = (news["of"] - news["generation"]) * news["seconds"]
+        speed = news["steps"] / news["seconds"] / 1e6
+        print(f"{where}: generation {news['generation']} of {news['of']}, {speed:.2f} M steps/s, {_duration(left)} left", flush=True)
+
+    def measuring(self, number: int, count: int) -> None:
+        print(f"examining champion {number + 1} of {count} in C MuJoCo", flush=True)
+
+
+def _create(folder: Path, study: Any, creature: Creature) -> None:
+    """Makes the folder of a study with its exact file and creature."""
+    try:
+        if folder.exists() and any(folder.iterdir()):
+            raise UserError(f"{folder}: holds something already; name another folder with --out, or go on with --resume {folder}")
+        (folder / CREATURE).mkdir(parents=True, exist_ok=True)
+        for name, text in creature.files.items():
+            (folder / CREATURE / name).write_text(text, encoding="utf-8")
+        (folder / STUDY).write_text(dump_toml(study), encoding="utf-8")
+    except OSError as error:
+        raise UserError(f"{folder}: cannot be written ({error.strerror})") from None
+
+
+def _open(folder: Path) -> tuple[Any, Creature]:
+    from mjxgait.ablation.plan import Study
+
+    if not (folder / STUDY).is_file():
+        raise UserError(f"{folder}: not the folder of a study (it has no {STUDY})")
+    return build(Study, read_toml(folder / STUDY), str(folder / STUDY)), load_creature(folder / CREATURE)
+
+
+def _repeatable(options: AblateOptions) -> list[str]:
+    """The options that decide the results, without folders: the report is the same wherever it is made."""
+    if options.resume:
+        return ["study.toml"]
+    parts = [str(options.study)]
+    for name in OVER:
+        if getattr(options, name) is not None:
+            parts += [f"--{name.replace('_', '-')}", str(getattr(options, name))]
+    return parts
+
+
+def _hours(steps: int, programs: int) -> float:
+    return (steps / EXPECTED_SPEED + 20 * programs) / 3600
+
+
+def _duration(seconds: float) -> str:
+    return f"{seconds / 3600:.1f} h" if seconds > 5400 else f"{seconds / 60:.0f} min" if seconds > 90 else f"{seconds:.0f} s"

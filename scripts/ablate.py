@@ -1,0 +1,7 @@
+"""Compares variants of the settings: `python scripts/ablate.py forced_evolution --out runs/forced`. The same as `mjxgait ablate`."""
+
+import sys
+
+from mjxgait.cli import main
+
+main(["ablate", *sys.argv[1:]])

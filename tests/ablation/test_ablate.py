@@ -1,0 +1,149 @@
+"""The command as a user runs it: a report with everything, rows that equal runs alone, kills that lose nothing."""
+
+import json
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pyarrow.parquet
+import pytest
+from helpers import STOOL
+
+from mjxgait.folder import read_metrics
+
+STUDY = f"""
+question = "Does plain PD do as well?"
+env = "{STOOL.as_posix()}"
+seeds = 3
+generations = 4
+
+[base]
+evolution = {{ population = 6 }}
+rollout = {{ seconds = 0.4, starts = 2, physics = "mjx", lanes = 4 }}
+
+[[variant]]
+name = "stable PD"
+
+[[variant]]
+name = "plain PD"
+settings = {{ controller = {{ law = "pd" }} }}
+
+[[variant]]
+name = "three key poses"
+settings = {{ controller = {{ key_poses = 3 }} }}
+generations = 3
+"""
+
+
+def command(*arguments: object) -> list[str]:
+    return [sys.executable, "-m", "mjxgait", *map(str, arguments)]
+
+
+def mjxgait(*arguments: object, code: int = 0) -> str:
+    done = subprocess.run(command(*arguments), capture_output=True, text=True, timeout=300)
+    assert done.returncode == code, done.stderr
+    assert "Traceback" not in done.stderr
+    return done.stdout + done.stderr
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("study") / "law.toml"
+    path.write_text(STUDY)
+    return path
+
+
+@pytest.fixture(scope="module")
+def finished(study: Path) -> tuple[Path, str]:
+    folder = study.parent / "out"
+    return folder, mjxgait("ablate", study, "--out", folder)
+
+
+def test_the_report_holds_everything(finished: tuple[Path, str]):
+    folder, said = finished
+    assert "3 variants × 3 seeds = 9 runs in 2 programs" in said
+    report = (folder / "report.md").read_text()
+    for words in ("# Does plain PD do as well?", "| stable PD |", "| plain PD |", "What can be concluded, and what cannot", "p corrected"):
+        assert words in report
+    page = (folder / "report.html").read_text()
+    assert "<table>" in page
+    assert page.count("data:image/png;base64,") == 2
+    results = (folder / "results.csv").read_text().splitlines()
+    assert len(results) == 1 + 9
+    generations = pyarrow.parquet.read_table(folder / "generations.parquet").to_pylist()
+    assert len(generations) == 6 * 5 + 3 * 4
+    assert {"variant", "seed", "generation", "best", "sim_steps", "term_distance"} <= generations[0].keys()
+
+
+def test_a_row_is_the_run_that_train_makes(finished: tuple[Path, str], tmp_path: Path):
+    """Same seed, same settings: the same log to the last bit."""
+    folder, _ = finished
+    train = ["train", "--env", STOOL, "--seed", "1", "--population", "6", "--generations", "4", "--controller.law", "pd"]
+    train += ["--rollout.seconds", "0.4", "--rollout.starts", "2", "--rollout.physics", "mjx", "--rollout.lanes", "4"]
+    train += ["--evolution.forced.patience", "0", "--examination.candidates", "0", "--no-plots", "--out", tmp_path / "alone"]
+    mjxgait(*train)
+    row = [line for line in read_metrics(folder / "groups/0/metrics.jsonl") if (line["variant"], line["seed"]) == ("plain PD", 1)]
+    alone = read_metrics(tmp_path / "alone/metrics.jsonl")
+    for mine, other in zip(row, alone, strict=True):
+        ignored = {"variant", "seed", "wall_s", "steps_per_second", "computed_steps"}
+        assert {k: v for k, v in mine.items() if k not in ignored} == {k: v for k, v in other.items() if k not in ignored}
+
+
+def test_the_same_data_give_the_same_report_byte_for_byte(finished: tuple[Path, str], tmp_path: Path):
+    folder, _ = finished
+    copy = tmp_path / "copy"
+    shutil.copytree(folder, copy)
+    names = ("report.md", "report.html", "results.csv", "generations.parquet", "curves.png", "intervals.png")
+    for name in names:
+        (copy / name).unlink()
+    mjxgait("ablate", "--resume", copy)
+    again = tmp_path / "again"
+    shutil.copytree(copy, again)
+    mjxgait("ablate", "--resume", again)
+    for name in names:
+        assert (again / name).read_bytes() == (copy / name).read_bytes(), name
+    assert (copy / "results.csv").read_bytes() == (folder / "results.csv").read_bytes()
+
+
+def test_a_killed_study_goes_on_and_ends_the_same(finished: tuple[Path, str], study: Path, tmp_path: Path):
+    whole, _ = finished
+    folder = tmp_path / "killed"
+    process = subprocess.Popen(command("ablate", study, "--out", folder), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    log = folder / "groups/0/metrics.jsonl"
+    while not (log.exists() and any(line["generation"] >= 1 for line in read_metrics(log))):
+        assert process.poll() is None
+        time.sleep(0.02)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    mjxgait("ablate", "--resume", folder)
+    assert (folder / "results.csv").read_bytes() == (whole / "results.csv").read_bytes()
+    assert (folder / "generations.parquet").read_bytes() == (whole / "generations.parquet").read_bytes()
+
+
+def test_a_study_that_would_take_days_is_refused_with_the_estimate(study: Path, tmp_path: Path):
+    said = mjxgait("ablate", study, "--generations", "10000000", "--out", tmp_path / "x", code=2)
+    assert "hours" in said
+    assert not (tmp_path / "x").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["nosuch"], "nosuch: no such file"),
+        ([], "name the file of a study"),
+        (["--resume", "nowhere"], "not the folder of a study"),
+        (["switches", "--env", "dragon"], 'unknown creature "dragon"'),
+    ],
+)
+def test_mistakes_are_one_sentence(arguments: list[str], words: str):
+    assert words in mjxgait("ablate", *arguments, code=2)
+
+
+def test_a_folder_in_use_is_left_alone(finished: tuple[Path, str], study: Path):
+    folder, _ = finished
+    before = json.dumps(sorted(path.name for path in folder.iterdir()))
+    assert "--resume" in mjxgait("ablate", study, "--out", folder, code=2)
+    assert json.dumps(sorted(path.name for path in folder.iterdir())) == before
