@@ -154,13 +154,17 @@ class Batch:
         count, one = len(self.experiments), jax.eval_shape(self.experiments[0].init)
         return jax.tree.map(lambda leaf: jax.ShapeDtypeStruct((count, *leaf.shape), leaf.dtype), one)
 
-    def compile(self) -> Step:
-        """A generation of all rows as one compiled program: states and metrics have leaves [B, ...]."""
+    def lower(self) -> jax.stages.Lowered:
+        """The program of a generation, the same for all settings of the same shape: what has been compiled once is found again."""
         simulator = self.experiments[0].simulator
         everywhere = _everywhere(simulator)
         program = jax.jit(partial(_generation, simulator), in_shardings=everywhere, out_shardings=everywhere)
-        rows = jax.device_put(self.rows, everywhere)
-        return partial(program.lower(rows, self.abstract()).compile(compiler_options=_compiler_options()), rows)
+        return program.lower(self.rows, self.abstract())
+
+    def compile(self) -> Step:
+        """A generation of all rows as one compiled program: states and metrics have leaves [B, ...]."""
+        rows = jax.device_put(self.rows, _everywhere(self.experiments[0].simulator))
+        return partial(self.lower().compile(compiler_options=_compiler_options()), rows)
 
     def place(self, states: EvolutionState) -> EvolutionState:
         """The states on all devices, where the compiled program wants them."""

@@ -100,6 +100,11 @@ def test_a_row_that_goes_non_finite_does_not_touch_the_others(stool: Creature):
 
 
 def test_one_program_serves_every_value(stool: Creature):
-    """Settings that differ in values only are rows of one program, compiled once; those that shape it are refused with a sentence."""
+    """Another seed, weight or mutation is found in the compilation cache: the program's text is the same."""
+    texts = {build_batch(stool, [variant(tables)]).lower().as_text() for tables in VARIANTS.values()}
+    assert len(texts) == 1
+
+
+def test_settings_of_different_shapes_are_refused(stool: Creature):
     with pytest.raises(UserError, match="different shapes"):
         build_batch(stool, [small_config(), small_config(controller={"key_poses": 3})])
