@@ -11,6 +11,7 @@ import numpy as np
 
 from mjxgait.errors import UserError
 from mjxgait.importing.anatomy import Anatomy, find_anatomy, in_plane
+from mjxgait.importing.balance import steady_balance
 from mjxgait.importing.body import Puppet
 from mjxgait.importing.drive import Drive, plan_drive
 from mjxgait.importing.hold import Held, hold
@@ -101,6 +102,8 @@ def _import(path: Path, choices: ImportChoices, notes: Notes) -> Imported:
     planar = is_planar(puppet, start) is not None
     mirror = find_mirror(puppet, start, planar, notes)
     best = _stand(puppet, _poses(puppet, model, anatomy, source, start), mirror, planar, notes)
+    feet = {name for foot in best.feet for name in foot}
+    steady_balance(best.drive, best.puppet.names, best.model, best.qpos, feet, best.notes)
     name = plain_names([choices.name or path.stem], ["creature"])[0]
     check_same(model, anatomy, best.puppet, best.model)
     return _folder(name, path.name, best, mirror, planar)

@@ -1,6 +1,7 @@
 """Lets a creature stand in C MuJoCo with stable PD, and tells whether it does."""
 
 import dataclasses
+from collections.abc import Callable
 
 import mujoco
 import numpy as np
@@ -34,18 +35,32 @@ class Held:
 
 
 def hold(
-    model: mujoco.MjModel, qpos: np.ndarray, kp: np.ndarray, kd: np.ndarray, limit: np.ndarray, feet: set[str], seconds: float = SECONDS
+    model: mujoco.MjModel,
+    qpos: np.ndarray,
+    kp: np.ndarray,
+    kd: np.ndarray,
+    limit: np.ndarray,
+    feet: set[str],
+    seconds: float = SECONDS,
+    *,
+    stand: np.ndarray | None = None,
+    correct: Callable[[mujoco.MjData], np.ndarray] | None = None,
 ) -> Held:
-    """Stands for some seconds with targets at the joint angles of qpos [nq]. kp, kd, limit: [J]. feet: names of geoms that may touch."""
+    """Stands for some seconds from qpos [nq]. kp, kd, limit: [J]. feet: names of geoms that may touch.
+
+    Args:
+      stand: [J] target angles, those of qpos where it is None. correct: the change [J] of the target at a moment.
+    """
     data = mujoco.MjData(model)
     data.qpos[:] = qpos
     mujoco.mj_forward(model, data)
     up_axis, start = data.xmat[1].reshape(3, 3).T @ [0.0, 0.0, 1.0], data.xpos[1].copy()
-    step, target, mass = model.opt.timestep, qpos[7:].copy(), np.zeros((model.nv, model.nv))
+    step, goal, mass = model.opt.timestep, qpos[7:] if stand is None else stand, np.zeros((model.nv, model.nv))
     up, height, touched = 1.0, 1.0, ""
     for _ in range(round(seconds / step)):
         mujoco.mj_step1(model, data)
         mujoco.mj_fullM(model, data, mass)
+        target = goal + correct(data) if correct else goal
         spring = -kp * (data.qpos[7:] + step * data.qvel[6:] - target) - kd * data.qvel[6:]
         force = data.qfrc_passive - data.qfrc_bias
         force[6:] += spring
@@ -61,7 +76,7 @@ def hold(
         touched = touched or _touching(model, data, feet)
         if up < 0.3:
             break
-    error = data.qpos[7:] - target
+    error = data.qpos[7:] - goal
     moved = float(np.linalg.norm(data.xpos[1][:2] - start[:2]))
     return Held(up, height, moved, float(np.sqrt((error**2).mean())), float(np.sqrt((data.qvel[6:] ** 2).mean())), touched)
 

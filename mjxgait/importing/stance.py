@@ -127,7 +127,10 @@ class Search:
         return float(np.mean(ratios))
 
     def cost(self, q: np.ndarray) -> float:
-        """How bad a stance is: uneven feet, weight beside them, other parts low, stretched legs, limits near, far from the file's pose."""
+        """How bad a stance is.
+
+        Uneven feet, weight beside them, other parts low, stretched legs, feet within the hips, limits near, far from the file's pose.
+        """
         puppet, hip = self.puppet, self.hip
         xpos, xrot = puppet.pose(q)
         soles = puppet.sole_points(xpos, xrot)
@@ -138,11 +141,13 @@ class Search:
         others = [height_of(puppet.bodies, xpos, xrot, s) - floor for s in self.segments]
         others.append(puppet.shank_height(xpos, xrot) - floor)
         crouched = sum(max(0.2 - h / hip, 0.0) for h in others)
-        stretched = beneath = 0.0
+        stretched = beneath = narrow = 0.0
         for f, leg in enumerate(self.legs):
             anchors = puppet.data.xanchor[[j + 1 for j in leg]]
             path = np.concatenate([anchors, middles[f][None]])
             beneath += max(float(np.linalg.norm(path[-1][:2] - path[0][:2])) / hip - 0.3, 0.0)
+            side = float(anchors[np.abs(anchors[:, 1]).argmax(), 1])
+            narrow += max(abs(side) - float(middles[f][1]) * np.sign(side), 0.0) / hip
             ratio = straightness(path)
             stretched += max(ratio - 0.94, 0.0) + max(0.75 - ratio, 0.0)
         near = np.maximum(MARGIN - np.minimum(q - puppet.low, puppet.high - q), 0.0) / MARGIN
@@ -155,6 +160,7 @@ class Search:
             + 40 * stretched
             + 0.3 * (near**2).mean()
             + 3 * beneath
+            + (0 if self.planar else 20 * narrow)  # feet within the hips: what steps so tips over
             + 200 * tilted
             + 5 * low_trunk
             + 0.2 * ((q - self.start) ** 2).mean()

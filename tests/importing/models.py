@@ -1,5 +1,7 @@
 """Two small animals that tests import: an MJCF quadruped with what real files hold, and a URDF biped."""
 
+from functools import reduce
+
 LEG = """
       <body name="{n}_thigh" pos="{x} {y} 0">
         <joint name="{n}_hip" type="hinge" axis="0 1 0" range="-60 60"/>
@@ -10,6 +12,8 @@ LEG = """
         </body>
       </body>"""
 CORNERS = {"fl": (0.2, 0.1), "fr": (0.2, -0.1), "hl": (-0.2, 0.1), "hr": (-0.2, -0.1)}
+ROLL = '<joint name="{n}_roll" axis="1 0 0" range="-40 40"/>'
+"""A second hinge at the hip, which swings the leg sideways."""
 LEGS = "".join(LEG.format(n=n, x=x, y=y) for n, (x, y) in CORNERS.items())
 QUADRUPED = f"""<mujoco model="quad">
   <compiler angle="degree"/>
@@ -33,6 +37,8 @@ QUADRUPED = f"""<mujoco model="quad">
   <sensor><gyro site="imu"/></sensor>
 </mujoco>
 """
+
+ROLLING = reduce(lambda text, n: text.replace(hip := f'<joint name="{n}_hip"', ROLL.format(n=n) + hip), CORNERS, QUADRUPED)
 
 LINK = """
   <link name="{name}">

@@ -9,6 +9,7 @@ from importing.packages import MODELS, model_file
 
 from mjxgait.commands.import_ import write_folder
 from mjxgait.creature import load_creature
+from mjxgait.creature.geometry import ancestors
 from mjxgait.errors import UserError
 from mjxgait.importing import ImportChoices, import_model
 from mjxgait.importing.portrait import standing
@@ -70,3 +71,20 @@ def test_the_ant_is_the_same_animal(tmp_path: Path):
     np.testing.assert_allclose(after.body_pos[2:], before.body_pos[2:], atol=1e-6)
     np.testing.assert_allclose(after.jnt_axis[1:], before.jnt_axis[1:], atol=1e-6)
     np.testing.assert_allclose(after.jnt_pos[1:], before.jnt_pos[1:], atol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["laikago", "mini cheetah", "solo12"])
+def test_a_stance_that_was_searched_has_no_foot_within_the_hips(tmp_path: Path, name: str):
+    """Legs tucked in or crossed under the trunk stand, but whatever steps from there tips over."""
+    path, search = model_file(name)
+    write_folder(tmp_path / "mine", import_model(path, ImportChoices(search=search, apart=False)))
+    creature = load_creature(tmp_path / "mine")
+    data = mujoco.MjData(creature.model)
+    data.qpos[:] = creature.stand_qpos
+    mujoco.mj_kinematics(creature.model, data)
+    left = creature.stand_rot @ creature.left
+    for geom in creature.watched[: len(creature.foot_of)]:
+        bodies = ancestors(creature.model, int(creature.model.geom_bodyid[geom]))
+        hips = [data.xanchor[j] @ left for j in range(1, creature.model.njnt) if creature.model.jnt_bodyid[j] in bodies]
+        hip = max(hips, key=abs)
+        assert data.geom_xpos[geom] @ left * np.sign(hip) > abs(hip) - 0.03 * creature.hip_height
