@@ -42,6 +42,13 @@ def geom_reach(model: mujoco.MjModel, data: mujoco.MjData, geom: int, direction:
     return float(data.geom_xpos[geom] @ direction + r + np.abs(u) @ box + np.sqrt(((u * ellipsoid) ** 2).sum()))
 
 
+def body_length(model: mujoco.MjModel, data: mujoco.MjData, forward: np.ndarray) -> float:
+    """From the foremost to the hindmost point along a world direction [3]; m."""
+    parts = [g for g in range(model.ngeom) if model.geom_bodyid[g] != 0]
+    front = max(geom_reach(model, data, g, forward) for g in parts)
+    return front + max(geom_reach(model, data, g, -forward) for g in parts)
+
+
 def ancestors(model: mujoco.MjModel, body: int) -> list[int]:
     """The bodies from `body` up to, but without, the world."""
     chain = []

@@ -188,7 +188,7 @@ def _assemble(settings: CreatureSettings, files: Mapping[str, str], model: mujoc
         foot_names=tuple(model.body(b).name for b in feet),
         ground=ground,
         hip_height=float(geometry.leg_lengths(model, data, feet, joints).mean()),
-        body_length=settings.creature.body_length or _body_length(model, data, world[:, 0]),
+        body_length=settings.creature.body_length or geometry.body_length(model, data, world[:, 0]),
         mass=float(model.body_mass.sum()),
     )
     _check(creature, data)
@@ -297,12 +297,6 @@ def _check_names(names: list[str], partner: np.ndarray) -> None:
             raise UserError(
                 f'joint "{name}" mirrors to "{other}" by its geometry but to "{swapped}" by its name; settle it in [mirror] pairs'
             )
-
-
-def _body_length(model: mujoco.MjModel, data: mujoco.MjData, forward: np.ndarray) -> float:
-    parts = [g for g in range(model.ngeom) if model.geom_bodyid[g] != 0]
-    front = max(geometry.geom_reach(model, data, g, forward) for g in parts)
-    return front + max(geometry.geom_reach(model, data, g, -forward) for g in parts)
 
 
 def _check(creature: Creature, data: mujoco.MjData) -> None:

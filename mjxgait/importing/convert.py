@@ -9,6 +9,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+from mjxgait.creature import geometry
 from mjxgait.errors import UserError
 from mjxgait.importing.anatomy import Anatomy, find_anatomy, in_plane
 from mjxgait.importing.balance import steady_balance
@@ -229,7 +230,23 @@ def _folder(name: str, origin: str, best: Candidate, mirror: tuple[np.ndarray, n
     if planar and mirror is not None:  # the geometry alone cannot tell two legs in one place apart
         pairs = {n: (puppet.names[mirror[0][j]], int(mirror[1][j])) for j, n in enumerate(puppet.names)}
     forward = rotation(puppet.bodies[0].quat).T @ [1.0, 0.0, 0.0]
-    toml = creature_toml(name, origin, trunk, forward, feet, puppet.names, best.drive, (mirror is not None, pairs), notes)
+    length = _stated_length(best)
+    toml = creature_toml(name, origin, trunk, forward, feet, puppet.names, best.drive, (mirror is not None, pairs), length, notes)
     report = f"# {name}\n\nMade by `mjxgait import` from {origin}.\n\n```text\n{notes.text()}\n```\n"
     files = {"creature.xml": creature_xml(name, puppet.bodies, best.qpos), "creature.toml": toml, "README.md": report}
     return Imported(name, files, notes, best.held.stands)
+
+
+def _stated_length(best: Candidate) -> float | None:
+    """m, of a body that is shorter than its legs, such as a biped's; None for all others.
+
+    Speeds are wanted and judged in body lengths. A biped, measured from its back to its toes, would be praised for shuffling.
+    """
+    model, data = best.model, mujoco.MjData(best.model)
+    data.qpos[:] = best.qpos
+    mujoco.mj_kinematics(model, data)
+    hip = stance_of(best.puppet, best.qpos[7:]).hip
+    if geometry.body_length(model, data, np.array([1.0, 0.0, 0.0])) >= hip:
+        return None
+    best.notes.guess("body_length", f"{hip:.3g}", "medium", "the hip height: the body is shorter than its legs, and speeds count in it")
+    return hip

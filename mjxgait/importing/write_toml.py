@@ -19,6 +19,7 @@ def creature_toml(
     joints: list[str],
     drive: Drive,
     mirror: tuple[bool, dict[str, tuple[str, int]]],
+    body_length: float | None,
     notes: Notes,
 ) -> str:
     """The text of creature.toml.
@@ -26,6 +27,7 @@ def creature_toml(
     Args:
       origin: the model file's name. forward: [3] in the trunk's frame. feet: names of geoms.
       mirror: whether it is symmetric, and stated pairs: joint to partner and sign.
+      body_length: m, None where the loader shall measure it.
     """
     symmetric, pairs = mirror
     remark = {guess.what: f"  # {guess.confidence}: {guess.reason}" for guess in notes.guesses}
@@ -40,6 +42,7 @@ def creature_toml(
         f"forward = {[round(float(v), 6) + 0.0 for v in forward]}{remark.get('forward', '')}",
         f"feet = [{', '.join(_quoted(foot) for foot in feet)}]{remark.get('feet', '')}",
         'keyframe = "stand"',
+        *([] if body_length is None else [f"body_length = {body_length:.4g}{remark.get('body_length', '')}"]),
         "",
         "[joints]",
         f"kp = {_usual(kp)}{remark.get('kp, kd', '')}",

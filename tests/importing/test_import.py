@@ -47,6 +47,14 @@ def test_a_quadruped_stands_on_four_feet_and_knows_its_left_and_right(tmp_path):
     assert creature.steer_stride[names.index("fr_hip")] == -0.5
 
 
+def test_a_body_shorter_than_its_legs_is_as_long_as_they_are(tmp_path):
+    """Speeds are wanted and judged in body lengths; a biped measured from back to toes would be praised for shuffling."""
+    for kind, text in (("urdf", BIPED), ("xml", QUADRUPED)):
+        creature, imported = bring(tmp_path, text, kind)
+        assert told(imported, "body_length") == (text is BIPED)
+        assert creature.body_length > 0.95 * creature.hip_height
+
+
 def motionless(creature: Creature, gains: dict[str, float]) -> Champion:
     """A gait whose only pose is the stance."""
     tuning = dict.fromkeys(("steer", "pitch", "pitch_rate", "roll", "roll_rate"), 0.0) | {"threshold": 0.12, "period": 0.8}
