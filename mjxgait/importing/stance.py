@@ -141,11 +141,12 @@ class Search:
         others = [height_of(puppet.bodies, xpos, xrot, s) - floor for s in self.segments]
         others.append(puppet.shank_height(xpos, xrot) - floor)
         crouched = sum(max(0.2 - h / hip, 0.0) for h in others)
-        stretched = beneath = narrow = 0.0
+        stretched = beneath = narrow = ahead = 0.0
         for f, leg in enumerate(self.legs):
             anchors = puppet.data.xanchor[[j + 1 for j in leg]]
             path = np.concatenate([anchors, middles[f][None]])
             beneath += max(float(np.linalg.norm(path[-1][:2] - path[0][:2])) / hip - 0.3, 0.0)
+            ahead += (float(path[-1][0] - path[0][0]) / hip) ** 2
             side = float(anchors[np.abs(anchors[:, 1]).argmax(), 1])
             narrow += max(abs(side) - float(middles[f][1]) * np.sign(side), 0.0) / hip
             ratio = straightness(path)
@@ -160,6 +161,7 @@ class Search:
             + 40 * stretched
             + 0.3 * (near**2).mean()
             + 3 * beneath
+            + 10 * ahead  # a leg steps as far forward as back from beneath its hip
             + (0 if self.planar else 20 * narrow)  # feet within the hips: what steps so tips over
             + 200 * tilted
             + 5 * low_trunk
