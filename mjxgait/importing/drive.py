@@ -16,6 +16,12 @@ STRENGTH, LEAST_STRENGTH, MOST_STRENGTH = 2.0, 0.5, 1.0
 """Torque limit, likewise."""
 DAMPING = 0.015
 """kd in units of kp, s. Stable PD needs 0.0075 at a step of 5 ms."""
+QUICKNESS = 5.0
+"""Least natural frequency of a joint, in units of a pendulum's of the hips' height: a slower joint cannot follow a stride."""
+SWING = 0.35
+"""rad, amplitude at which a joint's own inertia must be swung at that frequency within the torque limit."""
+LEAST_DAMPING = 0.5
+"""Damping ratio of a joint on its own."""
 LEAST_INERTIA = 2.0
 """Of a joint, in units of time step times kd. Stable PD does not know what the floor holds, and so gives way by I / (I + h kd)."""
 RANGES = {"stride": 40.0, "lift": 40.0, "side": 15.0, "twist": 12.0, "ankle": 25.0, "spine": 15.0, "other": 20.0}
@@ -41,18 +47,20 @@ class Drive:
 def plan_drive(puppet: Puppet, q: np.ndarray, stance: Stance, planar: bool, notes: Notes) -> Drive:
     """The drive of a body that faces +x in its standing pose [J]."""
     feet = len(puppet.feet)
-    weight = puppet.mass * GRAVITY * stance.hip
-    kp = np.full(len(q), weight * float(np.clip(STIFFNESS / feet, LEAST_STIFFNESS, MOST_STIFFNESS)))
-    own = weight * float(np.clip(STRENGTH / feet, LEAST_STRENGTH, MOST_STRENGTH))
+    roles, moves = _roles(puppet, q, stance)
+    weight, inertia = puppet.mass * GRAVITY * stance.hip, _own_inertia(puppet)
+    quick = QUICKNESS**2 * GRAVITY / stance.hip * inertia
+    kp = np.maximum(weight * float(np.clip(STIFFNESS / feet, LEAST_STIFFNESS, MOST_STIFFNESS)), quick)
+    kd = np.maximum(DAMPING * kp, 2 * LEAST_DAMPING * np.sqrt(kp * inertia))
+    own = np.maximum(weight * float(np.clip(STRENGTH / feet, LEAST_STRENGTH, MOST_STRENGTH)), SWING * quick)
     stated = np.array([joint.effort for joint in puppet.joints])
     # The file's number is taken where it is one that a walk could need; 0 and 1000 N·m often only mean "not known".
     torque = np.where(np.isfinite(stated) & (stated > 0.15 * own), np.minimum(stated, 3 * own), own)
-    roles, moves = _roles(puppet, q, stance)
-    drive = Drive(roles, kp, DAMPING * kp, torque, _ranges(puppet, q, roles))
-    _add_armature(puppet, drive, notes)
-    notes.guess(
-        "kp, kd", f"{kp[0]:.3g}, {drive.kd[0]:.3g}", "medium", f"weight {puppet.mass * GRAVITY:.3g} N times hip height {stance.hip:.3g} m"
-    )
+    drive = Drive(roles, kp, kd, torque, _ranges(puppet, q, roles))
+    _add_armature(puppet, drive, inertia, notes)
+    reason = f"weight {puppet.mass * GRAVITY:.3g} N times hip height {stance.hip:.3g} m"
+    reason += "; more where a joint's own inertia needs it" if (kp == quick).any() else ""
+    notes.guess("kp, kd", f"{np.median(kp):.3g}, {np.median(kd):.3g}", "medium", reason)
     used = np.isfinite(stated) & (torque == stated)
     notes.guess("torque_limit", f"{torque.min():.3g} to {torque.max():.3g}", "high" if used.all() else "medium",
                 f"stated for {used.sum()} of {len(q)} joints; else from weight times hip height")  # fmt: skip
@@ -63,12 +71,16 @@ def plan_drive(puppet: Puppet, q: np.ndarray, stance: Stance, planar: bool, note
     return drive
 
 
-def _add_armature(puppet: Puppet, drive: Drive, notes: Notes) -> None:
-    """Gives light joints the rotor inertia that a motor of such strength has, so that stable PD can hold the weight with them."""
+def _own_inertia(puppet: Puppet) -> np.ndarray:
+    """[J] kg m², what each joint moves when the body floats free in the latest pose; with the armature."""
     mujoco.mj_forward(puppet.model, puppet.data)
     mass = np.zeros((puppet.model.nv, puppet.model.nv))
     mujoco.mj_fullM(puppet.model, puppet.data, mass)
-    own = 1 / np.diag(np.linalg.inv(mass))[6:]
+    return 1 / np.diag(np.linalg.inv(mass))[6:]
+
+
+def _add_armature(puppet: Puppet, drive: Drive, own: np.ndarray, notes: Notes) -> None:
+    """Gives light joints, of inertia `own` [J], the rotor of a motor of such strength, so that stable PD can hold the weight with them."""
     least = LEAST_INERTIA * puppet.model.opt.timestep * drive.kd
     raised = []
     for joint, has, wants in zip(puppet.joints, own, least, strict=True):

@@ -56,7 +56,7 @@ def creature_toml(
         lines += ["[[joint]]", f"match = {_quoted(joint)}", f"range = [{low}, {high}]  # low: what it does: {drive.role[j]}"]
         if torque[j] != _usual(torque):
             lines.append(f"torque_limit = {float(torque[j])}")
-        if kp[j] != _usual(kp):
+        if kp[j] != _usual(kp) or kd[j] != _usual(kd):
             lines += [f"kp = {float(kp[j])}", f"kd = {float(kd[j])}"]
         lines.append("")
     lines += ["[mirror]", f"symmetric = {json.dumps(symmetric)}{remark.get('mirror', '')}"]

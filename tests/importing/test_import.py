@@ -55,6 +55,17 @@ def test_a_body_shorter_than_its_legs_is_as_long_as_they_are(tmp_path):
         assert creature.body_length > 0.95 * creature.hip_height
 
 
+def test_joints_with_heavy_rotors_are_stiff_and_strong_enough_to_stride(tmp_path):
+    """The rotor inertia of gym's ant is a hundred times what its weight needs: with gains from the weight alone it moves in slow motion."""
+    slow, _ = bring(tmp_path, QUADRUPED)
+    quick, imported = bring(tmp_path, QUADRUPED.replace("<default>", '<default><joint armature="1"/>'))
+    pendulum = np.sqrt(9.81 / quick.hip_height)
+    assert (np.sqrt(quick.kp / 1.1) > 4 * pendulum).all()
+    assert (quick.kd > 0.9 * np.sqrt(quick.kp)).all()
+    assert (quick.torque_limit > 5 * slow.torque_limit).all()
+    assert told(imported, "own inertia")
+
+
 def motionless(creature: Creature, gains: dict[str, float]) -> Champion:
     """A gait whose only pose is the stance."""
     tuning = dict.fromkeys(("steer", "pitch", "pitch_rate", "roll", "roll_rate"), 0.0) | {"threshold": 0.12, "period": 0.8}
