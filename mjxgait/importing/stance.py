@@ -161,7 +161,8 @@ class Search:
             + 40 * stretched
             + 0.3 * (near**2).mean()
             + 3 * beneath
-            + 10 * ahead  # a leg steps as far forward as back from beneath its hip
+            # A leg steps as far forward as back from beneath its hip; but two feet must be beneath the weight.
+            + (10 * ahead if len(self.legs) > 2 else 0)
             + (0 if self.planar else 20 * narrow)  # feet within the hips: what steps so tips over
             + 200 * tilted
             + 5 * low_trunk
