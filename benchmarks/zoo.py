@@ -2,20 +2,20 @@
 
     python benchmarks/zoo.py --env tall_quadruped short_quadruped --seeds 0 1 2 3 4 --config default --out runs/zoo
 
-A run that is there already is not repeated. Columns: whether the champion is certified and the margin of its worst criterion; which
-criteria fail; speed over the certificate's 20 s; body lengths per second from the nominal start over evolution's own episode, in the
-simulation that evolved it and in C MuJoCo; share of 64 perturbed starts, which evolution never saw, that are up and forward after an
-episode and after 22 s; generations; wall time of the whole command, start-up, compilation and examination included.
+A run that is there already is not repeated. Columns: whether the champion is certified ("outdated" when the certificate is another
+champion's, or does not say whose) and the margin of its worst criterion; which criteria fail; speed over the certificate's 20 s; body
+lengths per second from the nominal start over evolution's own episode, in the simulation that evolved it and in C MuJoCo; share of 64
+perturbed starts, which evolution never saw, that are up and forward after an episode and after 22 s; generations; wall time of the whole
+command, start-up, compilation and examination included.
 """
 
 import argparse
-import json
 import subprocess
 import sys
 import time
 from pathlib import Path
 
-from mjxgait.certify import distance, survival
+from mjxgait.certify import distance, outdated, read_certificate, survival
 from mjxgait.champion import read_champion
 from mjxgait.folder import CERTIFICATE, CHAMPION, METRICS, open_run, read_metrics
 
@@ -54,7 +54,7 @@ def row(folder: Path, seed: int, wall: float) -> list[str]:
     """What the run folder and two more looks in C MuJoCo say."""
     creature, _ = open_run(folder)
     champion = read_champion(folder / CHAMPION, creature)
-    certificate = json.loads((folder / CERTIFICATE).read_text())
+    certificate = read_certificate(folder / CERTIFICATE) or sys.exit(f"{folder}: no certificate; delete it, and it is made again")
     seconds = champion.origin["nominal_seconds"]
     evolved, examined = champion.origin["nominal_forward"], distance(creature, champion, seconds)
     starts = next(c for c in certificate["criteria"] if c["number"] == 4)["measures"][0]["value"]
@@ -62,7 +62,7 @@ def row(folder: Path, seed: int, wall: float) -> list[str]:
     return [
         creature.name,
         str(seed),
-        "yes" if certificate["passed"] else "no",
+        "outdated" if outdated(certificate, champion) else "yes" if certificate["passed"] else "no",
         "none" if margin is None else f"{margin:.2f}",
         " ".join(str(c["number"]) for c in certificate["criteria"] if not c["passed"]) or "-",
         f"{certificate['report']['speed_body_lengths'] or 0:.2f}",

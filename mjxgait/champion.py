@@ -1,6 +1,7 @@
 """`champion.json`: one gait, complete and readable without JAX: poses by joint name, cycle settings, gains, fitness."""
 
 import dataclasses
+import hashlib
 import json
 from collections.abc import Mapping
 from pathlib import Path
@@ -32,6 +33,18 @@ class Champion:
     fitness: float
     terms: Mapping[str, float]
     origin: Mapping[str, Any]
+
+    @property
+    def fingerprint(self) -> str:
+        """Hash of all that decides how it moves: body, poses, tuning, controller; not of its fitness or where it comes from."""
+        moves = {
+            "creature": self.digest,
+            # As float64, which is what a file gives back: a champion has one fingerprint before it is written and after.
+            "key_poses": np.asarray(self.key_poses, float).tolist(),
+            "tuning": {name: float(value) for name, value in self.tuning.items()},
+            "controller": dataclasses.asdict(self.controller),
+        }
+        return hashlib.sha256(json.dumps(moves, sort_keys=True).encode()).hexdigest()[:16]
 
 
 def write_champion(champion: Champion, creature: Creature, path: Path) -> None:

@@ -3,5 +3,18 @@
 from mjxgait.certify.certificate import Certificate, certify, distance, push_ladder, record, survival
 from mjxgait.certify.config import CertificateConfig
 from mjxgait.certify.criteria import Criterion, Measure
+from mjxgait.certify.standing import outdated, read_certificate
 
-__all__ = ["Certificate", "CertificateConfig", "Criterion", "Measure", "certify", "distance", "push_ladder", "record", "survival"]
+__all__ = [
+    "Certificate",
+    "CertificateConfig",
+    "Criterion",
+    "Measure",
+    "certify",
+    "distance",
+    "outdated",
+    "push_ladder",
+    "read_certificate",
+    "record",
+    "survival",
+]

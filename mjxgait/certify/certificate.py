@@ -23,10 +23,11 @@ SCHEMA = 1
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Certificate:
-    """The verdict. report: the numbers without a threshold. seconds: that the examination took."""
+    """The verdict. champion: fingerprint of the one examined. report: the numbers without a threshold. seconds: that it took."""
 
     creature: str
     digest: str
+    champion: str
     criteria: tuple[Criterion, ...]
     report: dict[str, Any]
     config: CertificateConfig
@@ -56,6 +57,7 @@ class Certificate:
             "schema": SCHEMA,
             "creature": self.creature,
             "creature_digest": self.digest,
+            "champion": self.champion,
             "passed": self.passed,
             "margin": self.margin,
             "criteria": [
@@ -99,7 +101,7 @@ def certify(creature: Creature, champion: Champion, config: CertificateConfig | 
         "push_survival": {f"{speed:g}": share for speed, share in sorted(shares.items())},
         "push_that_fells_half": half_point(shares),
     }
-    return Certificate(creature.name, creature.digest, judged, report, config, time.perf_counter() - began)
+    return Certificate(creature.name, creature.digest, champion.fingerprint, judged, report, config, time.perf_counter() - began)
 
 
 def record(creature: Creature, champion: Champion, seconds: float, refine: int = 1, threads: int = 0) -> Recording:

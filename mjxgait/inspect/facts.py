@@ -10,10 +10,13 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
+from mjxgait.certify import outdated, read_certificate
+from mjxgait.champion import read_champion
 from mjxgait.config import TuningRanges, resolve_config
 from mjxgait.errors import UserError
 from mjxgait.evolution import Origin
 from mjxgait.fitness import TERMS, weight_vector
+from mjxgait.folder import CERTIFICATE, CHAMPION
 from mjxgait.inspect.snapshot import Snapshot
 
 TUNING = tuple(field.name for field in dataclasses.fields(TuningRanges))
@@ -37,6 +40,7 @@ def facts(snapshot: Snapshot) -> dict[str, Any]:
         "written": datetime.datetime.fromtimestamp(snapshot.written, datetime.UTC).isoformat(timespec="seconds"),
         "bytes": snapshot.size,
         "versions": dict(snapshot.versions),
+        "certificate": certificate(snapshot),
         "settings_changed": settings_changed(snapshot),
         "fitness": fitness_summary(snapshot.fitness),
         "history": [{key: line[key] for key in ("generation", "best", "mean", "forced")} for line in snapshot.lines],
@@ -45,6 +49,20 @@ def facts(snapshot: Snapshot) -> dict[str, Any]:
         "diversity": diversity(snapshot),
         "champion": individual_facts(snapshot, 1),
     }
+
+
+def certificate(snapshot: Snapshot) -> str:
+    """One sentence about the certificate of the run's champion, whatever checkpoint the snapshot is of."""
+    try:
+        document = read_certificate(snapshot.run / CERTIFICATE)
+        if document is None:
+            return "The champion has not been examined."
+        if reason := outdated(document, read_champion(snapshot.run / CHAMPION, snapshot.creature)):
+            return reason
+    except UserError as error:
+        return str(error)
+    failed = " ".join(str(c["number"]) for c in document["criteria"] if not c["passed"])
+    return f"The champion fails criteria {failed}." if failed else f"The champion is certified, margin {document['margin']:.2f}."
 
 
 def settings_changed(snapshot: Snapshot) -> dict[str, dict[str, Any]]:

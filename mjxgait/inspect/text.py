@@ -94,6 +94,7 @@ def _print_identity(facts: Mapping[str, Any], console: Console) -> None:
         "seed": f"{facts['seed']} ({facts['random_key']['kind']} key now {key})",
         "body": facts["creature_digest"],
         "versions": versions or "unknown: the run has no champion.json",
+        "certificate": facts["certificate"],
         "fitness": ", ".join(f"{name.replace('_', ' ')} {show(value)}" for name, value in fitness.items() if name != "broken")
         + (f"; {fitness['broken']} without a finite one" if fitness["broken"] else ""),
         "genomes": f"{facts['diversity']['unique']} different of {facts['diversity']['individuals']}",

@@ -2,7 +2,6 @@
 
 import base64
 import html
-import json
 import math
 import string
 from collections.abc import Iterable, Sequence
@@ -12,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from mjxgait.animation import WalkLoop, build_glb, walk_loop
+from mjxgait.certify import outdated, read_certificate
 from mjxgait.champion import Champion, read_champion
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
@@ -67,7 +67,7 @@ def _sections(run: Path, creature: Creature, champion: Champion, walk: Walk) -> 
     parts = ["<h2>The walk</h2>", *_images(gait_figures(walk), creature)]
     if fitness:
         parts += ["<h2>How it was learnt</h2>", *_images(fitness, creature)]
-    parts += ["<h2>Certificate</h2>", certificate_table(run)]
+    parts += ["<h2>Certificate</h2>", certificate_table(run, champion)]
     parts += ["<h2>Where it comes from</h2>", _origin(creature, champion)]
     return "\n".join(parts)
 
@@ -82,15 +82,14 @@ def _images(figures: Figures, creature: Creature) -> Iterable[str]:
         yield f'<img alt="{html.escape(name)} of the {html.escape(creature.name)}" src="data:image/svg+xml;base64,{data}">'
 
 
-def certificate_table(run: Path) -> str:
+def certificate_table(run: Path, champion: Champion) -> str:
     """The criteria as a table, or why there is none."""
-    file, champion = run / CERTIFICATE, run / CHAMPION
-    if not file.exists():
+    document = read_certificate(run / CERTIFICATE)
+    if document is None:
         return "<p>Not examined: <code>mjxgait certify</code> does it.</p>"
-    if file.stat().st_mtime < champion.stat().st_mtime:
-        return "<p>Examined before the champion last changed: <code>mjxgait certify</code> does it again.</p>"
+    if reason := outdated(document, champion):
+        return f"<p>{html.escape(reason)} <code>mjxgait certify</code> examines this one.</p>"
     try:
-        document = json.loads(file.read_text(encoding="utf-8"))
         rows = [
             [
                 f"{c['number']} {c['name']}",
@@ -103,8 +102,8 @@ def certificate_table(run: Path) -> str:
             for m in c["measures"]
         ]
         verdict = "All criteria pass." if document["passed"] else "Not all criteria pass."
-    except (OSError, ValueError, KeyError, TypeError):
-        raise UserError(f"{file}: not a certificate; `mjxgait certify {run}` writes it anew") from None
+    except (ValueError, KeyError, TypeError):
+        raise UserError(f"{run / CERTIFICATE}: not a certificate; `mjxgait certify {run}` writes it anew") from None
     return f"<p>{verdict}</p>" + _table(("criterion", "measure", "value", "wanted", "verdict"), rows)
 
 

@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 from inspection.made_up import FORCED, LAST, POPULATION
 
+from mjxgait.champion import read_champion
 from mjxgait.cli import main
+from mjxgait.folder import CERTIFICATE, CHAMPION
 from mjxgait.inspect import facts, individual_facts, read_snapshot
 
 
@@ -47,6 +49,24 @@ def test_tells_what_it_is(finished_run):
     assert found["ended"] == f"all {LAST} generations are done"
     assert found["checkpoints"][-1] == LAST
     assert found["bytes"] > 1000
+
+
+def test_tells_whether_the_certificate_is_the_champions(run):
+    def said():
+        return facts(read_snapshot(run))["certificate"]
+
+    snapshot = read_snapshot(run)
+    fingerprint = read_champion(run / CHAMPION, snapshot.creature).fingerprint
+    certificate = {"passed": False, "margin": -1.0, "champion": fingerprint, "criteria": [{"number": 7, "passed": False, "measures": []}]}
+    assert said() == "The champion has not been examined."
+    (run / CERTIFICATE).write_text(json.dumps(certificate))
+    assert said() == "The champion fails criteria 7."
+    (run / CERTIFICATE).write_text(json.dumps(certificate | {"passed": True, "margin": 0.25, "criteria": []}))
+    assert said() == "The champion is certified, margin 0.25."
+    (run / CERTIFICATE).write_text(json.dumps(certificate | {"champion": "other"}))
+    assert "outdated" in said()
+    (run / CERTIFICATE).write_text("[]")
+    assert "not a certificate" in said()
 
 
 def test_contributions_of_the_terms_add_up_to_the_fitness(finished_run):
