@@ -85,10 +85,14 @@ class GaitConfig:
 
 @dataclasses.dataclass(frozen=True)
 class PhysicsConfig:
-    """8. joint_speed: rad/s. body_speed: sqrt(g * hip height). penetration: hip heights. torque: torque limits."""
+    """8. joint_speed: rad/s. joint_overrun: rad past the end of a joint's range. body_speed: sqrt(g * hip height).
+
+    penetration: hip heights. torque: torque limits.
+    """
 
     __pydantic_config__ = STRICT
     joint_speed: Positive = 20.0
+    joint_overrun: Positive = 0.1
     body_speed: Positive = 3.0
     penetration: Positive = 0.05
     torque: Positive = 1.0

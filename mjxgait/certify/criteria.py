@@ -224,18 +224,25 @@ def slip_distance(window: Recording) -> np.ndarray:
 
 
 def physics(window: Recording, config: PhysicsConfig) -> Criterion:
-    """8. No physics exploit: speeds, penetration and torques of a machine that could exist."""
+    """8. No physics exploit: speeds, joint angles, penetration and torques of a machine that could exist."""
     size = window.dimensions
     return Criterion(
         8,
         "physics",
         (
             at_most("joint speed (rad/s)", np.abs(window.joint_vel).max(), config.joint_speed),
+            at_most("joint past its range (rad)", joint_overrun(window).max(), config.joint_overrun),
             at_most("body speed / sqrt(g h)", window.body_speed.max() / np.sqrt(size.gravity * size.hip_height), config.body_speed),
             at_most("penetration / hip height", window.penetration.max() / size.hip_height, config.penetration),
             Measure("torque / limit", float((np.abs(window.torque) / size.torque_limit).max()), "<=", config.torque, 0.0),
         ),
     )
+
+
+def joint_overrun(window: Recording) -> np.ndarray:
+    """[T, J] rad past the end of each joint's range; 0 within it. The shipped bodies have no stop there, only targets end there."""
+    low, high = np.array(window.dimensions.joint_range).T
+    return np.maximum(np.maximum(low - window.joint_pos, window.joint_pos - high), 0.0)
 
 
 def speed(window: Recording) -> float:

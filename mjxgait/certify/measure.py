@@ -22,7 +22,8 @@ CARRIES = 1e-3
 class Dimensions:
     """The sizes against which a gait is judged, in m, kg, m/s².
 
-    torque_limit: N·m per joint. foot_places: forward and left of the trunk when standing, in m per foot.
+    torque_limit: N·m per joint. joint_range: rad per joint, infinite where it has none.
+    foot_places: forward and left of the trunk when standing, in m per foot.
     crawler: whether other parts than feet may touch the floor.
     """
 
@@ -32,6 +33,7 @@ class Dimensions:
     mass: float
     gravity: float
     torque_limit: tuple[float, ...]
+    joint_range: tuple[tuple[float, float], ...]
     foot_names: tuple[str, ...]
     foot_places: tuple[tuple[float, float], ...]
     crawler: bool = False
@@ -97,6 +99,7 @@ def dimensions(creature: Creature) -> Dimensions:
         mass=creature.mass,
         gravity=float(-model.opt.gravity[2]),
         torque_limit=tuple(map(float, creature.torque_limit)),
+        joint_range=tuple((float(low), float(high)) for low, high in zip(creature.joint_low, creature.joint_high, strict=True)),
         foot_names=creature.foot_names,
         foot_places=tuple((float(forward), float(left)) for forward, left in middles),
         crawler=len(creature.ground) > 0,

@@ -74,6 +74,7 @@ DOG = Dimensions(
     mass=20.0,
     gravity=9.81,
     torque_limit=(30.0,) * 4,
+    joint_range=((-0.8, 0.5),) * 4,
     foot_names=tuple(LEGS),
     foot_places=tuple(LEGS.values()),
 )

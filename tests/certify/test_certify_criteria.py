@@ -117,7 +117,8 @@ def aimless():
     good = walk()
     rng = np.random.default_rng(0)
     noise = np.cumsum(rng.normal(0, 0.02, (4400, 4)), 0)
-    return changed(good, joint_pos=noise)
+    # It wanders further than the dog's joints go, which is not what is to be found out here.
+    return changed(good, joint_pos=noise, dimensions=dataclasses.replace(DOG, joint_range=((-np.inf, np.inf),) * 4))
 
 
 def unsteady():
@@ -201,13 +202,27 @@ def test_criterion_7_gait(fraud):
 
 @pytest.mark.parametrize(
     ("name", "value"),
-    [("joint_vel", 21.0), ("body_speed", 6.0), ("penetration", 0.03), ("torque", 31.0)],
+    [("joint_vel", 21.0), ("joint_pos", 0.61), ("joint_pos", -0.91), ("body_speed", 6.0), ("penetration", 0.03), ("torque", 31.0)],
 )
 def test_criterion_8_physics(name, value):
     good = walk()
     values = getattr(good, name).copy()
     values[3000] = value
     assert failures(changed(good, **{name: values})) == {8}
+
+
+def test_criterion_8_gives_where_a_joint_overshoots_a_little():
+    good = walk()
+    joints = good.joint_pos.copy()
+    joints[3000, 2], joints[3001, 1] = 0.59, -0.81
+    overshooting = changed(good, joint_pos=joints).window(2.0)
+    assert criteria.joint_overrun(overshooting).max(0) == pytest.approx([0, 0.01, 0.09, 0])
+    assert criteria.physics(overshooting, CONFIG.physics).passed
+
+
+def test_criterion_8_knows_joints_without_a_range():
+    endless = dataclasses.replace(DOG, joint_range=((-np.inf, np.inf),) * 4)
+    assert criteria.joint_overrun(changed(walk(), dimensions=endless, joint_pos=np.full((4400, 4), 50.0))).max() == 0
 
 
 def test_a_walk_that_blew_up_fails_everything_measured_on_it():
