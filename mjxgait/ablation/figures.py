@@ -29,7 +29,7 @@ def draw_intervals(findings: "Sequence[Finding]", measure: str, path: Path) -> N
             axes.plot([value.value], [row], "o", color=ACCENT if row else DARK)
         axes.set_yticks(range(len(findings)), [finding.name for finding in findings])
         axes.invert_yaxis()
-        axes.set(xlabel=measure, title="interquartile mean with 95 % interval; dots are runs")
+        axes.set(xlabel=measure, title="estimate with 95 % interval; dots are runs")
         drawing.savefig(path, metadata={"Software": None})
 
 

@@ -61,6 +61,8 @@ class Study:
     def __post_init__(self) -> None:
         if bool(self.variant) == bool(self.grid):
             raise ValueError("give either [[variant]] tables or a [grid], not both and not neither")
+        if self.measure == "certified" and not self.certify:
+            raise ValueError('measure = "certified" needs certify = true')
         if self.measure == "generations" and self.threshold is None:
             raise ValueError('measure = "generations" counts up to a fitness: set threshold')
 

@@ -17,7 +17,7 @@ from markdown_it import MarkdownIt
 from mjxgait.ablation.figures import draw_curves, draw_intervals
 from mjxgait.ablation.measures import Result
 from mjxgait.ablation.plan import Plan
-from mjxgait.ablation.statistics import Comparison, Estimate, compare, estimate, share
+from mjxgait.ablation.statistics import TRIM, Comparison, Estimate, compare, estimate, share
 from mjxgait.checkpoint import disk_errors
 
 NAMES = {
@@ -66,16 +66,23 @@ def find(plan: Plan, results: Sequence[Result]) -> list[Finding]:
     sign = -1.0 if measure in LOWER_IS_BETTER else 1.0
     values = {name: np.array([r.value(measure) for r in results if r.variant == name]) for name in plan.variants}
     base, *others = plan.variants
-    comparisons = compare(sign * values[base], [sign * values[name] for name in others], plan.study.paired)
+    trim = _trim(measure)
+    comparisons = compare(sign * values[base], [sign * values[name] for name in others], plan.study.paired, trim)
     return [
-        Finding(name, values[name], estimate(values[name]), comparison)
+        Finding(name, values[name], estimate(values[name], trim), comparison)
         for name, comparison in zip(plan.variants, [None, *comparisons], strict=True)
     ]
+
+
+def _trim(measure: str) -> float:
+    """Yes and no have no middle half: of them the mean is taken."""
+    return 0.0 if measure == "certified" else TRIM
 
 
 def markdown(plan: Plan, results: Sequence[Result], findings: Sequence[Finding], command: str) -> str:
     """The report."""
     study, base = plan.study, plan.variants[0]
+    means = "Interquartile means" if _trim(study.measure) else "Means"
     lines = [
         f"# {study.question}",
         "",
@@ -85,7 +92,7 @@ def markdown(plan: Plan, results: Sequence[Result], findings: Sequence[Finding],
         "",
         f"    {command}",
         "",
-        f"Interquartile means over the seeds with 95 % bootstrap intervals (BCa). Difference, chance of being better and p are against "
+        f"{means} over the seeds with 95 % bootstrap intervals (BCa). Difference, chance of being better and p are against "
         f"“{base}”; p is of a permutation test{' within seeds' if study.paired else ''}, corrected (Holm) for {len(plan.variants) - 1} "
         f"comparison{'s' if len(plan.variants) > 2 else ''}.",
         "",

@@ -6,11 +6,14 @@ instead of points, probability of improvement. All random draws are from a fixed
 
 import dataclasses
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 from scipy import stats
 
 RESAMPLES = 9999
+TRIM = 0.25
+"""Share cut off at either end: what is left is the interquartile mean. 0 is the mean, which is what a share of successes needs."""
 CONFIDENCE = 0.95
 
 
@@ -27,7 +30,7 @@ class Estimate:
 class Comparison:
     """A variant against the base.
 
-    difference: of interquartile means. improvement: probability that a run of the variant beats one of the base.
+    difference: of trimmed means. improvement: probability that a run of the variant beats one of the base.
     p: of a permutation test of the difference. corrected: p after Holm's correction for all comparisons of the study.
     """
 
@@ -37,20 +40,22 @@ class Comparison:
     corrected: float
 
 
-def interquartile_mean(values: np.ndarray, axis: int = -1) -> np.ndarray:
-    """Mean of the middle half."""
-    return np.asarray(stats.trim_mean(values, 0.25, axis=axis))
+def trimmed_mean(values: np.ndarray, trim: float = TRIM, axis: int = -1) -> np.ndarray:
+    """Mean of what is left between the ends; by default of the middle half."""
+    return np.asarray(stats.trim_mean(values, trim, axis=axis))
 
 
-def estimate(values: np.ndarray) -> Estimate:
-    """Interquartile mean with its bias-corrected and accelerated bootstrap interval (Efron 1987)."""
-    return _bootstrap((values,), interquartile_mean, paired=False)
+def estimate(values: np.ndarray, trim: float = TRIM) -> Estimate:
+    """Trimmed mean with its bias-corrected and accelerated bootstrap interval (Efron 1987)."""
+    return _bootstrap((values,), partial(trimmed_mean, trim=trim), paired=False)
 
 
-def compare(base: np.ndarray, variants: Sequence[np.ndarray], paired: bool) -> list[Comparison]:
+def compare(base: np.ndarray, variants: Sequence[np.ndarray], paired: bool, trim: float = TRIM) -> list[Comparison]:
     """Each variant against the base; paired: whether the i-th values of both come from the same seed."""
+    gap = partial(_gap, trim=trim)
     rows = [
-        (_difference(base, values, paired), improvement(base, values, paired), permutation_p(base, values, paired)) for values in variants
+        (_bootstrap((base, values), gap, paired), improvement(base, values, paired), permutation_p(base, values, paired, trim))
+        for values in variants
     ]
     corrected = holm([p for *_, p in rows])
     return [Comparison(*row, after) for row, after in zip(rows, corrected, strict=True)]
@@ -67,11 +72,12 @@ def improvement(base: np.ndarray, values: np.ndarray, paired: bool = False) -> E
     return _bootstrap((base, values), better, paired)
 
 
-def permutation_p(base: np.ndarray, values: np.ndarray, paired: bool) -> float:
+def permutation_p(base: np.ndarray, values: np.ndarray, paired: bool, trim: float = TRIM) -> float:
     """Chance of a difference as large, either way, if the variant did nothing: labels swapped within seeds, or anyhow when unpaired."""
     kind = "samples" if paired else "independent"
     rng = np.random.default_rng(0)
-    result = stats.permutation_test((base, values), _gap, permutation_type=kind, vectorized=True, n_resamples=RESAMPLES, rng=rng)
+    gap = partial(_gap, trim=trim)
+    result = stats.permutation_test((base, values), gap, permutation_type=kind, vectorized=True, n_resamples=RESAMPLES, rng=rng)
     return float(result.pvalue)
 
 
@@ -90,12 +96,8 @@ def share(successes: int, count: int) -> Estimate:
     return Estimate(successes / count, float(interval.low), float(interval.high))
 
 
-def _gap(base: np.ndarray, values: np.ndarray, axis: int = -1) -> np.ndarray:
-    return interquartile_mean(values, axis) - interquartile_mean(base, axis)
-
-
-def _difference(base: np.ndarray, values: np.ndarray, paired: bool) -> Estimate:
-    return _bootstrap((base, values), _gap, paired)
+def _gap(base: np.ndarray, values: np.ndarray, trim: float, axis: int = -1) -> np.ndarray:
+    return trimmed_mean(values, trim, axis) - trimmed_mean(base, trim, axis)
 
 
 def _bootstrap(samples: tuple[np.ndarray, ...], statistic: Callable[..., np.ndarray], paired: bool) -> Estimate:

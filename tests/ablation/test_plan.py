@@ -66,6 +66,7 @@ def test_values_share_a_program_and_shapes_need_one_each(stool: Creature):
         ({"base": {"rollout": {"start": 3}}}, ["[base]", "start"]),
         ({"measure": "beauty"}, ["measure", "beauty"]),
         ({"measure": "generations"}, ["threshold"]),
+        ({"measure": "certified"}, ["certify = true"]),
         ({"seeds": 1}, ["seeds"]),
         ({"grid": {"evolution.sigma": [0.1]}, "variant": TWO}, ["either"]),
         ({"qustion": "?"}, ["qustion", "question"]),

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from mjxgait.ablation.statistics import Estimate, compare, estimate, holm, improvement, interquartile_mean, permutation_p, share
+from mjxgait.ablation.statistics import Estimate, compare, estimate, holm, improvement, permutation_p, share, trimmed_mean
 
 RNG = np.random.default_rng
 
 
 def test_the_interquartile_mean_is_the_mean_of_the_middle_half():
-    assert interquartile_mean(np.array([100.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, -50.0])) == pytest.approx(3.5)
+    assert trimmed_mean(np.array([100.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, -50.0])) == pytest.approx(3.5)
 
 
 def test_the_interval_covers_the_truth_as_often_as_it_says():
@@ -20,6 +20,13 @@ def test_the_interval_covers_the_truth_as_often_as_it_says():
         found = estimate(RNG(seed).normal(3.0, 1.0, 24))
         covered += found.low <= 3.0 <= found.high
     assert 175 <= covered <= 199
+
+
+def test_successes_are_compared_by_their_share():
+    """Of 12 of 16 the middle half would be all."""
+    found = estimate(np.array([1.0] * 12 + [0.0] * 4), trim=0.0)
+    assert found.value == 0.75
+    assert 0.4 < found.low < 0.75 < found.high < 1.0
 
 
 def test_a_sample_without_spread_has_an_interval_without_width():
