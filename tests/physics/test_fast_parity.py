@@ -100,7 +100,7 @@ def scene() -> Scene:
     layout = SenseLayout(model.body("trunk").id, model.jnt_qposadr[hinges], model.jnt_dofadr[hinges], watched)
     rng = np.random.default_rng(2)
     torque = np.asarray(2 * rng.normal(size=(model.nv, LANES)), np.float32)
-    damping = np.asarray(rng.uniform(0, 0.1, model.nv), np.float32)
+    damping = np.asarray(rng.uniform(0, 0.1, (model.nv, LANES)), np.float32)
     return Scene(model, fast_plant(model, layout), layout, _states(model), torque, damping)
 
 
@@ -196,7 +196,7 @@ def test_damped_solve(scene: Scene, result: Any, references: list[mujoco.MjData]
     for lane, data in enumerate(references):
         mass = np.zeros((scene.model.nv, scene.model.nv))
         mujoco.mj_fullM(scene.model, data, mass)
-        _close(result[1][:, lane], np.linalg.solve(mass + np.diag(scene.damping), scene.torque[:, lane]))
+        _close(result[1][:, lane], np.linalg.solve(mass + np.diag(scene.damping[:, lane]), scene.torque[:, lane]))
 
 
 def test_acceleration_and_constraint_force(result: Any, references: list[mujoco.MjData]) -> None:
@@ -215,8 +215,8 @@ def test_one_step(scene: Scene, result: Any) -> None:
 
 def test_like_mjx(scene: Scene, result: Any) -> None:
     """MJX computes in float32 too: wider tolerances."""
-    in_front = jax.tree.map(lambda x: jnp.moveaxis(x, -1, 0), (scene.state, scene.torque))
-    sensed, damped, after = _everything(mjx_plant(scene.model, scene.layout))(in_front[0], scene.damping, in_front[1])
+    in_front = jax.tree.map(lambda x: jnp.moveaxis(x, -1, 0), (scene.state, scene.damping, scene.torque))
+    sensed, damped, after = _everything(mjx_plant(scene.model, scene.layout))(*in_front)
     for ours, theirs in zip(jax.tree.leaves(result), jax.tree.leaves((sensed, damped, after)), strict=True):
         theirs = np.moveaxis(np.asarray(theirs), 0, -1)
         _close(ours, theirs, 1e-3)
