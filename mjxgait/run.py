@@ -16,13 +16,13 @@ from typing import Any
 import jax
 import numpy as np
 
-from mjxgait.certify import Certificate, certify
-from mjxgait.champion import Champion, write_champion
+from mjxgait.champion import write_champion
 from mjxgait.checkpoint import Checkpoints, disk_errors
 from mjxgait.config import Config
 from mjxgait.creature import Creature
 from mjxgait.evolution import EvolutionState, GenerationMetrics, stop_reason
-from mjxgait.experiment import Experiment, Step, build_experiment
+from mjxgait.examination import Examined, Examiner, why_ended
+from mjxgait.experiment import Step, build_experiment
 from mjxgait.fitness import TERMS
 from mjxgait.folder import CERTIFICATE, CHAMPION, METRICS, PLOT, read_metrics, truncate_metrics
 from mjxgait.screen import Screen
@@ -46,14 +46,18 @@ def train(folder: Path, creature: Creature, config: Config, screen: Screen, resu
     with screen.compiling(creature.name, experiment):
         step = experiment.compile()
     began = time.perf_counter()
+    examiner = Examiner(experiment, versions(), screen.say)
     try:
         with interruptible() as interrupted:
-            state, reason = _evolve(folder, experiment, step, experiment.place(state), checkpoints, screen, interrupted)
+            state, reason, examined = _evolve(folder, examiner, step, experiment.place(state), checkpoints, screen, interrupted)
     finally:
         screen.close()
         checkpoints.close()
-    if reason is not None:
-        _examine(folder, experiment, state, screen)
+    if reason is not None and (examined := examined or examiner.best(state)):
+        with disk_errors(folder):
+            write_champion(examined.champion, creature, folder / CHAMPION)
+            (folder / CERTIFICATE).write_text(examined.certificate.to_json(), encoding="utf-8")
+        screen.certificate(examined.certificate)
     lines = read_metrics(folder / METRICS)
     if lines:
         from mjxgait.viewing.curves import plot_fitness  # matplotlib is slow to import, and nothing needed it until now
@@ -65,16 +69,20 @@ def train(folder: Path, creature: Creature, config: Config, screen: Screen, resu
 
 def _evolve(
     folder: Path,
-    experiment: Experiment,
+    examiner: Examiner,
     step: Step,
     state: EvolutionState,
     checkpoints: Checkpoints,
     screen: Screen,
     interrupted: threading.Event,
-) -> tuple[EvolutionState, str | None]:
-    """Generation after generation; returns the last state and why it ended, None when the user interrupted it."""
+) -> tuple[EvolutionState, str | None, Examined | None]:
+    """Generation after generation; returns the last state, why it ended (None when the user interrupted it), and who ended it."""
+    experiment, examined, saved = examiner.experiment, None, int(state.generation)
     config, creature = experiment.config, experiment.creature
     while (reason := stop_reason(state, config.evolution)) is None and not interrupted.is_set():
+        if examined := examiner.early(state):
+            reason = why_ended(int(state.generation), examined.certificate.margin)
+            break
         began = time.perf_counter()
         state, metrics = step(state)
         metrics = jax.device_get(metrics)
@@ -87,28 +95,13 @@ def _evolve(
         if np.isfinite(metrics.best):
             with disk_errors(folder):
                 write_champion(experiment.champion(state, versions()), creature, folder / CHAMPION)
-        last = interrupted.is_set() or stop_reason(state, config.evolution) is not None
-        if last or int(metrics.generation) % config.checkpoint_every == 0:
+        if int(metrics.generation) % config.checkpoint_every == 0:
             checkpoints.save(state, creature.name, creature.digest)
+            saved = int(metrics.generation)
         screen.generation(line, config.evolution.generations)
-    return state, reason
-
-
-def _examine(folder: Path, experiment: Experiment, state: EvolutionState, screen: Screen) -> None:
-    """Makes the first of the best few that passes the examination the champion; if none does, the one that comes nearest."""
-    found: list[tuple[Certificate, Champion]] = []
-    for rank in experiment.candidates(state):
-        screen.console.print("Examining in C MuJoCo…" if not found else "Examining the next best…")
-        champion = experiment.champion(state, versions(), rank)
-        found.append((certify(experiment.creature, champion), champion))
-        if found[-1][0].passed:
-            break
-    if found:
-        certificate, champion = max(found, key=lambda pair: (pair[0].passed, pair[0].margin))
-        with disk_errors(folder):
-            write_champion(champion, experiment.creature, folder / CHAMPION)
-            (folder / CERTIFICATE).write_text(certificate.to_json(), encoding="utf-8")
-        screen.certificate(certificate)
+    if int(state.generation) > saved:
+        checkpoints.save(state, creature.name, creature.digest)
+    return state, reason, examined
 
 
 def metrics_line(metrics: GenerationMetrics, seconds: float) -> dict[str, Any]:

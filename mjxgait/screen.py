@@ -42,6 +42,10 @@ class Screen:
             yield
         self.console.print(f"Compiled in {time.perf_counter() - began:.1f} s")
 
+    def say(self, text: str) -> None:
+        """A line of its own."""
+        self.console.print(text)
+
     def generation(self, line: Mapping[str, Any], last: int) -> None:
         """Shows a generation; see `metrics_line`. last: the generation at which the run ends at the latest."""
         self._walls = [*self._walls[-4:], line["wall_s"]]

@@ -17,6 +17,7 @@ from mjxgait import run
 from mjxgait.bench.ours import Ours
 from mjxgait.checkpoint import Checkpoints
 from mjxgait.evolution import EvolutionState, GenerationMetrics, Judged
+from mjxgait.examination import Examiner
 from mjxgait.experiment import Experiment, evolution_of
 from mjxgait.fitness import TERMS
 from mjxgait.screen import Screen
@@ -80,13 +81,18 @@ def _host_loop(ours: Ours, generations: int) -> tuple[float, float, float]:
         inside.append(time.perf_counter() - began)
         return result
 
-    config = dataclasses.replace(ours.experiment.config.evolution, generations=generations)
-    experiment = dataclasses.replace(ours.experiment, config=dataclasses.replace(ours.experiment.config, evolution=config))
+    config = ours.experiment.config
+    config = dataclasses.replace(
+        config,
+        evolution=dataclasses.replace(config.evolution, generations=generations),
+        examination=dataclasses.replace(config.examination, every=0),
+    )
+    experiment = dataclasses.replace(ours.experiment, config=config)
     with tempfile.TemporaryDirectory() as folder:
         checkpoints = _TimedCheckpoints(Path(folder), experiment.config.keep_every)
         screen = Screen(Console(file=io.StringIO()))
         began = time.perf_counter()
-        run._evolve(Path(folder), experiment, step, ours.first, checkpoints, screen, threading.Event())
+        run._evolve(Path(folder), Examiner(experiment, {}, screen.say), step, ours.first, checkpoints, screen, threading.Event())
         whole = time.perf_counter() - began
         screen.close()
         checkpoints.close()

@@ -1,6 +1,6 @@
 """The stable-walk certificate, in NumPy and C MuJoCo, free of JAX (docs/certificate.md)."""
 
-from mjxgait.certify.certificate import Certificate, certify, distance, push_ladder, record, survival
+from mjxgait.certify.certificate import Certificate, certify, distance, glance, push_ladder, record, survival
 from mjxgait.certify.config import CertificateConfig
 from mjxgait.certify.criteria import Criterion, Measure
 from mjxgait.certify.standing import outdated, read_certificate
@@ -12,6 +12,7 @@ __all__ = [
     "Measure",
     "certify",
     "distance",
+    "glance",
     "outdated",
     "push_ladder",
     "read_certificate",

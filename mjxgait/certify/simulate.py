@@ -167,8 +167,9 @@ class _Run:
             travel[running] = self._travel(running)
             down = running[self._down(running)]
             fell[down] = np.minimum(fell[down], (k + 1) * time_step)
-            if len(down):
-                running = running[self._sane(running) & ((running < self.record) | np.isinf(fell[running]))]
+            watched = (k + 1) * time_step < self.starts.end[running]
+            if len(down) or not watched.all():
+                running = running[watched & self._sane(running) & ((running < self.record) | np.isinf(fell[running]))]
         return Outcome(fell, travel, film)
 
     def _control_step(self, running: np.ndarray, k: int, heading: float | None, film: Trajectory) -> None:

@@ -14,6 +14,7 @@ class Starts:
     joint_offset, joint_velocity: [S, J] rad, rad/s; added to the standing pose.
     friction: [S] factor on the sliding friction. mass: [S, nbody] factor on each body's mass and inertia.
     push_time: [S] s, infinite for none. push: [S, 2] m/s, sudden change of the trunk's horizontal velocity in the world.
+    end: [S] s, from which nobody looks any more: who is up until then has stayed up. Infinite for the end of the simulation.
     """
 
     joint_offset: np.ndarray
@@ -22,6 +23,7 @@ class Starts:
     mass: np.ndarray
     push_time: np.ndarray
     push: np.ndarray
+    end: np.ndarray
 
     def __len__(self) -> int:
         return len(self.friction)
@@ -46,6 +48,7 @@ def nominal_starts(creature: Creature, count: int) -> Starts:
         mass=np.ones((count, creature.model.nbody)),
         push_time=np.full(count, np.inf),
         push=np.zeros((count, 2)),
+        end=np.full(count, np.inf),
     )
 
 

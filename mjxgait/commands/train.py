@@ -10,7 +10,7 @@ from typing import Annotated
 
 import tyro
 
-from mjxgait.config import Config, find_creature, resolve_config
+from mjxgait.config import Config, ExaminationConfig, find_creature, resolve_config
 from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import INTERRUPTED, UserError
 from mjxgait.folder import create_run, open_run
@@ -28,7 +28,8 @@ class TrainOptions:
       env: Name of a shipped creature, path of a creature folder, or a model file (MJCF or URDF) to import on the fly.
       config: TOML file with settings, or the name of a shipped config such as wilson.
       out: Folder for the run; by default a new one under runs/.
-      resume: Run folder to go on with; its own creature and settings are used, only --generations and --evolution.target may differ.
+      resume: Run folder to go on with; its own creature and settings are used, only what ends a run may differ: --generations,
+        --evolution.target, --examination.
       generation: With --resume: the checkpoint to go on from instead of the latest.
       population: Short for --evolution.population.
       generations: Short for --evolution.generations.
@@ -62,7 +63,9 @@ def train_command(arguments: Sequence[str]) -> int:
 
     if options.resume:
         if _without_ends(config) != _without_ends(default):
-            raise UserError(f"{options.resume}: a resumed run keeps its settings; only --generations and --evolution.target may differ")
+            raise UserError(
+                f"{options.resume}: a resumed run keeps its settings; only --generations, --evolution.target and --examination may differ"
+            )
         folder = options.resume
     else:
         folder = options.out or _new_folder(creature.name, config.seed)
@@ -115,7 +118,8 @@ def _settings(options: TrainOptions) -> Config:
 
 def _without_ends(config: Config) -> Config:
     """The settings that decide what a generation computes."""
-    return dataclasses.replace(config, evolution=dataclasses.replace(config.evolution, generations=0, target=None))
+    endless = dataclasses.replace(config.evolution, generations=0, target=None)
+    return dataclasses.replace(config, evolution=endless, examination=ExaminationConfig())
 
 
 def _new_folder(creature: str, seed: int) -> Path:

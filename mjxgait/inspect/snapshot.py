@@ -16,12 +16,15 @@ import jax
 import numpy as np
 import orbax.checkpoint as ocp
 
+from mjxgait.certify import outdated, read_certificate
+from mjxgait.champion import read_champion
 from mjxgait.checkpoint import FOLDER, SCHEMA, Manifest, array_hash
 from mjxgait.config import Config
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.evolution import EvolutionState, stop_reason
-from mjxgait.folder import CHAMPION, CONFIG, METRICS, open_run, read_metrics
+from mjxgait.examination import due, why_ended
+from mjxgait.folder import CERTIFICATE, CHAMPION, CONFIG, METRICS, open_run, read_metrics
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -66,7 +69,21 @@ class Snapshot:
     @property
     def ended(self) -> str | None:
         """Why the run is over at this checkpoint; None when it was to go on."""
-        return stop_reason(cast(EvolutionState, SimpleNamespace(**self.arrays)), self.config.evolution)
+        state = cast(EvolutionState, SimpleNamespace(**self.arrays))
+        return stop_reason(state, self.config.evolution) or self._certified()
+
+    def _certified(self) -> str | None:
+        """What an early examination that ended the run here would have said."""
+        if self.generation != self.generations[-1] or not due(self.config.examination, self.generation):
+            return None
+        try:
+            document = read_certificate(self.run / CERTIFICATE)
+            if document is None or outdated(document, read_champion(self.run / CHAMPION, self.creature)):
+                return None
+        except UserError:
+            return None
+        enough = document["passed"] and document["margin"] >= self.config.examination.enough
+        return why_ended(self.generation, document["margin"]) if enough else None
 
 
 def read_snapshot(path: Path, generation: int | None = None) -> Snapshot:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from certify_made_up import DOG, make_champion, walk
 
-from mjxgait.certify import CertificateConfig, certify
+from mjxgait.certify import CertificateConfig, certify, glance
 from mjxgait.certify.describe import cost_of_transport, describe, footfall_phases, gait_name
 from mjxgait.certify.measure import dimensions
 from mjxgait.errors import UserError
@@ -157,3 +157,8 @@ def test_names_of_hexapod_gaits(phases, duty, name):
 def test_what_may_lie_on_the_floor_crawls():
     alien = dataclasses.replace(DOG, foot_names=("left", "right"), foot_places=((0.1, 0.1), (0.1, -0.1)), crawler=True)
     assert gait_name(alien, np.full(2, 0.5), np.array([0.0, 0.5])) == "crawl"
+
+
+def test_a_glance_is_the_part_that_the_undisturbed_walk_decides(tiny, trotter, certificate):
+    alone = min(c.margin for c in certificate.criteria if c.number in (1, 2, 3, 7, 8))
+    assert glance(tiny, trotter, certificate.config) == alone

@@ -1,0 +1,78 @@
+"""Who of a population walks: the best few before the examiner in C MuJoCo, at the end of a run and on the way there."""
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+
+from mjxgait.certify import Certificate, CertificateConfig, certify, glance
+from mjxgait.champion import Champion
+from mjxgait.config import ExaminationConfig
+from mjxgait.evolution import EvolutionState
+from mjxgait.experiment import Experiment
+from mjxgait.fitness import TERMS
+
+SPARE = 1.2
+"""How much faster than the certificate's least speed a gait should be in evolution before it is worth an examination."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Examined:
+    """A champion and what the examiner says of it."""
+
+    certificate: Certificate
+    champion: Champion
+
+
+def why_ended(generation: int, margin: float) -> str:
+    """Why a run is over that an early examination ended."""
+    return f"certified with a margin of {margin:.2f} in generation {generation}"
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Examiner:
+    """Examines individuals of a run. versions: of the packages, for the champions. tell: called with what is about to be done."""
+
+    experiment: Experiment
+    versions: dict[str, str]
+    tell: Callable[[str], None]
+
+    def early(self, state: EvolutionState) -> Examined | None:
+        """The best individual with its certificate, if it is time to look and it passes with the margin that ends a run.
+
+        Depends on nothing but the state, so that a resumed run ends where it would have ended. An examination takes as long as ten
+        generations: first comes what evolution knows already, then the undisturbed walk alone.
+        """
+        settings = self.experiment.config.examination
+        generation = int(state.generation)
+        if not due(settings, generation) or not _promising(state, self.experiment.config.rollout.seconds):
+            return None
+        champion = self.experiment.champion(state, self.versions)
+        if glance(self.experiment.creature, champion) < settings.enough:
+            return None
+        self.tell(f"Generation {generation}: examining the best in C MuJoCo…")
+        certificate = certify(self.experiment.creature, champion)
+        return Examined(certificate, champion) if certificate.passed and certificate.margin >= settings.enough else None
+
+    def best(self, state: EvolutionState) -> Examined | None:
+        """The first of the best few that passes; if none does, the one that comes nearest. None if nobody is to be examined."""
+        found: list[Examined] = []
+        for rank in self.experiment.candidates(state):
+            self.tell("Examining in C MuJoCo…" if not found else "Examining the next best…")
+            champion = self.experiment.champion(state, self.versions, rank)
+            found.append(Examined(certify(self.experiment.creature, champion), champion))
+            if found[-1].certificate.passed:
+                return found[-1]
+        return max(found, key=lambda examined: examined.certificate.margin, default=None)
+
+
+def due(settings: ExaminationConfig, generation: int) -> bool:
+    """Whether a run looks at its best after this generation, before its last."""
+    return bool(settings.every and settings.candidates) and generation > 0 and generation % settings.every == 0
+
+
+def _promising(state: EvolutionState, seconds: float) -> bool:
+    """Whether the best individual was up to the end on all its starts, and clearly faster than it must be."""
+    wanted = SPARE * CertificateConfig().progress.speed * seconds
+    terms = dict(zip(TERMS, np.asarray(state.terms[0]).T, strict=True))
+    return bool((terms["alive"] >= 1).all() and (terms["distance"] >= wanted).all())
