@@ -85,7 +85,7 @@ class RolloutConfig:
 
     __pydantic_config__ = STRICT
     seconds: Annotated[Positive, SHAPE] = 8.0
-    starts: Annotated[Count, SHAPE] = 8
+    starts: Annotated[Count, SHAPE] = 2
     joint_noise: NonNegative = 0.05
     velocity_noise: NonNegative = 0.1
     friction: tuple[Positive, Positive] = (0.8, 1.2)
@@ -182,7 +182,7 @@ class EvolutionConfig:
     """
 
     __pydantic_config__ = STRICT
-    population: Annotated[Count, SHAPE] = 64
+    population: Annotated[Count, SHAPE] = 256
     generations: Annotated[Whole, HOST] = 60
     target: Annotated[Finite | None, HOST] = None
     growth: Annotated[Positive, SHAPE] = 2.0

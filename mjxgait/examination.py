@@ -36,6 +36,8 @@ class Examiner:
     experiment: Experiment
     versions: dict[str, str]
     tell: Callable[[str], None]
+    _refused: set[str] = dataclasses.field(default_factory=set)
+    """Fingerprints of the champions that did not do on the way: to look at them again would say the same."""
 
     def early(self, state: EvolutionState) -> Examined | None:
         """The best individual with its certificate, if it is time to look and it passes with the margin that ends a run.
@@ -48,11 +50,15 @@ class Examiner:
         if not due(settings, generation) or not _promising(state, self.experiment.config.rollout.seconds):
             return None
         champion = self.experiment.champion(state, self.versions)
-        if glance(self.experiment.creature, champion) < settings.enough:
+        if champion.fingerprint in self._refused:
             return None
-        self.tell(f"Generation {generation}: examining the best in C MuJoCo…")
-        certificate = certify(self.experiment.creature, champion)
-        return Examined(certificate, champion) if certificate.passed and certificate.margin >= settings.enough else None
+        if glance(self.experiment.creature, champion) >= settings.enough:
+            self.tell(f"Generation {generation}: examining the best in C MuJoCo…")
+            certificate = certify(self.experiment.creature, champion)
+            if certificate.passed and certificate.margin >= settings.enough:
+                return Examined(certificate, champion)
+        self._refused.add(champion.fingerprint)
+        return None
 
     def best(self, state: EvolutionState) -> Examined | None:
         """The first of the best few that passes; if none does, the one that comes nearest. None if nobody is to be examined."""

@@ -10,6 +10,8 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
+from mjxgait.config import RolloutConfig
+
 POPULATIONS = (32, 128, 512, 2048, 8192)
 LANES = (8, 16, 32, 64, 128, 256)
 DEFAULTS = (32, 128, 512)
@@ -32,7 +34,7 @@ def scaling_points(creature: str, say: Callable[[str], None]) -> dict[str, list[
     curves = {
         "population": [Point(population=p) for p in POPULATIONS],
         "lanes": [Point(population=512, lanes=n) for n in LANES],
-        "defaults": [Point(population=p, starts=8, seconds=8.0) for p in DEFAULTS],
+        "defaults": [Point(population=p, starts=RolloutConfig.starts, seconds=RolloutConfig.seconds) for p in DEFAULTS],
     }
     found: dict[str, list[dict[str, Any]]] = {name: [] for name in curves}
     for name, points in curves.items():

@@ -1,0 +1,80 @@
+"""From model files that nobody here wrote to certified walks: imports and trains each in processes of its own, and prints a table.
+
+    python benchmarks/imported.py --models "laikago" "gym ant" --out runs/imported
+
+Names are those of `tests/importing/packages.py`, whose files come from the package index. Options after `--` go to `train`. Columns: wall
+time of both commands together and of the import alone; whether the champion is certified, and the margin of its worst criterion; speed over
+the certificate's 20 s; generations; what fails, each measure with its value.
+"""
+
+import argparse
+import json
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+sys.path.append(str(Path(__file__).parents[1] / "tests"))
+from importing.packages import MODELS, model_file
+
+from mjxgait.folder import CERTIFICATE, METRICS, read_metrics
+
+HEADER = ("model", "wall", "import", "certified", "margin", "m/s", "lengths/s", "gait", "gens", "fails")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--models", nargs="+", choices=MODELS, default=list(MODELS), metavar="NAME")
+    parser.add_argument("--out", type=Path, default=Path("runs/imported"))
+    parser.add_argument("more", nargs="*", help="options of train, after --")
+    options = parser.parse_args()
+    print(*HEADER, sep=" | ")
+    for name in options.models:
+        print(*walk(name, options.out, options.more), sep=" | ", flush=True)
+
+
+def walk(name: str, out: Path, more: list[str]) -> list[str]:
+    """A row of the table; a refusal of the import or of the training is its last column."""
+    path, search = model_file(name)
+    env, run = (out / kind / name.replace(" ", "_") for kind in ("envs", "runs"))
+    for folder in (env, run):
+        shutil.rmtree(folder, ignore_errors=True)
+    began = time.perf_counter()
+    searches = [word for folder in search for word in ("--search", str(folder))]
+    imported = _mjxgait(env.with_suffix(".log"), "import", str(path), "--out", str(env), *searches)
+    between = time.perf_counter()
+    trained = imported or _mjxgait(run.with_suffix(".log"), "train", "--env", str(env), "--out", str(run), "--no-plots", *more)
+    seconds = [f"{time.perf_counter() - began:.0f} s", f"{between - began:.0f} s"]
+    if trained or not (run / CERTIFICATE).exists():
+        return [name, *seconds, *[""] * 6, trained or "never moved"]
+    certificate = json.loads((run / CERTIFICATE).read_text(encoding="utf-8"))
+    return [name, *seconds, *_findings(certificate, read_metrics(run / METRICS)[-1]["generation"])]
+
+
+def _mjxgait(log: Path, *command: str) -> str:
+    """Runs a command, its output into a file; what it says last if it fails, else nothing."""
+    log.parent.mkdir(parents=True, exist_ok=True)
+    done = subprocess.run([sys.executable, "-m", "mjxgait", *command], capture_output=True, text=True, check=False)
+    log.write_text(done.stdout + done.stderr, encoding="utf-8")
+    return done.stderr.strip().splitlines()[-1] if done.returncode else ""
+
+
+def _findings(certificate: dict[str, Any], generations: int) -> list[str]:
+    measures = [m for c in certificate["criteria"] for m in c["measures"] if not m["passed"]]
+    values = ["none" if m["value"] is None else f"{m['value']:.3g}" for m in measures]
+    report, margin = certificate["report"], certificate["margin"]
+    return [
+        "yes" if certificate["passed"] else "no",
+        "none" if margin is None else f"{margin:.2f}",
+        f"{report['speed'] or 0:.2f}",
+        f"{report['speed_body_lengths'] or 0:.2f}",
+        str(report["gait"]),
+        str(generations),
+        ", ".join(f"{m['name']} {value}" for m, value in zip(measures, values, strict=True)) or "-",
+    ]
+
+
+if __name__ == "__main__":
+    main()
