@@ -5,13 +5,14 @@ from collections.abc import Callable
 import mujoco
 import numpy as np
 
+from mjxgait.config import resolve_config
 from mjxgait.importing.drive import Drive
 from mjxgait.importing.hold import Held, hold
 from mjxgait.importing.notes import Notes
 from mjxgait.importing.parts import rotation
 
-ANGLE_GAIN, RATE_GAIN, MOST = 0.8, 0.1, 0.5
-"""1/1, s, rad: the strongest feedback that evolution may choose by default, and where the controller clips it (docs/controller.md)."""
+MOST = 0.5
+"""rad, where the controller clips the feedback (docs/controller.md)."""
 SHARES = (1.0, 0.5, 0.25, 0.12, 0.06, 0.0)
 """Of the full weight, tried in this order."""
 NUDGE = 0.05
@@ -26,6 +27,8 @@ def steady_balance(drive: Drive, names: list[str], model: mujoco.MjModel, qpos: 
     Args:
       names: [J] of the joints. model, qpos: [nq] the creature facing +x in its standing pose. feet: names of geoms that may touch.
     """
+    tuning = resolve_config({}, "the imported creature").controller.tuning
+    strongest = ((tuning.roll[1], tuning.roll_rate[1]), (tuning.pitch[1], tuning.pitch_rate[1]))
     start = qpos.copy()
     start[7:] += np.random.default_rng(0).uniform(-NUDGE, NUDGE, len(names))
     for axis, table in enumerate((drive.roll, drive.pitch)):
@@ -34,7 +37,7 @@ def steady_balance(drive: Drive, names: list[str], model: mujoco.MjModel, qpos: 
         full = np.array([table.get(name, 0.0) for name in names])
         tried: dict[float, Held] = {}
         for share in SHARES:
-            correct = feedback(share * full, axis, qpos)
+            correct = feedback(share * full, axis, qpos, *strongest[axis])
             tried[share] = hold(model, start, drive.kp, drive.kd, drive.torque, feet, stand=qpos[7:], correct=correct)
             if tried[share].stands and tried[share].speed < CALM:
                 break
@@ -48,11 +51,12 @@ def steady_balance(drive: Drive, names: list[str], model: mujoco.MjModel, qpos: 
             notes.guess(what, f"{share:g} of full", "medium", "with more it shakes itself off its feet at the strongest feedback")
 
 
-def feedback(weights: np.ndarray, axis: int, stand: np.ndarray) -> Callable[[mujoco.MjData], np.ndarray]:
-    """The controller's correction [J] of the target at the full gains.
+def feedback(weights: np.ndarray, axis: int, stand: np.ndarray, gain: float, rate_gain: float) -> Callable[[mujoco.MjData], np.ndarray]:
+    """The controller's correction [J] of the target.
 
     Args:
       weights: [J]. axis: 0 for roll, 1 for pitch. stand: [nq] the standing pose, in which the creature faces +x.
+      gain, rate_gain: of the trunk's angle, 1, and of its rate, s.
     """
     level = rotation(stand[3:7])
 
@@ -61,6 +65,6 @@ def feedback(weights: np.ndarray, axis: int, stand: np.ndarray) -> Callable[[muj
         axes = turned @ level.T  # columns: forward, left and up of the stance in the world of this moment
         angle = np.arcsin(np.clip(axes[2, 1] if axis == 0 else -axes[2, 0], -1, 1))
         rate = (turned @ data.qvel[3:6]) @ axes[:, axis]
-        return weights * np.clip(ANGLE_GAIN * angle + RATE_GAIN * rate, -MOST, MOST)
+        return weights * np.clip(gain * angle + rate_gain * rate, -MOST, MOST)
 
     return correct

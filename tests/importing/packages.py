@@ -11,6 +11,14 @@ import pytest
 
 CACHE = Path(os.environ.get("MJXGAIT_TEST_CACHE", Path.home() / ".cache" / "mjxgait-test-models"))
 SECONDS = 240
+VERSIONS = {
+    "brax": "0.14.2",
+    "dm_control": "1.0.50",
+    "example-robot-data": "6.0.0",
+    "gymnasium": "1.4.0",
+    "playground": "0.2.0",
+    "pybullet": "3.2.7",
+}
 ERD = "cmeel.prefix/share/example-robot-data"
 MODELS = {
     # name: (package, path inside it, whether its packages are searched for meshes)
@@ -47,6 +55,7 @@ MODELS = {
 @cache
 def unpacked(package: str) -> Path:
     """The folder with a package's files; skips the test where the index cannot be reached or has no wheel for this machine."""
+    package = f"{package}=={VERSIONS[package]}"
     folder = CACHE / package
     if (folder / "done").exists():
         return folder
