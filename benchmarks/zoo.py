@@ -27,7 +27,7 @@ def main() -> None:
     parser.add_argument("--env", nargs="+", default=["tall_quadruped", "short_quadruped", "crab", "duck", "alien"])
     parser.add_argument("--seeds", nargs="+", type=int, default=[0, 1, 2, 3, 4])
     parser.add_argument("--config", default=None)
-    parser.add_argument("--candidates", type=int, default=4, help="how many of the best are examined at most")
+    parser.add_argument("--candidates", type=int, default=12, help="how many of the best are looked at in the end")
     parser.add_argument("--out", type=Path, default=Path("runs/zoo"))
     options = parser.parse_args()
     print(*HEADER, sep=" | ")

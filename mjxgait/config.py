@@ -219,14 +219,14 @@ class ExaminationConfig:
     Attributes:
       every: generations between looks on the way at the best, if it is promising; 0 examines only after the last generation.
       enough: margin of the certificate with which a run ends before its last generation.
-      candidates: so many of the best, different from each other, are examined at the end, until one passes; 0 leaves all examinations out.
+      candidates: so many of the best, different from each other, are looked at in the end, until one passes; 0 leaves all examinations out.
       difference: in units of each gene's range, root mean square; what counts as different.
     """
 
     __pydantic_config__ = STRICT
     every: Annotated[Whole, HOST] = 5
     enough: Annotated[Finite, HOST] = 0.2
-    candidates: Annotated[Whole, HOST] = 4
+    candidates: Annotated[Whole, HOST] = 12
     difference: Annotated[NonNegative, HOST] = 0.02
 
 

@@ -14,6 +14,8 @@ from mjxgait.fitness import TERMS
 
 SPARE = 1.2
 """How much faster than the certificate's least speed a gait should be in evolution before it is worth an examination."""
+MOST = 4
+"""Whole examinations at the end of a run, at most; who fails undisturbed is not examined further."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -46,30 +48,38 @@ class Examiner:
         generations: first comes what evolution knows already, then the undisturbed walk alone.
         """
         settings = self.experiment.config.examination
-        generation = int(state.generation)
-        if not due(settings, generation) or not _promising(state, self.experiment.config.rollout.seconds):
+        if not due(settings, int(state.generation)) or not _promising(state, self.experiment.config.rollout.seconds):
             return None
         champion = self.experiment.champion(state, self.versions)
         if champion.fingerprint in self._refused:
             return None
         if glance(self.experiment.creature, champion) >= settings.enough:
-            self.tell(f"Generation {generation}: examining the best in C MuJoCo…")
-            certificate = certify(self.experiment.creature, champion)
-            if certificate.passed and certificate.margin >= settings.enough:
-                return Examined(certificate, champion)
+            examined = self._examine(champion, "the best")
+            if examined.certificate.passed and examined.certificate.margin >= settings.enough:
+                return examined
         self._refused.add(champion.fingerprint)
         return None
 
     def best(self, state: EvolutionState) -> Examined | None:
         """The first of the best few that passes; if none does, the one that comes nearest. None if nobody is to be examined."""
-        found: list[Examined] = []
+        examined: list[Examined] = []
+        failed: list[tuple[float, Champion]] = []
         for rank in self.experiment.candidates(state):
-            self.tell("Examining in C MuJoCo…" if not found else "Examining the next best…")
             champion = self.experiment.champion(state, self.versions, rank)
-            found.append(Examined(certify(self.experiment.creature, champion), champion))
-            if found[-1].certificate.passed:
-                return found[-1]
-        return max(found, key=lambda examined: examined.certificate.margin, default=None)
+            margin = glance(self.experiment.creature, champion)
+            if margin < 0:
+                failed.append((margin, champion))
+                continue
+            examined.append(self._examine(champion, "the next best" if examined or failed else "the best"))
+            if examined[-1].certificate.passed or len(examined) == MOST:
+                break
+        if failed and not examined:
+            examined.append(self._examine(max(failed, key=lambda pair: pair[0])[1], "who comes nearest"))
+        return max(examined, key=lambda e: (e.certificate.passed, e.certificate.margin), default=None)
+
+    def _examine(self, champion: Champion, who: str) -> Examined:
+        self.tell(f"Generation {champion.origin['generation']}: examining {who} in C MuJoCo…")
+        return Examined(certify(self.experiment.creature, champion), champion)
 
 
 def due(settings: ExaminationConfig, generation: int) -> bool:

@@ -93,6 +93,18 @@ def test_who_did_not_do_is_not_looked_at_again(experiment: Experiment, looks: di
     assert looks["asked"] == [0.1, 1.0]
 
 
+def test_in_the_end_nobody_is_examined_further_who_fails_undisturbed(experiment: Experiment, looks: dict[str, list[float]]):
+    config = dataclasses.replace(experiment.config, examination=ExaminationConfig(candidates=3, difference=0.0))
+    judged = dataclasses.replace(experiment.init(), fitness=jnp.arange(6.0)[::-1], generation=jnp.int32(9))
+    examiner = Examiner(dataclasses.replace(experiment, config=config), {}, lambda _: None)
+    assert examiner.best(judged).certificate.passed
+    assert looks["asked"] == [0.1, 1.0]  # the first does
+    looks["asked"].clear()
+    looks["glance"] = [-0.3]
+    assert examiner.best(judged) is not None
+    assert looks["asked"] == [0.1, 0.1, 0.1, 1.0]  # none of three does, and one is examined to say why
+
+
 @pytest.fixture
 def promising(monkeypatch: pytest.MonkeyPatch, looks: dict[str, list[float]]) -> None:
     """Everybody is promising, so that the small run is looked at."""
