@@ -32,7 +32,7 @@ class BenchOptions:
     json: Path
     env: str = "tall_quadruped"
     rounds: int = 7
-    population: int = 64
+    population: int = 256
     generations: int = 10
     scaling: bool = False
     history: Path | None = None
