@@ -97,11 +97,17 @@ class Plan:
 def read_study(file: Path, over: Mapping[str, Any]) -> Study:
     """The study in a file or shipped under this name, with options laid over it.
 
+    With other generations than the file's, variants that have their own keep their share of evaluations, the initial population's included.
+
     Raises:
       UserError: names the file and the key.
     """
     path = _find(file)
-    return build(Study, merge(read_toml(path), {key: value for key, value in over.items() if value is not None}), str(path))
+    given = build(Study, read_toml(path), str(path))
+    study = build(Study, merge(dataclasses.asdict(given), {key: value for key, value in over.items() if value is not None}), str(path))
+    scale = (study.generations + 1) / (given.generations + 1)
+    scaled = [dataclasses.replace(v, generations=v.generations and max(1, round((v.generations + 1) * scale) - 1)) for v in study.variant]
+    return dataclasses.replace(study, variant=tuple(scaled))
 
 
 def make_plan(study: Study, creature: Creature, where: str) -> Plan:

@@ -33,7 +33,7 @@ class AblateOptions:
       env: Another creature than the study names.
       seeds: Another number of seeds.
       first_seed: Another first seed.
-      generations: Another number of generations.
+      generations: Another number of generations; variants that have a number of their own keep their share of evaluations.
       config: Another base config: a TOML file, or the name of a shipped one.
       resume: Folder of a study to go on with, as it was.
       hours: Refuse a study that would take longer than this.

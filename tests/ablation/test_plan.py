@@ -99,10 +99,16 @@ def test_the_sizes_have_equal_evaluations():
     assert max(spent) / min(spent) < 1.05
 
 
+def test_with_other_generations_variants_keep_their_share_of_evaluations():
+    study = read_study(Path("sizes"), {"generations": 41})
+    assert {v.name: v.generations for v in study.variant}["population 50"] == 83
+    assert {v.name: v.generations for v in study.variant}["3 key poses"] is None
+
+
 def test_an_unknown_study_names_the_shipped_ones():
     with pytest.raises(UserError, match="switches"):
         read_study(Path("swiches"), {})
 
 
 def test_stool_is_a_creature_of_a_study(stool: Creature):
-    assert plan(stool, env=str(STOOL)).upper_bound(stool) == 6 * (5 + 1) * 64 * 8 * 1600
+    assert plan(stool, env=str(STOOL)).upper_bound(stool) == 6 * (5 + 1) * 256 * 2 * 1600
