@@ -236,13 +236,13 @@ class Config:
 
     Attributes:
       seed: Of all randomness.
-      checkpoint_every: Generations between checkpoints; the latest three stay.
+      checkpoint_every: Generations between checkpoints, which is what a killed run loses at most; the latest three stay.
       keep_every: Checkpoints of generations that are a multiple of this are kept for good.
     """
 
     __pydantic_config__ = STRICT
     seed: Annotated[Whole, HOST] = 0
-    checkpoint_every: Annotated[Count, HOST] = 1
+    checkpoint_every: Annotated[Count, HOST] = 5
     keep_every: Annotated[Count, HOST] = 5
     controller: ControllerConfig = dataclasses.field(default_factory=ControllerConfig)
     rollout: RolloutConfig = dataclasses.field(default_factory=RolloutConfig)

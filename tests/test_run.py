@@ -18,7 +18,7 @@ from mjxgait.creature import load_creature
 from mjxgait.folder import open_run, read_metrics
 
 SMALL = ["--env", str(STOOL), "--population", "8", "--generations", "7", "--rollout.seconds", "0.4", "--rollout.starts", "2"]
-SMALL += ["--seed", "5", "--examination.candidates", "0", "--no-plots"]
+SMALL += ["--seed", "5", "--examination.candidates", "0", "--no-plots", "--checkpoint-every", "1"]
 
 
 def command(*arguments: object) -> list[str]:
@@ -77,13 +77,13 @@ def test_the_same_seed_gives_the_same_champion(finished: tuple[Path, str], tmp_p
     assert without_times(tmp_path / "again") == without_times(finished[0])
 
 
-def kill_when(folder: Path, ready: Callable[[], bool], how: int = signal.SIGKILL) -> int:
+def kill_when(folder: Path, ready: Callable[[], bool], *more: str) -> int:
     """Starts the run and kills it as soon as `ready` holds; returns its exit code."""
-    process = subprocess.Popen(command("train", *SMALL, "--out", folder), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    process = subprocess.Popen(command("train", *SMALL, *more, "--out", folder), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     deadline = time.monotonic() + 200
     while not ready() and process.poll() is None and time.monotonic() < deadline:
         time.sleep(0.001)
-    process.send_signal(how)
+    process.kill()
     return process.wait(timeout=60)
 
 
@@ -100,6 +100,15 @@ def test_a_killed_run_goes_on_to_the_same_champion_bit_for_bit(finished: tuple[P
     folder = tmp_path / "killed"
     kind, number = moment.split()
     kill_when(folder, generations(folder, int(number)) if kind == "generation" else saving(folder, int(number)))
+    mjxgait("train", "--resume", folder)
+    assert result(folder) == result(finished[0])
+    assert without_times(folder) == without_times(finished[0])
+
+
+def test_killed_between_two_checkpoints_it_repeats_what_came_after_the_first(finished: tuple[Path, str], tmp_path: Path):
+    folder = tmp_path / "killed"
+    kill_when(folder, generations(folder, 4), "--checkpoint-every", "5")
+    assert sorted(int(path.name) for path in (folder / "checkpoints").iterdir() if path.name.isdigit()) == [0]
     mjxgait("train", "--resume", folder)
     assert result(folder) == result(finished[0])
     assert without_times(folder) == without_times(finished[0])
