@@ -183,7 +183,7 @@ class EvolutionConfig:
 
     __pydantic_config__ = STRICT
     population: Annotated[Count, SHAPE] = 256
-    generations: Annotated[Whole, HOST] = 60
+    generations: Annotated[Whole, HOST] = 75
     target: Annotated[Finite | None, HOST] = None
     growth: Annotated[Positive, SHAPE] = 2.0
     pose_range: Annotated[float, pydantic.Field(gt=0, le=1)] = 1.0
