@@ -2,6 +2,7 @@
 
 import contextlib
 import dataclasses
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
@@ -28,6 +29,8 @@ def view_command(arguments: Sequence[str]) -> int:
     options = tyro.cli(ViewOptions, args=list(arguments), prog="mjxgait view")
     from mjxgait.viewing.live import serve
 
+    # What a script starts in the background ignores interrupts, and Python leaves it so: without this nothing but a kill would end it.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     serve(options.run, options.port, ready=lambda address: print(f"{address} (only from this machine; Ctrl-C ends it)", flush=True))
     return 0
 
