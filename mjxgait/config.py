@@ -218,7 +218,7 @@ class ExaminationConfig:
 
     Attributes:
       every: generations between looks on the way at the best, if it is promising; 0 examines only after the last generation.
-      enough: margin of the certificate with which a run ends before its last generation.
+      enough: margin of the certificate that ends a run in the first half of its generations; in the second any pass does.
       candidates: so many of the best, different from each other, are looked at in the end, until one passes; 0 leaves all examinations out.
       difference: in units of each gene's range, root mean square; what counts as different.
     """

@@ -7,7 +7,7 @@ import numpy as np
 
 from mjxgait.certify import Certificate, CertificateConfig, certify, glance
 from mjxgait.champion import Champion
-from mjxgait.config import ExaminationConfig
+from mjxgait.config import Config, ExaminationConfig
 from mjxgait.evolution import EvolutionState
 from mjxgait.experiment import Experiment
 from mjxgait.fitness import TERMS
@@ -38,26 +38,29 @@ class Examiner:
     experiment: Experiment
     versions: dict[str, str]
     tell: Callable[[str], None]
-    _refused: set[str] = dataclasses.field(default_factory=set)
-    """Fingerprints of the champions that did not do on the way: to look at them again would say the same."""
+    _margins: dict[str, float] = dataclasses.field(default_factory=dict)
+    """Of the champions that did not do on the way, by fingerprint, at most: another look would say the same."""
 
     def early(self, state: EvolutionState) -> Examined | None:
         """The best individual with its certificate, if it is time to look and it passes with the margin that ends a run.
 
-        Depends on nothing but the state, so that a resumed run ends where it would have ended. An examination takes as long as ten
-        generations: first comes what evolution knows already, then the undisturbed walk alone.
+        Depends on nothing but the state and the settings, so that a resumed run ends where it would have ended. An examination takes as
+        long as ten generations: first comes what evolution knows already, then the undisturbed walk alone.
         """
-        settings = self.experiment.config.examination
-        if not due(settings, int(state.generation)) or not _promising(state, self.experiment.config.rollout.seconds):
+        config, generation = self.experiment.config, int(state.generation)
+        if not due(config.examination, generation) or not _promising(state, config.rollout.seconds):
             return None
+        wanted = enough(config, generation)
         champion = self.experiment.champion(state, self.versions)
-        if champion.fingerprint in self._refused:
+        if self._margins.get(champion.fingerprint, np.inf) < wanted:
             return None
-        if glance(self.experiment.creature, champion) >= settings.enough:
+        margin = glance(self.experiment.creature, champion)
+        if margin >= wanted:
             examined = self._examine(champion, "the best")
-            if examined.certificate.passed and examined.certificate.margin >= settings.enough:
+            margin = examined.certificate.margin
+            if examined.certificate.passed and margin >= wanted:
                 return examined
-        self._refused.add(champion.fingerprint)
+        self._margins[champion.fingerprint] = margin
         return None
 
     def best(self, state: EvolutionState) -> Examined | None:
@@ -80,6 +83,11 @@ class Examiner:
     def _examine(self, champion: Champion, who: str) -> Examined:
         self.tell(f"Generation {champion.origin['generation']}: examining {who} in C MuJoCo…")
         return Examined(certify(self.experiment.creature, champion), champion)
+
+
+def enough(config: Config, generation: int) -> float:
+    """The margin with which a run ends early: room to spare in the first half of its generations, any pass after that."""
+    return config.examination.enough if 2 * generation <= config.evolution.generations else 0.0
 
 
 def due(settings: ExaminationConfig, generation: int) -> bool:

@@ -88,9 +88,18 @@ def test_else_it_goes_on_and_spares_what_it_can(experiment: Experiment, looks, g
 def test_who_did_not_do_is_not_looked_at_again(experiment: Experiment, looks: dict[str, list[float]]):
     looks["certify"] = [0.1]
     examiner = Examiner(experiment, {}, lambda _: None)
-    for generation in (3, 6):
-        assert examiner.early(state_with(experiment, generation)) is None
+    for _ in range(2):
+        assert examiner.early(state_with(experiment, 3)) is None
     assert looks["asked"] == [0.1, 1.0]
+
+
+def test_in_the_second_half_any_pass_will_do(experiment: Experiment, looks: dict[str, list[float]]):
+    looks["certify"] = [0.1]
+    examiner = Examiner(experiment, {}, lambda _: None)
+    assert examiner.early(state_with(experiment, 3)) is None
+    assert examiner.early(state_with(experiment, 6)) is not None
+    looks["certify"] = [-0.1]
+    assert Examiner(experiment, {}, lambda _: None).early(state_with(experiment, 6)) is None
 
 
 def test_in_the_end_nobody_is_examined_further_who_fails_undisturbed(experiment: Experiment, looks: dict[str, list[float]]):
