@@ -14,8 +14,6 @@ from mjxgait.fitness import TERMS
 
 SPARE = 1.2
 """How much faster than the certificate's least speed a gait should be in evolution before it is worth an examination."""
-MOST = 4
-"""Whole examinations at the end of a run, at most; who fails undisturbed is not examined further."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -64,7 +62,10 @@ class Examiner:
         return None
 
     def best(self, state: EvolutionState) -> Examined | None:
-        """The first of the best few that passes; if none does, the one that comes nearest. None if nobody is to be examined."""
+        """The first of the best few that passes; if none does, the one that comes nearest. None if nobody is to be examined.
+
+        Who fails undisturbed is not examined further, but for the one that comes nearest when all do.
+        """
         examined: list[Examined] = []
         failed: list[tuple[float, Champion]] = []
         for rank in self.experiment.candidates(state):
@@ -74,11 +75,11 @@ class Examiner:
                 failed.append((margin, champion))
                 continue
             examined.append(self._examine(champion, "the next best" if examined or failed else "the best"))
-            if examined[-1].certificate.passed or len(examined) == MOST:
-                break
+            if examined[-1].certificate.passed:
+                return examined[-1]
         if failed and not examined:
             examined.append(self._examine(max(failed, key=lambda pair: pair[0])[1], "who comes nearest"))
-        return max(examined, key=lambda e: (e.certificate.passed, e.certificate.margin), default=None)
+        return max(examined, key=lambda e: e.certificate.margin, default=None)
 
     def _examine(self, champion: Champion, who: str) -> Examined:
         self.tell(f"Generation {champion.origin['generation']}: examining {who} in C MuJoCo…")
