@@ -64,7 +64,7 @@ class Examiner:
     def best(self, state: EvolutionState) -> Examined | None:
         """The first of the best few that passes; if none does, the one that comes nearest. None if nobody is to be examined.
 
-        Who fails undisturbed is not examined further, but for the one that comes nearest when all do.
+        Who fails undisturbed is not examined further, but for the one that comes nearest when nobody passes.
         """
         examined: list[Examined] = []
         failed: list[tuple[float, Champion]] = []
@@ -77,8 +77,9 @@ class Examiner:
             examined.append(self._examine(champion, "the next best" if examined or failed else "the best"))
             if examined[-1].certificate.passed:
                 return examined[-1]
-        if failed and not examined:
-            examined.append(self._examine(max(failed, key=lambda pair: pair[0])[1], "who comes nearest"))
+        nearest = max(failed, key=lambda pair: pair[0], default=None)
+        if nearest and all(e.certificate.margin < nearest[0] for e in examined):
+            examined.append(self._examine(nearest[1], "who comes nearest"))
         return max(examined, key=lambda e: e.certificate.margin, default=None)
 
     def _examine(self, champion: Champion, who: str) -> Examined:
