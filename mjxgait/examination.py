@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from mjxgait.certify import Certificate, CertificateConfig, certify, glance
+from mjxgait.certify import Certificate, CertificateConfig, Glance, certify, glance
 from mjxgait.champion import Champion
 from mjxgait.config import Config, ExaminationConfig
 from mjxgait.evolution import EvolutionState
@@ -52,9 +52,10 @@ class Examiner:
         champion = self.experiment.champion(state, self.versions)
         if self._margins.get(champion.fingerprint, np.inf) < wanted:
             return None
-        margin = glance(self.experiment.creature, champion)
+        seen = glance(self.experiment.creature, champion)
+        margin = seen.margin
         if margin >= wanted:
-            examined = self._examine(champion, "the best")
+            examined = self._examine(champion, seen, "the best")
             margin = examined.certificate.margin
             if examined.certificate.passed and margin >= wanted:
                 return examined
@@ -67,24 +68,24 @@ class Examiner:
         Who fails undisturbed is not examined further, but for the one that comes nearest when nobody passes.
         """
         examined: list[Examined] = []
-        failed: list[tuple[float, Champion]] = []
+        failed: list[tuple[Champion, Glance]] = []
         for rank in self.experiment.candidates(state):
             champion = self.experiment.champion(state, self.versions, rank)
-            margin = glance(self.experiment.creature, champion)
-            if margin < 0:
-                failed.append((margin, champion))
+            seen = glance(self.experiment.creature, champion)
+            if seen.margin < 0:
+                failed.append((champion, seen))
                 continue
-            examined.append(self._examine(champion, "the next best" if examined or failed else "the best"))
+            examined.append(self._examine(champion, seen, "the next best" if examined or failed else "the best"))
             if examined[-1].certificate.passed:
                 return examined[-1]
-        nearest = max(failed, key=lambda pair: pair[0], default=None)
-        if nearest and all(e.certificate.margin < nearest[0] for e in examined):
-            examined.append(self._examine(nearest[1], "who comes nearest"))
+        nearest = max(failed, key=lambda pair: pair[1].margin, default=None)
+        if nearest and all(e.certificate.margin < nearest[1].margin for e in examined):
+            examined.append(self._examine(*nearest, "who comes nearest"))
         return max(examined, key=lambda e: e.certificate.margin, default=None)
 
-    def _examine(self, champion: Champion, who: str) -> Examined:
+    def _examine(self, champion: Champion, seen: Glance, who: str) -> Examined:
         self.tell(f"Generation {champion.origin['generation']}: examining {who} in C MuJoCo…")
-        return Examined(certify(self.experiment.creature, champion), champion)
+        return Examined(certify(self.experiment.creature, champion, seen=seen), champion)
 
 
 def enough(config: Config, generation: int) -> float:

@@ -3,6 +3,7 @@
 import dataclasses
 import io
 from pathlib import Path
+from types import SimpleNamespace
 
 import jax.numpy as jnp
 import numpy as np
@@ -50,12 +51,13 @@ def state_with(experiment: Experiment, generation: int, speed: float = 0.7, aliv
 def looks(monkeypatch: pytest.MonkeyPatch) -> dict[str, list[float]]:
     """What the examiner will say (`glance`, `certify`), and how often it was asked."""
     said: dict[str, list[float]] = {"glance": [0.3], "certify": [0.3], "asked": []}
-    monkeypatch.setattr(
-        examination,
-        "glance",
-        lambda *_: said["asked"].append(0.1) or said["glance"][min(said["asked"].count(0.1), len(said["glance"])) - 1],
-    )
-    monkeypatch.setattr(examination, "certify", lambda *_: said["asked"].append(1.0) or certificate(said["certify"][0]))
+
+    def glance(*_: object) -> SimpleNamespace:
+        said["asked"].append(0.1)
+        return SimpleNamespace(margin=said["glance"][min(said["asked"].count(0.1), len(said["glance"])) - 1])
+
+    monkeypatch.setattr(examination, "glance", glance)
+    monkeypatch.setattr(examination, "certify", lambda *_, seen: said["asked"].append(1.0) or certificate(said["certify"][0]))
     return said
 
 

@@ -76,43 +76,50 @@ class Certificate:
         return json.dumps(_finite(document), indent=2, allow_nan=False) + "\n"
 
 
-def certify(creature: Creature, champion: Champion, config: CertificateConfig | None = None, threads: int = 0) -> Certificate:
-    """Examines a champion against all eight criteria."""
+@dataclasses.dataclass(frozen=True, eq=False)
+class Glance:
+    """The undisturbed walk, and the criteria that it alone decides, half the time step among them (all but 4 and 5)."""
+
+    whole: Recording
+    criteria: tuple[Criterion, ...]
+
+    @property
+    def margin(self) -> float:
+        """That of the worst of its criteria."""
+        return min(c.margin for c in self.criteria)
+
+
+def glance(creature: Creature, champion: Champion, config: CertificateConfig | None = None, threads: int = 0) -> Glance:
+    """The part of the examination that nobody disturbs: a third of its time."""
     config = config or CertificateConfig()
-    began = time.perf_counter()
-    groups = (nominal_starts(creature, 1), *_starts(creature, config), *_ladder(creature, config))
-    outcome = simulate(creature, champion, join(*groups), config.seconds, record=1, fall=config.upright, threads=threads)
-    whole, halved = measure(creature, champion, outcome.trajectory), record(creature, champion, config.seconds, 2, threads)
-    plain, started, pushed, *harder = (float(up.mean()) for up in np.split(outcome.stayed_up, np.cumsum([len(g) for g in groups])[:-1]))
+    whole, halved = (record(creature, champion, config.seconds, refine, threads) for refine in (1, 2))
     window = whole.window(config.warmup)
     judged = (
         *criteria.basic(whole, config),
-        criteria.starts(started, config),
-        criteria.pushes(pushed, config),
         criteria.half_step(whole, halved, config),
         criteria.gait(window, config.gait),
         criteria.physics(window, config.physics),
     )
+    return Glance(whole, judged)
+
+
+def certify(
+    creature: Creature, champion: Champion, config: CertificateConfig | None = None, threads: int = 0, seen: Glance | None = None
+) -> Certificate:
+    """Examines a champion against all eight criteria. seen: what a glance with the same config has found, to save looking again."""
+    config = config or CertificateConfig()
+    began = time.perf_counter()
+    seen = seen or glance(creature, champion, config, threads)
+    groups = (nominal_starts(creature, 1), *_starts(creature, config), *_ladder(creature, config))
+    outcome = simulate(creature, champion, join(*groups), config.seconds, fall=config.upright, threads=threads)
+    plain, started, pushed, *harder = (float(up.mean()) for up in np.split(outcome.stayed_up, np.cumsum([len(g) for g in groups])[:-1]))
+    judged = sorted((*seen.criteria, criteria.starts(started, config), criteria.pushes(pushed, config)), key=lambda c: c.number)
     shares = dict(zip(config.pushes.ladder, harder, strict=True)) | {0.0: plain, config.pushes.speed: pushed}
-    report = describe.describe(window, config.gait.clearance) | {
+    report = describe.describe(seen.whole.window(config.warmup), config.gait.clearance) | {
         "push_survival": {f"{speed:g}": share for speed, share in sorted(shares.items())},
         "push_that_fells_half": half_point(shares),
     }
-    return Certificate(creature.name, creature.digest, champion.fingerprint, judged, report, config, time.perf_counter() - began)
-
-
-def glance(creature: Creature, champion: Champion, config: CertificateConfig | None = None) -> float:
-    """Margin of the worst of the criteria that the undisturbed walk alone decides (all but 4 and 5): a third of the whole examination."""
-    config = config or CertificateConfig()
-    whole, halved = (record(creature, champion, config.seconds, refine) for refine in (1, 2))
-    window = whole.window(config.warmup)
-    judged = (
-        *criteria.basic(whole, config),
-        criteria.half_step(whole, halved, config),
-        criteria.gait(window, config.gait),
-        criteria.physics(window, config.physics),
-    )
-    return min(c.margin for c in judged)
+    return Certificate(creature.name, creature.digest, champion.fingerprint, tuple(judged), report, config, time.perf_counter() - began)
 
 
 def record(creature: Creature, champion: Champion, seconds: float, refine: int = 1, threads: int = 0) -> Recording:
