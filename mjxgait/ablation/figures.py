@@ -34,7 +34,7 @@ def draw_intervals(findings: "Sequence[Finding]", measure: str, path: Path) -> N
 
 
 def draw_curves(plan: Plan, logs: Sequence[Mapping[str, Any]], path: Path) -> None:
-    """Interquartile mean of the best fitness, and the middle half of the runs, for every variant."""
+    """Interquartile mean of the best fitness and the middle half of the runs, for every variant. A run without any counts as the worst."""
     with figure((8, 4.5)) as drawing:
         axes = drawing.subplots()
         shades = np.linspace(0.0, 0.65, len(plan.variants))
@@ -42,10 +42,10 @@ def draw_curves(plan: Plan, logs: Sequence[Mapping[str, Any]], path: Path) -> No
             runs: dict[int, list[float]] = {}
             for line in logs:
                 if line["variant"] == variant:
-                    runs.setdefault(line["seed"], []).append(np.nan if line["best"] is None else line["best"])
+                    runs.setdefault(line["seed"], []).append(-np.inf if line["best"] is None else line["best"])
             shortest = min(map(len, runs.values()))
             curves = np.array([curve[:shortest] for curve in runs.values()])
-            low, high = np.nanpercentile(curves, [25, 75], axis=0)
+            low, high = np.percentile(curves, [25, 75], axis=0, method="nearest")
             shade = ACCENT if not number else str(shades[number])
             axes.fill_between(range(shortest), low, high, color=shade, alpha=0.12, linewidth=0)
             axes.plot(trim_mean(curves, 0.25, axis=0), LINES[number % len(LINES)], color=shade, label=variant)

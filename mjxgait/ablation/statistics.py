@@ -5,11 +5,13 @@ instead of points, probability of improvement. All random draws are from a fixed
 """
 
 import dataclasses
+import warnings
 from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
 from scipy import stats
+from scipy.stats import DegenerateDataWarning
 
 RESAMPLES = 9999
 TRIM = 0.25
@@ -104,7 +106,7 @@ def _bootstrap(samples: tuple[np.ndarray, ...], statistic: Callable[..., np.ndar
     """BCa where it is defined, percentiles where it is not (many equal values)."""
     value = float(statistic(*samples, axis=-1))
     for method in ("BCa", "percentile"):
-        with np.errstate(all="ignore"):
+        with np.errstate(all="ignore"), warnings.catch_warnings(action="ignore", category=DegenerateDataWarning):
             found = stats.bootstrap(
                 samples,
                 statistic,
