@@ -4,4 +4,5 @@ import sys
 
 from mjxgait.cli import main
 
-main(["ablate", *sys.argv[1:]])
+if __name__ == "__main__":
+    main(["ablate", *sys.argv[1:]])

@@ -4,4 +4,5 @@ import sys
 
 from mjxgait.cli import main
 
-main(["inspect", *sys.argv[1:]])
+if __name__ == "__main__":
+    main(["inspect", *sys.argv[1:]])

@@ -4,18 +4,20 @@ import dataclasses
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from mjxgait.ablation.plan import Plan, Run
+from mjxgait.ablation.plan import Plan, Run, Study
 from mjxgait.ablation.rows import GROUPS, champion_path
 from mjxgait.certify import certify
 from mjxgait.certify.simulate import simulate
 from mjxgait.certify.starts import join, nominal_starts, perturbed_starts
 from mjxgait.champion import Champion, read_champion
 from mjxgait.checkpoint import disk_errors
+from mjxgait.cores import process_per_core
 from mjxgait.creature import Creature
 from mjxgait.folder import METRICS, read_metrics
 
@@ -57,19 +59,21 @@ def read_logs(folder: Path) -> list[dict[str, Any]]:
 
 
 def measure(folder: Path, creature: Creature, plan: Plan, tell: Callable[[int, int], None]) -> list[Result]:
-    """The result of every run, in the order of the plan. What has been measured before is not measured again."""
+    """The result of every run, in the order of the plan. One process per core; what has been measured before is not measured again."""
     known = {(line["variant"], line["seed"]): Result(**line) for line in _measured(folder)}
     lines: dict[tuple[str, int], list[dict[str, Any]]] = {}
     for line in read_logs(folder):
         lines.setdefault((line["variant"], line["seed"]), []).append(line)
-    for number, run in enumerate(plan.runs):
-        place = (run.variant, run.seed)
-        if place in known:
-            continue
-        tell(number, len(plan.runs))
-        known[place] = _result(creature, plan, run, lines[place], champion_path(folder, plan, run))
-        with disk_errors(folder), (folder / MEASURED).open("a", encoding="utf-8") as log:
-            log.write(json.dumps(dataclasses.asdict(known[place])) + "\n")
+    missing = [run for run in plan.runs if (run.variant, run.seed) not in known]
+    tell(0, len(missing))
+    with process_per_core(len(missing)) as pool:
+        paths = [champion_path(folder, plan, run) for run in missing]
+        found = pool.map(partial(_result, creature, plan.study), missing, [lines[run.variant, run.seed] for run in missing], paths)
+        for number, result in enumerate(found, 1):
+            known[result.variant, result.seed] = result
+            with disk_errors(folder), (folder / MEASURED).open("a", encoding="utf-8") as log:
+                log.write(json.dumps(dataclasses.asdict(result)) + "\n")
+            tell(number, len(missing))
     return [known[run.variant, run.seed] for run in plan.runs]
 
 
@@ -77,12 +81,12 @@ def _measured(folder: Path) -> list[dict[str, Any]]:
     return read_metrics(folder / MEASURED)
 
 
-def _result(creature: Creature, plan: Plan, run: Run, lines: Sequence[Mapping[str, Any]], path: Path) -> Result:
+def _result(creature: Creature, study: Study, run: Run, lines: Sequence[Mapping[str, Any]], path: Path) -> Result:
     champion = read_champion(path, creature)
     best = [-math.inf if line["best"] is None else line["best"] for line in lines]
     finite = math.isfinite(best[-1])
     walk, up, nominal = _walk(creature, champion) if finite else (0.0, 0.0, 0.0)
-    threshold = plan.study.threshold
+    threshold = study.threshold
     reached = [i for i, value in enumerate(best) if threshold is not None and value >= threshold]
     # One that falls or lags this far behind the speed that the certificate asks for cannot pass, so the long examination is spared.
     worth = nominal > 0.4
@@ -91,7 +95,7 @@ def _result(creature: Creature, plan: Plan, run: Run, lines: Sequence[Mapping[st
         seed=run.seed,
         walk=walk,
         up=up,
-        certified=(worth and certify(creature, champion).passed) if plan.study.certify else None,
+        certified=(worth and certify(creature, champion, threads=1).passed) if study.certify else None,
         fitness=best[-1] if finite else -1e9,
         area=float(np.mean([value for value in best if math.isfinite(value)])) if finite else -1e9,
         generations=reached[0] if reached else run.generations + 1,
@@ -103,6 +107,6 @@ def _result(creature: Creature, plan: Plan, run: Run, lines: Sequence[Mapping[st
 def _walk(creature: Creature, champion: Champion) -> tuple[float, float, float]:
     """Mean speed and share up over the unseen starts, and the speed from the undisturbed start (0 if it falls)."""
     starts = join(nominal_starts(creature, 1), perturbed_starts(creature, STARTS, np.random.default_rng(SEED)))
-    outcome = simulate(creature, champion, starts, SECONDS)
+    outcome = simulate(creature, champion, starts, SECONDS, threads=1)
     speed = outcome.travel[:, 0] / creature.body_length / SECONDS
     return float(speed[1:].mean()), float(outcome.stayed_up[1:].mean()), float(speed[0] * outcome.stayed_up[0])

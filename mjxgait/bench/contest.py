@@ -16,9 +16,10 @@ from mjxgait.bench.limits import distance_to_limit, step_cost
 from mjxgait.bench.machine import machine_facts, measured_peak
 from mjxgait.bench.ours import Ours, as_workload, half_and_half
 from mjxgait.bench.overhead import overhead
-from mjxgait.bench.workers import Workers, cores
+from mjxgait.bench.workers import Workers
 from mjxgait.bench.workload import Lap, Workload
 from mjxgait.config import Config
+from mjxgait.cores import cores
 
 DART_STRIDE = 4
 """DART is so much slower that it is given every fourth genome only."""

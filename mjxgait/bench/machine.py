@@ -1,7 +1,5 @@
 """What the measuring machine is, and the most that its cores were seen to do."""
 
-import concurrent.futures
-import multiprocessing
 import os
 import platform
 import time
@@ -11,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from mjxgait.bench.workers import cores, single_threaded
+from mjxgait.cores import cores, process_per_core
 
 TRIES = 20
 
@@ -27,8 +25,8 @@ def measured_peak() -> dict[str, float]:
 
     One process per core, all at once; the best of a few tries of each, summed.
     """
-    count, context = cores(), multiprocessing.get_context("spawn")
-    with single_threaded(), concurrent.futures.ProcessPoolExecutor(count, mp_context=context) as pool:
+    count = cores()
+    with process_per_core() as pool:
         return {
             "flops": sum(pool.map(_matrix_product, [1024] * count)),
             "memory_bytes": sum(pool.map(_addition, [1 << 24] * count, [1] * count)),

@@ -1,17 +1,13 @@
 """A contestant on all cores: one process per core, each with its share of the episodes, started together and waited for together."""
 
 import multiprocessing
-import os
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from multiprocessing.connection import Connection
 from typing import Protocol
 
 from mjxgait.bench.workload import Lap, Workload
-
-SINGLE_THREADED = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
-"""One process per core leaves no core for the threads of a linear algebra library."""
+from mjxgait.cores import cores, single_threaded
 
 
 class Peer(Protocol):
@@ -20,26 +16,6 @@ class Peer(Protocol):
     def lap(self) -> tuple[int, float]:
         """Simulates all its episodes; useful steps, and the sum of the distances forward in m."""
         ...
-
-
-def cores() -> int:
-    """That this process may use; a container often has fewer than the machine."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-@contextmanager
-def single_threaded() -> Iterator[None]:
-    """Processes that are started in here use one thread each for their linear algebra."""
-    before = {name: os.environ.get(name) for name in SINGLE_THREADED}
-    os.environ.update(SINGLE_THREADED)
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
 
 
 class Workers:

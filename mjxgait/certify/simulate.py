@@ -6,7 +6,6 @@ Letters: `S` simulations, `R` recorded ones (the first of the `S`), `T` control 
 import concurrent.futures
 import copy
 import dataclasses
-import os
 from typing import Annotated
 
 import mujoco
@@ -18,6 +17,7 @@ from mjxgait.certify.controller import Controller, Senses
 from mjxgait.certify.layout import Layout, LowestPoint, colliding_geoms
 from mjxgait.certify.starts import Starts
 from mjxgait.champion import Champion
+from mjxgait.cores import cores
 from mjxgait.creature import Creature
 from mjxgait.tables import STRICT, NonNegative, Positive
 
@@ -108,7 +108,7 @@ def simulate(
       heading: [T] rad, commanded heading at each control step; None walks straight ahead.
       threads: 0 takes the machine's cores. The result does not depend on it.
     """
-    threads = threads or _cores()
+    threads = threads or cores()
     # Dealt out like cards, so that each thread gets its share of every kind of start.
     shares = [np.arange(i, len(starts), threads) for i in range(min(threads, len(starts)))]
     steps = round(seconds / creature.model.opt.timestep)
@@ -250,11 +250,6 @@ class _Run:
         position = np.zeros((self.record, steps), dtype=int)
         time_step = self.creature.model.opt.timestep
         return Trajectory(time_step, blank(self.model.nq), blank(self.model.nv), blank(len(self.creature.dof_adr)), position)
-
-
-def _cores() -> int:
-    """That this process may use; a container often has fewer than the machine."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _batch(creature: Creature, model: mujoco.MjModel, starts: Starts) -> Batch:

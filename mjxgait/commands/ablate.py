@@ -110,7 +110,7 @@ class _Progress:
         print(f"{where}: generation {news['generation']} of {news['of']}, {speed:.2f} M steps/s, {_duration(left)} left", flush=True)
 
     def measuring(self, number: int, count: int) -> None:
-        print(f"examining champion {number + 1} of {count} in C MuJoCo", flush=True)
+        print(f"{number} of {count} champions examined in C MuJoCo", flush=True)
 
 
 def _create(folder: Path, study: Any, creature: Creature) -> None:

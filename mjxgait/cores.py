@@ -1,0 +1,40 @@
+"""The cores of the machine, and processes that use one each."""
+
+import concurrent.futures
+import multiprocessing
+import os
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+SINGLE_THREADED = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+"""One process per core leaves no core for the threads of a linear algebra library."""
+
+
+def cores() -> int:
+    """That this process may use; a container often has fewer than the machine."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@contextmanager
+def single_threaded() -> Iterator[None]:
+    """Processes that are started in here use one thread each for their linear algebra."""
+    before = {name: os.environ.get(name) for name in SINGLE_THREADED}
+    os.environ.update(SINGLE_THREADED)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
+
+@contextmanager
+def process_per_core(most: int | None = None) -> Iterator[concurrent.futures.Executor]:
+    """A pool of fresh processes, not more than `most`; Ctrl-C is left to the process that waits for them."""
+    count = min(cores(), most or cores())
+    context = multiprocessing.get_context("spawn")  # a fork of a process in which JAX has threads may hang
+    with single_threaded(), concurrent.futures.ProcessPoolExecutor(count, context, signal.signal, (signal.SIGINT, signal.SIG_IGN)) as pool:
+        yield pool
