@@ -121,13 +121,8 @@ def test_in_the_end_nobody_is_examined_further_who_fails_undisturbed(experiment:
     looks["asked"].clear()
     looks["glance"], looks["certify"] = [0.3, -0.3, -0.5], [-3.0]
     assert examiner.best(judged) is not None
-    assert looks["asked"] == [
-        0.1,
-        1.0,
-        0.1,
-        0.1,
-        1.0,
-    ]  # the first falls when disturbed; the second, which fails by less, may be the nearest
+    # The first falls when disturbed; the second, which fails by less, may be the nearest.
+    assert looks["asked"] == [0.1, 1.0, 0.1, 0.1, 1.0]
 
 
 @pytest.fixture

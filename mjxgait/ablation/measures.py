@@ -65,7 +65,8 @@ def measure(folder: Path, creature: Creature, plan: Plan, tell: Callable[[int, i
     for line in read_logs(folder):
         lines.setdefault((line["variant"], line["seed"]), []).append(line)
     missing = [run for run in plan.runs if (run.variant, run.seed) not in known]
-    tell(0, len(missing))
+    if missing:
+        tell(0, len(missing))
     with process_per_core(len(missing)) as pool:
         paths = [champion_path(folder, plan, run) for run in missing]
         found = pool.map(partial(_result, creature, plan.study), missing, [lines[run.variant, run.seed] for run in missing], paths)
