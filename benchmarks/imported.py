@@ -21,11 +21,24 @@ from importing.packages import MODELS, model_file
 
 from mjxgait.folder import CERTIFICATE, METRICS, read_metrics
 
-HEADER = ("model", "wall", "import", "certified", "margin", "m/s", "lengths/s", "gait", "gens", "fails")
+HEADER = (
+    "model",
+    "wall",
+    "import",
+    "certified",
+    "margin",
+    "m/s",
+    "lengths/s",
+    "gait",
+    "gens",
+    "fails",
+)
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--models", nargs="+", choices=MODELS, default=list(MODELS), metavar="NAME")
     parser.add_argument("--out", type=Path, default=Path("runs/imported"))
     parser.add_argument("more", nargs="*", help="options of train, after --")
@@ -45,7 +58,9 @@ def walk(name: str, out: Path, more: list[str]) -> list[str]:
     searches = [word for folder in search for word in ("--search", str(folder))]
     imported = _mjxgait(env.with_suffix(".log"), "import", str(path), "--out", str(env), *searches)
     between = time.perf_counter()
-    trained = imported or _mjxgait(run.with_suffix(".log"), "train", "--env", str(env), "--out", str(run), "--no-plots", *more)
+    trained = imported or _mjxgait(
+        run.with_suffix(".log"), "train", "--env", str(env), "--out", str(run), "--no-plots", *more
+    )
     seconds = [f"{time.perf_counter() - began:.0f} s", f"{between - began:.0f} s"]
     if trained or not (run / CERTIFICATE).exists():
         return [name, *seconds, *[""] * 6, trained or "never moved"]
@@ -56,7 +71,9 @@ def walk(name: str, out: Path, more: list[str]) -> list[str]:
 def _mjxgait(log: Path, *command: str) -> str:
     """Runs a command, its output into a file; what it says last if it fails, else nothing."""
     log.parent.mkdir(parents=True, exist_ok=True)
-    done = subprocess.run([sys.executable, "-m", "mjxgait", *command], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-m", "mjxgait", *command], capture_output=True, text=True, check=False
+    )
     log.write_text(done.stdout + done.stderr, encoding="utf-8")
     return done.stderr.strip().splitlines()[-1] if done.returncode else ""
 

@@ -66,7 +66,9 @@ HEADER = (
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("runs", nargs="+", type=Path)
     parser.add_argument("--starts", type=int, default=16, help="of each trial; a multiple of four")
     parser.add_argument("--json", type=Path, help="file for all numbers")
@@ -78,7 +80,12 @@ def main() -> None:
     found = []
     for run in options.runs:
         creature, _ = open_run(run)
-        found.append({"run": run.name} | examine(creature, read_champion(run / CHAMPION, creature), options.starts, note(run.name)))
+        found.append(
+            {"run": run.name}
+            | examine(
+                creature, read_champion(run / CHAMPION, creature), options.starts, note(run.name)
+            )
+        )
         print_row(cells(found[-1]))
         if options.json:
             options.json.write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
@@ -89,7 +96,9 @@ def note(run: str) -> Callable[[str], None]:
     return lambda trial: print(f"{run}: {trial}", file=sys.stderr, flush=True)
 
 
-def examine(creature: Creature, champion: Champion, count: int, tell: Callable[[str], None]) -> dict[str, Any]:
+def examine(
+    creature: Creature, champion: Champion, count: int, tell: Callable[[str], None]
+) -> dict[str, Any]:
     """All trials of one champion."""
     starts = perturbed_starts(creature, count, np.random.default_rng(SEED))
     tell("plain")
@@ -97,7 +106,10 @@ def examine(creature: Creature, champion: Champion, count: int, tell: Callable[[
     way = float(plain.travel[:, 0].mean())
     found: dict[str, Any] = {
         "starts": count,
-        "plain": {"up": share_up(plain), "body_lengths_per_second": way / SECONDS / creature.body_length},
+        "plain": {
+            "up": share_up(plain),
+            "body_lengths_per_second": way / SECONDS / creature.body_length,
+        },
     }
     for amplitude in BUMPS:
         tell(f"bumps of {amplitude:.0%}")
@@ -106,11 +118,18 @@ def examine(creature: Creature, champion: Champion, count: int, tell: Callable[[
         tell(name)
         found[name] = slopes(creature, champion, starts, sign)
     tell("friction, trunk")
-    found["friction_0.4"] = bearing([simulate(slippery(creature, 0.4), champion, even_friction(starts), SECONDS)], way)
-    found["trunk_1.3"] = bearing([simulate(creature, champion, heavier_trunk(creature, starts, 1.3), SECONDS)], way)
+    found["friction_0.4"] = bearing(
+        [simulate(slippery(creature, 0.4), champion, even_friction(starts), SECONDS)], way
+    )
+    found["trunk_1.3"] = bearing(
+        [simulate(creature, champion, heavier_trunk(creature, starts, 1.3), SECONDS)], way
+    )
     for name, rate in TURNS.items():
         tell(name.replace("_", " "))
-        found[name] = {side: turn(creature, champion, angle, rate) for side, angle in (("left", 90.0), ("right", -90.0))}
+        found[name] = {
+            side: turn(creature, champion, angle, rate)
+            for side, angle in (("left", 90.0), ("right", -90.0))
+        }
     tell("pushes")
     found["push"] = pushes(creature, champion, count)
     tell("ten minutes")
@@ -128,11 +147,19 @@ def bearing(outcomes: Sequence[Outcome], way: float) -> dict[str, float]:
     return {"up": share_up(*outcomes), "distance": float(travel.mean() / way)}
 
 
-def bumps(creature: Creature, champion: Champion, starts: Starts, amplitude: float) -> list[Outcome]:
+def bumps(
+    creature: Creature, champion: Champion, starts: Starts, amplitude: float
+) -> list[Outcome]:
     """On each of the floors its share of the starts; amplitude: hip heights."""
-    floors = [uneven(creature, amplitude * creature.hip_height, np.random.default_rng([SEED, i])) for i in range(FLOORS)]
+    floors = [
+        uneven(creature, amplitude * creature.hip_height, np.random.default_rng([SEED, i]))
+        for i in range(FLOORS)
+    ]
     shares = [starts.rows(np.arange(i, len(starts), FLOORS)) for i in range(FLOORS)]
-    return [simulate(floor, champion, share, SECONDS, fall=Fall(touch=False)) for floor, share in zip(floors, shares, strict=True)]
+    return [
+        simulate(floor, champion, share, SECONDS, fall=Fall(touch=False))
+        for floor, share in zip(floors, shares, strict=True)
+    ]
 
 
 def slopes(creature: Creature, champion: Champion, starts: Starts, sign: int) -> dict[str, Any]:
@@ -163,11 +190,26 @@ def turn(creature: Creature, champion: Champion, degrees: float, rate: float) ->
     time_step = creature.model.opt.timestep
     before, steps = round(BEFORE_TURN / time_step), round((BEFORE_TURN + TURN_SECONDS) / time_step)
     since = np.maximum(np.arange(steps) - before + 1, 0) * time_step
-    asked = np.where(since > 0, abs(degrees), 0.0) if np.isinf(rate) else np.minimum(since * rate, abs(degrees))
+    asked = (
+        np.where(since > 0, abs(degrees), 0.0)
+        if np.isinf(rate)
+        else np.minimum(since * rate, abs(degrees))
+    )
     commanded = np.sign(degrees) * np.radians(asked)
-    outcome = simulate(creature, champion, nominal_starts(creature, 1), steps * time_step, record=1, heading=commanded)
+    outcome = simulate(
+        creature,
+        champion,
+        nominal_starts(creature, 1),
+        steps * time_step,
+        record=1,
+        heading=commanded,
+    )
     width = round(1 / time_step)
-    mean = np.convolve(np.degrees(headings(creature, outcome.trajectory.qpos[0])), np.full(width, 1 / width), "valid")[before:]
+    mean = np.convolve(
+        np.degrees(headings(creature, outcome.trajectory.qpos[0])),
+        np.full(width, 1 / width),
+        "valid",
+    )[before:]
     # NaN, after a simulation blew up, counts as off.
     off = np.flatnonzero(~(np.abs(mean - degrees) <= WITHIN))
     arrived = int(off[-1]) + 1 if len(off) else 0
@@ -197,11 +239,16 @@ def headings(creature: Creature, qpos: np.ndarray) -> np.ndarray:
 def pushes(creature: Creature, champion: Champion, count: int) -> dict[str, Any]:
     config = CertificateConfig(seed=SEED, pushes=PushesConfig(ladder=PUSHES, ladder_count=count))
     shares = push_ladder(creature, champion, config)
-    return {"fells_half": half_point({0.0: 1.0} | shares), "up": {f"{speed:g}": share for speed, share in shares.items()}}
+    return {
+        "fells_half": half_point({0.0: 1.0} | shares),
+        "up": {f"{speed:g}": share for speed, share in shares.items()},
+    }
 
 
 def long_walk(creature: Creature, champion: Champion, starts: Starts) -> dict[str, Any]:
-    outcome = simulate(creature, champion, join(nominal_starts(creature, 1), starts.rows(slice(0, 3))), LONG)
+    outcome = simulate(
+        creature, champion, join(nominal_starts(creature, 1), starts.rows(slice(0, 3))), LONG
+    )
     return {
         "up": int(outcome.stayed_up.sum()),
         "of": len(outcome.fell),
@@ -219,7 +266,11 @@ def cells(found: dict[str, Any]) -> list[str]:
     def turned(result: dict[str, Any]) -> str:
         if result["reached"]:
             return f"{result['seconds']:.1f} s"
-        return f"falls after {result['fell']:.1f} s" if result["fell"] is not None else f"no, {result['heading_at_end']:.0f}°"
+        return (
+            f"falls after {result['fell']:.1f} s"
+            if result["fell"] is not None
+            else f"no, {result['heading_at_end']:.0f}°"
+        )
 
     half = found["push"]["fells_half"]
     return [

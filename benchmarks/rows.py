@@ -20,7 +20,9 @@ from mjxgait.experiment import build_batch, build_experiment, prepare_devices
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--variants", type=int, default=4)
     parser.add_argument("--seeds", type=int, default=16)
     parser.add_argument("--generations", type=int, default=4)
@@ -29,7 +31,10 @@ def main() -> None:
     creature = load_creature(find_creature("tall_quadruped"))
     config = resolve_config(creature.settings.train, creature.name)
     single = build_experiment(creature, config)
-    batch = build_batch(creature, [variant(config, v, s) for v in range(options.variants) for s in range(options.seeds)])
+    batch = build_batch(
+        creature,
+        [variant(config, v, s) for v in range(options.variants) for s in range(options.seeds)],
+    )
     alone, rows = single.compile(), batch.compile()
     state, states = single.place(single.init()), batch.place(batch.init())
     before, ratios = memory(), []
@@ -37,13 +42,20 @@ def main() -> None:
         state, one = timed(alone, state)
         states, many = timed(rows, states)
         ratios.append(many / one)
-        print(f"generation {generation}: alone {one / 1e6:.2f}, rows {many / 1e6:.2f} M steps/s, ratio {many / one:.2f}", flush=True)
-    print(f"{len(batch.experiments)} rows: median ratio {median(ratios):.2f} ({min(ratios):.2f} to {max(ratios):.2f})")
+        print(
+            f"generation {generation}: alone {one / 1e6:.2f}, rows {many / 1e6:.2f} M steps/s, ratio {many / one:.2f}",
+            flush=True,
+        )
+    print(
+        f"{len(batch.experiments)} rows: median ratio {median(ratios):.2f} ({min(ratios):.2f} to {max(ratios):.2f})"
+    )
     print(f"peak memory {before:.0f} MiB when compiled, {memory():.0f} MiB at the end")
 
 
 def variant(config: Config, number: int, seed: int) -> Config:
-    evolution = dataclasses.replace(config.evolution, mutation_rate=config.evolution.mutation_rate / (1 + number))
+    evolution = dataclasses.replace(
+        config.evolution, mutation_rate=config.evolution.mutation_rate / (1 + number)
+    )
     return dataclasses.replace(config, seed=seed, evolution=evolution)
 
 

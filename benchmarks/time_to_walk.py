@@ -20,11 +20,31 @@ SEEDS = range(5)
 
 def run(env: str, seed: int, cache: Path, folder: Path) -> dict:
     """One run of the command: its wall time, and what came of it."""
-    command = [sys.executable, "-m", "mjxgait", "train", "--env", env, "--seed", str(seed), "--out", str(folder), "--no-plots"]
+    command = [
+        sys.executable,
+        "-m",
+        "mjxgait",
+        "train",
+        "--env",
+        env,
+        "--seed",
+        str(seed),
+        "--out",
+        str(folder),
+        "--no-plots",
+    ]
     began = time.perf_counter()
-    subprocess.run(command, env=os.environ | {"XDG_CACHE_HOME": str(cache)}, check=True, stdout=subprocess.DEVNULL)
+    subprocess.run(
+        command,
+        env=os.environ | {"XDG_CACHE_HOME": str(cache)},
+        check=True,
+        stdout=subprocess.DEVNULL,
+    )
     seconds = time.perf_counter() - began
-    lines = [json.loads(line) for line in (folder / "metrics.jsonl").read_text(encoding="utf-8").splitlines()]
+    lines = [
+        json.loads(line)
+        for line in (folder / "metrics.jsonl").read_text(encoding="utf-8").splitlines()
+    ]
     certificate = json.loads((folder / "certificate.json").read_text(encoding="utf-8"))
     shares = [line["sim_steps"] / line["computed_steps"] for line in lines]
     return {
@@ -46,14 +66,24 @@ def main() -> None:
     for seed in SEEDS:
         with tempfile.TemporaryDirectory() as scratch:
             for kind, entries in runs.items():
-                entries.append({"seed": seed} | run(options.env, seed, Path(scratch) / "cache", Path(scratch) / kind))
-                print(f"seed {seed} {kind}: {entries[-1]['seconds']:.1f} s, certified: {entries[-1]['passed']}", flush=True)
+                entries.append(
+                    {"seed": seed}
+                    | run(options.env, seed, Path(scratch) / "cache", Path(scratch) / kind)
+                )
+                print(
+                    f"seed {seed} {kind}: {entries[-1]['seconds']:.1f} s, certified: {entries[-1]['passed']}",
+                    flush=True,
+                )
                 options.json.write_text(json.dumps(report(runs), indent=2) + "\n", encoding="utf-8")
 
 
 def report(runs: dict[str, list[dict]]) -> dict:
     """Medians of the runs so far, and how busy the machine is."""
-    medians = {f"{kind}_median_s": median(entry["seconds"] for entry in entries) for kind, entries in runs.items() if entries}
+    medians = {
+        f"{kind}_median_s": median(entry["seconds"] for entry in entries)
+        for kind, entries in runs.items()
+        if entries
+    }
     return medians | {"load": os.getloadavg()[0], "runs": runs}
 
 

@@ -19,15 +19,35 @@ from mjxgait.certify import distance, outdated, read_certificate, survival
 from mjxgait.champion import read_champion
 from mjxgait.folder import CERTIFICATE, CHAMPION, METRICS, open_run, read_metrics
 
-HEADER = ("creature", "seed", "certified", "margin", "fails", "speed", "evolved", "in C", "up, episode", "up, 22 s", "gait", "gens", "wall")
+HEADER = (
+    "creature",
+    "seed",
+    "certified",
+    "margin",
+    "fails",
+    "speed",
+    "evolved",
+    "in C",
+    "up, episode",
+    "up, 22 s",
+    "gait",
+    "gens",
+    "wall",
+)
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--env", nargs="+", default=["tall_quadruped", "short_quadruped", "crab", "duck", "alien"])
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--env", nargs="+", default=["tall_quadruped", "short_quadruped", "crab", "duck", "alien"]
+    )
     parser.add_argument("--seeds", nargs="+", type=int, default=[0, 1, 2, 3, 4])
     parser.add_argument("--config", default=None)
-    parser.add_argument("--candidates", type=int, default=12, help="how many of the best are looked at in the end")
+    parser.add_argument(
+        "--candidates", type=int, default=12, help="how many of the best are looked at in the end"
+    )
     parser.add_argument("--out", type=Path, default=Path("runs/zoo"))
     options = parser.parse_args()
     print(*HEADER, sep=" | ")
@@ -42,10 +62,26 @@ def train(folder: Path, name: str, seed: int, config: str | None, candidates: in
     """Wall time of the run in s; the one noted beside it when it is there already."""
     note = folder.with_suffix(".wall")
     if not note.exists():
-        command = [sys.executable, "-m", "mjxgait", "train", "--env", name, "--seed", str(seed), "--out", str(folder), "--no-plots"]
+        command = [
+            sys.executable,
+            "-m",
+            "mjxgait",
+            "train",
+            "--env",
+            name,
+            "--seed",
+            str(seed),
+            "--out",
+            str(folder),
+            "--no-plots",
+        ]
         command += ["--examination.candidates", str(candidates)]
         began = time.perf_counter()
-        subprocess.run(command + (["--config", config] if config else []), check=True, stdout=subprocess.DEVNULL)
+        subprocess.run(
+            command + (["--config", config] if config else []),
+            check=True,
+            stdout=subprocess.DEVNULL,
+        )
         note.write_text(str(time.perf_counter() - began))
     return float(note.read_text())
 
@@ -54,7 +90,9 @@ def row(folder: Path, seed: int, wall: float) -> list[str]:
     """What the run folder and two more looks in C MuJoCo say."""
     creature, _ = open_run(folder)
     champion = read_champion(folder / CHAMPION, creature)
-    certificate = read_certificate(folder / CERTIFICATE) or sys.exit(f"{folder}: no certificate; delete it, and it is made again")
+    certificate = read_certificate(folder / CERTIFICATE) or sys.exit(
+        f"{folder}: no certificate; delete it, and it is made again"
+    )
     seconds = champion.origin["nominal_seconds"]
     evolved, examined = champion.origin["nominal_forward"], distance(creature, champion, seconds)
     starts = next(c for c in certificate["criteria"] if c["number"] == 4)["measures"][0]["value"]

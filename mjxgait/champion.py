@@ -54,10 +54,17 @@ def write_champion(champion: Champion, creature: Creature, path: Path) -> None:
         "schema": SCHEMA,
         "creature": champion.creature,
         "creature_digest": champion.digest,
-        "key_poses": [dict(zip(creature.joint_names, map(float, pose), strict=True)) for pose in champion.key_poses],
+        "key_poses": [
+            dict(zip(creature.joint_names, map(float, pose), strict=True))
+            for pose in champion.key_poses
+        ],
         "tuning": {name: float(value) for name, value in champion.tuning.items()},
-        "controller": dataclasses.asdict(champion.controller) | {"mirrored": creature.symmetric and champion.controller.mirror},
-        "gains": {name: {"kp": float(kp), "kd": float(kd), "torque_limit": float(limit)} for name, kp, kd, limit in gains},
+        "controller": dataclasses.asdict(champion.controller)
+        | {"mirrored": creature.symmetric and champion.controller.mirror},
+        "gains": {
+            name: {"kp": float(kp), "kd": float(kd), "torque_limit": float(limit)}
+            for name, kp, kd, limit in gains
+        },
         "fitness": champion.fitness,
         "terms": dict(champion.terms),
         "origin": dict(champion.origin),
@@ -76,14 +83,22 @@ def read_champion(path: Path, creature: Creature) -> Champion:
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
         if document["schema"] != SCHEMA:
-            raise UserError(f"{path}: written with schema {document['schema']}, this version reads {SCHEMA}")
+            raise UserError(
+                f"{path}: written with schema {document['schema']}, this version reads {SCHEMA}"
+            )
         if document["creature_digest"] != creature.digest:
-            raise UserError(f"{path}: evolved on another body than {creature.name} as it is now; use the run's own creature folder")
-        settings = {key: value for key, value in document["controller"].items() if key != "mirrored"}
+            raise UserError(
+                f"{path}: evolved on another body than {creature.name} as it is now; use the run's own creature folder"
+            )
+        settings = {
+            key: value for key, value in document["controller"].items() if key != "mirrored"
+        }
         return Champion(
             creature=document["creature"],
             digest=document["creature_digest"],
-            key_poses=np.array([[pose[name] for name in creature.joint_names] for pose in document["key_poses"]]),
+            key_poses=np.array(
+                [[pose[name] for name in creature.joint_names] for pose in document["key_poses"]]
+            ),
             tuning=document["tuning"],
             controller=build(ControllerConfig, settings, str(path)),
             fitness=document["fitness"],

@@ -38,12 +38,18 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """The console command. Exit codes: 0 done, 2 a mistake in what was given, 130 interrupted."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     if not given or given[0] in ("-h", "--help"):
-        print(USAGE.format(commands="\n".join(f"  {name:8} {what}" for name, what in COMMANDS.items())))
+        print(
+            USAGE.format(
+                commands="\n".join(f"  {name:8} {what}" for name, what in COMMANDS.items())
+            )
+        )
         sys.exit(0 if given else 2)
     try:
         if given[0] not in COMMANDS:
             raise UserError(f'unknown subcommand "{given[0]}"; {did_you_mean(given[0], COMMANDS)}')
-        module = importlib.import_module(f"mjxgait.commands.{given[0] + '_' * keyword.iskeyword(given[0])}")
+        module = importlib.import_module(
+            f"mjxgait.commands.{given[0] + '_' * keyword.iskeyword(given[0])}"
+        )
         sys.exit(getattr(module, f"{given[0]}_command")(given[1:]))
     except UserError as error:
         print(f"mjxgait: {error}", file=sys.stderr)

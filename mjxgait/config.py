@@ -9,7 +9,18 @@ from typing import Annotated, Any, Literal
 import pydantic
 
 from mjxgait.errors import UserError, did_you_mean
-from mjxgait.tables import STRICT, Count, Finite, Fraction, NonNegative, Positive, Whole, build, merge, read_toml
+from mjxgait.tables import (
+    STRICT,
+    Count,
+    Finite,
+    Fraction,
+    NonNegative,
+    Positive,
+    Whole,
+    build,
+    merge,
+    read_toml,
+)
 
 SHAPE = "shape"
 """Marks what decides the shape of the compiled program; every other number or choice is a value that the program is handed."""
@@ -204,7 +215,9 @@ class EvolutionConfig:
         if self.population < 2:
             raise ValueError("population must be at least 2: crossover needs two parents")
         if round(self.population * (self.growth - 1)) < 1:
-            raise ValueError(f"growth = {self.growth} leaves no room for offspring; make it larger than {1 + 1 / self.population:.3g}")
+            raise ValueError(
+                f"growth = {self.growth} leaves no room for offspring; make it larger than {1 + 1 / self.population:.3g}"
+            )
 
     @property
     def offspring(self) -> int:
@@ -258,7 +271,9 @@ def data_folder(kind: Literal["envs", "configs"]) -> Path:
     return packaged if packaged.is_dir() else package.parent / kind
 
 
-def resolve_config(creature_table: Mapping[str, Any], creature_name: str, file: Path | None = None) -> Config:
+def resolve_config(
+    creature_table: Mapping[str, Any], creature_name: str, file: Path | None = None
+) -> Config:
     """The layers, each over the one before: `configs/default.toml`, the creature's `[train]`, the user's file.
 
     Raises:
@@ -267,7 +282,9 @@ def resolve_config(creature_table: Mapping[str, Any], creature_name: str, file: 
     default = data_folder("configs") / "default.toml"
     table = read_toml(default)
     build(Config, table, str(default))
-    layers: list[tuple[str, Mapping[str, Any]]] = [(f"{creature_name}/creature.toml: [train]", creature_table)]
+    layers: list[tuple[str, Mapping[str, Any]]] = [
+        (f"{creature_name}/creature.toml: [train]", creature_table)
+    ]
     if file is not None:
         layers.append((str(file), read_toml(_find_config(file))))
     for where, layer in layers:
@@ -282,7 +299,9 @@ def _find_config(file: Path) -> Path:
         return shipped
     if not file.exists():
         known = [path.stem for path in data_folder("configs").glob("*.toml")]
-        raise UserError(f"{file}: no such file and no shipped config of that name; {did_you_mean(str(file), known)}")
+        raise UserError(
+            f"{file}: no such file and no shipped config of that name; {did_you_mean(str(file), known)}"
+        )
     return file
 
 

@@ -35,6 +35,13 @@ def single_threaded() -> Iterator[None]:
 def process_per_core(most: int | None = None) -> Iterator[concurrent.futures.Executor]:
     """A pool of fresh processes, not more than `most`; Ctrl-C is left to the process that waits for them."""
     count = min(cores(), most or cores())
-    context = multiprocessing.get_context("spawn")  # a fork of a process in which JAX has threads may hang
-    with single_threaded(), concurrent.futures.ProcessPoolExecutor(count, context, signal.signal, (signal.SIGINT, signal.SIG_IGN)) as pool:
+    context = multiprocessing.get_context(
+        "spawn"
+    )  # a fork of a process in which JAX has threads may hang
+    with (
+        single_threaded(),
+        concurrent.futures.ProcessPoolExecutor(
+            count, context, signal.signal, (signal.SIGINT, signal.SIG_IGN)
+        ) as pool,
+    ):
         yield pool

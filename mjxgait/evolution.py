@@ -141,13 +141,17 @@ class Evolution:
         offspring, origin = self._offspring(key_offspring, state, self._seeding(state))
         return Proposal(key, offspring, origin)
 
-    def absorb(self, state: EvolutionState, proposal: Proposal, judged: Judged) -> tuple[EvolutionState, GenerationMetrics]:
+    def absorb(
+        self, state: EvolutionState, proposal: Proposal, judged: Judged
+    ) -> tuple[EvolutionState, GenerationMetrics]:
         """The rest of a generation: survival, and the decision whether the next one is forced."""
         seeding = self._seeding(state)
         generation = jnp.where(seeding, jnp.where(self._filled(state), 0, -1), state.generation + 1)
         grown = self._survive(state, proposal.offspring, judged.terms, proposal.origin, generation)
         planted = self._plant(state, judged.terms, generation)
-        state = jax.tree.map(lambda a, b: jnp.where(seeding, a, b), _without_key(planted), _without_key(grown))
+        state = jax.tree.map(
+            lambda a, b: jnp.where(seeding, a, b), _without_key(planted), _without_key(grown)
+        )
         forced = state.forced
         state = self._decide(dataclasses.replace(state, key=proposal.key, generation=generation))
         return state, self._metrics(state, judged, forced)
@@ -158,7 +162,9 @@ class Evolution:
     def _filled(self, state: EvolutionState) -> jax.Array:
         return state.seeded + self.config.offspring >= self.config.population
 
-    def _offspring(self, key: jax.Array, state: EvolutionState, seeding: jax.Array) -> tuple[Any, jax.Array]:
+    def _offspring(
+        self, key: jax.Array, state: EvolutionState, seeding: jax.Array
+    ) -> tuple[Any, jax.Array]:
         """Genomes [M, ...] and their origins [M]: the unjudged initial population, forced ones, or children."""
         key_children, key_forced = jax.random.split(key)
         places = state.seeded + jnp.arange(self.config.offspring)
@@ -169,19 +175,25 @@ class Evolution:
         def pick(first: jax.Array, second: jax.Array, third: jax.Array) -> jax.Array:
             return jnp.where(seeding, first, jnp.where(state.forced, second, third))
 
-        return jax.tree.map(pick, initial, forced, children), pick(jnp.zeros_like(child_origin), forced_origin, child_origin)
+        return jax.tree.map(pick, initial, forced, children), pick(
+            jnp.zeros_like(child_origin), forced_origin, child_origin
+        )
 
     def _children(self, key: jax.Array, state: EvolutionState) -> tuple[Any, jax.Array]:
         config, count = self.config, self.config.offspring
         key_parents, key_cross, key_whether, key_mutate, key_mutated = jax.random.split(key, 5)
         mothers, fathers = parents(key_parents, count, config.population, config.selection)
-        mother, father = (jax.tree.map(lambda leaf, i=i: leaf[i], state.genomes) for i in (mothers, fathers))
+        mother, father = (
+            jax.tree.map(lambda leaf, i=i: leaf[i], state.genomes) for i in (mothers, fathers)
+        )
         crossed = jax.vmap(self.variation.cross)(jax.random.split(key_cross, count), mother, father)
         crosses = jax.random.bernoulli(key_whether, config.crossover, (count,))
         child = _pick(crosses, crossed, mother)
         mutated = jax.vmap(self.variation.mutate)(jax.random.split(key_mutate, count), child)
         # A child of one parent that is not mutated would be a duplicate, unless the algorithm knows no mutation at all.
-        mutates = jax.random.bernoulli(key_mutated, config.mutation_rate, (count,)) | (~crosses & (config.mutation_rate > 0))
+        mutates = jax.random.bernoulli(key_mutated, config.mutation_rate, (count,)) | (
+            ~crosses & (config.mutation_rate > 0)
+        )
         origin = jnp.where(crosses, int(Origin.CROSSOVER), int(Origin.MUTATION))
         return _pick(mutates, mutated, child), origin
 
@@ -192,23 +204,40 @@ class Evolution:
         drawn = jax.random.randint(key_parents, (count,), 0, self.config.population)
         mutants = jax.tree.map(lambda leaf: leaf[drawn], state.genomes)
         for key_mutation in key_mutations:
-            mutants = jax.vmap(self.variation.mutate)(jax.random.split(key_mutation, count), mutants)
+            mutants = jax.vmap(self.variation.mutate)(
+                jax.random.split(key_mutation, count), mutants
+            )
         is_new = jnp.arange(count) < newcomers
         created = self.variation.create(key_create, count)
-        return _pick(is_new, created, mutants), jnp.where(is_new, int(Origin.NEWCOMER), int(Origin.MUTATION))
+        return _pick(is_new, created, mutants), jnp.where(
+            is_new, int(Origin.NEWCOMER), int(Origin.MUTATION)
+        )
 
-    def _plant(self, state: EvolutionState, terms: jax.Array, generation: jax.Array) -> EvolutionState:
+    def _plant(
+        self, state: EvolutionState, terms: jax.Array, generation: jax.Array
+    ) -> EvolutionState:
         """The initial population with the verdict on its next members in their places."""
         places = state.seeded + jnp.arange(self.config.offspring)
         terms = state.terms.at[places].set(terms, mode="drop")
         seeded = jnp.minimum(state.seeded + self.config.offspring, self.config.population)
         judged = jnp.arange(self.config.population) < seeded
         fitness = jnp.where(judged, self.rank(terms, jnp.maximum(generation, 0)), -jnp.inf)
-        order = jnp.where(self._filled(state), jnp.argsort(-fitness, stable=True), jnp.arange(self.config.population))
+        order = jnp.where(
+            self._filled(state),
+            jnp.argsort(-fitness, stable=True),
+            jnp.arange(self.config.population),
+        )
         planted = dataclasses.replace(state, terms=terms, fitness=fitness, seeded=seeded)
         return _reordered(planted, order)
 
-    def _survive(self, state: EvolutionState, offspring: Any, terms: jax.Array, origin: jax.Array, generation: jax.Array) -> EvolutionState:
+    def _survive(
+        self,
+        state: EvolutionState,
+        offspring: Any,
+        terms: jax.Array,
+        origin: jax.Array,
+        generation: jax.Array,
+    ) -> EvolutionState:
         """The P best of the grown population, without duplicates; in a forced generation what was fit enough goes before the old."""
         count, born = self.config.population, jnp.full(self.config.offspring, generation)
         pool = jax.tree.map(
@@ -237,26 +266,41 @@ class Evolution:
             refreshed=refreshed.astype(jnp.int32),
         )
 
-    def _admitted(self, state: EvolutionState, fitness: jax.Array, candidates: jax.Array) -> jax.Array:
+    def _admitted(
+        self, state: EvolutionState, fitness: jax.Array, candidates: jax.Array
+    ) -> jax.Array:
         """Which of the candidates [P + M] a forced generation takes in: fit enough, best first, as many as the spell has room for."""
         old = jnp.sort(fitness[: self.config.population])
-        enough = old[jnp.floor(self.config.forced.accept * jnp.float32(self.config.population - 1)).astype(jnp.int32)]
+        enough = old[
+            jnp.floor(self.config.forced.accept * jnp.float32(self.config.population - 1)).astype(
+                jnp.int32
+            )
+        ]
         fit = candidates & (fitness >= enough) & jnp.isfinite(fitness)
         place = jnp.argsort(jnp.argsort(jnp.where(fit, -fitness, jnp.inf), stable=True))
         return fit & (place < self._room() - state.refreshed)
 
     def _room(self) -> jax.Array:
-        return jnp.clip(jnp.round(self.config.forced.refresh * jnp.float32(self.config.population)), 1, self.config.population - 1)
+        return jnp.clip(
+            jnp.round(self.config.forced.refresh * jnp.float32(self.config.population)),
+            1,
+            self.config.population - 1,
+        )
 
     def _decide(self, state: EvolutionState) -> EvolutionState:
         """Begins a spell of forced evolution when best and mean have stalled over the window; ends it when it has done its work."""
         config = self.config.forced
         best, mean = state.fitness[0], _finite_mean(state.fitness)
-        bests, means = jnp.append(state.best_history[1:], best), jnp.append(state.mean_history[1:], mean)
+        bests, means = (
+            jnp.append(state.best_history[1:], best),
+            jnp.append(state.mean_history[1:], mean),
+        )
         age = jnp.where(state.forced, state.spell_age + 1, 0)
         ends = state.forced & ((age >= config.limit) | (state.refreshed >= self._room()))
         quiet = jnp.where(state.forced | (state.generation <= 0), 0, state.quiet + 1)
-        stalled = (quiet >= config.window) & ~_grown(bests, config.gain) & ~_grown(means, config.gain)
+        stalled = (
+            (quiet >= config.window) & ~_grown(bests, config.gain) & ~_grown(means, config.gain)
+        )
         begins = stalled & ~state.forced & config.enabled
         first = ~jnp.isfinite(state.spell_best)
         pays = first | _grown(jnp.stack([state.spell_best, best]), config.gain)
@@ -269,12 +313,18 @@ class Evolution:
             spell_age=jnp.where(begins, 0, age).astype(jnp.int32),
             refreshed=jnp.where(begins, 0, state.refreshed).astype(jnp.int32),
             spell_best=jnp.where(begins, best, state.spell_best),
-            barren=jnp.where(begins, jnp.where(pays, 0, state.barren + 1), state.barren).astype(jnp.int32),
+            barren=jnp.where(begins, jnp.where(pays, 0, state.barren + 1), state.barren).astype(
+                jnp.int32
+            ),
         )
 
-    def _metrics(self, state: EvolutionState, judged: Judged, forced: jax.Array) -> GenerationMetrics:
+    def _metrics(
+        self, state: EvolutionState, judged: Judged, forced: jax.Array
+    ) -> GenerationMetrics:
         quartiles = jnp.percentile(
-            jnp.where(jnp.isfinite(state.fitness), state.fitness, jnp.nan), jnp.array([25, 50, 75]), method="nearest"
+            jnp.where(jnp.isfinite(state.fitness), state.fitness, jnp.nan),
+            jnp.array([25, 50, 75]),
+            method="nearest",
         )
         spreads = [jnp.mean(jnp.std(leaf, axis=0)) for leaf in jax.tree.leaves(state.genomes)]
         return GenerationMetrics(
@@ -297,7 +347,9 @@ class Evolution:
         )
 
 
-def parents(key: jax.Array, count: int, population: int, selection: Any) -> tuple[jax.Array, jax.Array]:
+def parents(
+    key: jax.Array, count: int, population: int, selection: Any
+) -> tuple[jax.Array, jax.Array]:
     """Places [count] of mothers and fathers in a population sorted best first; never the same individual twice.
 
     `uniform` draws all alike; `rank` falls linearly to zero with rank (Baker 1985, pressure 2); `tournament` takes the better of two.
@@ -307,8 +359,14 @@ def parents(key: jax.Array, count: int, population: int, selection: Any) -> tupl
     def draw(key: jax.Array, among: int) -> jax.Array:
         uniformly = jax.random.randint(key, (count,), 0, among)
         best_of_two = jnp.min(jax.random.randint(key, (count, 2), 0, among), axis=1)
-        by_rank = jnp.floor(among * (1 - jnp.sqrt(1 - jax.random.uniform(key, (count,))))).astype(jnp.int32)
-        return jnp.where(chosen(selection, "uniform"), uniformly, jnp.where(chosen(selection, "tournament"), best_of_two, by_rank))
+        by_rank = jnp.floor(among * (1 - jnp.sqrt(1 - jax.random.uniform(key, (count,))))).astype(
+            jnp.int32
+        )
+        return jnp.where(
+            chosen(selection, "uniform"),
+            uniformly,
+            jnp.where(chosen(selection, "tournament"), best_of_two, by_rank),
+        )
 
     mothers, others = draw(key_mother, population), draw(key_father, population - 1)
     return mothers, others + (others >= mothers)
@@ -318,8 +376,14 @@ def stop_reason(state: EvolutionState, config: EvolutionConfig) -> str | None:
     """Why a run is over after this generation, in words; None while it goes on. Reads the state on the host."""
     if config.target is not None and float(state.fitness[0]) >= config.target:
         return f"the target fitness of {config.target:g} is reached"
-    if config.forced.enabled and config.forced.patience and int(state.barren) >= config.forced.patience:
-        return f"forced evolution no longer pays: {int(state.barren)} spells in a row without growth"
+    if (
+        config.forced.enabled
+        and config.forced.patience
+        and int(state.barren) >= config.forced.patience
+    ):
+        return (
+            f"forced evolution no longer pays: {int(state.barren)} spells in a row without growth"
+        )
     if int(state.generation) >= config.generations:
         return f"all {config.generations} generations are done"
     return None
@@ -331,18 +395,26 @@ def _grown(history: jax.Array, gain: jax.Array | float) -> jax.Array:
 
 def _finite_mean(values: jax.Array) -> jax.Array:
     finite = jnp.isfinite(values)
-    return jnp.where(jnp.any(finite), jnp.sum(jnp.where(finite, values, 0.0)) / jnp.maximum(jnp.sum(finite), 1), -jnp.inf)
+    return jnp.where(
+        jnp.any(finite),
+        jnp.sum(jnp.where(finite, values, 0.0)) / jnp.maximum(jnp.sum(finite), 1),
+        -jnp.inf,
+    )
 
 
 def _pick(condition: jax.Array, yes: Any, no: Any) -> Any:
     """Row by row [M] from one or the other pytree of leaves [M, ...]."""
-    return jax.tree.map(lambda a, b: jnp.where(condition.reshape(-1, *[1] * (a.ndim - 1)), a, b), yes, no)
+    return jax.tree.map(
+        lambda a, b: jnp.where(condition.reshape(-1, *[1] * (a.ndim - 1)), a, b), yes, no
+    )
 
 
 def _reordered(state: EvolutionState, order: jax.Array) -> EvolutionState:
     rows = (state.genomes, state.terms, state.fitness, state.born, state.origin)
     genomes, terms, fitness, born, origin = jax.tree.map(lambda leaf: leaf[order], rows)
-    return dataclasses.replace(state, genomes=genomes, terms=terms, fitness=fitness, born=born, origin=origin)
+    return dataclasses.replace(
+        state, genomes=genomes, terms=terms, fitness=fitness, born=born, origin=origin
+    )
 
 
 def _without_key(state: EvolutionState) -> EvolutionState:

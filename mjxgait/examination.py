@@ -75,7 +75,9 @@ class Examiner:
             if seen.margin < 0:
                 failed.append((champion, seen))
                 continue
-            examined.append(self._examine(champion, seen, "the next best" if examined or failed else "the best"))
+            examined.append(
+                self._examine(champion, seen, "the next best" if examined or failed else "the best")
+            )
             if examined[-1].certificate.passed:
                 return examined[-1]
         nearest = max(failed, key=lambda pair: pair[1].margin, default=None)
@@ -95,7 +97,11 @@ def enough(config: Config, generation: int) -> float:
 
 def due(settings: ExaminationConfig, generation: int) -> bool:
     """Whether a run looks at its best after this generation, before its last."""
-    return bool(settings.every and settings.candidates) and generation > 0 and generation % settings.every == 0
+    return (
+        bool(settings.every and settings.candidates)
+        and generation > 0
+        and generation % settings.every == 0
+    )
 
 
 def _promising(state: EvolutionState, seconds: float) -> bool:

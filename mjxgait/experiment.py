@@ -33,7 +33,12 @@ Step = Callable[[EvolutionState], tuple[EvolutionState, GenerationMetrics]]
 def prepare_devices() -> None:
     """One JAX host device per core, and compiled programs kept in the user's cache folder. Call before JAX's first computation."""
     if jax.config.values["jax_num_cpu_devices"] < 0:
-        jax.config.update("jax_num_cpu_devices", len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1)
+        jax.config.update(
+            "jax_num_cpu_devices",
+            len(os.sched_getaffinity(0))
+            if hasattr(os, "sched_getaffinity")
+            else os.cpu_count() or 1,
+        )
     if jax.config.values["jax_compilation_cache_dir"] is None:
         cache = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
         jax.config.update("jax_compilation_cache_dir", os.path.join(cache, "mjxgait", "jax"))
@@ -64,7 +69,11 @@ class Experiment:
 
     def init(self) -> EvolutionState:
         """The state of generation -1: a population that nobody has judged."""
-        return _initial(self.simulator, self.row.settings, jax.random.fold_in(jax.random.key(self.config.seed), 0))
+        return _initial(
+            self.simulator,
+            self.row.settings,
+            jax.random.fold_in(jax.random.key(self.config.seed), 0),
+        )
 
     def simulate(self, genomes: Genome, starts: Starts | None = None) -> Episodes:
         """Genomes [N, ...] on the starts [R] of this run or on others: episodes with leaves [N, R, ...]."""
@@ -90,12 +99,21 @@ class Experiment:
     def candidates(self, state: EvolutionState) -> list[int]:
         """Ranks of the best individuals that differ from each other, as many as the config asks for; best first."""
         low, high = self.simulator.tracker.bounds(self.config.controller)
-        genes = jax.tree.map(lambda leaf, a, b: np.asarray((leaf - a) / jnp.maximum(b - a, 1e-9)), state.genomes, low, high)
-        rows = np.concatenate([leaf.reshape(leaf.shape[0], -1) for leaf in jax.tree.leaves(genes)], axis=1)
+        genes = jax.tree.map(
+            lambda leaf, a, b: np.asarray((leaf - a) / jnp.maximum(b - a, 1e-9)),
+            state.genomes,
+            low,
+            high,
+        )
+        rows = np.concatenate(
+            [leaf.reshape(leaf.shape[0], -1) for leaf in jax.tree.leaves(genes)], axis=1
+        )
         chosen: list[int] = []
         for rank in np.flatnonzero(np.isfinite(state.fitness)):
             apart = np.sqrt(np.mean((rows[chosen] - rows[rank]) ** 2, axis=1))
-            if (apart > self.config.examination.difference).all() and len(chosen) < self.config.examination.candidates:
+            if (apart > self.config.examination.difference).all() and len(
+                chosen
+            ) < self.config.examination.candidates:
                 chosen.append(int(rank))
         return chosen
 
@@ -112,7 +130,10 @@ class Experiment:
         best = jax.tree.map(lambda leaf: leaf[rank], genomes)
         terms = every_term[rank].mean(axis=0)
         nominal = forward_distance(
-            self.creature, self.config.fitness, self.config.rollout.seconds, float(every_term[rank, 0, TERMS.index("distance")])
+            self.creature,
+            self.config.fitness,
+            self.config.rollout.seconds,
+            float(every_term[rank, 0, TERMS.index("distance")]),
         )
         origin = {
             "generation": int(generation),
@@ -152,13 +173,17 @@ class Batch:
     def abstract(self) -> EvolutionState:
         """Shapes and types of the states."""
         count, one = len(self.experiments), jax.eval_shape(self.experiments[0].init)
-        return jax.tree.map(lambda leaf: jax.ShapeDtypeStruct((count, *leaf.shape), leaf.dtype), one)
+        return jax.tree.map(
+            lambda leaf: jax.ShapeDtypeStruct((count, *leaf.shape), leaf.dtype), one
+        )
 
     def lower(self) -> jax.stages.Lowered:
         """The program of a generation, the same for all settings of the same shape: what has been compiled once is found again."""
         simulator = self.experiments[0].simulator
         everywhere = _everywhere(simulator)
-        program = jax.jit(partial(_generation, simulator), in_shardings=everywhere, out_shardings=everywhere)
+        program = jax.jit(
+            partial(_generation, simulator), in_shardings=everywhere, out_shardings=everywhere
+        )
         return program.lower(self.rows, self.abstract())
 
     def compile(self) -> Step:
@@ -187,7 +212,9 @@ def build_batch(creature: Creature, configs: Sequence[Config]) -> Batch:
       UserError: two configs need different programs, or the physics does not support the creature's model.
     """
     if len({jax.tree.structure(traced(config)) for config in configs}) != 1:
-        raise UserError("these settings need programs of different shapes: run them in batches of their own")
+        raise UserError(
+            "these settings need programs of different shapes: run them in batches of their own"
+        )
     simulator = _simulator(creature, configs[0])
     return Batch(tuple(_experiment(creature, config, simulator) for config in configs))
 
@@ -208,28 +235,40 @@ def _initial(simulator: Simulator, settings: Config, key: jax.Array) -> Evolutio
     return evolution_of(simulator, settings).init(key, settings.rollout.starts, len(TERMS))
 
 
-def _generation(simulator: Simulator, rows: Row, states: EvolutionState) -> tuple[EvolutionState, GenerationMetrics]:
+def _generation(
+    simulator: Simulator, rows: Row, states: EvolutionState
+) -> tuple[EvolutionState, GenerationMetrics]:
     """One generation of all rows [B]. Row by row but for the simulations, so that a row's numbers do not depend on its neighbours."""
 
     def propose(pair: tuple[Row, EvolutionState]) -> Proposal:
         row, state = pair
         return evolution_of(simulator, row.settings).propose(state)
 
-    def absorb(of_row: tuple[Row, EvolutionState, Proposal, Tally, jax.Array]) -> tuple[EvolutionState, GenerationMetrics]:
+    def absorb(
+        of_row: tuple[Row, EvolutionState, Proposal, Tally, jax.Array],
+    ) -> tuple[EvolutionState, GenerationMetrics]:
         row, state, proposal, tally, computed = of_row
-        return evolution_of(simulator, row.settings).absorb(state, proposal, _verdict(simulator, row.settings, tally, computed))
+        return evolution_of(simulator, row.settings).absorb(
+            state, proposal, _verdict(simulator, row.settings, tally, computed)
+        )
 
     proposals = jax.lax.map(propose, (rows, states))
     episodes = simulator.simulate(proposals.offspring, rows.starts, rows.settings)
     lived = jnp.sum(episodes.tally.steps, axis=(1, 2))
     # Idle lanes are nobody's: each row bears a part of them in proportion to the steps that it lived.
-    computed = jnp.round(episodes.computed_steps * (lived / jnp.maximum(jnp.sum(lived), 1))).astype(jnp.int32)
+    computed = jnp.round(episodes.computed_steps * (lived / jnp.maximum(jnp.sum(lived), 1))).astype(
+        jnp.int32
+    )
     return jax.lax.map(absorb, (rows, states, proposals, episodes.tally, computed))
 
 
-def _verdict(simulator: Simulator, settings: Config, tally: Tally, computed_steps: jax.Array) -> Judged:
+def _verdict(
+    simulator: Simulator, settings: Config, tally: Tally, computed_steps: jax.Array
+) -> Judged:
     """Terms and outcome of one row's episodes; tally with leaves [N, R, ...]."""
-    terms_of = partial(fitness_terms, simulator.creature, settings.fitness, simulator.tracker.step, simulator.steps)
+    terms_of = partial(
+        fitness_terms, simulator.creature, settings.fitness, simulator.tracker.step, simulator.steps
+    )
     terms = jax.vmap(jax.vmap(terms_of))(tally)
     return Judged(
         terms=jnp.where((tally.reason == Reason.NONFINITE)[..., None], jnp.nan, terms),
@@ -240,7 +279,9 @@ def _verdict(simulator: Simulator, settings: Config, tally: Tally, computed_step
 
 
 def _experiment(creature: Creature, config: Config, simulator: Simulator) -> Experiment:
-    starts = draw_starts(jax.random.fold_in(jax.random.key(config.seed), 1), creature, config.rollout)
+    starts = draw_starts(
+        jax.random.fold_in(jax.random.key(config.seed), 1), creature, config.rollout
+    )
     return Experiment(creature, config, simulator, Row(traced(config), starts))
 
 

@@ -24,7 +24,9 @@ def stride_limit(mass: float) -> float:
     return 1.2 * 4.48 * mass**-0.14
 
 
-def fitness_terms(creature: Creature, config: FitnessConfig, step: float, horizon: int, tally: Tally) -> jax.Array:
+def fitness_terms(
+    creature: Creature, config: FitnessConfig, step: float, horizon: int, tally: Tally
+) -> jax.Array:
     """The terms [F] of one episode in the order of `TERMS`, each without unit and before its weight. The config may be traced.
 
     Every penalty is at least zero and every sum ended with the creature's life, so an individual that has died gains nothing more.
@@ -37,7 +39,12 @@ def fitness_terms(creature: Creature, config: FitnessConfig, step: float, horizo
     moved = jnp.maximum(tally.forward, 0.25 * length)
     strides = jnp.maximum(tally.strides, 1)
     # Several swings in one cycle of poses must not hide a buzz.
-    rate = jnp.maximum(tally.strides / jnp.maximum(tally.stride_steps, 1), jnp.mean(tally.swings) / lived) / step
+    rate = (
+        jnp.maximum(
+            tally.strides / jnp.maximum(tally.stride_steps, 1), jnp.mean(tally.swings) / lived
+        )
+        / step
+    )
     duty = tally.contact / lived
     second_half = tally.forward - tally.forward_half
     enough = _enough(config.speed, horizon * step)
@@ -47,7 +54,9 @@ def fitness_terms(creature: Creature, config: FitnessConfig, step: float, horizo
         "drift": jnp.abs(tally.left) / length + jnp.abs(jnp.sin(0.5 * tally.heading)),
         "fade": jnp.maximum(tally.forward_half - second_half, 0.0) / length,
         "slip": jnp.max(tally.slip) / moved,
-        "clearance": jnp.where(tally.strides > 1, tally.shortfall / jnp.maximum(strides - 1, 1), 1.0),
+        "clearance": jnp.where(
+            tally.strides > 1, tally.shortfall / jnp.maximum(strides - 1, 1), 1.0
+        ),
         "frequency": jnp.maximum(rate / stride_limit(creature.mass) - config.frequency, 0.0),
         "duty": jnp.max(jnp.maximum(duty - 0.8, 0.0) + jnp.maximum(0.25 - duty, 0.0)) / 0.2,
         "airborne": tally.airborne / lived,
@@ -60,7 +69,9 @@ def fitness_terms(creature: Creature, config: FitnessConfig, step: float, horizo
         "limits": tally.limits / lived,
     }
     # Style counts as far as there is a walk: a creature that has yet to learn walking must not be punished for trying.
-    walked = jnp.where(jnp.isfinite(enough), jnp.clip(tally.forward / length / enough, 0.0, 1.0), 1.0)
+    walked = jnp.where(
+        jnp.isfinite(enough), jnp.clip(tally.forward / length / enough, 0.0, 1.0), 1.0
+    )
     return jnp.stack([values[name] * (walked if name in STYLE else 1.0) for name in TERMS])
 
 
@@ -74,7 +85,9 @@ def _counted(distance: jax.Array, enough: jax.Array) -> jax.Array:
     return jnp.minimum(distance, enough) + BEYOND * jnp.maximum(distance - enough, 0.0)
 
 
-def forward_distance(creature: Creature, config: FitnessConfig, horizon_seconds: float, term: float) -> float:
+def forward_distance(
+    creature: Creature, config: FitnessConfig, horizon_seconds: float, term: float
+) -> float:
     """Metres forward that a `distance` term stands for."""
     enough = config.speed * horizon_seconds
     lengths = enough + (term - enough) / BEYOND if enough and term > enough else term
@@ -83,7 +96,12 @@ def forward_distance(creature: Creature, config: FitnessConfig, horizon_seconds:
 
 def weight_vector(config: FitnessConfig, generation: jax.Array) -> jax.Array:
     """Signed weights [F] at a generation []: penalties negative, style terms ramped in by an optax schedule."""
-    base = jnp.stack([jnp.float32(getattr(config.weights, name) * (1 if name in REWARDS else -1)) for name in TERMS])
+    base = jnp.stack(
+        [
+            jnp.float32(getattr(config.weights, name) * (1 if name in REWARDS else -1))
+            for name in TERMS
+        ]
+    )
     grown = optax.linear_schedule(0.0, 1.0, 1)(generation / jnp.maximum(config.style_ramp, 1))
     ramp = jnp.where(jnp.asarray(config.style_ramp) > 0, grown, 1.0)
     return jnp.where(jnp.array([name in STYLE for name in TERMS]), base * ramp, base)

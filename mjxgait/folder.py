@@ -22,7 +22,9 @@ def create_run(folder: Path, creature: Creature, config: Config) -> None:
     try:
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             holds = "another run" if (folder / CONFIG).exists() else "something else"
-            raise UserError(f"{folder}: holds {holds}; name another folder with --out, or go on with --resume {folder}")
+            raise UserError(
+                f"{folder}: holds {holds}; name another folder with --out, or go on with --resume {folder}"
+            )
         (folder / CREATURE).mkdir(parents=True, exist_ok=True)
         for name, text in creature.files.items():
             (folder / CREATURE / name).write_text(text, encoding="utf-8")
@@ -39,7 +41,9 @@ def open_run(folder: Path) -> tuple[Creature, Config]:
     """
     if not (folder / CONFIG).is_file():
         raise UserError(f"{folder}: not a run folder (it has no {CONFIG})")
-    return load_creature(folder / CREATURE), build(Config, read_toml(folder / CONFIG), str(folder / CONFIG))
+    return load_creature(folder / CREATURE), build(
+        Config, read_toml(folder / CONFIG), str(folder / CONFIG)
+    )
 
 
 def read_metrics(path: Path) -> list[dict[str, Any]]:

@@ -63,7 +63,10 @@ class PoseTracker:
 
     def bounds(self, config: ControllerConfig) -> tuple[Genome, Genome]:
         """Lowest and highest genome: key_poses [K, J], tuning [E]."""
-        low, high = (jnp.stack([jnp.float32(getattr(config.tuning, name)[end]) for name in TUNING]) for end in (0, 1))
+        low, high = (
+            jnp.stack([jnp.float32(getattr(config.tuning, name)[end]) for name in TUNING])
+            for end in (0, 1)
+        )
         shape = (config.key_poses, len(self.creature.joint_names))
 
         def genome(pose: np.ndarray, tuning: jax.Array) -> Genome:
@@ -75,18 +78,28 @@ class PoseTracker:
         """The whole cycle of a genome [K, J] under the settings, plain or traced."""
         poses = pose_cycle(self.creature, genome.key_poses)
         count = jnp.where(config.mirror, poses.shape[0], config.key_poses)
-        return PoseCycle(poses, genome.tuning, count, jnp.int32(config.interpolation), chosen(config.advance, "clock"))
+        return PoseCycle(
+            poses,
+            genome.tuning,
+            count,
+            jnp.int32(config.interpolation),
+            chosen(config.advance, "clock"),
+        )
 
     def init(self) -> GaitState:
         """The state at the start of an episode."""
         return GaitState(position=jnp.zeros((), jnp.int32), time=jnp.zeros((), jnp.float32))
 
-    def target(self, cycle: PoseCycle, state: GaitState, sensed: Sensed) -> tuple[jax.Array, GaitState, jax.Array]:
+    def target(
+        self, cycle: PoseCycle, state: GaitState, sensed: Sensed
+    ) -> tuple[jax.Array, GaitState, jax.Array]:
         """Target pose [J] of this moment, the state of the next, and whether a stride has just been completed []."""
         creature = self.creature
         target = interpolate(cycle.poses, state.position, cycle.interpolation, cycle.count)
         target = target + corrections(creature, cycle.tuning, target, sensed)
-        target = jnp.clip(target, creature.joint_low.astype(np.float32), creature.joint_high.astype(np.float32))
+        target = jnp.clip(
+            target, creature.joint_low.astype(np.float32), creature.joint_high.astype(np.float32)
+        )
         time = state.time + self.step
         positions = cycle.count * cycle.interpolation
         reached = jnp.mean((target - sensed.joint_pos) ** 2) < cycle.tuning[THRESHOLD] ** 2
@@ -99,10 +112,14 @@ def pose_cycle(creature: Creature, key_poses: jax.Array) -> jax.Array:
     """The closed cycle [C, J]: the key poses [K, J] and, for a symmetric creature, their mirror images."""
     if not creature.symmetric:
         return key_poses
-    return jnp.concatenate([key_poses, creature.sign.astype(np.float32) * key_poses[:, creature.partner]])
+    return jnp.concatenate(
+        [key_poses, creature.sign.astype(np.float32) * key_poses[:, creature.partner]]
+    )
 
 
-def interpolate(poses: jax.Array, position: jax.Array, n: jax.Array | int, count: jax.Array | int) -> jax.Array:
+def interpolate(
+    poses: jax.Array, position: jax.Array, n: jax.Array | int, count: jax.Array | int
+) -> jax.Array:
     """Target pose [J] at a position [] of a cycle with n steps between neighbours: the first `count` [] of the poses [C, J].
 
     A weighted sum over all poses instead of two look-ups: with lanes innermost a look-up would be a gather per lane.
@@ -116,12 +133,16 @@ def interpolate(poses: jax.Array, position: jax.Array, n: jax.Array | int, count
 
 def heading_error(creature: Creature, sensed: Sensed) -> tuple[jax.Array, jax.Array, jax.Array]:
     """Forward [3] and left [3] of the trunk in the world, and its heading [] in rad, left of the start's forward."""
-    forward, left = (sensed.trunk_rot @ axis.astype(np.float32) for axis in (creature.forward, creature.left))
+    forward, left = (
+        sensed.trunk_rot @ axis.astype(np.float32) for axis in (creature.forward, creature.left)
+    )
     start_forward, start_left = start_axes(creature)
     return forward, left, jnp.arctan2(forward @ start_left, forward @ start_forward)
 
 
-def corrections(creature: Creature, tuning: jax.Array, target: jax.Array, sensed: Sensed) -> jax.Array:
+def corrections(
+    creature: Creature, tuning: jax.Array, target: jax.Array, sensed: Sensed
+) -> jax.Array:
     """Change [J] of the target pose by steering and balance; zero where the genes are zero."""
     forward, left, heading = heading_error(creature, sensed)
     offset = (sensed.trunk_pos - start_position(creature)) @ start_axes(creature)[1]
@@ -131,7 +152,13 @@ def corrections(creature: Creature, tuning: jax.Array, target: jax.Array, sensed
     roll = _clip(tuning[ROLL] * roll + tuning[ROLL_RATE] * (sensed.trunk_angvel @ forward))
     bend, stride, on_pitch, on_roll, stand = (
         value.astype(np.float32)
-        for value in (creature.steer_bend, creature.steer_stride, creature.balance_pitch, creature.balance_roll, creature.stand)
+        for value in (
+            creature.steer_bend,
+            creature.steer_stride,
+            creature.balance_pitch,
+            creature.balance_roll,
+            creature.stand,
+        )
     )
     return (target - stand) * steer * stride + steer * bend + pitch * on_pitch + roll * on_roll
 

@@ -65,7 +65,11 @@ def _fields(cls: type) -> list[tuple[Any, Any, str]]:
     rows = []
     for field in dataclasses.fields(cls):
         hint = hints[field.name]
-        marks = [mark for mark in getattr(hint, "__metadata__", ()) if mark in (SHAPE, HOST)] if get_origin(hint) is not Literal else []
+        marks = (
+            [mark for mark in getattr(hint, "__metadata__", ()) if mark in (SHAPE, HOST)]
+            if get_origin(hint) is not Literal
+            else []
+        )
         rows.append((field, hint, marks[0] if marks else ""))
     return rows
 
@@ -78,7 +82,9 @@ def _register(cls: type) -> None:
         if isinstance(inner, type) and dataclasses.is_dataclass(inner):
             _register(inner)
     data = [name for name, role in roles.items() if not role]
-    jax.tree_util.register_dataclass(cls, data_fields=data, meta_fields=[name for name, role in roles.items() if role])
+    jax.tree_util.register_dataclass(
+        cls, data_fields=data, meta_fields=[name for name, role in roles.items() if role]
+    )
 
 
 _register(Config)

@@ -99,11 +99,17 @@ class Simulator:
 
         def in_order(leaf: jax.Array) -> jax.Array:
             by_device = leaf.reshape(devices, queue, *leaf.shape[1:])
-            return jnp.swapaxes(by_device, 0, 1).reshape(-1, *leaf.shape[1:])[:total].reshape(*shape, *leaf.shape[1:])
+            return (
+                jnp.swapaxes(by_device, 0, 1)
+                .reshape(-1, *leaf.shape[1:])[:total]
+                .reshape(*shape, *leaf.shape[1:])
+            )
 
         return Episodes(jax.tree.map(in_order, tally), jnp.sum(computed))
 
-    def _run_queue(self, jobs: jax.Array, genomes: Any, starts: Starts, settings: Config, *, total: int) -> tuple[Tally, jax.Array]:
+    def _run_queue(
+        self, jobs: jax.Array, genomes: Any, starts: Starts, settings: Config, *, total: int
+    ) -> tuple[Tally, jax.Array]:
         """Works off one device's queue of jobs [Q]: tally with leaves [Q, ...], and the computed steps [1]."""
         queue = jobs.shape[0]
         lanes = min(self.lanes, queue)
@@ -111,15 +117,23 @@ class Simulator:
 
         def fresh(places: jax.Array) -> Lane:
             job = jnp.where(places < waiting, places, queue)
-            lane = jax.vmap(partial(self._fresh_lane, genomes, starts, settings))(job, jobs[jnp.minimum(places, queue - 1)])
+            lane = jax.vmap(partial(self._fresh_lane, genomes, starts, settings))(
+                job, jobs[jnp.minimum(places, queue - 1)]
+            )
             return jax.tree.map(lambda leaf: jnp.moveaxis(leaf, 0, self.plant.lane_axis), lane)
 
         def store(results: Tally, place: jax.Array, tally: Tally) -> Tally:
             return jax.tree.map(
-                lambda rows, leaf: rows.at[place].set(jnp.moveaxis(leaf, self.plant.lane_axis, 0), mode="drop"), results, tally
+                lambda rows, leaf: rows.at[place].set(
+                    jnp.moveaxis(leaf, self.plant.lane_axis, 0), mode="drop"
+                ),
+                results,
+                tally,
             )
 
-        def body(carry: tuple[Lane, Tally, jax.Array, jax.Array]) -> tuple[Lane, Tally, jax.Array, jax.Array]:
+        def body(
+            carry: tuple[Lane, Tally, jax.Array, jax.Array],
+        ) -> tuple[Lane, Tally, jax.Array, jax.Array]:
             lane, results, taken, rounds = carry
             lane = jax.lax.fori_loop(0, CHECK_EVERY, lambda _, lane: self._step(lane), lane)
             done = (lane.tally.steps >= self.steps) | (lane.tally.reason != Reason.FINISHED)
@@ -127,18 +141,27 @@ class Simulator:
             lane = self._per_lane(_choose)(done, fresh(taken + jnp.cumsum(done) - 1), lane)
             return lane, results, taken + jnp.sum(done), rounds + 1
 
-        results = jax.tree.map(lambda leaf: jnp.zeros((queue, *leaf.shape), leaf.dtype), self.judge.init())
+        results = jax.tree.map(
+            lambda leaf: jnp.zeros((queue, *leaf.shape), leaf.dtype), self.judge.init()
+        )
         carry = (fresh(jnp.arange(lanes)), results, jnp.int32(lanes), jnp.int32(0))
         # Not a while_loop: XLA's CPU compiler aborts on the fast plant's kernels in a loop whose length it does not know. Whenever a lane
         # is free it takes a job, so this many rounds always suffice (Graham 1966); what is left of them costs next to nothing.
         longest = -(-self.steps // CHECK_EVERY) + 1
         most = -(-queue * longest // lanes) + longest
         carry = jax.lax.fori_loop(
-            0, most, lambda _, carry: jax.lax.cond(jnp.any(carry[0].job < queue), body, lambda same: same, carry), carry
+            0,
+            most,
+            lambda _, carry: jax.lax.cond(
+                jnp.any(carry[0].job < queue), body, lambda same: same, carry
+            ),
+            carry,
         )
         return carry[1], (carry[3] * (CHECK_EVERY * lanes))[None]
 
-    def _fresh_lane(self, genomes: Any, starts: Starts, settings: Config, job: jax.Array, episode: jax.Array) -> Lane:
+    def _fresh_lane(
+        self, genomes: Any, starts: Starts, settings: Config, job: jax.Array, episode: jax.Array
+    ) -> Lane:
         """The lane at the start of an episode []: of row, genome and start, the start changes fastest."""
         count, individuals = starts.friction.shape[1], jax.tree.leaves(genomes)[0].shape[1]
         row, individual = episode // (individuals * count), episode // count % individuals
@@ -147,8 +170,16 @@ class Simulator:
         still = jnp.zeros_like(start.qvel)
         return Lane(
             job=job,
-            body=BodyState(start.qpos, start.qvel, warmstart=still, constraint_force=still, friction=start.friction),
-            cycle=self.tracker.prepare(jax.tree.map(lambda leaf: leaf[row, individual], genomes), mine.controller),
+            body=BodyState(
+                start.qpos,
+                start.qvel,
+                warmstart=still,
+                constraint_force=still,
+                friction=start.friction,
+            ),
+            cycle=self.tracker.prepare(
+                jax.tree.map(lambda leaf: leaf[row, individual], genomes), mine.controller
+            ),
             control=self.tracker.init(),
             tally=self.judge.init(),
             rules=self._rules(mine),
@@ -164,36 +195,55 @@ class Simulator:
             stiffness=jnp.asarray(law.stiffness, jnp.float32),
             damping=jnp.asarray(law.damping, jnp.float32),
             terminate=jnp.asarray(settings.rollout.terminate),
-            clearance=jnp.asarray(settings.fitness.clearance * self.creature.hip_height, jnp.float32),
+            clearance=jnp.asarray(
+                settings.fitness.clearance * self.creature.hip_height, jnp.float32
+            ),
         )
 
     def _step(self, lane: Lane) -> Lane:
         """All lanes one control step on. A lane whose episode has ended moves on too, but its tally stands still."""
         body = self._per_lane(_push)(lane)
         sensed, workings = self.plant.forward(body)
-        target, control, stride = self._per_lane(self.tracker.target)(lane.cycle, lane.control, sensed)
+        target, control, stride = self._per_lane(self.tracker.target)(
+            lane.cycle, lane.control, sensed
+        )
         torque = self._torque(lane.rules, body, sensed, workings, target)
         tally = self._per_lane(self._judge)(lane.rules, lane.tally, sensed, torque, stride)
         body = self.plant.advance(body, workings, self._per_lane(self._lift)(torque))
         return dataclasses.replace(lane, body=body, control=control, tally=tally)
 
-    def _torque(self, rules: Rules, body: BodyState, sensed: Any, workings: Any, target: jax.Array) -> jax.Array:
+    def _torque(
+        self, rules: Rules, body: BodyState, sensed: Any, workings: Any, target: jax.Array
+    ) -> jax.Array:
         """Joint torques, [J] per lane. Plain PD is stable PD that looks no step ahead."""
         creature, step = self.creature, self.tracker.step
         limit = creature.torque_limit.astype(np.float32)
 
-        def pull(rules: Rules, pos: jax.Array, vel: jax.Array, goal: jax.Array) -> tuple[jax.Array, jax.Array, jax.Array]:
-            kp, kd = creature.kp.astype(np.float32) * rules.stiffness, creature.kd.astype(np.float32) * rules.damping
+        def pull(
+            rules: Rules, pos: jax.Array, vel: jax.Array, goal: jax.Array
+        ) -> tuple[jax.Array, jax.Array, jax.Array]:
+            kp, kd = (
+                creature.kp.astype(np.float32) * rules.stiffness,
+                creature.kd.astype(np.float32) * rules.damping,
+            )
             ahead = jnp.where(rules.stable, step, 0.0)
             return spd.pd_force(pos, vel, goal, kp, kd, ahead), ahead * kd, self._lift(step * kd)
 
-        force, braked, damping = self._per_lane(pull)(rules, sensed.joint_pos, sensed.joint_vel, target)
+        force, braked, damping = self._per_lane(pull)(
+            rules, sensed.joint_pos, sensed.joint_vel, target
+        )
         pushed = jnp.where(rules.constraint_forces, 1.0, 0.0)
-        total = self._per_lane(lambda f, c, on, bias: self._lift(f) + on * c - bias)(force, body.constraint_force, pushed, sensed.bias)
+        total = self._per_lane(lambda f, c, on, bias: self._lift(f) + on * c - bias)(
+            force, body.constraint_force, pushed, sensed.bias
+        )
         acceleration = self.plant.solve_damped(workings, damping, total)
-        return self._per_lane(lambda f, a, b: spd.limited_torque(f, a[creature.dof_adr], b, limit))(force, acceleration, braked)
+        return self._per_lane(lambda f, a, b: spd.limited_torque(f, a[creature.dof_adr], b, limit))(
+            force, acceleration, braked
+        )
 
-    def _judge(self, rules: Rules, tally: Tally, sensed: Any, torque: jax.Array, stride: jax.Array) -> Tally:
+    def _judge(
+        self, rules: Rules, tally: Tally, sensed: Any, torque: jax.Array, stride: jax.Array
+    ) -> Tally:
         going = (tally.reason == Reason.FINISHED) & (tally.steps < self.steps)
         found = self.judge.examine(sensed)
         reason = jnp.where(rules.terminate | (found == Reason.NONFINITE), found, Reason.FINISHED)

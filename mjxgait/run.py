@@ -28,7 +28,14 @@ from mjxgait.folder import CERTIFICATE, CHAMPION, METRICS, PLOT, read_metrics, t
 from mjxgait.screen import Screen
 
 
-def train(folder: Path, creature: Creature, config: Config, screen: Screen, resume: bool = False, generation: int | None = None) -> bool:
+def train(
+    folder: Path,
+    creature: Creature,
+    config: Config,
+    screen: Screen,
+    resume: bool = False,
+    generation: int | None = None,
+) -> bool:
     """Runs, or goes on with, the evolution in a run folder; returns whether it came to its end.
 
     Args:
@@ -49,7 +56,9 @@ def train(folder: Path, creature: Creature, config: Config, screen: Screen, resu
     examiner = Examiner(experiment, versions(), screen.say)
     try:
         with interruptible() as interrupted:
-            state, reason, examined = _evolve(folder, examiner, step, experiment.place(state), checkpoints, screen, interrupted)
+            state, reason, examined = _evolve(
+                folder, examiner, step, experiment.place(state), checkpoints, screen, interrupted
+            )
     finally:
         screen.close()
         checkpoints.close()
@@ -60,10 +69,18 @@ def train(folder: Path, creature: Creature, config: Config, screen: Screen, resu
         screen.certificate(examined.certificate)
     lines = read_metrics(folder / METRICS)
     if lines:
-        from mjxgait.viewing.curves import plot_fitness  # matplotlib is slow to import, and nothing needed it until now
+        from mjxgait.viewing.curves import (
+            plot_fitness,
+        )  # matplotlib is slow to import, and nothing needed it until now
 
         plot_fitness(lines, folder / PLOT)
-        screen.report(folder, reason or "interrupted", lines[-1], time.perf_counter() - began, interrupted=reason is None)
+        screen.report(
+            folder,
+            reason or "interrupted",
+            lines[-1],
+            time.perf_counter() - began,
+            interrupted=reason is None,
+        )
     return reason is not None
 
 
@@ -106,10 +123,16 @@ def _evolve(
 
 def metrics_line(metrics: GenerationMetrics, seconds: float) -> dict[str, Any]:
     """What `metrics.jsonl` holds of one generation; numbers that are not finite become null."""
-    line = {field.name: getattr(metrics, field.name).item() for field in dataclasses.fields(metrics) if field.name != "best_terms"}
+    line = {
+        field.name: getattr(metrics, field.name).item()
+        for field in dataclasses.fields(metrics)
+        if field.name != "best_terms"
+    }
     line["forced"] = bool(line["forced"])
     line |= {"steps_per_second": round(line["sim_steps"] / seconds), "wall_s": round(seconds, 4)}
-    line |= {f"term_{name}": float(value) for name, value in zip(TERMS, metrics.best_terms, strict=True)}
+    line |= {
+        f"term_{name}": float(value) for name, value in zip(TERMS, metrics.best_terms, strict=True)
+    }
     return {key: value if np.isfinite(value) else None for key, value in line.items()}
 
 
@@ -117,7 +140,9 @@ def metrics_line(metrics: GenerationMetrics, seconds: float) -> dict[str, Any]:
 def versions() -> dict[str, str]:
     """Of everything that decides what a run computes."""
     packages = ("mjxgait", "jax", "jaxlib", "mujoco", "mujoco-mjx")
-    return {"python": platform.python_version()} | {name: importlib.metadata.version(name) for name in packages}
+    return {"python": platform.python_version()} | {
+        name: importlib.metadata.version(name) for name in packages
+    }
 
 
 @contextmanager

@@ -50,7 +50,9 @@ class Screen:
         """Shows a generation; see `metrics_line`. last: the generation at which the run ends at the latest."""
         self._walls = [*self._walls[-4:], line["wall_s"]]
         left = (last - line["generation"]) * sum(self._walls) / len(self._walls)
-        best, mean = (f"{line[key]:.3f}" if line[key] is not None else "none" for key in ("best", "mean"))
+        best, mean = (
+            f"{line[key]:.3f}" if line[key] is not None else "none" for key in ("best", "mean")
+        )
         episodes = max(line["episodes"], 1)
         text = (
             f"generation {line['generation']:>3}/{last}  best {best}  mean {mean}  "
@@ -83,7 +85,9 @@ class Screen:
             f"{verdict} (margin {certificate.margin:.2f}). {report['gait']}, {report['speed']:.2f} m/s; {certificate.seconds:.0f} s."
         )
 
-    def report(self, folder: Path, why: str, last: Mapping[str, Any], seconds: float, interrupted: bool) -> None:
+    def report(
+        self, folder: Path, why: str, last: Mapping[str, Any], seconds: float, interrupted: bool
+    ) -> None:
         """The table at the end: how it went and where everything is. last: the last line of the metrics."""
         self.close()
         self.console.print(f"{why[0].upper()}{why[1:]}; {seconds:.0f} s.")

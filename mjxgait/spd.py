@@ -9,17 +9,23 @@ import jax.numpy as jnp
 from jax.typing import ArrayLike
 
 
-def pd_force(pos: jax.Array, vel: jax.Array, target: jax.Array, kp: ArrayLike, kd: ArrayLike, step: ArrayLike) -> jax.Array:
+def pd_force(
+    pos: jax.Array, vel: jax.Array, target: jax.Array, kp: ArrayLike, kd: ArrayLike, step: ArrayLike
+) -> jax.Array:
     """Spring and damper at the end of the coming step: `-kp (q + h v - target) - kd v`; all [J], step in s (0 gives plain PD); N·m."""
     return -jnp.asarray(kp) * (pos + step * vel - target) - jnp.asarray(kd) * vel
 
 
-def limited_torque(force: jax.Array, acceleration: jax.Array, brake: ArrayLike, limit: ArrayLike) -> jax.Array:
+def limited_torque(
+    force: jax.Array, acceleration: jax.Array, brake: ArrayLike, limit: ArrayLike
+) -> jax.Array:
     """The torque [J], `force - brake acc` with `brake = h kd`, clamped to the limit.
 
     Clamping comes last, or the damping would be that of a stronger joint.
     """
-    return jnp.clip(force - jnp.asarray(brake) * acceleration, -jnp.asarray(limit), jnp.asarray(limit))
+    return jnp.clip(
+        force - jnp.asarray(brake) * acceleration, -jnp.asarray(limit), jnp.asarray(limit)
+    )
 
 
 def stable_pd(

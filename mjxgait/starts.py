@@ -34,14 +34,24 @@ def draw_starts(key: jax.Array, creature: Creature, config: RolloutConfig) -> St
     perturbed = (jnp.arange(count) > 0)[:, None]
     joints = len(creature.joint_names)
     qpos = jnp.tile(jnp.asarray(creature.stand_qpos, jnp.float32), (count, 1))
-    noise = perturbed * config.joint_noise * jax.random.uniform(key_pos, (count, joints), minval=-1.0)
-    spin = perturbed * config.velocity_noise * jax.random.uniform(key_vel, (count, joints), minval=-1.0)
-    friction = jax.random.uniform(key_friction, (count,), minval=config.friction[0], maxval=config.friction[1])
+    noise = (
+        perturbed * config.joint_noise * jax.random.uniform(key_pos, (count, joints), minval=-1.0)
+    )
+    spin = (
+        perturbed
+        * config.velocity_noise
+        * jax.random.uniform(key_vel, (count, joints), minval=-1.0)
+    )
+    friction = jax.random.uniform(
+        key_friction, (count,), minval=config.friction[0], maxval=config.friction[1]
+    )
     angle = jax.random.uniform(key_direction, (count,), maxval=2 * jnp.pi)
     direction = perturbed * jnp.stack([jnp.cos(angle), jnp.sin(angle)], axis=1)
     speed = config.push * float(np.sqrt(-creature.model.opt.gravity[2] * creature.hip_height))
     steps = round(config.seconds / creature.model.opt.timestep)
-    moment = jax.random.randint(key_moment, (count,), steps // 4, max(3 * steps // 4, steps // 4 + 1))
+    moment = jax.random.randint(
+        key_moment, (count,), steps // 4, max(3 * steps // 4, steps // 4 + 1)
+    )
     return Starts(
         qpos=qpos.at[:, creature.qpos_adr].add(noise),
         qvel=jnp.zeros((count, creature.model.nv)).at[:, creature.dof_adr].set(spin),

@@ -48,7 +48,9 @@ def merge(base: Table, over: Table) -> dict[str, Any]:
     merged = dict(base)
     for key, value in over.items():
         old = merged.get(key)
-        merged[key] = merge(old, value) if isinstance(old, Mapping) and isinstance(value, Mapping) else value
+        merged[key] = (
+            merge(old, value) if isinstance(old, Mapping) and isinstance(value, Mapping) else value
+        )
     return merged
 
 
@@ -90,7 +92,14 @@ def _keys(cls: type, parents: list[str]) -> list[str]:
         fields = {field.name: field for field in dataclasses.fields(cls)}
         if name in fields:
             inner = fields[name].type
-            cls = next((t for t in (inner, *getattr(inner, "__args__", ())) if dataclasses.is_dataclass(t)), cls)  # type: ignore[assignment]
+            cls = next(
+                (
+                    t
+                    for t in (inner, *getattr(inner, "__args__", ()))
+                    if dataclasses.is_dataclass(t)
+                ),
+                cls,
+            )  # type: ignore[assignment]
     return [field.name for field in dataclasses.fields(cls)]
 
 

@@ -82,8 +82,14 @@ class Judge:
         """The empty tally."""
         feet = len(self.creature.foot_names)
         values = {field.name: jnp.zeros(()) for field in dataclasses.fields(Tally)}
-        counts = {name: jnp.zeros((), jnp.int32) for name in ("steps", "reason", "strides", "stride_steps")}
-        per_foot = {name: jnp.zeros(feet) for name in ("swings", "swinging", "peak", "contact", "slip", "foot_down")}
+        counts = {
+            name: jnp.zeros((), jnp.int32)
+            for name in ("steps", "reason", "strides", "stride_steps")
+        }
+        per_foot = {
+            name: jnp.zeros(feet)
+            for name in ("swings", "swinging", "peak", "contact", "slip", "foot_down")
+        }
         return Tally(**(values | counts | per_foot | {"foot_pos": jnp.zeros((feet, 2))}))
 
     def examine(self, sensed: Sensed) -> jax.Array:
@@ -97,10 +103,22 @@ class Judge:
         reason = jnp.where(height > limits.height[1], Reason.TOO_HIGH, reason)
         reason = jnp.where(height < limits.height[0], Reason.TOO_LOW, reason)
         reason = jnp.where(up < limits.min_up, Reason.TIPPED, reason)
-        finite = jnp.isfinite(jnp.sum(sensed.joint_vel) + jnp.sum(sensed.trunk_pos) + jnp.sum(sensed.trunk_rot) + jnp.sum(sensed.bias))
+        finite = jnp.isfinite(
+            jnp.sum(sensed.joint_vel)
+            + jnp.sum(sensed.trunk_pos)
+            + jnp.sum(sensed.trunk_rot)
+            + jnp.sum(sensed.bias)
+        )
         return jnp.where(finite, reason, Reason.NONFINITE).astype(jnp.int32)
 
-    def update(self, tally: Tally, sensed: Sensed, torque: jax.Array, stride: jax.Array, clearance: jax.Array) -> Tally:
+    def update(
+        self,
+        tally: Tally,
+        sensed: Sensed,
+        torque: jax.Array,
+        stride: jax.Array,
+        clearance: jax.Array,
+    ) -> Tally:
         """The tally after one more step.
 
         Args:
@@ -119,7 +137,9 @@ class Judge:
         rise = SWING * creature.hip_height
         swinging = jnp.where(low > rise, 1.0, jnp.where(low < 0.5 * rise, 0.0, tally.swinging))
         first = tally.strides == 0
-        outside = (sensed.joint_pos < creature.pose_low.astype(np.float32)) | (sensed.joint_pos > creature.pose_high.astype(np.float32))
+        outside = (sensed.joint_pos < creature.pose_low.astype(np.float32)) | (
+            sensed.joint_pos > creature.pose_high.astype(np.float32)
+        )
         steps = tally.steps + 1
         forward = moved @ start_forward
         return Tally(
@@ -145,7 +165,8 @@ class Judge:
             wobble=tally.wobble + sensed.trunk_angvel @ sensed.trunk_angvel,
             touch=tally.touch + self._touches(sensed),
             work=tally.work + jnp.sum(jnp.maximum(torque * sensed.joint_vel, 0.0)) * self.step,
-            saturation=tally.saturation + jnp.mean(jnp.abs(torque) >= creature.torque_limit.astype(np.float32)),
+            saturation=tally.saturation
+            + jnp.mean(jnp.abs(torque) >= creature.torque_limit.astype(np.float32)),
             limits=tally.limits + jnp.mean(outside),
         )
 
@@ -155,7 +176,10 @@ class Judge:
 
     def _feet(self, sensed: Sensed) -> tuple[jax.Array, jax.Array]:
         """Lowest point [F] of each foot and its horizontal position [F, 2], the mean of its geoms."""
-        groups = [np.flatnonzero(self.creature.foot_of == foot) for foot in range(len(self.creature.foot_names))]
+        groups = [
+            np.flatnonzero(self.creature.foot_of == foot)
+            for foot in range(len(self.creature.foot_names))
+        ]
         low = jnp.stack([jnp.min(sensed.geom_low[g[0] : g[-1] + 1]) for g in groups])
         pos = jnp.stack([jnp.mean(sensed.geom_pos[g[0] : g[-1] + 1, :2], axis=0) for g in groups])
         return low, pos

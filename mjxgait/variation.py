@@ -43,16 +43,28 @@ def pose_variation(box: Box, config: EvolutionConfig) -> Variation:
     All options of a choice are computed and one is taken: they cost next to nothing beside the simulations.
     """
     poses = narrowed(box, config.pose_range)
-    box = Box(*(dataclasses.replace(edge, key_poses=part.key_poses) for edge, part in ((box.low, poses.low), (box.high, poses.high))))
+    box = Box(
+        *(
+            dataclasses.replace(edge, key_poses=part.key_poses)
+            for edge, part in ((box.low, poses.low), (box.high, poses.high))
+        )
+    )
     middle = narrowed(box, config.initial_spread)
 
     def create(key: jax.Array, count: int) -> Any:
         uniformly = chosen(config.initial, "uniform")
-        return jax.tree.map(partial(jnp.where, uniformly), uniform(key, middle, count), latin_hypercube(key, middle, count))
+        return jax.tree.map(
+            partial(jnp.where, uniformly),
+            uniform(key, middle, count),
+            latin_hypercube(key, middle, count),
+        )
 
     def cross(key: jax.Array, mother: Any, father: Any) -> Any:
         key_poses, key_tuning = jax.random.split(key)
-        permuted, aligned = (f(key_poses, mother.key_poses, father.key_poses) for f in (permuted_poses, aligned_poses))
+        permuted, aligned = (
+            f(key_poses, mother.key_poses, father.key_poses)
+            for f in (permuted_poses, aligned_poses)
+        )
         from_mother = jax.random.bernoulli(key_tuning, 0.5, mother.tuning.shape)
         return dataclasses.replace(
             mother,
@@ -63,8 +75,22 @@ def pose_variation(box: Box, config: EvolutionConfig) -> Variation:
     def mutate(key: jax.Array, genome: Any) -> Any:
         key_poses, key_tuning = jax.random.split(key)
         low, high = box.low, box.high
-        poses = mutated_poses(key_poses, genome.key_poses, low.key_poses, high.key_poses, config.mutation, config.sigma)
-        tuning = jittered(key_tuning, genome.tuning, low.tuning, high.tuning, config.tuning_rate, config.tuning_sigma)
+        poses = mutated_poses(
+            key_poses,
+            genome.key_poses,
+            low.key_poses,
+            high.key_poses,
+            config.mutation,
+            config.sigma,
+        )
+        tuning = jittered(
+            key_tuning,
+            genome.tuning,
+            low.tuning,
+            high.tuning,
+            config.tuning_rate,
+            config.tuning_sigma,
+        )
         return dataclasses.replace(genome, key_poses=poses, tuning=tuning)
 
     return Variation(create=create, cross=cross, mutate=mutate)
@@ -90,7 +116,9 @@ def latin_hypercube(key: jax.Array, box: Box, count: int) -> Any:
     def draw(key: jax.Array, shape: tuple[int, ...]) -> jax.Array:
         key_slice, key_within = jax.random.split(key)
         slices = jax.random.permutation(
-            key_slice, jnp.broadcast_to(jnp.arange(count)[:, None], (count, math.prod(shape[1:]))), independent=True
+            key_slice,
+            jnp.broadcast_to(jnp.arange(count)[:, None], (count, math.prod(shape[1:]))),
+            independent=True,
         )
         return ((slices + jax.random.uniform(key_within, slices.shape)) / count).reshape(shape)
 
@@ -108,7 +136,14 @@ def aligned_poses(key: jax.Array, mother: jax.Array, father: jax.Array) -> jax.A
     return jnp.where(jax.random.bernoulli(key, 0.5, (mother.shape[0], 1)), mother, father)
 
 
-def mutated_poses(key: jax.Array, poses: jax.Array, low: jax.Array, high: jax.Array, kind: Any, sigma: jax.Array | float) -> jax.Array:
+def mutated_poses(
+    key: jax.Array,
+    poses: jax.Array,
+    low: jax.Array,
+    high: jax.Array,
+    kind: Any,
+    sigma: jax.Array | float,
+) -> jax.Array:
     """Key poses [K, J] with a change in one of them; see `EvolutionConfig.mutation` for the kinds. Never leaves the box."""
     key_pose, key_joint, key_value, key_kind = jax.random.split(key, 4)
     count, joints = poses.shape
@@ -116,7 +151,11 @@ def mutated_poses(key: jax.Array, poses: jax.Array, low: jax.Array, high: jax.Ar
     order = jax.random.permutation(key_joint, jnp.arange(joints))
     moves = chosen(kind, "gaussian") | (chosen(kind, "mixed") & jax.random.bernoulli(key_kind))
     coded, code = chosen(kind, "bit") | chosen(kind, "byte"), eight_bits(poses, low, high)
-    flipped = code ^ jnp.where(chosen(kind, "bit"), 1 << jax.random.randint(key_kind, (), 0, 8), jax.random.randint(key_kind, (), 0, 256))
+    flipped = code ^ jnp.where(
+        chosen(kind, "bit"),
+        1 << jax.random.randint(key_kind, (), 0, 8),
+        jax.random.randint(key_kind, (), 0, 256),
+    )
     moved = poses + sigma * (high - low) * jax.random.normal(key_value, poses.shape)
     drawn = low + (high - low) * jax.random.uniform(key_value, poses.shape)
     value = jnp.where(moves, moved, jnp.where(coded, low + flipped / 255 * (high - low), drawn))
@@ -127,16 +166,25 @@ def mutated_poses(key: jax.Array, poses: jax.Array, low: jax.Array, high: jax.Ar
 
 def eight_bits(values: jax.Array, low: jax.Array, high: jax.Array) -> jax.Array:
     """The nearest of 256 levels between low and high, as integers."""
-    return jnp.round(255 * jnp.clip((values - low) / jnp.maximum(high - low, 1e-9), 0.0, 1.0)).astype(jnp.int32)
+    return jnp.round(
+        255 * jnp.clip((values - low) / jnp.maximum(high - low, 1e-9), 0.0, 1.0)
+    ).astype(jnp.int32)
 
 
 def jittered(
-    key: jax.Array, values: jax.Array, low: jax.Array, high: jax.Array, rate: jax.Array | float, sigma: jax.Array | float
+    key: jax.Array,
+    values: jax.Array,
+    low: jax.Array,
+    high: jax.Array,
+    rate: jax.Array | float,
+    sigma: jax.Array | float,
 ) -> jax.Array:
     """Values [E], each moved with probability `rate` by a Gaussian of `sigma` ranges; never leaves the box."""
     key_which, key_by = jax.random.split(key)
     moved = values + sigma * (high - low) * jax.random.normal(key_by, values.shape)
-    return jnp.clip(jnp.where(jax.random.bernoulli(key_which, rate, values.shape), moved, values), low, high)
+    return jnp.clip(
+        jnp.where(jax.random.bernoulli(key_which, rate, values.shape), moved, values), low, high
+    )
 
 
 def first_occurrence(genomes: Any) -> jax.Array:
@@ -144,7 +192,9 @@ def first_occurrence(genomes: Any) -> jax.Array:
 
     Sorts by a random projection, so the cost grows as N log N; equal genomes have equal projections, and neighbours are compared in full.
     """
-    rows = jnp.concatenate([leaf.reshape(leaf.shape[0], -1) for leaf in jax.tree.leaves(genomes)], axis=1)
+    rows = jnp.concatenate(
+        [leaf.reshape(leaf.shape[0], -1) for leaf in jax.tree.leaves(genomes)], axis=1
+    )
     # Elementwise product and sum, row by row alike: a matrix product may round equal rows differently at different places.
     projection = jnp.sum(rows * jax.random.normal(jax.random.key(0), (rows.shape[1],)), axis=1)
     order = jnp.argsort(projection, stable=True)
@@ -153,9 +203,14 @@ def first_occurrence(genomes: Any) -> jax.Array:
     return jnp.zeros(len(order), bool).at[order].set(~repeats)
 
 
-def _draw(key: jax.Array, box: Box, count: int, draw: Callable[[jax.Array, tuple[int, ...]], jax.Array]) -> Any:
+def _draw(
+    key: jax.Array, box: Box, count: int, draw: Callable[[jax.Array, tuple[int, ...]], jax.Array]
+) -> Any:
     lows, shape_of = jax.tree.flatten(box.low)
     highs = jax.tree.leaves(box.high)
     keys = jax.random.split(key, len(lows))
-    leaves = [low + (high - low) * draw(k, (count, *low.shape)) for k, low, high in zip(keys, lows, highs, strict=True)]
+    leaves = [
+        low + (high - low) * draw(k, (count, *low.shape))
+        for k, low, high in zip(keys, lows, highs, strict=True)
+    ]
     return jax.tree.unflatten(shape_of, leaves)

@@ -27,11 +27,18 @@ def strip(run: Path, name: str) -> Path:
             if ended.code:
                 raise
         with Image.open(drawn) as image:
-            image.convert("RGB").resize((WIDTH, round(image.height * WIDTH / image.width))).save(picture, quality=70)
+            image.convert("RGB").resize((WIDTH, round(image.height * WIDTH / image.width))).save(
+                picture, quality=70
+            )
     return picture
 
 
-lines = ["# One stride of each champion", "", "Drawn from the walks in C MuJoCo whose figures are in [results.md](results.md).", ""]
+lines = [
+    "# One stride of each champion",
+    "",
+    "Drawn from the walks in C MuJoCo whose figures are in [results.md](results.md).",
+    "",
+]
 for run in map(Path, sys.argv[1:]):
     creature, config = open_run(run)
     certificate = read_certificate(run / CERTIFICATE)

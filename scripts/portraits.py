@@ -12,7 +12,19 @@ for run in sys.argv[1:]:
     creature, _ = open_run(Path(run))
     PICTURES.mkdir(exist_ok=True)
     try:
-        main(["render", run, "--out", str(PICTURES / f"{creature.name}.webp"), "--seconds", "3", "--size", "320", "180"])
+        main(
+            [
+                "render",
+                run,
+                "--out",
+                str(PICTURES / f"{creature.name}.webp"),
+                "--seconds",
+                "3",
+                "--size",
+                "320",
+                "180",
+            ]
+        )
     except SystemExit as ended:
         if ended.code:
             raise

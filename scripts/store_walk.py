@@ -19,7 +19,9 @@ from mjxgait.folder import CERTIFICATE, CHAMPION, open_run
 
 def main() -> None:
     """Examines, records and writes."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("run", type=Path)
     parser.add_argument("folder", type=Path)
     options = parser.parse_args()
@@ -28,7 +30,9 @@ def main() -> None:
     config = CertificateConfig()
     options.folder.mkdir(parents=True, exist_ok=True)
     shutil.copy(options.run / CHAMPION, options.folder / CHAMPION)
-    (options.folder / CERTIFICATE).write_text(certify(creature, champion, config).to_json(), encoding="utf-8")
+    (options.folder / CERTIFICATE).write_text(
+        certify(creature, champion, config).to_json(), encoding="utf-8"
+    )
     window = record(creature, champion, config.seconds).window(config.warmup)
     np.savez_compressed(options.folder / "walk.npz", allow_pickle=False, **arrays(window))
 

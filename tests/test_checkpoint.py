@@ -44,14 +44,18 @@ def run(tmp_path: Path, states: list[EvolutionState]) -> Path:
 
 
 def restore(run: Path, evolution, digest: str = DIGEST, **where) -> EvolutionState:
-    return Checkpoints(run).restore(jax.eval_shape(lambda: evolution.init(jax.random.key(0), 1, 1)), digest, **where)
+    return Checkpoints(run).restore(
+        jax.eval_shape(lambda: evolution.init(jax.random.key(0), 1, 1)), digest, **where
+    )
 
 
 def test_the_latest_three_and_every_third_are_kept(run: Path):
     assert Checkpoints(run).generations() == [0, 3, 4, 5, 6]
 
 
-def test_what_comes_back_is_what_was_saved_to_the_bit(run: Path, states: list[EvolutionState], evolution):
+def test_what_comes_back_is_what_was_saved_to_the_bit(
+    run: Path, states: list[EvolutionState], evolution
+):
     for wanted, generation in ((states[6], None), (states[3], 3)):
         found = restore(run, evolution, generation=generation)
         for a, b in zip(jax.tree.leaves(found), jax.tree.leaves(wanted), strict=True):
@@ -61,14 +65,19 @@ def test_what_comes_back_is_what_was_saved_to_the_bit(run: Path, states: list[Ev
             assert np.array_equal(a, b)
 
 
-def test_the_restored_key_goes_on_where_the_saved_one_was(run: Path, states: list[EvolutionState], evolution):
+def test_the_restored_key_goes_on_where_the_saved_one_was(
+    run: Path, states: list[EvolutionState], evolution
+):
     step = jax.jit(evolution.step)
     assert np.array_equal(step(restore(run, evolution))[0].fitness, step(states[6])[0].fitness)
 
 
 def corrupt(run: Path, generation: int) -> None:
     """Flips bytes in the middle of the largest file of a checkpoint."""
-    largest = max((run / FOLDER / str(generation) / "state").rglob("*"), key=lambda path: path.stat().st_size if path.is_file() else 0)
+    largest = max(
+        (run / FOLDER / str(generation) / "state").rglob("*"),
+        key=lambda path: path.stat().st_size if path.is_file() else 0,
+    )
     data = bytearray(largest.read_bytes())
     middle = len(data) // 2
     data[middle : middle + 16] = bytes(16 * [255])
@@ -78,7 +87,10 @@ def corrupt(run: Path, generation: int) -> None:
 def test_a_damaged_checkpoint_is_refused_and_the_newest_intact_one_offered(run: Path, evolution):
     corrupt(run, 6)
     corrupt(run, 5)
-    with pytest.raises(UserError, match=r"checkpoints/6: the checkpoint is damaged .*generation 4 is intact: add --generation 4"):
+    with pytest.raises(
+        UserError,
+        match=r"checkpoints/6: the checkpoint is damaged .*generation 4 is intact: add --generation 4",
+    ):
         restore(run, evolution)
 
 
@@ -111,7 +123,9 @@ def test_another_schema_is_refused(run: Path, evolution):
 
 
 def test_other_settings_are_refused_with_the_array_that_differs(run: Path):
-    with pytest.raises(UserError, match=r"does not fit the settings of this run: born is \(\(20,\), 'int32'\)"):
+    with pytest.raises(
+        UserError, match=r"does not fit the settings of this run: born is \(\(20,\), 'int32'\)"
+    ):
         restore(run, toy(population=12))
 
 
@@ -132,17 +146,27 @@ def test_a_half_written_checkpoint_does_not_count(run: Path, evolution):
     assert int(restore(run, evolution).generation) == 6
 
 
-def test_a_disk_that_refuses_is_one_sentence(tmp_path: Path, states: list[EvolutionState], monkeypatch: pytest.MonkeyPatch):
+def test_a_disk_that_refuses_is_one_sentence(
+    tmp_path: Path, states: list[EvolutionState], monkeypatch: pytest.MonkeyPatch
+):
     checkpoints = Checkpoints(tmp_path)
 
     def full(*_: object, **__: object) -> None:
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(checkpoints._manager, "save", full)
-    with pytest.raises(UserError, match=r"No space left on device.*make room and go on with --resume"):
+    with pytest.raises(
+        UserError, match=r"No space left on device.*make room and go on with --resume"
+    ):
         checkpoints.save(states[0], "toy", DIGEST)
 
 
 def test_a_state_is_a_pytree_that_holds_everything(states: list[EvolutionState]):
-    assert {field.name for field in dataclasses.fields(EvolutionState)} >= {"key", "genomes", "terms", "forced", "best_history"}
+    assert {field.name for field in dataclasses.fields(EvolutionState)} >= {
+        "key",
+        "genomes",
+        "terms",
+        "forced",
+        "best_history",
+    }
     assert all(hasattr(leaf, "dtype") for leaf in jax.tree.leaves(states[0]))

@@ -10,7 +10,9 @@ from mjxgait.errors import UserError
 from mjxgait.tables import build, dump_toml, read_toml
 
 
-@pytest.mark.parametrize("path", sorted(data_folder("configs").glob("*.toml")), ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path", sorted(data_folder("configs").glob("*.toml")), ids=lambda path: path.stem
+)
 def test_every_shipped_config_loads(path: Path):
     table = read_toml(path)
     if path.stem != "certificate":
@@ -26,7 +28,10 @@ def test_a_config_survives_its_own_file(tmp_path: Path):
 @pytest.mark.parametrize(
     ("table", "words"),
     [
-        ({"evolution": {"populaton": 3}}, 'unknown key "evolution.populaton"; did you mean "population"?'),
+        (
+            {"evolution": {"populaton": 3}},
+            'unknown key "evolution.populaton"; did you mean "population"?',
+        ),
         ({"evolution": {"population": 1}}, "population must be at least 2"),
         ({"evolution": {"growth": 1.0}}, "growth = 1.0 leaves no room for offspring"),
         ({"rollout": {"physics": "warp"}}, "rollout.physics = 'warp'"),

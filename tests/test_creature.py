@@ -39,33 +39,55 @@ def test_mirroring_twice_is_nothing(shipped: Creature):
 
 def test_mirror_map_agrees_with_the_names(shipped: Creature):
     for name, partner in zip(shipped.joint_names, shipped.partner, strict=True):
-        swapped = re.sub("left|right", lambda side: {"left": "right", "right": "left"}[side.group()], name)
+        swapped = re.sub(
+            "left|right", lambda side: {"left": "right", "right": "left"}[side.group()], name
+        )
         assert shipped.joint_names[partner] == swapped
 
 
 def test_mirror_signs_of_single_joints():
     """Pitch keeps its sign under reflection, roll and yaw change it, because an axis of rotation is a pseudo-vector."""
     axes = np.array([[0, 1, 0], [1, 0, 0], [0, 0, 1]], float)
-    partner, sign = mirror_map(np.zeros((3, 3)), axes, np.zeros(3, bool), ["pitch", "roll", "yaw"], 0.01)
+    partner, sign = mirror_map(
+        np.zeros((3, 3)), axes, np.zeros(3, bool), ["pitch", "roll", "yaw"], 0.01
+    )
     assert partner.tolist() == [0, 1, 2]
     assert sign.tolist() == [1, -1, -1]
 
 
 def test_a_joint_without_partner_is_named():
     with pytest.raises(UserError, match='joint "b" has no mirror partner'):
-        mirror_map(np.array([[0, 0, 0], [0, 0.5, 0]]), np.array([[0, 1.0, 0], [0, 1.0, 0]]), np.zeros(2, bool), ["a", "b"], 0.01)
+        mirror_map(
+            np.array([[0, 0, 0], [0, 0.5, 0]]),
+            np.array([[0, 1.0, 0], [0, 1.0, 0]]),
+            np.zeros(2, bool),
+            ["a", "b"],
+            0.01,
+        )
 
 
 def test_the_mirror_map_can_be_overridden(tmp_path: Path):
     ends = ("front", "hind")
-    pairs = [f'{{joint="{end}_{side}_hip", partner="{end}_{other}_hip", sign=-1}}' for end in ends for side, other in (SIDES, SIDES[::-1])]
-    folder = edited(tmp_path, "creature.toml", "[joints]", f"[mirror]\npairs = [{', '.join(pairs)}]\n\n[joints]")
+    pairs = [
+        f'{{joint="{end}_{side}_hip", partner="{end}_{other}_hip", sign=-1}}'
+        for end in ends
+        for side, other in (SIDES, SIDES[::-1])
+    ]
+    folder = edited(
+        tmp_path, "creature.toml", "[joints]", f"[mirror]\npairs = [{', '.join(pairs)}]\n\n[joints]"
+    )
     assert load_creature(folder).sign.tolist() == [-1, -1, -1, -1]
 
 
 def test_names_and_mirror_map_must_not_contradict_each_other(tmp_path: Path):
-    pairs = [f'{{joint="{end}_{side}_hip", partner="{end}_{side}_hip"}}' for end in ("front", "hind") for side in SIDES]
-    folder = edited(tmp_path, "creature.toml", "[joints]", f"[mirror]\npairs = [{', '.join(pairs)}]\n\n[joints]")
+    pairs = [
+        f'{{joint="{end}_{side}_hip", partner="{end}_{side}_hip"}}'
+        for end in ("front", "hind")
+        for side in SIDES
+    ]
+    folder = edited(
+        tmp_path, "creature.toml", "[joints]", f"[mirror]\npairs = [{', '.join(pairs)}]\n\n[joints]"
+    )
     with pytest.raises(UserError, match="by its name"):
         load_creature(folder)
 
@@ -81,15 +103,50 @@ def test_a_capsule_reaches_its_radius_beyond_its_ends():
     ("file", "old", "new", "words"),
     [
         ("creature.toml", 'trunk = "trunk"', 'trunk = "trunkk"', 'did you mean "trunk"?'),
-        ("creature.toml", '"front_left_foot", ', '"front_foot", ', 'creature.feet = "front_foot" is not in creature.xml'),
-        ("creature.toml", "kp = 40.0", "kpp = 40.0", 'unknown key "joints.kpp"; did you mean "kp"?'),
+        (
+            "creature.toml",
+            '"front_left_foot", ',
+            '"front_foot", ',
+            'creature.feet = "front_foot" is not in creature.xml',
+        ),
+        (
+            "creature.toml",
+            "kp = 40.0",
+            "kpp = 40.0",
+            'unknown key "joints.kpp"; did you mean "kp"?',
+        ),
         ("creature.toml", "kp = 40.0", "kp = -1", "joints.kp = -1"),
-        ("creature.toml", "kp = 40.0", "kp = 40000.0", "unstable at a time step of 0.005 s; raise kd to"),
-        ("creature.toml", "range = [-40, 40]", "range = [70, 80]", "pose range lies outside its range"),
-        ("creature.toml", 'trunk = "trunk"', 'trunk = "trunk"\nforward = [0, 0, 1]', "points up or down"),
-        ("creature.toml", "[joints]", "[steering]\nbend = { spine = 1.0 }\n\n[joints]", 'no joint matches "spine"'),
+        (
+            "creature.toml",
+            "kp = 40.0",
+            "kp = 40000.0",
+            "unstable at a time step of 0.005 s; raise kd to",
+        ),
+        (
+            "creature.toml",
+            "range = [-40, 40]",
+            "range = [70, 80]",
+            "pose range lies outside its range",
+        ),
+        (
+            "creature.toml",
+            'trunk = "trunk"',
+            'trunk = "trunk"\nforward = [0, 0, 1]',
+            "points up or down",
+        ),
+        (
+            "creature.toml",
+            "[joints]",
+            "[steering]\nbend = { spine = 1.0 }\n\n[joints]",
+            'no joint matches "spine"',
+        ),
         ("creature.xml", '<key name="stand"', '<key name="sit"', 'no keyframe "stand"'),
-        ("creature.xml", 'name="floor"', 'name="ground"', 'the floor = "floor" is not in creature.xml'),
+        (
+            "creature.xml",
+            'name="floor"',
+            'name="ground"',
+            'the floor = "floor" is not in creature.xml',
+        ),
         ("creature.xml", "</worldbody>", "</worldbod>", "not a model that MuJoCo can load"),
         ("creature.xml", 'type="capsule"', 'type="capsul"', "not a model that MuJoCo can load"),
     ],
@@ -104,4 +161,7 @@ def test_a_mistake_is_one_sentence(tmp_path: Path, file: str, old: str, new: str
 
 
 def test_the_digest_follows_the_body_only(tmp_path: Path):
-    assert load_creature(STOOL).digest != load_creature(edited(tmp_path, "creature.xml", "0.04", "0.05")).digest
+    assert (
+        load_creature(STOOL).digest
+        != load_creature(edited(tmp_path, "creature.xml", "0.04", "0.05")).digest
+    )

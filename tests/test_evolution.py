@@ -10,7 +10,15 @@ import numpy as np
 import pytest
 
 from mjxgait.config import EvolutionConfig, ForcedConfig
-from mjxgait.evolution import Evolution, EvolutionState, GenerationMetrics, Judged, Origin, parents, stop_reason
+from mjxgait.evolution import (
+    Evolution,
+    EvolutionState,
+    GenerationMetrics,
+    Judged,
+    Origin,
+    parents,
+    stop_reason,
+)
 from mjxgait.gait import Genome
 from mjxgait.variation import Box, pose_variation
 
@@ -31,7 +39,12 @@ class Toy(Evolution):
     def step(self, state: EvolutionState) -> tuple[EvolutionState, GenerationMetrics]:
         proposal = self.propose(state)
         terms = self.value(proposal.offspring)[:, None, None]
-        judged = Judged(terms=terms, failed=~jnp.isfinite(terms[..., 0]), sim_steps=jnp.int32(0), computed_steps=jnp.int32(0))
+        judged = Judged(
+            terms=terms,
+            failed=~jnp.isfinite(terms[..., 0]),
+            sim_steps=jnp.int32(0),
+            computed_steps=jnp.int32(0),
+        )
         return self.absorb(state, proposal, judged)
 
 
@@ -43,7 +56,9 @@ def toy(value: Callable[[Genome], jax.Array] = near_zero, **settings) -> Toy:
     return Toy(config, pose_variation(BOX, config), rank, value)
 
 
-def run(evolution: Toy, generations: int = 30, seed: int = 0) -> list[tuple[EvolutionState, GenerationMetrics]]:
+def run(
+    evolution: Toy, generations: int = 30, seed: int = 0
+) -> list[tuple[EvolutionState, GenerationMetrics]]:
     state, step = evolution.init(jax.random.key(seed), 1, 1), jax.jit(evolution.step)
     history = []
     while len(history) < generations:
@@ -133,7 +148,9 @@ def test_growth_keeps_forced_evolution_away():
 
 def test_unfit_newcomers_are_not_taken_in():
     forced = ForcedConfig(window=1, gain=10.0, newcomers=1.0, accept=1.0, patience=0)
-    for (before, _), (after, metrics) in zip(history := run(toy(forced=forced), 12), history[1:], strict=False):
+    for (before, _), (after, metrics) in zip(
+        history := run(toy(forced=forced), 12), history[1:], strict=False
+    ):
         if metrics.forced:
             taken = np.asarray(after.born == after.generation)
             assert (np.asarray(after.fitness)[taken] >= float(before.fitness[0])).all()
@@ -143,7 +160,9 @@ def test_a_run_stops_when_forced_evolution_no_longer_pays():
     forced = ForcedConfig(window=2, limit=1, patience=2)
     evolution = toy(flat, forced=forced)
     reasons = [stop_reason(state, evolution.config) for state, _ in run(evolution, 25)]
-    assert next(reason for reason in reasons if reason).startswith("forced evolution no longer pays")
+    assert next(reason for reason in reasons if reason).startswith(
+        "forced evolution no longer pays"
+    )
 
 
 def test_a_run_stops_at_the_target_and_at_the_cap():

@@ -27,10 +27,16 @@ from mjxgait.types import Sensed
 
 
 def random_poses(creature: Creature, count: int = 3) -> np.ndarray:
-    return np.random.default_rng(1).uniform(creature.pose_low, creature.pose_high, (count, len(creature.joint_names))).astype(np.float32)
+    return (
+        np.random.default_rng(1)
+        .uniform(creature.pose_low, creature.pose_high, (count, len(creature.joint_names)))
+        .astype(np.float32)
+    )
 
 
-def sensed(creature: Creature, joints: np.ndarray, rotation: np.ndarray | None = None, offset: float = 0.0) -> Sensed:
+def sensed(
+    creature: Creature, joints: np.ndarray, rotation: np.ndarray | None = None, offset: float = 0.0
+) -> Sensed:
     nothing = jnp.zeros(3)
     return Sensed(
         joint_pos=jnp.asarray(joints, jnp.float32),
@@ -86,24 +92,34 @@ def test_the_cycle_is_periodic_and_linear_between_neighbours(stool: Creature):
 
 def test_an_unsymmetric_creature_is_not_mirrored(stool: Creature):
     alone = dataclasses.replace(stool.settings.mirror, symmetric=False)
-    lopsided = dataclasses.replace(stool, settings=dataclasses.replace(stool.settings, mirror=alone))
-    cycle = tracker(lopsided).prepare(Genome(jnp.asarray(random_poses(stool)), tuning()), settings())
+    lopsided = dataclasses.replace(
+        stool, settings=dataclasses.replace(stool.settings, mirror=alone)
+    )
+    cycle = tracker(lopsided).prepare(
+        Genome(jnp.asarray(random_poses(stool)), tuning()), settings()
+    )
     assert cycle.poses.shape == (3, 4)
     assert int(cycle.count) == 3
 
 
 def test_without_the_mirror_the_key_poses_are_the_whole_cycle(stool: Creature):
     poses = random_poses(stool)
-    cycle = tracker(stool).prepare(Genome(jnp.asarray(poses), tuning(threshold=9.0)), settings(mirror=False))
+    cycle = tracker(stool).prepare(
+        Genome(jnp.asarray(poses), tuning(threshold=9.0)), settings(mirror=False)
+    )
     for s in range(24):
         a, f = (s // 4) % 3, (s % 4) / 4
         expected = (1 - f) * poses[a] + f * poses[(a + 1) % 3]
-        assert np.allclose(interpolate(cycle.poses, jnp.int32(s), 4, cycle.count), expected, atol=1e-6)
+        assert np.allclose(
+            interpolate(cycle.poses, jnp.int32(s), 4, cycle.count), expected, atol=1e-6
+        )
 
 
 def test_a_blocked_creature_stays_and_a_following_one_moves_on(stool: Creature):
     control = tracker(stool)
-    cycle = control.prepare(Genome(jnp.asarray(random_poses(stool)), tuning(threshold=0.1)), settings())
+    cycle = control.prepare(
+        Genome(jnp.asarray(random_poses(stool)), tuning(threshold=0.1)), settings()
+    )
     target = np.asarray(cycle.poses[0])
     _, blocked, _ = control.target(cycle, control.init(), sensed(stool, target + 0.11))
     _, moved, stride = control.target(cycle, control.init(), sensed(stool, target + 0.09))
@@ -112,7 +128,9 @@ def test_a_blocked_creature_stays_and_a_following_one_moves_on(stool: Creature):
 
 def test_a_stride_is_completed_when_the_cycle_begins_anew(stool: Creature):
     control = tracker(stool)
-    cycle = control.prepare(Genome(jnp.asarray(random_poses(stool)), tuning(threshold=9.0)), settings())
+    cycle = control.prepare(
+        Genome(jnp.asarray(random_poses(stool)), tuning(threshold=9.0)), settings()
+    )
     state, strides = control.init(), []
     for _ in range(48):
         _, state, stride = control.target(cycle, state, sensed(stool, stool.stand))
@@ -122,7 +140,9 @@ def test_a_stride_is_completed_when_the_cycle_begins_anew(stool: Creature):
 
 def test_the_clock_moves_on_whatever_the_creature_does(stool: Creature):
     control = tracker(stool)
-    cycle = control.prepare(Genome(jnp.asarray(random_poses(stool)), tuning(period=0.8)), settings(advance="clock"))
+    cycle = control.prepare(
+        Genome(jnp.asarray(random_poses(stool)), tuning(period=0.8)), settings(advance="clock")
+    )
     state = GaitState(jnp.int32(0), jnp.float32(0.395))
     _, state, _ = control.target(cycle, state, sensed(stool, stool.stand + 1))
     assert int(state.position) == 12
@@ -137,19 +157,38 @@ def test_the_clock_moves_on_whatever_the_creature_does(stool: Creature):
         (ROLL, turned(0, 0.2), 0.0, ("balance_roll", 0.2)),
         (STEER, turned(2, 2.0), 0.0, ("steer_bend", 0.5)),
     ],
-    ids=["turned left", "left of the line", "nose down", "right side down", "never more than half a radian"],
+    ids=[
+        "turned left",
+        "left of the line",
+        "nose down",
+        "right side down",
+        "never more than half a radian",
+    ],
 )
-def test_signs_of_the_corrections(stool: Creature, gene: int, rotation: np.ndarray | None, offset: float, expected: tuple[str, float]):
+def test_signs_of_the_corrections(
+    stool: Creature,
+    gene: int,
+    rotation: np.ndarray | None,
+    offset: float,
+    expected: tuple[str, float],
+):
     weight = {expected[0]: np.array([1.0, 0, 0, 0])}
     creature = dataclasses.replace(stool, **weight, body_length=0.5)
     genes = jnp.zeros(len(TUNING)).at[gene].set(1.0)
-    change = corrections(creature, genes, jnp.asarray(stool.stand, jnp.float32), sensed(stool, stool.stand, rotation, offset))
+    change = corrections(
+        creature,
+        genes,
+        jnp.asarray(stool.stand, jnp.float32),
+        sensed(stool, stool.stand, rotation, offset),
+    )
     assert np.allclose(change, [expected[1], 0, 0, 0], atol=1e-5)
 
 
 def test_without_genes_there_is_no_correction(shipped: Creature):
     tipped = sensed(shipped, shipped.stand, turned(0, 0.3) @ turned(2, 0.4), 0.3)
-    assert not np.any(corrections(shipped, tuning(), jnp.asarray(shipped.stand + 0.2, jnp.float32), tipped))
+    assert not np.any(
+        corrections(shipped, tuning(), jnp.asarray(shipped.stand + 0.2, jnp.float32), tipped)
+    )
 
 
 def test_genes_and_bounds_have_the_order_of_the_config(stool: Creature):

@@ -22,7 +22,14 @@ def shape(**tables: dict) -> object:
 @pytest.mark.parametrize(
     "tables",
     [
-        {"evolution": {"mutation_rate": 0.1, "mutation": "bit", "generations": 7, "remove_duplicates": False}},
+        {
+            "evolution": {
+                "mutation_rate": 0.1,
+                "mutation": "bit",
+                "generations": 7,
+                "remove_duplicates": False,
+            }
+        },
         {"evolution": {"forced": {"enabled": False, "patience": 9}}},
         {"controller": {"law": "pd", "advance": "clock", "mirror": False, "stiffness": 2.0}},
         {"rollout": {"terminate": False, "push": 0.0, "worst": 0.0}},
@@ -60,14 +67,19 @@ VARIANTS = {
     "as it is": {},
     "another seed": {"seed": 5},
     "plain PD": {"controller": {"law": "pd"}},
-    "bit flips by the clock": {"controller": {"advance": "clock"}, "evolution": {"mutation": "bit", "selection": "tournament"}},
+    "bit flips by the clock": {
+        "controller": {"advance": "clock"},
+        "evolution": {"mutation": "bit", "selection": "tournament"},
+    },
 }
 
 
 def variant(tables: dict) -> Config:
     """A config with the lanes of one that runs alone, so that rounding is the same."""
     seed = tables.get("seed", 0)
-    return dataclasses.replace(small_config(**{name: table for name, table in tables.items() if name != "seed"}), seed=seed)
+    return dataclasses.replace(
+        small_config(**{name: table for name, table in tables.items() if name != "seed"}), seed=seed
+    )
 
 
 def test_a_row_equals_the_run_that_runs_alone_to_the_bit(stool: Creature):
@@ -91,7 +103,10 @@ def test_a_row_that_goes_non_finite_does_not_touch_the_others(stool: Creature):
     batch = build_batch(stool, [variant({}), variant({"seed": 1})])
     step, states = batch.compile(), batch.init()
     poisoned = dataclasses.replace(
-        states, genomes=dataclasses.replace(states.genomes, key_poses=states.genomes.key_poses.at[1].set(jnp.nan))
+        states,
+        genomes=dataclasses.replace(
+            states.genomes, key_poses=states.genomes.key_poses.at[1].set(jnp.nan)
+        ),
     )
     sound, _ = step(batch.place(states))
     mixed, metrics = step(batch.place(poisoned))
@@ -101,7 +116,9 @@ def test_a_row_that_goes_non_finite_does_not_touch_the_others(stool: Creature):
 
 def test_one_program_serves_every_value(stool: Creature):
     """Another seed, weight or mutation is found in the compilation cache: the program's text is the same."""
-    texts = {build_batch(stool, [variant(tables)]).lower().as_text() for tables in VARIANTS.values()}
+    texts = {
+        build_batch(stool, [variant(tables)]).lower().as_text() for tables in VARIANTS.values()
+    }
     assert len(texts) == 1
 
 

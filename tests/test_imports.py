@@ -56,10 +56,14 @@ def test_rollout_does_not_know_evolution():
 def test_nothing_below_the_run_imports_pictures(path: Path):
     leaves = {"run", "cli", "__main__"}
     if path.stem not in leaves:
-        assert not any(name.startswith(("mjxgait.viewing", "mjxgait.animation")) for name in imports(path))
+        assert not any(
+            name.startswith(("mjxgait.viewing", "mjxgait.animation")) for name in imports(path)
+        )
 
 
 def test_only_one_place_jits():
     """One program per run: a second jit elsewhere would be a second compile."""
-    calls = {path.name for path in PACKAGE.glob("*.py") if "jax.jit(" in path.read_text(encoding="utf-8")}
+    calls = {
+        path.name for path in PACKAGE.glob("*.py") if "jax.jit(" in path.read_text(encoding="utf-8")
+    }
     assert calls <= {"experiment.py", "run.py"}

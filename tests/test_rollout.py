@@ -12,7 +12,16 @@ from helpers import small_config
 from mjxgait.config import Config
 from mjxgait.creature import Creature
 from mjxgait.experiment import Experiment, build_experiment, evolution_of
-from mjxgait.fitness import BEYOND, REWARDS, TERMS, fitness_terms, forward_distance, score, stride_limit, weight_vector
+from mjxgait.fitness import (
+    BEYOND,
+    REWARDS,
+    TERMS,
+    fitness_terms,
+    forward_distance,
+    score,
+    stride_limit,
+    weight_vector,
+)
 from mjxgait.gait import Genome
 from mjxgait.rollout import Episodes
 from mjxgait.starts import NEVER, Starts, draw_starts
@@ -21,12 +30,18 @@ from mjxgait.variation import Box, uniform
 
 
 def genomes(experiment: Experiment, count: int, seed: int = 0) -> Genome:
-    return uniform(jax.random.key(seed), Box(*experiment.simulator.tracker.bounds(experiment.config.controller)), count)
+    return uniform(
+        jax.random.key(seed),
+        Box(*experiment.simulator.tracker.bounds(experiment.config.controller)),
+        count,
+    )
 
 
 def with_lanes(experiment: Experiment, lanes: int, devices: int) -> Experiment:
     mesh = jax.sharding.Mesh(np.array(jax.devices()[:devices]), ("lanes",))
-    return dataclasses.replace(experiment, simulator=dataclasses.replace(experiment.simulator, lanes=lanes, mesh=mesh))
+    return dataclasses.replace(
+        experiment, simulator=dataclasses.replace(experiment.simulator, lanes=lanes, mesh=mesh)
+    )
 
 
 def simulate(experiment: Experiment, population: Genome, starts: Starts | None = None) -> Episodes:
@@ -52,14 +67,18 @@ def test_every_genome_is_judged_on_every_start(experiment: Experiment, episodes:
 
 
 @pytest.mark.parametrize(("lanes", "devices"), [(1, 1), (5, 2), (64, 1)])
-def test_results_do_not_depend_on_lanes_or_devices(experiment: Experiment, episodes: Episodes, lanes: int, devices: int):
+def test_results_do_not_depend_on_lanes_or_devices(
+    experiment: Experiment, episodes: Episodes, lanes: int, devices: int
+):
     """Other batch sizes may round differently in float32; half a second of simulation keeps that below a tenth of a millimetre."""
     other = simulate(with_lanes(experiment, lanes, devices), genomes(experiment, 7))
     assert np.allclose(other.tally.forward, episodes.tally.forward, atol=1e-4)
     assert (other.tally.steps == episodes.tally.steps).all()
 
 
-def test_the_order_of_results_is_the_order_of_the_genomes(experiment: Experiment, episodes: Episodes):
+def test_the_order_of_results_is_the_order_of_the_genomes(
+    experiment: Experiment, episodes: Episodes
+):
     backwards = simulate(experiment, jax.tree.map(lambda leaf: leaf[::-1], genomes(experiment, 7)))
     assert np.allclose(backwards.tally.forward[::-1], episodes.tally.forward, atol=1e-4)
 
@@ -85,7 +104,12 @@ def test_not_finite_means_the_lowest_score(experiment: Experiment):
 def start_at(experiment: Experiment, height: float = 0.0, roll: float = 0.0) -> Starts:
     """The starts with the trunk moved up and rolled over."""
     starts = experiment.starts
-    qpos = starts.qpos.at[:, 2].add(height).at[:, 3:5].set(jnp.array([np.cos(roll / 2), np.sin(roll / 2)]))
+    qpos = (
+        starts.qpos.at[:, 2]
+        .add(height)
+        .at[:, 3:5]
+        .set(jnp.array([np.cos(roll / 2), np.sin(roll / 2)]))
+    )
     return dataclasses.replace(starts, qpos=qpos)
 
 
@@ -111,7 +135,10 @@ def test_death_freezes_the_tally(experiment: Experiment, stool: Creature):
     population = genomes(long, 7)
     leaning = start_at(experiment, height=0.1, roll=0.9)
     starts = dataclasses.replace(leaning, qvel=leaning.qvel.at[:, 3].set(6.0))
-    first, second = simulate(experiment, population, starts).tally, simulate(long, population, starts).tally
+    first, second = (
+        simulate(experiment, population, starts).tally,
+        simulate(long, population, starts).tally,
+    )
     died = np.asarray(first.reason != Reason.FINISHED)
     assert died.any()
     for before, after in zip(jax.tree.leaves(first), jax.tree.leaves(second), strict=True):
@@ -127,7 +154,10 @@ def test_the_first_start_is_nominal_and_the_others_are_not(stool: Creature):
     assert int(starts.push_step[0]) == NEVER
     noise = np.asarray(starts.qpos[1:, stool.qpos_adr] - stool.stand)
     assert 0.02 < np.abs(noise).max() <= 0.05
-    assert np.allclose(np.linalg.norm(starts.push[1:, :2], axis=1), config.rollout.push * np.sqrt(9.81 * stool.hip_height))
+    assert np.allclose(
+        np.linalg.norm(starts.push[1:, :2], axis=1),
+        config.rollout.push * np.sqrt(9.81 * stool.hip_height),
+    )
     assert ((starts.push_step[1:] >= 100) & (starts.push_step[1:] < 300)).all()
     assert len(set(np.asarray(starts.friction[1:]).tolist())) == 4
 
@@ -135,9 +165,16 @@ def test_the_first_start_is_nominal_and_the_others_are_not(stool: Creature):
 def standing_terms(experiment: Experiment) -> dict[str, float]:
     """The terms of an individual whose key poses are the standing pose."""
     still = genomes(experiment, 7)
-    poses = jnp.broadcast_to(jnp.asarray(experiment.creature.stand, jnp.float32), still.key_poses.shape)
-    tally = jax.tree.map(lambda leaf: leaf[0, 0], simulate(experiment, dataclasses.replace(still, key_poses=poses)).tally)
-    terms = fitness_terms(experiment.creature, experiment.config.fitness, 0.005, experiment.simulator.steps, tally)
+    poses = jnp.broadcast_to(
+        jnp.asarray(experiment.creature.stand, jnp.float32), still.key_poses.shape
+    )
+    tally = jax.tree.map(
+        lambda leaf: leaf[0, 0],
+        simulate(experiment, dataclasses.replace(still, key_poses=poses)).tally,
+    )
+    terms = fitness_terms(
+        experiment.creature, experiment.config.fitness, 0.005, experiment.simulator.steps, tally
+    )
     return dict(zip(TERMS, np.asarray(terms).tolist(), strict=True))
 
 
@@ -150,21 +187,37 @@ def test_terms_of_one_that_stands_still(experiment: Experiment):
 
 def test_style_counts_in_proportion_to_the_walk(experiment: Experiment):
     """A foot that never leaves the floor costs nothing while there is no walk, and the whole of its weight at the wanted speed."""
-    creature, config, horizon = experiment.creature, experiment.config.fitness, experiment.simulator.steps
+    creature, config, horizon = (
+        experiment.creature,
+        experiment.config.fitness,
+        experiment.simulator.steps,
+    )
     enough = config.speed * horizon * 0.005 * creature.body_length
     for share in (0.0, 0.5, 1.0):
-        tally = dataclasses.replace(experiment.simulator.judge.init(), steps=jnp.int32(horizon), forward=jnp.float32(share * enough))
+        tally = dataclasses.replace(
+            experiment.simulator.judge.init(),
+            steps=jnp.int32(horizon),
+            forward=jnp.float32(share * enough),
+        )
         terms = fitness_terms(creature, config, 0.005, horizon, tally)
         assert float(terms[TERMS.index("clearance")]) == pytest.approx(share, abs=1e-5)
 
 
 def test_beyond_the_wanted_speed_distance_counts_little(experiment: Experiment):
-    creature, config, horizon = experiment.creature, experiment.config.fitness, experiment.simulator.steps
+    creature, config, horizon = (
+        experiment.creature,
+        experiment.config.fitness,
+        experiment.simulator.steps,
+    )
     lengths = config.speed * horizon * 0.005
-    tally = dataclasses.replace(experiment.simulator.judge.init(), forward=jnp.float32(3 * lengths * creature.body_length))
+    tally = dataclasses.replace(
+        experiment.simulator.judge.init(), forward=jnp.float32(3 * lengths * creature.body_length)
+    )
     term = float(fitness_terms(creature, config, 0.005, horizon, tally)[TERMS.index("distance")])
     assert term == pytest.approx(lengths * (1 + 2 * BEYOND), rel=1e-5)
-    assert forward_distance(creature, config, horizon * 0.005, term) == pytest.approx(3 * lengths * creature.body_length, rel=1e-4)
+    assert forward_distance(creature, config, horizon * 0.005, term) == pytest.approx(
+        3 * lengths * creature.body_length, rel=1e-4
+    )
 
 
 def test_score_mixes_the_worst_start_and_the_mean():
@@ -176,8 +229,13 @@ def test_score_mixes_the_worst_start_and_the_mean():
 
 def test_penalties_are_negative_and_style_ramps_in():
     config = small_config(fitness={"style_ramp": 10}).fitness
-    vectors = {generation: np.asarray(weight_vector(config, jnp.int32(generation))).tolist() for generation in (0, 5, 10)}
-    at = {generation: dict(zip(TERMS, vector, strict=True)) for generation, vector in vectors.items()}
+    vectors = {
+        generation: np.asarray(weight_vector(config, jnp.int32(generation))).tolist()
+        for generation in (0, 5, 10)
+    }
+    at = {
+        generation: dict(zip(TERMS, vector, strict=True)) for generation, vector in vectors.items()
+    }
     assert all(at[10][name] <= 0 for name in TERMS if name not in REWARDS)
     assert at[0]["slip"] == 0.0
     assert at[5]["slip"] == pytest.approx(0.5 * at[10]["slip"])
@@ -191,7 +249,10 @@ def test_the_stride_limit_of_a_dog():
 def test_mjx_agrees_with_c_mujoco(shipped: Creature):
     """The same controlled motion, 60 steps through touchdown, in float32 MJX and in float64 C MuJoCo."""
     config = Config()
-    experiment = build_experiment(shipped, dataclasses.replace(config, rollout=dataclasses.replace(config.rollout, physics="mjx")))
+    experiment = build_experiment(
+        shipped,
+        dataclasses.replace(config, rollout=dataclasses.replace(config.rollout, physics="mjx")),
+    )
     model = shipped.evolution_model
     data = mujoco.MjData(model)
     data.qpos[:] = shipped.stand_qpos
@@ -207,7 +268,9 @@ def test_mjx_agrees_with_c_mujoco(shipped: Creature):
     rng = np.random.default_rng(0)
     for k in range(60):
         if k % 10 == 0:
-            torque[0, shipped.dof_adr] = rng.uniform(-0.1, 0.1, len(shipped.dof_adr)) * shipped.torque_limit
+            torque[0, shipped.dof_adr] = (
+                rng.uniform(-0.1, 0.1, len(shipped.dof_adr)) * shipped.torque_limit
+            )
         data.qfrc_applied[:] = torque[0]
         state, _ = step(state, torque)
         mujoco.mj_step(model, data)
@@ -218,4 +281,6 @@ def _at_rest(creature: Creature):
     from mjxgait.types import BodyState
 
     still = jnp.zeros(creature.model.nv)
-    return BodyState(jnp.asarray(creature.stand_qpos, jnp.float32), still, still, still, jnp.ones(()))
+    return BodyState(
+        jnp.asarray(creature.stand_qpos, jnp.float32), still, still, still, jnp.ones(())
+    )

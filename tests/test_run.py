@@ -17,7 +17,18 @@ from mjxgait.champion import read_champion
 from mjxgait.creature import load_creature
 from mjxgait.folder import open_run, read_metrics
 
-SMALL = ["--env", str(STOOL), "--population", "8", "--generations", "7", "--rollout.seconds", "0.4", "--rollout.starts", "2"]
+SMALL = [
+    "--env",
+    str(STOOL),
+    "--population",
+    "8",
+    "--generations",
+    "7",
+    "--rollout.seconds",
+    "0.4",
+    "--rollout.starts",
+    "2",
+]
 SMALL += ["--seed", "5", "--examination.candidates", "0", "--no-plots", "--checkpoint-every", "1"]
 
 
@@ -26,7 +37,9 @@ def command(*arguments: object) -> list[str]:
 
 
 def mjxgait(*arguments: object, code: int = 0, **options) -> str:
-    done = subprocess.run(command(*arguments), capture_output=True, text=True, timeout=300, **options)
+    done = subprocess.run(
+        command(*arguments), capture_output=True, text=True, timeout=300, **options
+    )
     assert done.returncode == code, done.stderr
     assert "Traceback" not in done.stderr
     return done.stdout + done.stderr
@@ -45,13 +58,23 @@ def result(folder: Path) -> dict:
 
 
 def without_times(folder: Path) -> list[dict]:
-    return [{k: v for k, v in line.items() if k not in ("wall_s", "steps_per_second")} for line in read_metrics(folder / "metrics.jsonl")]
+    return [
+        {k: v for k, v in line.items() if k not in ("wall_s", "steps_per_second")}
+        for line in read_metrics(folder / "metrics.jsonl")
+    ]
 
 
 def test_the_folder_holds_the_whole_run(finished: tuple[Path, str]):
     folder, said = finished
     names = {path.name for path in folder.iterdir()}
-    assert names >= {"config.toml", "creature", "metrics.jsonl", "checkpoints", "champion.json", "fitness.png"}
+    assert names >= {
+        "config.toml",
+        "creature",
+        "metrics.jsonl",
+        "checkpoints",
+        "champion.json",
+        "fitness.png",
+    }
     creature, config = open_run(folder)
     assert creature.digest == load_creature(STOOL).digest
     assert (config.seed, config.evolution.population) == (5, 8)
@@ -59,7 +82,19 @@ def test_the_folder_holds_the_whole_run(finished: tuple[Path, str]):
     lines = read_metrics(folder / "metrics.jsonl")
     assert [line["generation"] for line in lines] == list(range(8))
     assert champion.fitness == pytest.approx(lines[-1]["best"])
-    promised = {"best", "mean", "median", "worst", "unique", "forced", "failures", "evaluations", "sim_steps", "steps_per_second", "wall_s"}
+    promised = {
+        "best",
+        "mean",
+        "median",
+        "worst",
+        "unique",
+        "forced",
+        "failures",
+        "evaluations",
+        "sim_steps",
+        "steps_per_second",
+        "wall_s",
+    }
     assert promised | {"term_distance", "term_slip"} <= set(lines[0])
     assert (folder / "fitness.png").stat().st_size > 5000
     assert "Compiling" in said
@@ -68,7 +103,10 @@ def test_the_folder_holds_the_whole_run(finished: tuple[Path, str]):
 def test_one_plain_line_per_generation_where_there_is_no_terminal(finished: tuple[Path, str]):
     lines = [line for line in finished[1].splitlines() if line.startswith("generation")]
     assert len(lines) == 8
-    assert all(re.search(r"best \S+  mean \S+  alive +\d+%  .* steps/s +\d+ s left", line) for line in lines)
+    assert all(
+        re.search(r"best \S+  mean \S+  alive +\d+%  .* steps/s +\d+ s left", line)
+        for line in lines
+    )
 
 
 def test_the_same_seed_gives_the_same_champion(finished: tuple[Path, str], tmp_path: Path):
@@ -79,7 +117,11 @@ def test_the_same_seed_gives_the_same_champion(finished: tuple[Path, str], tmp_p
 
 def kill_when(folder: Path, ready: Callable[[], bool], *more: str) -> int:
     """Starts the run and kills it as soon as `ready` holds; returns its exit code."""
-    process = subprocess.Popen(command("train", *SMALL, *more, "--out", folder), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    process = subprocess.Popen(
+        command("train", *SMALL, *more, "--out", folder),
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
     deadline = time.monotonic() + 200
     while not ready() and process.poll() is None and time.monotonic() < deadline:
         time.sleep(0.001)
@@ -88,7 +130,10 @@ def kill_when(folder: Path, ready: Callable[[], bool], *more: str) -> int:
 
 
 def generations(folder: Path, count: int) -> Callable[[], bool]:
-    return lambda: (folder / "metrics.jsonl").exists() and (folder / "metrics.jsonl").read_bytes().count(b"\n") >= count
+    return lambda: (
+        (folder / "metrics.jsonl").exists()
+        and (folder / "metrics.jsonl").read_bytes().count(b"\n") >= count
+    )
 
 
 def saving(folder: Path, generation: int) -> Callable[[], bool]:
@@ -96,19 +141,28 @@ def saving(folder: Path, generation: int) -> Callable[[], bool]:
 
 
 @pytest.mark.parametrize("moment", ["generation 1", "generation 5", "save 1", "save 3", "save 6"])
-def test_a_killed_run_goes_on_to_the_same_champion_bit_for_bit(finished: tuple[Path, str], tmp_path: Path, moment: str):
+def test_a_killed_run_goes_on_to_the_same_champion_bit_for_bit(
+    finished: tuple[Path, str], tmp_path: Path, moment: str
+):
     folder = tmp_path / "killed"
     kind, number = moment.split()
-    kill_when(folder, generations(folder, int(number)) if kind == "generation" else saving(folder, int(number)))
+    kill_when(
+        folder,
+        generations(folder, int(number)) if kind == "generation" else saving(folder, int(number)),
+    )
     mjxgait("train", "--resume", folder)
     assert result(folder) == result(finished[0])
     assert without_times(folder) == without_times(finished[0])
 
 
-def test_killed_between_two_checkpoints_it_repeats_what_came_after_the_first(finished: tuple[Path, str], tmp_path: Path):
+def test_killed_between_two_checkpoints_it_repeats_what_came_after_the_first(
+    finished: tuple[Path, str], tmp_path: Path
+):
     folder = tmp_path / "killed"
     kill_when(folder, generations(folder, 4), "--checkpoint-every", "5")
-    assert sorted(int(path.name) for path in (folder / "checkpoints").iterdir() if path.name.isdigit()) == [0]
+    assert sorted(
+        int(path.name) for path in (folder / "checkpoints").iterdir() if path.name.isdigit()
+    ) == [0]
     mjxgait("train", "--resume", folder)
     assert result(folder) == result(finished[0])
     assert without_times(folder) == without_times(finished[0])
@@ -122,10 +176,22 @@ def test_twice_interrupted_is_the_same_too(finished: tuple[Path, str], tmp_path:
     assert result(folder) == result(finished[0])
 
 
-def test_ctrl_c_finishes_the_generation_saves_and_says_how_to_go_on(finished: tuple[Path, str], tmp_path: Path):
+def test_ctrl_c_finishes_the_generation_saves_and_says_how_to_go_on(
+    finished: tuple[Path, str], tmp_path: Path
+):
     folder = tmp_path / "interrupted"
-    arguments = [*SMALL, "--generations", "100000", "--evolution.forced.patience", "0", "--out", folder]
-    process = subprocess.Popen(command("train", *arguments), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    arguments = [
+        *SMALL,
+        "--generations",
+        "100000",
+        "--evolution.forced.patience",
+        "0",
+        "--out",
+        folder,
+    ]
+    process = subprocess.Popen(
+        command("train", *arguments), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    )
     while not generations(folder, 3)():
         time.sleep(0.01)
     process.send_signal(signal.SIGINT)
@@ -149,14 +215,19 @@ def test_a_changed_creature_is_refused(finished: tuple[Path, str], tmp_path: Pat
     subprocess.run(["cp", "-r", str(finished[0]), str(folder)], check=True)
     xml = folder / "creature" / "creature.xml"
     xml.write_text(xml.read_text().replace("0.04", "0.05"))
-    assert "belongs to another body than stool as it is now" in mjxgait("train", "--resume", folder, "--generations", "9", code=2)
+    assert "belongs to another body than stool as it is now" in mjxgait(
+        "train", "--resume", folder, "--generations", "9", code=2
+    )
 
 
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
         (["trian"], 'unknown subcommand "trian"; did you mean "train"?'),
-        (["train", "--env", "dragon"], 'unknown creature "dragon"; shipped: alien, crab, duck, short_quadruped, tall_quadruped'),
+        (
+            ["train", "--env", "dragon"],
+            'unknown creature "dragon"; shipped: alien, crab, duck, short_quadruped, tall_quadruped',
+        ),
         (["train", "--config", "nothing.toml"], "nothing.toml: no such file"),
         (["train", "--population", "1"], "population must be at least 2"),
         (["train", "--evolution.populaton", "7"], "--evolution.population"),
@@ -165,7 +236,9 @@ def test_a_changed_creature_is_refused(finished: tuple[Path, str], tmp_path: Pat
         (["train", "--out", "/proc/run"], "cannot be written"),
     ],
 )
-def test_a_mistake_is_one_sentence_and_exit_code_2(arguments: list[str], words: str, tmp_path: Path):
+def test_a_mistake_is_one_sentence_and_exit_code_2(
+    arguments: list[str], words: str, tmp_path: Path
+):
     assert words in " ".join(mjxgait(*arguments, code=2, cwd=tmp_path).split())
     assert not list(tmp_path.rglob("config.toml"))
 
@@ -179,6 +252,12 @@ def test_help_reads_well():
 
 def test_the_script_is_the_command(tmp_path: Path):
     script = Path(__file__).parents[1] / "scripts" / "train.py"
-    done = subprocess.run([sys.executable, str(script), "--env", "dragon"], capture_output=True, text=True, env=os.environ, timeout=60)
+    done = subprocess.run(
+        [sys.executable, str(script), "--env", "dragon"],
+        capture_output=True,
+        text=True,
+        env=os.environ,
+        timeout=60,
+    )
     assert done.returncode == 2
     assert "unknown creature" in done.stderr

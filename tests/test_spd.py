@@ -13,7 +13,13 @@ def reference(mass, bias, q, v, target, kp, kd, limit, h, dofs, constraint) -> n
     """Tan, Liu & Turk 2011 in float64 over all degrees of freedom, the unactuated ones with zero gain."""
     nv = len(bias)
     kp_full, kd_full, q_full, v_full, target_full = (np.zeros(nv) for _ in range(5))
-    kp_full[dofs], kd_full[dofs], q_full[dofs], v_full[dofs], target_full[dofs] = kp, kd, q, v, target
+    kp_full[dofs], kd_full[dofs], q_full[dofs], v_full[dofs], target_full[dofs] = (
+        kp,
+        kd,
+        q,
+        v,
+        target,
+    )
     p = -kp_full * (q_full + h * v_full - target_full)
     d = -kd_full * v_full
     acceleration = np.linalg.inv(mass + h * np.diag(kd_full)) @ (p + d - bias + constraint)
@@ -32,12 +38,21 @@ def moment(stool: Creature) -> dict[str, np.ndarray]:
     mujoco.mj_forward(stool.model, data)
     mass = np.zeros((stool.model.nv, stool.model.nv))
     mujoco.mj_fullM(stool.model, data, mass)
-    return {"mass": mass, "bias": data.qfrc_bias, "q": data.qpos[stool.qpos_adr], "v": data.qvel[stool.dof_adr]}
+    return {
+        "mass": mass,
+        "bias": data.qfrc_bias,
+        "q": data.qpos[stool.qpos_adr],
+        "v": data.qvel[stool.dof_adr],
+    }
 
 
-@pytest.mark.parametrize("force", [0.0, 5.0], ids=["without constraint forces", "with them, as in DART's tutorial"])
+@pytest.mark.parametrize(
+    "force", [0.0, 5.0], ids=["without constraint forces", "with them, as in DART's tutorial"]
+)
 @pytest.mark.parametrize("limit", [1e9, 3.0], ids=["unlimited", "limited"])
-def test_agrees_with_the_paper_in_float64(stool: Creature, moment: dict, force: float, limit: float):
+def test_agrees_with_the_paper_in_float64(
+    stool: Creature, moment: dict, force: float, limit: float
+):
     constraint = force * np.linspace(-1, 1, stool.model.nv)
     target = np.array([0.3, -0.2, 0.1, 0.4])
     state, limits = (moment["mass"], moment["bias"], moment["q"], moment["v"]), np.full(4, limit)
@@ -48,8 +63,13 @@ def test_agrees_with_the_paper_in_float64(stool: Creature, moment: dict, force: 
 
 def test_the_limit_comes_last():
     """The damping that counts is that of the limited torque, so clamping before it would be another controller."""
-    force = pd_force(np.array([0.0]), np.array([0.0]), np.array([1.0]), np.array([100.0]), np.array([1.0]), 0.01)
-    assert float(limited_torque(force, np.array([2000.0]), np.array([0.01]), np.array([50.0]))[0]) == 50.0
+    force = pd_force(
+        np.array([0.0]), np.array([0.0]), np.array([1.0]), np.array([100.0]), np.array([1.0]), 0.01
+    )
+    assert (
+        float(limited_torque(force, np.array([2000.0]), np.array([0.01]), np.array([50.0]))[0])
+        == 50.0
+    )
 
 
 def stand(creature: Creature, stable: bool, kp: float, kd: float, h: float) -> float:
@@ -66,7 +86,9 @@ def stand(creature: Creature, stable: bool, kp: float, kd: float, h: float) -> f
         q, v = data.qpos[creature.qpos_adr], data.qvel[dofs]
         if stable:
             mujoco.mj_fullM(model, data, mass)
-            torque = reference(mass, data.qfrc_bias, q, v, creature.stand, *gains, limit, h, dofs, 0.0)
+            torque = reference(
+                mass, data.qfrc_bias, q, v, creature.stand, *gains, limit, h, dofs, 0.0
+            )
         else:
             torque = -kp * (q - creature.stand) - kd * v
         data.qfrc_applied[dofs] = torque

@@ -22,13 +22,17 @@ def keys(count: int) -> jax.Array:
 
 
 def inside(genomes: Genome) -> bool:
-    pairs = zip(jax.tree.leaves(BOX.low), jax.tree.leaves(genomes), jax.tree.leaves(BOX.high), strict=True)
+    pairs = zip(
+        jax.tree.leaves(BOX.low), jax.tree.leaves(genomes), jax.tree.leaves(BOX.high), strict=True
+    )
     return all(bool(jnp.all((low <= leaf) & (leaf <= high))) for low, leaf, high in pairs)
 
 
 @pytest.mark.parametrize("initial", ["uniform", "latin"])
 def test_initial_genomes_fill_the_box(initial: str):
-    genomes = pose_variation(BOX, EvolutionConfig(initial=initial, initial_spread=1.0)).create(jax.random.key(1), 200)
+    genomes = pose_variation(BOX, EvolutionConfig(initial=initial, initial_spread=1.0)).create(
+        jax.random.key(1), 200
+    )
     assert genomes.key_poses.shape == (200, K, J)
     assert inside(genomes)
     share = (genomes.key_poses - BOX.low.key_poses) / (BOX.high.key_poses - BOX.low.key_poses)
@@ -45,11 +49,18 @@ def test_a_latin_hypercube_has_one_value_in_each_slice():
 
 @pytest.mark.parametrize("crossing", ["permute", "align"])
 def test_every_pose_of_a_child_is_one_of_a_parent(crossing: str):
-    mother, father = (jax.tree.map(lambda leaf: leaf[0], variation.uniform(key, BOX, 1)) for key in keys(2))
+    mother, father = (
+        jax.tree.map(lambda leaf: leaf[0], variation.uniform(key, BOX, 1)) for key in keys(2)
+    )
     cross = pose_variation(BOX, EvolutionConfig(crossing=crossing)).cross
     children = jax.vmap(cross, in_axes=(0, None, None))(keys(100), mother, father)
     both = np.concatenate([mother.key_poses, father.key_poses])
-    places = np.array([[np.flatnonzero((both == pose).all(axis=1))[0] for pose in child] for child in np.asarray(children.key_poses)])
+    places = np.array(
+        [
+            [np.flatnonzero((both == pose).all(axis=1))[0] for pose in child]
+            for child in np.asarray(children.key_poses)
+        ]
+    )
     assert set(places.ravel()) == set(range(2 * K))
     if crossing == "permute":
         assert all(len(set(row)) == K for row in places)
@@ -58,7 +69,9 @@ def test_every_pose_of_a_child_is_one_of_a_parent(crossing: str):
     assert np.all((children.tuning == mother.tuning) | (children.tuning == father.tuning))
 
 
-@pytest.mark.parametrize(("mutation", "changed"), [("redraw", 2), ("single", 1), ("pose", J), ("gaussian", J)])
+@pytest.mark.parametrize(
+    ("mutation", "changed"), [("redraw", 2), ("single", 1), ("pose", J), ("gaussian", J)]
+)
 def test_mutation_changes_one_pose_and_as_many_joints_as_its_kind_says(mutation: str, changed: int):
     genome = Genome(jnp.zeros((K, J)), jnp.full(E, 0.5).at[0].set(0.0))
     mutate = pose_variation(BOX, EvolutionConfig(mutation=mutation, tuning_rate=0.0)).mutate
@@ -80,7 +93,9 @@ def test_mixed_mutation_is_the_one_kind_or_the_other():
 
 
 def test_the_initial_spread_is_the_middle_of_each_range():
-    genomes = pose_variation(BOX, EvolutionConfig(initial_spread=0.5)).create(jax.random.key(1), 500)
+    genomes = pose_variation(BOX, EvolutionConfig(initial_spread=0.5)).create(
+        jax.random.key(1), 500
+    )
     reach = np.abs(genomes.key_poses).max(axis=0) / BOX.high.key_poses
     assert ((reach > 0.45) & (reach <= 0.5)).all()
     assert float(genomes.tuning[:, 1:].min()) >= 0.25
@@ -88,10 +103,19 @@ def test_the_initial_spread_is_the_middle_of_each_range():
 
 def test_mutation_never_leaves_the_box():
     edge = BOX.high
-    mutate = pose_variation(BOX, EvolutionConfig(sigma=3.0, tuning_rate=1.0, tuning_sigma=3.0)).mutate
+    mutate = pose_variation(
+        BOX, EvolutionConfig(sigma=3.0, tuning_rate=1.0, tuning_sigma=3.0)
+    ).mutate
     assert inside(jax.vmap(mutate, in_axes=(0, None))(keys(200), edge))
 
 
 def test_duplicates_are_all_but_the_first_of_equal_genomes():
     rows = jnp.array([[1.0, 2], [3, 4], [1, 2], [1, 2.0001], [3, 4], [1, 2]])
-    assert first_occurrence({"a": rows[:, :1], "b": rows[:, 1:]}).tolist() == [True, True, False, True, False, False]
+    assert first_occurrence({"a": rows[:, :1], "b": rows[:, 1:]}).tolist() == [
+        True,
+        True,
+        False,
+        True,
+        False,
+        False,
+    ]

@@ -23,7 +23,13 @@ def draw_intervals(findings: "Sequence[Finding]", measure: str, path: Path) -> N
         base = findings[0].estimate
         axes.axvspan(base.low, base.high, color="0.92", label="interval of the base")
         for row, finding in enumerate(findings):
-            axes.plot(finding.values, np.full(len(finding.values), row + 0.18), ".", color="0.6", markersize=4)
+            axes.plot(
+                finding.values,
+                np.full(len(finding.values), row + 0.18),
+                ".",
+                color="0.6",
+                markersize=4,
+            )
             value = finding.estimate
             axes.plot([value.low, value.high], [row, row], "-", color=DARK, linewidth=2)
             axes.plot([value.value], [row], "o", color=ACCENT if row else DARK)
@@ -42,13 +48,20 @@ def draw_curves(plan: Plan, logs: Sequence[Mapping[str, Any]], path: Path) -> No
             runs: dict[int, list[float]] = {}
             for line in logs:
                 if line["variant"] == variant:
-                    runs.setdefault(line["seed"], []).append(-np.inf if line["best"] is None else line["best"])
+                    runs.setdefault(line["seed"], []).append(
+                        -np.inf if line["best"] is None else line["best"]
+                    )
             shortest = min(map(len, runs.values()))
             curves = np.array([curve[:shortest] for curve in runs.values()])
             low, high = np.percentile(curves, [25, 75], axis=0, method="nearest")
             shade = ACCENT if not number else str(shades[number])
             axes.fill_between(range(shortest), low, high, color=shade, alpha=0.12, linewidth=0)
-            axes.plot(trim_mean(curves, 0.25, axis=0), LINES[number % len(LINES)], color=shade, label=variant)
+            axes.plot(
+                trim_mean(curves, 0.25, axis=0),
+                LINES[number % len(LINES)],
+                color=shade,
+                label=variant,
+            )
         axes.set(xlabel="generation", ylabel="best fitness (higher is better)")
         axes.legend(loc="best", fontsize=8)
         drawing.savefig(path, metadata={"Software": None})

@@ -58,7 +58,9 @@ def read_logs(folder: Path) -> list[dict[str, Any]]:
     return [line for file in files for line in read_metrics(file)]
 
 
-def measure(folder: Path, creature: Creature, plan: Plan, tell: Callable[[int, int], None]) -> list[Result]:
+def measure(
+    folder: Path, creature: Creature, plan: Plan, tell: Callable[[int, int], None]
+) -> list[Result]:
     """The result of every run, in the order of the plan. One process per core; what has been measured before is not measured again."""
     known = {(line["variant"], line["seed"]): Result(**line) for line in _measured(folder)}
     lines: dict[tuple[str, int], list[dict[str, Any]]] = {}
@@ -69,7 +71,12 @@ def measure(folder: Path, creature: Creature, plan: Plan, tell: Callable[[int, i
         tell(0, len(missing))
     with process_per_core(len(missing)) as pool:
         paths = [champion_path(folder, plan, run) for run in missing]
-        found = pool.map(partial(_result, creature, plan.study), missing, [lines[run.variant, run.seed] for run in missing], paths)
+        found = pool.map(
+            partial(_result, creature, plan.study),
+            missing,
+            [lines[run.variant, run.seed] for run in missing],
+            paths,
+        )
         for number, result in enumerate(found, 1):
             known[result.variant, result.seed] = result
             with disk_errors(folder), (folder / MEASURED).open("a", encoding="utf-8") as log:
@@ -82,7 +89,9 @@ def _measured(folder: Path) -> list[dict[str, Any]]:
     return read_metrics(folder / MEASURED)
 
 
-def _result(creature: Creature, study: Study, run: Run, lines: Sequence[Mapping[str, Any]], path: Path) -> Result:
+def _result(
+    creature: Creature, study: Study, run: Run, lines: Sequence[Mapping[str, Any]], path: Path
+) -> Result:
     champion = read_champion(path, creature)
     best = [-math.inf if line["best"] is None else line["best"] for line in lines]
     finite = math.isfinite(best[-1])
@@ -96,7 +105,9 @@ def _result(creature: Creature, study: Study, run: Run, lines: Sequence[Mapping[
         seed=run.seed,
         walk=walk,
         up=up,
-        certified=(worth and certify(creature, champion, threads=1).passed) if study.certify else None,
+        certified=(worth and certify(creature, champion, threads=1).passed)
+        if study.certify
+        else None,
         fitness=best[-1] if finite else -1e9,
         area=float(np.mean([value for value in best if math.isfinite(value)])) if finite else -1e9,
         generations=reached[0] if reached else run.generations + 1,
@@ -107,7 +118,13 @@ def _result(creature: Creature, study: Study, run: Run, lines: Sequence[Mapping[
 
 def _walk(creature: Creature, champion: Champion) -> tuple[float, float, float]:
     """Mean speed and share up over the unseen starts, and the speed from the undisturbed start (0 if it falls)."""
-    starts = join(nominal_starts(creature, 1), perturbed_starts(creature, STARTS, np.random.default_rng(SEED)))
+    starts = join(
+        nominal_starts(creature, 1), perturbed_starts(creature, STARTS, np.random.default_rng(SEED))
+    )
     outcome = simulate(creature, champion, starts, SECONDS, threads=1)
     speed = outcome.travel[:, 0] / creature.body_length / SECONDS
-    return float(speed[1:].mean()), float(outcome.stayed_up[1:].mean()), float(speed[0] * outcome.stayed_up[0])
+    return (
+        float(speed[1:].mean()),
+        float(outcome.stayed_up[1:].mean()),
+        float(speed[0] * outcome.stayed_up[0]),
+    )

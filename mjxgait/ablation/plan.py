@@ -104,9 +104,21 @@ def read_study(file: Path, over: Mapping[str, Any]) -> Study:
     """
     path = _find(file)
     given = build(Study, read_toml(path), str(path))
-    study = build(Study, merge(dataclasses.asdict(given), {key: value for key, value in over.items() if value is not None}), str(path))
+    study = build(
+        Study,
+        merge(
+            dataclasses.asdict(given),
+            {key: value for key, value in over.items() if value is not None},
+        ),
+        str(path),
+    )
     scale = (study.generations + 1) / (given.generations + 1)
-    scaled = [dataclasses.replace(v, generations=v.generations and max(1, round((v.generations + 1) * scale) - 1)) for v in study.variant]
+    scaled = [
+        dataclasses.replace(
+            v, generations=v.generations and max(1, round((v.generations + 1) * scale) - 1)
+        )
+        for v in study.variant
+    ]
     return dataclasses.replace(study, variant=tuple(scaled))
 
 
@@ -117,17 +129,28 @@ def make_plan(study: Study, creature: Creature, where: str) -> Plan:
       UserError: an unknown key, a bad value, two variants of one name, or two that are equal.
     """
     tables = list(study.variant) or _grid(study, where)
-    config = resolve_config(creature.settings.train, creature.name, Path(study.config) if study.config else None)
+    config = resolve_config(
+        creature.settings.train, creature.name, Path(study.config) if study.config else None
+    )
     base = dataclasses.asdict(_settled(_lay(config, study.base, f"{where}: [base]")))
     configs: dict[str, Config] = {}
     for table in tables:
         if table.name in configs:
             raise UserError(f'{where}: two variants are called "{table.name}"; name them apart')
-        new = _settled(_lay(build(Config, base, where), table.settings, f'{where}: variant "{table.name}"'))
-        new = dataclasses.replace(new, evolution=dataclasses.replace(new.evolution, generations=table.generations or study.generations))
+        new = _settled(
+            _lay(build(Config, base, where), table.settings, f'{where}: variant "{table.name}"')
+        )
+        new = dataclasses.replace(
+            new,
+            evolution=dataclasses.replace(
+                new.evolution, generations=table.generations or study.generations
+            ),
+        )
         equal = next((name for name, other in configs.items() if other == new), None)
         if equal is not None and not study.allow_equal:
-            raise UserError(f'{where}: the variants "{equal}" and "{table.name}" are equal; change one, or set allow_equal = true')
+            raise UserError(
+                f'{where}: the variants "{equal}" and "{table.name}" are equal; change one, or set allow_equal = true'
+            )
         configs[table.name] = new
     if len(configs) < 2:
         raise UserError(f"{where}: a comparison needs two variants")
@@ -135,19 +158,30 @@ def make_plan(study: Study, creature: Creature, where: str) -> Plan:
     for place, (name, variant) in enumerate(configs.items()):
         first = study.first_seed + (0 if study.paired else place * study.seeds)
         for seed in range(first, first + study.seeds):
-            runs.append(Run(name, seed, variant.evolution.generations, dataclasses.replace(variant, seed=seed)))
+            runs.append(
+                Run(
+                    name,
+                    seed,
+                    variant.evolution.generations,
+                    dataclasses.replace(variant, seed=seed),
+                )
+            )
     return Plan(study, tuple(configs), tuple(runs))
 
 
 def _settled(config: Config) -> Config:
     """All runs go on for all their generations: one that stopped early would be compared with others that had more."""
     forced = dataclasses.replace(config.evolution.forced, patience=0)
-    return dataclasses.replace(config, evolution=dataclasses.replace(config.evolution, target=None, forced=forced))
+    return dataclasses.replace(
+        config, evolution=dataclasses.replace(config.evolution, target=None, forced=forced)
+    )
 
 
 def _lay(config: Config, table: Mapping[str, Any], where: str) -> Config:
     if "seed" in table or "generations" in table.get("evolution", {}):
-        raise UserError(f"{where}: seeds and generations are the study's own keys, not settings of a variant")
+        raise UserError(
+            f"{where}: seeds and generations are the study's own keys, not settings of a variant"
+        )
     return build(Config, merge(dataclasses.asdict(config), table), where)
 
 
@@ -159,7 +193,13 @@ def _grid(study: Study, where: str) -> list[VariantTable]:
         for key, value in zip(study.grid, values, strict=True):
             settings = merge(settings, _nested(key, value))
         rows.append(
-            VariantTable(", ".join(f"{key.split('.')[-1]} = {value}" for key, value in zip(study.grid, values, strict=True)), settings)
+            VariantTable(
+                ", ".join(
+                    f"{key.split('.')[-1]} = {value}"
+                    for key, value in zip(study.grid, values, strict=True)
+                ),
+                settings,
+            )
         )
     return rows
 
@@ -184,4 +224,6 @@ def _find(file: Path) -> Path:
     if shipped.exists():
         return shipped
     known = sorted(path.stem for path in folder.glob("*.toml"))
-    raise UserError(f"{file}: no such file and no shipped study of that name; {did_you_mean(str(file), known)}")
+    raise UserError(
+        f"{file}: no such file and no shipped study of that name; {did_you_mean(str(file), known)}"
+    )

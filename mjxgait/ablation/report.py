@@ -32,8 +32,10 @@ LOWER_IS_BETTER = ("generations",)
 OWN_SCALE = ("fitness", "area", "generations")
 """Measured by each variant's own fitness."""
 LEVEL = 0.05
-STYLE = "body{font:16px/1.5 system-ui,sans-serif;max-width:60em;margin:2em auto;padding:0 1em}table{border-collapse:collapse}\
+STYLE = (
+    "body{font:16px/1.5 system-ui,sans-serif;max-width:60em;margin:2em auto;padding:0 1em}table{border-collapse:collapse}\
 td,th{border:1px solid #bbb;padding:.2em .6em;text-align:left}img{max-width:100%}"
+)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -46,17 +48,27 @@ class Finding:
     comparison: Comparison | None
 
 
-def write_report(folder: Path, plan: Plan, results: Sequence[Result], logs: Sequence[Mapping[str, Any]], command: str) -> Path:
+def write_report(
+    folder: Path,
+    plan: Plan,
+    results: Sequence[Result],
+    logs: Sequence[Mapping[str, Any]],
+    command: str,
+) -> Path:
     """Writes report.md, report.html, results.csv, generations.parquet and the pictures; returns the path of report.md."""
     findings = find(plan, results)
     with disk_errors(folder):
         (folder / "results.csv").write_text(_csv(results), encoding="utf-8")
-        pyarrow.parquet.write_table(pyarrow.Table.from_pylist([dict(line) for line in logs]), folder / "generations.parquet")
+        pyarrow.parquet.write_table(
+            pyarrow.Table.from_pylist([dict(line) for line in logs]), folder / "generations.parquet"
+        )
         draw_intervals(findings, plan.study.measure, folder / "intervals.png")
         draw_curves(plan, logs, folder / "curves.png")
         text = markdown(plan, results, findings, command)
         (folder / "report.md").write_text(text, encoding="utf-8")
-        (folder / "report.html").write_text(_page(plan.study.question, text, folder), encoding="utf-8")
+        (folder / "report.html").write_text(
+            _page(plan.study.question, text, folder), encoding="utf-8"
+        )
     return folder / "report.md"
 
 
@@ -64,10 +76,15 @@ def find(plan: Plan, results: Sequence[Result]) -> list[Finding]:
     """What the study's measure says of every variant, the base first."""
     measure = plan.study.measure
     sign = -1.0 if measure in LOWER_IS_BETTER else 1.0
-    values = {name: np.array([r.value(measure) for r in results if r.variant == name]) for name in plan.variants}
+    values = {
+        name: np.array([r.value(measure) for r in results if r.variant == name])
+        for name in plan.variants
+    }
     base, *others = plan.variants
     trim = _trim(measure)
-    comparisons = compare(sign * values[base], [sign * values[name] for name in others], plan.study.paired, trim)
+    comparisons = compare(
+        sign * values[base], [sign * values[name] for name in others], plan.study.paired, trim
+    )
     return [
         Finding(name, values[name], estimate(values[name], trim), comparison)
         for name, comparison in zip(plan.variants, [None, *comparisons], strict=True)
@@ -79,7 +96,9 @@ def _trim(measure: str) -> float:
     return 0.0 if measure == "certified" else TRIM
 
 
-def markdown(plan: Plan, results: Sequence[Result], findings: Sequence[Finding], command: str) -> str:
+def markdown(
+    plan: Plan, results: Sequence[Result], findings: Sequence[Finding], command: str
+) -> str:
     """The report."""
     study, base = plan.study, plan.variants[0]
     means = "Interquartile means" if _trim(study.measure) else "Means"
@@ -116,19 +135,38 @@ def markdown(plan: Plan, results: Sequence[Result], findings: Sequence[Finding],
 
 
 def _table(plan: Plan, results: Sequence[Result], findings: Sequence[Finding]) -> list[str]:
-    head = ["variant", plan.study.measure, "difference", "chance of being better", "p", "p corrected", "up", "certified", "steps per run"]
+    head = [
+        "variant",
+        plan.study.measure,
+        "difference",
+        "chance of being better",
+        "p",
+        "p corrected",
+        "up",
+        "certified",
+        "steps per run",
+    ]
     rows = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
     for finding in findings:
         mine = [r for r in results if r.variant == finding.name]
         comparison = finding.comparison
         cells = [finding.name, _estimate(finding.estimate)]
         if comparison:
-            cells += [_estimate(comparison.difference, "+"), _estimate(comparison.improvement), _p(comparison.p), _p(comparison.corrected)]
+            cells += [
+                _estimate(comparison.difference, "+"),
+                _estimate(comparison.improvement),
+                _p(comparison.p),
+                _p(comparison.corrected),
+            ]
         else:
             cells += ["-"] * 4
         judged = [r.certified for r in mine if r.certified is not None]
         certified = _estimate(share(sum(judged), len(judged))) if judged else "-"
-        cells += [f"{np.mean([r.up for r in mine]):.0%}", certified, f"{np.mean([r.steps for r in mine]) / 1e6:.1f} M"]
+        cells += [
+            f"{np.mean([r.up for r in mine]):.0%}",
+            certified,
+            f"{np.mean([r.steps for r in mine]) / 1e6:.1f} M",
+        ]
         rows.append("| " + " | ".join(cells) + " |")
     return rows
 
@@ -152,15 +190,28 @@ def _cautions(plan: Plan, results: Sequence[Result]) -> list[str]:
     found = []
     if plan.study.measure in OWN_SCALE:
         first = plan.runs[0].config
-        if any((r.config.fitness, r.config.rollout) != (first.fitness, first.rollout) for r in plan.runs):
-            found.append("The variants do not share fitness and starts, so their fitness values are not on one scale; compare by `walk`.")
+        if any(
+            (r.config.fitness, r.config.rollout) != (first.fitness, first.rollout)
+            for r in plan.runs
+        ):
+            found.append(
+                "The variants do not share fitness and starts, so their fitness values are not on one scale; compare by `walk`."
+            )
     broken = [f"{r.variant}, seed {r.seed}" for r in results if not r.finite]
     if broken:
-        found.append(f"Runs in which nobody could be judged (not finite), counted as the worst: {'; '.join(broken)}.")
-    steps = {name: np.mean([r.steps for r in results if r.variant == name]) for name in plan.variants}
+        found.append(
+            f"Runs in which nobody could be judged (not finite), counted as the worst: {'; '.join(broken)}."
+        )
+    steps = {
+        name: np.mean([r.steps for r in results if r.variant == name]) for name in plan.variants
+    }
     if max(steps.values()) > 1.5 * min(steps.values()):
-        found.append("The variants did not use the same number of simulated steps (last column): equal generations are not equal cost.")
-    found.append(f"It holds for {plan.study.env} under these settings and this budget; another creature or a longer run may differ.")
+        found.append(
+            "The variants did not use the same number of simulated steps (last column): equal generations are not equal cost."
+        )
+    found.append(
+        f"It holds for {plan.study.env} under these settings and this budget; another creature or a longer run may differ."
+    )
     return found
 
 
@@ -188,7 +239,13 @@ def _estimate(value: Estimate, sign: str = "") -> str:
 
 
 def _number(value: float, sign: str = "") -> str:
-    return f"{value:{sign}.1f}" if abs(value) >= 100 else f"{value:{sign}.3g}" if abs(value) >= 1 else f"{value:{sign}.2f}"
+    return (
+        f"{value:{sign}.1f}"
+        if abs(value) >= 100
+        else f"{value:{sign}.3g}"
+        if abs(value) >= 1
+        else f"{value:{sign}.2f}"
+    )
 
 
 def _p(value: float) -> str:

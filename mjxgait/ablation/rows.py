@@ -49,14 +49,18 @@ def run_study(folder: Path, creature: Creature, plan: Plan, tell: Progress) -> b
                 return False
             if all(champion_path(folder, plan, run).exists() for run in runs):
                 continue
-            _Group(folder, creature, plan, runs, number).evolve(interrupted.is_set, partial(tell, number, len(parts)))
+            _Group(folder, creature, plan, runs, number).evolve(
+                interrupted.is_set, partial(tell, number, len(parts))
+            )
     return not interrupted.is_set()
 
 
 class _Group:
     """The rows of one program, in a folder of their own below the study's."""
 
-    def __init__(self, folder: Path, creature: Creature, plan: Plan, runs: list[Run], number: int) -> None:
+    def __init__(
+        self, folder: Path, creature: Creature, plan: Plan, runs: list[Run], number: int
+    ) -> None:
         self.study, self.creature, self.plan, self.runs = folder, creature, plan, runs
         self.folder = folder / GROUPS / str(number)
         self.last = max(run.generations for run in runs)
@@ -80,12 +84,23 @@ class _Group:
                 now = int(np.max(metrics.generation))
                 if now < 0:
                     continue
-                lines = [metrics_line(jax.tree.map(lambda leaf, i=i: leaf[i], metrics), 1.0) for i in range(len(self.runs))]
+                lines = [
+                    metrics_line(jax.tree.map(lambda leaf, i=i: leaf[i], metrics), 1.0)
+                    for i in range(len(self.runs))
+                ]
                 self._log(lines)
                 self._keep_champions(batch, states, now)
                 checkpoints.save(states, self.creature.name, self.creature.digest)
                 seconds = time.perf_counter() - began
-                tell({"generation": now, "of": self.last, "seconds": seconds, "steps": int(metrics.sim_steps.sum()), "before": generation})
+                tell(
+                    {
+                        "generation": now,
+                        "of": self.last,
+                        "seconds": seconds,
+                        "steps": int(metrics.sim_steps.sum()),
+                        "before": generation,
+                    }
+                )
         finally:
             checkpoints.close()
 
@@ -102,13 +117,21 @@ class _Group:
         with disk_errors(self.folder), (self.folder / METRICS).open("a", encoding="utf-8") as log:
             for run, line in zip(self.runs, lines, strict=True):
                 if line["generation"] <= run.generations:
-                    kept = {key: value for key, value in line.items() if key not in ("wall_s", "steps_per_second")}
+                    kept = {
+                        key: value
+                        for key, value in line.items()
+                        if key not in ("wall_s", "steps_per_second")
+                    }
                     log.write(json.dumps({"variant": run.variant, "seed": run.seed, **kept}) + "\n")
 
     def _keep_champions(self, batch: Batch, states: EvolutionState, now: int) -> None:
         for row, run in enumerate(self.runs):
             if now == run.generations:
-                state = jax.tree.map(lambda leaf, i=row: leaf[i], dataclasses.replace(states, key=states.generation))
+                state = jax.tree.map(
+                    lambda leaf, i=row: leaf[i], dataclasses.replace(states, key=states.generation)
+                )
                 champion = batch.experiments[row].champion(state, versions())
                 with disk_errors(self.study):
-                    write_champion(champion, self.creature, champion_path(self.study, self.plan, run))
+                    write_champion(
+                        champion, self.creature, champion_path(self.study, self.plan, run)
+                    )

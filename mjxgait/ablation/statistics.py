@@ -52,11 +52,17 @@ def estimate(values: np.ndarray, trim: float = TRIM) -> Estimate:
     return _bootstrap((values,), partial(trimmed_mean, trim=trim), paired=False)
 
 
-def compare(base: np.ndarray, variants: Sequence[np.ndarray], paired: bool, trim: float = TRIM) -> list[Comparison]:
+def compare(
+    base: np.ndarray, variants: Sequence[np.ndarray], paired: bool, trim: float = TRIM
+) -> list[Comparison]:
     """Each variant against the base; paired: whether the i-th values of both come from the same seed."""
     gap = partial(_gap, trim=trim)
     rows = [
-        (_bootstrap((base, values), gap, paired), improvement(base, values, paired), permutation_p(base, values, paired, trim))
+        (
+            _bootstrap((base, values), gap, paired),
+            improvement(base, values, paired),
+            permutation_p(base, values, paired, trim),
+        )
         for values in variants
     ]
     corrected = holm([p for *_, p in rows])
@@ -79,7 +85,9 @@ def permutation_p(base: np.ndarray, values: np.ndarray, paired: bool, trim: floa
     kind = "samples" if paired else "independent"
     rng = np.random.default_rng(0)
     gap = partial(_gap, trim=trim)
-    result = stats.permutation_test((base, values), gap, permutation_type=kind, vectorized=True, n_resamples=RESAMPLES, rng=rng)
+    result = stats.permutation_test(
+        (base, values), gap, permutation_type=kind, vectorized=True, n_resamples=RESAMPLES, rng=rng
+    )
     return float(result.pvalue)
 
 
@@ -102,11 +110,16 @@ def _gap(base: np.ndarray, values: np.ndarray, trim: float, axis: int = -1) -> n
     return trimmed_mean(values, trim, axis) - trimmed_mean(base, trim, axis)
 
 
-def _bootstrap(samples: tuple[np.ndarray, ...], statistic: Callable[..., np.ndarray], paired: bool) -> Estimate:
+def _bootstrap(
+    samples: tuple[np.ndarray, ...], statistic: Callable[..., np.ndarray], paired: bool
+) -> Estimate:
     """BCa where it is defined, percentiles where it is not (many equal values)."""
     value = float(statistic(*samples, axis=-1))
     for method in ("BCa", "percentile"):
-        with np.errstate(all="ignore"), warnings.catch_warnings(action="ignore", category=DegenerateDataWarning):
+        with (
+            np.errstate(all="ignore"),
+            warnings.catch_warnings(action="ignore", category=DegenerateDataWarning),
+        ):
             found = stats.bootstrap(
                 samples,
                 statistic,

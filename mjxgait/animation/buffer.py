@@ -19,7 +19,13 @@ class Buffer:
         self.document = document
         self.blob = bytearray()
 
-    def add(self, values: np.ndarray, target: int | None = None, bounds: bool = False, normalized: bool = False) -> int:
+    def add(
+        self,
+        values: np.ndarray,
+        target: int | None = None,
+        bounds: bool = False,
+        normalized: bool = False,
+    ) -> int:
         """Stores an array [n] or [n, width] and returns the number of its accessor. bounds: state least and greatest values.
 
         normalized: whole numbers stand for 0 to 1.
@@ -27,7 +33,9 @@ class Buffer:
         values = np.ascontiguousarray(values)
         rows = values.reshape(len(values), -1)
         self.blob += bytes(-len(self.blob) % 4)
-        view = gltf.BufferView(buffer=0, byteOffset=len(self.blob), byteLength=values.nbytes, target=target)
+        view = gltf.BufferView(
+            buffer=0, byteOffset=len(self.blob), byteLength=values.nbytes, target=target
+        )
         self.blob += values.tobytes()
         self.document.bufferViews.append(view)
         accessor = gltf.Accessor(

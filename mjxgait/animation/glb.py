@@ -63,16 +63,26 @@ def build_glb(loop: WalkLoop, travelling: bool = False) -> bytes:
     document.nodes.append(gltf.Node(name=name, mesh=0, skin=0))
     document.scenes = [gltf.Scene(name=name, nodes=[0, len(document.nodes) - 1])]
     document.scene = 0
-    document.extras = {"strides": loop.strides, "speed_m_per_s": loop.speed, "frames_per_s": loop.rate, "travelling": travelling}
+    document.extras = {
+        "strides": loop.strides,
+        "speed_m_per_s": loop.speed,
+        "frames_per_s": loop.rate,
+        "travelling": travelling,
+    }
     buffer.close()
     return b"".join(document.save_to_bytes())
 
 
 def skeleton_of(model: mujoco.MjModel, trunk: int) -> Skeleton:
     """The bodies of the tree that begins at the trunk, below a root that stays on the floor."""
-    bodies = [0, *(b for b in range(1, model.nbody) if model.body_rootid[b] == model.body_rootid[trunk])]
+    bodies = [
+        0,
+        *(b for b in range(1, model.nbody) if model.body_rootid[b] == model.body_rootid[trunk]),
+    ]
     parents = (-1, *(bodies.index(int(model.body_parentid[b])) for b in bodies[1:]))
-    return Skeleton(("root", *(model.body(b).name or f"body_{b}" for b in bodies[1:])), parents, tuple(bodies))
+    return Skeleton(
+        ("root", *(model.body(b).name or f"body_{b}" for b in bodies[1:])), parents, tuple(bodies)
+    )
 
 
 def gltf_axes(forward: np.ndarray) -> np.ndarray:
@@ -81,7 +91,9 @@ def gltf_axes(forward: np.ndarray) -> np.ndarray:
     return np.stack([np.cross([0.0, 0.0, 1.0], way), [0.0, 0.0, 1.0], way])
 
 
-def local_poses(model: mujoco.MjModel, skeleton: Skeleton, qpos: np.ndarray, axes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def local_poses(
+    model: mujoco.MjModel, skeleton: Skeleton, qpos: np.ndarray, axes: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Each joint against its parent: positions [F, B, 3] m and quaternions [F, B, 4] (x, y, z, w), in glTF's axes."""
     pos, rot = _world_poses(model, skeleton, qpos, axes)
     local_pos, quat = pos.copy(), np.zeros((*pos.shape[:2], 4))
@@ -95,7 +107,9 @@ def local_poses(model: mujoco.MjModel, skeleton: Skeleton, qpos: np.ndarray, axe
     return local_pos, quat
 
 
-def _world_poses(model: mujoco.MjModel, skeleton: Skeleton, qpos: np.ndarray, axes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _world_poses(
+    model: mujoco.MjModel, skeleton: Skeleton, qpos: np.ndarray, axes: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     data = mujoco.MjData(model)
     pos, rot = [], []
     for row in qpos:
@@ -127,7 +141,9 @@ def _standing(loop: WalkLoop) -> np.ndarray:
     return qpos
 
 
-def _add_joints(document: gltf.GLTF2, skeleton: Skeleton, pos: np.ndarray, quat: np.ndarray) -> None:
+def _add_joints(
+    document: gltf.GLTF2, skeleton: Skeleton, pos: np.ndarray, quat: np.ndarray
+) -> None:
     for b, name in enumerate(skeleton.names):
         children = [c for c, parent in enumerate(skeleton.parent) if parent == b]
         node = gltf.Node(name=name, translation=pos[b].tolist(), rotation=quat[b].tolist())
@@ -136,7 +152,14 @@ def _add_joints(document: gltf.GLTF2, skeleton: Skeleton, pos: np.ndarray, quat:
         document.nodes.append(node)
 
 
-def _add_mesh(document: gltf.GLTF2, buffer: Buffer, model: mujoco.MjModel, skeleton: Skeleton, axes: np.ndarray, stand: np.ndarray) -> None:
+def _add_mesh(
+    document: gltf.GLTF2,
+    buffer: Buffer,
+    model: mujoco.MjModel,
+    skeleton: Skeleton,
+    axes: np.ndarray,
+    stand: np.ndarray,
+) -> None:
     """One primitive and material per colour, in the standing pose."""
     data = mujoco.MjData(model)
     data.qpos[:] = stand
@@ -150,17 +173,28 @@ def _add_mesh(document: gltf.GLTF2, buffer: Buffer, model: mujoco.MjModel, skele
             points, normals, faces = geom_surface(model, g)
             turn = axes @ data.geom_xmat[g].reshape(3, 3)
             joint = skeleton.bodies.index(int(model.geom_bodyid[g]))
-            parts.append((points @ turn.T + axes @ data.geom_xpos[g], normals @ turn.T, faces, np.full(len(points), joint)))
+            parts.append(
+                (
+                    points @ turn.T + axes @ data.geom_xpos[g],
+                    normals @ turn.T,
+                    faces,
+                    np.full(len(points), joint),
+                )
+            )
         primitives.append(_primitive(buffer, parts, len(document.materials)))
         document.materials.append(_material(np.array(colour)))
     document.meshes.append(gltf.Mesh(name="body", primitives=primitives))
 
 
-def _primitive(buffer: Buffer, parts: Sequence[tuple[np.ndarray, ...]], material: int) -> gltf.Primitive:
+def _primitive(
+    buffer: Buffer, parts: Sequence[tuple[np.ndarray, ...]], material: int
+) -> gltf.Primitive:
     """parts: points [V, 3], normals [V, 3], triangles [F, 3] and joint [V] of each shape."""
     firsts = np.cumsum([0, *(len(part[0]) for part in parts)])
     points, normals, joints = (np.concatenate([part[i] for part in parts]) for i in (0, 1, 3))
-    faces = np.concatenate([part[2] + first for part, first in zip(parts, firsts[:-1], strict=True)])
+    faces = np.concatenate(
+        [part[2] + first for part, first in zip(parts, firsts[:-1], strict=True)]
+    )
     places = np.zeros((len(points), 4), np.uint16 if joints.max() > 255 else np.uint8)
     places[:, 0] = joints
     weights = np.tile(np.array([255, 0, 0, 0], np.uint8), (len(points), 1))
@@ -184,11 +218,24 @@ def _unit(vectors: np.ndarray) -> np.ndarray:
 def _material(colour: np.ndarray) -> gltf.Material:
     """From sRGB [4] to the linear colours of glTF."""
     rgb = np.where(colour[:3] <= 0.04045, colour[:3] / 12.92, ((colour[:3] + 0.055) / 1.055) ** 2.4)
-    look = gltf.PbrMetallicRoughness(baseColorFactor=[*map(float, rgb), float(colour[3])], metallicFactor=0.0, roughnessFactor=ROUGHNESS)
-    return gltf.Material(pbrMetallicRoughness=look, alphaMode="BLEND" if colour[3] < 1 else "OPAQUE")
+    look = gltf.PbrMetallicRoughness(
+        baseColorFactor=[*map(float, rgb), float(colour[3])],
+        metallicFactor=0.0,
+        roughnessFactor=ROUGHNESS,
+    )
+    return gltf.Material(
+        pbrMetallicRoughness=look, alphaMode="BLEND" if colour[3] < 1 else "OPAQUE"
+    )
 
 
-def _add_skin(document: gltf.GLTF2, buffer: Buffer, model: mujoco.MjModel, skeleton: Skeleton, axes: np.ndarray, stand: np.ndarray) -> None:
+def _add_skin(
+    document: gltf.GLTF2,
+    buffer: Buffer,
+    model: mujoco.MjModel,
+    skeleton: Skeleton,
+    axes: np.ndarray,
+    stand: np.ndarray,
+) -> None:
     pos, rot = _world_poses(model, skeleton, stand[None], axes)
     inverse = np.zeros((len(skeleton.names), 4, 4))
     inverse[:, :3, :3] = rot[0].transpose(0, 2, 1)
@@ -197,11 +244,23 @@ def _add_skin(document: gltf.GLTF2, buffer: Buffer, model: mujoco.MjModel, skele
     # glTF stores matrices column by column.
     columns = inverse.transpose(0, 2, 1).reshape(-1, 16).astype(np.float32)
     document.skins.append(
-        gltf.Skin(name="skeleton", joints=list(range(len(skeleton.names))), skeleton=0, inverseBindMatrices=buffer.add(columns))
+        gltf.Skin(
+            name="skeleton",
+            joints=list(range(len(skeleton.names))),
+            skeleton=0,
+            inverseBindMatrices=buffer.add(columns),
+        )
     )
 
 
-def _add_animation(document: gltf.GLTF2, buffer: Buffer, loop: WalkLoop, skeleton: Skeleton, axes: np.ndarray, travelling: bool) -> None:
+def _add_animation(
+    document: gltf.GLTF2,
+    buffer: Buffer,
+    loop: WalkLoop,
+    skeleton: Skeleton,
+    axes: np.ndarray,
+    travelling: bool,
+) -> None:
     pos, quat = local_poses(loop.walk.creature.model, skeleton, loop.qpos, axes)
     if travelling:
         pos[:, 0] = np.linspace(0, 1, len(pos))[:, None] * [0.0, 0.0, loop.advance]
@@ -209,10 +268,17 @@ def _add_animation(document: gltf.GLTF2, buffer: Buffer, loop: WalkLoop, skeleto
     times = buffer.add(loop.times.astype(np.float32), bounds=True)
     rest = document.nodes
     for b in range(len(skeleton.names)):
-        for path, values, usual in (("translation", pos[:, b], rest[b].translation), ("rotation", quat[:, b], rest[b].rotation)):
+        for path, values, usual in (
+            ("translation", pos[:, b], rest[b].translation),
+            ("rotation", quat[:, b], rest[b].rotation),
+        ):
             if np.abs(values - usual).max() > STILL:
                 target = gltf.AnimationChannelTarget(node=b, path=path)
-                animation.channels.append(gltf.AnimationChannel(sampler=len(animation.samplers), target=target))
+                animation.channels.append(
+                    gltf.AnimationChannel(sampler=len(animation.samplers), target=target)
+                )
                 output = buffer.add(values.astype(np.float32))
-                animation.samplers.append(gltf.AnimationSampler(input=times, output=output, interpolation="LINEAR"))
+                animation.samplers.append(
+                    gltf.AnimationSampler(input=times, output=output, interpolation="LINEAR")
+                )
     document.animations.append(animation)

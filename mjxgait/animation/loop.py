@@ -48,8 +48,14 @@ def walk_loop(walk: Walk, rate: int = 30) -> WalkLoop:
     """
     chosen = _fitting_strides(walk, rate)
     if chosen is None:
-        why = f"it fell after {walk.fell:.2f} s" if np.isfinite(walk.fell) else f"none was completed in {walk.seconds:g} s"
-        raise UserError(f"{walk.creature.name}: the champion has no steady stride to make a loop of ({why}); train it for longer")
+        why = (
+            f"it fell after {walk.fell:.2f} s"
+            if np.isfinite(walk.fell)
+            else f"none was completed in {walk.seconds:g} s"
+        )
+        raise UserError(
+            f"{walk.creature.name}: the champion has no steady stride to make a loop of ({why}); train it for longer"
+        )
     first, last, strides, count = chosen
     share = np.linspace(0.0, 1.0, count + 1)
     model = walk.creature.model
@@ -62,7 +68,9 @@ def walk_loop(walk: Walk, rate: int = 30) -> WalkLoop:
     qpos[-1] = qpos[0]
     place = int(model.jnt_qposadr[model.body_jntadr[walk.creature.trunk]])
     qpos[:, place : place + 2] -= qpos[:-1, place : place + 2].mean(0)
-    return WalkLoop(walk, qpos, rate, strides, advance, count / rate / ((last - first) * walk.time_step))
+    return WalkLoop(
+        walk, qpos, rate, strides, advance, count / rate / ((last - first) * walk.time_step)
+    )
 
 
 def walk_take(walk: Walk, rate: int = 30) -> WalkLoop:
@@ -73,7 +81,9 @@ def walk_take(walk: Walk, rate: int = 30) -> WalkLoop:
     place = int(model.jnt_qposadr[model.body_jntadr[trunk]])
     advance = float((qpos[-1, place : place + 2] - qpos[0, place : place + 2]) @ walk.forward)
     share = np.linspace(0.0, 1.0, count)[:, None]
-    qpos[:, place : place + 2] -= (1 - share) * qpos[0, place : place + 2] + share * qpos[-1, place : place + 2]
+    qpos[:, place : place + 2] -= (1 - share) * qpos[0, place : place + 2] + share * qpos[
+        -1, place : place + 2
+    ]
     return WalkLoop(walk, qpos, rate, 0, advance, 1.0)
 
 

@@ -36,7 +36,9 @@ def _globe() -> tuple[np.ndarray, np.ndarray]:
     tilt = np.linspace(-np.pi / 2, np.pi / 2, RINGS + 1)
     around = np.linspace(0, 2 * np.pi, AROUND, endpoint=False)
     circle = np.stack([np.cos(around), np.sin(around), np.zeros(AROUND)], 1)
-    points = (np.cos(tilt)[:, None, None] * circle + np.sin(tilt)[:, None, None] * [0.0, 0.0, 1.0]).reshape(-1, 3)
+    points = (
+        np.cos(tilt)[:, None, None] * circle + np.sin(tilt)[:, None, None] * [0.0, 0.0, 1.0]
+    ).reshape(-1, 3)
     return points, _rings(RINGS + 1)
 
 
@@ -45,19 +47,27 @@ def _rings(count: int) -> np.ndarray:
     ring, step = np.meshgrid(np.arange(count - 1), np.arange(AROUND), indexing="ij")
     a, b = ring * AROUND + step, ring * AROUND + (step + 1) % AROUND
     c, d = a + AROUND, b + AROUND
-    return np.concatenate([np.stack([a, b, d], -1).reshape(-1, 3), np.stack([a, d, c], -1).reshape(-1, 3)])
+    return np.concatenate(
+        [np.stack([a, b, d], -1).reshape(-1, 3), np.stack([a, d, c], -1).reshape(-1, 3)]
+    )
 
 
 def _with_area(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
     corners = points[faces]
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    area = np.linalg.norm(
+        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+    )
     return faces[area > 1e-12 + 1e-6 * area.max()]
 
 
 def _ellipsoid(radii: np.ndarray) -> Surface:
     unit, faces = _globe()
     points, normals = unit * radii, unit / radii
-    return points, normals / np.linalg.norm(normals, axis=1, keepdims=True), _with_area(points, faces)
+    return (
+        points,
+        normals / np.linalg.norm(normals, axis=1, keepdims=True),
+        _with_area(points, faces),
+    )
 
 
 def _capsule(radius: float, half: float) -> Surface:
@@ -75,7 +85,14 @@ def _cylinder(radius: float, half: float) -> Surface:
     top = np.array([0.0, 0.0, half])
     fan = np.array([[0, i, i + 1] for i in range(1, AROUND - 1)])
     points = np.concatenate([radius * circle - top, radius * circle + top] * 2)
-    normals = np.concatenate([circle, circle, np.tile([0.0, 0.0, -1.0], (AROUND, 1)), np.tile([0.0, 0.0, 1.0], (AROUND, 1))])
+    normals = np.concatenate(
+        [
+            circle,
+            circle,
+            np.tile([0.0, 0.0, -1.0], (AROUND, 1)),
+            np.tile([0.0, 0.0, 1.0], (AROUND, 1)),
+        ]
+    )
     return points, normals, np.concatenate([_rings(2), fan[:, ::-1] + 2 * AROUND, fan + 3 * AROUND])
 
 
@@ -89,9 +106,15 @@ def _box(half: np.ndarray) -> Surface:
             normal[axis] = side
             u, v = np.roll([1.0, 0.0, 0.0], axis + 1), np.roll([1.0, 0.0, 0.0], axis + 2) * side
             faces.append(np.array([[0, 1, 2], [0, 2, 3]]) + 4 * len(faces))
-            points.append([(normal + a * u + b * v) * half for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
+            points.append(
+                [(normal + a * u + b * v) * half for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+            )
             normals.append(np.tile(normal, (4, 1)))
-    return np.concatenate([np.array(side) for side in points]), np.concatenate(normals), np.concatenate(faces)
+    return (
+        np.concatenate([np.array(side) for side in points]),
+        np.concatenate(normals),
+        np.concatenate(faces),
+    )
 
 
 def _mesh(points: np.ndarray, faces: np.ndarray) -> Surface:

@@ -34,7 +34,9 @@ class Contestant(Protocol):
         ...
 
 
-def contest(folder: Path, config: Config, rounds: int, generations: int, say: Callable[[str], None]) -> dict[str, Any]:
+def contest(
+    folder: Path, config: Config, rounds: int, generations: int, say: Callable[[str], None]
+) -> dict[str, Any]:
     """Everything that the benchmark finds out, ready for JSON.
 
     Args:
@@ -63,8 +65,13 @@ def contest(folder: Path, config: Config, rounds: int, generations: int, say: Ca
     cost, peak = step_cost(ours.experiment), measured_peak()
     return {
         **_ratios(laps),
-        "creature_steps_per_second": {name: _spread([lap.rate for lap in entry]) for name, entry in laps.items()},
-        "processor_us_per_step": {name: _spread([1e6 * lap.processor / lap.steps for lap in entry]) for name, entry in laps.items()},
+        "creature_steps_per_second": {
+            name: _spread([lap.rate for lap in entry]) for name, entry in laps.items()
+        },
+        "processor_us_per_step": {
+            name: _spread([1e6 * lap.processor / lap.steps for lap in entry])
+            for name, entry in laps.items()
+        },
         "useful_share": {"initial_population": early, "workload": share},
         "startup_s": {"ours": ours.startup, **{name: peer.startup for name, peer in peers.items()}},
         "compile_s": {"ours": ours.compile},
@@ -112,7 +119,9 @@ def _peers(work: Workload) -> tuple[dict[str, Workers], dict[str, str]]:
     return peers, left_out
 
 
-def _interleave(contestants: dict[str, Contestant], rounds: int, say: Callable[[str], None]) -> dict[str, list[Lap]]:
+def _interleave(
+    contestants: dict[str, Contestant], rounds: int, say: Callable[[str], None]
+) -> dict[str, list[Lap]]:
     """Turn by turn; the first turn of each only warms up."""
     laps: dict[str, list[Lap]] = {name: [] for name in contestants}
     for turn in range(rounds + 1):
@@ -138,7 +147,13 @@ def _ratios(laps: dict[str, list[Lap]]) -> dict[str, Any]:
 
 def _spread(values: list[float]) -> dict[str, float]:
     low, quarter, middle, three_quarters, high = np.percentile(values, [0, 25, 50, 75, 100])
-    return {"median": middle, "lower_quartile": quarter, "upper_quartile": three_quarters, "lowest": low, "highest": high}
+    return {
+        "median": middle,
+        "lower_quartile": quarter,
+        "upper_quartile": three_quarters,
+        "lowest": low,
+        "highest": high,
+    }
 
 
 def _described(work: Workload, ours: Ours, rounds: int, generations: int) -> dict[str, Any]:

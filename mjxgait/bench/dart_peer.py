@@ -42,8 +42,13 @@ class DartPeer:
         running = self.lanes
         while running:
             transforms = [lane.trunk.getWorldTransform() for lane in running]
-            pos, rot = np.array([t.translation() for t in transforms]), np.array([t.rotation() for t in transforms])
-            ended = self._down(running, pos, rot) | np.array([lane.step >= self.work.steps for lane in running])
+            pos, rot = (
+                np.array([t.translation() for t in transforms]),
+                np.array([t.rotation() for t in transforms]),
+            )
+            ended = self._down(running, pos, rot) | np.array(
+                [lane.step >= self.work.steps for lane in running]
+            )
             if not ended.any():
                 self._step(running, pos, rot)
                 continue
@@ -56,14 +61,19 @@ class DartPeer:
 
     def _step(self, running: list["_Lane"], pos: np.ndarray, rot: np.ndarray) -> None:
         starts = len(self.work.qpos)
-        genome, position = np.array([lane.job // starts for lane in running]), np.array([lane.position for lane in running])
+        genome, position = (
+            np.array([lane.job // starts for lane in running]),
+            np.array([lane.position for lane in running]),
+        )
         for lane, turned in zip(running, rot, strict=True):
             if lane.step == self.work.push_step[lane.job % starts]:
                 lane.push(turned.T @ self.work.push[lane.job % starts][:3])
         q = np.array([lane.skeleton.getPositions() for lane in running])
         v = np.array([lane.skeleton.getVelocities() for lane in running])
         # MuJoCo's order, in which the law reads the root's angular velocity; both have it in the body's frame.
-        target = self.law.target(genome, position, pos, rot, np.concatenate([v[:, 3:6], v[:, :3], v[:, FREE_DOFS:]], 1))
+        target = self.law.target(
+            genome, position, pos, rot, np.concatenate([v[:, 3:6], v[:, :3], v[:, FREE_DOFS:]], 1)
+        )
         forces = self._stable_pd(running, q, v, target)
         moved = (pos - self.law.start) @ self.law.forward
         steps = np.array([lane.step + 1 for lane in running])
@@ -73,20 +83,30 @@ class DartPeer:
             lane.world.step()
             lane.position, lane.moved, lane.step = int(position[i]), float(moved[i]), lane.step + 1
 
-    def _stable_pd(self, running: list["_Lane"], q: np.ndarray, v: np.ndarray, target: np.ndarray) -> np.ndarray:
+    def _stable_pd(
+        self, running: list["_Lane"], q: np.ndarray, v: np.ndarray, target: np.ndarray
+    ) -> np.ndarray:
         """The tutorial's formula, constraint forces of the previous step included; clamped like ours."""
         p, d = np.zeros_like(q), -self.kd * v
-        p[:, FREE_DOFS:] = -self.law.kp * (q[:, FREE_DOFS:] + v[:, FREE_DOFS:] * self.law.step - target)
+        p[:, FREE_DOFS:] = -self.law.kp * (
+            q[:, FREE_DOFS:] + v[:, FREE_DOFS:] * self.law.step - target
+        )
         mass = np.array([lane.skeleton.getMassMatrix() for lane in running])
         bias = np.array([lane.skeleton.getCoriolisAndGravityForces() for lane in running])
         pushed = np.array([lane.skeleton.getConstraintForces() for lane in running])
-        acceleration = np.linalg.solve(mass + self.damping, (p + d - bias + pushed)[..., None])[..., 0]
+        acceleration = np.linalg.solve(mass + self.damping, (p + d - bias + pushed)[..., None])[
+            ..., 0
+        ]
         return np.clip(p + d - self.kd * acceleration * self.law.step, -self.limit, self.limit)
 
     def _down(self, running: list["_Lane"], pos: np.ndarray, rot: np.ndarray) -> np.ndarray:
         limits = self.creature.settings.termination
         height = pos[:, 2] / self.creature.stand_height
-        fine = (rot[:, 2] @ self.creature.up >= limits.min_up) & (height >= limits.height[0]) & (height <= limits.height[1])
+        fine = (
+            (rot[:, 2] @ self.creature.up >= limits.min_up)
+            & (height >= limits.height[0])
+            & (height <= limits.height[1])
+        )
         if limits.touch:
             fine &= [lane.step % TOUCH_EVERY != 0 or not lane.touches() for lane in running]
         return ~fine
@@ -118,8 +138,12 @@ class _Lane:
         self.world.reset()
         self.skeleton.resetGeneralizedForces()
         self.skeleton.clearConstraintImpulses()
-        self.skeleton.setPositions(np.concatenate([dartpy.dynamics.FreeJoint.convertToPositions(root), qpos[7:]]))
-        self.skeleton.setVelocities(np.concatenate([qvel[3:6], root.rotation().T @ qvel[:3], qvel[6:]]))
+        self.skeleton.setPositions(
+            np.concatenate([dartpy.dynamics.FreeJoint.convertToPositions(root), qpos[7:]])
+        )
+        self.skeleton.setVelocities(
+            np.concatenate([qvel[3:6], root.rotation().T @ qvel[:3], qvel[6:]])
+        )
         friction = float(self.model.geom("floor").friction[0] * work.friction[start])
         self.floor.getBodyNode(0).getShapeNode(0).getDynamicsAspect().setFrictionCoeff(friction)
         self.job, self.step, self.position, self.moved = job, 0, 0, 0.0
@@ -147,7 +171,9 @@ def _skeleton(creature: Creature, model: mujoco.MjModel) -> tuple[Any, dict[int,
         node = _node(skeleton, model, body, nodes.get(int(model.body_parentid[body])))
         frame = _rotation(model.body_iquat[body])
         inertia = frame @ np.diag(model.body_inertia[body]) @ frame.T
-        node.setInertia(dartpy.dynamics.Inertia(float(model.body_mass[body]), model.body_ipos[body], inertia))
+        node.setInertia(
+            dartpy.dynamics.Inertia(float(model.body_mass[body]), model.body_ipos[body], inertia)
+        )
         nodes[body] = node
     for geom in creature.watched[: len(creature.foot_of)]:
         _sphere(nodes[int(model.geom_bodyid[geom])], model, int(geom))
@@ -160,9 +186,17 @@ def _node(skeleton: Any, model: mujoco.MjModel, body: int, parent: Any) -> Any:
     joints = range(model.body_jntadr[body], model.body_jntadr[body] + model.body_jntnum[body])
     if [model.jnt_type[j] for j in joints] == [mujoco.mjtJoint.mjJNT_FREE]:
         return skeleton.createFreeJointAndBodyNodePair()[1]
-    if len(joints) not in (1, 2) or any(model.jnt_type[j] != mujoco.mjtJoint.mjJNT_HINGE or np.any(model.jnt_pos[j]) for j in joints):
-        raise ValueError("the DART peer knows one hinge or two crossing ones per body, at the body's origin")
-    properties = dynamics.RevoluteJointProperties() if len(joints) == 1 else dynamics.UniversalJointProperties()
+    if len(joints) not in (1, 2) or any(
+        model.jnt_type[j] != mujoco.mjtJoint.mjJNT_HINGE or np.any(model.jnt_pos[j]) for j in joints
+    ):
+        raise ValueError(
+            "the DART peer knows one hinge or two crossing ones per body, at the body's origin"
+        )
+    properties = (
+        dynamics.RevoluteJointProperties()
+        if len(joints) == 1
+        else dynamics.UniversalJointProperties()
+    )
     if len(joints) == 1:
         properties.mAxis = model.jnt_axis[joints[0]]
     else:
@@ -171,7 +205,11 @@ def _node(skeleton: Any, model: mujoco.MjModel, body: int, parent: Any) -> Any:
     place.set_translation(model.body_pos[body])
     place.set_rotation(_rotation(model.body_quat[body]))
     properties.mT_ParentBodyToJoint = place
-    create = skeleton.createRevoluteJointAndBodyNodePair if len(joints) == 1 else skeleton.createUniversalJointAndBodyNodePair
+    create = (
+        skeleton.createRevoluteJointAndBodyNodePair
+        if len(joints) == 1
+        else skeleton.createUniversalJointAndBodyNodePair
+    )
     return create(parent, properties)[1]
 
 
@@ -196,15 +234,23 @@ def _floor() -> Any:
     return floor
 
 
-def _forbidden_spheres(creature: Creature, model: mujoco.MjModel) -> list[tuple[int, np.ndarray, float]]:
+def _forbidden_spheres(
+    creature: Creature, model: mujoco.MjModel
+) -> list[tuple[int, np.ndarray, float]]:
     """Body, centres and radius of spheres that reach as low as the parts that must not touch: of a capsule its two ends."""
     balls = []
     for geom in creature.watched[len(creature.foot_of) :]:
-        body, centre, size = int(model.geom_bodyid[geom]), model.geom_pos[geom], model.geom_size[geom]
+        body, centre, size = (
+            int(model.geom_bodyid[geom]),
+            model.geom_pos[geom],
+            model.geom_size[geom],
+        )
         shape = mujoco.mjtGeom(model.geom_type[geom])
         if shape not in (mujoco.mjtGeom.mjGEOM_SPHERE, mujoco.mjtGeom.mjGEOM_CAPSULE):
             raise ValueError("the DART peer knows spheres and capsules only")
-        along = _rotation(model.geom_quat[geom])[:, 2] * (size[1] if shape == mujoco.mjtGeom.mjGEOM_CAPSULE else 0.0)
+        along = _rotation(model.geom_quat[geom])[:, 2] * (
+            size[1] if shape == mujoco.mjtGeom.mjGEOM_CAPSULE else 0.0
+        )
         balls.append((body, np.array([centre + along, centre - along]), float(size[0])))
     return balls
 

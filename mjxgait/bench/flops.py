@@ -14,7 +14,9 @@ ONE_EACH = frozenset((
 ))
 # fmt: on
 """Primitives that do one operation per element of their result."""
-REDUCTIONS = frozenset(["reduce_sum", "reduce_max", "reduce_min", "reduce_prod", "cumsum", "reduce_and", "reduce_or"])
+REDUCTIONS = frozenset(
+    ["reduce_sum", "reduce_max", "reduce_min", "reduce_prod", "cumsum", "reduce_and", "reduce_or"]
+)
 
 
 def count_flops(function: Callable[..., Any], *args: Any) -> float:

@@ -33,7 +33,9 @@ def step_cost(experiment: Experiment) -> dict[str, float]:
     return {name: value / lanes for name, value in costs.items()}
 
 
-def distance_to_limit(cost: dict[str, float], peak: dict[str, float], computed_rate: float) -> dict[str, Any]:
+def distance_to_limit(
+    cost: dict[str, float], peak: dict[str, float], computed_rate: float
+) -> dict[str, Any]:
     """Shares of the measured peaks that `computed_rate` creature-steps per second use; 1 would be the machine's limit."""
     bound = {
         "flops": peak["flops"] / cost["flops_asked"],
@@ -52,7 +54,9 @@ def _lanes(experiment: Experiment, lanes: int) -> Lane:
     simulator = experiment.simulator
     low, _ = simulator.tracker.bounds(experiment.config.controller)
     genomes = jax.tree.map(lambda leaf: leaf[None, None], low)
-    starts, settings = jax.tree.map(lambda leaf: leaf[None], (experiment.row.starts, experiment.row.settings))
+    starts, settings = jax.tree.map(
+        lambda leaf: leaf[None], (experiment.row.starts, experiment.row.settings)
+    )
     jobs = jnp.zeros(lanes, jnp.int32)
     lane = jax.vmap(partial(simulator._fresh_lane, genomes, starts, settings))(jobs, jobs)
     return jax.tree.map(lambda leaf: jnp.moveaxis(leaf, 0, simulator.plant.lane_axis), lane)

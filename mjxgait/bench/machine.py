@@ -17,7 +17,13 @@ TRIES = 20
 def machine_facts() -> dict[str, Any]:
     """Processor, cores, system, and how busy the machine was before the measurement."""
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else None
-    return {"processor": _processor(), "cores": cores(), "system": platform.system(), "architecture": platform.machine(), "load": load}
+    return {
+        "processor": _processor(),
+        "cores": cores(),
+        "system": platform.system(),
+        "architecture": platform.machine(),
+        "load": load,
+    }
 
 
 def measured_peak() -> dict[str, float]:

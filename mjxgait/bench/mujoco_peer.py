@@ -30,7 +30,9 @@ class MujocoPeer:
             or controller.constraint_forces
             or (controller.mirror, controller.stiffness, controller.damping) != (True, 1, 1)
         ):
-            raise ValueError("the peer knows mirrored poses and stable PD with the gains of the creature only")
+            raise ValueError(
+                "the peer knows mirrored poses and stable PD with the gains of the creature only"
+            )
         self.work, self.creature = workload, workload.creature()
         self.jobs = np.arange(first, workload.episodes, stride)
         self.lanes = min(lanes, len(self.jobs))
@@ -39,11 +41,23 @@ class MujocoPeer:
         self.friction = self.batch.expand("geom_friction")
         self.usual_friction = self.model.geom_friction[:, 0].copy()
         bind = self.batch.bind
-        self.qpos, self.qvel, self.warmstart, self.applied = bind("qpos"), bind("qvel"), bind("qacc_warmstart"), bind("qfrc_applied")
-        self.xpos, self.xmat, self.mass, self.bias = bind("xpos"), bind("xmat"), bind("M"), bind("qfrc_bias")
+        self.qpos, self.qvel, self.warmstart, self.applied = (
+            bind("qpos"),
+            bind("qvel"),
+            bind("qacc_warmstart"),
+            bind("qfrc_applied"),
+        )
+        self.xpos, self.xmat, self.mass, self.bias = (
+            bind("xpos"),
+            bind("xmat"),
+            bind("M"),
+            bind("qfrc_bias"),
+        )
         self.geom_xpos, self.geom_xmat = bind("geom_xpos"), bind("geom_xmat")
         self.passive = bind("qfrc_passive") if _has_passive(self.model) else None
-        self.forbidden = LowestPoint(self.model, self.creature.watched[len(self.creature.foot_of) :])
+        self.forbidden = LowestPoint(
+            self.model, self.creature.watched[len(self.creature.foot_of) :]
+        )
         self.law = Law(self.creature, workload)
         self.damped = DampedSolve(self.model, self.creature)
 
@@ -61,7 +75,10 @@ class MujocoPeer:
             ended = (self._down(rows) | (self.steps[rows] >= self.work.steps)).nonzero()[0]
             if len(ended):
                 ended = ended if isinstance(rows, slice) else rows[ended]
-                total, forward = total + int(self.steps[ended].sum()), forward + float(self.moved[ended].sum())
+                total, forward = (
+                    total + int(self.steps[ended].sum()),
+                    forward + float(self.moved[ended].sum()),
+                )
                 idle = ended[self._refill(ended) :]
                 if len(idle):
                     rows = np.setdiff1d(np.arange(self.lanes)[rows], idle)
@@ -73,7 +90,10 @@ class MujocoPeer:
     def _step(self, rows: Any) -> None:
         """One control step of the simulations in `rows`."""
         creature, law, genome = self.creature, self.law, self.job[rows] // len(self.work.qpos)
-        pos, rot = self.xpos[rows, creature.trunk], self.xmat[rows, creature.trunk].reshape(-1, 3, 3)
+        pos, rot = (
+            self.xpos[rows, creature.trunk],
+            self.xmat[rows, creature.trunk].reshape(-1, 3, 3),
+        )
         q, v = self.qpos[rows][:, law.qpos], self.qvel[rows]
         self.moved[rows] = (pos - law.start) @ law.forward
         self.steps[rows] += 1
@@ -83,7 +103,9 @@ class MujocoPeer:
         pushed = -bias
         pushed[:, law.dof] += force
         acceleration = self.damped.solve(self.mass[rows], pushed)[:, law.dof]
-        self.applied[rows, law.dof] = np.clip(force - law.step * law.kd * acceleration, -creature.torque_limit, creature.torque_limit)
+        self.applied[rows, law.dof] = np.clip(
+            force - law.step * law.kd * acceleration, -creature.torque_limit, creature.torque_limit
+        )
         self.position[rows] = law.advance(genome, self.position[rows], target, q, self.steps[rows])
         self.batch.step(None if isinstance(rows, slice) else rows, stage=VELOCITY_STAGE)
 
@@ -134,35 +156,72 @@ class Law:
         self.length = self.poses * settings.interpolation
         self.root = Layout(creature.model).root_dof + 3
         self.start = creature.stand_pos
-        self.forward, self.left = (_horizontal(creature.stand_rot @ axis) for axis in (creature.forward, creature.left))
+        self.forward, self.left = (
+            _horizontal(creature.stand_rot @ axis) for axis in (creature.forward, creature.left)
+        )
         self.axes = np.stack([creature.forward, creature.left], 1)
-        self.balances = any(np.any(self.tuning[name]) for name in ("pitch", "pitch_rate", "roll", "roll_rate"))
+        self.balances = any(
+            np.any(self.tuning[name]) for name in ("pitch", "pitch_rate", "roll", "roll_rate")
+        )
 
-    def target(self, genome: np.ndarray, position: np.ndarray, pos: np.ndarray, rot: np.ndarray, v: np.ndarray) -> np.ndarray:
+    def target(
+        self,
+        genome: np.ndarray,
+        position: np.ndarray,
+        pos: np.ndarray,
+        rot: np.ndarray,
+        v: np.ndarray,
+    ) -> np.ndarray:
         """Corrected target [S, J] in rad."""
         creature, gain = self.creature, self.tuning
         a, step = np.divmod(position, self.interpolation)
         here = self.cycle[genome, a]
-        target = here + (step / self.interpolation)[:, None] * (self.cycle[genome, (a + 1) % self.poses] - here)
+        target = here + (step / self.interpolation)[:, None] * (
+            self.cycle[genome, (a + 1) % self.poses] - here
+        )
         axes = rot @ self.axes
         forward = axes[:, :, 0]
-        wrong = np.arctan2(forward @ self.left, forward @ self.forward) + (pos - self.start) @ self.left / (2 * creature.body_length)
+        wrong = np.arctan2(forward @ self.left, forward @ self.forward) + (
+            pos - self.start
+        ) @ self.left / (2 * creature.body_length)
         steer = np.clip(gain["steer"][genome] * wrong, -0.5, 0.5)[:, None]
         target += steer * (creature.steer_bend + creature.steer_stride * (target - creature.stand))
         if self.balances:
             spin = (rot @ v[:, self.root : self.root + 3, None])[:, None, :, 0] @ axes
             lean = np.arcsin(np.clip(axes[:, 2], -1, 1))
-            pitch = np.clip(gain["pitch_rate"][genome] * spin[:, 0, 1] - gain["pitch"][genome] * lean[:, 0], -0.5, 0.5)
-            roll = np.clip(gain["roll_rate"][genome] * spin[:, 0, 0] + gain["roll"][genome] * lean[:, 1], -0.5, 0.5)
-            target += pitch[:, None] * creature.balance_pitch + roll[:, None] * creature.balance_roll
+            pitch = np.clip(
+                gain["pitch_rate"][genome] * spin[:, 0, 1] - gain["pitch"][genome] * lean[:, 0],
+                -0.5,
+                0.5,
+            )
+            roll = np.clip(
+                gain["roll_rate"][genome] * spin[:, 0, 0] + gain["roll"][genome] * lean[:, 1],
+                -0.5,
+                0.5,
+            )
+            target += (
+                pitch[:, None] * creature.balance_pitch + roll[:, None] * creature.balance_roll
+            )
         return np.clip(target, creature.joint_low, creature.joint_high, out=target)
 
-    def advance(self, genome: np.ndarray, position: np.ndarray, target: np.ndarray, q: np.ndarray, steps: np.ndarray) -> np.ndarray:
+    def advance(
+        self,
+        genome: np.ndarray,
+        position: np.ndarray,
+        target: np.ndarray,
+        q: np.ndarray,
+        steps: np.ndarray,
+    ) -> np.ndarray:
         """Positions in the cycle [S] at the next step."""
         if self.by_clock:
-            return (self.length * steps * self.step / self.tuning["period"][genome] + 1e-6).astype(int) % self.length
+            return (self.length * steps * self.step / self.tuning["period"][genome] + 1e-6).astype(
+                int
+            ) % self.length
         error = target - q
-        reached = np.einsum("sj,sj->s", error, error) < error.shape[1] * self.tuning["threshold"][genome] ** 2
+        reached = (
+            np.einsum("sj,sj->s", error, error)
+            < error.shape[1] * self.tuning["threshold"][genome] ** 2
+        )
         return (position + reached) % self.length
 
 
@@ -172,10 +231,14 @@ class DampedSolve:
     def __init__(self, model: mujoco.MjModel, creature: Creature) -> None:
         layout = Layout(model)
         entry = np.full((model.nv, model.nv), model.nC)
-        entry[layout.mass_row, layout.mass_column] = entry[layout.mass_column, layout.mass_row] = np.arange(model.nC)
+        entry[layout.mass_row, layout.mass_column] = entry[layout.mass_column, layout.mass_row] = (
+            np.arange(model.nC)
+        )
         self.entry, self.size = entry.ravel(), model.nv
         self.damping = np.zeros(model.nC)
-        self.damping[entry[creature.dof_adr, creature.dof_adr]] = float(creature.model.opt.timestep) * creature.kd
+        self.damping[entry[creature.dof_adr, creature.dof_adr]] = (
+            float(creature.model.opt.timestep) * creature.kd
+        )
 
     def solve(self, mass: np.ndarray, force: np.ndarray) -> np.ndarray:
         """Accelerations [S, nv] of stored entries [S, nC] and forces [S, nv]."""
@@ -187,18 +250,29 @@ class DampedSolve:
 
 def _quiet(model: mujoco.MjModel) -> mujoco.MjModel:
     """A simulation that blows up must end, not begin anew; and islands cost more than they save on one creature."""
-    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET) | int(mujoco.mjtDisableBit.mjDSBL_ISLAND)
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET) | int(
+        mujoco.mjtDisableBit.mjDSBL_ISLAND
+    )
     model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
     return model
 
 
 def _has_passive(model: mujoco.MjModel) -> bool:
-    return bool(np.any(model.dof_damping) or np.any(model.jnt_stiffness) or model.opt.density or model.opt.viscosity)
+    return bool(
+        np.any(model.dof_damping)
+        or np.any(model.jnt_stiffness)
+        or model.opt.density
+        or model.opt.viscosity
+    )
 
 
 def _span(adr: np.ndarray) -> Any:
     """Addresses as a slice where they are neighbours: a view instead of a copy."""
-    return slice(int(adr[0]), int(adr[-1]) + 1) if np.array_equal(adr, np.arange(adr[0], adr[0] + len(adr))) else adr
+    return (
+        slice(int(adr[0]), int(adr[-1]) + 1)
+        if np.array_equal(adr, np.arange(adr[0], adr[0] + len(adr)))
+        else adr
+    )
 
 
 def _horizontal(vector: np.ndarray) -> np.ndarray:

@@ -40,8 +40,13 @@ class Ours:
 
     def take(self, genomes: Genome) -> None:
         """Makes these [P] the population that laps judge: a state that nobody has judged yet."""
-        if self.experiment.config.evolution.offspring != self.experiment.config.evolution.population:
-            raise ValueError("laps need growth = 2: as many are judged in a generation as there are in the population")
+        if (
+            self.experiment.config.evolution.offspring
+            != self.experiment.config.evolution.population
+        ):
+            raise ValueError(
+                "laps need growth = 2: as many are judged in a generation as there are in the population"
+            )
         self.first = self.experiment.place(dataclasses.replace(self.first, genomes=genomes))
 
     def lap(self) -> Lap:
@@ -55,7 +60,14 @@ class Ours:
         """m, over all episodes."""
         creature, config = self.experiment.creature, self.experiment.config
         distances = np.asarray(state.terms[..., TERMS.index("distance")]).ravel()
-        return float(np.nanmean([forward_distance(creature, config.fitness, config.rollout.seconds, float(d)) for d in distances]))
+        return float(
+            np.nanmean(
+                [
+                    forward_distance(creature, config.fitness, config.rollout.seconds, float(d))
+                    for d in distances
+                ]
+            )
+        )
 
     def useful_share(self) -> float:
         """Of all computed steps, how many were lived, in the generation that a lap computes."""
@@ -67,7 +79,9 @@ def half_and_half(ours: Ours, generations: int) -> Genome:
     """The better half of an evolved population and half of the initial one: good walkers and early deaths alike."""
     half = ours.experiment.config.evolution.population // 2
     evolved, initial = ours.evolved(generations).genomes, ours.first.genomes
-    return jax.tree.map(lambda a, b: jnp.concatenate([a[:half], b[: b.shape[0] - half]]), evolved, initial)
+    return jax.tree.map(
+        lambda a, b: jnp.concatenate([a[:half], b[: b.shape[0] - half]]), evolved, initial
+    )
 
 
 def as_workload(folder: Path, experiment: Experiment, genomes: Genome) -> Workload:

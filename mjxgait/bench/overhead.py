@@ -33,7 +33,11 @@ def overhead(ours: Ours, generations: int = 8) -> dict[str, float]:
     whole, compiled, checkpoint = _host_loop(ours, generations)
     parts = {"operators": operators, "checkpoint": checkpoint, "log": whole - compiled - checkpoint}
     shares = {f"{name}_share": seconds / whole for name, seconds in parts.items()}
-    return {"generation_s": whole, **{f"{name}_s": seconds for name, seconds in parts.items()}, **shares}
+    return {
+        "generation_s": whole,
+        **{f"{name}_s": seconds for name, seconds in parts.items()},
+        **shares,
+    }
 
 
 def _operators(experiment: Experiment) -> float:
@@ -41,7 +45,9 @@ def _operators(experiment: Experiment) -> float:
     rollout, count = experiment.config.rollout, experiment.config.evolution.offspring
 
     def stub(genomes: Any) -> Judged:
-        terms = jnp.mean(genomes.key_poses, axis=(1, 2))[:, None, None] * jnp.ones((1, rollout.starts, len(TERMS)))
+        terms = jnp.mean(genomes.key_poses, axis=(1, 2))[:, None, None] * jnp.ones(
+            (1, rollout.starts, len(TERMS))
+        )
         return Judged(terms, jnp.zeros((count, rollout.starts), bool), jnp.int32(1), jnp.int32(1))
 
     evolution = evolution_of(experiment.simulator, experiment.row.settings)
@@ -92,7 +98,15 @@ def _host_loop(ours: Ours, generations: int) -> tuple[float, float, float]:
         checkpoints = _TimedCheckpoints(Path(folder), experiment.config.keep_every)
         screen = Screen(Console(file=io.StringIO()))
         began = time.perf_counter()
-        run._evolve(Path(folder), Examiner(experiment, {}, screen.say), step, ours.first, checkpoints, screen, threading.Event())
+        run._evolve(
+            Path(folder),
+            Examiner(experiment, {}, screen.say),
+            step,
+            ours.first,
+            checkpoints,
+            screen,
+            threading.Event(),
+        )
         whole = time.perf_counter() - began
         screen.close()
         checkpoints.close()

@@ -34,7 +34,10 @@ def scaling_points(creature: str, say: Callable[[str], None]) -> dict[str, list[
     curves = {
         "population": [Point(population=p) for p in POPULATIONS],
         "lanes": [Point(population=512, lanes=n) for n in LANES],
-        "defaults": [Point(population=p, starts=RolloutConfig.starts, seconds=RolloutConfig.seconds) for p in DEFAULTS],
+        "defaults": [
+            Point(population=p, starts=RolloutConfig.starts, seconds=RolloutConfig.seconds)
+            for p in DEFAULTS
+        ],
     }
     found: dict[str, list[dict[str, Any]]] = {name: [] for name in curves}
     for name, points in curves.items():
@@ -54,7 +57,12 @@ def _line(point: dict[str, Any]) -> str:
 def measure(creature: str, point: Point) -> dict[str, Any]:
     """One point, in a new process."""
     arguments = [creature, json.dumps(dataclasses.asdict(point))]
-    result = subprocess.run([sys.executable, "-m", "mjxgait.bench.scaling", *arguments], capture_output=True, text=True, check=True)
+    result = subprocess.run(
+        [sys.executable, "-m", "mjxgait.bench.scaling", *arguments],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
     return json.loads(result.stdout.splitlines()[-1])
 
 
@@ -67,7 +75,9 @@ def measure_here(creature: str, point: Point) -> dict[str, Any]:
     folder = find_creature(creature)
     settings = load_creature(folder).settings
     config = resolve_config(settings.train, settings.creature.name)
-    rollout = dataclasses.replace(config.rollout, starts=point.starts, seconds=point.seconds, lanes=point.lanes)
+    rollout = dataclasses.replace(
+        config.rollout, starts=point.starts, seconds=point.seconds, lanes=point.lanes
+    )
     evolution = dataclasses.replace(config.evolution, population=point.population)
     ours = Ours(folder, dataclasses.replace(config, rollout=rollout, evolution=evolution))
     compiled = _peak_memory()
@@ -100,10 +110,16 @@ def draw(points: dict[str, list[dict[str, Any]]], path: Path) -> None:
         x = [point[curve] for point in points[curve]]
         for kind in ("useful", "computed"):
             axes.plot(x, [point[kind + key] for point in points[curve]], "o-", label=kind)
-        axes.set(xlabel=curve if curve == "population" else "lanes per device", ylabel=label, ylim=(0, None))
+        axes.set(
+            xlabel=curve if curve == "population" else "lanes per device",
+            ylabel=label,
+            ylim=(0, None),
+        )
         axes.legend(frameon=False)
     x = [point["population"] for point in points["population"]]
-    panels[2].plot(x, [point["memory_mib"] for point in points["population"]], "o-", color="tab:green")
+    panels[2].plot(
+        x, [point["memory_mib"] for point in points["population"]], "o-", color="tab:green"
+    )
     panels[2].set(xlabel="population", ylabel="peak memory, MiB", ylim=(0, None))
     for axes in panels:
         axes.set_xscale("log", base=2)

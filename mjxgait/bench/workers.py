@@ -21,14 +21,20 @@ class Peer(Protocol):
 class Workers:
     """Processes that wait between laps, so that they take nothing from the other contestants. startup: s until all were ready."""
 
-    def __init__(self, peer: Callable[[Workload, int, int], Peer], workload: Workload, count: int | None = None) -> None:
+    def __init__(
+        self,
+        peer: Callable[[Workload, int, int], Peer],
+        workload: Workload,
+        count: int | None = None,
+    ) -> None:
         count = count or cores()
         self.episodes = workload.episodes
         began = time.perf_counter()
         context = multiprocessing.get_context("spawn")
         pairs = [context.Pipe() for _ in range(count)]
         self.processes = [
-            context.Process(target=_serve, args=(theirs, peer, workload, i, count), daemon=True) for i, (_, theirs) in enumerate(pairs)
+            context.Process(target=_serve, args=(theirs, peer, workload, i, count), daemon=True)
+            for i, (_, theirs) in enumerate(pairs)
         ]
         with single_threaded():
             for process in self.processes:
@@ -58,7 +64,13 @@ class Workers:
             process.join()
 
 
-def _serve(pipe: Connection, peer: Callable[[Workload, int, int], Peer], workload: Workload, first: int, stride: int) -> None:
+def _serve(
+    pipe: Connection,
+    peer: Callable[[Workload, int, int], Peer],
+    workload: Workload,
+    first: int,
+    stride: int,
+) -> None:
     contestant = peer(workload, first, stride)
     try:
         pipe.send("ready")

@@ -1,6 +1,15 @@
 """The stable-walk certificate, in NumPy and C MuJoCo, free of JAX (docs/certificate.md)."""
 
-from mjxgait.certify.certificate import Certificate, Glance, certify, distance, glance, push_ladder, record, survival
+from mjxgait.certify.certificate import (
+    Certificate,
+    Glance,
+    certify,
+    distance,
+    glance,
+    push_ladder,
+    record,
+    survival,
+)
 from mjxgait.certify.config import CertificateConfig
 from mjxgait.certify.criteria import Criterion, Measure
 from mjxgait.certify.standing import outdated, read_certificate

@@ -45,7 +45,13 @@ class Certificate:
     def rows(self) -> list[tuple[str, str, str, str, str]]:
         """A table: criterion, measure, value, threshold, verdict."""
         return [
-            (f"{c.number} {c.name}", m.name, f"{m.value:.3g}", f"{m.sense} {m.threshold:g}", "pass" if m.passed else "FAIL")
+            (
+                f"{c.number} {c.name}",
+                m.name,
+                f"{m.value:.3g}",
+                f"{m.sense} {m.threshold:g}",
+                "pass" if m.passed else "FAIL",
+            )
             for c in self.criteria
             for m in c.measures
         ]
@@ -89,10 +95,17 @@ class Glance:
         return min(c.margin for c in self.criteria)
 
 
-def glance(creature: Creature, champion: Champion, config: CertificateConfig | None = None, threads: int = 0) -> Glance:
+def glance(
+    creature: Creature,
+    champion: Champion,
+    config: CertificateConfig | None = None,
+    threads: int = 0,
+) -> Glance:
     """The part of the examination that nobody disturbs: a third of its time."""
     config = config or CertificateConfig()
-    whole, halved = (record(creature, champion, config.seconds, refine, threads) for refine in (1, 2))
+    whole, halved = (
+        record(creature, champion, config.seconds, refine, threads) for refine in (1, 2)
+    )
     window = whole.window(config.warmup)
     judged = (
         *criteria.basic(whole, config),
@@ -104,31 +117,71 @@ def glance(creature: Creature, champion: Champion, config: CertificateConfig | N
 
 
 def certify(
-    creature: Creature, champion: Champion, config: CertificateConfig | None = None, threads: int = 0, seen: Glance | None = None
+    creature: Creature,
+    champion: Champion,
+    config: CertificateConfig | None = None,
+    threads: int = 0,
+    seen: Glance | None = None,
 ) -> Certificate:
     """Examines a champion against all eight criteria. seen: what a glance with the same config has found, to save looking again."""
     config = config or CertificateConfig()
     began = time.perf_counter()
     seen = seen or glance(creature, champion, config, threads)
     groups = (nominal_starts(creature, 1), *_starts(creature, config), *_ladder(creature, config))
-    outcome = simulate(creature, champion, join(*groups), config.seconds, fall=config.upright, threads=threads)
-    plain, started, pushed, *harder = (float(up.mean()) for up in np.split(outcome.stayed_up, np.cumsum([len(g) for g in groups])[:-1]))
-    judged = sorted((*seen.criteria, criteria.starts(started, config), criteria.pushes(pushed, config)), key=lambda c: c.number)
-    shares = dict(zip(config.pushes.ladder, harder, strict=True)) | {0.0: plain, config.pushes.speed: pushed}
+    outcome = simulate(
+        creature, champion, join(*groups), config.seconds, fall=config.upright, threads=threads
+    )
+    plain, started, pushed, *harder = (
+        float(up.mean())
+        for up in np.split(outcome.stayed_up, np.cumsum([len(g) for g in groups])[:-1])
+    )
+    judged = sorted(
+        (*seen.criteria, criteria.starts(started, config), criteria.pushes(pushed, config)),
+        key=lambda c: c.number,
+    )
+    shares = dict(zip(config.pushes.ladder, harder, strict=True)) | {
+        0.0: plain,
+        config.pushes.speed: pushed,
+    }
     report = describe.describe(seen.whole.window(config.warmup), config.gait.clearance) | {
         "push_survival": {f"{speed:g}": share for speed, share in sorted(shares.items())},
         "push_that_fells_half": half_point(shares),
     }
-    return Certificate(creature.name, creature.digest, champion.fingerprint, tuple(judged), report, config, time.perf_counter() - began)
+    return Certificate(
+        creature.name,
+        creature.digest,
+        champion.fingerprint,
+        tuple(judged),
+        report,
+        config,
+        time.perf_counter() - began,
+    )
 
 
-def record(creature: Creature, champion: Champion, seconds: float, refine: int = 1, threads: int = 0) -> Recording:
+def record(
+    creature: Creature, champion: Champion, seconds: float, refine: int = 1, threads: int = 0
+) -> Recording:
     """The undisturbed walk, measured."""
-    outcome = simulate(creature, champion, nominal_starts(creature, 1), seconds, record=1, refine=refine, threads=threads)
+    outcome = simulate(
+        creature,
+        champion,
+        nominal_starts(creature, 1),
+        seconds,
+        record=1,
+        refine=refine,
+        threads=threads,
+    )
     return measure(creature, champion, outcome.trajectory)
 
 
-def survival(creature: Creature, champion: Champion, starts: int = 64, seconds: float = 22.0, seed: int = 0, threads: int = 0) -> float:
+def survival(
+    creature: Creature,
+    champion: Champion,
+    starts: int = 64,
+    seconds: float = 22.0,
+    seed: int = 0,
+    threads: int = 0,
+) -> float:
     """Share of perturbed starts that are up to the end and have moved forward."""
     disturbed = perturbed_starts(creature, starts, np.random.default_rng(seed))
     outcome = simulate(creature, champion, disturbed, seconds, threads=threads)
@@ -140,11 +193,21 @@ def distance(creature: Creature, champion: Champion, seconds: float) -> float:
     return float(simulate(creature, champion, nominal_starts(creature, 1), seconds).travel[0, 0])
 
 
-def push_ladder(creature: Creature, champion: Champion, config: CertificateConfig, threads: int = 0) -> dict[float, float]:
+def push_ladder(
+    creature: Creature, champion: Champion, config: CertificateConfig, threads: int = 0
+) -> dict[float, float]:
     """Share that stays up after each of the larger pushes, whose speeds are in units of sqrt(g * hip height)."""
     groups = _ladder(creature, config)
-    outcome = simulate(creature, champion, join(*groups), config.seconds, fall=config.upright, threads=threads)
-    return dict(zip(config.pushes.ladder, map(float, outcome.stayed_up.reshape(len(groups), -1).mean(1)), strict=True))
+    outcome = simulate(
+        creature, champion, join(*groups), config.seconds, fall=config.upright, threads=threads
+    )
+    return dict(
+        zip(
+            config.pushes.ladder,
+            map(float, outcome.stayed_up.reshape(len(groups), -1).mean(1)),
+            strict=True,
+        )
+    )
 
 
 def half_point(shares: dict[float, float]) -> float | None:
@@ -169,7 +232,13 @@ def _starts(creature: Creature, config: CertificateConfig) -> tuple[Starts, Star
             noise.friction,
             noise.masses,
         ),
-        pushed_starts(creature, push.count, np.random.default_rng([config.seed, 1]), push.speed * _unit_speed(creature), push.window),
+        pushed_starts(
+            creature,
+            push.count,
+            np.random.default_rng([config.seed, 1]),
+            push.speed * _unit_speed(creature),
+            push.window,
+        ),
     )
 
 
@@ -180,7 +249,12 @@ def _ladder(creature: Creature, config: CertificateConfig) -> list[Starts]:
     begin, end = settings.window[0], min(settings.window[0] + 2.0, settings.window[1])
     watched = np.full(settings.ladder_count, end + settings.ladder_seconds)
     speeds = [size * _unit_speed(creature) for size in settings.ladder]
-    return [dataclasses.replace(pushed_starts(creature, settings.ladder_count, rng, speed, (begin, end)), end=watched) for speed in speeds]
+    return [
+        dataclasses.replace(
+            pushed_starts(creature, settings.ladder_count, rng, speed, (begin, end)), end=watched
+        )
+        for speed in speeds
+    ]
 
 
 def _unit_speed(creature: Creature) -> float:

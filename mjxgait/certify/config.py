@@ -117,4 +117,6 @@ class CertificateConfig:
 
     def __post_init__(self) -> None:
         if self.warmup >= self.seconds:
-            raise ValueError(f"warmup = {self.warmup}: must be shorter than seconds = {self.seconds}")
+            raise ValueError(
+                f"warmup = {self.warmup}: must be shorter than seconds = {self.seconds}"
+            )

@@ -42,8 +42,15 @@ class Controller:
         self.creature = creature
         self.settings = champion.controller
         self.tuning = champion.tuning
-        self.cycle = pose_cycle(champion.key_poses, creature) if champion.controller.mirror else champion.key_poses
-        self.kp, self.kd = champion.controller.stiffness * creature.kp, champion.controller.damping * creature.kd
+        self.cycle = (
+            pose_cycle(champion.key_poses, creature)
+            if champion.controller.mirror
+            else champion.key_poses
+        )
+        self.kp, self.kd = (
+            champion.controller.stiffness * creature.kp,
+            champion.controller.damping * creature.kd,
+        )
         self.length = len(self.cycle) * champion.controller.interpolation
         data = mujoco.MjData(creature.model)
         data.qpos[:] = creature.stand_qpos
@@ -59,28 +66,47 @@ class Controller:
         f = (step / self.settings.interpolation)[:, None]
         return (1 - f) * self.cycle[a] + f * self.cycle[(a + 1) % len(self.cycle)]
 
-    def target(self, position: np.ndarray, senses: Senses, heading: float | None = None) -> np.ndarray:
+    def target(
+        self, position: np.ndarray, senses: Senses, heading: float | None = None
+    ) -> np.ndarray:
         """Target [S, J] in rad with steering and balance, within the joints' ranges; `heading` is the commanded one in rad."""
         creature = self.creature
         steer, pitch, roll = (part[:, None] for part in self.corrections(senses, heading))
-        stretched = creature.stand + (self.planned(position) - creature.stand) * (1 + steer * creature.steer_stride)
-        target = stretched + steer * creature.steer_bend + pitch * creature.balance_pitch + roll * creature.balance_roll
+        stretched = creature.stand + (self.planned(position) - creature.stand) * (
+            1 + steer * creature.steer_stride
+        )
+        target = (
+            stretched
+            + steer * creature.steer_bend
+            + pitch * creature.balance_pitch
+            + roll * creature.balance_roll
+        )
         return np.clip(target, creature.joint_low, creature.joint_high)
 
-    def corrections(self, senses: Senses, heading: float | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def corrections(
+        self, senses: Senses, heading: float | None = None
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """`u`, `p` and `r` of docs/controller.md, [S] each."""
         creature, gain = self.creature, self.tuning
         forward, left = senses.trunk_rot @ creature.forward, senses.trunk_rot @ creature.left
         wrong = np.arctan2(forward @ self.start_left, forward @ self.start_forward)
         if heading is None:
-            wrong = wrong + (senses.trunk_pos - self.start) @ self.start_left / (2 * creature.body_length)
+            wrong = wrong + (senses.trunk_pos - self.start) @ self.start_left / (
+                2 * creature.body_length
+            )
         else:
             wrong = wrong - heading
         nose_down = -np.arcsin(np.clip(forward[:, 2], -1, 1))
         right_down = np.arcsin(np.clip(left[:, 2], -1, 1))
         pitch = gain["pitch"] * nose_down + gain["pitch_rate"] * (senses.trunk_angvel * left).sum(1)
-        roll = gain["roll"] * right_down + gain["roll_rate"] * (senses.trunk_angvel * forward).sum(1)
-        return np.clip(gain["steer"] * wrong, -0.5, 0.5), np.clip(pitch, -0.5, 0.5), np.clip(roll, -0.5, 0.5)
+        roll = gain["roll"] * right_down + gain["roll_rate"] * (senses.trunk_angvel * forward).sum(
+            1
+        )
+        return (
+            np.clip(gain["steer"] * wrong, -0.5, 0.5),
+            np.clip(pitch, -0.5, 0.5),
+            np.clip(roll, -0.5, 0.5),
+        )
 
     def torque(self, target: np.ndarray, senses: Senses, time_step: float) -> np.ndarray:
         """Joint torques [S, J] in N·m that pull towards the target [S, J]; stable PD (Tan, Liu & Turk 2011) or plain PD."""
@@ -94,7 +120,9 @@ class Controller:
             wanted = spring_damper - time_step * self.kd * acceleration
         return np.clip(wanted, -creature.torque_limit, creature.torque_limit)
 
-    def _predicted_acceleration(self, spring_damper: np.ndarray, senses: Senses, time_step: float) -> np.ndarray:
+    def _predicted_acceleration(
+        self, spring_damper: np.ndarray, senses: Senses, time_step: float
+    ) -> np.ndarray:
         """Of the actuated joints [S, J], with the damping of the coming step taken implicitly."""
         dof = self.creature.dof_adr
         force = -senses.bias
@@ -105,11 +133,15 @@ class Controller:
         damped[:, dof, dof] += time_step * self.kd
         return np.linalg.solve(damped, force[..., None])[:, dof, 0]
 
-    def advance(self, position: np.ndarray, target: np.ndarray, joint_pos: np.ndarray, next_time: float) -> np.ndarray:
+    def advance(
+        self, position: np.ndarray, target: np.ndarray, joint_pos: np.ndarray, next_time: float
+    ) -> np.ndarray:
         """Positions [S] at the next control step, which starts at `next_time` in s; target, joint_pos [S, J]: of this step."""
         if self.settings.advance == "clock":
             # The nudge keeps a position that is whole in exact arithmetic from being rounded down.
-            return np.full_like(position, int(self.length * next_time / self.tuning["period"] + 1e-6) % self.length)
+            return np.full_like(
+                position, int(self.length * next_time / self.tuning["period"] + 1e-6) % self.length
+            )
         error = np.sqrt(((target - joint_pos) ** 2).mean(1))
         return np.where(error < self.tuning["threshold"], (position + 1) % self.length, position)
 

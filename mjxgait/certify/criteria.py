@@ -9,7 +9,13 @@ from typing import Literal
 
 import numpy as np
 
-from mjxgait.certify.config import CertificateConfig, GaitConfig, PeriodConfig, PhysicsConfig, ProgressConfig
+from mjxgait.certify.config import (
+    CertificateConfig,
+    GaitConfig,
+    PeriodConfig,
+    PhysicsConfig,
+    ProgressConfig,
+)
 from mjxgait.certify.measure import Recording
 from mjxgait.certify.simulate import Fall
 
@@ -31,15 +37,21 @@ class Measure:
     @property
     def passed(self) -> bool:
         """NaN never passes."""
-        return bool(self.value >= self.threshold if self.sense == ">=" else self.value <= self.threshold)
+        return bool(
+            self.value >= self.threshold if self.sense == ">=" else self.value <= self.threshold
+        )
 
     @property
     def margin(self) -> float:
         """Distance to the threshold in units of `room`: 1 at best, negative when failed."""
         if np.isnan(self.value):
             return -np.inf
-        distance = self.value - self.threshold if self.sense == ">=" else self.threshold - self.value
-        return float(min(distance / self.room, 1.0)) if self.room else (1.0 if self.passed else -1.0)
+        distance = (
+            self.value - self.threshold if self.sense == ">=" else self.threshold - self.value
+        )
+        return (
+            float(min(distance / self.room, 1.0)) if self.room else (1.0 if self.passed else -1.0)
+        )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -63,7 +75,9 @@ class Criterion:
 
 def at_least(name: str, value: float, threshold: float, best: float | None = None) -> Measure:
     """A measure that should be large; `best` is the value beyond which more is no better (twice the threshold if not given)."""
-    return Measure(name, float(value), ">=", threshold, (2 * threshold if best is None else best) - threshold)
+    return Measure(
+        name, float(value), ">=", threshold, (2 * threshold if best is None else best) - threshold
+    )
 
 
 def at_most(name: str, value: float, threshold: float) -> Measure:
@@ -104,10 +118,21 @@ def progress(window: Recording, config: ProgressConfig) -> Criterion:
         "progress",
         (
             at_least("strides", len(starts) - 1, config.strides),
-            at_least("shortest stride / mean stride", advance.min() / abs(advance.mean()), 0.0, 0.5),
-            at_least("speed (body lengths/s)", speed(window) / window.dimensions.body_length, config.speed),
+            at_least(
+                "shortest stride / mean stride", advance.min() / abs(advance.mean()), 0.0, 0.5
+            ),
+            at_least(
+                "speed (body lengths/s)",
+                speed(window) / window.dimensions.body_length,
+                config.speed,
+            ),
             at_most("drift / distance", _ratio(sideways, distance), config.drift),
-            at_least("second half / first half", second / first if first > 0 else np.nan, config.second_half, 1.0),
+            at_least(
+                "second half / first half",
+                second / first if first > 0 else np.nan,
+                config.second_half,
+                1.0,
+            ),
         ),
     )
 
@@ -119,7 +144,10 @@ def periodic(window: Recording, config: PeriodConfig) -> Criterion:
         peak = variation = np.nan
     else:
         signal = np.column_stack([window.joint_pos, window.pitch, window.roll])
-        peak, variation = autocorrelation_peak(signal, periods.mean()), periods.std() / periods.mean()
+        peak, variation = (
+            autocorrelation_peak(signal, periods.mean()),
+            periods.std() / periods.mean(),
+        )
     return Criterion(
         3,
         "periodic",
@@ -135,7 +163,9 @@ def autocorrelation_peak(signal: np.ndarray, period: float) -> float:
     # Without what changes slower than a stride: a wandering signal resembles itself at any shift.
     width = round(period)
     sums = np.cumsum(np.pad(signal, ((1, 0), (0, 0))), axis=0)
-    signal = signal[width // 2 :][: len(signal) - width + 1] - (sums[width:] - sums[:-width]) / width
+    signal = (
+        signal[width // 2 :][: len(signal) - width + 1] - (sums[width:] - sums[:-width]) / width
+    )
 
     def correlation(lag: int) -> float:
         early, late = signal[:-lag], signal[lag:]
@@ -148,12 +178,16 @@ def autocorrelation_peak(signal: np.ndarray, period: float) -> float:
 
 def starts(share: float, config: CertificateConfig) -> Criterion:
     """4. Share of the perturbed starts that stayed up."""
-    return Criterion(4, "perturbed starts", (at_least("share that stays up", share, config.starts.upright, 1.0),))
+    return Criterion(
+        4, "perturbed starts", (at_least("share that stays up", share, config.starts.upright, 1.0),)
+    )
 
 
 def pushes(share: float, config: CertificateConfig) -> Criterion:
     """5. Share of the pushed simulations that stayed up."""
-    return Criterion(5, "pushes", (at_least("share that stays up", share, config.pushes.upright, 1.0),))
+    return Criterion(
+        5, "pushes", (at_least("share that stays up", share, config.pushes.upright, 1.0),)
+    )
 
 
 def half_step(whole: Recording, halved: Recording, config: CertificateConfig) -> Criterion:
@@ -175,7 +209,11 @@ def half_step(whole: Recording, halved: Recording, config: CertificateConfig) ->
 def basic(whole: Recording, config: CertificateConfig) -> tuple[Criterion, Criterion, Criterion]:
     """Criteria 1 to 3 of one recording."""
     window = whole.window(config.warmup)
-    return upright(whole, window, config.upright), progress(window, config.progress), periodic(window, config.period)
+    return (
+        upright(whole, window, config.upright),
+        progress(window, config.progress),
+        periodic(window, config.period),
+    )
 
 
 def gait(window: Recording, config: GaitConfig) -> Criterion:
@@ -188,10 +226,26 @@ def gait(window: Recording, config: GaitConfig) -> Criterion:
         7,
         "gait",
         (
-            at_most("stride frequency / animal's", frequency / (4.48 * size.mass**-0.14), config.frequency),
-            at_least("stride length / hip height", speed(window) / frequency / size.hip_height, config.stride_length),
-            at_least("least clearance / hip height", clearances(window).min(initial=np.inf) / size.hip_height, config.clearance),
-            at_most("worst foot's slip / distance", _ratio(slip_distance(window).max(), _distance(window)), config.slip),
+            at_most(
+                "stride frequency / animal's",
+                frequency / (4.48 * size.mass**-0.14),
+                config.frequency,
+            ),
+            at_least(
+                "stride length / hip height",
+                speed(window) / frequency / size.hip_height,
+                config.stride_length,
+            ),
+            at_least(
+                "least clearance / hip height",
+                clearances(window).min(initial=np.inf) / size.hip_height,
+                config.clearance,
+            ),
+            at_most(
+                "worst foot's slip / distance",
+                _ratio(slip_distance(window).max(), _distance(window)),
+                config.slip,
+            ),
             at_least("least duty factor", duty.min(), low),
             Measure("greatest duty factor", float(duty.max()), "<=", high, 1 - high),
         ),
@@ -207,7 +261,9 @@ def stride_frequency(window: Recording, clearance: float) -> float:
     if len(starts) < 2:
         return np.nan
     cycles = 1 / (float(np.diff(starts).mean()) * window.time_step)
-    swings = [_swings(height, clearance * window.dimensions.hip_height) for height in window.foot_height.T]
+    swings = [
+        _swings(height, clearance * window.dimensions.hip_height) for height in window.foot_height.T
+    ]
     return max(cycles, float(np.median(swings)) / (len(window.position) * window.time_step))
 
 
@@ -231,10 +287,26 @@ def physics(window: Recording, config: PhysicsConfig) -> Criterion:
         "physics",
         (
             at_most("joint speed (rad/s)", np.abs(window.joint_vel).max(), config.joint_speed),
-            at_most("joint past its range (rad)", joint_overrun(window).max(), config.joint_overrun),
-            at_most("body speed / sqrt(g h)", window.body_speed.max() / np.sqrt(size.gravity * size.hip_height), config.body_speed),
-            at_most("penetration / hip height", window.penetration.max() / size.hip_height, config.penetration),
-            Measure("torque / limit", float((np.abs(window.torque) / size.torque_limit).max()), "<=", config.torque, 0.0),
+            at_most(
+                "joint past its range (rad)", joint_overrun(window).max(), config.joint_overrun
+            ),
+            at_most(
+                "body speed / sqrt(g h)",
+                window.body_speed.max() / np.sqrt(size.gravity * size.hip_height),
+                config.body_speed,
+            ),
+            at_most(
+                "penetration / hip height",
+                window.penetration.max() / size.hip_height,
+                config.penetration,
+            ),
+            Measure(
+                "torque / limit",
+                float((np.abs(window.torque) / size.torque_limit).max()),
+                "<=",
+                config.torque,
+                0.0,
+            ),
         ),
     )
 

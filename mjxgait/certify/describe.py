@@ -99,7 +99,10 @@ def _biped(phases: np.ndarray, walking: bool) -> str:
 
 def _quadruped(places: np.ndarray, duty: np.ndarray, phases: np.ndarray) -> str:
     order = np.argsort(-places[:, 0])
-    front, hind = sorted(order[:2], key=lambda n: -places[n, 1]), sorted(order[2:], key=lambda n: -places[n, 1])
+    front, hind = (
+        sorted(order[:2], key=lambda n: -places[n, 1]),
+        sorted(order[2:], key=lambda n: -places[n, 1]),
+    )
     fl, fr, hl, hr = (float(phases[n]) for n in (*front, *hind))
     front_pair, hind_pair = _apart(fl, fr), _apart(hl, hr)
     if max(front_pair, hind_pair) < 0.15:
@@ -107,7 +110,12 @@ def _quadruped(places: np.ndarray, duty: np.ndarray, phases: np.ndarray) -> str:
     if min(front_pair, hind_pair) < 0.35:
         return "gallop" if duty.mean() < 0.5 else "walk"
     # Symmetrical gaits: how far a fore foot follows the hind foot of its side.
-    lag = float(np.angle(np.exp(2j * np.pi * (fl - hl)) + np.exp(2j * np.pi * (fr - hr))) / (2 * np.pi)) % 1.0
+    lag = (
+        float(
+            np.angle(np.exp(2j * np.pi * (fl - hl)) + np.exp(2j * np.pi * (fr - hr))) / (2 * np.pi)
+        )
+        % 1.0
+    )
     if _apart(lag, 0.5) < 0.125:
         return "trot"
     if _apart(lag, 0.0) < 0.125:
@@ -118,10 +126,19 @@ def _quadruped(places: np.ndarray, duty: np.ndarray, phases: np.ndarray) -> str:
 
 
 def _many_legs(places: np.ndarray, duty: np.ndarray, phases: np.ndarray) -> str:
-    sides = [sorted(np.flatnonzero(side), key=lambda n: -places[n, 0]) for side in (places[:, 1] > 0, places[:, 1] <= 0)]
+    sides = [
+        sorted(np.flatnonzero(side), key=lambda n: -places[n, 0])
+        for side in (places[:, 1] > 0, places[:, 1] <= 0)
+    ]
     if len(sides[0]) != len(sides[1]):
         return "walk"
-    turn = np.array([[(rank + side) % 2 * 0.5, phases[n]] for side, feet in enumerate(sides) for rank, n in enumerate(feet)])
+    turn = np.array(
+        [
+            [(rank + side) % 2 * 0.5, phases[n]]
+            for side, feet in enumerate(sides)
+            for rank, n in enumerate(feet)
+        ]
+    )
     together = abs(np.exp(2j * np.pi * (turn[:, 1] - turn[:, 0])).mean())
     if together > 0.8:
         return "tripod" if len(duty) == 6 else "alternating"

@@ -39,7 +39,9 @@ class LowestPoint:
     def heights(self, xpos: np.ndarray, xmat: np.ndarray) -> np.ndarray:
         """[S, geoms] m, from all geoms' positions [S, ngeom, 3] and rotations [S, ngeom, 9]."""
         down = np.abs(xmat[:, self.geoms, 6:])
-        reach = self.radius + (down * self.box).sum(2) + np.sqrt(((down * self.ellipsoid) ** 2).sum(2))
+        reach = (
+            self.radius + (down * self.box).sum(2) + np.sqrt(((down * self.ellipsoid) ** 2).sum(2))
+        )
         return xpos[:, self.geoms, 2] - reach - self.floor
 
     def lowest(self, xpos: np.ndarray, xmat: np.ndarray) -> np.ndarray:

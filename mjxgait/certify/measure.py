@@ -77,8 +77,14 @@ class Recording:
 
     def window(self, begin: float, end: float = np.inf) -> "Recording":
         """The frames from `begin` to `end` in s."""
-        frames = slice(round(begin / self.time_step), None if np.isinf(end) else round(end / self.time_step))
-        arrays = {f.name: getattr(self, f.name)[frames] for f in dataclasses.fields(self) if isinstance(getattr(self, f.name), np.ndarray)}
+        frames = slice(
+            round(begin / self.time_step), None if np.isinf(end) else round(end / self.time_step)
+        )
+        arrays = {
+            f.name: getattr(self, f.name)[frames]
+            for f in dataclasses.fields(self)
+            if isinstance(getattr(self, f.name), np.ndarray)
+        }
         return dataclasses.replace(self, **arrays)
 
 
@@ -99,14 +105,19 @@ def dimensions(creature: Creature) -> Dimensions:
         mass=creature.mass,
         gravity=float(-model.opt.gravity[2]),
         torque_limit=tuple(map(float, creature.torque_limit)),
-        joint_range=tuple((float(low), float(high)) for low, high in zip(creature.joint_low, creature.joint_high, strict=True)),
+        joint_range=tuple(
+            (float(low), float(high))
+            for low, high in zip(creature.joint_low, creature.joint_high, strict=True)
+        ),
         foot_names=creature.foot_names,
         foot_places=tuple((float(forward), float(left)) for forward, left in middles),
         crawler=len(creature.ground) > 0,
     )
 
 
-def measure(creature: Creature, champion: Champion, trajectory: Trajectory, row: int = 0) -> Recording:
+def measure(
+    creature: Creature, champion: Champion, trajectory: Trajectory, row: int = 0
+) -> Recording:
     """Looks at one undisturbed simulation again: every stored frame is given to C MuJoCo, whose contacts are then read.
 
     Frames after a simulation blew up are NaN, which no criterion accepts.
@@ -118,14 +129,18 @@ def measure(creature: Creature, champion: Champion, trajectory: Trajectory, row:
         if not (np.isfinite(qpos[k]).all() and np.isfinite(qvel[k]).all()):
             break
         sight.look(k, qpos[k], qvel[k], torque[k])
-    forward, left, up = (sight.trunk_rot @ axis for axis in (creature.forward, creature.left, creature.up))
+    forward, left, up = (
+        sight.trunk_rot @ axis for axis in (creature.forward, creature.left, creature.up)
+    )
     moved = sight.trunk_pos - controller.start * [1, 1, 0]
     return Recording(
         dimensions=dimensions(creature),
         time_step=trajectory.time_step,
         cycle_length=controller.length,
         position=trajectory.position[row],
-        trunk_pos=np.stack([moved @ controller.start_forward, moved @ controller.start_left, moved[:, 2]], 1),
+        trunk_pos=np.stack(
+            [moved @ controller.start_forward, moved @ controller.start_left, moved[:, 2]], 1
+        ),
         trunk_up=up[:, 2],
         pitch=-np.arcsin(np.clip(forward[:, 2], -1, 1)),
         roll=np.arcsin(np.clip(left[:, 2], -1, 1)),
@@ -154,19 +169,35 @@ class _Sight:
         self.foot_of_geom[foot_geoms] = creature.foot_of
         self.may_touch = np.isin(np.arange(self.model.ngeom), [*foot_geoms, *creature.ground])
         self.floor = self.model.geom("floor").id
-        self.trunk_pos, self.trunk_rot = np.full((frames, 3), np.nan), np.full((frames, 3, 3), np.nan)
-        self.foot_force, self.foot_slip, self.foot_height = (np.full((frames, feet), np.nan) for _ in range(3))
-        self.touch, self.penetration, self.body_speed = np.ones(frames, bool), np.full(frames, np.nan), np.full(frames, np.nan)
+        self.trunk_pos, self.trunk_rot = (
+            np.full((frames, 3), np.nan),
+            np.full((frames, 3, 3), np.nan),
+        )
+        self.foot_force, self.foot_slip, self.foot_height = (
+            np.full((frames, feet), np.nan) for _ in range(3)
+        )
+        self.touch, self.penetration, self.body_speed = (
+            np.ones(frames, bool),
+            np.full(frames, np.nan),
+            np.full(frames, np.nan),
+        )
 
     def look(self, k: int, qpos: np.ndarray, qvel: np.ndarray, torque: np.ndarray) -> None:
         data, creature = self.data, self.creature
         data.qpos[:], data.qvel[:] = qpos, qvel
         data.qfrc_applied[creature.dof_adr] = torque
         mujoco.mj_forward(self.model, data)
-        self.trunk_pos[k], self.trunk_rot[k] = data.xpos[creature.trunk], data.xmat[creature.trunk].reshape(3, 3)
+        self.trunk_pos[k], self.trunk_rot[k] = (
+            data.xpos[creature.trunk],
+            data.xmat[creature.trunk].reshape(3, 3),
+        )
         heights = self.reach.heights(data.geom_xpos[None], data.geom_xmat[None])[0]
-        self.foot_height[k] = [heights[creature.foot_of == n].min() for n in range(len(creature.foot_names))]
-        self.body_speed[k] = np.linalg.norm(_velocity(data, data.xipos, np.arange(self.model.nbody))[1:], axis=1).max()
+        self.foot_height[k] = [
+            heights[creature.foot_of == n].min() for n in range(len(creature.foot_names))
+        ]
+        self.body_speed[k] = np.linalg.norm(
+            _velocity(data, data.xipos, np.arange(self.model.nbody))[1:], axis=1
+        ).max()
         self._contacts(k)
 
     def _contacts(self, k: int) -> None:
@@ -182,7 +213,9 @@ class _Sight:
         # On a horizontal floor the tangential part is the horizontal one.
         slip = np.hypot(velocity[:, 0], velocity[:, 1])
         force = np.zeros(6)
-        for i, foot, speed in zip(np.flatnonzero(on_floor), self.foot_of_geom[geom], slip, strict=True):
+        for i, foot, speed in zip(
+            np.flatnonzero(on_floor), self.foot_of_geom[geom], slip, strict=True
+        ):
             if foot >= 0:
                 mujoco.mj_contactForce(self.model, data, i, force)
                 self.foot_force[k, foot] += force[0]

@@ -42,7 +42,9 @@ class Fall:
 
     def __post_init__(self) -> None:
         if not self.height[0] < 1 < self.height[1]:
-            raise ValueError(f"height = {list(self.height)}: must be a range around 1, the standing height")
+            raise ValueError(
+                f"height = {list(self.height)}: must be a range around 1, the standing height"
+            )
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -115,7 +117,9 @@ def simulate(
     fall = fall or Fall()
 
     def run(share: np.ndarray) -> Outcome:
-        return _Run(creature, champion, starts.rows(share), int((share < record).sum()), refine, fall).to_the_end(steps, heading)
+        return _Run(
+            creature, champion, starts.rows(share), int((share < record).sum()), refine, fall
+        ).to_the_end(steps, heading)
 
     with concurrent.futures.ThreadPoolExecutor(len(shares)) as pool:
         parts = list(pool.map(run, shares))
@@ -126,7 +130,8 @@ def simulate(
         fell=np.concatenate([p.fell for p in parts])[order],
         travel=np.concatenate([p.travel for p in parts])[order],
         trajectory=Trajectory(
-            creature.model.opt.timestep, *(np.concatenate([getattr(p.trajectory, f) for p in parts])[kept] for f in fields)
+            creature.model.opt.timestep,
+            *(np.concatenate([getattr(p.trajectory, f) for p in parts])[kept] for f in fields),
         ),
     )
 
@@ -134,8 +139,22 @@ def simulate(
 class _Run:
     """The simulations of one thread, of which the first `record` are recorded."""
 
-    def __init__(self, creature: Creature, champion: Champion, starts: Starts, record: int, refine: int, fall: Fall) -> None:
-        self.creature, self.starts, self.record, self.refine, self.fall = creature, starts, record, refine, fall
+    def __init__(
+        self,
+        creature: Creature,
+        champion: Champion,
+        starts: Starts,
+        record: int,
+        refine: int,
+        fall: Fall,
+    ) -> None:
+        self.creature, self.starts, self.record, self.refine, self.fall = (
+            creature,
+            starts,
+            record,
+            refine,
+            fall,
+        )
         self.controller = Controller(creature, champion)
         self.model = examined_model(creature, refine)
         self.batch = _batch(creature, self.model, starts)
@@ -145,7 +164,11 @@ class _Run:
         bind = self.batch.bind
         self.qpos, self.qvel, self.applied = bind("qpos"), bind("qvel"), bind("qfrc_applied")
         self.xpos, self.xmat, self.mass = bind("xpos"), bind("xmat"), bind("M")
-        self.bias, self.passive, self.constraint = bind("qfrc_bias"), bind("qfrc_passive"), bind("qfrc_constraint")
+        self.bias, self.passive, self.constraint = (
+            bind("qfrc_bias"),
+            bind("qfrc_passive"),
+            bind("qfrc_constraint"),
+        )
         self.geom_xpos, self.geom_xmat = bind("geom_xpos"), bind("geom_xmat")
         self._lift()
         self.position = np.zeros(len(starts), dtype=int)
@@ -169,10 +192,16 @@ class _Run:
             fell[down] = np.minimum(fell[down], (k + 1) * time_step)
             watched = (k + 1) * time_step < self.starts.end[running]
             if len(down) or not watched.all():
-                running = running[watched & self._sane(running) & ((running < self.record) | np.isinf(fell[running]))]
+                running = running[
+                    watched
+                    & self._sane(running)
+                    & ((running < self.record) | np.isinf(fell[running]))
+                ]
         return Outcome(fell, travel, film)
 
-    def _control_step(self, running: np.ndarray, k: int, heading: float | None, film: Trajectory) -> None:
+    def _control_step(
+        self, running: np.ndarray, k: int, heading: float | None, film: Trajectory
+    ) -> None:
         kept = running[running < self.record]
         film.qpos[kept, k], film.qvel[kept, k] = self.qpos[kept], self.qvel[kept]
         film.position[kept, k] = self.position[kept]
@@ -180,9 +209,13 @@ class _Run:
         film.torque[kept, k] = torque[: len(kept)]
         for _ in range(self.refine - 1):
             self.batch.step(running, stage=VELOCITY_STAGE)
-        self.position[running] = self.controller.advance(self.position[running], target, reached, (k + 1) * film.time_step)
+        self.position[running] = self.controller.advance(
+            self.position[running], target, reached, (k + 1) * film.time_step
+        )
 
-    def _physics_step(self, running: np.ndarray, heading: float | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _physics_step(
+        self, running: np.ndarray, heading: float | None
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Target, joint positions before the step, and torque, [running, J] each."""
         senses = self._senses(running)
         target = self.controller.target(self.position[running], senses, heading)
@@ -203,7 +236,9 @@ class _Run:
             trunk_pos=self.xpos[running, creature.trunk],
             trunk_rot=rot,
             # A free joint's angular velocity is in the body's own frame.
-            trunk_angvel=(rot * velocity[:, None, self.layout.root_dof + 3 : self.layout.root_dof + 6]).sum(2),
+            trunk_angvel=(
+                rot * velocity[:, None, self.layout.root_dof + 3 : self.layout.root_dof + 6]
+            ).sum(2),
             mass_matrix=self.layout.dense(self.mass[running]),
             bias=self.bias[running] - self.passive[running],
             constraint_force=self.last_force[running],
@@ -216,19 +251,25 @@ class _Run:
         standing.qpos[:] = self.creature.stand_qpos
         mujoco.mj_kinematics(self.model, standing)
         usual = self.solid.lowest(standing.geom_xpos[None], standing.geom_xmat[None])
-        self.qpos[:, self.layout.root_qpos + 2] += np.maximum(usual - self.solid.lowest(self.geom_xpos, self.geom_xmat), 0)
+        self.qpos[:, self.layout.root_qpos + 2] += np.maximum(
+            usual - self.solid.lowest(self.geom_xpos, self.geom_xmat), 0
+        )
         self.batch.forward(stage=VELOCITY_STAGE)
 
     def _push(self, running: np.ndarray, k: int) -> None:
         time_step = self.creature.model.opt.timestep
         pushed = running[np.floor(self.starts.push_time[running] / time_step) == k]
         if len(pushed):
-            self.qvel[pushed, self.layout.root_dof : self.layout.root_dof + 2] += self.starts.push[pushed]
+            self.qvel[pushed, self.layout.root_dof : self.layout.root_dof + 2] += self.starts.push[
+                pushed
+            ]
             self.batch.forward(pushed, stage=VELOCITY_STAGE)
 
     def _travel(self, running: np.ndarray) -> np.ndarray:
         moved = self.xpos[running, self.creature.trunk] - self.controller.start
-        return np.stack([moved @ self.controller.start_forward, moved @ self.controller.start_left], 1)
+        return np.stack(
+            [moved @ self.controller.start_forward, moved @ self.controller.start_left], 1
+        )
 
     def _sane(self, running: np.ndarray) -> np.ndarray:
         return (np.abs(self.qvel[running]) < BLOWN_UP).all(1)
@@ -238,7 +279,12 @@ class _Run:
         trunk = self.creature.trunk
         up = self.xmat[running, trunk].reshape(-1, 3, 3)[:, 2] @ self.creature.up
         height = self.xpos[running, trunk, 2] / self.creature.stand_height
-        fine = self._sane(running) & (up > self.fall.min_up) & (height > self.fall.height[0]) & (height < self.fall.height[1])
+        fine = (
+            self._sane(running)
+            & (up > self.fall.min_up)
+            & (height > self.fall.height[0])
+            & (height < self.fall.height[1])
+        )
         if self.fall.touch:
             fine &= self.forbidden.lowest(self.geom_xpos[running], self.geom_xmat[running]) > 0
         return ~fine
@@ -249,7 +295,13 @@ class _Run:
 
         position = np.zeros((self.record, steps), dtype=int)
         time_step = self.creature.model.opt.timestep
-        return Trajectory(time_step, blank(self.model.nq), blank(self.model.nv), blank(len(self.creature.dof_adr)), position)
+        return Trajectory(
+            time_step,
+            blank(self.model.nq),
+            blank(self.model.nv),
+            blank(len(self.creature.dof_adr)),
+            position,
+        )
 
 
 def _batch(creature: Creature, model: mujoco.MjModel, starts: Starts) -> Batch:

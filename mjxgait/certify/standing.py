@@ -18,11 +18,15 @@ def read_certificate(path: Path) -> dict[str, Any] | None:
         return None
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
-        whole = isinstance(document["passed"], bool) and all({"number", "passed", "measures"} <= set(c) for c in document["criteria"])
+        whole = isinstance(document["passed"], bool) and all(
+            {"number", "passed", "measures"} <= set(c) for c in document["criteria"]
+        )
     except (OSError, ValueError, KeyError, TypeError):
         whole = False
     if not whole:
-        raise UserError(f"{path}: not a certificate; `mjxgait certify {path.parent}` writes it anew")
+        raise UserError(
+            f"{path}: not a certificate; `mjxgait certify {path.parent}` writes it anew"
+        )
     return document
 
 

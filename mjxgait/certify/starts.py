@@ -30,12 +30,19 @@ class Starts:
 
     def rows(self, index: slice | np.ndarray) -> "Starts":
         """Some of the simulations."""
-        return Starts(**{field.name: getattr(self, field.name)[index] for field in dataclasses.fields(self)})
+        return Starts(
+            **{field.name: getattr(self, field.name)[index] for field in dataclasses.fields(self)}
+        )
 
 
 def join(*parts: Starts) -> Starts:
     """All simulations of the parts, in order."""
-    return Starts(**{f.name: np.concatenate([getattr(p, f.name) for p in parts]) for f in dataclasses.fields(Starts)})
+    return Starts(
+        **{
+            f.name: np.concatenate([getattr(p, f.name) for p in parts])
+            for f in dataclasses.fields(Starts)
+        }
+    )
 
 
 def nominal_starts(creature: Creature, count: int) -> Starts:
@@ -73,10 +80,18 @@ def perturbed_starts(
 
 
 def pushed_starts(
-    creature: Creature, count: int, rng: np.random.Generator, speed: float | np.ndarray, window: tuple[float, float]
+    creature: Creature,
+    count: int,
+    rng: np.random.Generator,
+    speed: float | np.ndarray,
+    window: tuple[float, float],
 ) -> Starts:
     """Pushes of a speed in m/s ([] or [count]) at uniform moments of a window in s, each quarter of the compass equally often."""
     sector = (np.arange(count) + rng.random(count)) / count
     direction = 2 * np.pi * rng.permutation(sector)
-    push = np.broadcast_to(speed, (count,))[:, None] * np.stack([np.cos(direction), np.sin(direction)], 1)
-    return dataclasses.replace(nominal_starts(creature, count), push=push, push_time=rng.uniform(*window, count))
+    push = np.broadcast_to(speed, (count,))[:, None] * np.stack(
+        [np.cos(direction), np.sin(direction)], 1
+    )
+    return dataclasses.replace(
+        nominal_starts(creature, count), push=push, push_time=rng.uniform(*window, count)
+    )

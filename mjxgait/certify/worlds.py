@@ -17,7 +17,9 @@ THICKNESS = 1.0
 """Of the uneven ground in m, more than anything sinks in."""
 
 
-def uneven(creature: Creature, amplitude: float, rng: np.random.Generator, reach: float = 40.0) -> Creature:
+def uneven(
+    creature: Creature, amplitude: float, rng: np.random.Generator, reach: float = 40.0
+) -> Creature:
     """The floor as a height field around the start, `reach` m to each side.
 
     At the corners of a grid of half a hip height the heights are uniform in ±`amplitude` m; triangles join them. The start is level: the
@@ -26,7 +28,13 @@ def uneven(creature: Creature, amplitude: float, rng: np.random.Generator, reach
     spec = mujoco.MjSpec.from_string(creature.files["creature.xml"])
     side = 2 * round(2 * reach / creature.hip_height) + 1
     # The compiler stretches heights to the full range, so they are set afterwards.
-    spec.add_hfield(name="bumps", nrow=side, ncol=side, size=[reach, reach, 2 * amplitude, THICKNESS], userdata=np.zeros(side**2))
+    spec.add_hfield(
+        name="bumps",
+        nrow=side,
+        ncol=side,
+        size=[reach, reach, 2 * amplitude, THICKNESS],
+        userdata=np.zeros(side**2),
+    )
     floor = spec.geom(FLOOR)
     floor.type, floor.hfieldname = mujoco.mjtGeom.mjGEOM_HFIELD, "bumps"
     floor.pos = floor.pos + np.array([*creature.stand_pos[:2], -amplitude])
@@ -46,7 +54,9 @@ def sloping(creature: Creature, angle: float) -> Creature:
     model = copy.copy(creature.model)
     forward = (creature.stand_rot @ creature.forward) * [1.0, 1.0, 0.0]
     forward /= np.linalg.norm(forward)
-    model.opt.gravity[:] = model.opt.gravity[2] * (np.sin(angle) * forward + [0.0, 0.0, np.cos(angle)])
+    model.opt.gravity[:] = model.opt.gravity[2] * (
+        np.sin(angle) * forward + [0.0, 0.0, np.cos(angle)]
+    )
     return dataclasses.replace(creature, model=model)
 
 

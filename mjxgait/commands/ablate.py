@@ -59,17 +59,26 @@ def ablate_command(arguments: Sequence[str]) -> int:
     from mjxgait.ablation.plan import make_plan, read_study
     from mjxgait.ablation.report import write_report
 
-    folder = options.resume or options.out or Path("runs") / f"ablate-{options.study.stem if options.study else ''}"
+    folder = (
+        options.resume
+        or options.out
+        or Path("runs") / f"ablate-{options.study.stem if options.study else ''}"
+    )
     if options.resume:
         study, creature = _open(folder)
     else:
         if options.study is None:
-            raise UserError("name the file of a study, such as: mjxgait ablate forced_evolution --out runs/forced")
+            raise UserError(
+                "name the file of a study, such as: mjxgait ablate forced_evolution --out runs/forced"
+            )
         over = {name: getattr(options, name) for name in OVER}
         study = read_study(options.study, over)
         creature = load_creature(find_creature(study.env))
     plan = make_plan(study, creature, str(options.study or folder / STUDY))
-    from mjxgait.ablation.rows import groups, run_study  # JAX takes a second to import: only once the study is known to be good
+    from mjxgait.ablation.rows import (
+        groups,
+        run_study,
+    )  # JAX takes a second to import: only once the study is known to be good
     from mjxgait.experiment import prepare_devices
 
     prepare_devices()
@@ -80,7 +89,9 @@ def ablate_command(arguments: Sequence[str]) -> int:
         f"about {_duration(3600 * hours)} at most on two cores"
     )
     if hours > options.hours:
-        raise UserError(f"this study may take {hours:.0f} hours; take fewer --seeds or --generations, or allow it with --hours {hours:.0f}")
+        raise UserError(
+            f"this study may take {hours:.0f} hours; take fewer --seeds or --generations, or allow it with --hours {hours:.0f}"
+        )
     if options.dry_run:
         return 0
     if not options.resume:
@@ -107,7 +118,10 @@ class _Progress:
             return
         left = (news["of"] - news["generation"]) * news["seconds"]
         speed = news["steps"] / news["seconds"] / 1e6
-        print(f"{where}: generation {news['generation']} of {news['of']}, {speed:.2f} M steps/s, {_duration(left)} left", flush=True)
+        print(
+            f"{where}: generation {news['generation']} of {news['of']}, {speed:.2f} M steps/s, {_duration(left)} left",
+            flush=True,
+        )
 
     def measuring(self, number: int, count: int) -> None:
         print(f"{number} of {count} champions examined in C MuJoCo", flush=True)
@@ -117,7 +131,9 @@ def _create(folder: Path, study: Any, creature: Creature) -> None:
     """Makes the folder of a study with its exact file and creature."""
     try:
         if folder.exists() and any(folder.iterdir()):
-            raise UserError(f"{folder}: holds something already; name another folder with --out, or go on with --resume {folder}")
+            raise UserError(
+                f"{folder}: holds something already; name another folder with --out, or go on with --resume {folder}"
+            )
         (folder / CREATURE).mkdir(parents=True, exist_ok=True)
         for name, text in creature.files.items():
             (folder / CREATURE / name).write_text(text, encoding="utf-8")
@@ -131,7 +147,9 @@ def _open(folder: Path) -> tuple[Any, Creature]:
 
     if not (folder / STUDY).is_file():
         raise UserError(f"{folder}: not the folder of a study (it has no {STUDY})")
-    return build(Study, read_toml(folder / STUDY), str(folder / STUDY)), load_creature(folder / CREATURE)
+    return build(Study, read_toml(folder / STUDY), str(folder / STUDY)), load_creature(
+        folder / CREATURE
+    )
 
 
 def _repeatable(options: AblateOptions) -> list[str]:
@@ -150,4 +168,10 @@ def _hours(steps: int, programs: int) -> float:
 
 
 def _duration(seconds: float) -> str:
-    return f"{seconds / 3600:.1f} h" if seconds > 5400 else f"{seconds / 60:.0f} min" if seconds > 90 else f"{seconds:.0f} s"
+    return (
+        f"{seconds / 3600:.1f} h"
+        if seconds > 5400
+        else f"{seconds / 60:.0f} min"
+        if seconds > 90
+        else f"{seconds:.0f} s"
+    )

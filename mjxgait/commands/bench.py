@@ -44,10 +44,14 @@ def bench_command(arguments: Sequence[str]) -> int:
     folder = find_creature(options.env)
     settings = load_creature(folder).settings
     config = resolve_config(settings.train, settings.creature.name)
-    config = dataclasses.replace(config, evolution=dataclasses.replace(config.evolution, population=options.population))
+    config = dataclasses.replace(
+        config, evolution=dataclasses.replace(config.evolution, population=options.population)
+    )
     from mjxgait.bench.contest import append_history, contest  # JAX takes a second to import
 
-    result = contest(folder, config, options.rounds, options.generations, lambda line: print(line, flush=True))
+    result = contest(
+        folder, config, options.rounds, options.generations, lambda line: print(line, flush=True)
+    )
     _write(options.json, result)
     if options.scaling:
         from mjxgait.bench.scaling import draw, scaling_points
@@ -71,7 +75,15 @@ def _summary(result: dict) -> str:
     lines = []
     for name, rate in result["creature_steps_per_second"].items():
         ratio = result.get(f"ratio_over_{name}")
-        lines.append(f"{name:14} {rate['median']:>10,.0f} creature-steps/s" + (f"   ours is {ratio:.2f} x" if ratio else ""))
+        lines.append(
+            f"{name:14} {rate['median']:>10,.0f} creature-steps/s"
+            + (f"   ours is {ratio:.2f} x" if ratio else "")
+        )
     lines += [f"{name:14} left out: {why}" for name, why in result["left_out"].items()]
     share = result["limit"]["share_of_bound"]
-    return "\n".join([*lines, f"of the measured peak: {share['flops']:.1%} of arithmetic, {share['cache_bytes']:.1%} of cache traffic"])
+    return "\n".join(
+        [
+            *lines,
+            f"of the measured peak: {share['flops']:.1%} of arithmetic, {share['cache_bytes']:.1%} of cache traffic",
+        ]
+    )

@@ -32,7 +32,11 @@ def certify_command(arguments: Sequence[str]) -> int:
     options = tyro.cli(CertifyOptions, args=list(arguments), prog="mjxgait certify")
     creature, _ = open_run(options.run)
     champion = read_champion(options.run / CHAMPION, creature)
-    config = build(CertificateConfig, read_toml(options.config), str(options.config)) if options.config else CertificateConfig()
+    config = (
+        build(CertificateConfig, read_toml(options.config), str(options.config))
+        if options.config
+        else CertificateConfig()
+    )
     from mjxgait.screen import Screen  # rich is slow to import
 
     certificate = certify(creature, champion, config)

@@ -34,10 +34,14 @@ def export_command(arguments: Sequence[str]) -> int:
     from mjxgait.viewing.cast import LOOP_SECONDS, champion_of
 
     if options.out.suffix.lower() != ".glb":
-        raise UserError(f'{options.out}: cannot write "{options.out.suffix}"; end the name with .glb')
+        raise UserError(
+            f'{options.out}: cannot write "{options.out.suffix}"; end the name with .glb'
+        )
     loop = walk_loop(champion_of(options.run, LOOP_SECONDS).walk, options.rate)
     export_glb(loop, options.out, options.travelling)
     size = options.out.stat().st_size / 1024
     strides = "1 stride" if loop.strides == 1 else f"{loop.strides} strides"
-    print(f"{options.out} ({size:,.0f} KiB): {strides}, {loop.times[-1]:.2f} s at {loop.rate} frames/s, {loop.speed:.2f} m/s")
+    print(
+        f"{options.out} ({size:,.0f} KiB): {strides}, {loop.times[-1]:.2f} s at {loop.rate} frames/s, {loop.speed:.2f} m/s"
+    )
     return 0

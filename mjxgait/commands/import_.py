@@ -42,13 +42,22 @@ class ImportOptions:
 def import_command(arguments: Sequence[str]) -> int:
     """Returns the exit code."""
     options = tyro.cli(ImportOptions, args=list(arguments), prog="mjxgait import")
-    choices = ImportChoices(options.name, tuple(map(Path, options.search)), options.keep, options.freeze, options.up, options.forward)
+    choices = ImportChoices(
+        options.name,
+        tuple(map(Path, options.search)),
+        options.keep,
+        options.freeze,
+        options.up,
+        options.forward,
+    )
     imported = import_model(options.model, choices)
     write_folder(options.out, imported)
     print(imported.notes.text())
     print(f"wrote {options.out}; look at it with: mjxgait check {options.out}")
     if not imported.stands:
-        print("It does not stand by itself; it may still learn to walk, or edit the keyframe in creature.xml.")
+        print(
+            "It does not stand by itself; it may still learn to walk, or edit the keyframe in creature.xml."
+        )
     return 0
 
 
@@ -58,7 +67,9 @@ def write_folder(folder: Path, imported: Imported) -> None:
     Raises:
       UserError: the folder holds something else, or cannot be written.
     """
-    if folder.exists() and (not folder.is_dir() or any(file.name not in imported.files for file in folder.iterdir())):
+    if folder.exists() and (
+        not folder.is_dir() or any(file.name not in imported.files for file in folder.iterdir())
+    ):
         raise UserError(f"{folder}: holds something else; name another folder with --out")
     try:
         folder.mkdir(parents=True, exist_ok=True)

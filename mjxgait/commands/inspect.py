@@ -52,14 +52,27 @@ def inspect_command(arguments: Sequence[str]) -> int:
         return 0
 
     if options.diff:
-        if options.path is not None or options.generation is not None or options.individual is not None:
-            raise UserError("--diff takes two runs or checkpoints (such as RUN/checkpoints/5) and nothing else but --json")
-        return tell(inspect.differences(*map(inspect.read_snapshot, options.diff)), inspect.print_differences)
+        if (
+            options.path is not None
+            or options.generation is not None
+            or options.individual is not None
+        ):
+            raise UserError(
+                "--diff takes two runs or checkpoints (such as RUN/checkpoints/5) and nothing else but --json"
+            )
+        return tell(
+            inspect.differences(*map(inspect.read_snapshot, options.diff)),
+            inspect.print_differences,
+        )
     if options.path is None:
-        raise UserError("name a run folder, a checkpoint, or a folder full of runs: mjxgait inspect runs/tall_quadruped-seed0")
+        raise UserError(
+            "name a run folder, a checkpoint, or a folder full of runs: mjxgait inspect runs/tall_quadruped-seed0"
+        )
     if runs := inspect.runs_in(options.path):
         return tell(inspect.list_runs(runs), inspect.print_runs)
     snapshot = inspect.read_snapshot(options.path, options.generation)
     if options.individual is not None:
-        return tell(inspect.individual_facts(snapshot, options.individual), inspect.print_individual)
+        return tell(
+            inspect.individual_facts(snapshot, options.individual), inspect.print_individual
+        )
     return tell(inspect.facts(snapshot), inspect.print_facts)

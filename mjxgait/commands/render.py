@@ -62,7 +62,11 @@ def render_command(arguments: Sequence[str]) -> int:
         _still(runners, stage, options)
     else:
         backend = _backend(stage, options, wanted)
-        video.write_video(video.moving_pictures(runners, stage, options.fps, options.slow, backend), options.out, options.fps)
+        video.write_video(
+            video.moving_pictures(runners, stage, options.fps, options.slow, backend),
+            options.out,
+            options.fps,
+        )
     print(f"{options.out} ({options.out.stat().st_size / 1024:,.0f} KiB)")
     return 0
 
@@ -86,9 +90,13 @@ def _check(options: RenderOptions) -> list[int]:
     if options.top and options.generations:
         raise UserError("--top and --generations are two kinds of race; name one of them")
     try:
-        generations = [int(part) for part in options.generations.split(",")] if options.generations else []
+        generations = (
+            [int(part) for part in options.generations.split(",")] if options.generations else []
+        )
     except ValueError:
-        raise UserError(f"--generations {options.generations}: must be numbers with commas between them, such as 0,5,20") from None
+        raise UserError(
+            f"--generations {options.generations}: must be numbers with commas between them, such as 0,5,20"
+        ) from None
     if len(generations) > MOST_RUNNERS:
         raise UserError(f"--generations: at most {MOST_RUNNERS} can race")
     return generations

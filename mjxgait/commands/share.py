@@ -26,7 +26,9 @@ def share_command(arguments: Sequence[str]) -> int:
     """Returns the exit code."""
     options = tyro.cli(ShareOptions, args=list(arguments), prog="mjxgait share")
     if options.out.suffix.lower() not in (".html", ".htm"):
-        raise UserError(f'{options.out}: cannot write "{options.out.suffix}"; end the name with .html')
+        raise UserError(
+            f'{options.out}: cannot write "{options.out.suffix}"; end the name with .html'
+        )
     from mjxgait.viewing.page import write_page
 
     write_page(options.run, options.out)

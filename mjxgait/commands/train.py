@@ -53,9 +53,16 @@ class TrainOptions:
 def train_command(arguments: Sequence[str]) -> int:
     """Returns the exit code."""
     creature, default = _layers(arguments)
-    options = tyro.cli(TrainOptions, args=list(arguments), prog="mjxgait train", default=TrainOptions(settings=default))
+    options = tyro.cli(
+        TrainOptions,
+        args=list(arguments),
+        prog="mjxgait train",
+        default=TrainOptions(settings=default),
+    )
     config = _settings(options)
-    from mjxgait import run  # JAX takes a second to import: only once the options are known to be good
+    from mjxgait import (
+        run,
+    )  # JAX takes a second to import: only once the options are known to be good
     from mjxgait.commands.view import following
     from mjxgait.experiment import prepare_devices
     from mjxgait.screen import Screen
@@ -72,7 +79,14 @@ def train_command(arguments: Sequence[str]) -> int:
         create_run(folder, creature, config)
     prepare_devices()
     with following(folder) if options.view else contextlib.nullcontext():
-        ended = run.train(folder, creature, config, Screen(), resume=options.resume is not None, generation=options.generation)
+        ended = run.train(
+            folder,
+            creature,
+            config,
+            Screen(),
+            resume=options.resume is not None,
+            generation=options.generation,
+        )
     if ended and options.plots:
         plot_run(folder)
         print(f"plots         {folder / PLOTS}/")
@@ -91,7 +105,9 @@ def _layers(arguments: Sequence[str]) -> tuple[Creature, Config]:
     if given.resume:
         return open_run(Path(given.resume))
     creature = _creature(given.env or TrainOptions.env)
-    return creature, resolve_config(creature.settings.train, creature.name, Path(given.config) if given.config else None)
+    return creature, resolve_config(
+        creature.settings.train, creature.name, Path(given.config) if given.config else None
+    )
 
 
 def _creature(env: str) -> Creature:
@@ -124,5 +140,7 @@ def _without_ends(config: Config) -> Config:
 
 def _new_folder(creature: str, seed: int) -> Path:
     """The first folder under runs/ that is not there yet."""
-    names = (f"{creature}-seed{seed}{suffix}" for suffix in ("", *(f"-{i}" for i in range(2, 10_000))))
+    names = (
+        f"{creature}-seed{seed}{suffix}" for suffix in ("", *(f"-{i}" for i in range(2, 10_000)))
+    )
     return next(folder for name in names if not (folder := Path("runs") / name).exists())

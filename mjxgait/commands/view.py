@@ -31,14 +31,22 @@ def view_command(arguments: Sequence[str]) -> int:
 
     # What a script starts in the background ignores interrupts, and Python leaves it so: without this nothing but a kill would end it.
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    serve(options.run, options.port, ready=lambda address: print(f"{address} (only from this machine; Ctrl-C ends it)", flush=True))
+    serve(
+        options.run,
+        options.port,
+        ready=lambda address: print(
+            f"{address} (only from this machine; Ctrl-C ends it)", flush=True
+        ),
+    )
     return 0
 
 
 @contextlib.contextmanager
 def following(run: Path) -> Iterator[None]:
     """Shows a run as long as the block lasts, in a process of its own that prints its address; if it fails, the block goes on."""
-    viewer = subprocess.Popen([sys.executable, "-m", "mjxgait", "view", str(run)], stdin=subprocess.DEVNULL)
+    viewer = subprocess.Popen(
+        [sys.executable, "-m", "mjxgait", "view", str(run)], stdin=subprocess.DEVNULL
+    )
     try:
         yield
     finally:

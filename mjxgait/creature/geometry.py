@@ -35,11 +35,18 @@ def support_extents(geom_type: int, size: np.ndarray) -> tuple[float, np.ndarray
             return 0.0, np.array([a, b, c]), zero
 
 
-def geom_reach(model: mujoco.MjModel, data: mujoco.MjData, geom: int, direction: np.ndarray) -> float:
+def geom_reach(
+    model: mujoco.MjModel, data: mujoco.MjData, geom: int, direction: np.ndarray
+) -> float:
     """How far a geom reaches along a world direction [3], measured from the world's origin; m."""
     r, box, ellipsoid = support_extents(model.geom_type[geom], model.geom_size[geom])
     u = data.geom_xmat[geom].reshape(3, 3).T @ direction
-    return float(data.geom_xpos[geom] @ direction + r + np.abs(u) @ box + np.sqrt(((u * ellipsoid) ** 2).sum()))
+    return float(
+        data.geom_xpos[geom] @ direction
+        + r
+        + np.abs(u) @ box
+        + np.sqrt(((u * ellipsoid) ** 2).sum())
+    )
 
 
 def body_length(model: mujoco.MjModel, data: mujoco.MjData, forward: np.ndarray) -> float:
@@ -58,13 +65,20 @@ def ancestors(model: mujoco.MjModel, body: int) -> list[int]:
     return chain
 
 
-def leg_lengths(model: mujoco.MjModel, data: mujoco.MjData, feet: list[int], joints: list[int]) -> np.ndarray:
+def leg_lengths(
+    model: mujoco.MjModel, data: mujoco.MjData, feet: list[int], joints: list[int]
+) -> np.ndarray:
     """[feet] height in m of each leg's first joint above the floor; a leg is the part of the tree that leads to one foot body only."""
     chains = {foot: ancestors(model, foot) for foot in feet}
     lengths = []
     for foot, chain in chains.items():
         shared = {b for other, c in chains.items() if other != foot for b in c}
-        own = [j for j in joints if model.jnt_bodyid[j] in chain and (model.jnt_bodyid[j] not in shared or len(feet) == 1)]
+        own = [
+            j
+            for j in joints
+            if model.jnt_bodyid[j] in chain
+            and (model.jnt_bodyid[j] not in shared or len(feet) == 1)
+        ]
         heights = [data.xanchor[j][2] for j in own] or [data.xpos[foot][2]]
         lengths.append(max(heights))
     return np.array(lengths)

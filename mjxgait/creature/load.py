@@ -123,7 +123,9 @@ def load_creature(folder: Path) -> Creature:
     except OSError as error:
         raise UserError(f"{xml}: cannot be read ({error.strerror})") from None
     except (ValueError, UnicodeDecodeError, mujoco.FatalError) as error:
-        raise UserError(f"{xml}: not a model that MuJoCo can load ({' '.join(str(error).split())})") from None
+        raise UserError(
+            f"{xml}: not a model that MuJoCo can load ({' '.join(str(error).split())})"
+        ) from None
     try:
         return _assemble(settings, files, model)
     except UserError as error:
@@ -136,23 +138,41 @@ def _check_alone(path: Path, text: str) -> None:
         raise UserError(f"{path}: larger than {MOST_TEXT // 1_000_000} MB; a creature is smaller")
     if found := NOT_ALONE.search(text):
         what = found.group(1) or found.group(2)
-        raise UserError(f'{path}: "{what}" is not allowed here: the file must hold the whole body; `mjxgait import` makes such a file')
+        raise UserError(
+            f'{path}: "{what}" is not allowed here: the file must hold the whole body; `mjxgait import` makes such a file'
+        )
 
 
-def _assemble(settings: CreatureSettings, files: Mapping[str, str], model: mujoco.MjModel) -> Creature:
+def _assemble(
+    settings: CreatureSettings, files: Mapping[str, str], model: mujoco.MjModel
+) -> Creature:
     trunk = _id(model, mujoco.mjtObj.mjOBJ_BODY, settings.creature.trunk, "creature.trunk")
     data = _standing(model, settings.creature.keyframe)
     axes = _trunk_axes(data.xmat[trunk].reshape(3, 3), np.array(settings.creature.forward))
-    joints = [j for j in range(model.njnt) if model.jnt_type[j] in (HINGE, SLIDE) and model.jnt_bodyid[j] != trunk]
+    joints = [
+        j
+        for j in range(model.njnt)
+        if model.jnt_type[j] in (HINGE, SLIDE) and model.jnt_bodyid[j] != trunk
+    ]
     if not joints:
         raise UserError("the model has no hinge joint below its trunk, so there is nothing to move")
     names = [model.joint(j).name for j in joints]
     qpos_adr, dof_adr = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
     stand = data.qpos[qpos_adr]
     values = _joint_values(settings, names)
-    joint_range = np.where((model.jnt_range[joints] == 0).all(1, keepdims=True), [-np.inf, np.inf], model.jnt_range[joints])
+    joint_range = np.where(
+        (model.jnt_range[joints] == 0).all(1, keepdims=True),
+        [-np.inf, np.inf],
+        model.jnt_range[joints],
+    )
     feet, feet_geoms = _feet(model, settings.creature.feet)
-    ground = np.array([_id(model, mujoco.mjtObj.mjOBJ_GEOM, g, "creature.ground") for g in settings.creature.ground], dtype=int)
+    ground = np.array(
+        [
+            _id(model, mujoco.mjtObj.mjOBJ_GEOM, g, "creature.ground")
+            for g in settings.creature.ground
+        ],
+        dtype=int,
+    )
     partner, sign = _mirror(model, data, settings, joints, names, axes)
     world = data.xmat[trunk].reshape(3, 3) @ axes.T
     creature = Creature(
@@ -207,7 +227,9 @@ def _id(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str, key: str) -> int:
 def _standing(model: mujoco.MjModel, keyframe: str) -> mujoco.MjData:
     key = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, keyframe)
     if key < 0:
-        raise UserError(f'creature.xml has no keyframe "{keyframe}" for the standing pose; add <keyframe><key name="{keyframe}" qpos=.../>')
+        raise UserError(
+            f'creature.xml has no keyframe "{keyframe}" for the standing pose; add <keyframe><key name="{keyframe}" qpos=.../>'
+        )
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, key)
     mujoco.mj_forward(model, data)
@@ -230,7 +252,13 @@ def _joint_values(settings: CreatureSettings, names: list[str]) -> dict[str, np.
     rows = [dataclasses.asdict(settings.joints) for _ in names]
     for exception in settings.joint:
         for i in _matching(exception.match, names, "joint.match"):
-            rows[i].update({k: v for k, v in dataclasses.asdict(exception).items() if v is not None and k != "match"})
+            rows[i].update(
+                {
+                    k: v
+                    for k, v in dataclasses.asdict(exception).items()
+                    if v is not None and k != "match"
+                }
+            )
     fields = {field.name for field in dataclasses.fields(JointException)} - {"match"}
     return {key: np.array([row[key] for row in rows], dtype=float) for key in fields}
 
@@ -238,7 +266,9 @@ def _joint_values(settings: CreatureSettings, names: list[str]) -> dict[str, np.
 def _matching(pattern: str, names: list[str], key: str) -> list[int]:
     found = [i for i, name in enumerate(names) if fnmatch.fnmatchcase(name, pattern)]
     if not found:
-        raise UserError(f'creature.toml: {key}: no joint matches "{pattern}"; {did_you_mean(pattern, names)}')
+        raise UserError(
+            f'creature.toml: {key}: no joint matches "{pattern}"; {did_you_mean(pattern, names)}'
+        )
     return found
 
 
@@ -260,12 +290,23 @@ def _feet(model: mujoco.MjModel, names: tuple[str, ...]) -> tuple[list[int], lis
 
 def _forbidden(model: mujoco.MjModel, feet: list[int], ground: np.ndarray) -> list[int]:
     floor = _id(model, mujoco.mjtObj.mjOBJ_GEOM, FLOOR, "the floor")
-    colliding = [g for g in range(model.ngeom) if model.geom_contype[g] or model.geom_conaffinity[g]]
-    return [g for g in colliding if g not in {floor, *feet, *ground.tolist()} and model.geom_bodyid[g] != 0]
+    colliding = [
+        g for g in range(model.ngeom) if model.geom_contype[g] or model.geom_conaffinity[g]
+    ]
+    return [
+        g
+        for g in colliding
+        if g not in {floor, *feet, *ground.tolist()} and model.geom_bodyid[g] != 0
+    ]
 
 
 def _mirror(
-    model: mujoco.MjModel, data: mujoco.MjData, settings: CreatureSettings, joints: list[int], names: list[str], axes: np.ndarray
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    settings: CreatureSettings,
+    joints: list[int],
+    names: list[str],
+    axes: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Partner [J] and sign [J]: those that the file states, the others from the geometry; without symmetry everyone is their own."""
     partner, sign = np.arange(len(joints)), np.ones(len(joints), dtype=int)
@@ -274,16 +315,26 @@ def _mirror(
     for pair in settings.mirror.pairs:
         for name in (pair.joint, pair.partner):
             if name not in names:
-                raise UserError(f'mirror.pairs: no joint is called "{name}"; {did_you_mean(name, names)}')
-        partner[names.index(pair.joint)], sign[names.index(pair.joint)] = names.index(pair.partner), pair.sign
+                raise UserError(
+                    f'mirror.pairs: no joint is called "{name}"; {did_you_mean(name, names)}'
+                )
+        partner[names.index(pair.joint)], sign[names.index(pair.joint)] = (
+            names.index(pair.partner),
+            pair.sign,
+        )
     stated = {pair.joint for pair in settings.mirror.pairs}
     free = np.array([i for i, name in enumerate(names) if name not in stated], dtype=int)
     if len(free):
         trunk, chosen = model.body(settings.creature.trunk).id, [joints[i] for i in free]
         frame = axes @ data.xmat[trunk].reshape(3, 3).T
-        anchors, directions = (data.xanchor[chosen] - data.xpos[trunk]) @ frame.T, data.xaxis[chosen] @ frame.T
+        anchors, directions = (
+            (data.xanchor[chosen] - data.xpos[trunk]) @ frame.T,
+            data.xaxis[chosen] @ frame.T,
+        )
         near = 0.02 * float(np.ptp(data.xanchor[joints], axis=0).max() + 0.05)
-        found, sign[free] = geometry.mirror_map(anchors, directions, model.jnt_type[chosen] == SLIDE, [names[i] for i in free], near)
+        found, sign[free] = geometry.mirror_map(
+            anchors, directions, model.jnt_type[chosen] == SLIDE, [names[i] for i in free], near
+        )
         partner[free] = free[found]
     _check_names(names, partner)
     return partner, sign
@@ -307,7 +358,9 @@ def _check(creature: Creature, data: mujoco.MjData) -> None:
     inertia = 1 / np.diag(np.linalg.inv(mass))[creature.dof_adr]
     for j, name in enumerate(creature.joint_names):
         if creature.pose_low[j] > creature.pose_high[j]:
-            raise UserError(f'joint "{name}": its pose range lies outside its range in creature.xml; widen one of them')
+            raise UserError(
+                f'joint "{name}": its pose range lies outside its range in creature.xml; widen one of them'
+            )
         if h * h * creature.kp[j] >= (4 * inertia[j] + 2 * h * creature.kd[j]) / 3:
             need = (1.5 * h * h * creature.kp[j] - 2 * inertia[j]) / h
             raise UserError(

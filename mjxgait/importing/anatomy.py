@@ -44,7 +44,10 @@ class Anatomy:
         heights = []
         for b in bodies:
             solid = [s for s in self.shapes[b] if s.solid] or self.shapes[b]
-            heights += [float((self.xpos[b] + s.points @ self.xrot[b].T)[:, 2].min() - s.radius) for s in solid]
+            heights += [
+                float((self.xpos[b] + s.points @ self.xrot[b].T)[:, 2].min() - s.radius)
+                for s in solid
+            ]
             if not solid:
                 heights.append(float(self.xpos[b][2]))
         return min(heights)
@@ -55,7 +58,12 @@ class NoLegs(UserError):
 
 
 def find_anatomy(
-    model: mujoco.MjModel, coupled: Sequence[str], keep: Sequence[str], freeze: Sequence[str], up: str | None, notes: Notes
+    model: mujoco.MjModel,
+    coupled: Sequence[str],
+    keep: Sequence[str],
+    freeze: Sequence[str],
+    up: str | None,
+    notes: Notes,
 ) -> Anatomy:
     """The anatomy of a compiled model.
 
@@ -98,10 +106,24 @@ def reference_pose(model: mujoco.MjModel) -> np.ndarray:
 
 def _check_size(model: mujoco.MjModel) -> None:
     if model.nbody > MOST_BODIES:
-        raise UserError(f"the model has {model.nbody} bodies; more than {MOST_BODIES} is not one creature")
-    arrays = (model.body_pos, model.body_mass, model.body_inertia, model.jnt_range, model.geom_size, model.geom_pos, model.qpos0)
-    if not all(np.isfinite(a).all() and np.abs(a, dtype=float).max(initial=0) < 1e9 for a in arrays):
-        raise UserError("the model has numbers that are infinite, not a number or absurdly large; correct them in the file")
+        raise UserError(
+            f"the model has {model.nbody} bodies; more than {MOST_BODIES} is not one creature"
+        )
+    arrays = (
+        model.body_pos,
+        model.body_mass,
+        model.body_inertia,
+        model.jnt_range,
+        model.geom_size,
+        model.geom_pos,
+        model.qpos0,
+    )
+    if not all(
+        np.isfinite(a).all() and np.abs(a, dtype=float).max(initial=0) < 1e9 for a in arrays
+    ):
+        raise UserError(
+            "the model has numbers that are infinite, not a number or absurdly large; correct them in the file"
+        )
 
 
 def _root(model: mujoco.MjModel) -> int:
@@ -116,7 +138,9 @@ def _root(model: mujoco.MjModel) -> int:
         raise UserError("the model has no body; there is nothing that could walk")
     root = max(tops, key=weight)
     while True:
-        children = [b for b in range(1, model.nbody) if model.body_parentid[b] == root and b != root]
+        children = [
+            b for b in range(1, model.nbody) if model.body_parentid[b] == root and b != root
+        ]
         slides = _types(model, root) and all(t in (SLIDE, HINGE) for t in _types(model, root))
         carries = len(children) == 1 and model.body_mass[root] < 1e-2 * model.body_subtreemass[root]
         leads_on = children and SLIDE in _types(model, children[0])
@@ -129,7 +153,11 @@ def _root(model: mujoco.MjModel) -> int:
 
 def _types(model: mujoco.MjModel, body: int) -> list[int]:
     start = int(model.body_jntadr[body])
-    return [int(t) for t in model.jnt_type[start : start + int(model.body_jntnum[body])]] if start >= 0 else []
+    return (
+        [int(t) for t in model.jnt_type[start : start + int(model.body_jntnum[body])]]
+        if start >= 0
+        else []
+    )
 
 
 def in_plane(model: mujoco.MjModel, root: int) -> bool:
@@ -143,7 +171,10 @@ def _root_joints(model: mujoco.MjModel, root: int, notes: Notes) -> None:
     if types == [FREE]:
         return
     if not types:
-        notes.change(f'free joint added to "{model.body(root).name}"', "the file fixes the trunk in the world")
+        notes.change(
+            f'free joint added to "{model.body(root).name}"',
+            "the file fixes the trunk in the world",
+        )
     else:
         notes.change(
             f'free joint in place of the {len(types)} root joints of "{model.body(root).name}"',
@@ -158,11 +189,21 @@ def _scale(model: mujoco.MjModel, bodies: list[int], notes: Notes) -> float:
     span = float(np.ptp(data.xpos[bodies], axis=0).max(initial=0))
     if span < 40:
         return 1.0
-    notes.change("all lengths divided by 1000", f"the body would be {span:.0f} m long, so the file is taken to be in millimetres")
+    notes.change(
+        "all lengths divided by 1000",
+        f"the body would be {span:.0f} m long, so the file is taken to be in millimetres",
+    )
     return 1e-3
 
 
-def _up_axis(model: mujoco.MjModel, bodies: list[int], root: int, qpos: np.ndarray, up: str | None, notes: Notes) -> np.ndarray:
+def _up_axis(
+    model: mujoco.MjModel,
+    bodies: list[int],
+    root: int,
+    qpos: np.ndarray,
+    up: str | None,
+    notes: Notes,
+) -> np.ndarray:
     """[3] unit vector of the file's world that points up."""
     gravity = model.opt.gravity
     if up:
@@ -170,14 +211,26 @@ def _up_axis(model: mujoco.MjModel, bodies: list[int], root: int, qpos: np.ndarr
         return UP_AXES[up]
     strongest = int(np.abs(gravity).argmax())
     if abs(gravity[strongest]) > 1 and strongest != 2:
-        notes.change("turned so that z is up", f"the file's gravity is {np.round(gravity, 2).tolist()}")
+        notes.change(
+            "turned so that z is up", f"the file's gravity is {np.round(gravity, 2).tolist()}"
+        )
         notes.guess("up", "xyz"[strongest], "high", "the file's gravity")
         return -np.sign(gravity[strongest]) * np.eye(3)[strongest]
     data = mujoco.MjData(model)
     data.qpos[:] = qpos
     mujoco.mj_kinematics(model, data)
     leaves = [b for b in bodies if not (model.body_parentid == b).any()]
-    hips = [next((b for b in reversed(ancestors(model, leaf)) if b != root and root in ancestors(model, b)), leaf) for leaf in leaves]
+    hips = [
+        next(
+            (
+                b
+                for b in reversed(ancestors(model, leaf))
+                if b != root and root in ancestors(model, b)
+            ),
+            leaf,
+        )
+        for leaf in leaves
+    ]
     below = (data.xpos[hips] - data.xpos[leaves]).mean(0) if leaves else np.zeros(3)
     if below[1] > 1.3 * abs(below[2]) and below[1] > abs(below[0]):
         notes.change("turned so that z is up", "the limbs end below the trunk along y, not along z")
@@ -187,7 +240,14 @@ def _up_axis(model: mujoco.MjModel, bodies: list[int], root: int, qpos: np.ndarr
     return UP_AXES["z"]
 
 
-def _measure(model: mujoco.MjModel, qpos: np.ndarray, axis: np.ndarray, root: int, bodies: list[int], scale: float) -> Anatomy:
+def _measure(
+    model: mujoco.MjModel,
+    qpos: np.ndarray,
+    axis: np.ndarray,
+    root: int,
+    bodies: list[int],
+    scale: float,
+) -> Anatomy:
     data = mujoco.MjData(model)
     data.qpos[:] = qpos
     mujoco.mj_kinematics(model, data)
@@ -196,7 +256,12 @@ def _measure(model: mujoco.MjModel, qpos: np.ndarray, axis: np.ndarray, root: in
     for b in bodies:
         shapes[b] = read_shapes(model, b)
         for s in shapes[b]:
-            s.size, s.pos, s.points, s.radius = s.size * scale, s.pos * scale, s.points * scale, s.radius * scale
+            s.size, s.pos, s.points, s.radius = (
+                s.size * scale,
+                s.pos * scale,
+                s.points * scale,
+                s.radius * scale,
+            )
     xrot = turn @ data.xmat.reshape(-1, 3, 3)
     return Anatomy(qpos, scale * data.xpos @ turn.T, xrot, root, bodies, [], [], scale, shapes)
 
@@ -210,7 +275,13 @@ def _turn_up(axis: np.ndarray) -> np.ndarray:
     return np.stack([side, np.cross(axis, side), axis])
 
 
-def _movable(model: mujoco.MjModel, anatomy: Anatomy, coupled: Sequence[str], freeze: Sequence[str], notes: Notes) -> list[int]:
+def _movable(
+    model: mujoco.MjModel,
+    anatomy: Anatomy,
+    coupled: Sequence[str],
+    freeze: Sequence[str],
+    notes: Notes,
+) -> list[int]:
     """Joints that could be active."""
     joints, slides, told = [], [], []
     followers = _followers(model)
@@ -225,11 +296,17 @@ def _movable(model: mujoco.MjModel, anatomy: Anatomy, coupled: Sequence[str], fr
         elif name not in coupled and j not in followers and kind != FREE:
             joints.append(j)
     if slides:
-        notes.change(f"slide joints {listed(slides)} frozen", "the controller's key poses are angles; a sliding limb keeps its length")
+        notes.change(
+            f"slide joints {listed(slides)} frozen",
+            "the controller's key poses are angles; a sliding limb keeps its length",
+        )
     if told:
         notes.change(f"joints {listed(told)} frozen", "as told by --freeze")
     if followers:
-        notes.change(f"joints {listed([model.joint(j).name for j in sorted(followers)])} frozen", "they follow other joints (equality)")
+        notes.change(
+            f"joints {listed([model.joint(j).name for j in sorted(followers)])} frozen",
+            "they follow other joints (equality)",
+        )
     return joints
 
 
@@ -265,7 +342,11 @@ def _legs(model: mujoco.MjModel, anatomy: Anatomy, movable: list[int]) -> list[i
     span = float(np.ptp(anatomy.xpos[anatomy.bodies], axis=0).max())
     height = max(top - floor, 0.1 * span, 1e-6)
     ends = _without_toes(model, anatomy, ends, movers)
-    feet = sorted(b for b in ends if anatomy.low(model, _below(model, anatomy, b)) <= floor + SAME_LEVEL * height)
+    feet = sorted(
+        b
+        for b in ends
+        if anatomy.low(model, _below(model, anatomy, b)) <= floor + SAME_LEVEL * height
+    )
     if not feet:
         lowest = min(ends, key=lambda b: anatomy.low(model, _below(model, anatomy, b)))
         raise NoLegs(
@@ -274,7 +355,9 @@ def _legs(model: mujoco.MjModel, anatomy: Anatomy, movable: list[int]) -> list[i
         )
     wheels = [b for b in feet if _is_wheel(model, anatomy, b)]
     if len(wheels) == len(feet):
-        raise UserError(f'"{model.body(wheels[0]).name}" is a wheel, as are all parts on the floor; a creature needs legs that step')
+        raise UserError(
+            f'"{model.body(wheels[0]).name}" is a wheel, as are all parts on the floor; a creature needs legs that step'
+        )
     return [b for b in feet if b not in wheels]
 
 
@@ -289,16 +372,31 @@ def lowered_limbs(model: mujoco.MjModel, anatomy: Anatomy, movable: list[int]) -
     up = anatomy.xrot[anatomy.root] @ _world_rotation(model, anatomy.qpos, anatomy.root).T
     movers = {int(model.jnt_bodyid[j]) for j in movable}
     for end in (b for b in movers if not any(c != b and b in ancestors(model, c) for c in movers)):
-        joints = [j for j in movable if int(model.jnt_bodyid[j]) in ancestors(model, end) and int(model.jnt_type[j]) == HINGE]
+        joints = [
+            j
+            for j in movable
+            if int(model.jnt_bodyid[j]) in ancestors(model, end) and int(model.jnt_type[j]) == HINGE
+        ]
         adr = model.jnt_qposadr[joints]
-        limits = np.array([model.jnt_range[j] if model.jnt_range[j][0] < model.jnt_range[j][1] else (-1.6, 1.6) for j in joints])
-        low, high = np.maximum(limits[:, 0], data.qpos[adr] - 2.0), np.minimum(limits[:, 1], data.qpos[adr] + 2.0)
+        limits = np.array(
+            [
+                model.jnt_range[j] if model.jnt_range[j][0] < model.jnt_range[j][1] else (-1.6, 1.6)
+                for j in joints
+            ]
+        )
+        low, high = (
+            np.maximum(limits[:, 0], data.qpos[adr] - 2.0),
+            np.minimum(limits[:, 1], data.qpos[adr] + 2.0),
+        )
         best, lowest = data.qpos[adr].copy(), np.inf
         for _ in range(300):
             data.qpos[adr] = rng.uniform(np.minimum(low, high), np.maximum(low, high))
             mujoco.mj_kinematics(model, data)
             clouds = [(b, s) for b in _below(model, anatomy, end) for s in anatomy.shapes[b]]
-            points = [data.xpos[b] + (s.points / anatomy.scale) @ data.xmat[b].reshape(3, 3).T for b, s in clouds] or [data.xpos[[end]]]
+            points = [
+                data.xpos[b] + (s.points / anatomy.scale) @ data.xmat[b].reshape(3, 3).T
+                for b, s in clouds
+            ] or [data.xpos[[end]]]
             height = float((np.concatenate(points) @ up.T)[:, 2].min())
             if height < lowest:
                 best, lowest = data.qpos[adr].copy(), height
@@ -313,7 +411,9 @@ def _world_rotation(model: mujoco.MjModel, qpos: np.ndarray, body: int) -> np.nd
     return data.xmat[body].reshape(3, 3)
 
 
-def _without_toes(model: mujoco.MjModel, anatomy: Anatomy, ends: list[int], movers: set[int]) -> list[int]:
+def _without_toes(
+    model: mujoco.MjModel, anatomy: Anatomy, ends: list[int], movers: set[int]
+) -> list[int]:
     """Several ends that branch off one moving body near each other are toes or fingers: that body is the end."""
     span = max(float(np.ptp(anatomy.xpos[anatomy.bodies], axis=0).max()), 1e-6)
     result: list[int] = []
@@ -342,7 +442,9 @@ def _is_wheel(model: mujoco.MjModel, anatomy: Anatomy, body: int) -> bool:
     return bool(away.max() > 0 and centre < 0.1 * away.max() and len(points) > 2)
 
 
-def _choose_joints(model: mujoco.MjModel, anatomy: Anatomy, movable: list[int], keep: Sequence[str], notes: Notes) -> None:
+def _choose_joints(
+    model: mujoco.MjModel, anatomy: Anatomy, movable: list[int], keep: Sequence[str], notes: Notes
+) -> None:
     """Active are the joints between the trunk and a foot, and those that the user keeps."""
     on_legs = {b for foot in anatomy.feet for b in ancestors(model, foot)}
     frozen = []
@@ -353,16 +455,28 @@ def _choose_joints(model: mujoco.MjModel, anatomy: Anatomy, movable: list[int], 
         else:
             frozen.append(model.joint(j).name or f"joint {j}")
     if frozen:
-        notes.change(f"joints {listed(frozen)} frozen", "no leg hangs on them, so they have no part in walking (--keep PATTERN keeps some)")
+        notes.change(
+            f"joints {listed(frozen)} frozen",
+            "no leg hangs on them, so they have no part in walking (--keep PATTERN keeps some)",
+        )
     if len(anatomy.active) > MOST_JOINTS:
-        raise UserError(f"{len(anatomy.active)} joints would move; freeze those that do not matter with --freeze (at most {MOST_JOINTS})")
+        raise UserError(
+            f"{len(anatomy.active)} joints would move; freeze those that do not matter with --freeze (at most {MOST_JOINTS})"
+        )
 
 
 def _check_loops(model: mujoco.MjModel, anatomy: Anatomy) -> None:
     """Refuses a loop that a moving joint is part of."""
-    moved = {b for b in anatomy.bodies if any(int(model.jnt_bodyid[j]) in ancestors(model, b) for j in anatomy.active)}
+    moved = {
+        b
+        for b in anatomy.bodies
+        if any(int(model.jnt_bodyid[j]) in ancestors(model, b) for j in anatomy.active)
+    }
     for e in range(model.neq):
-        if int(model.eq_type[e]) not in (int(mujoco.mjtEq.mjEQ_CONNECT), int(mujoco.mjtEq.mjEQ_WELD)):
+        if int(model.eq_type[e]) not in (
+            int(mujoco.mjtEq.mjEQ_CONNECT),
+            int(mujoco.mjtEq.mjEQ_WELD),
+        ):
             continue
         objects = [int(model.eq_obj1id[e]), int(model.eq_obj2id[e])]
         if int(model.eq_objtype[e]) == int(mujoco.mjtObj.mjOBJ_SITE):

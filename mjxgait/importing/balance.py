@@ -21,7 +21,14 @@ CALM = 0.3
 """rad/s, root mean square of the joints at the end; more is a tremor."""
 
 
-def steady_balance(drive: Drive, names: list[str], model: mujoco.MjModel, qpos: np.ndarray, feet: set[str], notes: Notes) -> None:
+def steady_balance(
+    drive: Drive,
+    names: list[str],
+    model: mujoco.MjModel,
+    qpos: np.ndarray,
+    feet: set[str],
+    notes: Notes,
+) -> None:
     """Scales the pitch and the roll weights of the drive.
 
     Args:
@@ -38,7 +45,16 @@ def steady_balance(drive: Drive, names: list[str], model: mujoco.MjModel, qpos: 
         tried: dict[float, Held] = {}
         for share in SHARES:
             correct = feedback(share * full, axis, qpos, *strongest[axis])
-            tried[share] = hold(model, start, drive.kp, drive.kd, drive.torque, feet, stand=qpos[7:], correct=correct)
+            tried[share] = hold(
+                model,
+                start,
+                drive.kp,
+                drive.kd,
+                drive.torque,
+                feet,
+                stand=qpos[7:],
+                correct=correct,
+            )
             if tried[share].stands and tried[share].speed < CALM:
                 break
         else:  # a body that falls in any case, for example one on two points: what holds it longest
@@ -48,10 +64,17 @@ def steady_balance(drive: Drive, names: list[str], model: mujoco.MjModel, qpos: 
         table.update(weights)
         if share < 1:
             what = ("balance.roll", "balance.pitch")[axis]
-            notes.guess(what, f"{share:g} of full", "medium", "with more it shakes itself off its feet at the strongest feedback")
+            notes.guess(
+                what,
+                f"{share:g} of full",
+                "medium",
+                "with more it shakes itself off its feet at the strongest feedback",
+            )
 
 
-def feedback(weights: np.ndarray, axis: int, stand: np.ndarray, gain: float, rate_gain: float) -> Callable[[mujoco.MjData], np.ndarray]:
+def feedback(
+    weights: np.ndarray, axis: int, stand: np.ndarray, gain: float, rate_gain: float
+) -> Callable[[mujoco.MjData], np.ndarray]:
     """The controller's correction [J] of the target.
 
     Args:
@@ -62,7 +85,9 @@ def feedback(weights: np.ndarray, axis: int, stand: np.ndarray, gain: float, rat
 
     def correct(data: mujoco.MjData) -> np.ndarray:
         turned = data.xmat[1].reshape(3, 3)
-        axes = turned @ level.T  # columns: forward, left and up of the stance in the world of this moment
+        axes = (
+            turned @ level.T
+        )  # columns: forward, left and up of the stance in the world of this moment
         angle = np.arcsin(np.clip(axes[2, 1] if axis == 0 else -axes[2, 0], -1, 1))
         rate = (turned @ data.qvel[3:6]) @ axes[:, axis]
         return weights * np.clip(gain * angle + rate_gain * rate, -MOST, MOST)

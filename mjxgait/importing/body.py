@@ -61,7 +61,9 @@ class Puppet:
 
     def qpos(self, q: np.ndarray) -> np.ndarray:
         """[nq] with the trunk where it was placed."""
-        return np.concatenate([self.bodies[0].pos, self.bodies[0].quat / np.linalg.norm(self.bodies[0].quat), q])
+        return np.concatenate(
+            [self.bodies[0].pos, self.bodies[0].quat / np.linalg.norm(self.bodies[0].quat), q]
+        )
 
     def centre_of_mass(self) -> np.ndarray:
         """[3] m in the latest pose."""
@@ -71,11 +73,17 @@ class Puppet:
     def sole_points(self, xpos: np.ndarray, xrot: np.ndarray) -> list[np.ndarray]:
         """For each foot [n, 3] m; of a foot without shapes the place of its farthest part."""
         soles = [tip_points(tips, xpos, xrot) for tips in self.tips]
-        return [sole if len(sole) else xpos[group[-1:]] for sole, group in zip(soles, self.feet, strict=True)]
+        return [
+            sole if len(sole) else xpos[group[-1:]]
+            for sole, group in zip(soles, self.feet, strict=True)
+        ]
 
     def shank_height(self, xpos: np.ndarray, xrot: np.ndarray) -> float:
         """m, the lowest point of all that belongs to the last parts of legs but not to their ends."""
-        return min(float(tip_points(tips, xpos, xrot, far=False)[:, 2].min(initial=np.inf)) for tips in self.tips)
+        return min(
+            float(tip_points(tips, xpos, xrot, far=False)[:, 2].min(initial=np.inf))
+            for tips in self.tips
+        )
 
     def jacobian(self, foot: int, at: np.ndarray) -> np.ndarray:
         """[J, 3] m/rad that a point [3] m of a foot moves per joint, in the latest pose."""
@@ -89,10 +97,15 @@ class Puppet:
         self.pose(q)
         left = np.cross([0.0, 0.0, 1.0], forward)
         frame = np.stack([forward, left, [0.0, 0.0, 1.0]])
-        anchors, axes = (self.data.xanchor[1:] - self.data.xpos[1]) @ frame.T, self.data.xaxis[1:] @ frame.T
+        anchors, axes = (
+            (self.data.xanchor[1:] - self.data.xpos[1]) @ frame.T,
+            self.data.xaxis[1:] @ frame.T,
+        )
         near = 0.02 * float(np.ptp(self.data.xanchor[1:], axis=0).max() + 0.05)
         try:
-            return geometry.mirror_map(anchors, axes, np.zeros(len(self.joints), bool), self.names, near)
+            return geometry.mirror_map(
+                anchors, axes, np.zeros(len(self.joints), bool), self.names, near
+            )
         except UserError:
             return None
 

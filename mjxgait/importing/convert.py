@@ -85,8 +85,16 @@ def import_model(path: Path, choices: ImportChoices | None = None) -> Imported:
     except UserError as error:
         text = str(error)
         raise UserError(text if str(path) in text else f"{path}: {text}") from None
-    except (np.linalg.LinAlgError, FloatingPointError, OverflowError, mujoco.FatalError, MemoryError) as error:
-        raise UserError(f"{path}: its numbers cannot be computed with ({error}); correct the file") from None
+    except (
+        np.linalg.LinAlgError,
+        FloatingPointError,
+        OverflowError,
+        mujoco.FatalError,
+        MemoryError,
+    ) as error:
+        raise UserError(
+            f"{path}: its numbers cannot be computed with ({error}); correct the file"
+        ) from None
 
 
 def _import(path: Path, choices: ImportChoices, notes: Notes) -> Imported:
@@ -97,7 +105,9 @@ def _import(path: Path, choices: ImportChoices, notes: Notes) -> Imported:
     _tell_dropped(model, notes)
     anatomy = find_anatomy(model, source.coupled, choices.keep, choices.freeze, choices.up, notes)
     bodies = build_bodies(model, anatomy, source.efforts, notes)
-    puppet = Puppet(bodies, [anatomy.bodies.index(b) for b in anatomy.feet], in_plane(model, anatomy.root))
+    puppet = Puppet(
+        bodies, [anatomy.bodies.index(b) for b in anatomy.feet], in_plane(model, anatomy.root)
+    )
     start = _start(puppet, model, anatomy)
     puppet.turn(yaw_to(find_forward(puppet, start, choices.forward, notes)))
     planar = is_planar(puppet, start) is not None
@@ -124,7 +134,9 @@ def read_source(path: Path, search: Sequence[Path], notes: Notes) -> Source:
         case "robot":
             clean_urdf(source, path, places, notes)
         case other:
-            raise UserError(f"{path}: begins with <{other[:40]}>; a model file begins with <mujoco> (MJCF) or <robot> (URDF)")
+            raise UserError(
+                f"{path}: begins with <{other[:40]}>; a model file begins with <mujoco> (MJCF) or <robot> (URDF)"
+            )
     return source
 
 
@@ -132,9 +144,21 @@ def _tell_dropped(model: mujoco.MjModel, notes: Notes) -> None:
     for count, what, why in (
         (model.nu, "actuators", "joint torques are applied directly; their limits were read"),
         (model.ntendon, "tendons", "joint torques are applied directly"),
-        (int((model.jnt_stiffness != 0).sum() + (model.dof_damping != 0).sum()), "springs and dampers", "the controller has its own"),
-        (int((model.dof_frictionloss != 0).sum()), "dry joint frictions", "the fast physics has none"),
-        (model.npair + model.nexclude, "contact pairs and exclusions", "shapes touch the floor only, not each other"),
+        (
+            int((model.jnt_stiffness != 0).sum() + (model.dof_damping != 0).sum()),
+            "springs and dampers",
+            "the controller has its own",
+        ),
+        (
+            int((model.dof_frictionloss != 0).sum()),
+            "dry joint frictions",
+            "the fast physics has none",
+        ),
+        (
+            model.npair + model.nexclude,
+            "contact pairs and exclusions",
+            "shapes touch the floor only, not each other",
+        ),
     ):
         if count:
             notes.change(f"{count} {what} dropped", why)
@@ -151,21 +175,44 @@ def _start(puppet: Puppet, model: mujoco.MjModel, anatomy: Anatomy) -> np.ndarra
 
 def _angles(puppet: Puppet, model: mujoco.MjModel, qpos: np.ndarray) -> np.ndarray:
     hinge = int(mujoco.mjtJoint.mjJNT_HINGE)
-    q = np.array([qpos[model.jnt_qposadr[j.id]] if int(model.jnt_type[j.id]) == hinge else 0.0 for j in puppet.joints])
+    q = np.array(
+        [
+            qpos[model.jnt_qposadr[j.id]] if int(model.jnt_type[j.id]) == hinge else 0.0
+            for j in puppet.joints
+        ]
+    )
     return np.clip(q, puppet.low, puppet.high)
 
 
-def _poses(puppet: Puppet, model: mujoco.MjModel, anatomy: Anatomy, source: Source, start: np.ndarray) -> list[tuple[str, np.ndarray]]:
+def _poses(
+    puppet: Puppet, model: mujoco.MjModel, anatomy: Anatomy, source: Source, start: np.ndarray
+) -> list[tuple[str, np.ndarray]]:
     """Poses that the file offers, with what they are."""
-    order = sorted(range(model.nkey), key=lambda k: model.key(k).name.lower() not in ("stand", "standing", "home", "walk", "walking"))
-    poses = [(f'the keyframe "{model.key(k).name}"', _angles(puppet, model, model.key_qpos[k])) for k in order[:3]]
-    poses += [("init_qpos", _angles(puppet, model, np.array(p))) for p in source.poses if len(p) == model.nq]
+    order = sorted(
+        range(model.nkey),
+        key=lambda k: (
+            model.key(k).name.lower() not in ("stand", "standing", "home", "walk", "walking")
+        ),
+    )
+    poses = [
+        (f'the keyframe "{model.key(k).name}"', _angles(puppet, model, model.key_qpos[k]))
+        for k in order[:3]
+    ]
+    poses += [
+        ("init_qpos", _angles(puppet, model, np.array(p)))
+        for p in source.poses
+        if len(p) == model.nq
+    ]
     poses.append(("the file's zero pose", start))
     return [(what, q) for what, q in poses if np.isfinite(q).all()]
 
 
 def _stand(
-    puppet: Puppet, offered: list[tuple[str, np.ndarray]], mirror: tuple[np.ndarray, np.ndarray] | None, planar: bool, notes: Notes
+    puppet: Puppet,
+    offered: list[tuple[str, np.ndarray]],
+    mirror: tuple[np.ndarray, np.ndarray] | None,
+    planar: bool,
+    notes: Notes,
 ) -> Candidate:
     """The first pose that stands, of the file's own and those that a search finds; the best one where none does."""
     tried: list[tuple[str, Candidate]] = []
@@ -177,21 +224,44 @@ def _stand(
             break
     else:
         for seed, spread in enumerate(SPREADS):
-            tried.append(("a search over leg bends", _try(puppet, search.run(spread, seed)[0], mirror, planar, notes)))
+            tried.append(
+                (
+                    "a search over leg bends",
+                    _try(puppet, search.run(spread, seed)[0], mirror, planar, notes),
+                )
+            )
             if tried[-1][1].held.stands and search.stretch(tried[-1][1].q) < STRAIGHT:
                 break
-    what, best = max(tried, key=lambda pair: pair[1].held.score - 0.2 * (search.stretch(pair[1].q) > STRAIGHT))
+    what, best = max(
+        tried, key=lambda pair: pair[1].held.score - 0.2 * (search.stretch(pair[1].q) > STRAIGHT)
+    )
     held = best.held
     notes.changes, notes.guesses = best.notes.changes, best.notes.guesses
     if held.stands:
-        best.notes.guess("standing pose", what, "high", f"stood 2 s: sag {held.sag:.3f} rad, upright {held.up:.2f}")
+        best.notes.guess(
+            "standing pose",
+            what,
+            "high",
+            f"stood 2 s: sag {held.sag:.3f} rad, upright {held.up:.2f}",
+        )
     else:
         touched = f', "{held.touched}" touches the floor' if held.touched else ""
-        best.notes.guess("standing pose", what, "low", f"it falls: upright {held.up:.2f}, height {held.height:.2f} of the start{touched}")
+        best.notes.guess(
+            "standing pose",
+            what,
+            "low",
+            f"it falls: upright {held.up:.2f}, height {held.height:.2f} of the start{touched}",
+        )
     return best
 
 
-def _try(puppet: Puppet, q: np.ndarray, mirror: tuple[np.ndarray, np.ndarray] | None, planar: bool, notes: Notes) -> Candidate:
+def _try(
+    puppet: Puppet,
+    q: np.ndarray,
+    mirror: tuple[np.ndarray, np.ndarray] | None,
+    planar: bool,
+    notes: Notes,
+) -> Candidate:
     """Puts the creature on soles in a pose, and lets it stand."""
     notes, bodies = copy.deepcopy(notes), copy.deepcopy(puppet.bodies)
     trial = Puppet(bodies, [group[0] for group in puppet.feet])
@@ -206,7 +276,9 @@ def _try(puppet: Puppet, q: np.ndarray, mirror: tuple[np.ndarray, np.ndarray] | 
     drop(made, q, SINK)
     qpos = made.qpos(q)
     model = compile_own(creature_xml("trial", bodies, qpos))
-    held = hold(model, qpos, drive.kp, drive.kd, drive.torque, {name for foot in feet for name in foot})
+    held = hold(
+        model, qpos, drive.kp, drive.kd, drive.torque, {name for foot in feet for name in foot}
+    )
     return Candidate(made, q, feet, drive, model, qpos, held, notes)
 
 
@@ -218,22 +290,50 @@ def _name_shapes(bodies: list[Body]) -> None:
             shape.name = f"{body.name}_guard" + (f"_{i + 1}" if len(unnamed) > 1 else "")
 
 
-def _folder(name: str, origin: str, best: Candidate, mirror: tuple[np.ndarray, np.ndarray] | None, planar: bool) -> Imported:
+def _folder(
+    name: str,
+    origin: str,
+    best: Candidate,
+    mirror: tuple[np.ndarray, np.ndarray] | None,
+    planar: bool,
+) -> Imported:
     puppet, notes = best.puppet, best.notes
     feet = [geom for foot in best.feet for geom in foot]
     trunk = puppet.bodies[0].name
     notes.guess("trunk", trunk, "high", "the body that all limbs hang on")
     notes.guess(
-        "feet", f"{len(best.feet)} feet", "high" if math.isfinite(best.held.up) and best.held.stands else "low", "limbs that end lowest"
+        "feet",
+        f"{len(best.feet)} feet",
+        "high" if math.isfinite(best.held.up) and best.held.stands else "low",
+        "limbs that end lowest",
     )
     pairs: dict[str, tuple[str, int]] = {}
     if planar and mirror is not None:  # the geometry alone cannot tell two legs in one place apart
-        pairs = {n: (puppet.names[mirror[0][j]], int(mirror[1][j])) for j, n in enumerate(puppet.names)}
+        pairs = {
+            n: (puppet.names[mirror[0][j]], int(mirror[1][j])) for j, n in enumerate(puppet.names)
+        }
     forward = rotation(puppet.bodies[0].quat).T @ [1.0, 0.0, 0.0]
     length = _stated_length(best)
-    toml = creature_toml(name, origin, trunk, forward, feet, puppet.names, best.drive, (mirror is not None, pairs), length, notes)
-    report = f"# {name}\n\nMade by `mjxgait import` from {origin}.\n\n```text\n{notes.text()}\n```\n"
-    files = {"creature.xml": creature_xml(name, puppet.bodies, best.qpos), "creature.toml": toml, "README.md": report}
+    toml = creature_toml(
+        name,
+        origin,
+        trunk,
+        forward,
+        feet,
+        puppet.names,
+        best.drive,
+        (mirror is not None, pairs),
+        length,
+        notes,
+    )
+    report = (
+        f"# {name}\n\nMade by `mjxgait import` from {origin}.\n\n```text\n{notes.text()}\n```\n"
+    )
+    files = {
+        "creature.xml": creature_xml(name, puppet.bodies, best.qpos),
+        "creature.toml": toml,
+        "README.md": report,
+    }
     return Imported(name, files, notes, best.held.stands)
 
 
@@ -248,5 +348,10 @@ def _stated_length(best: Candidate) -> float | None:
     hip = stance_of(best.puppet, best.qpos[7:]).hip
     if geometry.body_length(model, data, np.array([1.0, 0.0, 0.0])) >= hip:
         return None
-    best.notes.guess("body_length", f"{hip:.3g}", "medium", "the hip height: the body is shorter than its legs, and speeds count in it")
+    best.notes.guess(
+        "body_length",
+        f"{hip:.3g}",
+        "medium",
+        "the hip height: the body is shorter than its legs, and speeds count in it",
+    )
     return hip

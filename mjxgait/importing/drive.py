@@ -24,7 +24,15 @@ LEAST_DAMPING = 0.5
 """Damping ratio of a joint on its own."""
 LEAST_INERTIA = 2.0
 """Of a joint, in units of time step times kd. Stable PD does not know what the floor holds, and so gives way by I / (I + h kd)."""
-RANGES = {"stride": 40.0, "lift": 40.0, "side": 15.0, "twist": 12.0, "ankle": 25.0, "spine": 15.0, "other": 20.0}
+RANGES = {
+    "stride": 40.0,
+    "lift": 40.0,
+    "side": 15.0,
+    "twist": 12.0,
+    "ankle": 25.0,
+    "spine": 15.0,
+    "other": 20.0,
+}
 """deg to both sides of the standing angle, by what a joint does."""
 ROLES = ("stride", "side", "lift")
 
@@ -50,9 +58,13 @@ def plan_drive(puppet: Puppet, q: np.ndarray, stance: Stance, planar: bool, note
     roles, moves = _roles(puppet, q, stance)
     weight, inertia = puppet.mass * GRAVITY * stance.hip, _own_inertia(puppet)
     quick = QUICKNESS**2 * GRAVITY / stance.hip * inertia
-    kp = np.maximum(weight * float(np.clip(STIFFNESS / feet, LEAST_STIFFNESS, MOST_STIFFNESS)), quick)
+    kp = np.maximum(
+        weight * float(np.clip(STIFFNESS / feet, LEAST_STIFFNESS, MOST_STIFFNESS)), quick
+    )
     kd = np.maximum(DAMPING * kp, 2 * LEAST_DAMPING * np.sqrt(kp * inertia))
-    own = np.maximum(weight * float(np.clip(STRENGTH / feet, LEAST_STRENGTH, MOST_STRENGTH)), SWING * quick)
+    own = np.maximum(
+        weight * float(np.clip(STRENGTH / feet, LEAST_STRENGTH, MOST_STRENGTH)), SWING * quick
+    )
     stated = np.array([joint.effort for joint in puppet.joints])
     # The file's number is taken where it is one that a walk could need; 0 and 1000 N·m often only mean "not known".
     torque = np.where(np.isfinite(stated) & (stated > 0.15 * own), np.minimum(stated, 3 * own), own)
@@ -64,7 +76,9 @@ def plan_drive(puppet: Puppet, q: np.ndarray, stance: Stance, planar: bool, note
     used = np.isfinite(stated) & (torque == stated)
     notes.guess("torque_limit", f"{torque.min():.3g} to {torque.max():.3g}", "high" if used.all() else "medium",
                 f"stated for {used.sum()} of {len(q)} joints; else from weight times hip height")  # fmt: skip
-    notes.guess("range", "by what each joint does", "low", "45 degrees and less, within the file's limits")
+    notes.guess(
+        "range", "by what each joint does", "low", "45 degrees and less, within the file's limits"
+    )
     if not planar:
         _steering(puppet, stance, drive, moves)
     _balance(puppet, stance, drive, moves, planar)
@@ -113,7 +127,9 @@ def _roles(puppet: Puppet, q: np.ndarray, stance: Stance) -> tuple[list[str], np
         elif size < 0.2 * stance.hip:
             roles.append("ankle" if axes[j][1] > 0.7 else "twist")
         else:
-            roles.append(ROLES[int((np.abs(mean[j]) * [1.3, 1.0, 1.0]).argmax())])  # a tie is a stride
+            roles.append(
+                ROLES[int((np.abs(mean[j]) * [1.3, 1.0, 1.0]).argmax())]
+            )  # a tie is a stride
     return roles, mean
 
 
@@ -132,11 +148,17 @@ def _steering(puppet: Puppet, stance: Stance, drive: Drive, moves: np.ndarray) -
         own = [j for j in puppet.leg(f) if drive.role[j] == "stride"]
         if own and abs(side) > 0.02 * stance.hip:
             drive.stride[puppet.names[own[0]]] = 0.5 if side > 0 else -0.5
-    spine = [j for j, role in enumerate(drive.role) if role == "spine" and abs(puppet.data.xaxis[j + 1][2]) > 0.7]
+    spine = [
+        j
+        for j, role in enumerate(drive.role)
+        if role == "spine" and abs(puppet.data.xaxis[j + 1][2]) > 0.7
+    ]
     behind = [j for j in spine if puppet.data.xanchor[j + 1][0] < puppet.data.xpos[1][0]]
     if behind:
         # The hind part swings to the left with positive yaw about -z, which curves the body to the right.
-        drive.bend[puppet.names[behind[0]]] = 0.5 * float(np.sign(puppet.data.xaxis[behind[0] + 1][2]))
+        drive.bend[puppet.names[behind[0]]] = 0.5 * float(
+            np.sign(puppet.data.xaxis[behind[0] + 1][2])
+        )
 
 
 def _balance(puppet: Puppet, stance: Stance, drive: Drive, moves: np.ndarray, planar: bool) -> None:
@@ -149,7 +171,9 @@ def _balance(puppet: Puppet, stance: Stance, drive: Drive, moves: np.ndarray, pl
             drive.roll[puppet.names[sides[0]]] = -float(np.sign(moves[sides[0]][1]))
         ankles = [j for j in leg if drive.role[j] == "ankle"]
         if len(puppet.feet) <= 2 and ankles:
-            drive.pitch[puppet.names[ankles[-1]]] = float(np.sign(puppet.data.xaxis[ankles[-1] + 1][1]))
+            drive.pitch[puppet.names[ankles[-1]]] = float(
+                np.sign(puppet.data.xaxis[ankles[-1] + 1][1])
+            )
         elif abs(ahead) > 0.2 * stance.hip:
             own = [j for j in leg if drive.role[j] in ("lift", "stride")]
             if own:

@@ -31,7 +31,14 @@ class Held:
     @property
     def score(self) -> float:
         """For the better of several that do not stand, or do: larger is better."""
-        return 2 * self.stands + self.up + self.height - self.sag - 0.2 * min(self.speed, 5.0) - bool(self.touched)
+        return (
+            2 * self.stands
+            + self.up
+            + self.height
+            - self.sag
+            - 0.2 * min(self.speed, 5.0)
+            - bool(self.touched)
+        )
 
 
 def hold(
@@ -55,7 +62,11 @@ def hold(
     data.qpos[:] = qpos
     mujoco.mj_forward(model, data)
     up_axis, start = data.xmat[1].reshape(3, 3).T @ [0.0, 0.0, 1.0], data.xpos[1].copy()
-    step, goal, mass = model.opt.timestep, qpos[7:] if stand is None else stand, np.zeros((model.nv, model.nv))
+    step, goal, mass = (
+        model.opt.timestep,
+        qpos[7:] if stand is None else stand,
+        np.zeros((model.nv, model.nv)),
+    )
     up, height, touched = 1.0, 1.0, ""
     for _ in range(round(seconds / step)):
         mujoco.mj_step1(model, data)
@@ -78,7 +89,14 @@ def hold(
             break
     error = data.qpos[7:] - goal
     moved = float(np.linalg.norm(data.xpos[1][:2] - start[:2]))
-    return Held(up, height, moved, float(np.sqrt((error**2).mean())), float(np.sqrt((data.qvel[6:] ** 2).mean())), touched)
+    return Held(
+        up,
+        height,
+        moved,
+        float(np.sqrt((error**2).mean())),
+        float(np.sqrt((data.qvel[6:] ** 2).mean())),
+        touched,
+    )
 
 
 def _touching(model: mujoco.MjModel, data: mujoco.MjData, feet: set[str]) -> str:

@@ -5,7 +5,15 @@ from pathlib import Path
 
 from mjxgait.errors import UserError
 from mjxgait.importing.notes import Notes
-from mjxgait.importing.source import MOST_ELEMENTS, MOST_INCLUDES, Places, Source, load_mesh, numbers, parse_xml
+from mjxgait.importing.source import (
+    MOST_ELEMENTS,
+    MOST_INCLUDES,
+    Places,
+    Source,
+    load_mesh,
+    numbers,
+    parse_xml,
+)
 
 DROPPED = {
     "sensor": "a sensor has no part in walking",
@@ -41,7 +49,13 @@ def clean_mjcf(source: Source, path: Path, places: Places, notes: Notes) -> None
     tree = source.tree
     _include(tree, path, places, [0, 0])
     folders = _compiler(tree)
-    source.poses = [n for n in (numbers(e.get("data")) for e in tree.iter("numeric") if e.get("name") == "init_qpos") if n]
+    source.poses = [
+        n
+        for n in (
+            numbers(e.get("data")) for e in tree.iter("numeric") if e.get("name") == "init_qpos"
+        )
+        if n
+    ]
     for name, why in DROPPED.items():
         for element in tree.findall(name):
             tree.remove(element)
@@ -52,7 +66,11 @@ def clean_mjcf(source: Source, path: Path, places: Places, notes: Notes) -> None
     _drop_inner(tree, notes)
     _drop_unreadable(source, places, folders, notes)
     for element in tree.iter():
-        for key in [k for k in element.attrib if k.startswith("file") and not (element.tag == "mesh" and k == "file")]:
+        for key in [
+            k
+            for k in element.attrib
+            if k.startswith("file") and not (element.tag == "mesh" and k == "file")
+        ]:
             del element.attrib[key]
         for key in ("texture", "plugin", "instance"):
             element.attrib.pop(key, None)
@@ -115,12 +133,17 @@ def _drop_inner(tree: ET.Element, notes: Notes) -> None:
         if child.tag in dropped:
             parent.remove(child)
             if dropped[child.tag] and child.tag not in ("camera", "light"):
-                notes.change(f"<{child.tag}> {child.get('name', '')} dropped".replace("  ", " "), dropped[child.tag])
+                notes.change(
+                    f"<{child.tag}> {child.get('name', '')} dropped".replace("  ", " "),
+                    dropped[child.tag],
+                )
         elif child.tag == "replicate":
             copies = numbers(child.get("count"))
             total *= max(copies[0], 1.0) if copies else MOST_COPIES + 1
             if total > MOST_COPIES:
-                raise UserError(f'<replicate count="{child.get("count", "")[:20]}"> is more than a creature needs; write its parts out')
+                raise UserError(
+                    f'<replicate count="{child.get("count", "")[:20]}"> is more than a creature needs; write its parts out'
+                )
 
 
 def _drop_unreadable(source: Source, places: Places, folders: list[str], notes: Notes) -> None:
@@ -142,5 +165,9 @@ def _drop_unreadable(source: Source, places: Places, folders: list[str], notes: 
                 mesh.attrib.pop("content_type", None)
     for parent in list(source.tree.iter()):
         for geom in parent.findall("geom"):
-            if geom.get("mesh") in gone or geom.get("type") in ("hfield", "sdf") or "hfield" in geom.attrib:
+            if (
+                geom.get("mesh") in gone
+                or geom.get("type") in ("hfield", "sdf")
+                or "hfield" in geom.attrib
+            ):
                 parent.remove(geom)

@@ -44,7 +44,9 @@ class Notes:
 
     def text(self) -> str:
         """The report in plain lines."""
-        lines = ["Changes:"] + [f"  - {c.what}: {c.why}" for c in self.changes] if self.changes else []
+        lines = (
+            ["Changes:"] + [f"  - {c.what}: {c.why}" for c in self.changes] if self.changes else []
+        )
         lines += ["Guesses (change them in creature.toml):"]
         lines += [f"  - {g.what} = {g.value}  [{g.confidence}] {g.reason}" for g in self.guesses]
         return "\n".join(lines)

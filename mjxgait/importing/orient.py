@@ -22,7 +22,12 @@ FRONT_WORDS, BACK_WORDS = (
         "rh_",
     ),
 )
-FORWARDS = {"x": np.array([1.0, 0, 0]), "-x": np.array([-1.0, 0, 0]), "y": np.array([0, 1.0, 0]), "-y": np.array([0, -1.0, 0])}
+FORWARDS = {
+    "x": np.array([1.0, 0, 0]),
+    "-x": np.array([-1.0, 0, 0]),
+    "y": np.array([0, 1.0, 0]),
+    "-y": np.array([0, -1.0, 0]),
+}
 
 
 def yaw_to(forward: np.ndarray) -> np.ndarray:
@@ -44,7 +49,11 @@ def find_forward(puppet: Puppet, q: np.ndarray, told: str | None, notes: Notes) 
         lateral = int(np.abs(axes[0][:2]).argmax())
         name, sure, why = ("x", "y")[1 - lateral], "high", "all hinges turn about the other axis"
     elif sides["x"] != sides["y"]:
-        name, sure, why = ("x" if sides["x"] else "y"), "high", "the body is its own mirror image about it"
+        name, sure, why = (
+            ("x" if sides["x"] else "y"),
+            "high",
+            "the body is its own mirror image about it",
+        )
     elif sides["x"]:
         name, sure, why = "x", "medium", "the body is as symmetric along y; x is the convention"
     else:
@@ -54,7 +63,12 @@ def find_forward(puppet: Puppet, q: np.ndarray, told: str | None, notes: Notes) 
     sign, evidence = _front(puppet, xpos, FORWARDS[name])
     if sign < 0:
         name = f"-{name}"
-    notes.guess("forward", name, "medium" if sure == "high" and not evidence else sure, why + (f"; {evidence}" if evidence else ""))
+    notes.guess(
+        "forward",
+        name,
+        "medium" if sure == "high" and not evidence else sure,
+        why + (f"; {evidence}" if evidence else ""),
+    )
     return FORWARDS[name]
 
 
@@ -86,7 +100,9 @@ def is_planar(puppet: Puppet, q: np.ndarray) -> np.ndarray | None:
     axes = puppet.data.xaxis[1:]
     if np.abs(axes @ axes[0]).min() < 0.99 or abs(axes[0][2]) > 0.1:
         return None
-    middles = [float((sole.max(0) + sole.min(0)) @ axes[0]) / 2 for sole in puppet.sole_points(*poses)]
+    middles = [
+        float((sole.max(0) + sole.min(0)) @ axes[0]) / 2 for sole in puppet.sole_points(*poses)
+    ]
     height = max(float(np.ptp(poses[0][:, 2])), 1e-6)
     return axes[0] if np.ptp(middles) < (0.4 if puppet.in_plane else 0.05) * height else None
 
@@ -103,19 +119,32 @@ def planar_pairs(puppet: Puppet, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]
         return None
     for a, b in zip(own, others, strict=True):
         apart = (puppet.data.xanchor[a + 1] - puppet.data.xanchor[b + 1])[[0, 2]]
-        same = puppet.joints[a].low == puppet.joints[b].low and puppet.joints[a].high == puppet.joints[b].high
-        if np.linalg.norm(apart) > 0.05 * float(np.ptp(puppet.data.xpos[1:], axis=0).max() + 1e-6) or not same:
+        same = (
+            puppet.joints[a].low == puppet.joints[b].low
+            and puppet.joints[a].high == puppet.joints[b].high
+        )
+        if (
+            np.linalg.norm(apart) > 0.05 * float(np.ptp(puppet.data.xpos[1:], axis=0).max() + 1e-6)
+            or not same
+        ):
             return None
         partner[a], partner[b] = b, a
         sign[a] = sign[b] = int(np.sign(puppet.data.xaxis[a + 1] @ puppet.data.xaxis[b + 1]))
     return partner, sign
 
 
-def find_mirror(puppet: Puppet, q: np.ndarray, planar: bool, notes: Notes) -> tuple[np.ndarray, np.ndarray] | None:
+def find_mirror(
+    puppet: Puppet, q: np.ndarray, planar: bool, notes: Notes
+) -> tuple[np.ndarray, np.ndarray] | None:
     """Partner and sign [J] of a body that faces +x, or None for one that is not symmetric."""
     if planar:
         found = planar_pairs(puppet, q)
-        notes.guess("mirror", "two alike legs" if found else "none", "high", "the legs of a body in a plane are compared")
+        notes.guess(
+            "mirror",
+            "two alike legs" if found else "none",
+            "high",
+            "the legs of a body in a plane are compared",
+        )
         return found
     found = puppet.mirror(np.array([1.0, 0, 0]), q)
     if found is not None and not _mirrors(puppet, q, *found):
@@ -125,7 +154,11 @@ def find_mirror(puppet: Puppet, q: np.ndarray, planar: bool, notes: Notes) -> tu
         found = None
         reason = "the geometry and the names left and right contradict each other"
     else:
-        reason = "partners found from the anchors and axes of the joints" if found else "some joint has no mirror image"
+        reason = (
+            "partners found from the anchors and axes of the joints"
+            if found
+            else "some joint has no mirror image"
+        )
     notes.guess("mirror", "symmetric" if found else "none", "high" if found else "medium", reason)
     return found
 

@@ -9,7 +9,9 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 GEOM = mujoco.mjtGeom
-FREE, BALL, SLIDE, HINGE = (int(getattr(mujoco.mjtJoint, f"mjJNT_{name}")) for name in ("FREE", "BALL", "SLIDE", "HINGE"))
+FREE, BALL, SLIDE, HINGE = (
+    int(getattr(mujoco.mjtJoint, f"mjJNT_{name}")) for name in ("FREE", "BALL", "SLIDE", "HINGE")
+)
 MOST_POINTS = 48
 """Of the hull that stands for a mesh."""
 RINGS = 16
@@ -92,7 +94,11 @@ def read_shapes(model: mujoco.MjModel, body: int) -> list[Shape]:
     shapes = []
     for g in range(model.ngeom):
         kind = int(model.geom_type[g])
-        if model.geom_bodyid[g] != body or kind in (GEOM.mjGEOM_PLANE, GEOM.mjGEOM_HFIELD, GEOM.mjGEOM_SDF):
+        if model.geom_bodyid[g] != body or kind in (
+            GEOM.mjGEOM_PLANE,
+            GEOM.mjGEOM_HFIELD,
+            GEOM.mjGEOM_SDF,
+        ):
             continue
         local, radius = _points(model, g)
         pos, quat = model.geom_pos[g].copy(), model.geom_quat[g].copy()
@@ -101,7 +107,19 @@ def read_shapes(model: mujoco.MjModel, body: int) -> list[Shape]:
         solid = bool(model.geom_contype[g] or model.geom_conaffinity[g])
         seen = bool(model.geom_group[g] < 3 and rgba[3] > 0)
         points = pos + local @ rotation(quat).T
-        shapes.append(Shape(kind, model.geom_size[g].copy(), pos, quat, rgba.astype(float).copy(), points, radius, solid, seen))
+        shapes.append(
+            Shape(
+                kind,
+                model.geom_size[g].copy(),
+                pos,
+                quat,
+                rgba.astype(float).copy(),
+                points,
+                radius,
+                solid,
+                seen,
+            )
+        )
     return shapes
 
 
@@ -124,7 +142,9 @@ def _points(model: mujoco.MjModel, geom: int) -> tuple[np.ndarray, float]:
         case GEOM.mjGEOM_MESH:
             mesh = int(model.geom_dataid[geom])
             start = int(model.mesh_vertadr[mesh])
-            return hull_points(model.mesh_vert[start : start + int(model.mesh_vertnum[mesh])].astype(float)), 0.0
+            return hull_points(
+                model.mesh_vert[start : start + int(model.mesh_vertnum[mesh])].astype(float)
+            ), 0.0
         case _:
             corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
             return corners * [a, b, c], 0.0

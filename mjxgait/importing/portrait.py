@@ -14,15 +14,34 @@ from mjxgait.viewing.shapes import Silhouettes
 WIDTH, HEIGHT = 1100, 760
 ROOM = 1.7
 """Of the picture, in units of the creature."""
-FOOT, FORWARD, LEFT, UP, GROUND = (214, 84, 0), (200, 30, 30), (20, 140, 40), (30, 60, 200), (130, 90, 160)
-PAIRS = ((0, 110, 160), (150, 80, 0), (120, 0, 120), (0, 120, 70), (160, 0, 50), (90, 90, 0), (60, 60, 60))
+FOOT, FORWARD, LEFT, UP, GROUND = (
+    (214, 84, 0),
+    (200, 30, 30),
+    (20, 140, 40),
+    (30, 60, 200),
+    (130, 90, 160),
+)
+PAIRS = (
+    (0, 110, 160),
+    (150, 80, 0),
+    (120, 0, 120),
+    (0, 120, 70),
+    (160, 0, 50),
+    (90, 90, 0),
+    (60, 60, 60),
+)
 ALONE = (255, 255, 255)
 
 
 def standing(creature: Creature) -> Held:
     """How it stands for two seconds."""
-    feet = {creature.model.geom(int(g)).name for g in [*creature.watched[: len(creature.foot_of)], *creature.ground]}
-    return hold(creature.model, creature.stand_qpos, creature.kp, creature.kd, creature.torque_limit, feet)
+    feet = {
+        creature.model.geom(int(g)).name
+        for g in [*creature.watched[: len(creature.foot_of)], *creature.ground]
+    }
+    return hold(
+        creature.model, creature.stand_qpos, creature.kp, creature.kd, creature.torque_limit, feet
+    )
 
 
 def facts(creature: Creature) -> list[str]:
@@ -33,7 +52,11 @@ def facts(creature: Creature) -> list[str]:
     names = creature.joint_names
     pairs = [(a, int(b)) for a, b in enumerate(creature.partner) if a < b]
     own = [names[a] for a, b in enumerate(creature.partner) if a == b]
-    mirror = [f"  {names[a]} <-> {'-' if creature.sign[a] < 0 else ''}{names[b]}" for a, b in pairs] if creature.symmetric else []
+    mirror = (
+        [f"  {names[a]} <-> {'-' if creature.sign[a] < 0 else ''}{names[b]}" for a, b in pairs]
+        if creature.symmetric
+        else []
+    )
     return [
         f"{creature.name}: {creature.mass:.3g} kg, hip height {creature.hip_height:.3g} m, body length {creature.body_length:.3g} m",
         f"joints: {len(names)}, feet: {', '.join(creature.foot_names)}",
@@ -56,30 +79,42 @@ def portrait(creature: Creature) -> Image.Image:
     _mark_feet(draw, camera, creature, data)
     _mark_joints(draw, camera, creature, data)
     _mark_axes(draw, camera, creature, data)
-    legend = (
-        "red forward, green left, blue up; rings: feet; a number: joints that mirror each other (- with the opposite sign); white: alone"
-    )
+    legend = "red forward, green left, blue up; rings: feet; a number: joints that mirror each other (- with the opposite sign); white: alone"
     draw.text((12, 10), f"{creature.name}\n{legend}", fill=DARK_INK, font=font(15))
     return picture
 
 
 def _camera(creature: Creature, painter: Painter, places: tuple[np.ndarray, np.ndarray]) -> Camera:
     forward = (creature.stand_rot @ creature.forward)[:2]
-    flat = Camera(np.zeros(3), forward / np.linalg.norm(forward), 1.0, 0, 0, azimuth=np.radians(35.0), elevation=np.radians(22.0))
+    flat = Camera(
+        np.zeros(3),
+        forward / np.linalg.norm(forward),
+        1.0,
+        0,
+        0,
+        azimuth=np.radians(35.0),
+        elevation=np.radians(22.0),
+    )
     if not len(painter.geoms):
         corners = places[0]
     else:
         directions = np.concatenate([np.eye(3), -np.eye(3)])
         outline = Silhouettes(creature.model, painter.geoms)
-        corners = outline.outermost(places[0][painter.geoms], places[1][painter.geoms], directions).reshape(-1, 3)
+        corners = outline.outermost(
+            places[0][painter.geoms], places[1][painter.geoms], directions
+        ).reshape(-1, 3)
     seen = flat.pixels(corners)
     size = np.maximum(np.ptp(seen, axis=0), 1e-3)
     scale = float(min(WIDTH / (ROOM * size[0]), HEIGHT / (ROOM * size[1])))
     centre = (corners.min(0) + corners.max(0)) / 2
-    return Camera(centre, flat.forward, scale, WIDTH, HEIGHT, azimuth=flat.azimuth, elevation=flat.elevation)
+    return Camera(
+        centre, flat.forward, scale, WIDTH, HEIGHT, azimuth=flat.azimuth, elevation=flat.elevation
+    )
 
 
-def _mark_feet(draw: ImageDraw.ImageDraw, camera: Camera, creature: Creature, data: mujoco.MjData) -> None:
+def _mark_feet(
+    draw: ImageDraw.ImageDraw, camera: Camera, creature: Creature, data: mujoco.MjData
+) -> None:
     for g in creature.watched[: len(creature.foot_of)]:
         _ring(draw, camera.pixels(data.geom_xpos[g]), 13, FOOT)
     for g in creature.ground:
@@ -90,12 +125,16 @@ def _mark_feet(draw: ImageDraw.ImageDraw, camera: Camera, creature: Creature, da
         draw.text((x, y + 16), name, fill=FOOT, font=font(13), anchor="ma")
 
 
-def _ring(draw: ImageDraw.ImageDraw, at: np.ndarray, radius: float, colour: tuple[int, int, int]) -> None:
+def _ring(
+    draw: ImageDraw.ImageDraw, at: np.ndarray, radius: float, colour: tuple[int, int, int]
+) -> None:
     x, y = at
     draw.ellipse([x - radius, y - radius, x + radius, y + radius], outline=colour, width=3)
 
 
-def _mark_joints(draw: ImageDraw.ImageDraw, camera: Camera, creature: Creature, data: mujoco.MjData) -> None:
+def _mark_joints(
+    draw: ImageDraw.ImageDraw, camera: Camera, creature: Creature, data: mujoco.MjData
+) -> None:
     """A dot with a number per joint; joints at one point stand side by side."""
     firsts = dict.fromkeys(min(j, int(partner)) for j, partner in enumerate(creature.partner))
     numbers = {first: n for n, first in enumerate(firsts)}
@@ -112,15 +151,32 @@ def _mark_joints(draw: ImageDraw.ImageDraw, camera: Camera, creature: Creature, 
         fill = ALONE if alone or not creature.symmetric else PAIRS[number % len(PAIRS)]
         draw.ellipse([x - 9, y - 9, x + 9, y + 9], fill=fill, outline=DARK_INK)
         sign = "-" if creature.symmetric and creature.sign[j] < 0 else ""
-        draw.text((x, y), f"{sign}{number + 1}", fill=DARK_INK if fill == ALONE else (255, 255, 255), font=font(11), anchor="mm")
+        draw.text(
+            (x, y),
+            f"{sign}{number + 1}",
+            fill=DARK_INK if fill == ALONE else (255, 255, 255),
+            font=font(11),
+            anchor="mm",
+        )
 
 
-def _mark_axes(draw: ImageDraw.ImageDraw, camera: Camera, creature: Creature, data: mujoco.MjData) -> None:
-    origin, length = data.xpos[creature.trunk], min(0.6 * creature.body_length, 0.9 * creature.stand_height)
-    for axis, colour, name in ((creature.forward, FORWARD, "forward"), (creature.left, LEFT, "left"), (creature.up, UP, "up")):
+def _mark_axes(
+    draw: ImageDraw.ImageDraw, camera: Camera, creature: Creature, data: mujoco.MjData
+) -> None:
+    origin, length = (
+        data.xpos[creature.trunk],
+        min(0.6 * creature.body_length, 0.9 * creature.stand_height),
+    )
+    for axis, colour, name in (
+        (creature.forward, FORWARD, "forward"),
+        (creature.left, LEFT, "left"),
+        (creature.up, UP, "up"),
+    ):
         a, b = camera.pixels(np.stack([origin, origin + length * (creature.stand_rot @ axis)]))
         draw.line([tuple(a), tuple(b)], fill=colour, width=4)
         along = (b - a) / max(float(np.linalg.norm(b - a)), 1e-9)
         across = np.array([-along[1], along[0]])
-        draw.polygon([tuple(b + 12 * along), tuple(b + 6 * across), tuple(b - 6 * across)], fill=colour)
+        draw.polygon(
+            [tuple(b + 12 * along), tuple(b + 6 * across), tuple(b - 6 * across)], fill=colour
+        )
         draw.text(tuple(b + 26 * along), name, fill=colour, font=font(14), anchor="mm")

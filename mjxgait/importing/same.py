@@ -11,7 +11,9 @@ from mjxgait.importing.parts import BALL
 TOLERANCE = 1e-6
 
 
-def check_same(model: mujoco.MjModel, anatomy: Anatomy, puppet: Puppet, made: mujoco.MjModel) -> None:
+def check_same(
+    model: mujoco.MjModel, anatomy: Anatomy, puppet: Puppet, made: mujoco.MjModel
+) -> None:
     """Compares the compiled file with the written creature, body by body and joint by joint, relative to their size.
 
     Raises:
@@ -20,7 +22,12 @@ def check_same(model: mujoco.MjModel, anatomy: Anatomy, puppet: Puppet, made: mu
     scale = anatomy.scale
     ids = np.array([body.id for body in puppet.bodies])
     _equal("mass", model.body_mass[ids], made.body_mass[1:], float(model.body_mass[ids].sum()))
-    _equal("inertia", model.body_inertia[ids] * scale**2, made.body_inertia[1:], float(model.body_inertia[ids].max()) * scale**2)
+    _equal(
+        "inertia",
+        model.body_inertia[ids] * scale**2,
+        made.body_inertia[1:],
+        float(model.body_inertia[ids].max()) * scale**2,
+    )
     heavy = model.body_mass[ids] > 0
     _equal("centre of mass", (model.body_ipos[ids] * scale)[heavy], made.body_ipos[1:][heavy], 1.0)
     turned = np.abs((model.body_iquat[ids] * made.body_iquat[1:]).sum(1))[heavy]
@@ -33,14 +40,23 @@ def check_same(model: mujoco.MjModel, anatomy: Anatomy, puppet: Puppet, made: mu
     _places(model, anatomy, puppet, made, source, own)
 
 
-def _places(model: mujoco.MjModel, anatomy: Anatomy, puppet: Puppet, made: mujoco.MjModel, source: list[int], own: list[int]) -> None:
+def _places(
+    model: mujoco.MjModel,
+    anatomy: Anatomy,
+    puppet: Puppet,
+    made: mujoco.MjModel,
+    source: list[int],
+    own: list[int],
+) -> None:
     """Where joints are and turn about, relative to the trunk, in the file's pose."""
     before, after = mujoco.MjData(model), mujoco.MjData(made)
     before.qpos[:] = anatomy.qpos
     after.qpos[:] = made.qpos0
     for a, b in zip(source, own, strict=True):
         after.qpos[made.jnt_qposadr[b]] = before.qpos[model.jnt_qposadr[a]]
-    balls = [int(model.jnt_bodyid[j.id]) for j in puppet.joints if int(model.jnt_type[j.id]) == BALL]
+    balls = [
+        int(model.jnt_bodyid[j.id]) for j in puppet.joints if int(model.jnt_type[j.id]) == BALL
+    ]
     if balls:  # three hinges are zero where the ball is
         return
     for m, d in ((model, before), (made, after)):

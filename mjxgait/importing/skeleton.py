@@ -8,7 +8,16 @@ import numpy as np
 
 from mjxgait.importing.anatomy import Anatomy
 from mjxgait.importing.notes import Notes, listed
-from mjxgait.importing.parts import BALL, HINGE, Body, Joint, Shape, plain_names, quaternion, rotation
+from mjxgait.importing.parts import (
+    BALL,
+    HINGE,
+    Body,
+    Joint,
+    Shape,
+    plain_names,
+    quaternion,
+    rotation,
+)
 
 MOST_RADIANS = 4 * np.pi
 """A limit beyond it was meant in degrees."""
@@ -16,7 +25,9 @@ SHANK_END = 0.7
 """From this share of its length on, a shank is the foot."""
 
 
-def build_bodies(model: mujoco.MjModel, anatomy: Anatomy, efforts: Mapping[str, float], notes: Notes) -> list[Body]:
+def build_bodies(
+    model: mujoco.MjModel, anatomy: Anatomy, efforts: Mapping[str, float], notes: Notes
+) -> list[Body]:
     """The creature's bodies, parents first; frozen joints are baked into the bodies' places."""
     ids = anatomy.bodies
     names = plain_names([model.body(b).name for b in ids], [f"body_{i}" for i in range(len(ids))])
@@ -65,13 +76,24 @@ def _placed(model: mujoco.MjModel, anatomy: Anatomy) -> tuple[np.ndarray, np.nda
     return anatomy.scale * data.xpos @ turn.T, turn @ data.xmat.reshape(-1, 3, 3)
 
 
-def _add_joints(model: mujoco.MjModel, anatomy: Anatomy, bodies: list[Body], efforts: Mapping[str, float], notes: Notes) -> None:
+def _add_joints(
+    model: mujoco.MjModel,
+    anatomy: Anatomy,
+    bodies: list[Body],
+    efforts: Mapping[str, float],
+    notes: Notes,
+) -> None:
     at = {body.id: body for body in bodies}
-    names = plain_names([model.joint(j).name for j in anatomy.active], [f"joint_{j}" for j in anatomy.active])
+    names = plain_names(
+        [model.joint(j).name for j in anatomy.active], [f"joint_{j}" for j in anatomy.active]
+    )
     degrees = []
     for name, j in zip(names, anatomy.active, strict=True):
         body = at[int(model.jnt_bodyid[j])]
-        pos, armature = model.jnt_pos[j] * anatomy.scale, float(model.dof_armature[model.jnt_dofadr[j]])
+        pos, armature = (
+            model.jnt_pos[j] * anatomy.scale,
+            float(model.dof_armature[model.jnt_dofadr[j]]),
+        )
         effort = efforts.get(model.joint(j).name, _stated_torque(model, j))
         if int(model.jnt_type[j]) == HINGE:
             low, high = (float(v) for v in model.jnt_range[j])
@@ -80,16 +102,24 @@ def _add_joints(model: mujoco.MjModel, anatomy: Anatomy, bodies: list[Body], eff
                 low, high = np.radians(low), np.radians(high)
                 degrees.append(name)
             ref = float(model.qpos0[model.jnt_qposadr[j]])
-            body.joints.append(Joint(name, j, pos, model.jnt_axis[j].copy(), low, high, ref, armature, effort))
+            body.joints.append(
+                Joint(name, j, pos, model.jnt_axis[j].copy(), low, high, ref, armature, effort)
+            )
             continue
         reach = float(model.jnt_range[j][1]) if model.jnt_limited[j] else np.inf
         for axis, letter in zip(np.eye(3), "xyz", strict=True):
-            body.joints.append(Joint(f"{name}_{letter}", j, pos, axis, -reach, reach, 0.0, armature, effort))
+            body.joints.append(
+                Joint(f"{name}_{letter}", j, pos, axis, -reach, reach, 0.0, armature, effort)
+            )
         notes.change(
-            f'ball joint "{name}" written as the three hinges {name}_x, {name}_y and {name}_z', "the controller's key poses are angles"
+            f'ball joint "{name}" written as the three hinges {name}_x, {name}_y and {name}_z',
+            "the controller's key poses are angles",
         )
     if degrees:
-        notes.change(f"limits of {listed(degrees)} read as degrees", "they are beyond two turns if they are in radians")
+        notes.change(
+            f"limits of {listed(degrees)} read as degrees",
+            "they are beyond two turns if they are in radians",
+        )
 
 
 def _stated_torque(model: mujoco.MjModel, joint: int) -> float:
@@ -98,14 +128,21 @@ def _stated_torque(model: mujoco.MjModel, joint: int) -> float:
     if model.jnt_actfrclimited[joint]:
         torques.append(float(np.abs(model.jnt_actfrcrange[joint]).max()))
     for a in range(model.nu):
-        on_joint = int(model.actuator_trntype[a]) == int(mujoco.mjtTrn.mjTRN_JOINT) and int(model.actuator_trnid[a][0]) == joint
+        on_joint = (
+            int(model.actuator_trntype[a]) == int(mujoco.mjtTrn.mjTRN_JOINT)
+            and int(model.actuator_trnid[a][0]) == joint
+        )
         if not on_joint:
             continue
         gear = abs(float(model.actuator_gear[a][0]))
         if model.actuator_forcelimited[a]:
             torques.append(gear * float(np.abs(model.actuator_forcerange[a]).max()))
         elif model.actuator_ctrllimited[a] and not model.actuator_biasprm[a].any():
-            torques.append(gear * abs(float(model.actuator_gainprm[a][0])) * float(np.abs(model.actuator_ctrlrange[a]).max()))
+            torques.append(
+                gear
+                * abs(float(model.actuator_gainprm[a][0]))
+                * float(np.abs(model.actuator_ctrlrange[a]).max())
+            )
     stated = [t for t in torques if np.isfinite(t) and t > 0]
     return min(stated) if stated else float("nan")
 
@@ -138,7 +175,9 @@ def foot_tips(bodies: list[Body], group: list[int]) -> list[Tip]:
     for i in group[1:]:
         at, turn = places[bodies[i].parent]
         places[i] = (at + turn @ bodies[i].pos, turn @ rotation(bodies[i].quat))
-    shapes = [(i, s) for i in group for s in bodies[i].shapes if s.solid] or [(i, s) for i in group for s in bodies[i].shapes if s.seen]
+    shapes = [(i, s) for i in group for s in bodies[i].shapes if s.solid] or [
+        (i, s) for i in group for s in bodies[i].shapes if s.seen
+    ]
     if not shapes:
         return []
     ankle = bodies[group[0]].joints[-1].pos if bodies[group[0]].joints else np.zeros(3)

@@ -30,7 +30,9 @@ class Stance:
     hip: float
 
 
-def lay_soles(bodies: list[Body], groups: list[list[int]], stance: Stance, planar: bool, notes: Notes) -> list[list[str]]:
+def lay_soles(
+    bodies: list[Body], groups: list[list[int]], stance: Stance, planar: bool, notes: Notes
+) -> list[list[str]]:
     """Names of the foot geoms of each foot; `bodies` change.
 
     groups: of each foot, the places of its last moving body and what is welded to it.
@@ -46,7 +48,9 @@ def lay_soles(bodies: list[Body], groups: list[list[int]], stance: Stance, plana
     return names
 
 
-def _sole(bodies: list[Body], group: list[int], stance: Stance, planar: bool, notes: Notes) -> list[tuple[int, Shape]]:
+def _sole(
+    bodies: list[Body], group: list[int], stance: Stance, planar: bool, notes: Notes
+) -> list[tuple[int, Shape]]:
     """The shapes of one foot with the places of their bodies. Old shapes stay as pictures only."""
     name = bodies[group[0]].name
     owned = [(i, s) for i in group for s in bodies[i].shapes]
@@ -54,7 +58,10 @@ def _sole(bodies: list[Body], group: list[int], stance: Stance, planar: bool, no
     if not solid:
         i = group[-1]
         ball = _ball(bodies[i], np.zeros(3), 0.03 * stance.hip)
-        notes.change(f'a sphere added to "{bodies[i].name}"', "the foot has no shape that could touch the floor")
+        notes.change(
+            f'a sphere added to "{bodies[i].name}"',
+            "the foot has no shape that could touch the floor",
+        )
         return [(i, ball)]
     heights = [tip_points([tip], stance.xpos, stance.xrot)[:, 2].min() for tip in solid]
     band = BAND * stance.hip
@@ -62,17 +69,23 @@ def _sole(bodies: list[Body], group: list[int], stance: Stance, planar: bool, no
     for _, s in owned:
         s.seen, s.solid = s.seen or (s.solid and not any(o.seen for _, o in owned)), False
     round_only = all(t.shape.kind in (SPHERE, CAPSULE) for t in low) and len(low) <= 4
-    made = [_round_foot(bodies, t, stance, notes) for t in low] if round_only else _fitted(bodies, low, group[0], stance, band)
+    made = (
+        [_round_foot(bodies, t, stance, notes) for t in low]
+        if round_only
+        else _fitted(bodies, low, group[0], stance, band)
+    )
     if not round_only:
         what = " and ".join(sorted({_kind_name(t.shape.kind) for t in low}))
         shapes = " and ".join(sorted({_kind_name(s.kind) for _, s in made}))
         notes.change(
-            f'foot "{name}": {len(made)} {shapes} in place of its {what}', "spheres and capsules touch the floor fastest and most smoothly"
+            f'foot "{name}": {len(made)} {shapes} in place of its {what}',
+            "spheres and capsules touch the floor fastest and most smoothly",
         )
     if planar:
         made = _across(bodies, made, stance)
         notes.change(
-            f'foot "{name}" widened across to {2 * stance.hip:.2g} m', "the body lives in a plane; wide feet keep it from tipping sideways"
+            f'foot "{name}" widened across to {2 * stance.hip:.2g} m',
+            "the body lives in a plane; wide feet keep it from tipping sideways",
         )
     return made
 
@@ -83,7 +96,17 @@ def _kind_name(kind: int) -> str:
 
 def _ball(body: Body, pos: np.ndarray, radius: float, seen: bool = False) -> Shape:
     size = np.array([radius, 0.0, 0.0])
-    return Shape(SPHERE, size, pos, np.array([1.0, 0, 0, 0]), _colour(body), pos[None], radius, True, seen or not _drawn(body))
+    return Shape(
+        SPHERE,
+        size,
+        pos,
+        np.array([1.0, 0, 0, 0]),
+        _colour(body),
+        pos[None],
+        radius,
+        True,
+        seen or not _drawn(body),
+    )
 
 
 def bar(body: Body, a: np.ndarray, b: np.ndarray, radius: float) -> Shape:
@@ -97,7 +120,17 @@ def bar(body: Body, a: np.ndarray, b: np.ndarray, radius: float) -> Shape:
     x /= np.linalg.norm(x)
     quat = quaternion(np.stack([x, np.cross(z, x), z], axis=1))
     size = np.array([radius, length / 2, 0.0])
-    return Shape(CAPSULE, size, (a + b) / 2, quat, _colour(body), np.stack([a, b]), radius, True, not _drawn(body))
+    return Shape(
+        CAPSULE,
+        size,
+        (a + b) / 2,
+        quat,
+        _colour(body),
+        np.stack([a, b]),
+        radius,
+        True,
+        not _drawn(body),
+    )
 
 
 def _drawn(body: Body) -> bool:
@@ -121,11 +154,16 @@ def _round_foot(bodies: list[Body], tip: Tip, stance: Stance, notes: Notes) -> t
     count = sum(s.name.startswith(f"{bodies[i].name}_upper_end") for s in bodies[i].shapes)
     knee.name, knee.seen = f"{bodies[i].name}_upper_end" + (f"_{count + 1}" if count else ""), False
     bodies[i].shapes.append(knee)
-    notes.change(f'foot "{bodies[i].name}": the lower end of its capsule', "it touches the floor there; the upper end counts as a knee")
+    notes.change(
+        f'foot "{bodies[i].name}": the lower end of its capsule',
+        "it touches the floor there; the upper end counts as a knee",
+    )
     return i, _ball(bodies[i], lower, shape.radius)
 
 
-def _fitted(bodies: list[Body], low: list[Tip], home: int, stance: Stance, band: float) -> list[tuple[int, Shape]]:
+def _fitted(
+    bodies: list[Body], low: list[Tip], home: int, stance: Stance, band: float
+) -> list[tuple[int, Shape]]:
     """Spheres or capsules whose lower side is the footprint of the low points."""
     world = tip_points(low, stance.xpos, stance.xrot)
     thick = float(np.ptp(world[:, 2]))
@@ -147,16 +185,41 @@ def _fitted(bodies: list[Body], low: list[Tip], home: int, stance: Stance, band:
     ends_x = (low_corner[0] + radius, high_corner[0] - radius)
     ends_y = (low_corner[1] + radius, high_corner[1] - radius)
     if width < NARROW_FOOT * stance.hip:
-        return [(home, bar(bodies[home], local(ends_x[0], middle[1], radius), local(ends_x[1], middle[1], radius), radius))]
+        return [
+            (
+                home,
+                bar(
+                    bodies[home],
+                    local(ends_x[0], middle[1], radius),
+                    local(ends_x[1], middle[1], radius),
+                    radius,
+                ),
+            )
+        ]
     if length < NARROW_FOOT * stance.hip:
-        return [(home, bar(bodies[home], local(middle[0], ends_y[0], radius), local(middle[0], ends_y[1], radius), radius))]
+        return [
+            (
+                home,
+                bar(
+                    bodies[home],
+                    local(middle[0], ends_y[0], radius),
+                    local(middle[0], ends_y[1], radius),
+                    radius,
+                ),
+            )
+        ]
     radius = float(np.clip(min(length, width) / 6, least, most))
     ends_x = (low_corner[0] + radius, high_corner[0] - radius)
     ends_y = (low_corner[1] + radius, high_corner[1] - radius)
-    return [(home, bar(bodies[home], local(ends_x[0], y, radius), local(ends_x[1], y, radius), radius)) for y in ends_y]
+    return [
+        (home, bar(bodies[home], local(ends_x[0], y, radius), local(ends_x[1], y, radius), radius))
+        for y in ends_y
+    ]
 
 
-def _across(bodies: list[Body], made: list[tuple[int, Shape]], stance: Stance) -> list[tuple[int, Shape]]:
+def _across(
+    bodies: list[Body], made: list[tuple[int, Shape]], stance: Stance
+) -> list[tuple[int, Shape]]:
     """Each ball and each end of a capsule as a long capsule across: in the creature's plane nothing changes."""
     wide = []
     for i, shape in made:
@@ -172,7 +235,12 @@ def _across(bodies: list[Body], made: list[tuple[int, Shape]], stance: Stance) -
 
 
 def guard_parts(
-    bodies: list[Body], feet: list[list[int]], trunk: list[int], segments: list[list[int]], stance: Stance, notes: Notes
+    bodies: list[Body],
+    feet: list[list[int]],
+    trunk: list[int],
+    segments: list[list[int]],
+    stance: Stance,
+    notes: Notes,
 ) -> None:
     """Shapes of everything but the feet: a few spheres and capsules that end an episode when they touch the floor."""
     on_feet = {i for group in feet for i in group}
@@ -182,13 +250,21 @@ def guard_parts(
             continue
         most = MOST_TRUNK_SHAPES if segment == trunk else 1
         owned = [(i, s) for i in segment for s in bodies[i].shapes]
-        chosen = [(i, s) for i, s in owned if s.solid] or ([(i, s) for i, s in owned if s.seen] if segment == trunk else [])
-        chosen.sort(key=lambda pair: -float(np.ptp(pair[1].points, axis=0).max() + 2 * pair[1].radius))
+        chosen = [(i, s) for i, s in owned if s.solid] or (
+            [(i, s) for i, s in owned if s.seen] if segment == trunk else []
+        )
+        chosen.sort(
+            key=lambda pair: -float(np.ptp(pair[1].points, axis=0).max() + 2 * pair[1].radius)
+        )
         for i, s in owned:
             s.seen, s.solid = s.seen or (s.solid and not _drawn(bodies[i])), False
         for i, s in chosen[:most]:
             guard = s if s.kind in (SPHERE, CAPSULE) else _inscribed(bodies[i], s)
-            clearance = (stance.xpos[i] + guard.points @ stance.xrot[i].T)[:, 2].min() - guard.radius - stance.floor
+            clearance = (
+                (stance.xpos[i] + guard.points @ stance.xrot[i].T)[:, 2].min()
+                - guard.radius
+                - stance.floor
+            )
             if clearance < NEAR_FLOOR * stance.hip:
                 lowered.append(bodies[i].name)
                 continue
@@ -196,16 +272,24 @@ def guard_parts(
             if guard is not s:
                 bodies[i].shapes.append(guard)
                 notes.change(
-                    f'"{bodies[i].name}": a {_kind_name(guard.kind)} in place of its {_kind_name(s.kind)}', "for touching the floor"
+                    f'"{bodies[i].name}": a {_kind_name(guard.kind)} in place of its {_kind_name(s.kind)}',
+                    "for touching the floor",
                 )
     for body in bodies:
         for shape in body.shapes:  # the knee balls of feet, where they are too low to be knees
             if "_upper_end" in shape.name:
                 i = bodies.index(body)
-                height = (stance.xpos[i] + shape.points @ stance.xrot[i].T)[:, 2].min() - shape.radius - stance.floor
+                height = (
+                    (stance.xpos[i] + shape.points @ stance.xrot[i].T)[:, 2].min()
+                    - shape.radius
+                    - stance.floor
+                )
                 shape.solid = bool(height > NEAR_FLOOR * stance.hip)
     if lowered:
-        notes.change(f"{', '.join(dict.fromkeys(lowered))} do not collide", "they are so near the floor that a good step would touch it")
+        notes.change(
+            f"{', '.join(dict.fromkeys(lowered))} do not collide",
+            "they are so near the floor that a good step would touch it",
+        )
 
 
 def _inscribed(body: Body, shape: Shape) -> Shape:

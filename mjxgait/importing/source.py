@@ -54,7 +54,11 @@ class Places:
         path = uri.group(1) if uri else reference.replace("\\", "/")
         tries = [self.home / folder / path for folder in folders]
         for root in self.roots:
-            tries += [root / path, root.parent / path] if path.split("/")[0] == root.name else [root / path]
+            tries += (
+                [root / path, root.parent / path]
+                if path.split("/")[0] == root.name
+                else [root / path]
+            )
             if uri and "/" in path:
                 tries.append(root / path.split("/", 1)[1])
         for candidate in tries:
@@ -77,12 +81,16 @@ def parse_xml(path: Path) -> ET.Element:
         if not path.is_file():
             raise UserError(f"{path}: no such file")
         if path.stat().st_size > MOST_XML:
-            raise UserError(f"{path}: larger than {MOST_XML // 1_000_000} MB, so it is not read as a model file")
+            raise UserError(
+                f"{path}: larger than {MOST_XML // 1_000_000} MB, so it is not read as a model file"
+            )
         data = path.read_bytes()
     except (OSError, ValueError) as error:
         raise UserError(f"{path}: cannot be read ({error})") from None
     if b"<!DOCTYPE" in data or b"<!ENTITY" in data or b"\0" in data:
-        raise UserError(f"{path}: has a document type, entities or zero bytes, which are not read; save it as plain UTF-8 XML without them")
+        raise UserError(
+            f"{path}: has a document type, entities or zero bytes, which are not read; save it as plain UTF-8 XML without them"
+        )
     data = data[max(data.find(b"<?xml"), 0) :]  # some files have a comment before it
     try:
         return _bounded(path, ET.iterparse(io.BytesIO(data), ("start", "end")))
@@ -98,21 +106,31 @@ def _bounded(path: Path, events: Iterator[tuple[str, ET.Element]]) -> ET.Element
         depth += 1 if event == "start" else -1
         count += event == "start"
         if count > MOST_ELEMENTS or depth > MOST_DEPTH:
-            raise UserError(f"{path}: more than {MOST_ELEMENTS} elements, or nested deeper than {MOST_DEPTH}; this is not a creature")
+            raise UserError(
+                f"{path}: more than {MOST_ELEMENTS} elements, or nested deeper than {MOST_DEPTH}; this is not a creature"
+            )
     if root is None:
         raise UserError(f"{path}: empty")
     return root
 
 
-def load_mesh(source: Source, places: Places, reference: str, folders: Sequence[str], notes: Notes) -> str | None:
+def load_mesh(
+    source: Source, places: Places, reference: str, folders: Sequence[str], notes: Notes
+) -> str | None:
     """Key of a mesh in `source.assets`, or None with a note when it cannot be used."""
     suffix = Path(reference).suffix.lower()
     if suffix not in READABLE_MESHES:
-        notes.change(f'mesh "{reference}" dropped', f'MuJoCo cannot read "{suffix or "no suffix"}" (it reads STL, OBJ and MSH)')
+        notes.change(
+            f'mesh "{reference}" dropped',
+            f'MuJoCo cannot read "{suffix or "no suffix"}" (it reads STL, OBJ and MSH)',
+        )
         return None
     path = places.find(reference, folders)
     if path is None:
-        notes.change(f'mesh "{reference}" dropped', "not found in the model's folder or a search path (name more with --search)")
+        notes.change(
+            f'mesh "{reference}" dropped',
+            "not found in the model's folder or a search path (name more with --search)",
+        )
         return None
     size = path.stat().st_size
     if size > MOST_MESH or size + sum(map(len, source.assets.values())) > MOST_MESHES:
@@ -123,7 +141,9 @@ def load_mesh(source: Source, places: Places, reference: str, folders: Sequence[
     except OSError as error:
         notes.change(f'mesh "{reference}" dropped', f"cannot be read ({error.strerror})")
         return None
-    key = next((k for k, v in source.assets.items() if v == data), f"asset{len(source.assets)}{suffix}")
+    key = next(
+        (k for k, v in source.assets.items() if v == data), f"asset{len(source.assets)}{suffix}"
+    )
     source.assets[key] = data
     return key
 

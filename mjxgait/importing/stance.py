@@ -54,7 +54,13 @@ def stance_of(puppet: Puppet, q: np.ndarray) -> Stance:
     """Where everything is; the hip height is the mean height of each leg's first joint."""
     xpos, xrot = puppet.pose(q)
     floor = min(float(sole[:, 2].min()) for sole in puppet.sole_points(xpos, xrot))
-    shared = {j for f in range(len(puppet.feet)) for g in range(f) for j in puppet.leg(f) if j in puppet.leg(g)}
+    shared = {
+        j
+        for f in range(len(puppet.feet))
+        for g in range(f)
+        for j in puppet.leg(f)
+        if j in puppet.leg(g)
+    }
     hips = []
     for f in range(len(puppet.feet)):
         own = [j for j in puppet.leg(f) if j not in shared] or puppet.leg(f)
@@ -83,14 +89,26 @@ def straightness(path: np.ndarray) -> float:
 class Search:
     """Looks for a pose by the cross-entropy method; poses are symmetric where the body is."""
 
-    def __init__(self, puppet: Puppet, start: np.ndarray, mirror: tuple[np.ndarray, np.ndarray] | None, planar: bool) -> None:
+    def __init__(
+        self,
+        puppet: Puppet,
+        start: np.ndarray,
+        mirror: tuple[np.ndarray, np.ndarray] | None,
+        planar: bool,
+    ) -> None:
         self.puppet, self.mirror, self.planar = puppet, mirror, planar
         self.start = symmetric(np.clip(start, puppet.low, puppet.high), mirror)
         stance = stance_of(puppet, self.start)
         self.hip = 0.85 * float(np.mean([_leg_length(puppet, f) for f in range(len(puppet.feet))]))
-        self.flat = [i for i, sole in enumerate(puppet.sole_points(stance.xpos, stance.xrot)) if self._is_flat(i, sole)]
+        self.flat = [
+            i
+            for i, sole in enumerate(puppet.sole_points(stance.xpos, stance.xrot))
+            if self._is_flat(i, sole)
+        ]
         self.ups = [stance.xrot[puppet.feet[f][0]].T @ [0.0, 0.0, 1.0] for f in self.flat]
-        self.segments = [s for s in puppet.segments() if not any(set(s) & set(group) for group in puppet.feet)]
+        self.segments = [
+            s for s in puppet.segments() if not any(set(s) & set(group) for group in puppet.feet)
+        ]
         self.legs = [puppet.leg(f) for f in range(len(puppet.feet))]
 
     def _is_flat(self, foot: int, sole: np.ndarray) -> bool:
@@ -107,8 +125,12 @@ class Search:
         best, least = mean, self.cost(mean)
         for i in range(ROUNDS):
             shape = (SAMPLES, len(mean))
-            drawn = mean + width * (rng.normal(size=shape) if i else rng.uniform(-1, 1, (FIRST, len(mean))))
-            poses = [symmetric(np.clip(q, self.puppet.low, self.puppet.high), self.mirror) for q in drawn]
+            drawn = mean + width * (
+                rng.normal(size=shape) if i else rng.uniform(-1, 1, (FIRST, len(mean)))
+            )
+            poses = [
+                symmetric(np.clip(q, self.puppet.low, self.puppet.high), self.mirror) for q in drawn
+            ]
             costs = np.array([self.cost(q) for q in poses])
             order = costs.argsort()[:ELITE]
             if costs[order[0]] < least:
@@ -122,7 +144,9 @@ class Search:
         soles = self.puppet.sole_points(*self.puppet.pose(q))
         ratios = []
         for sole, leg in zip(soles, self.legs, strict=True):
-            path = np.concatenate([self.puppet.data.xanchor[[j + 1 for j in leg]], sole.mean(0)[None]])
+            path = np.concatenate(
+                [self.puppet.data.xanchor[[j + 1 for j in leg]], sole.mean(0)[None]]
+            )
             ratios.append(straightness(path))
         return float(np.mean(ratios))
 
@@ -136,7 +160,9 @@ class Search:
         soles = puppet.sole_points(xpos, xrot)
         lows = np.array([sole[:, 2].min() for sole in soles])
         floor = float(lows.min())
-        middles = np.array([sole[sole[:, 2] < sole[:, 2].min() + 0.03 * hip].mean(0) for sole in soles])
+        middles = np.array(
+            [sole[sole[:, 2] < sole[:, 2].min() + 0.03 * hip].mean(0) for sole in soles]
+        )
         beside = (puppet.centre_of_mass() - middles.mean(0))[:2] / hip
         others = [height_of(puppet.bodies, xpos, xrot, s) - floor for s in self.segments]
         others.append(puppet.shank_height(xpos, xrot) - floor)
@@ -152,7 +178,10 @@ class Search:
             ratio = straightness(path)
             stretched += max(ratio - 0.94, 0.0) + max(0.75 - ratio, 0.0)
         near = np.maximum(MARGIN - np.minimum(q - puppet.low, puppet.high - q), 0.0) / MARGIN
-        tilted = sum(1 - float((xrot[puppet.feet[f][0]] @ up)[2]) for f, up in zip(self.flat, self.ups, strict=True))
+        tilted = sum(
+            1 - float((xrot[puppet.feet[f][0]] @ up)[2])
+            for f, up in zip(self.flat, self.ups, strict=True)
+        )
         low_trunk = max(0.6 - (xpos[0][2] - floor) / hip, 0.0)
         return float(
             400 * (((lows - floor) / hip) ** 2).sum()

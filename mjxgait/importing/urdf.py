@@ -10,7 +10,12 @@ from mjxgait.importing.notes import Notes, listed
 from mjxgait.importing.source import Places, Source, load_mesh, numbers
 
 KEPT = ("link", "joint", "material")
-COMPILER = {"fusestatic": "false", "discardvisual": "false", "strippath": "false", "angle": "radian"}
+COMPILER = {
+    "fusestatic": "false",
+    "discardvisual": "false",
+    "strippath": "false",
+    "angle": "radian",
+}
 TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 LEAST_MASS = 1e-6
 """kg, below which a link counts as massless."""
@@ -23,8 +28,13 @@ def clean_urdf(source: Source, path: Path, places: Places, notes: Notes) -> None
       UserError: it is a xacro template, or has no links.
     """
     robot = source.tree
-    if any("xacro" in element.tag or any("${" in v for v in element.attrib.values()) for element in robot.iter()):
-        raise UserError(f"{path}: is a xacro template; run `xacro {path.name} > robot.urdf` first and import robot.urdf")
+    if any(
+        "xacro" in element.tag or any("${" in v for v in element.attrib.values())
+        for element in robot.iter()
+    ):
+        raise UserError(
+            f"{path}: is a xacro template; run `xacro {path.name} > robot.urdf` first and import robot.urdf"
+        )
     for element in list(robot):
         if element.tag not in KEPT:
             robot.remove(element)
@@ -46,7 +56,9 @@ def clean_urdf(source: Source, path: Path, places: Places, notes: Notes) -> None
     for joint in robot.findall("joint"):
         _joint(source, joint, notes)
     if source.coupled:
-        notes.change(f"joints {listed(source.coupled)} frozen", "they follow other joints (<mimic>)")
+        notes.change(
+            f"joints {listed(source.coupled)} frozen", "they follow other joints (<mimic>)"
+        )
     extension = ET.Element("mujoco")
     ET.SubElement(extension, "compiler", COMPILER)
     robot.insert(0, extension)
@@ -79,7 +91,9 @@ def _empty_shape(shape: ET.Element) -> bool:
     kind = geometry[0]
     if kind.tag == "mesh":
         return not kind.get("filename")
-    sizes = [numbers(kind.get(key)) for key in ("size", "radius", "length") if kind.get(key) is not None]
+    sizes = [
+        numbers(kind.get(key)) for key in ("size", "radius", "length") if kind.get(key) is not None
+    ]
     return not sizes or any(not size or min(size) <= 0 for size in sizes)
 
 
@@ -99,7 +113,10 @@ def _inertial(link: ET.Element, notes: Notes) -> None:
         link.remove(inertial)
         return
     inertia = inertial.find("inertia")
-    values = [numbers((inertia.attrib if inertia is not None else {}).get(key, "0")) or [0.0] for key in TENSOR]
+    values = [
+        numbers((inertia.attrib if inertia is not None else {}).get(key, "0")) or [0.0]
+        for key in TENSOR
+    ]
     xx, xy, xz, yy, yz, zz = (v[0] for v in values)
     tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     moments, axes = np.linalg.eigh(tensor)

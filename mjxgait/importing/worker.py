@@ -23,7 +23,9 @@ UNKNOWN_ATTRIBUTE = re.compile(r"unrecognized attribute: '([^']+)'.*?Element '([
 ASSET = re.compile(r"asset[0-9]+\.(?:stl|obj|msh)|(?<=')asset[0-9]+(?=')")
 
 
-def compile_apart(tree: ET.Element, assets: dict[str, bytes]) -> tuple[mujoco.MjModel, list[tuple[str, str]]]:
+def compile_apart(
+    tree: ET.Element, assets: dict[str, bytes]
+) -> tuple[mujoco.MjModel, list[tuple[str, str]]]:
     """`compile_here` in a process of its own, which cannot take this one down.
 
     Raises:
@@ -31,21 +33,33 @@ def compile_apart(tree: ET.Element, assets: dict[str, bytes]) -> tuple[mujoco.Mj
     """
     order = pickle.dumps((ET.tostring(tree), assets))
     try:
-        done = subprocess.run([sys.executable, "-m", __name__], input=order, capture_output=True, timeout=SECONDS, check=False)
+        done = subprocess.run(
+            [sys.executable, "-m", __name__],
+            input=order,
+            capture_output=True,
+            timeout=SECONDS,
+            check=False,
+        )
     except subprocess.TimeoutExpired:
         raise UserError(
             f"MuJoCo did not compile the model within {SECONDS} s; simplify its meshes or take out what is not its body"
         ) from None
     head, _, body = done.stdout.partition(b"\n")
     if done.returncode or not head:
-        raise UserError("MuJoCo ended abnormally or ran out of memory while it compiled the model; simplify its meshes")
+        raise UserError(
+            "MuJoCo ended abnormally or ran out of memory while it compiled the model; simplify its meshes"
+        )
     answer = json.loads(head)
     if "error" in answer:
         raise UserError(answer["error"])
-    return mujoco.MjModel.from_binary_path("model.mjb", {"model.mjb": body}), [(w, y) for w, y in answer["changes"]]
+    return mujoco.MjModel.from_binary_path("model.mjb", {"model.mjb": body}), [
+        (w, y) for w, y in answer["changes"]
+    ]
 
 
-def compile_here(tree: ET.Element, assets: dict[str, bytes]) -> tuple[mujoco.MjModel, list[tuple[str, str]]]:
+def compile_here(
+    tree: ET.Element, assets: dict[str, bytes]
+) -> tuple[mujoco.MjModel, list[tuple[str, str]]]:
     """The compiled model, and what had to be left out for it to compile, with the reasons.
 
     Raises:
@@ -68,26 +82,44 @@ def compile_here(tree: ET.Element, assets: dict[str, bytes]) -> tuple[mujoco.MjM
     raise UserError(f"MuJoCo cannot read the model after {MOST_REPAIRS} repairs: {message[:400]}")
 
 
-def _repair(tree: ET.Element, message: str, changes: list[tuple[str, str]], left_out: list[str]) -> bool:
+def _repair(
+    tree: ET.Element, message: str, changes: list[tuple[str, str]], left_out: list[str]
+) -> bool:
     """Changes the tree so that this message may not come again; False when nothing is left to try."""
     if found := UNKNOWN_ATTRIBUTE.search(message):
         name, tag = found.groups()
         hit = [e for e in tree.iter(tag) if name in e.attrib]
         for element in hit:
             del element.attrib[name]
-        changes.append((f'attribute "{name}" of <{tag}> dropped', "this version of MuJoCo does not know it"))
+        changes.append(
+            (f'attribute "{name}" of <{tag}> dropped', "this version of MuJoCo does not know it")
+        )
         return bool(hit)
-    if any(word in message for word in ("inertia must satisfy", "mass and inertia of moving bodies", "inertia must be positive")):
+    if any(
+        word in message
+        for word in (
+            "inertia must satisfy",
+            "mass and inertia of moving bodies",
+            "inertia must be positive",
+        )
+    ):
         compiler = _compiler(tree)
         if compiler.get("boundmass"):
             return False
         compiler.attrib.update(balanceinertia="true", boundmass="1e-4", boundinertia="1e-6")
-        changes.append(("masses and inertias raised to 1e-4 kg and 1e-6 kg m² and balanced where they were less", message[:160]))
+        changes.append(
+            (
+                "masses and inertias raised to 1e-4 kg and 1e-6 kg m² and balanced where they were less",
+                message[:160],
+            )
+        )
         return True
     if (found := ASSET.search(message)) and _drop_mesh(tree, found.group()):
         changes.append((f"a mesh and its shapes dropped ({found.group()})", message[:160]))
         return True
-    if "mesh" in message and ("volume" in message or "orientation" in message or "inertia" in message):
+    if "mesh" in message and (
+        "volume" in message or "orientation" in message or "inertia" in message
+    ):
         meshes = [m for m in tree.iter("mesh") if m.get("inertia") != "convex"]
         if meshes and tree.tag != "robot":
             for mesh in meshes:
@@ -100,7 +132,9 @@ def _repair(tree: ET.Element, message: str, changes: list[tuple[str, str]], left
         for part in parts:
             tree.remove(part)
         if parts:
-            changes.append((f"<{section}> dropped", f"the model does not compile with it: {message[:160]}"))
+            changes.append(
+                (f"<{section}> dropped", f"the model does not compile with it: {message[:160]}")
+            )
             return True
     return False
 
@@ -114,7 +148,9 @@ def _drop_mesh(tree: ET.Element, key: str) -> bool:
         for child in list(parent):
             mesh = child.find("geometry/mesh")
             of_urdf = mesh is not None and mesh.get("filename", "").split(".")[0] == stem
-            of_mjcf = (child.tag == "mesh" and child.get("name") in gone) or (child.tag == "geom" and child.get("mesh") in gone)
+            of_mjcf = (child.tag == "mesh" and child.get("name") in gone) or (
+                child.tag == "geom" and child.get("mesh") in gone
+            )
             if of_urdf or of_mjcf:
                 parent.remove(child)
                 hit = True
@@ -142,7 +178,10 @@ def _serve() -> None:
     try:
         model, changes = compile_here(ET.fromstring(text), assets)
     except (UserError, MemoryError) as error:
-        sys.stdout.buffer.write(json.dumps({"error": str(error) or "out of memory while compiling the model"}).encode() + b"\n")
+        sys.stdout.buffer.write(
+            json.dumps({"error": str(error) or "out of memory while compiling the model"}).encode()
+            + b"\n"
+        )
         return
     buffer = np.empty(mujoco.mj_sizeModel(model), np.uint8)
     mujoco.mj_saveModel(model, None, buffer)

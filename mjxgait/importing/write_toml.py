@@ -31,7 +31,9 @@ def creature_toml(
     """
     symmetric, pairs = mirror
     remark = {guess.what: f"  # {guess.confidence}: {guess.reason}" for guess in notes.guesses}
-    kp, kd, torque, ranges = (np.round(v, 4) for v in (drive.kp, drive.kd, drive.torque, drive.ranges))
+    kp, kd, torque, ranges = (
+        np.round(v, 4) for v in (drive.kp, drive.kd, drive.torque, drive.ranges)
+    )
     lines = [
         f"# Made by `mjxgait import` from {origin}. The words after each guess say how sure it is; change what is wrong.",
         f"# `mjxgait check` draws it. Mass, inertias, joint axes and positions in creature.xml are those of {origin}.",
@@ -42,7 +44,11 @@ def creature_toml(
         f"forward = {[round(float(v), 6) + 0.0 for v in forward]}{remark.get('forward', '')}",
         f"feet = [{', '.join(_quoted(foot) for foot in feet)}]{remark.get('feet', '')}",
         'keyframe = "stand"',
-        *([] if body_length is None else [f"body_length = {body_length:.4g}{remark.get('body_length', '')}"]),
+        *(
+            []
+            if body_length is None
+            else [f"body_length = {body_length:.4g}{remark.get('body_length', '')}"]
+        ),
         "",
         "[joints]",
         f"kp = {_usual(kp)}{remark.get('kp, kd', '')}",
@@ -53,14 +59,21 @@ def creature_toml(
     ]
     for j, joint in enumerate(joints):
         low, high = (round(float(v), 1) for v in ranges[j])
-        lines += ["[[joint]]", f"match = {_quoted(joint)}", f"range = [{low}, {high}]  # low: what it does: {drive.role[j]}"]
+        lines += [
+            "[[joint]]",
+            f"match = {_quoted(joint)}",
+            f"range = [{low}, {high}]  # low: what it does: {drive.role[j]}",
+        ]
         if torque[j] != _usual(torque):
             lines.append(f"torque_limit = {float(torque[j])}")
         if kp[j] != _usual(kp) or kd[j] != _usual(kd):
             lines += [f"kp = {float(kp[j])}", f"kd = {float(kd[j])}"]
         lines.append("")
     lines += ["[mirror]", f"symmetric = {json.dumps(symmetric)}{remark.get('mirror', '')}"]
-    rows = [f"    {{ joint = {_quoted(a)}, partner = {_quoted(b)}, sign = {sign} }}," for a, (b, sign) in pairs.items()]
+    rows = [
+        f"    {{ joint = {_quoted(a)}, partner = {_quoted(b)}, sign = {sign} }},"
+        for a, (b, sign) in pairs.items()
+    ]
     lines += ["pairs = [", *rows, "]", ""] if rows else ["pairs = []", ""]
     lines += [
         "[steering]  # low: from which way each joint moves its foot",
@@ -68,8 +81,21 @@ def creature_toml(
         f"stride = {_table(drive.stride)}",
         "",
     ]
-    lines += ["[balance]  # low: likewise", f"pitch = {_table(drive.pitch)}", f"roll = {_table(drive.roll)}", ""]
-    lines += ["[termination]", "min_up = 0.5", "height = [0.5, 1.5]", "touch = true", "", "[train]", ""]
+    lines += [
+        "[balance]  # low: likewise",
+        f"pitch = {_table(drive.pitch)}",
+        f"roll = {_table(drive.roll)}",
+        "",
+    ]
+    lines += [
+        "[termination]",
+        "min_up = 0.5",
+        "height = [0.5, 1.5]",
+        "touch = true",
+        "",
+        "[train]",
+        "",
+    ]
     return "\n".join(lines)
 
 
@@ -84,4 +110,8 @@ def _quoted(text: str) -> str:
 
 
 def _table(weights: dict[str, float]) -> str:
-    return "{ " + ", ".join(f"{_quoted(k)} = {v}" for k, v in weights.items()) + " }" if weights else "{}"
+    return (
+        "{ " + ", ".join(f"{_quoted(k)} = {v}" for k, v in weights.items()) + " }"
+        if weights
+        else "{}"
+    )

@@ -66,7 +66,9 @@ def compile_own(text: str) -> mujoco.MjModel:
     try:
         return mujoco.MjModel.from_xml_string(text)
     except (ValueError, mujoco.FatalError) as error:
-        raise UserError(f"the repaired model does not compile; correct this in the file: {' '.join(str(error).split())[:300]}") from None
+        raise UserError(
+            f"the repaired model does not compile; correct this in the file: {' '.join(str(error).split())[:300]}"
+        ) from None
 
 
 def _text(values: Sequence[float] | np.ndarray) -> str:
@@ -74,11 +76,15 @@ def _text(values: Sequence[float] | np.ndarray) -> str:
 
 
 def _body(parent: ET.Element, body: Body) -> ET.Element:
-    element = ET.SubElement(parent, "body", name=body.name, pos=_text(body.pos), quat=_text(body.quat))
+    element = ET.SubElement(
+        parent, "body", name=body.name, pos=_text(body.pos), quat=_text(body.quat)
+    )
     if body.parent < 0:
         ET.SubElement(element, "freejoint", name="root")
     for joint in body.joints:
-        made = ET.SubElement(element, "joint", name=joint.name, pos=_text(joint.pos), axis=_text(joint.axis))
+        made = ET.SubElement(
+            element, "joint", name=joint.name, pos=_text(joint.pos), axis=_text(joint.axis)
+        )
         if np.isfinite(joint.low):
             made.set("range", _text((joint.low, joint.high)))
         if joint.ref:
@@ -86,7 +92,12 @@ def _body(parent: ET.Element, body: Body) -> ET.Element:
         if joint.armature:
             made.set("armature", repr(joint.armature))
     if body.mass > 0:
-        inertia = {"pos": _text(body.ipos), "quat": _text(body.iquat), "mass": repr(body.mass), "diaginertia": _text(body.inertia)}
+        inertia = {
+            "pos": _text(body.ipos),
+            "quat": _text(body.iquat),
+            "mass": repr(body.mass),
+            "diaginertia": _text(body.inertia),
+        }
         ET.SubElement(element, "inertial", inertia)
     return element
 
@@ -99,13 +110,23 @@ def _shape(parent: ET.Element, asset: ET.Element, shape: Shape, mesh: str) -> No
         geom.set("group", "3")
     if shape.kind in KINDS:
         kind, sizes = KINDS[shape.kind]
-        geom.attrib.update(type=kind, size=_text(shape.size[:sizes]), pos=_text(shape.pos), quat=_text(shape.quat))
+        geom.attrib.update(
+            type=kind, size=_text(shape.size[:sizes]), pos=_text(shape.pos), quat=_text(shape.quat)
+        )
     elif _has_volume(shape.points):
-        ET.SubElement(asset, "mesh", name=mesh, vertex=" ".join(f"{v:.4g}" for v in shape.points.ravel()), inertia="shell")
+        ET.SubElement(
+            asset,
+            "mesh",
+            name=mesh,
+            vertex=" ".join(f"{v:.4g}" for v in shape.points.ravel()),
+            inertia="shell",
+        )
         geom.attrib.update(type="mesh", mesh=mesh)
     else:
         low, high = shape.points.min(0), shape.points.max(0)
-        geom.attrib.update(type="box", pos=_text((low + high) / 2), size=_text(np.maximum((high - low) / 2, 1e-4)))
+        geom.attrib.update(
+            type="box", pos=_text((low + high) / 2), size=_text(np.maximum((high - low) / 2, 1e-4))
+        )
     geom.set("rgba", " ".join(f"{v:.3g}" for v in np.clip(shape.rgba, 0, 1)))
 
 

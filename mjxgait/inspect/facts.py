@@ -20,7 +20,12 @@ from mjxgait.folder import CERTIFICATE, CHAMPION
 from mjxgait.inspect.snapshot import Snapshot
 
 TUNING = tuple(field.name for field in dataclasses.fields(TuningRanges))
-KINDS = {Origin.INITIAL: "initial", Origin.CROSSOVER: "crossover", Origin.MUTATION: "mutation", Origin.NEWCOMER: "newcomer"}
+KINDS = {
+    Origin.INITIAL: "initial",
+    Origin.CROSSOVER: "crossover",
+    Origin.MUTATION: "mutation",
+    Origin.NEWCOMER: "newcomer",
+}
 
 
 def facts(snapshot: Snapshot) -> dict[str, Any]:
@@ -37,13 +42,18 @@ def facts(snapshot: Snapshot) -> dict[str, Any]:
         "schema": snapshot.manifest.schema,
         "seed": snapshot.config.seed,
         "random_key": {"kind": snapshot.manifest.key_impl, "data": snapshot.arrays["key"].tolist()},
-        "written": datetime.datetime.fromtimestamp(snapshot.written, datetime.UTC).isoformat(timespec="seconds"),
+        "written": datetime.datetime.fromtimestamp(snapshot.written, datetime.UTC).isoformat(
+            timespec="seconds"
+        ),
         "bytes": snapshot.size,
         "versions": dict(snapshot.versions),
         "certificate": certificate(snapshot),
         "settings_changed": settings_changed(snapshot),
         "fitness": fitness_summary(snapshot.fitness),
-        "history": [{key: line[key] for key in ("generation", "best", "mean", "forced")} for line in snapshot.lines],
+        "history": [
+            {key: line[key] for key in ("generation", "best", "mean", "forced")}
+            for line in snapshot.lines
+        ],
         "forced_spells": forced_spells(snapshot.lines),
         "population": population(snapshot),
         "diversity": diversity(snapshot),
@@ -62,14 +72,22 @@ def certificate(snapshot: Snapshot) -> str:
     except UserError as error:
         return str(error)
     failed = " ".join(str(c["number"]) for c in document["criteria"] if not c["passed"])
-    return f"The champion fails criteria {failed}." if failed else f"The champion is certified, margin {document['margin']:.2f}."
+    return (
+        f"The champion fails criteria {failed}."
+        if failed
+        else f"The champion is certified, margin {document['margin']:.2f}."
+    )
 
 
 def settings_changed(snapshot: Snapshot) -> dict[str, dict[str, Any]]:
     """The settings that differ from configs/default.toml, by dotted key: the default and this run's."""
     default = flat(dataclasses.asdict(resolve_config({}, snapshot.creature.name)))
     mine = flat(dataclasses.asdict(snapshot.config))
-    return {key: {"default": default[key], "here": mine[key]} for key in mine if mine[key] != default[key]}
+    return {
+        key: {"default": default[key], "here": mine[key]}
+        for key in mine
+        if mine[key] != default[key]
+    }
 
 
 def flat(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
@@ -97,14 +115,25 @@ def fitness_summary(fitness: np.ndarray) -> dict[str, Any]:
             "broken": len(fitness),
         }
     best, upper, median, lower, worst = np.percentile(finite, [100, 75, 50, 25, 0])
-    names = {"best": best, "upper_quartile": upper, "median": median, "lower_quartile": lower, "worst": worst, "mean": finite.mean()}
-    return {name: float(value) for name, value in names.items()} | {"broken": len(fitness) - len(finite)}
+    names = {
+        "best": best,
+        "upper_quartile": upper,
+        "median": median,
+        "lower_quartile": lower,
+        "worst": worst,
+        "mean": finite.mean(),
+    }
+    return {name: float(value) for name, value in names.items()} | {
+        "broken": len(fitness) - len(finite)
+    }
 
 
 def forced_spells(lines: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Each unbroken row of forced generations: first and last, and best fitness before and after."""
     spells = []
-    for forced, group in itertools.groupby(range(len(lines)), key=lambda i: bool(lines[i]["forced"])):
+    for forced, group in itertools.groupby(
+        range(len(lines)), key=lambda i: bool(lines[i]["forced"])
+    ):
         places = list(group)
         if forced:
             before, after = lines[max(places[0] - 1, 0)], lines[places[-1]]
@@ -124,7 +153,9 @@ def forced_spells(lines: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
 def contributions(snapshot: Snapshot) -> np.ndarray:
     """[P, F] what each term gives to or takes from the fitness of each individual; a row's sum is its fitness."""
     terms = np.asarray(snapshot.arrays["terms"], float)
-    weights = np.asarray(weight_vector(snapshot.config.fitness, jnp.int32(snapshot.generation)), float)
+    weights = np.asarray(
+        weight_vector(snapshot.config.fitness, jnp.int32(snapshot.generation)), float
+    )
     worst = snapshot.config.rollout.worst
     scores = terms @ weights
     lowest = np.argmin(np.where(np.isnan(scores), -np.inf, scores), axis=1)
@@ -142,7 +173,9 @@ def population(snapshot: Snapshot) -> list[dict[str, Any]]:
             "born": int(arrays["born"][i]),
             "age": snapshot.generation - int(arrays["born"][i]),
             "kind": KINDS[Origin(int(arrays["origin"][i]))],
-            "contributions": {name: number(value) for name, value in zip(TERMS, parts[i], strict=True)},
+            "contributions": {
+                name: number(value) for name, value in zip(TERMS, parts[i], strict=True)
+            },
         }
         for i in range(len(parts))
     ]
@@ -150,7 +183,9 @@ def population(snapshot: Snapshot) -> list[dict[str, Any]]:
 
 def diversity(snapshot: Snapshot) -> dict[str, Any]:
     """How many genomes differ, and per joint the standard deviation over the population, mean of the key poses."""
-    genomes = np.concatenate([snapshot.key_poses.reshape(len(snapshot.fitness), -1), snapshot.tuning], axis=1)
+    genomes = np.concatenate(
+        [snapshot.key_poses.reshape(len(snapshot.fitness), -1), snapshot.tuning], axis=1
+    )
     spread = np.degrees(snapshot.key_poses.std(axis=0).mean(axis=0))
     room = np.degrees(snapshot.creature.pose_high - snapshot.creature.pose_low)
     return {
@@ -169,16 +204,26 @@ def individual_facts(snapshot: Snapshot, rank: int) -> dict[str, Any]:
       UserError: the population is smaller.
     """
     if not 1 <= rank <= len(snapshot.fitness):
-        raise UserError(f"{snapshot.run}: no individual {rank}; the population has ranks 1 to {len(snapshot.fitness)}")
+        raise UserError(
+            f"{snapshot.run}: no individual {rank}; the population has ranks 1 to {len(snapshot.fitness)}"
+        )
     i = rank - 1
     terms = np.asarray(snapshot.arrays["terms"][i], float)
     return population(snapshot)[i] | {
-        "terms": {name: [number(value) for value in column] for name, column in zip(TERMS, terms.T, strict=True)},
+        "terms": {
+            name: [number(value) for value in column]
+            for name, column in zip(TERMS, terms.T, strict=True)
+        },
         "tuning": dict(zip(TUNING, map(float, snapshot.tuning[i]), strict=True)),
         "key_poses_deg": [_by_joint(snapshot, np.degrees(pose)) for pose in snapshot.key_poses[i]],
         "range_deg": {
             name: [math.degrees(low), math.degrees(high)]
-            for name, low, high in zip(snapshot.creature.joint_names, snapshot.creature.pose_low, snapshot.creature.pose_high, strict=True)
+            for name, low, high in zip(
+                snapshot.creature.joint_names,
+                snapshot.creature.pose_low,
+                snapshot.creature.pose_high,
+                strict=True,
+            )
         },
     }
 

@@ -38,7 +38,10 @@ def print_runs(lines: Sequence[Mapping[str, Any]], console: Console) -> None:
     """As a table, the problems below it."""
     table = Table(box=None, pad_edge=False)
     for heading in ("run", "creature", "generation", "best", "mean", "seed", "written", "state"):
-        table.add_column(heading, justify="right" if heading in ("generation", "best", "mean", "seed") else "left")
+        table.add_column(
+            heading,
+            justify="right" if heading in ("generation", "best", "mean", "seed") else "left",
+        )
     for line in lines:
         name = Path(line["run"]).name
         if line["problem"]:

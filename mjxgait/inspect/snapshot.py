@@ -74,11 +74,15 @@ class Snapshot:
 
     def _certified(self) -> str | None:
         """What an early examination that ended the run here would have said."""
-        if self.generation != self.generations[-1] or not due(self.config.examination, self.generation):
+        if self.generation != self.generations[-1] or not due(
+            self.config.examination, self.generation
+        ):
             return None
         try:
             document = read_certificate(self.run / CERTIFICATE)
-            if document is None or outdated(document, read_champion(self.run / CHAMPION, self.creature)):
+            if document is None or outdated(
+                document, read_champion(self.run / CHAMPION, self.creature)
+            ):
                 return None
         except UserError:
             return None
@@ -96,15 +100,21 @@ def read_snapshot(path: Path, generation: int | None = None) -> Snapshot:
     creature, config = open_run(run)
     known = checkpoint_generations(run)
     if not known:
-        raise UserError(f"{run}: no checkpoint yet; the run ended before its first generation was done")
+        raise UserError(
+            f"{run}: no checkpoint yet; the run ended before its first generation was done"
+        )
     wanted = known[-1] if generation is None else generation
     if wanted not in known:
-        raise UserError(f"{run}: no checkpoint of generation {wanted}; there are {', '.join(map(str, known))}")
+        raise UserError(
+            f"{run}: no checkpoint of generation {wanted}; there are {', '.join(map(str, known))}"
+        )
     folder = run / FOLDER / str(wanted)
     try:
         manifest, arrays = _read(folder)
     except _Damaged as damage:
-        raise UserError(f"{folder}: the checkpoint is damaged ({damage}); {_way_out(run, known, wanted)}") from None
+        raise UserError(
+            f"{folder}: the checkpoint is damaged ({damage}); {_way_out(run, known, wanted)}"
+        ) from None
     _check_owner(folder, manifest, arrays, creature, config)
     files = [file for file in folder.rglob("*") if file.is_file()]
     return Snapshot(
@@ -124,7 +134,11 @@ def read_snapshot(path: Path, generation: int | None = None) -> Snapshot:
 def checkpoint_generations(run: Path) -> list[int]:
     """The generations a run has complete checkpoints of, oldest first; one that was being written when the run was killed is left out."""
     folder = run / FOLDER
-    return sorted(int(entry.name) for entry in folder.iterdir() if entry.name.isdigit()) if folder.is_dir() else []
+    return (
+        sorted(int(entry.name) for entry in folder.iterdir() if entry.name.isdigit())
+        if folder.is_dir()
+        else []
+    )
 
 
 def _lines(path: Path, last: int) -> list[dict[str, Any]]:
@@ -147,11 +161,17 @@ def _locate(path: Path, generation: int | None) -> tuple[Path, int | None]:
     if path.name.isdigit() and path.parent.name == FOLDER:
         run = path.parent.parent
         if not (run / CONFIG).is_file():
-            raise UserError(f"{path}: a checkpoint without its run; keep {CONFIG} and the creature folder beside {FOLDER}/")
+            raise UserError(
+                f"{path}: a checkpoint without its run; keep {CONFIG} and the creature folder beside {FOLDER}/"
+            )
         if generation is not None and generation != int(path.name):
-            raise UserError(f"{path}: is generation {path.name}; for generation {generation} name the run folder {run}")
+            raise UserError(
+                f"{path}: is generation {path.name}; for generation {generation} name the run folder {run}"
+            )
         return run, int(path.name)
-    raise UserError(f"{path}: neither a run folder (it has no {CONFIG}) nor one of its checkpoints; `mjxgait train` makes one")
+    raise UserError(
+        f"{path}: neither a run folder (it has no {CONFIG}) nor one of its checkpoints; `mjxgait train` makes one"
+    )
 
 
 class _Damaged(Exception):
@@ -160,9 +180,13 @@ class _Damaged(Exception):
 
 def _read(folder: Path) -> tuple[Manifest, dict[str, np.ndarray]]:
     try:
-        manifest = Manifest(**json.loads((folder / "manifest" / "metadata").read_text(encoding="utf-8")))
+        manifest = Manifest(
+            **json.loads((folder / "manifest" / "metadata").read_text(encoding="utf-8"))
+        )
         if manifest.schema != SCHEMA:
-            raise UserError(f"{folder}: written with schema {manifest.schema}, this version reads {SCHEMA}; use the version that wrote it")
+            raise UserError(
+                f"{folder}: written with schema {manifest.schema}, this version reads {SCHEMA}; use the version that wrote it"
+            )
         with _quiet(), ocp.Checkpointer(ocp.PyTreeCheckpointHandler()) as reader:
             where = (folder / "state").resolve()
             names = reader.metadata(where).item_metadata.tree
@@ -203,9 +227,17 @@ def _way_out(run: Path, known: Sequence[int], damaged: int) -> str:
     return "no other one is intact"
 
 
-def _check_owner(folder: Path, manifest: Manifest, arrays: Mapping[str, np.ndarray], creature: Creature, config: Config) -> None:
+def _check_owner(
+    folder: Path,
+    manifest: Manifest,
+    arrays: Mapping[str, np.ndarray],
+    creature: Creature,
+    config: Config,
+) -> None:
     if manifest.creature_digest != creature.digest:
-        raise UserError(f"{folder}: was written for another body ({manifest.creature}) than the creature folder of this run holds")
+        raise UserError(
+            f"{folder}: was written for another body ({manifest.creature}) than the creature folder of this run holds"
+        )
     shape = (config.evolution.population, config.controller.key_poses, len(creature.joint_names))
     if arrays["genomes.key_poses"].shape != shape:
         raise UserError(

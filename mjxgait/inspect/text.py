@@ -42,7 +42,11 @@ def sparkline(values: Sequence[float | None], low: float, high: float) -> str:
     room = max(high - low, 1e-9)
 
     def block(value: float | None) -> str:
-        return " " if value is None else BLOCKS[min(max(int((value - low) / room * len(BLOCKS)), 0), len(BLOCKS) - 1)]
+        return (
+            " "
+            if value is None
+            else BLOCKS[min(max(int((value - low) / room * len(BLOCKS)), 0), len(BLOCKS) - 1)]
+        )
 
     return "".join(map(block, values))
 
@@ -73,7 +77,9 @@ def print_pairs(rows: Mapping[str, str], console: Console) -> None:
 
 def ago(written: str) -> str:
     """How long before now, of an ISO time, in the largest unit that fits."""
-    seconds = (datetime.datetime.now(datetime.UTC) - datetime.datetime.fromisoformat(written)).total_seconds()
+    seconds = (
+        datetime.datetime.now(datetime.UTC) - datetime.datetime.fromisoformat(written)
+    ).total_seconds()
     for unit, length in (("day", 86400), ("hour", 3600), ("minute", 60)):
         if (count := int(seconds // length)) >= 1:
             return f"{count} {unit}{'s' if count > 1 else ''} ago"
@@ -81,10 +87,18 @@ def ago(written: str) -> str:
 
 
 def _print_identity(facts: Mapping[str, Any], console: Console) -> None:
-    state = facts["ended"] or "not finished: `mjxgait train --resume` goes on from the latest checkpoint"
+    state = (
+        facts["ended"]
+        or "not finished: `mjxgait train --resume` goes on from the latest checkpoint"
+    )
     versions = ", ".join(f"{name} {version}" for name, version in facts["versions"].items())
-    size, key = f"{facts['bytes'] / 1024:,.0f} KiB", " ".join(f"{word:08x}" for word in facts["random_key"]["data"])
-    console.print(f"[bold]{facts['creature']}[/], generation {facts['generation']} of {facts['generations']}")
+    size, key = (
+        f"{facts['bytes'] / 1024:,.0f} KiB",
+        " ".join(f"{word:08x}" for word in facts["random_key"]["data"]),
+    )
+    console.print(
+        f"[bold]{facts['creature']}[/], generation {facts['generation']} of {facts['generations']}"
+    )
     fitness = facts["fitness"]
     rows = {
         "run": facts["run"],
@@ -95,7 +109,11 @@ def _print_identity(facts: Mapping[str, Any], console: Console) -> None:
         "body": facts["creature_digest"],
         "versions": versions or "unknown: the run has no champion.json",
         "certificate": facts["certificate"],
-        "fitness": ", ".join(f"{name.replace('_', ' ')} {show(value)}" for name, value in fitness.items() if name != "broken")
+        "fitness": ", ".join(
+            f"{name.replace('_', ' ')} {show(value)}"
+            for name, value in fitness.items()
+            if name != "broken"
+        )
         + (f"; {fitness['broken']} without a finite one" if fitness["broken"] else ""),
         "genomes": f"{facts['diversity']['unique']} different of {facts['diversity']['individuals']}",
     }
@@ -123,7 +141,10 @@ def _print_history(facts: Mapping[str, Any], console: Console) -> None:
     thinned = history[::-1][::stride][::-1]
     values = [line[key] for line in thinned for key in ("best", "mean") if line[key] is not None]
     low, high = min(values, default=0.0), max(values, default=0.0)
-    forced = [any(line["forced"] for line in history[max(i - stride + 1, 0) : i + 1]) for i in range(len(history))][::-1][::stride][::-1]
+    forced = [
+        any(line["forced"] for line in history[max(i - stride + 1, 0) : i + 1])
+        for i in range(len(history))
+    ][::-1][::stride][::-1]
     console.print(
         f"\n[bold]history[/] of generations {history[0]['generation']} to {history[-1]['generation']}, fitness {low:.2f} to {high:.2f}"
     )
@@ -139,28 +160,60 @@ def _print_history(facts: Mapping[str, Any], console: Console) -> None:
 
 
 def _print_population(rows: Sequence[Mapping[str, Any]], console: Console) -> None:
-    weight = {name: sum(abs(row["contributions"][name] or 0.0) for row in rows) for name in rows[0]["contributions"]}
+    weight = {
+        name: sum(abs(row["contributions"][name] or 0.0) for row in rows)
+        for name in rows[0]["contributions"]
+    }
     # As many terms as the line has room for, those that matter most first.
-    main = sorted((name for name in weight if weight[name]), key=lambda name: -weight[name])[: max((console.width - 42) // 10, 1)]
-    table = titled_table("population; what each term gives to the fitness (--individual N tells all of one)", console)
+    main = sorted((name for name in weight if weight[name]), key=lambda name: -weight[name])[
+        : max((console.width - 42) // 10, 1)
+    ]
+    table = titled_table(
+        "population; what each term gives to the fitness (--individual N tells all of one)", console
+    )
     for heading in ("rank", "fitness", "age", "kind", *main, "others"):
         table.add_column(heading, justify="left" if heading == "kind" else "right", no_wrap=True)
     for row in rows:
-        others = sum(value or 0.0 for name, value in row["contributions"].items() if name not in main)
+        others = sum(
+            value or 0.0 for name, value in row["contributions"].items() if name not in main
+        )
         given = [show(row["contributions"][name], sign=True) for name in main]
-        table.add_row(str(row["rank"]), show(row["fitness"]), str(row["age"]), row["kind"], *given, show(others, sign=True))
+        table.add_row(
+            str(row["rank"]),
+            show(row["fitness"]),
+            str(row["age"]),
+            row["kind"],
+            *given,
+            show(others, sign=True),
+        )
     console.print(table)
 
 
-def _print_joints(individual: Mapping[str, Any], diversity: Mapping[str, Any] | None, console: Console) -> None:
+def _print_joints(
+    individual: Mapping[str, Any], diversity: Mapping[str, Any] | None, console: Console
+) -> None:
     """Key poses by joint; with the diversity also how far the population is spread."""
     poses = individual["key_poses_deg"]
     who = "champion" if individual["rank"] == 1 else f"individual {individual['rank']}"
     table = titled_table(f"{who}: key poses in degrees", console)
-    for heading in ("joint", "may lie in", *(f"pose {k + 1}" for k in range(len(poses))), *(["spread", "of range"] if diversity else [])):
+    for heading in (
+        "joint",
+        "may lie in",
+        *(f"pose {k + 1}" for k in range(len(poses))),
+        *(["spread", "of range"] if diversity else []),
+    ):
         table.add_column(heading, justify="left" if heading == "joint" else "right")
     for joint, (low, high) in individual["range_deg"].items():
-        spread = [f"{diversity['spread_deg'][joint]:.1f}", f"{diversity['spread_of_range'][joint]:.0%}"] if diversity else []
-        table.add_row(joint, f"{low:.0f} .. {high:.0f}", *(f"{pose[joint]:.1f}" for pose in poses), *spread)
+        spread = (
+            [f"{diversity['spread_deg'][joint]:.1f}", f"{diversity['spread_of_range'][joint]:.0%}"]
+            if diversity
+            else []
+        )
+        table.add_row(
+            joint, f"{low:.0f} .. {high:.0f}", *(f"{pose[joint]:.1f}" for pose in poses), *spread
+        )
     console.print(table)
-    console.print("tuning: " + ", ".join(f"{name} {value:.3g}" for name, value in individual["tuning"].items()))
+    console.print(
+        "tuning: "
+        + ", ".join(f"{name} {value:.3g}" for name, value in individual["tuning"].items())
+    )

@@ -25,4 +25,6 @@ def make_plant(creature: Creature, physics: Literal["auto", "mjx"]) -> tuple[Pla
     try:
         return mjx_plant(model, layout), 16
     except NotImplementedError as error:
-        raise UserError(f"{creature.name}: creature.xml uses what MJX does not support: {error}") from None
+        raise UserError(
+            f"{creature.name}: creature.xml uses what MJX does not support: {error}"
+        ) from None

@@ -14,7 +14,9 @@ from mjxgait.creature import geometry
 from mjxgait.physics.layout import SenseLayout
 from mjxgait.types import BodyState, Sensed
 
-with contextlib.redirect_stdout(io.StringIO()):  # MJX prints that Warp, which nobody asked for, is not installed
+with contextlib.redirect_stdout(
+    io.StringIO()
+):  # MJX prints that Warp, which nobody asked for, is not installed
     from mujoco import mjx
 
 
@@ -52,7 +54,9 @@ class MjxPlant:
         return jax.vmap(self._advance)(state, workings, torque)
 
     def _with_friction(self, friction: jax.Array) -> mjx.Model:
-        return self.model.replace(geom_friction=self.model.geom_friction * jnp.stack([friction, 1.0, 1.0]))
+        return self.model.replace(
+            geom_friction=self.model.geom_friction * jnp.stack([friction, 1.0, 1.0])
+        )
 
     def _forward(self, state: BodyState) -> tuple[Sensed, mjx.Data]:
         model = self._with_friction(state.friction)
@@ -77,7 +81,12 @@ class MjxPlant:
     def _lowest(self, pos: jax.Array, rot: jax.Array) -> jax.Array:
         r, box, ellipsoid = self.reach
         down = rot[:, 2, :]
-        return pos[:, 2] - r - jnp.sum(jnp.abs(down) * box, axis=1) - jnp.linalg.norm(down * ellipsoid, axis=1)
+        return (
+            pos[:, 2]
+            - r
+            - jnp.sum(jnp.abs(down) * box, axis=1)
+            - jnp.linalg.norm(down * ellipsoid, axis=1)
+        )
 
     def _advance(self, state: BodyState, data: mjx.Data, torque: jax.Array) -> BodyState:
         model = self._with_friction(state.friction)
@@ -85,7 +94,9 @@ class MjxPlant:
         touches = data._impl.efc_J.size > 0
         data = mjx.solve(model, data) if touches else data.replace(qacc=data.qacc_smooth)
         data = mjx.euler(model, data)
-        return BodyState(data.qpos, data.qvel, data.qacc_warmstart, data.qfrc_constraint, state.friction)
+        return BodyState(
+            data.qpos, data.qvel, data.qacc_warmstart, data.qfrc_constraint, state.friction
+        )
 
 
 def mjx_plant(model: mujoco.MjModel, layout: SenseLayout) -> MjxPlant:
@@ -96,6 +107,8 @@ def mjx_plant(model: mujoco.MjModel, layout: SenseLayout) -> MjxPlant:
     """
     device_model = mjx.put_model(model, impl="jax")
     data = mjx.make_data(device_model, impl="jax")
-    extents = [geometry.support_extents(model.geom_type[g], model.geom_size[g]) for g in layout.watched]
+    extents = [
+        geometry.support_extents(model.geom_type[g], model.geom_size[g]) for g in layout.watched
+    ]
     r, box, ellipsoid = (np.array(column, np.float32) for column in zip(*extents, strict=True))
     return MjxPlant(device_model, data, layout, (r, box, ellipsoid))

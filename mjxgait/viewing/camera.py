@@ -51,4 +51,6 @@ class Camera:
 
     def enlarged(self, factor: int) -> "Camera":
         """The same view in a picture that has more pixels."""
-        return dataclasses.replace(self, scale=self.scale * factor, width=self.width * factor, height=self.height * factor)
+        return dataclasses.replace(
+            self, scale=self.scale * factor, width=self.width * factor, height=self.height * factor
+        )

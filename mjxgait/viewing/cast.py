@@ -27,7 +27,10 @@ def top_of(run: Path, count: int, seconds: float) -> list[Runner]:
     Raises:
       UserError: there are not so many.
     """
-    return [Runner(walk, f"rank {rank}") for rank, walk in _walks(run, None, range(1, count + 1), seconds)]
+    return [
+        Runner(walk, f"rank {rank}")
+        for rank, walk in _walks(run, None, range(1, count + 1), seconds)
+    ]
 
 
 def through_generations(run: Path, generations: Sequence[int], seconds: float) -> list[Runner]:
@@ -37,7 +40,9 @@ def through_generations(run: Path, generations: Sequence[int], seconds: float) -
       UserError: there is no checkpoint of one of them.
     """
     return [
-        Runner(walk, f"generation {generation}") for generation in generations for _, walk in _walks(run, generation, range(1, 2), seconds)
+        Runner(walk, f"generation {generation}")
+        for generation in generations
+        for _, walk in _walks(run, generation, range(1, 2), seconds)
     ]
 
 
@@ -47,7 +52,9 @@ def _walks(run: Path, generation: int | None, ranks: range, seconds: float):
 
     snapshot = read_snapshot(run, generation)
     if ranks[-1] > len(snapshot.fitness):
-        raise UserError(f"{run}: no individual {ranks[-1]}; the population has ranks 1 to {len(snapshot.fitness)}")
+        raise UserError(
+            f"{run}: no individual {ranks[-1]}; the population has ranks 1 to {len(snapshot.fitness)}"
+        )
     for rank in ranks:
         i = rank - 1
         individual = Champion(

@@ -29,7 +29,13 @@ def draw_fitness(axes: Axes, lines: Lines) -> None:
     """Best, mean and quartiles, spells of forced evolution shaded."""
     column = columns(lines)
     generation = column["generation"]
-    axes.fill_between(generation, column["lower_quartile"], column["upper_quartile"], color=PALE, label="middle half")
+    axes.fill_between(
+        generation,
+        column["lower_quartile"],
+        column["upper_quartile"],
+        color=PALE,
+        label="middle half",
+    )
     axes.plot(generation, column["best"], "-", color=DARK, linewidth=2, label="best")
     axes.plot(generation, column["mean"], "--", color=DARK, linewidth=1.2, label="mean")
     shade_forced(axes, column)
@@ -46,8 +52,13 @@ def draw_terms(axes: Axes, lines: Lines, weights: Mapping[str, np.ndarray]) -> N
     column = columns(lines)
     generation = column["generation"]
     logged = {name: weight for name, weight in weights.items() if f"term_{name}" in column}
-    given = {name: np.nan_to_num(weight * column[f"term_{name}"]) for name, weight in logged.items()}
-    order = sorted((name for name in given if np.abs(given[name]).max() > 1e-3), key=lambda name: -np.abs(given[name]).sum())
+    given = {
+        name: np.nan_to_num(weight * column[f"term_{name}"]) for name, weight in logged.items()
+    }
+    order = sorted(
+        (name for name in given if np.abs(given[name]).max() > 1e-3),
+        key=lambda name: -np.abs(given[name]).sum(),
+    )
     main, others = order[:MAIN_TERMS], order[MAIN_TERMS:]
     parts = {name: given[name] for name in main}
     if others:
@@ -58,13 +69,25 @@ def draw_terms(axes: Axes, lines: Lines, weights: Mapping[str, np.ndarray]) -> N
         label = name.replace("_", " ")
         for base, part in ((above, gain), (below, loss)):
             if part.any():
-                axes.fill_between(generation, base, base + part, facecolor=grey, hatch=hatch, edgecolor="0.15", linewidth=0.4, label=label)
+                axes.fill_between(
+                    generation,
+                    base,
+                    base + part,
+                    facecolor=grey,
+                    hatch=hatch,
+                    edgecolor="0.15",
+                    linewidth=0.4,
+                    label=label,
+                )
                 label = "_"
         above, below = above + gain, below + loss
     outline = [withStroke(linewidth=5, foreground="white")]
     axes.plot(generation, above + below, color=DARK, linewidth=2, label="sum", path_effects=outline)
     axes.axhline(0, color=DARK, linewidth=0.8)
-    axes.set(ylabel="weight times term", title="what the terms give to the best individual (mean of its starts)")
+    axes.set(
+        ylabel="weight times term",
+        title="what the terms give to the best individual (mean of its starts)",
+    )
     _label_generations(axes, generation)
     axes.legend(loc="center left", bbox_to_anchor=(1, 0.5))
 
@@ -74,12 +97,26 @@ def draw_diversity(axes: Axes, lines: Lines) -> None:
     column = columns(lines)
     generation = column["generation"]
     population = max(float(np.nanmax(column["unique"])), 1.0)
-    axes.plot(generation, column["unique"] / population, "-", color=DARK, linewidth=2, label="different genomes (left)")
+    axes.plot(
+        generation,
+        column["unique"] / population,
+        "-",
+        color=DARK,
+        linewidth=2,
+        label="different genomes (left)",
+    )
     shade_forced(axes, column)
     axes.set(ylabel="share of the population", ylim=(0, 1.05), title="diversity")
     axes.yaxis.set_major_formatter(PercentFormatter(1.0))
     spread = axes.twinx()
-    spread.plot(generation, column["spread"], "--", color=MIDDLE, linewidth=1.6, label="spread of a gene (right)")
+    spread.plot(
+        generation,
+        column["spread"],
+        "--",
+        color=MIDDLE,
+        linewidth=1.6,
+        label="spread of a gene (right)",
+    )
     spread.set(ylabel="mean standard deviation (rad)")
     spread.set_ylim(bottom=0)
     spread.grid(False)
@@ -100,14 +137,28 @@ def progress_figures(lines: Lines, weights: Mapping[str, np.ndarray]) -> Figures
 
 def columns(lines: Lines) -> dict[str, np.ndarray]:
     """Each metric over the generations; what is missing or not finite is NaN."""
-    return {key: np.array([np.nan if (value := line.get(key)) is None else value for line in lines], float) for key in lines[0]}
+    return {
+        key: np.array(
+            [np.nan if (value := line.get(key)) is None else value for line in lines], float
+        )
+        for key in lines[0]
+    }
 
 
 def shade_forced(axes: Axes, column: Mapping[str, np.ndarray]) -> None:
     """Shades the generations that were forced."""
     for i, at in enumerate(column["generation"][column["forced"] == 1]):
         label = "_" if i else "forced evolution"
-        axes.axvspan(at - 0.5, at + 0.5, facecolor=ACCENT, alpha=0.25, hatch="//", edgecolor="0.5", linewidth=0, label=label)
+        axes.axvspan(
+            at - 0.5,
+            at + 0.5,
+            facecolor=ACCENT,
+            alpha=0.25,
+            hatch="//",
+            edgecolor="0.5",
+            linewidth=0,
+            label=label,
+        )
 
 
 def _label_generations(axes: Axes, generation: np.ndarray) -> None:

@@ -26,7 +26,13 @@ def filmstrip(walk: Walk, pictures: int = PICTURES, size: tuple[int, int] = SIZE
         share = (frame - window.start) / (window.stop - window.start)
         draw = ImageDraw.Draw(picture)
         draw.text((10, 8), f"{share:.0%}", fill=DARK_INK, font=font(22))
-        draw.text((size[0] - 10, 10), f"{frame * walk.time_step:.2f} s", fill=DARK_INK, font=font(16), anchor="ra")
+        draw.text(
+            (size[0] - 10, 10),
+            f"{frame * walk.time_step:.2f} s",
+            fill=DARK_INK,
+            font=font(16),
+            anchor="ra",
+        )
         row, column = divmod(i, columns)
         sheet.paste(picture, (column * (size[0] + 4), row * (size[1] + 4)))
     return sheet
@@ -38,4 +44,6 @@ def draw_filmstrip(drawing: Figure, walk: Walk) -> None:
     axes = drawing.subplots()
     axes.imshow(filmstrip(walk), interpolation="lanczos")
     axes.set_axis_off()
-    axes.set_title(f"{walk.creature.name.replace('_', ' ')}: {what.replace('1 strides', 'one stride')}, in parts of the stride")
+    axes.set_title(
+        f"{walk.creature.name.replace('_', ' ')}: {what.replace('1 strides', 'one stride')}, in parts of the stride"
+    )

@@ -32,7 +32,9 @@ def band_lines(camera: Camera, origin: np.ndarray) -> tuple[np.ndarray, float]:
     """Numbers of the lines between bands that may be in the picture, and the width of a band in m."""
     step = band_width(camera.scale)
     middle = int((camera.centre[:2] - origin) @ camera.forward // step)
-    reach = int(2 * (camera.width + camera.height) / np.sin(camera.elevation) / camera.scale / step) + 2
+    reach = (
+        int(2 * (camera.width + camera.height) / np.sin(camera.elevation) / camera.scale / step) + 2
+    )
     return np.arange(middle - reach, middle + reach), step
 
 
@@ -60,7 +62,9 @@ def number_bands(draw: ImageDraw.ImageDraw, camera: Camera, origin: np.ndarray) 
         if -50 < x < camera.width + 50:
             draw.line([(x, base), (foot, base - 6)], fill=INK, width=1)
             places = 2 if step < 0.1 else 1 if step < 1 else 0
-            draw.text((x, base + 2), f"{number * step:.{places}f} m", fill=INK, font=letters, anchor="ma")
+            draw.text(
+                (x, base + 2), f"{number * step:.{places}f} m", fill=INK, font=letters, anchor="ma"
+            )
 
 
 def _line_ends(camera: Camera, origin: np.ndarray, numbers: np.ndarray, step: float) -> np.ndarray:

@@ -22,7 +22,9 @@ def gait_window(walk: Walk, strides: int = STRIDES) -> tuple[slice, str]:
     if found:
         return slice(*found), f"{strides} strides from {found[0] * walk.time_step:.2f} s on"
     last = min(len(walk.qpos), round(FALLBACK / walk.time_step))
-    what = f"it fell after {walk.fell:.2f} s" if np.isfinite(walk.fell) else "it has no steady stride"
+    what = (
+        f"it fell after {walk.fell:.2f} s" if np.isfinite(walk.fell) else "it has no steady stride"
+    )
     return slice(0, last), f"the first {last * walk.time_step:.2f} s; {what}"
 
 
@@ -34,8 +36,18 @@ def draw_footfalls(axes: Axes, walk: Walk) -> None:
     share = contact.mean(0)
     for row, foot in enumerate(contact.T):
         padded = np.diff(np.concatenate([[0], foot.astype(int), [0]]))
-        for begin, end in zip(np.flatnonzero(padded == 1), np.flatnonzero(padded == -1), strict=True):
-            axes.add_patch(Rectangle((begin * step, row - ROW), (end - begin) * step, 2 * ROW, facecolor=DARK, linewidth=0))
+        for begin, end in zip(
+            np.flatnonzero(padded == 1), np.flatnonzero(padded == -1), strict=True
+        ):
+            axes.add_patch(
+                Rectangle(
+                    (begin * step, row - ROW),
+                    (end - begin) * step,
+                    2 * ROW,
+                    facecolor=DARK,
+                    linewidth=0,
+                )
+            )
         axes.text(len(contact) * step * 1.01, row, f"{share[row]:.0%}", va="center")
     labels = [_plain(name).removesuffix(" foot").removesuffix(" lower") for name in names]
     axes.set(
@@ -57,7 +69,10 @@ def draw_joints(drawing: Figure, walk: Walk) -> None:
     order = _partner_order(walk)
     columns = 2 if len(order) <= 20 else 4
     axes = drawing.subplots(-(-len(order) // columns), columns, sharex=True, squeeze=False)
-    angles, targets = np.degrees(walk.recording.joint_pos[window]), np.degrees(walk.targets()[window])
+    angles, targets = (
+        np.degrees(walk.recording.joint_pos[window]),
+        np.degrees(walk.targets()[window]),
+    )
     time = np.arange(len(angles)) * walk.time_step
     for place, panel in enumerate(axes.flat):
         if place >= len(order):
@@ -84,19 +99,30 @@ def draw_trunk(drawing: Figure, walk: Walk) -> None:
     above.plot(time, recording.trunk_pos[:, 2], "-", color=DARK, linewidth=1)
     above.axhline(walk.creature.stand_height, color=MIDDLE, linestyle=":", label="standing")
     above.set(ylabel="height (m)", title="trunk: height above the floor and forward speed")
-    above.set_ylim(0, max(1.35 * np.nanmax(recording.trunk_pos[:, 2]), 1.4 * walk.creature.stand_height))
+    above.set_ylim(
+        0, max(1.35 * np.nanmax(recording.trunk_pos[:, 2]), 1.4 * walk.creature.stand_height)
+    )
     speed = np.gradient(recording.trunk_pos[:, 0], step)
     below.plot(time, speed, "-", color="0.7", linewidth=0.8, label="at each moment")
     if (starts := walk.stride_frames()).size > 1:
         way = np.diff(recording.trunk_pos[starts, 0]) / (np.diff(starts) * step)
-        below.step(starts * step, [*way, way[-1]], where="post", color=DARK, linewidth=1.8, label="mean of each stride")
+        below.step(
+            starts * step,
+            [*way, way[-1]],
+            where="post",
+            color=DARK,
+            linewidth=1.8,
+            label="mean of each stride",
+        )
     below.axhline(0, color=DARK, linewidth=0.8)
     below.set(xlabel="time (s)", ylabel="speed (m/s)", xlim=(0, time[-1]))
     low, high = np.nanpercentile(speed, [1, 99])
     below.set_ylim(min(1.2 * low, -0.05), max(1.5 * high, 0.1))
     for panel in (above, below):
         if np.isfinite(walk.fell):
-            panel.axvline(walk.fell, color=ACCENT, linewidth=1.5, label=f"fell at {walk.fell:.2f} s")
+            panel.axvline(
+                walk.fell, color=ACCENT, linewidth=1.5, label=f"fell at {walk.fell:.2f} s"
+            )
         panel.legend(loc="upper right", ncols=3)
 
 
@@ -104,7 +130,10 @@ def gait_figures(walk: Walk) -> Figures:
     """The plots of this file by file name."""
     rows = -(-len(_partner_order(walk)) // 2)
     return {
-        "footfalls": ((9, 0.9 + 0.42 * len(walk.creature.foot_names)), lambda drawing: draw_footfalls(drawing.subplots(), walk)),
+        "footfalls": (
+            (9, 0.9 + 0.42 * len(walk.creature.foot_names)),
+            lambda drawing: draw_footfalls(drawing.subplots(), walk),
+        ),
         "joints": ((9, 1.0 + 1.15 * rows), lambda drawing: draw_joints(drawing, walk)),
         "trunk": ((9, 4.5), lambda drawing: draw_trunk(drawing, walk)),
     }
@@ -114,7 +143,13 @@ def _mark_strides(axes: Axes, walk: Walk, window: slice) -> None:
     """A line where a new stride begins."""
     for frame in walk.stride_frames():
         if window.start < frame < window.stop:
-            axes.axvline((frame - window.start) * walk.time_step, color=ACCENT, linewidth=1.2, zorder=3, label="a new stride begins")
+            axes.axvline(
+                (frame - window.start) * walk.time_step,
+                color=ACCENT,
+                linewidth=1.2,
+                zorder=3,
+                label="a new stride begins",
+            )
 
 
 def _partner_order(walk: Walk) -> list[int]:

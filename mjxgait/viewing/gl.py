@@ -30,19 +30,32 @@ def working_backend(stage: Stage, wanted: str | None = None) -> tuple[str | None
     """
     if wanted and wanted.lower() in OFF:
         return None, f"drawn without GL, as MUJOCO_GL={wanted} says"
-    candidates = [wanted] if wanted else ["egl", "osmesa"] if sys.platform == "linux" else ["default"]
+    candidates = (
+        [wanted] if wanted else ["egl", "osmesa"] if sys.platform == "linux" else ["default"]
+    )
     reasons = []
     for backend in candidates:
         with tempfile.TemporaryDirectory() as folder:
             try:
-                done = subprocess.run(_command(stage, [0], Path(folder)), env=_environment(backend), capture_output=True, timeout=PATIENCE)
+                done = subprocess.run(
+                    _command(stage, [0], Path(folder)),
+                    env=_environment(backend),
+                    capture_output=True,
+                    timeout=PATIENCE,
+                )
             except subprocess.TimeoutExpired:
                 reasons.append(f"{backend}: no picture in {PATIENCE:g} s")
                 continue
-        if done.returncode == 0 and len(done.stdout) == 3 * stage.width * stage.height and any(done.stdout):
+        if (
+            done.returncode == 0
+            and len(done.stdout) == 3 * stage.width * stage.height
+            and any(done.stdout)
+        ):
             return backend, f"drawn by MuJoCo with {backend}"
         lines = done.stderr.decode(errors="replace").strip().splitlines()
-        reasons.append(f"{backend}: {lines[-1][:100] if lines else f'ended with code {done.returncode}'}")
+        reasons.append(
+            f"{backend}: {lines[-1][:100] if lines else f'ended with code {done.returncode}'}"
+        )
     return None, f"drawn without GL, as it does not work here ({'; '.join(reasons)})"
 
 
@@ -54,13 +67,17 @@ def gl_pictures(stage: Stage, frames: Sequence[int], backend: str) -> Iterator[I
     """
     with tempfile.TemporaryDirectory() as folder:
         command = _command(stage, frames, Path(folder))
-        worker = subprocess.Popen(command, env=_environment(backend), stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+        worker = subprocess.Popen(
+            command, env=_environment(backend), stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+        )
         assert worker.stdout is not None
         try:
             for frame in frames:
                 raw = worker.stdout.read(3 * stage.width * stage.height)
                 if len(raw) < 3 * stage.width * stage.height:
-                    raise UserError(f"the GL renderer ({backend}) stopped in the middle; add --renderer painter")
+                    raise UserError(
+                        f"the GL renderer ({backend}) stopped in the middle; add --renderer painter"
+                    )
                 picture = Image.frombytes("RGB", (stage.width, stage.height), raw)
                 number_bands(ImageDraw.Draw(picture), stage.camera(frame), stage.origin)
                 yield picture
@@ -76,9 +93,13 @@ def scene_file(stage: Stage, frames: Sequence[int], path: Path) -> None:
     first = cameras[0]
     into, creature = first.axes[2], stage.walks[0].creature
     place = int(creature.model.jnt_qposadr[creature.model.body_jntadr[creature.trunk]])
-    poses = np.array([[walk.qpos[min(frame, len(walk.qpos) - 1)] for walk in stage.walks] for frame in frames])
+    poses = np.array(
+        [[walk.qpos[min(frame, len(walk.qpos) - 1)] for walk in stage.walks] for frame in frames]
+    )
     poses[..., place : place + 3] += stage.lanes
-    numbers = {int(n) for camera in (first, cameras[-1]) for n in band_lines(camera, stage.origin)[0]}
+    numbers = {
+        int(n) for camera in (first, cameras[-1]) for n in band_lines(camera, stage.origin)[0]
+    }
     step = band_lines(first, stage.origin)[1]
     dark = [n for n in range(min(numbers), max(numbers)) if n % 2]
     np.savez(
@@ -86,7 +107,13 @@ def scene_file(stage: Stage, frames: Sequence[int], path: Path) -> None:
         xml=np.array(creature.files["creature.xml"]),
         size=np.array([stage.width, stage.height]),
         extent=np.array(stage.height / first.scale),
-        view=np.array([np.degrees(np.arctan2(into[1], into[0])), -np.degrees(first.elevation), 20 * creature.body_length]),
+        view=np.array(
+            [
+                np.degrees(np.arctan2(into[1], into[0])),
+                -np.degrees(first.elevation),
+                20 * creature.body_length,
+            ]
+        ),
         centre=np.array([camera.centre for camera in cameras]),
         qpos=poses,
         bands=np.array([stage.origin + (n + 0.5) * step * stage.forward for n in dark]),

@@ -36,7 +36,9 @@ def main(path: str) -> None:
             renderer.update_scene(data[0], camera, option)
             moving = int(mujoco.mjtCatBit.mjCAT_DYNAMIC)
             for other in data[1:]:
-                mujoco.mjv_addGeoms(model, other, option, mujoco.MjvPerturb(), moving, renderer.scene)
+                mujoco.mjv_addGeoms(
+                    model, other, option, mujoco.MjvPerturb(), moving, renderer.scene
+                )
             _add_lamp(renderer.scene, centre, parts["lamp"], 0.25 * camera.distance)
             _keep_floor_out_of_shadows(renderer.scene, model.geom("floor").id)
             _add_bands(renderer.scene, parts["bands"], float(parts["band_width"]), parts["forward"])
@@ -59,7 +61,9 @@ def _prepared(model: mujoco.MjModel, parts: dict[str, np.ndarray]) -> mujoco.MjM
     return model
 
 
-def _add_lamp(scene: mujoco.MjvScene, centre: np.ndarray, towards: np.ndarray, distance: float) -> None:
+def _add_lamp(
+    scene: mujoco.MjvScene, centre: np.ndarray, towards: np.ndarray, distance: float
+) -> None:
     """A lamp far away that throws shadows. towards: [3] unit."""
     lamp = scene.lights[scene.nlight]
     lamp.type = int(mujoco.mjtLightType.mjLIGHT_DIRECTIONAL)
@@ -76,13 +80,25 @@ def _keep_floor_out_of_shadows(scene: mujoco.MjvScene, floor: int) -> None:
             geom.category = int(mujoco.mjtCatBit.mjCAT_DECOR)
 
 
-def _add_bands(scene: mujoco.MjvScene, middles: np.ndarray, width: float, forward: np.ndarray) -> None:
+def _add_bands(
+    scene: mujoco.MjvScene, middles: np.ndarray, width: float, forward: np.ndarray
+) -> None:
     """Bands across the way at points [n, 2] m."""
     turn = np.array([[forward[0], -forward[1], 0], [forward[1], forward[0], 0], [0, 0, 1]])
     for middle in middles:
         geom = scene.geoms[scene.ngeom]
-        size, colour = np.array([width / 2, 50.0, BAND_HEIGHT / 2]), np.array([BAND_GREY, BAND_GREY, BAND_GREY, 1], np.float32)
-        mujoco.mjv_initGeom(geom, mujoco.mjtGeom.mjGEOM_BOX, size, np.append(middle, BAND_HEIGHT / 2), turn.ravel(), colour)
+        size, colour = (
+            np.array([width / 2, 50.0, BAND_HEIGHT / 2]),
+            np.array([BAND_GREY, BAND_GREY, BAND_GREY, 1], np.float32),
+        )
+        mujoco.mjv_initGeom(
+            geom,
+            mujoco.mjtGeom.mjGEOM_BOX,
+            size,
+            np.append(middle, BAND_HEIGHT / 2),
+            turn.ravel(),
+            colour,
+        )
         geom.category = int(mujoco.mjtCatBit.mjCAT_DECOR)
         scene.ngeom += 1
 

@@ -75,14 +75,24 @@ class Watcher:
 
     def state(self) -> dict[str, Any]:
         """What the page asks for every second."""
-        history = [{key: line.get(key) for key in ("generation", "best", "mean", "forced")} for line in read_metrics(self.run / METRICS)]
+        history = [
+            {key: line.get(key) for key in ("generation", "best", "mean", "forced")}
+            for line in read_metrics(self.run / METRICS)
+        ]
         name = self.creature.name.replace("_", " ")
-        return {"name": name, "what": self.shown.what, "version": self.shown.version, "history": history}
+        return {
+            "name": name,
+            "what": self.shown.what,
+            "version": self.shown.version,
+            "history": history,
+        }
 
     def _shown(self) -> Shown:
         champion = read_champion(self.run / CHAMPION, self.creature)
         walk = record_walk(self.creature, champion, SECONDS)
-        found = f"generation {champion.origin.get('generation', '?')}, fitness {champion.fitness:.2f}"
+        found = (
+            f"generation {champion.origin.get('generation', '?')}, fitness {champion.fitness:.2f}"
+        )
         try:
             if np.isfinite(walk.fell):
                 loop, gait = walk_take(walk), f"falls after {walk.fell:.1f} s"
@@ -133,7 +143,9 @@ def open_server(watcher: Watcher, port: int | None = None) -> ThreadingHTTPServe
             return ThreadingHTTPServer((HERE, candidate), Handler)
         except OSError:
             continue
-    raise UserError(f"port {port or f'{PORTS.start} to {PORTS.stop - 1}'}: taken by another program; name a free one with --port")
+    raise UserError(
+        f"port {port or f'{PORTS.start} to {PORTS.stop - 1}'}: taken by another program; name a free one with --port"
+    )
 
 
 class _Handler(BaseHTTPRequestHandler):
@@ -150,7 +162,12 @@ class _Handler(BaseHTTPRequestHandler):
                 self._send((web / "live.html").read_bytes(), "text/html; charset=utf-8")
             case "/viewer.js":
                 # Without the reference to a source map, which is not here.
-                self._send((web / "model-viewer.min.js").read_bytes().rsplit(b"//# sourceMappingURL", 1)[0], "text/javascript")
+                self._send(
+                    (web / "model-viewer.min.js")
+                    .read_bytes()
+                    .rsplit(b"//# sourceMappingURL", 1)[0],
+                    "text/javascript",
+                )
             case "/state.json":
                 self._send(json.dumps(self.follows.state()).encode(), "application/json")
             case "/walk.glb" if self.follows.shown.version:

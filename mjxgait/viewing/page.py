@@ -46,7 +46,11 @@ def build_page(walk: Walk, loop: WalkLoop, sections: str) -> str:
     """The text of the page; sections: HTML below the walk."""
     web = resources.files("mjxgait.viewing") / "web"
     # Without the reference to a source map, which a browser's tools would ask for.
-    viewer = (web / "model-viewer.min.js").read_text(encoding="utf-8").rsplit("//# sourceMappingURL", 1)[0]
+    viewer = (
+        (web / "model-viewer.min.js")
+        .read_text(encoding="utf-8")
+        .rsplit("//# sourceMappingURL", 1)[0]
+    )
     stride = loop.times[-1] / loop.strides
     lead = (
         f"{loop.speed:.2f} m/s, {loop.speed / walk.creature.body_length:.2f} body lengths per second; "
@@ -63,7 +67,11 @@ def build_page(walk: Walk, loop: WalkLoop, sections: str) -> str:
 
 def _sections(run: Path, creature: Creature, champion: Champion, walk: Walk) -> str:
     lines = read_metrics(run / METRICS)
-    fitness: Figures = {"fitness": ((8, 4.0), lambda drawing: draw_fitness(drawing.subplots(), lines))} if lines else {}
+    fitness: Figures = (
+        {"fitness": ((8, 4.0), lambda drawing: draw_fitness(drawing.subplots(), lines))}
+        if lines
+        else {}
+    )
     parts = ["<h2>The walk</h2>", *_images(gait_figures(walk), creature)]
     if fitness:
         parts += ["<h2>How it was learnt</h2>", *_images(fitness, creature)]
@@ -103,18 +111,29 @@ def certificate_table(run: Path, champion: Champion) -> str:
         ]
         verdict = "All criteria pass." if document["passed"] else "Not all criteria pass."
     except (ValueError, KeyError, TypeError):
-        raise UserError(f"{run / CERTIFICATE}: not a certificate; `mjxgait certify {run}` writes it anew") from None
-    return f"<p>{verdict}</p>" + _table(("criterion", "measure", "value", "wanted", "verdict"), rows)
+        raise UserError(
+            f"{run / CERTIFICATE}: not a certificate; `mjxgait certify {run}` writes it anew"
+        ) from None
+    return f"<p>{verdict}</p>" + _table(
+        ("criterion", "measure", "value", "wanted", "verdict"), rows
+    )
 
 
 def _origin(creature: Creature, champion: Champion) -> str:
     origin = champion.origin
     rows = [
-        ["creature", f"{creature.name} (body {creature.digest}), {creature.mass:.1f} kg, {len(creature.joint_names)} joints"],
+        [
+            "creature",
+            f"{creature.name} (body {creature.digest}), {creature.mass:.1f} kg, {len(creature.joint_names)} joints",
+        ],
         ["fitness", f"{champion.fitness:.3f}"],
         ["found in generation", str(origin.get("born", "unknown"))],
         ["seed", str(origin.get("seed", "unknown"))],
-        ["versions", ", ".join(f"{name} {version}" for name, version in origin.get("versions", {}).items()) or "unknown"],
+        [
+            "versions",
+            ", ".join(f"{name} {version}" for name, version in origin.get("versions", {}).items())
+            or "unknown",
+        ],
     ]
     return _table((), rows)
 
@@ -122,7 +141,13 @@ def _origin(creature: Creature, champion: Champion) -> str:
 def _table(heading: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     def cell(text: str) -> str:
         # In a table with a heading numbers stand under each other.
-        kind = ' class="fails"' if text == "fails" else ' class="number"' if heading and _is_number(text) else ""
+        kind = (
+            ' class="fails"'
+            if text == "fails"
+            else ' class="number"'
+            if heading and _is_number(text)
+            else ""
+        )
         return f"<td{kind}>{html.escape(text)}</td>"
 
     head = f"<tr>{''.join(f'<th>{html.escape(h)}</th>' for h in heading)}</tr>" if heading else ""

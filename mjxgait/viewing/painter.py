@@ -24,7 +24,13 @@ OUTLINE = 0.45
 HAZE = np.array([224, 226, 228], dtype=np.float32)
 """What parts on the far side fade into, so that left and right limbs can be told apart."""
 MOST_HAZE = 0.42
-COMPASS = np.stack([np.cos(np.linspace(0, 2 * np.pi, 28, endpoint=False)), np.sin(np.linspace(0, 2 * np.pi, 28, endpoint=False))], 1)
+COMPASS = np.stack(
+    [
+        np.cos(np.linspace(0, 2 * np.pi, 28, endpoint=False)),
+        np.sin(np.linspace(0, 2 * np.pi, 28, endpoint=False)),
+    ],
+    1,
+)
 SEEN_GROUPS = 3
 """MuJoCo shows geom groups 0 to 2 unless told otherwise."""
 
@@ -40,7 +46,9 @@ class Painter:
         self.outlines = Silhouettes(model, self.geoms)
         self.far = np.zeros(len(self.geoms))
 
-    def picture(self, camera: Camera, creatures: Sequence[tuple[np.ndarray, np.ndarray]], origin: np.ndarray) -> Image.Image:
+    def picture(
+        self, camera: Camera, creatures: Sequence[tuple[np.ndarray, np.ndarray]], origin: np.ndarray
+    ) -> Image.Image:
         """One frame.
 
         Args:
@@ -48,7 +56,9 @@ class Painter:
           origin: [2] m, where the scale on the floor is zero.
         """
         fine = camera.enlarged(SMOOTH)
-        picture = draw_floor(camera, origin).resize((fine.width, fine.height), Image.Resampling.BICUBIC)
+        picture = draw_floor(camera, origin).resize(
+            (fine.width, fine.height), Image.Resampling.BICUBIC
+        )
         mine = [(pos[self.geoms], rot[self.geoms]) for pos, rot in creatures]
         self._shade_floor(picture, fine, mine)
         canvas = _Canvas(np.asarray(picture, dtype=np.float32).copy(), fine)
@@ -56,7 +66,12 @@ class Painter:
             self._draw(canvas, pos, rot)
         return canvas.image().reduce(SMOOTH)
 
-    def _shade_floor(self, picture: Image.Image, camera: Camera, creatures: Sequence[tuple[np.ndarray, np.ndarray]]) -> None:
+    def _shade_floor(
+        self,
+        picture: Image.Image,
+        camera: Camera,
+        creatures: Sequence[tuple[np.ndarray, np.ndarray]],
+    ) -> None:
         """Darkens the floor where the light from above does not reach it."""
         mask = Image.new("L", picture.size)
         draw = ImageDraw.Draw(mask)
@@ -71,7 +86,9 @@ class Painter:
 
     def _draw(self, canvas: "_Canvas", pos: np.ndarray, rot: np.ndarray) -> None:
         right, up, _ = canvas.camera.axes
-        rims = canvas.camera.pixels(self.outlines.outermost(pos, rot, np.stack([right, up, -right, -up])))
+        rims = canvas.camera.pixels(
+            self.outlines.outermost(pos, rot, np.stack([right, up, -right, -up]))
+        )
         for i, geom in enumerate(self.geoms):
             paint = _Paint(self.colours[i], float(self.far[i]), int(self.model.geom_bodyid[geom]))
             kind = int(self.model.geom_type[geom])
@@ -99,18 +116,35 @@ class _Canvas:
         self.body = np.full(pixels.shape[:2], -1, dtype=np.int32)
         self.light = lamp_direction(camera.forward)
 
-    def primitive(self, kind: int, size: np.ndarray, pos: np.ndarray, rot: np.ndarray, rim: np.ndarray, paint: _Paint) -> None:
+    def primitive(
+        self,
+        kind: int,
+        size: np.ndarray,
+        pos: np.ndarray,
+        rot: np.ndarray,
+        rim: np.ndarray,
+        paint: _Paint,
+    ) -> None:
         """Draws a geom whose outline lies between the pixels in rim [4, 2]."""
         x0, y0 = np.maximum(np.floor(rim.min(0)).astype(int) - 1, 0)
-        x1, y1 = np.minimum(np.ceil(rim.max(0)).astype(int) + 2, [self.camera.width, self.camera.height])
+        x1, y1 = np.minimum(
+            np.ceil(rim.max(0)).astype(int) + 2, [self.camera.width, self.camera.height]
+        )
         if x0 >= x1 or y0 >= y1:
             return
         rays = self.camera.rays(np.arange(x0, x1), np.arange(y0, y1)).reshape(-1, 3)
         distance, normal = hit(kind, size, (rays - pos) @ rot, self.camera.axes[2] @ rot)
         shape = (y1 - y0, x1 - x0)
-        self.cover((slice(y0, y1), slice(x0, x1)), distance.reshape(shape), (normal @ rot.T).reshape(*shape, 3), paint)
+        self.cover(
+            (slice(y0, y1), slice(x0, x1)),
+            distance.reshape(shape),
+            (normal @ rot.T).reshape(*shape, 3),
+            paint,
+        )
 
-    def cover(self, place: tuple[slice, slice], distance: np.ndarray, normal: np.ndarray, paint: _Paint) -> None:
+    def cover(
+        self, place: tuple[slice, slice], distance: np.ndarray, normal: np.ndarray, paint: _Paint
+    ) -> None:
         """Paints a rectangle where it is nearer than what is there. distance: [h, w] m; normal: [h, w, 3] in the world."""
         nearer = distance < self.depth[place]
         self.depth[place][nearer] = distance[nearer]
@@ -125,7 +159,9 @@ class _Canvas:
         """The picture, with dark lines where one part ends before another."""
         edge = np.zeros(self.depth.shape, dtype=bool)
         for axis in (0, 1):
-            here, there = (np.take(self.body, range(a, self.body.shape[axis] - 1 + a), axis) for a in (0, 1))
+            here, there = (
+                np.take(self.body, range(a, self.body.shape[axis] - 1 + a), axis) for a in (0, 1)
+            )
             differs = here != there
             inner = tuple(slice(None, -1) if i == axis else slice(None) for i in range(2))
             edge[inner] |= differs
@@ -142,10 +178,16 @@ def seen_geoms(model: mujoco.MjModel) -> np.ndarray:
     """Ids of the geoms that belong to a creature and can be seen."""
     alpha = geom_colours(model)[:, 3] if model.ngeom else np.zeros(0)
     flat = np.isin(model.geom_type, [mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD])
-    return np.flatnonzero((model.geom_bodyid != 0) & (model.geom_group < SEEN_GROUPS) & ~flat & (alpha > 0))
+    return np.flatnonzero(
+        (model.geom_bodyid != 0) & (model.geom_group < SEEN_GROUPS) & ~flat & (alpha > 0)
+    )
 
 
 def geom_colours(model: mujoco.MjModel) -> np.ndarray:
     """[ngeom, 4] red, green, blue, opacity, each 0 to 1: of the material where a geom has one."""
     material = model.geom_matid
-    return np.where((material >= 0)[:, None], model.mat_rgba[np.maximum(material, 0)] if model.nmat else 0.0, model.geom_rgba)
+    return np.where(
+        (material >= 0)[:, None],
+        model.mat_rgba[np.maximum(material, 0)] if model.nmat else 0.0,
+        model.geom_rgba,
+    )

@@ -31,7 +31,9 @@ def plot_run(run: Path, out: Path | None = None, formats: Sequence[str] = FORMAT
     creature, config = open_run(run)
     lines = read_metrics(run / METRICS)
     if not lines:
-        raise UserError(f"{run}: nothing to plot; the run ended before its first generation was done")
+        raise UserError(
+            f"{run}: nothing to plot; the run ended before its first generation was done"
+        )
     out = out or run / PLOTS
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -40,7 +42,9 @@ def plot_run(run: Path, out: Path | None = None, formats: Sequence[str] = FORMAT
     figures = dict(progress_figures(lines, _weights(config, lines)))
     if (run / CHAMPION).exists():
         walk = record_walk(creature, read_champion(run / CHAMPION, creature), SECONDS)
-        figures |= dict(gait_figures(walk)) | {"filmstrip": ((12, 4.8), lambda drawing: draw_filmstrip(drawing, walk))}
+        figures |= dict(gait_figures(walk)) | {
+            "filmstrip": ((12, 4.8), lambda drawing: draw_filmstrip(drawing, walk))
+        }
     files = []
     for name, (size, compose) in figures.items():
         with figure(size) as drawing:
@@ -51,5 +55,7 @@ def plot_run(run: Path, out: Path | None = None, formats: Sequence[str] = FORMAT
 
 def _weights(config: Config, lines: Lines) -> dict[str, np.ndarray]:
     """Signed weight of each term, [generations]."""
-    rows = np.array([weight_vector(config.fitness, jnp.int32(line["generation"])) for line in lines])
+    rows = np.array(
+        [weight_vector(config.fitness, jnp.int32(line["generation"])) for line in lines]
+    )
     return dict(zip(TERMS, rows.T, strict=True))

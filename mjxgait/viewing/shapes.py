@@ -30,7 +30,9 @@ class Silhouettes:
         return pos[:, None] + self.ball * directions + inner @ rot.transpose(0, 2, 1)
 
 
-def hit(kind: int, size: np.ndarray, origins: np.ndarray, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def hit(
+    kind: int, size: np.ndarray, origins: np.ndarray, direction: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Where parallel rays enter a primitive, in the primitive's own frame.
 
     Args:
@@ -52,13 +54,17 @@ def hit(kind: int, size: np.ndarray, origins: np.ndarray, direction: np.ndarray)
             return _box(size, origins, direction)
 
 
-def _ellipsoid(radii: np.ndarray, origins: np.ndarray, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _ellipsoid(
+    radii: np.ndarray, origins: np.ndarray, direction: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     o, d = origins / radii, direction / radii
     distance = _first_root(d @ d, o @ d, (o * o).sum(1) - 1)
     return distance, _unit((o + _reach(distance)[:, None] * d) / radii)
 
 
-def _capsule(radius: float, half: float, origins: np.ndarray, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _capsule(
+    radius: float, half: float, origins: np.ndarray, direction: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """The nearest of the side and the two round ends."""
     side = _side(radius, origins, direction)
     along = origins[:, 2] + _reach(side) * direction[2]
@@ -73,7 +79,9 @@ def _capsule(radius: float, half: float, origins: np.ndarray, direction: np.ndar
     return distance, _unit(points - axis[:, None] * [0.0, 0.0, 1.0])
 
 
-def _cylinder(radius: float, half: float, origins: np.ndarray, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _cylinder(
+    radius: float, half: float, origins: np.ndarray, direction: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     side = _side(radius, origins, direction)
     side = np.where(np.abs(origins[:, 2] + _reach(side) * direction[2]) <= half, side, MISS)
     facing = -np.sign(direction[2]) or 1.0
@@ -86,7 +94,9 @@ def _cylinder(radius: float, half: float, origins: np.ndarray, direction: np.nda
     return distance, np.where((cap < side)[:, None], [0.0, 0.0, facing], round_normal)
 
 
-def _box(half: np.ndarray, origins: np.ndarray, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _box(
+    half: np.ndarray, origins: np.ndarray, direction: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """By slabs."""
     slope = np.where(np.abs(direction) < 1e-9, 1e-9, direction)
     near = (-np.sign(slope) * half - origins) / slope

@@ -50,27 +50,43 @@ class Stage:
     def camera(self, frame: int) -> Camera:
         """Goes along with the one in front."""
         way = self.way[min(frame, len(self.way) - 1)]
-        centre = np.append(self.origin + way[0] * self.forward + way[1] * self.left[:2], self.middle)
-        return Camera(centre + self.shift, self.forward, self.scale, self.width, self.height, **self.elevation)
+        centre = np.append(
+            self.origin + way[0] * self.forward + way[1] * self.left[:2], self.middle
+        )
+        return Camera(
+            centre + self.shift, self.forward, self.scale, self.width, self.height, **self.elevation
+        )
 
     def behind(self, frame: int, place: int) -> np.ndarray:
         """[2] pixels, right behind the creature in a lane and half as high as it stands."""
         walk = self.walks[place]
         trunk = walk.trunk_pos[min(frame, len(walk.qpos) - 1)] + self.lanes[place]
-        return self.camera(frame).pixels(np.append(trunk[:2] + self.back * self.forward, 0.5 * self.top))
+        return self.camera(frame).pixels(
+            np.append(trunk[:2] + self.back * self.forward, 0.5 * self.top)
+        )
 
     def _place_lanes(self) -> None:
         forward = np.append(self.forward, 0.0)
         self.left = np.cross([0.0, 0.0, 1.0], forward)
-        pos, rot = (poses[0][self.painter.geoms] for poses in self.walks[0].geom_poses(np.array([0])))
+        pos, rot = (
+            poses[0][self.painter.geoms] for poses in self.walks[0].geom_poses(np.array([0]))
+        )
         side = pos @ self.left - (pos @ self.left).mean()
         self.painter.far = np.clip(side / max(float(np.abs(side).max()), 1e-6), 0.0, 1.0)
-        directions = np.concatenate([np.column_stack([COMPASS, 0 * COMPASS[:, 0]]), [[0, 0, 1], [0, 0, -1]]])
-        self.outline = Silhouettes(self.walks[0].creature.model, self.painter.geoms).outermost(pos, rot, directions).reshape(-1, 3)
+        directions = np.concatenate(
+            [np.column_stack([COMPASS, 0 * COMPASS[:, 0]]), [[0, 0, 1], [0, 0, -1]]]
+        )
+        self.outline = (
+            Silhouettes(self.walks[0].creature.model, self.painter.geoms)
+            .outermost(pos, rot, directions)
+            .reshape(-1, 3)
+        )
         self.top = float(self.outline[:, 2].max())
         self.back = float(((self.outline[:, :2] - self.origin) @ self.forward).min())
         across, along = np.ptp(self.outline @ self.left), np.ptp(self.outline @ forward)
-        places = (np.arange(len(self.walks)) - (len(self.walks) - 1) / 2) * max(LANE * across, LONG_LANE * along)
+        places = (np.arange(len(self.walks)) - (len(self.walks) - 1) / 2) * max(
+            LANE * across, LONG_LANE * along
+        )
         self.lanes = places[:, None] * self.left
 
     def _choose_view(self) -> None:
@@ -81,7 +97,10 @@ class Stage:
         self.scale = float(min(self.width / (ROOM * size[0]), self.height / (ROOM * size[1])))
         self.shift = float(seen[:, 0].max() + seen[:, 0].min()) / 2 * flat.axes[0]
         # The middle of what is seen, a little lower for the numbers on the floor.
-        self.middle = float(-seen[:, 1].min() - 0.5 * size[1]) / np.cos(flat.elevation) - 0.03 * self.height / self.scale
+        self.middle = (
+            float(-seen[:, 1].min() - 0.5 * size[1]) / np.cos(flat.elevation)
+            - 0.03 * self.height / self.scale
+        )
         ways = []
         for walk in self.walks:
             moved = walk.trunk_pos[:, :2] - self.origin
@@ -97,5 +116,13 @@ class Stage:
 def smooth(path: np.ndarray, frames: int) -> np.ndarray:
     """A path [T, D] averaged over so many frames."""
     frames = max(min(frames, len(path)), 1)
-    padded = np.concatenate([np.repeat(path[:1], frames // 2, 0), path, np.repeat(path[-1:], frames - 1 - frames // 2, 0)])
-    return np.column_stack([np.convolve(column, np.ones(frames) / frames, mode="valid") for column in padded.T])
+    padded = np.concatenate(
+        [
+            np.repeat(path[:1], frames // 2, 0),
+            path,
+            np.repeat(path[-1:], frames - 1 - frames // 2, 0),
+        ]
+    )
+    return np.column_stack(
+        [np.convolve(column, np.ones(frames) / frames, mode="valid") for column in padded.T]
+    )

@@ -44,7 +44,9 @@ def moving_pictures(
         yield picture
 
 
-def write_captions(picture: Image.Image, stage: Stage, runners: Sequence[Runner], frame: int, slow: float = 1.0) -> None:
+def write_captions(
+    picture: Image.Image, stage: Stage, runners: Sequence[Runner], frame: int, slow: float = 1.0
+) -> None:
     """Name, speed and time; in a race also who is who."""
     draw = ImageDraw.Draw(picture, "RGBA")
     size = max(stage.height // 20, 13)
@@ -54,7 +56,9 @@ def write_captions(picture: Image.Image, stage: Stage, runners: Sequence[Runner]
     draw.text((12, 10), name, fill=DARK_INK, font=font(size))
     draw.text((stage.width - 12, 10), time, fill=DARK_INK, font=font(size), anchor="ra")
     if len(runners) == 1:
-        draw.text((12, 14 + size), condition(lead, frame), fill=DARK_INK, font=font(round(0.8 * size)))
+        draw.text(
+            (12, 14 + size), condition(lead, frame), fill=DARK_INK, font=font(round(0.8 * size))
+        )
         return
     for place, runner in reversed(list(enumerate(runners))):
         x, y = stage.behind(frame, place) - [LABEL_GAP, 0]
@@ -94,7 +98,9 @@ def write_video(pictures: Iterable[Image.Image], path: Path, fps: int) -> None:
             case ".gif":
                 _write_gif(list(pictures), path, fps)
             case other:
-                raise UserError(f'{path}: cannot write "{other}"; end the name with {", ".join(FORMATS)}')
+                raise UserError(
+                    f'{path}: cannot write "{other}"; end the name with {", ".join(FORMATS)}'
+                )
     except OSError as error:
         raise UserError(f"{path}: cannot be written ({error.strerror or error})") from None
 
@@ -106,7 +112,9 @@ def require_writer(path: Path) -> None:
       UserError: see `write_video`.
     """
     if path.suffix.lower() not in FORMATS:
-        raise UserError(f'{path}: cannot write "{path.suffix}"; end the name with {", ".join(FORMATS)}')
+        raise UserError(
+            f'{path}: cannot write "{path.suffix}"; end the name with {", ".join(FORMATS)}'
+        )
     if not path.absolute().parent.is_dir():
         raise UserError(f"{path}: the folder {path.parent} does not exist")
     if path.suffix.lower() == ".mp4":
@@ -114,7 +122,15 @@ def require_writer(path: Path) -> None:
 
 
 def _write_webp(pictures: list[Image.Image], path: Path, fps: int) -> None:
-    pictures[0].save(path, save_all=True, append_images=pictures[1:], duration=round(1000 / fps), loop=0, quality=75, method=3)
+    pictures[0].save(
+        path,
+        save_all=True,
+        append_images=pictures[1:],
+        duration=round(1000 / fps),
+        loop=0,
+        quality=75,
+        method=3,
+    )
 
 
 def _write_gif(pictures: list[Image.Image], path: Path, fps: int) -> None:
@@ -124,7 +140,9 @@ def _write_gif(pictures: list[Image.Image], path: Path, fps: int) -> None:
     palette = joined.quantize(128, method=Image.Quantize.MEDIANCUT)
     frames = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
     duration = 10 * max(round(GIF_HUNDREDTHS / fps), 2)
-    frames[0].save(path, save_all=True, append_images=frames[1:], duration=duration, loop=0, optimize=False)
+    frames[0].save(
+        path, save_all=True, append_images=frames[1:], duration=duration, loop=0, optimize=False
+    )
 
 
 def _write_mp4(pictures: Iterable[Image.Image], path: Path, fps: int) -> None:
@@ -135,9 +153,16 @@ def _write_mp4(pictures: Iterable[Image.Image], path: Path, fps: int) -> None:
     width, height = first.width // 2 * 2, first.height // 2 * 2
     with av.open(str(path), "w") as container:
         stream = container.add_stream("libx264", rate=fps)
-        stream.width, stream.height, stream.pix_fmt, stream.options = width, height, "yuv420p", {"crf": "20"}
+        stream.width, stream.height, stream.pix_fmt, stream.options = (
+            width,
+            height,
+            "yuv420p",
+            {"crf": "20"},
+        )
         for picture in itertools.chain([first], frames):
-            container.mux(stream.encode(av.VideoFrame.from_image(picture.crop((0, 0, width, height)))))
+            container.mux(
+                stream.encode(av.VideoFrame.from_image(picture.crop((0, 0, width, height))))
+            )
         container.mux(stream.encode())
 
 
@@ -145,5 +170,7 @@ def _import_av(path: Path) -> Any:
     try:
         import av
     except ImportError:
-        raise UserError(f'{path}: MP4 needs the extra: pip install "mjxgait[video]"; WebP and GIF need nothing') from None
+        raise UserError(
+            f'{path}: MP4 needs the extra: pip install "mjxgait[video]"; WebP and GIF need nothing'
+        ) from None
     return av

@@ -81,7 +81,11 @@ class Walk:
 
     def body_poses(self, frames: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
         """World positions [T, nbody, 3] m and rotations [T, nbody, 3, 3] of the bodies."""
-        return _poses(self.creature.model, self.qpos if frames is None else self.qpos[frames], ("xpos", "xmat"))
+        return _poses(
+            self.creature.model,
+            self.qpos if frames is None else self.qpos[frames],
+            ("xpos", "xmat"),
+        )
 
     def geom_poses(self, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """World positions [T, G, 3] m and rotations [T, G, 3, 3] of the geoms at some frames."""
@@ -109,7 +113,9 @@ class Walk:
 
 def record_walk(creature: Creature, champion: Champion, seconds: float) -> Walk:
     """Simulates the champion on an even floor, without noise or pushes."""
-    outcome = simulate(creature, champion, nominal_starts(creature, 1), seconds, record=1, threads=1)
+    outcome = simulate(
+        creature, champion, nominal_starts(creature, 1), seconds, record=1, threads=1
+    )
     film, fell = outcome.trajectory, float(outcome.fell[0])
     finite = np.isfinite(film.qpos[0]).all(1) & np.isfinite(film.qvel[0]).all(1)
     last = len(finite) if finite.all() else int(np.argmin(finite))
@@ -120,7 +126,9 @@ def record_walk(creature: Creature, champion: Champion, seconds: float) -> Walk:
     return Walk(creature, champion, dataclasses.replace(film, **kept), fell)
 
 
-def _poses(model: mujoco.MjModel, qpos: np.ndarray, names: tuple[str, str]) -> tuple[np.ndarray, np.ndarray]:
+def _poses(
+    model: mujoco.MjModel, qpos: np.ndarray, names: tuple[str, str]
+) -> tuple[np.ndarray, np.ndarray]:
     data = mujoco.MjData(model)
     where, how = ([] for _ in names)
     for row in qpos:

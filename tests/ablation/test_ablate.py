@@ -66,7 +66,13 @@ def test_the_report_holds_everything(finished: tuple[Path, str]):
     folder, said = finished
     assert "3 variants × 3 seeds = 9 runs in 2 programs" in said
     report = (folder / "report.md").read_text()
-    for words in ("# Does plain PD do as well?", "| stable PD |", "| plain PD |", "What can be concluded, and what cannot", "p corrected"):
+    for words in (
+        "# Does plain PD do as well?",
+        "| stable PD |",
+        "| plain PD |",
+        "What can be concluded, and what cannot",
+        "p corrected",
+    ):
         assert words in report
     page = (folder / "report.html").read_text()
     assert "<table>" in page
@@ -75,28 +81,74 @@ def test_the_report_holds_everything(finished: tuple[Path, str]):
     assert len(results) == 1 + 9
     generations = pyarrow.parquet.read_table(folder / "generations.parquet").to_pylist()
     assert len(generations) == 6 * 5 + 3 * 4
-    assert {"variant", "seed", "generation", "best", "sim_steps", "term_distance"} <= generations[0].keys()
+    assert {"variant", "seed", "generation", "best", "sim_steps", "term_distance"} <= generations[
+        0
+    ].keys()
 
 
 def test_a_row_is_the_run_that_train_makes(finished: tuple[Path, str], tmp_path: Path):
     """Same seed, same settings: the same log to the last bit."""
     folder, _ = finished
-    train = ["train", "--env", STOOL, "--seed", "1", "--population", "6", "--generations", "4", "--controller.law", "pd"]
-    train += ["--rollout.seconds", "0.4", "--rollout.starts", "2", "--rollout.physics", "mjx", "--rollout.lanes", "4"]
-    train += ["--evolution.forced.patience", "0", "--examination.candidates", "0", "--no-plots", "--out", tmp_path / "alone"]
+    train = [
+        "train",
+        "--env",
+        STOOL,
+        "--seed",
+        "1",
+        "--population",
+        "6",
+        "--generations",
+        "4",
+        "--controller.law",
+        "pd",
+    ]
+    train += [
+        "--rollout.seconds",
+        "0.4",
+        "--rollout.starts",
+        "2",
+        "--rollout.physics",
+        "mjx",
+        "--rollout.lanes",
+        "4",
+    ]
+    train += [
+        "--evolution.forced.patience",
+        "0",
+        "--examination.candidates",
+        "0",
+        "--no-plots",
+        "--out",
+        tmp_path / "alone",
+    ]
     mjxgait(*train)
-    row = [line for line in read_metrics(folder / "groups/0/metrics.jsonl") if (line["variant"], line["seed"]) == ("plain PD", 1)]
+    row = [
+        line
+        for line in read_metrics(folder / "groups/0/metrics.jsonl")
+        if (line["variant"], line["seed"]) == ("plain PD", 1)
+    ]
     alone = read_metrics(tmp_path / "alone/metrics.jsonl")
     for mine, other in zip(row, alone, strict=True):
         ignored = {"variant", "seed", "wall_s", "steps_per_second", "computed_steps"}
-        assert {k: v for k, v in mine.items() if k not in ignored} == {k: v for k, v in other.items() if k not in ignored}
+        assert {k: v for k, v in mine.items() if k not in ignored} == {
+            k: v for k, v in other.items() if k not in ignored
+        }
 
 
-def test_the_same_data_give_the_same_report_byte_for_byte(finished: tuple[Path, str], tmp_path: Path):
+def test_the_same_data_give_the_same_report_byte_for_byte(
+    finished: tuple[Path, str], tmp_path: Path
+):
     folder, _ = finished
     copy = tmp_path / "copy"
     shutil.copytree(folder, copy)
-    names = ("report.md", "report.html", "results.csv", "generations.parquet", "curves.png", "intervals.png")
+    names = (
+        "report.md",
+        "report.html",
+        "results.csv",
+        "generations.parquet",
+        "curves.png",
+        "intervals.png",
+    )
     for name in names:
         (copy / name).unlink()
     mjxgait("ablate", "--resume", copy)
@@ -108,10 +160,16 @@ def test_the_same_data_give_the_same_report_byte_for_byte(finished: tuple[Path, 
     assert (copy / "results.csv").read_bytes() == (folder / "results.csv").read_bytes()
 
 
-def test_a_killed_study_goes_on_and_ends_the_same(finished: tuple[Path, str], study: Path, tmp_path: Path):
+def test_a_killed_study_goes_on_and_ends_the_same(
+    finished: tuple[Path, str], study: Path, tmp_path: Path
+):
     whole, _ = finished
     folder = tmp_path / "killed"
-    process = subprocess.Popen(command("ablate", study, "--out", folder), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    process = subprocess.Popen(
+        command("ablate", study, "--out", folder),
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
     log = folder / "groups/0/metrics.jsonl"
     while not (log.exists() and any(line["generation"] >= 1 for line in read_metrics(log))):
         assert process.poll() is None
@@ -120,7 +178,9 @@ def test_a_killed_study_goes_on_and_ends_the_same(finished: tuple[Path, str], st
     process.wait()
     mjxgait("ablate", "--resume", folder)
     assert (folder / "results.csv").read_bytes() == (whole / "results.csv").read_bytes()
-    assert (folder / "generations.parquet").read_bytes() == (whole / "generations.parquet").read_bytes()
+    assert (folder / "generations.parquet").read_bytes() == (
+        whole / "generations.parquet"
+    ).read_bytes()
 
 
 def test_a_study_that_would_take_days_is_refused_with_the_estimate(study: Path, tmp_path: Path):

@@ -16,25 +16,44 @@ TWO = [{"name": "base"}, {"name": "half", "settings": {"evolution": {"mutation_r
 
 
 def plan(stool: Creature, **keys) -> Plan:
-    table = {"question": "?", "seeds": 3, "generations": 5, **({"variant": TWO} if "grid" not in keys else {}), **keys}
+    table = {
+        "question": "?",
+        "seeds": 3,
+        "generations": 5,
+        **({"variant": TWO} if "grid" not in keys else {}),
+        **keys,
+    }
     return make_plan(build(Study, table, "study.toml"), stool, "study.toml")
 
 
 def test_every_variant_runs_with_every_seed(stool: Creature):
     found = plan(stool)
     assert found.variants == ("base", "half")
-    assert [(run.variant, run.seed) for run in found.runs] == [(name, seed) for name in ("base", "half") for seed in range(3)]
+    assert [(run.variant, run.seed) for run in found.runs] == [
+        (name, seed) for name in ("base", "half") for seed in range(3)
+    ]
     assert [run.config.evolution.mutation_rate for run in found.runs] == [0.8] * 3 + [0.4] * 3
     assert all(run.config.seed == run.seed for run in found.runs)
 
 
 def test_unpaired_variants_have_seeds_of_their_own(stool: Creature):
-    assert [run.seed for run in plan(stool, paired=False, first_seed=10).runs] == [10, 11, 12, 13, 14, 15]
+    assert [run.seed for run in plan(stool, paired=False, first_seed=10).runs] == [
+        10,
+        11,
+        12,
+        13,
+        14,
+        15,
+    ]
 
 
 def test_a_grid_is_the_base_and_every_combination(stool: Creature):
     found = plan(stool, grid={"evolution.mutation_rate": [0.2, 0.6], "controller.law": ["pd"]})
-    assert found.variants == ("base", "mutation_rate = 0.2, law = pd", "mutation_rate = 0.6, law = pd")
+    assert found.variants == (
+        "base",
+        "mutation_rate = 0.2, law = pd",
+        "mutation_rate = 0.6, law = pd",
+    )
 
 
 def test_all_runs_go_on_to_the_end(stool: Creature):
@@ -45,10 +64,17 @@ def test_all_runs_go_on_to_the_end(stool: Creature):
 
 
 def test_values_share_a_program_and_shapes_need_one_each(stool: Creature):
-    variants = [*TWO, {"name": "poses", "settings": {"controller": {"key_poses": 3}}}, {"name": "more", "generations": 9}]
+    variants = [
+        *TWO,
+        {"name": "poses", "settings": {"controller": {"key_poses": 3}}},
+        {"name": "more", "generations": 9},
+    ]
     variants[3]["settings"] = {"fitness": {"speed": 0.5}}
     parts = groups(plan(stool, variant=variants))
-    assert [sorted({run.variant for run in part}) for part in parts] == [["base", "half", "more"], ["poses"]]
+    assert [sorted({run.variant for run in part}) for part in parts] == [
+        ["base", "half", "more"],
+        ["poses"],
+    ]
 
 
 @pytest.mark.parametrize(
@@ -58,11 +84,17 @@ def test_values_share_a_program_and_shapes_need_one_each(stool: Creature):
             {"variant": [TWO[0], {"name": "x", "settings": {"evolution": {"mutation_rat": 0.4}}}]},
             ['variant "x"', "mutation_rat", "mutation_rate"],
         ),
-        ({"variant": [TWO[0], {"name": "x", "settings": {"evolution": {"mutation_rate": 4.0}}}]}, ['variant "x"', "mutation_rate"]),
+        (
+            {"variant": [TWO[0], {"name": "x", "settings": {"evolution": {"mutation_rate": 4.0}}}]},
+            ['variant "x"', "mutation_rate"],
+        ),
         ({"variant": [TWO[0], {"name": "x"}]}, ['"base" and "x" are equal', "allow_equal"]),
         ({"variant": [TWO[0], TWO[0]]}, ["two variants", '"base"']),
         ({"variant": TWO[:1]}, ["two variants"]),
-        ({"variant": [TWO[0], {"name": "x", "settings": {"seed": 3}}]}, ["seeds and generations are the study's own keys"]),
+        (
+            {"variant": [TWO[0], {"name": "x", "settings": {"seed": 3}}]},
+            ["seeds and generations are the study's own keys"],
+        ),
         ({"base": {"rollout": {"start": 3}}}, ["[base]", "start"]),
         ({"measure": "beauty"}, ["measure", "beauty"]),
         ({"measure": "generations"}, ["threshold"]),
@@ -80,7 +112,11 @@ def test_mistakes_are_told_before_anything_runs(stool: Creature, keys: dict, wor
         assert word in str(error.value)
 
 
-@pytest.mark.parametrize("path", sorted((data_folder("configs") / "ablations").glob("*.toml")), ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path",
+    sorted((data_folder("configs") / "ablations").glob("*.toml")),
+    ids=lambda path: path.stem,
+)
 def test_the_shipped_studies_are_sound_and_have_seeds_enough(path: Path):
     study = read_study(Path(path.stem), {})
     assert study.seeds >= 16

@@ -12,17 +12,46 @@ from mjxgait.ablation.report import write_report
 from mjxgait.creature import Creature
 
 SEEDS = 16
-RESULT = Result("base", 0, walk=0.5, up=1.0, certified=None, fitness=1.0, area=0.8, generations=5, steps=1000, finite=True)
+RESULT = Result(
+    "base",
+    0,
+    walk=0.5,
+    up=1.0,
+    certified=None,
+    fitness=1.0,
+    area=0.8,
+    generations=5,
+    steps=1000,
+    finite=True,
+)
 
 
-def report(creature: Creature, folder: Path, measure: str = "walk", settings: dict | None = None, **other) -> str:
+def report(
+    creature: Creature, folder: Path, measure: str = "walk", settings: dict | None = None, **other
+) -> str:
     """Of two variants: the base's runs lie around RESULT, the other's are changed by these amounts or to these values."""
-    variants = (VariantTable("base"), VariantTable("other", settings or {"evolution": {"mutation_rate": 0.4}}))
-    study = Study("?", env=str(STOOL), seeds=SEEDS, generations=2, threshold=0.0, measure=measure, variant=variants)
+    variants = (
+        VariantTable("base"),
+        VariantTable("other", settings or {"evolution": {"mutation_rate": 0.4}}),
+    )
+    study = Study(
+        "?",
+        env=str(STOOL),
+        seeds=SEEDS,
+        generations=2,
+        threshold=0.0,
+        measure=measure,
+        variant=variants,
+    )
     plan = make_plan(study, creature, "study.toml")
     results = [_result(plan, run.variant, run.seed, other) for run in plan.runs]
     lines = [
-        {"variant": r.variant, "seed": r.seed, "generation": g, "best": r.fitness + g if r.finite else None}
+        {
+            "variant": r.variant,
+            "seed": r.seed,
+            "generation": g,
+            "best": r.fitness + g if r.finite else None,
+        }
         for r in results
         for g in range(3)
     ]
@@ -31,11 +60,21 @@ def report(creature: Creature, folder: Path, measure: str = "walk", settings: di
 
 def _result(plan: Plan, variant: str, seed: int, other: dict) -> Result:
     spread = 0.01 * ((seed * 7) % SEEDS)
-    found = dataclasses.replace(RESULT, variant=variant, seed=seed, walk=0.5 + spread, generations=5 + seed % 3)
+    found = dataclasses.replace(
+        RESULT, variant=variant, seed=seed, walk=0.5 + spread, generations=5 + seed % 3
+    )
     if variant == plan.variants[0]:
         return found
-    shifted = {key: getattr(found, key) + value for key, value in other.items() if key in ("walk", "generations", "steps")}
-    broken = {"finite": False, "fitness": -1e9, "area": -1e9, "walk": 0.0} if seed in other.get("broken", ()) else {}
+    shifted = {
+        key: getattr(found, key) + value
+        for key, value in other.items()
+        if key in ("walk", "generations", "steps")
+    }
+    broken = (
+        {"finite": False, "fitness": -1e9, "area": -1e9, "walk": 0.0}
+        if seed in other.get("broken", ())
+        else {}
+    )
     return dataclasses.replace(found, **{**shifted, **broken})
 
 
@@ -45,7 +84,9 @@ def test_a_clear_difference_is_called_one(stool: Creature, tmp_path: Path):
 
 
 def test_where_fewer_is_better_fewer_is_called_better(stool: Creature, tmp_path: Path):
-    assert "“other” is better than “base” by 3" in report(stool, tmp_path, "generations", generations=-3)
+    assert "“other” is better than “base” by 3" in report(
+        stool, tmp_path, "generations", generations=-3
+    )
 
 
 def test_no_difference_shown_is_not_called_proof_of_none(stool: Creature, tmp_path: Path):

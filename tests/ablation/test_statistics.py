@@ -4,13 +4,24 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from mjxgait.ablation.statistics import Estimate, compare, estimate, holm, improvement, permutation_p, share, trimmed_mean
+from mjxgait.ablation.statistics import (
+    Estimate,
+    compare,
+    estimate,
+    holm,
+    improvement,
+    permutation_p,
+    share,
+    trimmed_mean,
+)
 
 RNG = np.random.default_rng
 
 
 def test_the_interquartile_mean_is_the_mean_of_the_middle_half():
-    assert trimmed_mean(np.array([100.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, -50.0])) == pytest.approx(3.5)
+    assert trimmed_mean(np.array([100.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, -50.0])) == pytest.approx(
+        3.5
+    )
 
 
 def test_the_interval_covers_the_truth_as_often_as_it_says():
@@ -39,21 +50,30 @@ def test_the_chance_of_being_better_is_mann_whitneys_u():
     assert improvement(base, values).value == pytest.approx(expected)
 
 
-@pytest.mark.parametrize(("values", "expected"), [([4.0, 5.0, 6.0], 1.0), ([1.0, 2.0, 3.0], 0.5), ([0.0, 0.0, 0.0], 0.0)])
+@pytest.mark.parametrize(
+    ("values", "expected"), [([4.0, 5.0, 6.0], 1.0), ([1.0, 2.0, 3.0], 0.5), ([0.0, 0.0, 0.0], 0.0)]
+)
 def test_the_chance_of_being_better_from_never_to_always(values: list[float], expected: float):
     assert improvement(np.array([1.0, 2.0, 3.0]), np.array(values)).value == pytest.approx(expected)
 
 
 def test_an_exact_permutation_test_by_hand():
     """Of the 20 ways to part {1..6} into threes, two are as extreme as the one that was seen."""
-    assert permutation_p(np.array([1.0, 2.0, 3.0]), np.array([4.0, 5.0, 6.0]), paired=False) == pytest.approx(2 / 20)
+    assert permutation_p(
+        np.array([1.0, 2.0, 3.0]), np.array([4.0, 5.0, 6.0]), paired=False
+    ) == pytest.approx(2 / 20)
 
 
 def test_a_paired_test_sees_what_an_unpaired_one_does_not():
     """Seeds differ much, the variant adds a little to each."""
     base = RNG(0).normal(0, 5, 12)
     values = base + RNG(1).normal(0.5, 0.1, 12)
-    assert permutation_p(base, values, paired=True) < 0.02 < 0.5 < permutation_p(base, values, paired=False)
+    assert (
+        permutation_p(base, values, paired=True)
+        < 0.02
+        < 0.5
+        < permutation_p(base, values, paired=False)
+    )
 
 
 def test_holms_published_example():

@@ -19,7 +19,12 @@ from mjxgait.viewing.walk import record_walk
 
 MILLIMETRE = 1e-3
 WIDTH = {"SCALAR": 1, "VEC3": 3, "VEC4": 4, "MAT4": 16}
-KIND = {gltf.FLOAT: np.float32, gltf.UNSIGNED_BYTE: np.uint8, gltf.UNSIGNED_SHORT: np.uint16, gltf.UNSIGNED_INT: np.uint32}
+KIND = {
+    gltf.FLOAT: np.float32,
+    gltf.UNSIGNED_BYTE: np.uint8,
+    gltf.UNSIGNED_SHORT: np.uint16,
+    gltf.UNSIGNED_INT: np.uint32,
+}
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +36,9 @@ def read(document, accessor):
     """An accessor's values [n, width]."""
     a = document.accessors[accessor]
     view = document.bufferViews[a.bufferView]
-    values = np.frombuffer(document.binary_blob(), KIND[a.componentType], a.count * WIDTH[a.type], view.byteOffset)
+    values = np.frombuffer(
+        document.binary_blob(), KIND[a.componentType], a.count * WIDTH[a.type], view.byteOffset
+    )
     return values.reshape(a.count, WIDTH[a.type])
 
 
@@ -46,13 +53,18 @@ def matrix(translation, quat):
 
 def node_poses(document, frame=None):
     """World matrix of each joint of the skin by name, at a key frame or, without one, at rest; from the file alone."""
-    local = [(np.array(n.translation or [0, 0, 0]), np.array(n.rotation or [0, 0, 0, 1])) for n in document.nodes]
+    local = [
+        (np.array(n.translation or [0, 0, 0]), np.array(n.rotation or [0, 0, 0, 1]))
+        for n in document.nodes
+    ]
     if frame is not None:
         animation = document.animations[0]
         for channel in animation.channels:
             value = read(document, animation.samplers[channel.sampler].output)[frame]
             place = ("translation", "rotation").index(channel.target.path)
-            local[channel.target.node] = tuple(value if i == place else old for i, old in enumerate(local[channel.target.node]))
+            local[channel.target.node] = tuple(
+                value if i == place else old for i, old in enumerate(local[channel.target.node])
+            )
     poses = {}
 
     def visit(node, above):
@@ -106,7 +118,9 @@ def test_the_loop_has_no_seam(loop):
 
 def test_in_place_it_stays_above_the_origin_and_travelling_it_leads_forward(stool):
     loop = walk_loop(record_walk(stool, treading(stool, degrees=15.0), 4.0), 30)
-    still, moving = (gltf.GLTF2.load_from_bytes(build_glb(loop, travelling)) for travelling in (False, True))
+    still, moving = (
+        gltf.GLTF2.load_from_bytes(build_glb(loop, travelling)) for travelling in (False, True)
+    )
     for frame in range(len(loop.qpos)):
         assert np.abs(node_poses(still, frame)["trunk"][[0, 2], 3]).max() < 0.1
     last = node_poses(moving, len(loop.qpos) - 1)["trunk"] - node_poses(moving, 0)["trunk"]
@@ -132,10 +146,16 @@ def test_up_is_y_and_forward_is_z():
 def test_one_skin_whose_rest_is_the_standing_pose(loop):
     document = gltf.GLTF2.load_from_bytes(build_glb(loop))
     assert len(document.skins) == len(document.animations) == len(document.meshes) == 1
-    inverse = read(document, document.skins[0].inverseBindMatrices).reshape(-1, 4, 4).transpose(0, 2, 1)
+    inverse = (
+        read(document, document.skins[0].inverseBindMatrices).reshape(-1, 4, 4).transpose(0, 2, 1)
+    )
     for joint, bind in zip(document.skins[0].joints, inverse, strict=True):
-        np.testing.assert_allclose(node_poses(document)[document.nodes[joint].name] @ bind, np.eye(4), atol=1e-5)
-    points = np.concatenate([read(document, p.attributes.POSITION) for p in document.meshes[0].primitives])
+        np.testing.assert_allclose(
+            node_poses(document)[document.nodes[joint].name] @ bind, np.eye(4), atol=1e-5
+        )
+    points = np.concatenate(
+        [read(document, p.attributes.POSITION) for p in document.meshes[0].primitives]
+    )
     assert abs(points[:, 1].min()) < 0.02 * loop.walk.creature.stand_height + 0.005
 
 
@@ -173,7 +193,17 @@ def test_a_champion_without_a_steady_stride_is_refused(stool):
 def test_the_command_writes_the_file(stool_run, tmp_path, capsys):
     for name, code in (("walk.glb", 0), ("walk.fbx", 2), ("missing/walk.glb", 2)):
         with pytest.raises(SystemExit) as ended:
-            main(["export", str(stool_run), "--out", str(tmp_path / name), "--rate", "24", "--travelling"])
+            main(
+                [
+                    "export",
+                    str(stool_run),
+                    "--out",
+                    str(tmp_path / name),
+                    "--rate",
+                    "24",
+                    "--travelling",
+                ]
+            )
         assert ended.value.code == code
     assert "24 frames/s" in capsys.readouterr().out
     assert (tmp_path / "walk.glb").read_bytes()[:4] == b"glTF"
@@ -190,10 +220,17 @@ def validate():
     """The Khronos validator on a file; needs Node and `npm install --global gltf-validator`."""
     if not (shutil.which("node") and shutil.which("npm")):
         pytest.skip("needs Node.js (apt: nodejs, npm)")
-    where = subprocess.run(["npm", "root", "--global"], capture_output=True, text=True, check=True).stdout.strip()
+    where = subprocess.run(
+        ["npm", "root", "--global"], capture_output=True, text=True, check=True
+    ).stdout.strip()
 
     def run(path):
-        done = subprocess.run(["node", "-e", VALIDATE, str(path)], env={"NODE_PATH": where}, capture_output=True, text=True)
+        done = subprocess.run(
+            ["node", "-e", VALIDATE, str(path)],
+            env={"NODE_PATH": where},
+            capture_output=True,
+            text=True,
+        )
         if "Cannot find module" in done.stderr:
             pytest.skip("needs the validator: npm install --global gltf-validator")
         return json.loads(done.stdout)

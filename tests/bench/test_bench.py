@@ -22,8 +22,18 @@ from mjxgait.champion import Champion
 from mjxgait.config import Config, ControllerConfig, find_creature
 from mjxgait.creature import load_creature
 
-NEEDS_DART = pytest.mark.skipif(importlib.util.find_spec("dartpy") is None, reason="dartpy is not installed")
-TUNING = {"threshold": 0.12, "period": 0.8, "steer": 0.7, "pitch": 0.3, "pitch_rate": 0.05, "roll": 0.4, "roll_rate": 0.02}
+NEEDS_DART = pytest.mark.skipif(
+    importlib.util.find_spec("dartpy") is None, reason="dartpy is not installed"
+)
+TUNING = {
+    "threshold": 0.12,
+    "period": 0.8,
+    "steer": 0.7,
+    "pitch": 0.3,
+    "pitch_rate": 0.05,
+    "roll": 0.4,
+    "roll_rate": 0.02,
+}
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +64,9 @@ def workload(creature):
 
 def test_the_law_is_the_examiners(creature, workload):
     rng, count = np.random.default_rng(1), 5
-    champion = Champion("", "", workload.key_poses[1], TUNING, workload.config.controller, 0.0, {}, {})
+    champion = Champion(
+        "", "", workload.key_poses[1], TUNING, workload.config.controller, 0.0, {}, {}
+    )
     turn = np.linalg.qr(rng.normal(size=(count, 3, 3)))[0]
     rot = turn * np.sign(np.linalg.det(turn))[:, None, None]
     v, pos = rng.normal(size=(count, creature.model.nv)), rng.normal(size=(count, 3))
@@ -65,7 +77,9 @@ def test_the_law_is_the_examiners(creature, workload):
     target = law.target(genome, position, pos, rot, v)
     np.testing.assert_allclose(target, examiner.target(position, senses), atol=1e-12)
     expected = examiner.advance(position, target, senses.joint_pos, 0.0)
-    np.testing.assert_array_equal(law.advance(genome, position, target, senses.joint_pos, position), expected)
+    np.testing.assert_array_equal(
+        law.advance(genome, position, target, senses.joint_pos, position), expected
+    )
 
 
 def test_the_solve_is_a_solve(creature):
@@ -88,7 +102,9 @@ def test_lanes_change_nothing(workload):
 
 
 def test_the_fallen_make_room(workload):
-    low = dataclasses.replace(workload, qpos=workload.qpos * np.where(np.arange(workload.qpos.shape[1]) == 2, 0.3, 1.0))
+    low = dataclasses.replace(
+        workload, qpos=workload.qpos * np.where(np.arange(workload.qpos.shape[1]) == 2, 0.3, 1.0)
+    )
     assert MujocoPeer(low, 0, 1, lanes=2).lap() == (0, 0.0)
 
 
@@ -117,17 +133,35 @@ def test_flops_of_loops_and_products():
 
 
 def test_the_curves_are_drawn(tmp_path):
-    point = {"population": 32, "lanes": 64, "useful_steps_per_second": 1.0, "computed_steps_per_second": 2.0, "memory_mib": 3.0}
+    point = {
+        "population": 32,
+        "lanes": 64,
+        "useful_steps_per_second": 1.0,
+        "computed_steps_per_second": 2.0,
+        "memory_mib": 3.0,
+    }
     draw({"population": [point], "lanes": [point]}, tmp_path / "curves.png")
     assert (tmp_path / "curves.png").stat().st_size > 1000
 
 
 def test_history_has_a_line_per_run(tmp_path):
-    result = dict.fromkeys(("date", "ratio_over_mujoco_c", "ratio_over_dart", "creature_steps_per_second", "processor_us_per_step"), 1)
+    result = dict.fromkeys(
+        (
+            "date",
+            "ratio_over_mujoco_c",
+            "ratio_over_dart",
+            "creature_steps_per_second",
+            "processor_us_per_step",
+        ),
+        1,
+    )
     result |= dict.fromkeys(("compile_s", "useful_share", "machine", "versions", "laps"), 2)
     for _ in range(2):
         contest.append_history(result, tmp_path / "new" / "history.jsonl")
-    lines = [json.loads(line) for line in (tmp_path / "new" / "history.jsonl").read_text(encoding="utf-8").splitlines()]
+    lines = [
+        json.loads(line)
+        for line in (tmp_path / "new" / "history.jsonl").read_text(encoding="utf-8").splitlines()
+    ]
     assert len(lines) == 2
     assert "laps" not in lines[0]
 
@@ -135,9 +169,21 @@ def test_history_has_a_line_per_run(tmp_path):
 @pytest.mark.slow
 def test_the_command_writes_the_ratios(tmp_path):
     file = tmp_path / "bench.json"
-    arguments = ["bench", "--json", str(file), "--rounds", "1", "--generations", "1", "--population", "8"]
+    arguments = [
+        "bench",
+        "--json",
+        str(file),
+        "--rounds",
+        "1",
+        "--generations",
+        "1",
+        "--population",
+        "8",
+    ]
     subprocess.run([sys.executable, "-m", "mjxgait", *arguments], check=True, capture_output=True)
     found = json.loads(file.read_text(encoding="utf-8"))
     assert found["ratio_over_mujoco_c"] > 0
-    assert found["laps"]["ours"][0]["steps"] == pytest.approx(found["laps"]["mujoco_c"][0]["steps"], rel=0.1)
+    assert found["laps"]["ours"][0]["steps"] == pytest.approx(
+        found["laps"]["mujoco_c"][0]["steps"], rel=0.1
+    )
     assert (found["ratio_over_dart"] is None) == ("dart" in found["left_out"])

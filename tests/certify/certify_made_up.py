@@ -17,7 +17,12 @@ LEG = """
         </body>
       </body>"""
 
-LEGS = {"front_left": (0.2, 0.11), "front_right": (0.2, -0.11), "hind_left": (-0.2, 0.11), "hind_right": (-0.2, -0.11)}
+LEGS = {
+    "front_left": (0.2, 0.11),
+    "front_right": (0.2, -0.11),
+    "hind_left": (-0.2, 0.11),
+    "hind_right": (-0.2, -0.11),
+}
 
 XML = f"""
 <mujoco>
@@ -57,14 +62,24 @@ pitch = { "*_hip" = 1.0 }
 roll = { "*_left_knee" = 1.0 }
 """
 
-TUNING = {"threshold": 0.12, "period": 0.6, "steer": 0.0, "pitch": 0.0, "pitch_rate": 0.0, "roll": 0.0, "roll_rate": 0.0}
+TUNING = {
+    "threshold": 0.12,
+    "period": 0.6,
+    "steer": 0.0,
+    "pitch": 0.0,
+    "pitch_rate": 0.0,
+    "roll": 0.0,
+    "roll_rate": 0.0,
+}
 
 
 def make_champion(creature, key_poses=None, tuning=None, **controller):
     """A champion that stands, unless poses say otherwise."""
     poses = np.stack([creature.stand] * 2) if key_poses is None else key_poses
     settings = ControllerConfig(key_poses=len(poses), **controller)
-    return Champion(creature.name, creature.digest, poses, TUNING | (tuning or {}), settings, 0.0, {}, {})
+    return Champion(
+        creature.name, creature.digest, poses, TUNING | (tuning or {}), settings, 0.0, {}, {}
+    )
 
 
 DOG = Dimensions(
@@ -80,7 +95,9 @@ DOG = Dimensions(
 )
 
 
-def walk(period=0.8, speed=0.8, duty=0.6, lift=0.05, phases=(0.0, 0.5, 0.5, 0.0), seconds=22.0) -> Recording:
+def walk(
+    period=0.8, speed=0.8, duty=0.6, lift=0.05, phases=(0.0, 0.5, 0.5, 0.0), seconds=22.0
+) -> Recording:
     """A made-up steady walk of a dog without physics: every number is a plain function of the phase."""
     time_step, positions = 0.005, 40
     time = np.arange(round(seconds / time_step)) * time_step

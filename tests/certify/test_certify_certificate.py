@@ -18,7 +18,13 @@ SMALL = {
     "seconds": 7.0,
     "warmup": 1.0,
     "starts": {"count": 4},
-    "pushes": {"count": 4, "window": [1.0, 3.0], "ladder": [0.3, 2.0], "ladder_count": 4, "ladder_seconds": 2.0},
+    "pushes": {
+        "count": 4,
+        "window": [1.0, 3.0],
+        "ladder": [0.3, 2.0],
+        "ladder_count": 4,
+        "ladder_seconds": 2.0,
+    },
 }
 
 
@@ -37,7 +43,11 @@ def test_a_walk_is_examined_against_all_eight(certificate):
 
 def test_standing_is_no_walk(tiny):
     certificate = certify(tiny, make_champion(tiny), build(CertificateConfig, SMALL, "test"))
-    assert [c.number for c in certificate.criteria if c.passed and c.number in (1, 2, 4, 7, 8)] == [1, 4, 8]
+    assert [c.number for c in certificate.criteria if c.passed and c.number in (1, 2, 4, 7, 8)] == [
+        1,
+        4,
+        8,
+    ]
     assert not certificate.passed
     assert certificate.margin < 0
     assert certificate.report["gait"] == "none"
@@ -87,8 +97,12 @@ def test_a_wrong_setting_is_named(table, words):
 
 def test_dimensions_say_where_the_feet_stand(tiny):
     size = dimensions(tiny)
-    np.testing.assert_allclose(size.foot_places, [(0.2, 0.11), (0.2, -0.11), (-0.2, 0.11), (-0.2, -0.11)], atol=1e-12)
-    assert size.foot_names == tuple(f"{leg}_lower" for leg in ("front_left", "front_right", "hind_left", "hind_right"))
+    np.testing.assert_allclose(
+        size.foot_places, [(0.2, 0.11), (0.2, -0.11), (-0.2, 0.11), (-0.2, -0.11)], atol=1e-12
+    )
+    assert size.foot_names == tuple(
+        f"{leg}_lower" for leg in ("front_left", "front_right", "hind_left", "hind_right")
+    )
 
 
 def test_the_report_of_a_made_up_walk():
@@ -103,7 +117,9 @@ def test_the_report_of_a_made_up_walk():
 
 def test_cost_of_transport_counts_positive_work_only():
     good = walk()
-    power = dataclasses.replace(good, torque=np.full((4400, 4), 2.0), joint_vel=np.tile([1.0, 1.0, -1.0, 0.0], (4400, 1)))
+    power = dataclasses.replace(
+        good, torque=np.full((4400, 4), 2.0), joint_vel=np.tile([1.0, 1.0, -1.0, 0.0], (4400, 1))
+    )
     assert cost_of_transport(power) == pytest.approx(4.0 / (20.0 * 9.81 * 0.8), rel=1e-3)
 
 
@@ -136,7 +152,9 @@ def test_names_of_quadruped_gaits(phases, duty, name):
     [((0.0, 0.5), 0.6, "walk"), ((0.0, 0.45), 0.4, "run"), ((0.0, 0.05), 0.4, "hop")],
 )
 def test_names_of_biped_gaits(phases, duty, name):
-    duck = dataclasses.replace(DOG, foot_names=("left", "right"), foot_places=((0.0, 0.1), (0.0, -0.1)))
+    duck = dataclasses.replace(
+        DOG, foot_names=("left", "right"), foot_places=((0.0, 0.1), (0.0, -0.1))
+    )
     assert gait_name(duck, np.full(2, duty), np.array(phases)) == name
 
 
@@ -155,7 +173,9 @@ def test_names_of_hexapod_gaits(phases, duty, name):
 
 
 def test_what_may_lie_on_the_floor_crawls():
-    alien = dataclasses.replace(DOG, foot_names=("left", "right"), foot_places=((0.1, 0.1), (0.1, -0.1)), crawler=True)
+    alien = dataclasses.replace(
+        DOG, foot_names=("left", "right"), foot_places=((0.1, 0.1), (0.1, -0.1)), crawler=True
+    )
     assert gait_name(alien, np.full(2, 0.5), np.array([0.0, 0.5])) == "crawl"
 
 

@@ -12,7 +12,11 @@ from mjxgait.certify.controller import Controller, Senses, pose_cycle
 def rotation(axis, angle):
     c, s = np.cos(angle), np.sin(angle)
     return np.array(
-        {"x": [[1, 0, 0], [0, c, -s], [0, s, c]], "y": [[c, 0, s], [0, 1, 0], [-s, 0, c]], "z": [[c, -s, 0], [s, c, 0], [0, 0, 1]]}[axis]
+        {
+            "x": [[1, 0, 0], [0, c, -s], [0, s, c]],
+            "y": [[c, 0, s], [0, 1, 0], [-s, 0, c]],
+            "z": [[c, -s, 0], [s, c, 0], [0, 0, 1]],
+        }[axis]
     )
 
 
@@ -20,7 +24,11 @@ def senses(creature, rot=None, pos=(0.0, 0.0, 0.3035), angvel=(0.0, 0.0, 0.0), s
     """A state; standing still unless a seed draws joints, velocities and dynamics."""
     nv, joints = creature.model.nv, len(creature.stand)
     rng = np.random.default_rng(seed)
-    draw = (lambda *shape: rng.normal(0, 0.3, shape)) if seed is not None else (lambda *shape: np.zeros(shape))
+    draw = (
+        (lambda *shape: rng.normal(0, 0.3, shape))
+        if seed is not None
+        else (lambda *shape: np.zeros(shape))
+    )
     root = draw(count, nv, nv)
     return Senses(
         joint_pos=creature.stand + draw(count, joints),
@@ -44,7 +52,9 @@ def test_the_cycle_passes_through_the_key_poses_and_their_mirror_images(tiny, co
     control = Controller(tiny, make_champion(tiny, key_poses, interpolation=7))
     assert control.length == 2 * count * 7
     at_poses = control.planned(np.arange(2 * count) * 7)
-    mirrored = np.array([[tiny.sign[j] * pose[tiny.partner[j]] for j in range(8)] for pose in key_poses])
+    mirrored = np.array(
+        [[tiny.sign[j] * pose[tiny.partner[j]] for j in range(8)] for pose in key_poses]
+    )
     np.testing.assert_array_equal(at_poses, [*key_poses, *mirrored])
 
 
@@ -67,12 +77,18 @@ def test_between_poses_the_target_is_linear_and_the_cycle_closes(tiny):
     key_poses = poses(tiny)
     control = Controller(tiny, make_champion(tiny, key_poses, interpolation=10))
     cycle = pose_cycle(key_poses, tiny)
-    np.testing.assert_allclose(control.planned(np.array([3]))[0], 0.7 * cycle[0] + 0.3 * cycle[1], atol=1e-15)
-    np.testing.assert_allclose(control.planned(np.array([39]))[0], 0.1 * cycle[3] + 0.9 * cycle[0], atol=1e-15)
+    np.testing.assert_allclose(
+        control.planned(np.array([3]))[0], 0.7 * cycle[0] + 0.3 * cycle[1], atol=1e-15
+    )
+    np.testing.assert_allclose(
+        control.planned(np.array([39]))[0], 0.1 * cycle[3] + 0.9 * cycle[0], atol=1e-15
+    )
 
 
 def test_an_unsymmetric_creature_is_not_mirrored(tiny):
-    settings = dataclasses.replace(tiny.settings, mirror=dataclasses.replace(tiny.settings.mirror, symmetric=False))
+    settings = dataclasses.replace(
+        tiny.settings, mirror=dataclasses.replace(tiny.settings.mirror, symmetric=False)
+    )
     lopsided = dataclasses.replace(tiny, settings=settings)
     assert len(pose_cycle(poses(tiny), lopsided)) == 2
 
@@ -97,7 +113,9 @@ def test_nose_down_and_right_side_down_are_positive(tiny):
 def test_rates_are_positive_when_the_angles_grow(tiny):
     swinging = make_champion(tiny, tuning={"pitch_rate": 0.1, "roll_rate": 0.2})
     turned = rotation("z", 1.0)
-    _, pitch, roll = Controller(tiny, swinging).corrections(senses(tiny, turned, angvel=turned @ [0.7, 0.5, 9.0]))
+    _, pitch, roll = Controller(tiny, swinging).corrections(
+        senses(tiny, turned, angvel=turned @ [0.7, 0.5, 9.0])
+    )
     assert (pitch, roll) == (pytest.approx(0.05), pytest.approx(0.14))
 
 
@@ -107,11 +125,17 @@ def test_the_corrected_target_is_the_sum_on_the_page(tiny):
     stand = np.full(8, 0.05)
     creature = dataclasses.replace(tiny, stand=stand)
     rot = rotation("z", 0.1) @ rotation("y", 0.2)
-    u, p, r = (float(part[0]) for part in Controller(creature, champion).corrections(senses(creature, rot)))
+    u, p, r = (
+        float(part[0]) for part in Controller(creature, champion).corrections(senses(creature, rot))
+    )
     target = Controller(creature, champion).target(np.array([0]), senses(creature, rot))[0]
     for j in range(8):
         want = stand[j] + (key_poses[0, j] - stand[j]) * (1 + u * creature.steer_stride[j])
-        want += u * creature.steer_bend[j] + p * creature.balance_pitch[j] + r * creature.balance_roll[j]
+        want += (
+            u * creature.steer_bend[j]
+            + p * creature.balance_pitch[j]
+            + r * creature.balance_roll[j]
+        )
         assert target[j] == pytest.approx(want, abs=1e-14)
 
 
@@ -147,7 +171,11 @@ def test_stable_pd_predicts_the_acceleration_that_its_own_torque_makes(tiny):
     force[tiny.dof_adr] += torque
     acc = np.linalg.solve(state.mass_matrix[0], force)[tiny.dof_adr]
     v = state.velocity[0, tiny.dof_adr]
-    np.testing.assert_allclose(torque, -tiny.kp * (state.joint_pos[0] + h * v - target[0]) - tiny.kd * (v + h * acc), rtol=1e-9)
+    np.testing.assert_allclose(
+        torque,
+        -tiny.kp * (state.joint_pos[0] + h * v - target[0]) - tiny.kd * (v + h * acc),
+        rtol=1e-9,
+    )
 
 
 def test_plain_pd(tiny):
@@ -161,11 +189,16 @@ def test_the_position_moves_on_when_the_pose_error_is_below_the_threshold(tiny):
     control = Controller(tiny, make_champion(tiny, tuning={"threshold": 0.12}))
     off = np.zeros((3, 8))
     off[0], off[1], off[2, 0] = 0.119, 0.121, 0.12 * np.sqrt(8) * 0.99
-    np.testing.assert_array_equal(control.advance(np.array([39, 39, 5]), off, np.zeros((3, 8)), 0.005), [0, 39, 6])
+    np.testing.assert_array_equal(
+        control.advance(np.array([39, 39, 5]), off, np.zeros((3, 8)), 0.005), [0, 39, 6]
+    )
 
 
 def test_the_clock_moves_on_whatever_the_error(tiny):
     control = Controller(tiny, make_champion(tiny, tuning={"period": 0.8}, advance="clock"))
     far = np.ones((1, 8))
-    at = [int(control.advance(np.array([0]), far, 0 * far, k * 0.005)[0]) for k in (0, 3, 4, 80, 159, 160, 164)]
+    at = [
+        int(control.advance(np.array([0]), far, 0 * far, k * 0.005)[0])
+        for k in (0, 3, 4, 80, 159, 160, 164)
+    ]
     assert at == [0, 0, 1, 20, 39, 0, 1]

@@ -91,13 +91,19 @@ def circler():
 
 def stopper():
     good = walk()
-    return moved(good, forward=np.minimum(good.trunk_pos[:, 0], 0.8 * 12) + 0.01 * np.maximum(time_of(good) - 12, 0))
+    return moved(
+        good,
+        forward=np.minimum(good.trunk_pos[:, 0], 0.8 * 12)
+        + 0.01 * np.maximum(time_of(good) - 12, 0),
+    )
 
 
 def rocker():
     good = walk()
     # forward in every other stride, back a little in those between
-    return moved(good, forward=good.trunk_pos[:, 0] + 0.35 * np.sin(np.pi * time_of(good) / 0.8 + np.pi / 2))
+    return moved(
+        good, forward=good.trunk_pos[:, 0] + 0.35 * np.sin(np.pi * time_of(good) / 0.8 + np.pi / 2)
+    )
 
 
 def creeper():
@@ -118,13 +124,19 @@ def aimless():
     rng = np.random.default_rng(0)
     noise = np.cumsum(rng.normal(0, 0.02, (4400, 4)), 0)
     # It wanders further than the dog's joints go, which is not what is to be found out here.
-    return changed(good, joint_pos=noise, dimensions=dataclasses.replace(DOG, joint_range=((-np.inf, np.inf),) * 4))
+    return changed(
+        good,
+        joint_pos=noise,
+        dimensions=dataclasses.replace(DOG, joint_range=((-np.inf, np.inf),) * 4),
+    )
 
 
 def unsteady():
     good = walk()
     # alternately long and short strides; the joints keep their own steady time
-    positions = np.concatenate([np.floor(np.arange(n) * 40 / n).astype(int) for _ in range(14) for n in (190, 130)])
+    positions = np.concatenate(
+        [np.floor(np.arange(n) * 40 / n).astype(int) for _ in range(14) for n in (190, 130)]
+    )
     return changed(good, position=positions[:4400])
 
 
@@ -192,17 +204,39 @@ def stander():
 def tripper():
     """Strides of a tenth of a hip height, fast enough only because the body is short."""
     good = walk(period=0.8, speed=0.15)
-    return changed(good, dimensions=dataclasses.replace(DOG, body_length=0.25), foot_slip=good.foot_slip / 10)
+    return changed(
+        good, dimensions=dataclasses.replace(DOG, body_length=0.25), foot_slip=good.foot_slip / 10
+    )
 
 
-@pytest.mark.parametrize("fraud", [vibrator, hidden_vibrator, foot_slider, one_foot_slider, dragger, limper, flier, stander, tripper])
+@pytest.mark.parametrize(
+    "fraud",
+    [
+        vibrator,
+        hidden_vibrator,
+        foot_slider,
+        one_foot_slider,
+        dragger,
+        limper,
+        flier,
+        stander,
+        tripper,
+    ],
+)
 def test_criterion_7_gait(fraud):
     assert failures(fraud()) == {7}
 
 
 @pytest.mark.parametrize(
     ("name", "value"),
-    [("joint_vel", 21.0), ("joint_pos", 0.61), ("joint_pos", -0.91), ("body_speed", 6.0), ("penetration", 0.03), ("torque", 31.0)],
+    [
+        ("joint_vel", 21.0),
+        ("joint_pos", 0.61),
+        ("joint_pos", -0.91),
+        ("body_speed", 6.0),
+        ("penetration", 0.03),
+        ("torque", 31.0),
+    ],
 )
 def test_criterion_8_physics(name, value):
     good = walk()
@@ -222,15 +256,26 @@ def test_criterion_8_gives_where_a_joint_overshoots_a_little():
 
 def test_criterion_8_knows_joints_without_a_range():
     endless = dataclasses.replace(DOG, joint_range=((-np.inf, np.inf),) * 4)
-    assert criteria.joint_overrun(changed(walk(), dimensions=endless, joint_pos=np.full((4400, 4), 50.0))).max() == 0
+    assert (
+        criteria.joint_overrun(
+            changed(walk(), dimensions=endless, joint_pos=np.full((4400, 4), 50.0))
+        ).max()
+        == 0
+    )
 
 
 def test_a_walk_that_blew_up_fails_everything_measured_on_it():
     good = walk()
     broken = {
-        f.name: np.where(time_of(good).reshape(-1, *[1] * (getattr(good, f.name).ndim - 1)) < 12, getattr(good, f.name), np.nan)
+        f.name: np.where(
+            time_of(good).reshape(-1, *[1] * (getattr(good, f.name).ndim - 1)) < 12,
+            getattr(good, f.name),
+            np.nan,
+        )
         for f in dataclasses.fields(good)
-        if getattr(good, f.name, None) is not None and isinstance(getattr(good, f.name), np.ndarray) and f.name not in ("position", "touch")
+        if getattr(good, f.name, None) is not None
+        and isinstance(getattr(good, f.name), np.ndarray)
+        and f.name not in ("position", "touch")
     }
     assert failures(changed(good, **broken)) >= {1, 2, 3, 6, 7, 8}
 
@@ -259,7 +304,9 @@ def test_margin_is_one_at_best_and_zero_at_the_threshold():
 def test_stride_frequency_counts_cycles_or_swings():
     window = walk().window(2.0)
     assert criteria.stride_frequency(window, 0.03) == pytest.approx(1 / 0.8, rel=0.01)
-    assert criteria.stride_frequency(hidden_vibrator().window(2.0), 0.03) == pytest.approx(6 / 0.8, rel=0.02)
+    assert criteria.stride_frequency(hidden_vibrator().window(2.0), 0.03) == pytest.approx(
+        6 / 0.8, rel=0.02
+    )
 
 
 def test_slip_is_summed_over_the_stance_only():

@@ -71,16 +71,24 @@ def plain_loop(creature, champion, starts, row, seconds):
         )
         target = control.target(position, senses)
         data.qfrc_applied[creature.dof_adr] = control.torque(target, senses, model.opt.timestep)[0]
-        position = control.advance(position, target, senses.joint_pos.copy(), (k + 1) * model.opt.timestep)
+        position = control.advance(
+            position, target, senses.joint_pos.copy(), (k + 1) * model.opt.timestep
+        )
         mujoco.mj_step2(model, data)
     return np.array(states)
 
 
 @pytest.mark.parametrize("row", [0, 1, 2, 3, 7])
 @pytest.mark.parametrize("advance", ["clock", "error"])
-def test_friction_mass_noise_and_push_reach_the_right_simulation(tiny, trotter, mixed, row, advance):
+def test_friction_mass_noise_and_push_reach_the_right_simulation(
+    tiny, trotter, mixed, row, advance
+):
     champion = make_champion(
-        tiny, trotter.key_poses, {"steer": 1.0, "roll": 0.3, "pitch_rate": 0.1}, advance=advance, constraint_forces=True
+        tiny,
+        trotter.key_poses,
+        {"steer": 1.0, "roll": 0.3, "pitch_rate": 0.1},
+        advance=advance,
+        constraint_forces=True,
     )
     film = simulate(tiny, champion, mixed, 1.0, record=len(mixed)).trajectory
     want = plain_loop(tiny, champion, mixed, row, 1.0)
@@ -113,7 +121,9 @@ def test_the_same_again_is_the_same(tiny, trotter, mixed, outcome):
 
 def test_a_standing_creature_stands(tiny):
     champion = make_champion(tiny)
-    assert simulate(tiny, champion, perturbed_starts(tiny, 6, np.random.default_rng(0)), 2.0).stayed_up.all()
+    assert simulate(
+        tiny, champion, perturbed_starts(tiny, 6, np.random.default_rng(0)), 2.0
+    ).stayed_up.all()
     assert abs(distance(tiny, champion, 2.0)) < 0.02
 
 
@@ -145,7 +155,9 @@ def test_slip_is_that_of_the_material_at_the_contact(tiny, trotter):
             foot = list(tiny.watched[:4]).index(max(contact.geom))
             mujoco.mj_jac(model, data, jac, None, contact.pos, model.geom_bodyid[max(contact.geom)])
             if recording.contact[k, foot]:
-                assert recording.foot_slip[k, foot] == pytest.approx(np.linalg.norm((jac @ data.qvel)[:2]), abs=1e-9)
+                assert recording.foot_slip[k, foot] == pytest.approx(
+                    np.linalg.norm((jac @ data.qvel)[:2]), abs=1e-9
+                )
                 seen += 1
     assert seen > 20
 
@@ -153,7 +165,9 @@ def test_slip_is_that_of_the_material_at_the_contact(tiny, trotter):
 def test_the_recording_looks_along_the_start(tiny, trotter):
     outcome = simulate(tiny, trotter, nominal_starts(tiny, 1), 2.0, record=1)
     recording = record(tiny, trotter, 2.0)
-    np.testing.assert_allclose(recording.trunk_pos[:, :2], outcome.trajectory.qpos[0, :, :2], atol=1e-12)
+    np.testing.assert_allclose(
+        recording.trunk_pos[:, :2], outcome.trajectory.qpos[0, :, :2], atol=1e-12
+    )
     np.testing.assert_array_equal(recording.joint_pos, outcome.trajectory.qpos[0][:, tiny.qpos_adr])
     assert np.abs(recording.torque).max() <= 12.0
     assert recording.touch.sum() == 0
@@ -170,7 +184,9 @@ def test_half_the_time_step_has_the_same_frames_and_nearly_the_same_walk(tiny, t
 def test_a_commanded_heading_turns_the_walk(tiny, trotter):
     steps = round(3.0 / 0.005)
     ways = [
-        simulate(tiny, trotter, nominal_starts(tiny, 1), 3.0, record=1, heading=np.full(steps, turn)).trajectory.qpos[0, :, 1]
+        simulate(
+            tiny, trotter, nominal_starts(tiny, 1), 3.0, record=1, heading=np.full(steps, turn)
+        ).trajectory.qpos[0, :, 1]
         for turn in (-0.5, 0.5)
     ]
     assert not np.allclose(*ways)
@@ -181,12 +197,18 @@ def test_what_lies_on_its_belly_is_down_though_upright(tiny):
     starts = nominal_starts(tiny, 1)
     outcome = simulate(tiny, flat, starts, 1.5, record=1)
     assert np.isfinite(outcome.fell[0])
-    assert simulate(tiny, flat, starts, 1.5, fall=Fall(height=(0.01, 1.5), touch=False)).stayed_up[0]
+    assert simulate(tiny, flat, starts, 1.5, fall=Fall(height=(0.01, 1.5), touch=False)).stayed_up[
+        0
+    ]
 
 
-def test_a_simulation_that_blows_up_is_down_and_does_not_come_back(tiny, trotter, tmp_path, monkeypatch):
+def test_a_simulation_that_blows_up_is_down_and_does_not_come_back(
+    tiny, trotter, tmp_path, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
-    starts = join(nominal_starts(tiny, 1), pushed_starts(tiny, 1, np.random.default_rng(0), 1e6, (0.2, 0.2)))
+    starts = join(
+        nominal_starts(tiny, 1), pushed_starts(tiny, 1, np.random.default_rng(0), 1e6, (0.2, 0.2))
+    )
     outcome = simulate(tiny, trotter, starts, 0.6, record=2, threads=1)
     assert outcome.stayed_up.tolist() == [True, False]
     assert np.isfinite(outcome.trajectory.qpos[0]).all()
@@ -202,8 +224,14 @@ def test_perturbations_stay_within_their_bounds(tiny):
     starts = perturbed_starts(tiny, 500, np.random.default_rng(0))
     assert np.abs(starts.joint_offset).max() == pytest.approx(0.05, rel=0.01)
     assert np.abs(starts.joint_velocity).max() == pytest.approx(0.1, rel=0.01)
-    assert (starts.friction.min(), starts.friction.max()) == (pytest.approx(0.8, abs=0.01), pytest.approx(1.2, abs=0.01))
-    assert (starts.mass.min(), starts.mass.max()) == (pytest.approx(0.95, abs=0.001), pytest.approx(1.05, abs=0.001))
+    assert (starts.friction.min(), starts.friction.max()) == (
+        pytest.approx(0.8, abs=0.01),
+        pytest.approx(1.2, abs=0.01),
+    )
+    assert (starts.mass.min(), starts.mass.max()) == (
+        pytest.approx(0.95, abs=0.001),
+        pytest.approx(1.05, abs=0.001),
+    )
     pushed = pushed_starts(tiny, 64, np.random.default_rng(0), 0.3, (2.0, 10.0))
     assert np.linalg.norm(pushed.push, axis=1) == pytest.approx(0.3)
     assert np.abs(pushed.push.mean(0)).max() < 0.02

@@ -25,7 +25,9 @@ def run(tiny, trotter, tmp_path_factory):
     """A folder with a champion and its certificate."""
     folder = tmp_path_factory.mktemp("run")
     write_champion(trotter, tiny, folder / "champion.json")
-    (folder / "certificate.json").write_text(certify(tiny, trotter, build(CertificateConfig, BRIEF, "test")).to_json())
+    (folder / "certificate.json").write_text(
+        certify(tiny, trotter, build(CertificateConfig, BRIEF, "test")).to_json()
+    )
     return folder
 
 
@@ -38,7 +40,12 @@ def test_a_certificate_is_of_the_champion_that_was_examined(run, tiny, trotter):
 
 def test_times_of_files_do_not_matter(run, tiny):
     os.utime(run / "certificate.json", (0, 0))
-    assert outdated(read_certificate(run / "certificate.json"), read_champion(run / "champion.json", tiny)) is None
+    assert (
+        outdated(
+            read_certificate(run / "certificate.json"), read_champion(run / "champion.json", tiny)
+        )
+        is None
+    )
 
 
 @pytest.mark.parametrize(
@@ -46,7 +53,11 @@ def test_times_of_files_do_not_matter(run, tiny):
     [
         lambda c: {"key_poses": c.key_poses + np.eye(2, 8) * 1e-6},
         lambda c: {"tuning": dict(c.tuning) | {"steer": 0.99}},
-        lambda c: {"controller": dataclasses.replace(c.controller, interpolation=c.controller.interpolation + 1)},
+        lambda c: {
+            "controller": dataclasses.replace(
+                c.controller, interpolation=c.controller.interpolation + 1
+            )
+        },
         lambda c: {"digest": "another body"},
     ],
     ids=["pose", "tuning", "controller", "body"],
@@ -57,14 +68,18 @@ def test_whatever_moves_otherwise_is_another_champion(run, trotter, change):
 
 
 def test_fitness_and_origin_are_not_what_was_examined(run, trotter):
-    same = dataclasses.replace(trotter, fitness=9.0, terms={"distance": 1.0}, origin={"generation": 3})
+    same = dataclasses.replace(
+        trotter, fitness=9.0, terms={"distance": 1.0}, origin={"generation": 3}
+    )
     assert outdated(read_certificate(run / "certificate.json"), same) is None
 
 
 def test_poses_in_single_precision_have_the_fingerprint_of_what_is_written(tiny, trotter, tmp_path):
     """Evolution hands over float32."""
     single = dataclasses.replace(
-        trotter, key_poses=trotter.key_poses.astype(np.float32), tuning={k: np.float32(v) for k, v in trotter.tuning.items()}
+        trotter,
+        key_poses=trotter.key_poses.astype(np.float32),
+        tuning={k: np.float32(v) for k, v in trotter.tuning.items()},
     )
     write_champion(single, tiny, tmp_path / "champion.json")
     assert read_champion(tmp_path / "champion.json", tiny).fingerprint == single.fingerprint
@@ -77,7 +92,15 @@ def test_a_certificate_that_does_not_say_whose_it_is_is_outdated(run, trotter):
 
 
 @pytest.mark.parametrize(
-    "text", ["[]", "{", "7", '{"passed": true}', '{"passed": true, "criteria": [{}]}', '{"passed": 1, "criteria": []}']
+    "text",
+    [
+        "[]",
+        "{",
+        "7",
+        '{"passed": true}',
+        '{"passed": true, "criteria": [{}]}',
+        '{"passed": 1, "criteria": []}',
+    ],
 )
 def test_what_is_not_a_certificate_is_said(tmp_path, text):
     assert read_certificate(tmp_path / "certificate.json") is None
@@ -87,4 +110,6 @@ def test_what_is_not_a_certificate_is_said(tmp_path, text):
 
 
 def test_the_file_is_read_as_written(run):
-    assert read_certificate(run / "certificate.json") == json.loads((run / "certificate.json").read_text())
+    assert read_certificate(run / "certificate.json") == json.loads(
+        (run / "certificate.json").read_text()
+    )

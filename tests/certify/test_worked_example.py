@@ -26,11 +26,21 @@ def by_hand():
 @pytest.fixture(scope="module")
 def certified():
     document = json.loads((FOLDER / "certificate.json").read_text())
-    return {m["name"]: m["value"] for c in document["criteria"] if c["number"] in (2, 3, 7) for m in c["measures"]}
+    return {
+        m["name"]: m["value"]
+        for c in document["criteria"]
+        if c["number"] in (2, 3, 7)
+        for m in c["measures"]
+    }
 
 
 def test_the_code_knows_nothing_of_the_examiner():
-    imported = {a.name for node in ast.walk(ast.parse(CODE)) if isinstance(node, ast.Import) for a in node.names}
+    imported = {
+        a.name
+        for node in ast.walk(ast.parse(CODE))
+        if isinstance(node, ast.Import)
+        for a in node.names
+    }
     assert imported == {"numpy"}
     assert not any(isinstance(node, ast.ImportFrom) for node in ast.walk(ast.parse(CODE)))
 
@@ -50,7 +60,9 @@ def test_the_table_shows_both(by_hand, certified):
 
 
 def test_the_walk_is_that_of_the_champion_and_its_certificate():
-    champion, certificate = (json.loads((FOLDER / f"{name}.json").read_text()) for name in ("champion", "certificate"))
+    champion, certificate = (
+        json.loads((FOLDER / f"{name}.json").read_text()) for name in ("champion", "certificate")
+    )
     assert champion["creature_digest"] == certificate["creature_digest"]
     walk = np.load(FOLDER / "walk.npz")
     window = certificate["config"]["seconds"] - certificate["config"]["warmup"]

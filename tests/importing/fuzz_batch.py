@@ -21,7 +21,11 @@ def main(scratch: Path, share: int, shares: int) -> None:
     good = home / "good.xml"
     good.write_text(QUADRUPED)
     creature = import_model(good, ImportChoices(apart=False)).files
-    inputs = [*model_inputs(), *toml_inputs(creature["creature.toml"]), *own_xml_inputs(creature["creature.xml"])]
+    inputs = [
+        *model_inputs(),
+        *toml_inputs(creature["creature.toml"]),
+        *own_xml_inputs(creature["creature.xml"]),
+    ]
     _forbid(outside)
     for name, kind, data in inputs[share::shares]:
         print("start", name, flush=True)
@@ -29,7 +33,10 @@ def main(scratch: Path, share: int, shares: int) -> None:
         data = data.replace(b"{outside}", str(outside).encode())
         try:
             if kind in ("toml", "own"):
-                files = {**{n: t.encode() for n, t in creature.items()}, "creature.toml" if kind == "toml" else "creature.xml": data}
+                files = {
+                    **{n: t.encode() for n, t in creature.items()},
+                    "creature.toml" if kind == "toml" else "creature.xml": data,
+                }
                 for file, text in files.items():
                     (folder / file).write_bytes(text)
                 made = load_creature(folder)
@@ -43,7 +50,11 @@ def main(scratch: Path, share: int, shares: int) -> None:
                 load_creature(folder)
                 outcome = "creature"
         except UserError as error:
-            outcome = "error" if str(error) and "\n" not in str(error) and len(str(error)) < 25_000 else f"badly said: {str(error)[:200]!r}"
+            outcome = (
+                "error"
+                if str(error) and "\n" not in str(error) and len(str(error)) < 25_000
+                else f"badly said: {str(error)[:200]!r}"
+            )
         print("end", name, f"{time.perf_counter() - began:.2f}", outcome, flush=True)
 
 
@@ -51,7 +62,11 @@ def _forbid(outside: Path) -> None:
     """Any opening of a file in a folder, by Python, ends the process."""
 
     def hook(event: str, arguments: tuple) -> None:
-        if event == "open" and isinstance(arguments[0], str | bytes) and str(outside) in str(arguments[0]):
+        if (
+            event == "open"
+            and isinstance(arguments[0], str | bytes)
+            and str(outside) in str(arguments[0])
+        ):
             print("read outside:", arguments[0], flush=True)
             raise SystemExit(9)
         if event in ("os.system", "subprocess.Popen", "os.exec", "os.posix_spawn"):

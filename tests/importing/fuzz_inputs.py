@@ -8,8 +8,40 @@ from importing.models import BIPED, QUADRUPED
 
 Input = tuple[str, str, bytes]
 NUMBER = re.compile(r"(?<=[\" ])-?[0-9][0-9.e-]*(?=[\" ])")
-ABSURD = ["nan", "inf", "-inf", "1e308", "-1e308", "1e-320", "0", "-1", "", "x", "1 2", "0x10", "9" * 400, "1e9", "٣"]
-WORDS = ["", "nothing", "mesh", "free", "ball", "slide", "hfield", "plane", "world", "\\", "../..", "%s%n", "${x}", "💥", "a" * 5000]
+ABSURD = [
+    "nan",
+    "inf",
+    "-inf",
+    "1e308",
+    "-1e308",
+    "1e-320",
+    "0",
+    "-1",
+    "",
+    "x",
+    "1 2",
+    "0x10",
+    "9" * 400,
+    "1e9",
+    "٣",
+]
+WORDS = [
+    "",
+    "nothing",
+    "mesh",
+    "free",
+    "ball",
+    "slide",
+    "hfield",
+    "plane",
+    "world",
+    "\\",
+    "../..",
+    "%s%n",
+    "${x}",
+    "💥",
+    "a" * 5000,
+]
 
 
 def model_inputs() -> Iterator[Input]:
@@ -40,7 +72,11 @@ def _replace_number(text: str, rng: random.Random) -> str:
 def _change_attribute(text: str, rng: random.Random) -> str:
     found = rng.choice(list(re.finditer(r'(\w+)="([^"]*)"', text)))
     new = rng.choice(
-        ["", f'{rng.choice(["pos", "mass", "quat", "axis", "type", "name"])}="{found[2]}"', f'{found[1]}="{rng.choice(WORDS)}"']
+        [
+            "",
+            f'{rng.choice(["pos", "mass", "quat", "axis", "type", "name"])}="{found[2]}"',
+            f'{found[1]}="{rng.choice(WORDS)}"',
+        ]
     )
     return text[: found.start()] + new + text[found.end() :]
 
@@ -150,12 +186,18 @@ def toml_inputs(text: str) -> Iterator[Input]:
                 "'" + "a" * 9999 + "'",
             ]
         )
-        lines[k] = rng.choice([f"{key} = {value}", "", f"{key}_x = {value}", lines[k] + lines[k], f"[{value}]"])
+        lines[k] = rng.choice(
+            [f"{key} = {value}", "", f"{key}_x = {value}", lines[k] + lines[k], f"[{value}]"]
+        )
         yield f"toml-value-{i}", "toml", "\n".join(lines).encode()
     for i in range(20):
         yield f"toml-byte-{i}", "toml", _flip_bytes(text.encode(), rng)
     yield "toml-deep", "toml", ("a = " + "[" * 50_000).encode()
-    yield "toml-deep-table", "toml", ("[train." + ".".join("a" * 1 for _ in range(3000)) + "]").encode()
+    yield (
+        "toml-deep-table",
+        "toml",
+        ("[train." + ".".join("a" * 1 for _ in range(3000)) + "]").encode(),
+    )
     yield "toml-glob", "toml", text.replace('match = "', 'match = "' + "*a" * 40).encode()
 
 
@@ -169,12 +211,34 @@ def own_xml_inputs(text: str) -> Iterator[Input]:
     for i in range(15):
         yield f"own-byte-{i}", "own", _flip_bytes(text.encode(), rng)
     for i, s in enumerate(SECRETS):
-        yield f"own-include-{i}", "own", text.replace("<worldbody>", f'<include file="{s}"/><worldbody>').encode()
-        yield f"own-mesh-{i}", "own", text.replace("<worldbody>", f'<asset><mesh name="s" file="{s}"/></asset><worldbody>').encode()
+        yield (
+            f"own-include-{i}",
+            "own",
+            text.replace("<worldbody>", f'<include file="{s}"/><worldbody>').encode(),
+        )
+        yield (
+            f"own-mesh-{i}",
+            "own",
+            text.replace(
+                "<worldbody>", f'<asset><mesh name="s" file="{s}"/></asset><worldbody>'
+            ).encode(),
+        )
     yield (
         "own-replicate",
         "own",
-        text.replace("<worldbody>", '<worldbody><replicate count="1000000000"><geom size="1"/></replicate>').encode(),
+        text.replace(
+            "<worldbody>", '<worldbody><replicate count="1000000000"><geom size="1"/></replicate>'
+        ).encode(),
     )
-    yield "own-plugin", "own", text.replace("<worldbody>", '<extension><plugin plugin="mujoco.pid"/></extension><worldbody>').encode()
-    yield "own-memory", "own", text.replace("<worldbody>", '<size memory="9000G"/><worldbody>').encode()
+    yield (
+        "own-plugin",
+        "own",
+        text.replace(
+            "<worldbody>", '<extension><plugin plugin="mujoco.pid"/></extension><worldbody>'
+        ).encode(),
+    )
+    yield (
+        "own-memory",
+        "own",
+        text.replace("<worldbody>", '<size memory="9000G"/><worldbody>').encode(),
+    )

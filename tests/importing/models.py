@@ -38,7 +38,11 @@ QUADRUPED = f"""<mujoco model="quad">
 </mujoco>
 """
 
-ROLLING = reduce(lambda text, n: text.replace(hip := f'<joint name="{n}_hip"', ROLL.format(n=n) + hip), CORNERS, QUADRUPED)
+ROLLING = reduce(
+    lambda text, n: text.replace(hip := f'<joint name="{n}_hip"', ROLL.format(n=n) + hip),
+    CORNERS,
+    QUADRUPED,
+)
 
 LINK = """
   <link name="{name}">
@@ -57,15 +61,60 @@ def _biped() -> str:
     parts = [LINK.format(name="trunk", com=0.1, mass=6, i=0.06, at="0 0 0.15", box="0.15 0.25 0.3")]
     for side, y in (("left", 0.09), ("right", -0.09)):
         parts += [
-            LINK.format(name=f"{side}_thigh", com=-0.12, mass=1.2, i=0.008, at="0 0 -0.12", box="0.06 0.06 0.2"),
-            LINK.format(name=f"{side}_shin", com=-0.12, mass=0.8, i=0.006, at="0 0 -0.12", box="0.05 0.05 0.2"),
-            LINK.format(name=f"{side}_foot", com=-0.02, mass=0.5, i=0.001, at="0.03 0 -0.03", box="0.2 0.1 0.03"),
-            HINGE.format(name=f"{side}_hip_roll", parent="trunk", child=f"{side}_hip", xyz=f"0 {y} 0", axis="1 0 0"),
+            LINK.format(
+                name=f"{side}_thigh",
+                com=-0.12,
+                mass=1.2,
+                i=0.008,
+                at="0 0 -0.12",
+                box="0.06 0.06 0.2",
+            ),
+            LINK.format(
+                name=f"{side}_shin",
+                com=-0.12,
+                mass=0.8,
+                i=0.006,
+                at="0 0 -0.12",
+                box="0.05 0.05 0.2",
+            ),
+            LINK.format(
+                name=f"{side}_foot",
+                com=-0.02,
+                mass=0.5,
+                i=0.001,
+                at="0.03 0 -0.03",
+                box="0.2 0.1 0.03",
+            ),
+            HINGE.format(
+                name=f"{side}_hip_roll",
+                parent="trunk",
+                child=f"{side}_hip",
+                xyz=f"0 {y} 0",
+                axis="1 0 0",
+            ),
             f'<link name="{side}_hip"><inertial><mass value="0.3"/>'
             '<inertia ixx="1e-3" ixy="0" ixz="0" iyy="1e-3" iyz="0" izz="1e-3"/></inertial></link>',
-            HINGE.format(name=f"{side}_hip_pitch", parent=f"{side}_hip", child=f"{side}_thigh", xyz="0 0 0", axis="0 1 0"),
-            HINGE.format(name=f"{side}_knee", parent=f"{side}_thigh", child=f"{side}_shin", xyz="0 0 -0.25", axis="0 1 0"),
-            HINGE.format(name=f"{side}_ankle", parent=f"{side}_shin", child=f"{side}_foot", xyz="0 0 -0.25", axis="0 1 0"),
+            HINGE.format(
+                name=f"{side}_hip_pitch",
+                parent=f"{side}_hip",
+                child=f"{side}_thigh",
+                xyz="0 0 0",
+                axis="0 1 0",
+            ),
+            HINGE.format(
+                name=f"{side}_knee",
+                parent=f"{side}_thigh",
+                child=f"{side}_shin",
+                xyz="0 0 -0.25",
+                axis="0 1 0",
+            ),
+            HINGE.format(
+                name=f"{side}_ankle",
+                parent=f"{side}_shin",
+                child=f"{side}_foot",
+                xyz="0 0 -0.25",
+                axis="0 1 0",
+            ),
         ]
     return f'<?xml version="1.0"?>\n<robot name="biped">{"".join(parts)}\n</robot>\n'
 

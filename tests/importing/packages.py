@@ -29,10 +29,18 @@ MODELS = {
     "gym humanoid": ("gymnasium", "gymnasium/envs/mujoco/assets/humanoid.xml", ""),
     "brax ant": ("brax", "brax/envs/assets/ant.xml", ""),
     "solo12": ("example-robot-data", f"{ERD}/robots/solo_description/robots/solo12.urdf", ERD),
-    "anymal b": ("example-robot-data", f"{ERD}/robots/anymal_b_simple_description/robots/anymal.urdf", ERD),
+    "anymal b": (
+        "example-robot-data",
+        f"{ERD}/robots/anymal_b_simple_description/robots/anymal.urdf",
+        ERD,
+    ),
     "unitree a1": ("example-robot-data", f"{ERD}/robots/a1_description/urdf/a1.urdf", ERD),
     "unitree go2": ("example-robot-data", f"{ERD}/robots/go2_description/urdf/go2.urdf", ERD),
-    "unitree g1": ("example-robot-data", f"{ERD}/robots/g1_description/urdf/g1_29dof_rev_1_0.urdf", ERD),
+    "unitree g1": (
+        "example-robot-data",
+        f"{ERD}/robots/g1_description/urdf/g1_29dof_rev_1_0.urdf",
+        ERD,
+    ),
     "talos": ("example-robot-data", f"{ERD}/robots/talos_data/robots/talos_reduced.urdf", ERD),
     "bolt": ("example-robot-data", f"{ERD}/robots/bolt_description/robots/bolt.urdf", ERD),
     "panda arm": ("example-robot-data", f"{ERD}/robots/panda_description/urdf/panda.urdf", ERD),
@@ -60,7 +68,19 @@ def unpacked(package: str) -> Path:
     if (folder / "done").exists():
         return folder
     folder.mkdir(parents=True, exist_ok=True)
-    order = [sys.executable, "-m", "pip", "download", "--no-deps", "--only-binary", ":all:", "--dest", str(folder), "--quiet", package]
+    order = [
+        sys.executable,
+        "-m",
+        "pip",
+        "download",
+        "--no-deps",
+        "--only-binary",
+        ":all:",
+        "--dest",
+        str(folder),
+        "--quiet",
+        package,
+    ]
     try:
         done = subprocess.run(order, capture_output=True, text=True, timeout=SECONDS, check=False)
     except subprocess.TimeoutExpired:

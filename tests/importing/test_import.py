@@ -41,7 +41,15 @@ def test_a_quadruped_stands_on_four_feet_and_knows_its_left_and_right(tmp_path):
     names = creature.joint_names
     assert names[creature.partner[names.index("fl_knee")]] == "fr_knee"
     assert standing(creature).stands
-    for words in ("free joint added", "sensor", "neck frozen", "cylinder", "actuators dropped", "options replaced", "[high]"):
+    for words in (
+        "free joint added",
+        "sensor",
+        "neck frozen",
+        "cylinder",
+        "actuators dropped",
+        "options replaced",
+        "[high]",
+    ):
         assert told(imported, words), words
     assert creature.steer_stride[names.index("fl_hip")] == 0.5
     assert creature.steer_stride[names.index("fr_hip")] == -0.5
@@ -58,7 +66,9 @@ def test_a_body_shorter_than_its_legs_is_as_long_as_they_are(tmp_path):
 def test_joints_with_heavy_rotors_are_stiff_and_strong_enough_to_stride(tmp_path):
     """The rotor inertia of gym's ant is a hundred times what its weight needs: with gains from the weight alone it moves in slow motion."""
     slow, _ = bring(tmp_path, QUADRUPED)
-    quick, imported = bring(tmp_path, QUADRUPED.replace("<default>", '<default><joint armature="1"/>'))
+    quick, imported = bring(
+        tmp_path, QUADRUPED.replace("<default>", '<default><joint armature="1"/>')
+    )
     pendulum = np.sqrt(9.81 / quick.hip_height)
     assert (np.sqrt(quick.kp / 1.1) > 4 * pendulum).all()
     assert (quick.kd > 0.9 * np.sqrt(quick.kp)).all()
@@ -68,8 +78,20 @@ def test_joints_with_heavy_rotors_are_stiff_and_strong_enough_to_stride(tmp_path
 
 def motionless(creature: Creature, gains: dict[str, float]) -> Champion:
     """A gait whose only pose is the stance."""
-    tuning = dict.fromkeys(("steer", "pitch", "pitch_rate", "roll", "roll_rate"), 0.0) | {"threshold": 0.12, "period": 0.8}
-    return Champion(creature.name, creature.digest, np.tile(creature.stand, (2, 1)), tuning | gains, ControllerConfig(), 0, {}, {})
+    tuning = dict.fromkeys(("steer", "pitch", "pitch_rate", "roll", "roll_rate"), 0.0) | {
+        "threshold": 0.12,
+        "period": 0.8,
+    }
+    return Champion(
+        creature.name,
+        creature.digest,
+        np.tile(creature.stand, (2, 1)),
+        tuning | gains,
+        ControllerConfig(),
+        0,
+        {},
+        {},
+    )
 
 
 @pytest.mark.parametrize("axis", ["pitch", "roll"])
@@ -83,7 +105,9 @@ def test_it_stands_with_the_strongest_balance_feedback(tmp_path, axis):
     assert simulate(creature, motionless(creature, gains), starts, 4.0).stayed_up.all()
     # The test can fail: with the full weights it does.
     loud = dataclasses.replace(creature, balance_roll=np.sign(creature.balance_roll))
-    assert axis == "pitch" or not simulate(loud, motionless(loud, gains), starts, 4.0).stayed_up.all()
+    assert (
+        axis == "pitch" or not simulate(loud, motionless(loud, gains), starts, 4.0).stayed_up.all()
+    )
 
 
 def test_mujoco_reads_the_same_masses_and_joints_from_both_files(tmp_path):
@@ -94,7 +118,11 @@ def test_mujoco_reads_the_same_masses_and_joints_from_both_files(tmp_path):
         np.testing.assert_allclose(a.axis, b.axis, atol=1e-9)
         np.testing.assert_allclose(a.pos, b.pos, atol=1e-9)
     np.testing.assert_allclose(before.body_mass.sum(), creature.mass, rtol=1e-9)
-    np.testing.assert_allclose(np.sort(before.body_inertia.ravel()), np.sort(creature.model.body_inertia.ravel()), rtol=1e-6)
+    np.testing.assert_allclose(
+        np.sort(before.body_inertia.ravel()),
+        np.sort(creature.model.body_inertia.ravel()),
+        rtol=1e-6,
+    )
 
 
 def test_a_urdf_biped_stands_without_its_meshes(tmp_path):
@@ -110,20 +138,27 @@ def test_a_urdf_biped_stands_without_its_meshes(tmp_path):
 
 @pytest.mark.parametrize("missing", ["mass", "inertia"])
 def test_a_broken_inertia_is_mended_and_named(tmp_path, missing):
-    broken = {"mass": ('<mass value="1.2"/>', '<mass value="-1"/>'), "inertia": ('ixx="0.008"', 'ixx="9.0"')}[missing]
+    broken = {
+        "mass": ('<mass value="1.2"/>', '<mass value="-1"/>'),
+        "inertia": ('ixx="0.008"', 'ixx="9.0"'),
+    }[missing]
     _, imported = bring(tmp_path, BIPED.replace(*broken), "urdf")
     assert told(imported, 'inertia of link "left_thigh"')
 
 
 def test_degrees_in_a_urdf_are_read_as_degrees(tmp_path):
-    creature, imported = bring(tmp_path, BIPED.replace('lower="-1.2" upper="1.2"', 'lower="-69" upper="69"'), "urdf")
+    creature, imported = bring(
+        tmp_path, BIPED.replace('lower="-1.2" upper="1.2"', 'lower="-69" upper="69"'), "urdf"
+    )
     assert told(imported, "read as degrees")
     np.testing.assert_allclose(creature.joint_high, np.radians(69), rtol=1e-6)
 
 
 def test_y_up_by_gravity_is_turned(tmp_path):
     tilted = QUADRUPED.replace("<option ", '<option gravity="0 -9.81 0" ')
-    tilted = tilted.replace('<body name="torso" pos="0 0 0.35">', '<body name="torso" pos="0 0.35 0" euler="-90 0 0">')
+    tilted = tilted.replace(
+        '<body name="torso" pos="0 0 0.35">', '<body name="torso" pos="0 0.35 0" euler="-90 0 0">'
+    )
     creature, imported = bring(tmp_path, tilted)
     assert imported.stands
     assert (creature.stand_rot @ creature.up)[2] == pytest.approx(1, abs=0.01)
@@ -188,7 +223,12 @@ def test_no_mesh_outside_the_model_s_folder_is_read(tmp_path):
     for place in (home / "inside.obj", tmp_path / "outside.obj"):
         place.write_text(mesh)
     (home / "link.obj").symlink_to(tmp_path / "outside.obj")
-    for reference, found in (("inside.obj", True), ("../outside.obj", False), (str(tmp_path / "outside.obj"), False), ("link.obj", False)):
+    for reference, found in (
+        ("inside.obj", True),
+        ("../outside.obj", False),
+        (str(tmp_path / "outside.obj"), False),
+        ("link.obj", False),
+    ):
         text = QUADRUPED.replace("<asset>", f'<asset><mesh name="s" file="{reference}"/>')
         text = text.replace('<site name="imu"/>', '<geom type="mesh" mesh="s" mass="0.1"/>')
         creature, imported = bring(home, text)

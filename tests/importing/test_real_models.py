@@ -16,7 +16,11 @@ from mjxgait.importing.portrait import standing
 from mjxgait.physics.fast import UnsupportedModel
 from mjxgait.physics.fast.support import check_supported
 
-REFUSED = {"r2d2": "wheel", "panda arm": "no limb reaches the floor", "dm swimmer": "no hinge joint below it"}
+REFUSED = {
+    "r2d2": "wheel",
+    "panda arm": "no limb reaches the floor",
+    "dm swimmer": "no hinge joint below it",
+}
 FALLS = {"bolt"}
 """Point feet on two legs: nothing stands on those without stepping."""
 FEET = {
@@ -46,7 +50,9 @@ def test_file_to_standing_creature(tmp_path: Path, name: str):
     assert (creature.pose_high >= creature.stand - 1e-9).all()
     assert not creature.model.nu + creature.model.neq + creature.model.ntendon
     assert imported.notes.changes
-    assert {"forward", "trunk", "feet", "standing pose", "mirror", "kp, kd"} <= {g.what for g in imported.notes.guesses}
+    assert {"forward", "trunk", "feet", "standing pose", "mirror", "kp, kd"} <= {
+        g.what for g in imported.notes.guesses
+    }
     try:
         check_supported(creature.evolution_model)
     except UnsupportedModel as reason:
@@ -85,6 +91,10 @@ def test_a_stance_that_was_searched_has_no_foot_within_the_hips(tmp_path: Path, 
     left = creature.stand_rot @ creature.left
     for geom in creature.watched[: len(creature.foot_of)]:
         bodies = ancestors(creature.model, int(creature.model.geom_bodyid[geom]))
-        hips = [data.xanchor[j] @ left for j in range(1, creature.model.njnt) if creature.model.jnt_bodyid[j] in bodies]
+        hips = [
+            data.xanchor[j] @ left
+            for j in range(1, creature.model.njnt)
+            if creature.model.jnt_bodyid[j] in bodies
+        ]
         hip = max(hips, key=abs)
         assert data.geom_xpos[geom] @ left * np.sign(hip) > abs(hip) - 0.03 * creature.hip_height

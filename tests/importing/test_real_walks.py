@@ -17,14 +17,25 @@ pytestmark = pytest.mark.slow
 
 
 def mjxgait(*arguments: object) -> None:
-    done = subprocess.run([sys.executable, "-m", "mjxgait", *map(str, arguments)], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-m", "mjxgait", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.parametrize("name", WALKERS)
 def test_file_to_certified_walk(tmp_path: Path, name: str):
     path, search = model_file(name)
-    mjxgait("import", path, "--out", tmp_path / "mine", *(word for folder in search for word in ("--search", folder)))
+    mjxgait(
+        "import",
+        path,
+        "--out",
+        tmp_path / "mine",
+        *(word for folder in search for word in ("--search", folder)),
+    )
     mjxgait("train", "--env", tmp_path / "mine", "--out", tmp_path / "run", "--no-plots")
     certificate = read_certificate(tmp_path / "run" / CERTIFICATE)
     assert certificate is not None

@@ -25,7 +25,12 @@ def finished_run(tmp_path_factory):
     for generation in range(LAST + 1):
         state = make_state(creature, config, generation)
         checkpoints.save(state, creature.name, creature.digest)
-        line = {"generation": generation, "best": float(state.fitness[0]), "mean": 1.0, "forced": generation == FORCED}
+        line = {
+            "generation": generation,
+            "best": float(state.fitness[0]),
+            "mean": 1.0,
+            "forced": generation == FORCED,
+        }
         with (folder / METRICS).open("a") as log:
             log.write(json.dumps(line) + "\n")
     checkpoints.close()

@@ -17,18 +17,35 @@ FORCED = 2
 def make_state(creature, config, generation):
     """Everybody's poses are the first key pose of rank 1 moved by the rank and the generation, in degrees."""
     ranks = np.arange(POPULATION)
-    poses = np.broadcast_to(creature.stand, (POPULATION, 2, len(creature.joint_names))) + np.radians(ranks + generation)[:, None, None]
+    poses = (
+        np.broadcast_to(creature.stand, (POPULATION, 2, len(creature.joint_names)))
+        + np.radians(ranks + generation)[:, None, None]
+    )
     terms = np.zeros((POPULATION, config.rollout.starts, len(TERMS)), np.float32)
-    terms[..., TERMS.index("distance")] = 5.0 + generation - ranks[:, None] + 0.1 * np.arange(config.rollout.starts)
+    terms[..., TERMS.index("distance")] = (
+        5.0 + generation - ranks[:, None] + 0.1 * np.arange(config.rollout.starts)
+    )
     terms[..., TERMS.index("drift")] = 0.5
     integer = jnp.int32(0)
     return EvolutionState(
-        genomes=Genome(jnp.asarray(poses, jnp.float32), jnp.ones((POPULATION, len(TUNING)), jnp.float32)),
+        genomes=Genome(
+            jnp.asarray(poses, jnp.float32), jnp.ones((POPULATION, len(TUNING)), jnp.float32)
+        ),
         terms=jnp.asarray(terms),
-        fitness=score(terms, weight_vector(config.fitness, jnp.int32(generation)), config.rollout.worst),
+        fitness=score(
+            terms, weight_vector(config.fitness, jnp.int32(generation)), config.rollout.worst
+        ),
         born=jnp.full(POPULATION, max(generation - 1, 0), jnp.int32),
         origin=jnp.asarray(
-            [Origin.CROSSOVER, Origin.MUTATION, Origin.NEWCOMER, Origin.INITIAL, Origin.MUTATION, Origin.MUTATION], jnp.int32
+            [
+                Origin.CROSSOVER,
+                Origin.MUTATION,
+                Origin.NEWCOMER,
+                Origin.INITIAL,
+                Origin.MUTATION,
+                Origin.MUTATION,
+            ],
+            jnp.int32,
         ),
         key=jax.random.key(7),
         generation=jnp.int32(generation),

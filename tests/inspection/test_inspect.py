@@ -42,7 +42,12 @@ def test_reads_in_under_three_seconds_where_other_devices_are(finished_run):
 
 def test_tells_what_it_is(finished_run):
     found = facts(read_snapshot(finished_run))
-    assert (found["creature"], found["seed"], found["generation"], found["intact"]) == ("tall_quadruped", 11, LAST, True)
+    assert (found["creature"], found["seed"], found["generation"], found["intact"]) == (
+        "tall_quadruped",
+        11,
+        LAST,
+        True,
+    )
     assert found["settings_changed"]["evolution.population"]["here"] == POPULATION
     assert "controller.law" not in found["settings_changed"]
     assert found["versions"] == {"jax": "9.9"}
@@ -57,11 +62,18 @@ def test_tells_whether_the_certificate_is_the_champions(run):
 
     snapshot = read_snapshot(run)
     fingerprint = read_champion(run / CHAMPION, snapshot.creature).fingerprint
-    certificate = {"passed": False, "margin": -1.0, "champion": fingerprint, "criteria": [{"number": 7, "passed": False, "measures": []}]}
+    certificate = {
+        "passed": False,
+        "margin": -1.0,
+        "champion": fingerprint,
+        "criteria": [{"number": 7, "passed": False, "measures": []}],
+    }
     assert said() == "The champion has not been examined."
     (run / CERTIFICATE).write_text(json.dumps(certificate))
     assert said() == "The champion fails criteria 7."
-    (run / CERTIFICATE).write_text(json.dumps(certificate | {"passed": True, "margin": 0.25, "criteria": []}))
+    (run / CERTIFICATE).write_text(
+        json.dumps(certificate | {"passed": True, "margin": 0.25, "criteria": []})
+    )
     assert said() == "The champion is certified, margin 0.25."
     (run / CERTIFICATE).write_text(json.dumps(certificate | {"champion": "other"}))
     assert "outdated" in said()
@@ -84,7 +96,9 @@ def test_population_tells_age_and_kind(finished_run):
 def test_diversity_is_the_spread_in_degrees(finished_run):
     found = facts(read_snapshot(finished_run))["diversity"]
     assert found["unique"] == POPULATION
-    assert set(np.round(list(found["spread_deg"].values()), 3)) == {round(np.arange(POPULATION).std(), 3)}
+    assert set(np.round(list(found["spread_deg"].values()), 3)) == {
+        round(np.arange(POPULATION).std(), 3)
+    }
 
 
 def test_forced_spells_are_told(finished_run):
@@ -98,7 +112,10 @@ def test_an_earlier_generation_and_one_individual(finished_run):
     assert early.generation == 1
     assert [line["generation"] for line in early.lines] == [0, 1]
     second = individual_facts(early, 2)
-    moved = second["key_poses_deg"][0]["spine_yaw"] - individual_facts(early, 1)["key_poses_deg"][0]["spine_yaw"]
+    moved = (
+        second["key_poses_deg"][0]["spine_yaw"]
+        - individual_facts(early, 1)["key_poses_deg"][0]["spine_yaw"]
+    )
     assert moved == pytest.approx(1.0, abs=1e-4)
 
 
@@ -121,7 +138,14 @@ def test_difference_of_two_checkpoints(finished_run, capsys):
 def test_everything_can_be_printed(finished_run, capsys):
     code, said = tell(capsys, finished_run)
     assert code == 0
-    for word in ("tall_quadruped, generation 3 of 3", "seed", "intact", "newcomer", "spine_yaw", "forced evolution in generations 2 to 2"):
+    for word in (
+        "tall_quadruped, generation 3 of 3",
+        "seed",
+        "intact",
+        "newcomer",
+        "spine_yaw",
+        "forced evolution in generations 2 to 2",
+    ):
         assert word in said
     assert "…" not in said
     code, said = tell(capsys, finished_run, "--individual", 2)
@@ -155,8 +179,14 @@ def test_a_run_killed_half_way_is_read_up_to_its_latest_checkpoint(run, capsys):
         (lambda run: shutil.rmtree(run / "checkpoints"), "no checkpoint yet"),
         (lambda run: (run / "config.toml").unlink(), "neither a run folder"),
         (lambda run: (run / "config.toml").write_text("seed = ["), "not valid TOML"),
-        (lambda run: (run / "checkpoints" / str(LAST) / "manifest" / "metadata").write_text("{"), "damaged"),
-        (lambda run: (run / "creature" / "creature.toml").open("a").write("\n# another body\n"), "another body"),
+        (
+            lambda run: (run / "checkpoints" / str(LAST) / "manifest" / "metadata").write_text("{"),
+            "damaged",
+        ),
+        (
+            lambda run: (run / "creature" / "creature.toml").open("a").write("\n# another body\n"),
+            "another body",
+        ),
     ],
 )
 def test_damaged_and_foreign_folders_end_with_a_sentence(run, capsys, damage, words):

@@ -97,7 +97,9 @@ def scene() -> Scene:
     model = mujoco.MjModel.from_xml_string(XML)
     hinges = np.nonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE)[0]
     watched = np.array([model.geom(name).id for name in WATCHED])
-    layout = SenseLayout(model.body("trunk").id, model.jnt_qposadr[hinges], model.jnt_dofadr[hinges], watched)
+    layout = SenseLayout(
+        model.body("trunk").id, model.jnt_qposadr[hinges], model.jnt_dofadr[hinges], watched
+    )
     rng = np.random.default_rng(2)
     torque = np.asarray(2 * rng.normal(size=(model.nv, LANES)), np.float32)
     damping = np.asarray(rng.uniform(0, 0.1, (model.nv, LANES)), np.float32)
@@ -112,7 +114,11 @@ def _everything(plant: Any) -> Everything:
 
     def everything(state: BodyState, damping: jax.Array, torque: jax.Array) -> Any:
         sensed, workings = plant.forward(state)
-        return sensed, plant.solve_damped(workings, damping, torque), plant.advance(state, workings, torque)
+        return (
+            sensed,
+            plant.solve_damped(workings, damping, torque),
+            plant.advance(state, workings, torque),
+        )
 
     return everything
 
@@ -149,12 +155,17 @@ def _forward_in_c(scene: Scene, lane: int, advance: bool = False) -> mujoco.MjDa
 
 def _close(ours: np.ndarray, theirs: np.ndarray, tolerance: float = 1e-5) -> None:
     """Equal to a fraction of the largest entry."""
-    np.testing.assert_allclose(ours, theirs, rtol=0, atol=tolerance * max(np.abs(theirs).max(), 1e-2))
+    np.testing.assert_allclose(
+        ours, theirs, rtol=0, atol=tolerance * max(np.abs(theirs).max(), 1e-2)
+    )
 
 
 def test_states_cover_what_can_happen(scene: Scene, references: list[mujoco.MjData]) -> None:
     types = [set(np.asarray(data.efc_type[: data.nefc])) for data in references]
-    limit, contact = int(mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT), int(mujoco.mjtConstraint.mjCNSTR_CONTACT_PYRAMIDAL)
+    limit, contact = (
+        int(mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT),
+        int(mujoco.mjtConstraint.mjCNSTR_CONTACT_PYRAMIDAL),
+    )
     assert set() in types
     assert any(limit in t for t in types)
     assert any(contact in t for t in types)
@@ -165,7 +176,9 @@ def test_sensed_terms(scene: Scene, result: Any, references: list[mujoco.MjData]
     sensed, layout = result[0], scene.layout
     for lane, data in enumerate(references):
         velocity = np.zeros(6)
-        mujoco.mj_objectVelocity(scene.model, data, mujoco.mjtObj.mjOBJ_XBODY, layout.trunk, velocity, 0)
+        mujoco.mj_objectVelocity(
+            scene.model, data, mujoco.mjtObj.mjOBJ_XBODY, layout.trunk, velocity, 0
+        )
         _close(sensed.joint_pos[:, lane], data.qpos[layout.qpos_adr])
         _close(sensed.joint_vel[:, lane], data.qvel[layout.dof_adr])
         _close(sensed.bias[:, lane], data.qfrc_bias - data.qfrc_passive)
@@ -183,12 +196,22 @@ def test_lowest_points(scene: Scene, result: Any, references: list[mujoco.MjData
     unit /= np.linalg.norm(unit, axis=1, keepdims=True)
     size = scene.model.geom_size
     left, right, rear, trunk, tail = scene.layout.watched
-    end, disc = np.sign(unit[:, 2:]) * [0, 0, 1], unit * [1, 1, 0] / np.linalg.norm(unit[:, :2], axis=1, keepdims=True)
-    surfaces = [size[left][0] * unit, size[right][0] * unit + size[right][1] * end, size[rear][0] * unit, size[trunk] * np.sign(unit)]
+    end, disc = (
+        np.sign(unit[:, 2:]) * [0, 0, 1],
+        unit * [1, 1, 0] / np.linalg.norm(unit[:, :2], axis=1, keepdims=True),
+    )
+    surfaces = [
+        size[left][0] * unit,
+        size[right][0] * unit + size[right][1] * end,
+        size[rear][0] * unit,
+        size[trunk] * np.sign(unit),
+    ]
     surfaces.append(size[tail][0] * disc + size[tail][1] * end)
     for lane, data in enumerate(references):
         for n, (geom, points) in enumerate(zip(scene.layout.watched, surfaces, strict=True)):
-            lowest = (data.geom_xpos[geom] + points @ data.geom_xmat[geom].reshape(3, 3).T)[:, 2].min()
+            lowest = (data.geom_xpos[geom] + points @ data.geom_xmat[geom].reshape(3, 3).T)[
+                :, 2
+            ].min()
             assert abs(result[0].geom_low[n, lane] - lowest) < 3e-4
 
 
@@ -196,13 +219,18 @@ def test_damped_solve(scene: Scene, result: Any, references: list[mujoco.MjData]
     for lane, data in enumerate(references):
         mass = np.zeros((scene.model.nv, scene.model.nv))
         mujoco.mj_fullM(scene.model, data, mass)
-        _close(result[1][:, lane], np.linalg.solve(mass + np.diag(scene.damping[:, lane]), scene.torque[:, lane]))
+        _close(
+            result[1][:, lane],
+            np.linalg.solve(mass + np.diag(scene.damping[:, lane]), scene.torque[:, lane]),
+        )
 
 
 def test_acceleration_and_constraint_force(result: Any, references: list[mujoco.MjData]) -> None:
     for lane, data in enumerate(references):
         scale = np.abs(data.qacc).max()
-        np.testing.assert_allclose(result[2].warmstart[:, lane], data.qacc, rtol=0, atol=2e-5 * scale)
+        np.testing.assert_allclose(
+            result[2].warmstart[:, lane], data.qacc, rtol=0, atol=2e-5 * scale
+        )
         _close(result[2].constraint_force[:, lane], data.qfrc_constraint, 2e-4)
 
 
@@ -215,9 +243,13 @@ def test_one_step(scene: Scene, result: Any) -> None:
 
 def test_like_mjx(scene: Scene, result: Any) -> None:
     """MJX computes in float32 too: wider tolerances."""
-    in_front = jax.tree.map(lambda x: jnp.moveaxis(x, -1, 0), (scene.state, scene.damping, scene.torque))
+    in_front = jax.tree.map(
+        lambda x: jnp.moveaxis(x, -1, 0), (scene.state, scene.damping, scene.torque)
+    )
     sensed, damped, after = _everything(mjx_plant(scene.model, scene.layout))(*in_front)
-    for ours, theirs in zip(jax.tree.leaves(result), jax.tree.leaves((sensed, damped, after)), strict=True):
+    for ours, theirs in zip(
+        jax.tree.leaves(result), jax.tree.leaves((sensed, damped, after)), strict=True
+    ):
         theirs = np.moveaxis(np.asarray(theirs), 0, -1)
         _close(ours, theirs, 1e-3)
 

@@ -14,7 +14,14 @@ FOOT = '<geom name="foot" type="sphere" size="0.05" pos="0 0 -0.2" contype="0" c
 HINGE = '<joint name="knee" axis="0 1 0"/>'
 
 
-def _model(flag: str = FLAG, floor: str = "", foot: str = FOOT, joint: str = HINGE, more: str = "", **option: float) -> mujoco.MjModel:
+def _model(
+    flag: str = FLAG,
+    floor: str = "",
+    foot: str = FOOT,
+    joint: str = HINGE,
+    more: str = "",
+    **option: float,
+) -> mujoco.MjModel:
     model = mujoco.MjModel.from_xml_string(f"""
     <mujoco>
       <option integrator="Euler" solver="Newton" cone="pyramidal">{flag}</option>
@@ -50,13 +57,25 @@ def test_accepts_a_plain_creature() -> None:
         ({"viscosity": 0.1}, "fluid"),
         ({"flag": "", "joint": '<joint name="knee" damping="1"/>'}, "eulerdamp"),
         ({"joint": '<joint name="knee" frictionloss="1"/>'}, "dry friction"),
-        ({"joint": '<joint name="knee" type="ball" range="0 60" limited="true"/>'}, "ball joint has a limit"),
+        (
+            {"joint": '<joint name="knee" type="ball" range="0 60" limited="true"/>'},
+            "ball joint has a limit",
+        ),
         ({"joint": '<joint name="knee" type="ball" stiffness="1"/>'}, "stiffness"),
         ({"floor": 'quat="0.9 0.1 0 0"'}, "not the floor z = 0"),
         ({"floor": 'pos="0 0 0.1"'}, "not the floor z = 0"),
-        ({"foot": FOOT.replace("sphere", "box").replace("0.05", ".1 .1 .1")}, "floor and foot can touch: only spheres and capsules"),
-        ({"foot": FOOT.replace("/>", ' condim="1"/>'), "floor": 'condim="1"'}, "condim other than 3"),
-        ({"foot": FOOT, "more": '<contact><pair geom1="floor" geom2="foot"/></contact>'}, "explicit contact pairs"),
+        (
+            {"foot": FOOT.replace("sphere", "box").replace("0.05", ".1 .1 .1")},
+            "floor and foot can touch: only spheres and capsules",
+        ),
+        (
+            {"foot": FOOT.replace("/>", ' condim="1"/>'), "floor": 'condim="1"'},
+            "condim other than 3",
+        ),
+        (
+            {"foot": FOOT, "more": '<contact><pair geom1="floor" geom2="foot"/></contact>'},
+            "explicit contact pairs",
+        ),
         ({"more": '<actuator><motor joint="knee"/></actuator>'}, "actuators"),
         ({"more": '<equality><joint joint1="knee"/></equality>'}, "equality"),
     ],

@@ -14,7 +14,14 @@ SOFTWARE_GL = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-s
 
 def launch(playwright):
     """Chromium with GL in software; skips where there is none."""
-    program = next((found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), None)
+    program = next(
+        (
+            found
+            for name in ("chromium", "chromium-browser", "google-chrome")
+            if (found := shutil.which(name))
+        ),
+        None,
+    )
     if program is None:
         pytest.skip("needs Chromium (apt: chromium)")
     return playwright.chromium.launch(executable_path=program, args=SOFTWARE_GL)
@@ -24,7 +31,9 @@ def watched_tab(browser, address):
     """A loaded page, what went wrong in it, and the addresses it asked for."""
     tab = browser.new_page(viewport={"width": 900, "height": 700})
     wrong, asked = [], []
-    tab.on("console", lambda message: wrong.append(message.text) if message.type == "error" else None)
+    tab.on(
+        "console", lambda message: wrong.append(message.text) if message.type == "error" else None
+    )
     tab.on("pageerror", lambda error: wrong.append(str(error)))
     tab.on("request", lambda request: asked.append(request.url))
     tab.goto(address)
@@ -44,7 +53,9 @@ def wait_until(tab, expression, seconds=60):
 def canvas(tab):
     """[height, width, 4] what the 3D canvas shows."""
     picture = tab.evaluate("document.getElementById('walk').toDataURL()")
-    return np.asarray(Image.open(io.BytesIO(base64.b64decode(picture.split(",")[1]))).convert("RGBA"), int)
+    return np.asarray(
+        Image.open(io.BytesIO(base64.b64decode(picture.split(",")[1]))).convert("RGBA"), int
+    )
 
 
 def is_blank(picture):

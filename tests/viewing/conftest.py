@@ -20,7 +20,9 @@ def stool_run(stool, tmp_path_factory):
 @pytest.fixture(scope="session")
 def browser():
     """Headless Chromium; needs the apt package chromium and the Python package playwright."""
-    playwright = pytest.importorskip("playwright.sync_api", reason="needs the Python package playwright")
+    playwright = pytest.importorskip(
+        "playwright.sync_api", reason="needs the Python package playwright"
+    )
     with playwright.sync_playwright() as play:
         chromium = launch(play)
         yield chromium

@@ -14,28 +14,57 @@ from mjxgait.gait import TUNING
 def treading(creature, degrees=4.0, period=0.5):
     """Key poses a few degrees around the standing one, by the clock."""
     rng = np.random.default_rng(3)
-    poses = creature.stand + np.radians(rng.uniform(-degrees, degrees, (2, len(creature.joint_names))))
+    poses = creature.stand + np.radians(
+        rng.uniform(-degrees, degrees, (2, len(creature.joint_names)))
+    )
     tuning = dict.fromkeys(TUNING, 0.0) | {"threshold": 0.1, "period": period}
     controller = ControllerConfig(advance="clock")
-    return Champion(creature.name, creature.digest, poses, tuning, controller, 1.0, {}, {"born": 3, "seed": 0, "versions": {"jax": "9.9"}})
+    return Champion(
+        creature.name,
+        creature.digest,
+        poses,
+        tuning,
+        controller,
+        1.0,
+        {},
+        {"born": 3, "seed": 0, "versions": {"jax": "9.9"}},
+    )
 
 
 def falling(creature):
     """Legs straight out to one side: it falls at once."""
     upright = treading(creature)
-    return dataclasses.replace(upright, key_poses=np.stack([creature.pose_high, creature.pose_high]))
+    return dataclasses.replace(
+        upright, key_poses=np.stack([creature.pose_high, creature.pose_high])
+    )
 
 
 def metrics_line(generation):
-    numbers = {"best": 1.0 + generation, "mean": 0.5 * generation, "lower_quartile": 0.3 * generation, "upper_quartile": 0.7 * generation}
-    terms = {"term_distance": float(generation), "term_alive": 1.0, "term_slip": 0.2, "term_drift": None}
-    return {"generation": generation, "forced": generation == 3, "unique": 8, "spread": 0.2} | numbers | terms
+    numbers = {
+        "best": 1.0 + generation,
+        "mean": 0.5 * generation,
+        "lower_quartile": 0.3 * generation,
+        "upper_quartile": 0.7 * generation,
+    }
+    terms = {
+        "term_distance": float(generation),
+        "term_alive": 1.0,
+        "term_slip": 0.2,
+        "term_drift": None,
+    }
+    return (
+        {"generation": generation, "forced": generation == 3, "unique": 8, "spread": 0.2}
+        | numbers
+        | terms
+    )
 
 
 def write_run(folder, creature, champion=None, generations=6):
     """A run folder with metrics and, if there is one, a champion."""
     create_run(folder, creature, Config())
-    (folder / METRICS).write_text("".join(json.dumps(metrics_line(g)) + "\n" for g in range(generations)))
+    (folder / METRICS).write_text(
+        "".join(json.dumps(metrics_line(g)) + "\n" for g in range(generations))
+    )
     if champion is not None:
         write_champion(champion, creature, folder / CHAMPION)
     return folder

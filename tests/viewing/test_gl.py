@@ -31,7 +31,10 @@ def test_both_renderers_draw_the_creature_at_the_same_place(stage, backend):
     difference = np.abs(np.asarray(gl.convert("L"), int) - np.asarray(painter.convert("L"), int))
     assert np.median(difference) < 40
     floor = [np.median(np.asarray(picture.convert("L"))) for picture in (gl, painter)]
-    masks = [np.abs(np.asarray(p.convert("L"), int) - f) > 45 for p, f in zip((gl, painter), floor, strict=True)]
+    masks = [
+        np.abs(np.asarray(p.convert("L"), int) - f) > 45
+        for p, f in zip((gl, painter), floor, strict=True)
+    ]
     # Shadows fall differently; the creatures' own outline does not.
     assert (masks[0] & masks[1]).sum() > 0.6 * min(masks[0].sum(), masks[1].sum())
 
@@ -53,7 +56,15 @@ def test_a_broken_gl_does_not_break_the_command(stool_run, tmp_path):
     """MUJOCO_GL names a library that is not there: importing MuJoCo would fail."""
     done = subprocess.run(
         [
-            *(sys.executable, "-m", "mjxgait", "render", str(stool_run), "--out", str(tmp_path / "walk.webp")),
+            *(
+                sys.executable,
+                "-m",
+                "mjxgait",
+                "render",
+                str(stool_run),
+                "--out",
+                str(tmp_path / "walk.webp"),
+            ),
             *("--seconds", "0.2", "--size", "96", "64"),
         ],
         env=os.environ | {"MUJOCO_GL": "nonsense"},

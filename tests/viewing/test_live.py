@@ -44,7 +44,9 @@ def improve(run, creature, champion):
 
 
 def get(address, **headers):
-    with urllib.request.urlopen(urllib.request.Request(address, headers=headers), timeout=10) as answer:
+    with urllib.request.urlopen(
+        urllib.request.Request(address, headers=headers), timeout=10
+    ) as answer:
         return answer.read()
 
 
@@ -99,7 +101,9 @@ def test_a_port_that_is_taken_is_said(site, run):
 
 
 def test_the_command_tells_its_address_and_ends(run):
-    viewer = subprocess.Popen([sys.executable, "-m", "mjxgait", "view", str(run)], stdout=subprocess.PIPE, text=True)
+    viewer = subprocess.Popen(
+        [sys.executable, "-m", "mjxgait", "view", str(run)], stdout=subprocess.PIPE, text=True
+    )
     try:
         said = viewer.stdout.readline()
         assert said.startswith(f"http://{HERE}:")
@@ -133,7 +137,10 @@ def test_the_page_shows_the_best_and_the_curve_grows(browser, site, run, stool):
     before = tab.inner_html("#curve")
     improve(run, stool, treading(stool, degrees=8.0))
     watcher.look()
-    wait_until(tab, "document.getElementById('walk').src.includes('version=2') && document.getElementById('walk').loaded")
+    wait_until(
+        tab,
+        "document.getElementById('walk').src.includes('version=2') && document.getElementById('walk').loaded",
+    )
     assert tab.inner_html("#curve") != before
     assert not is_blank(canvas(tab))
     assert wrong == []

@@ -22,7 +22,15 @@ CERTIFIED = {
             "number": 7,
             "name": "gait",
             "passed": False,
-            "measures": [{"name": "slip <or> slide", "value": None, "sense": "<=", "threshold": 0.15, "passed": False}],
+            "measures": [
+                {
+                    "name": "slip <or> slide",
+                    "value": None,
+                    "sense": "<=",
+                    "threshold": 0.15,
+                    "passed": False,
+                }
+            ],
         }
     ],
 }

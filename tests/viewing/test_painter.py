@@ -39,7 +39,9 @@ def painted(model):
     """[240, 320] where the shape's red is."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    picture = Painter(model).picture(view(), [(data.geom_xpos, data.geom_xmat.reshape(-1, 3, 3))], np.zeros(2))
+    picture = Painter(model).picture(
+        view(), [(data.geom_xpos, data.geom_xmat.reshape(-1, 3, 3))], np.zeros(2)
+    )
     colour = np.asarray(picture).astype(int)
     return colour[..., 0] - colour[..., 1] > 40, data
 
@@ -54,7 +56,9 @@ def test_rays_hit_where_mujoco_says(kind):
     origins = rng.uniform(-0.35, 0.35, (400, 3)) - 2 * direction
     distance, normal = hit(int(geom), size, origins, direction)
     here = np.eye(3).ravel()
-    expected = [mujoco.mju_rayGeom(np.zeros(3), here, size, o, direction, int(geom), None) for o in origins]
+    expected = [
+        mujoco.mju_rayGeom(np.zeros(3), here, size, o, direction, int(geom), None) for o in origins
+    ]
     expected = np.where(np.array(expected) < 0, np.inf, expected)
     assert np.isfinite(expected).sum() > 30
     np.testing.assert_allclose(distance, expected, atol=1e-6)
@@ -68,7 +72,10 @@ def test_every_shape_is_painted_where_it_is(kind):
     rays = view().rays(np.arange(320), np.arange(240)).reshape(-1, 3)
     into = view().axes[2]
     ids = np.zeros(1, np.int32)
-    seen = [mujoco.mj_ray(model, data, o - 5 * into, into, None, 1, -1, ids) >= 0 and ids[0] == 1 for o in rays[::7]]
+    seen = [
+        mujoco.mj_ray(model, data, o - 5 * into, into, None, 1, -1, ids) >= 0 and ids[0] == 1
+        for o in rays[::7]
+    ]
     assert sum(seen) > 100
     assert (mask.ravel()[::7] == np.array(seen)).mean() > 0.985
 
@@ -85,7 +92,9 @@ def test_nearer_shapes_hide_those_behind():
         painter = Painter(model)
         painter.geoms, painter.colours = painter.geoms[order], painter.colours[order]
         painter.outlines = Silhouettes(model, painter.geoms)
-        picture = painter.picture(camera, [(data.geom_xpos, data.geom_xmat.reshape(-1, 3, 3))], np.zeros(2))
+        picture = painter.picture(
+            camera, [(data.geom_xpos, data.geom_xmat.reshape(-1, 3, 3))], np.zeros(2)
+        )
         red, _, blue = picture.getpixel((100, 95))
         assert red > blue
 

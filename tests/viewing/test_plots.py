@@ -22,14 +22,19 @@ GAIT = {"footfalls", "joints", "trunk", "filmstrip"}
 def is_drawn(file):
     """Whether a picture has something on it: dark marks, also when seen in grey."""
     if file.suffix == ".svg":
-        return len(list(ElementTree.parse(file).iter("{http://www.w3.org/2000/svg}path"))) > 5 or "<image" in file.read_text()
+        return (
+            len(list(ElementTree.parse(file).iter("{http://www.w3.org/2000/svg}path"))) > 5
+            or "<image" in file.read_text()
+        )
     grey = np.asarray(Image.open(file).convert("L"))
     return (grey < 100).mean() > 0.002 and grey.max() == 255
 
 
 def test_all_plots_of_a_run(stool_run, tmp_path):
     files = plot_run(stool_run, tmp_path / "plots")
-    assert {file.name for file in files} == {f"{name}.{kind}" for name in PROGRESS | GAIT for kind in ("png", "svg")}
+    assert {file.name for file in files} == {
+        f"{name}.{kind}" for name in PROGRESS | GAIT for kind in ("png", "svg")
+    }
     assert all(is_drawn(file) for file in files)
 
 
@@ -43,11 +48,15 @@ def test_a_champion_that_falls_can_be_plotted(tmp_path):
     from mjxgait.creature import load_creature
 
     creature = load_creature(find_creature("tall_quadruped"))
-    assert len(plot_run(write_run(tmp_path / "run", creature, falling(creature)), formats=("png",))) == len(PROGRESS | GAIT)
+    assert len(
+        plot_run(write_run(tmp_path / "run", creature, falling(creature)), formats=("png",))
+    ) == len(PROGRESS | GAIT)
 
 
 def test_one_generation_can_be_plotted(stool, tmp_path):
-    assert all(map(is_drawn, plot_run(write_run(tmp_path / "run", stool, generations=1), formats=("png",))))
+    assert all(
+        map(is_drawn, plot_run(write_run(tmp_path / "run", stool, generations=1), formats=("png",)))
+    )
 
 
 def test_nothing_to_plot_is_said(stool, tmp_path):

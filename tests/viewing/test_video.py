@@ -29,7 +29,9 @@ def test_a_video_has_its_frames_and_moves(stool_run, tmp_path, capsys, kind):
     out = tmp_path / f"walk.{kind}"
     code, said = render(capsys, stool_run, "--out", out, *SMALL)
     assert (code, str(out) in said) == (0, True)
-    frames = [np.asarray(frame.convert("RGB"), int) for frame in ImageSequence.Iterator(Image.open(out))]
+    frames = [
+        np.asarray(frame.convert("RGB"), int) for frame in ImageSequence.Iterator(Image.open(out))
+    ]
     assert len(frames) == 8
     assert frames[0].shape == (96, 160, 3)
     assert np.abs(frames[2] - frames[6]).max() > 50
@@ -95,7 +97,9 @@ def test_a_race_has_lanes_beside_each_other_and_labels(stool_walk):
 def test_the_caption_tells_speed_and_fall(stool_walk):
     assert condition(stool_walk, 0) == "0.00 m/s"
     assert condition(stool_walk, 400).endswith("m/s")
-    walk = record_walk(creature := load_creature(find_creature("tall_quadruped")), falling(creature), 6.0)
+    walk = record_walk(
+        creature := load_creature(find_creature("tall_quadruped")), falling(creature), 6.0
+    )
     assert condition(walk, 10_000) == f"fell at {walk.fell:.1f} s"
 
 

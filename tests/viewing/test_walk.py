@@ -17,7 +17,9 @@ def test_targets_are_those_of_the_examiner(stool_walk):
     """Without steering and balance the target is the planned pose."""
     from mjxgait.certify.controller import Controller
 
-    planned = Controller(stool_walk.creature, stool_walk.champion).planned(stool_walk.recording.position)
+    planned = Controller(stool_walk.creature, stool_walk.champion).planned(
+        stool_walk.recording.position
+    )
     np.testing.assert_allclose(stool_walk.targets(), planned)
 
 
@@ -25,7 +27,9 @@ def test_a_walk_that_falls_ends_soon_after():
     from mjxgait.config import find_creature
     from mjxgait.creature import load_creature
 
-    walk = record_walk(creature := load_creature(find_creature("tall_quadruped")), falling(creature), 6.0)
+    walk = record_walk(
+        creature := load_creature(find_creature("tall_quadruped")), falling(creature), 6.0
+    )
     assert walk.fell < 3.0
     assert walk.seconds == pytest.approx(walk.fell + AFTERMATH, abs=0.02)
     assert walk.steady_strides(8) is None

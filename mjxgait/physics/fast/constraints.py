@@ -68,7 +68,10 @@ class Constraints:
 
 
 def along(
-    chains: Sequence[tuple[int, ...]], rows: Sequence[Sequence[jax.Array]], vector: Sequence[jax.Array], pin: Pin
+    chains: Sequence[tuple[int, ...]],
+    rows: Sequence[Sequence[jax.Array]],
+    vector: Sequence[jax.Array],
+    pin: Pin,
 ) -> tuple[jax.Array, ...]:
     """Contact Jacobian times a vector over the degrees of freedom: normal and tangents, three [C, L]."""
 
@@ -76,14 +79,22 @@ def along(
         terms = [row[n] * vector[k] for n, k in enumerate(chain)]
         return sum(terms[1:], terms[0])
 
-    return tuple(pin(jnp.stack([product(row[d], chain) for row, chain in zip(rows, chains, strict=True)])) for d in range(3))
+    return tuple(
+        pin(jnp.stack([product(row[d], chain) for row, chain in zip(rows, chains, strict=True)]))
+        for d in range(3)
+    )
 
 
-def touch(structure: Structure, poses: Sequence[Pose], paths: dict[int, jax.Array], pin: Pin) -> Touch | None:
+def touch(
+    structure: Structure, poses: Sequence[Pose], paths: dict[int, jax.Array], pin: Pin
+) -> Touch | None:
     """Distances and Jacobians of all contacts."""
     if not structure.contacts:
         return None
-    found = [_touch_one(structure, contact, poses[contact.body], paths, pin) for contact in structure.contacts]
+    found = [
+        _touch_one(structure, contact, poses[contact.body], paths, pin)
+        for contact in structure.contacts
+    ]
     return Touch(jnp.stack([distance for distance, _ in found]), tuple(rows for _, rows in found))
 
 
@@ -101,13 +112,17 @@ def _touch_one(
     return distance, pin((rows[2], rows[0], rows[1]))
 
 
-def _point_velocity(path: jax.Array, x: jax.Array, y: jax.Array, z: jax.Array) -> tuple[jax.Array, jax.Array, jax.Array]:
+def _point_velocity(
+    path: jax.Array, x: jax.Array, y: jax.Array, z: jax.Array
+) -> tuple[jax.Array, jax.Array, jax.Array]:
     """World velocity at a point per unit velocity of each degree of freedom, three [n, L]."""
     wx, wy, wz, vx, vy, vz = (path[:, c] for c in range(6))
     return vx + wy * z - wz * y, vy + wz * x - wx * z, vz + wx * y - wy * x
 
 
-def _aligned(rows: tuple[jax.Array, jax.Array, jax.Array], axis: jax.Array, pin: Pin) -> tuple[jax.Array, jax.Array, jax.Array]:
+def _aligned(
+    rows: tuple[jax.Array, jax.Array, jax.Array], axis: jax.Array, pin: Pin
+) -> tuple[jax.Array, jax.Array, jax.Array]:
     """Tangents along and across the capsule's axis as seen from above; along the world's y where it stands upright."""
     length = jnp.sqrt(axis[0] * axis[0] + axis[1] * axis[1])
     upright = length < 0.5
@@ -118,15 +133,26 @@ def _aligned(rows: tuple[jax.Array, jax.Array, jax.Array], axis: jax.Array, pin:
 
 
 def make_constraints(
-    structure: Structure, touch: Touch | None, friction: jax.Array, qpos: jax.Array, qvel: jax.Array, pin: Pin
+    structure: Structure,
+    touch: Touch | None,
+    friction: jax.Array,
+    qpos: jax.Array,
+    qvel: jax.Array,
+    pin: Pin,
 ) -> Constraints | None:
     """The constraints of the current state, None for a model without any."""
     if not structure.contacts and not structure.limits:
         return None
     empty = jnp.zeros((0, friction.shape[-1]), friction.dtype)
-    mu, reference, weight = (empty, (empty,) * 3, empty) if touch is None else _contact_terms(structure, touch, friction, qvel, pin)
+    mu, reference, weight = (
+        (empty, (empty,) * 3, empty)
+        if touch is None
+        else _contact_terms(structure, touch, friction, qvel, pin)
+    )
     limit = _limit_terms(structure, qpos, qvel, pin) if structure.limits else (empty, empty, empty)
-    return Constraints(structure, () if touch is None else touch.rows, mu, reference, weight, *limit)
+    return Constraints(
+        structure, () if touch is None else touch.rows, mu, reference, weight, *limit
+    )
 
 
 def _contact_terms(
@@ -137,24 +163,41 @@ def _contact_terms(
     mu = jnp.maximum(column([c.friction for c in contacts]) * friction, SMALLEST_FRICTION)
     stiffness, damping, impedance, depth = _soften([c.softness for c in contacts], touch.distance)
     # Regulariser of all edges (MJX `_efc_contact_pyramidal`): inverse mass along an edge, scaled by friction.
-    inverse_mass = column([c.weight for c in contacts]) * (1 + mu * mu) * 2 * mu * mu / structure.impratio
-    weight = jnp.where(depth < 0, impedance / jnp.maximum(inverse_mass * (1 - impedance), mujoco.mjMINVAL), 0.0)
+    inverse_mass = (
+        column([c.weight for c in contacts]) * (1 + mu * mu) * 2 * mu * mu / structure.impratio
+    )
+    weight = jnp.where(
+        depth < 0, impedance / jnp.maximum(inverse_mass * (1 - impedance), mujoco.mjMINVAL), 0.0
+    )
     chains = [structure.body_chain[c.body] for c in contacts]
     normal, first, second = along(chains, touch.rows, list(qvel), pin)
-    reference = (-damping * normal - stiffness * impedance * depth, -damping * first, -damping * second)
+    reference = (
+        -damping * normal - stiffness * impedance * depth,
+        -damping * first,
+        -damping * second,
+    )
     return pin(mu), pin(reference), pin(weight)
 
 
-def _limit_terms(structure: Structure, qpos: jax.Array, qvel: jax.Array, pin: Pin) -> tuple[jax.Array, jax.Array, jax.Array]:
+def _limit_terms(
+    structure: Structure, qpos: jax.Array, qvel: jax.Array, pin: Pin
+) -> tuple[jax.Array, jax.Array, jax.Array]:
     limits = structure.limits
     column = partial(_column, dtype=qpos.dtype)
     pos = jnp.stack([qpos[limit.qpos] for limit in limits])
     vel = jnp.stack([qvel[limit.dof] for limit in limits])
-    over_low, under_high = pos - column([limit.low for limit in limits]), column([limit.high for limit in limits]) - pos
+    over_low, under_high = (
+        pos - column([limit.low for limit in limits]),
+        column([limit.high for limit in limits]) - pos,
+    )
     sign = jnp.where(over_low < under_high, 1.0, -1.0)
-    stiffness, damping, impedance, depth = _soften([limit.softness for limit in limits], jnp.minimum(over_low, under_high))
+    stiffness, damping, impedance, depth = _soften(
+        [limit.softness for limit in limits], jnp.minimum(over_low, under_high)
+    )
     inverse_mass = column([limit.weight for limit in limits])
-    weight = jnp.where(depth < 0, impedance / jnp.maximum(inverse_mass * (1 - impedance), mujoco.mjMINVAL), 0.0)
+    weight = jnp.where(
+        depth < 0, impedance / jnp.maximum(inverse_mass * (1 - impedance), mujoco.mjMINVAL), 0.0
+    )
     return pin(sign), pin(-damping * sign * vel - stiffness * impedance * depth), pin(weight)
 
 
@@ -162,15 +205,24 @@ def _column(values: Sequence[float], dtype: np.dtype) -> np.ndarray:
     return np.array(values, dtype)[:, None]
 
 
-def _soften(softness: Sequence[Softness], distance: jax.Array) -> tuple[np.ndarray, np.ndarray, jax.Array, jax.Array]:
+def _soften(
+    softness: Sequence[Softness], distance: jax.Array
+) -> tuple[np.ndarray, np.ndarray, jax.Array, jax.Array]:
     """Stiffness, damping, impedance and distance less margin of constraints [C, L] (computation docs, "Impedance")."""
     column = partial(_column, dtype=distance.dtype)
     low, high, width, mid, power = (column([s.impedance[n] for s in softness]) for n in range(5))
     depth = distance - column([s.margin for s in softness])
     x = jnp.minimum(jnp.abs(depth) / width, 1.0)
     raised = _power(power)
-    y = jnp.where(x < mid, raised(x) / raised(mid) * mid, 1 - raised(1 - x) / raised(1 - mid) * (1 - mid))
-    return column([s.stiffness for s in softness]), column([s.damping for s in softness]), low + y * (high - low), depth
+    y = jnp.where(
+        x < mid, raised(x) / raised(mid) * mid, 1 - raised(1 - x) / raised(1 - mid) * (1 - mid)
+    )
+    return (
+        column([s.stiffness for s in softness]),
+        column([s.damping for s in softness]),
+        low + y * (high - low),
+        depth,
+    )
 
 
 def _power(power: np.ndarray) -> Callable[..., jax.Array]:

@@ -13,7 +13,19 @@ import jax.numpy as jnp
 import numpy as np
 
 from mjxgait.physics.fast.kinematics import Motion, Pose
-from mjxgait.physics.fast.lanes import Pin, Scalar, Vector, axes, cross, dot, minus, plus, scale, table, total
+from mjxgait.physics.fast.lanes import (
+    Pin,
+    Scalar,
+    Vector,
+    axes,
+    cross,
+    dot,
+    minus,
+    plus,
+    scale,
+    table,
+    total,
+)
 from mjxgait.physics.fast.structure import BALL, FREE, HINGE, SLIDE, Body, Structure
 from mjxgait.physics.fast.treematrix import Rows
 
@@ -32,7 +44,11 @@ class Inertia:
     def times(self, motion: Motion) -> Motion:
         """Momentum of a velocity, or force of an acceleration: (moment about the origin, force)."""
         xx, yy, zz, xy, xz, yz = self.turning
-        turned = (dot((xx, xy, xz), motion.spin), dot((xy, yy, yz), motion.spin), dot((xz, yz, zz), motion.spin))
+        turned = (
+            dot((xx, xy, xz), motion.spin),
+            dot((xy, yy, yz), motion.spin),
+            dot((xz, yz, zz), motion.spin),
+        )
         shifted = minus(scale(self.mass, motion.shift), cross(self.moment, motion.spin))
         return Motion(plus(turned, cross(self.moment, motion.shift)), shifted)
 
@@ -47,7 +63,10 @@ def inertias(structure: Structure, poses: Sequence[Pose], like: jax.Array, pin: 
         return np.array(values, like.dtype)[:, None]
 
     def turned(local: Sequence[Sequence[float]]) -> Vector:
-        return tuple(total([column([v[j] for v in local]) * rot[j][:, i] for j in range(3)]) for i in range(3))
+        return tuple(
+            total([column([v[j] for v in local]) * rot[j][:, i] for j in range(3)])
+            for i in range(3)
+        )
 
     center = pin(plus(axes(pos), turned([b.com for b in bodies])))
     first, second = pin((turned([b.axes[0] for b in bodies]), turned([b.axes[1] for b in bodies])))
@@ -73,7 +92,9 @@ def unpack(packed: jax.Array) -> Motion:
     return Motion(axes(packed), axes(packed[:, 3:]))
 
 
-def down(structure: Structure, steps: jax.Array, start: np.ndarray, pin: Pin) -> tuple[list[jax.Array], jax.Array]:
+def down(
+    structure: Structure, steps: jax.Array, start: np.ndarray, pin: Pin
+) -> tuple[list[jax.Array], jax.Array]:
     """Sums from the root: per body its sum [6, L], and per degree of freedom the sum before it [nv, 6, L].
 
     steps: [nv, 6, L], what each degree of freedom adds. start: [6, 1], of the world.
@@ -99,7 +120,11 @@ def up(structure: Structure, own: jax.Array, pin: Pin) -> list[jax.Array]:
 
 
 def _groups(body: Body) -> list[range]:
-    return [range(j.dof + first, j.dof + first + count) for j in body.joints for first, count in CARRIES[j.kind]]
+    return [
+        range(j.dof + first, j.dof + first + count)
+        for j in body.joints
+        for first, count in CARRIES[j.kind]
+    ]
 
 
 def _motion_cross(a: Motion, b: Motion) -> Motion:
@@ -109,10 +134,14 @@ def _motion_cross(a: Motion, b: Motion) -> Motion:
 
 def _force_cross(a: Motion, force: Motion) -> Motion:
     """Rate of change of a momentum carried along by a."""
-    return Motion(plus(cross(a.spin, force.spin), cross(a.shift, force.shift)), cross(a.spin, force.shift))
+    return Motion(
+        plus(cross(a.spin, force.spin), cross(a.shift, force.shift)), cross(a.spin, force.shift)
+    )
 
 
-def bias_force(structure: Structure, body: Inertia, freedom: Motion, qvel: jax.Array, pin: Pin) -> tuple[jax.Array, list[jax.Array]]:
+def bias_force(
+    structure: Structure, body: Inertia, freedom: Motion, qvel: jax.Array, pin: Pin
+) -> tuple[jax.Array, list[jax.Array]]:
     """Coriolis, centrifugal and gravity force (`qfrc_bias`) [nv, L], and every body's velocity [6, L]."""
     steps = Motion(scale(qvel, freedom.spin), scale(qvel, freedom.shift))
     moving, before = down(structure, pack(steps.parts, pin), np.zeros((6, 1), qvel.dtype), pin)
@@ -133,13 +162,19 @@ def by_dof(structure: Structure, bodies: Sequence[jax.Array], pin: Pin) -> jax.A
     return pin(jnp.stack([bodies[b] for b in structure.dof_body]))
 
 
-def mass_rows(structure: Structure, body: Inertia, freedom: Motion, paths: dict[int, jax.Array], pin: Pin) -> Rows:
+def mass_rows(
+    structure: Structure, body: Inertia, freedom: Motion, paths: dict[int, jax.Array], pin: Pin
+) -> Rows:
     """Rows of the mass matrix; paths: see `motion_paths`."""
     like = body.moment[0]
     mass = jnp.broadcast_to(body.mass, like.shape)
-    composite = by_dof(structure, up(structure, pack([*body.turning, *body.moment, mass], pin), pin), pin)
+    composite = by_dof(
+        structure, up(structure, pack([*body.turning, *body.moment, mass], pin), pin), pin
+    )
     parts = [composite[:, c] for c in range(10)]
-    force = pin(Inertia(tuple(parts[:6]), (parts[6], parts[7], parts[8]), parts[9]).times(freedom).parts)
+    force = pin(
+        Inertia(tuple(parts[:6]), (parts[6], parts[7], parts[8]), parts[9]).times(freedom).parts
+    )
     rows = []
     for k, chain in enumerate(structure.pattern.chains):
         own = np.zeros((len(chain), 1), like.dtype)

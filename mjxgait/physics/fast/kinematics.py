@@ -12,7 +12,20 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from mjxgait.physics.fast.lanes import Constants, Pin, Scalar, add, axes, cross, mul, plus, rotation, sub, table, turn
+from mjxgait.physics.fast.lanes import (
+    Constants,
+    Pin,
+    Scalar,
+    add,
+    axes,
+    cross,
+    mul,
+    plus,
+    rotation,
+    sub,
+    table,
+    turn,
+)
 from mjxgait.physics.fast.structure import BALL, FREE, HINGE, SLIDE, Body, Joint, Structure
 
 IDENTITY: Any = tuple(np.eye(3, dtype=np.float32)[:, j : j + 1] for j in range(3))
@@ -75,7 +88,9 @@ def posture(structure: Structure, qpos: jax.Array, pin: Pin) -> tuple[list[Pose]
 
 def motions(freedoms: Sequence[Freedom], like: jax.Array, pin: Pin) -> Motion:
     """The motion that each degree of freedom gives to its body and all below at unit velocity; components [nv, L]."""
-    axis, anchor, slide = (table([getattr(f, part) for f in freedoms], like) for part in ("axis", "anchor", "slide"))
+    axis, anchor, slide = (
+        table([getattr(f, part) for f in freedoms], like) for part in ("axis", "anchor", "slide")
+    )
     axis = pin(axis)
     shift = plus(cross(axes(anchor), axes(axis)), axes(slide))
     return Motion(axes(axis), pin(shift))
@@ -86,7 +101,11 @@ def _pinned(pose: Pose, pin: Pin) -> Pose:
 
 
 def _placed(body: Body, parent: Pose) -> Pose:
-    return Pose(parent.origin, parent.point(body.pos), tuple(turn(parent.rot, column) for column in body.rot))
+    return Pose(
+        parent.origin,
+        parent.point(body.pos),
+        tuple(turn(parent.rot, column) for column in body.rot),
+    )
 
 
 def unit_quaternion(quat: Any) -> tuple[jax.Array, ...]:
@@ -106,7 +125,9 @@ def _ball(joint: Joint, pose: Pose, qpos: jax.Array, pin: Pin) -> tuple[Pose, li
     anchor = pin(pose.point(joint.anchor))
     own = pin(rotation(unit_quaternion(qpos[joint.qpos : joint.qpos + 4])))
     rot = pin(tuple(turn(pose.rot, column) for column in own))
-    return Pose(pose.origin, sub(anchor, turn(rot, joint.anchor)), rot), [Freedom(axis=axis, anchor=anchor) for axis in rot]
+    return Pose(pose.origin, sub(anchor, turn(rot, joint.anchor)), rot), [
+        Freedom(axis=axis, anchor=anchor) for axis in rot
+    ]
 
 
 def _hinge(joint: Joint, pose: Pose, qpos: jax.Array, pin: Pin) -> tuple[Pose, list[Freedom]]:
@@ -114,7 +135,9 @@ def _hinge(joint: Joint, pose: Pose, qpos: jax.Array, pin: Pin) -> tuple[Pose, l
     angle = qpos[joint.qpos] - joint.reference
     sin, cos = pin((jnp.sin(angle), jnp.cos(angle)))
     rot = tuple(turn(pose.rot, column) for column in _about(joint.axis, sin, cos))
-    return Pose(pose.origin, sub(anchor, turn(rot, joint.anchor)), rot), [Freedom(axis=axis, anchor=anchor)]
+    return Pose(pose.origin, sub(anchor, turn(rot, joint.anchor)), rot), [
+        Freedom(axis=axis, anchor=anchor)
+    ]
 
 
 def _slide(joint: Joint, pose: Pose, qpos: jax.Array, pin: Pin) -> tuple[Pose, list[Freedom]]:

@@ -143,6 +143,10 @@ def table(vectors: Sequence[Any], like: jax.Array) -> Any:
     shape = (3, like.shape[-1])
 
     def full(vector: Any) -> jax.Array:
-        return vector if isinstance(vector, jax.Array) else jnp.broadcast_to(np.reshape(np.broadcast_to(vector, 3), (3, 1)), shape)
+        return (
+            vector
+            if isinstance(vector, jax.Array)
+            else jnp.broadcast_to(np.reshape(np.broadcast_to(vector, 3), (3, 1)), shape)
+        )
 
     return jnp.stack([full(v) for v in vectors])

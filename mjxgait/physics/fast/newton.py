@@ -42,14 +42,18 @@ class Iterate:
     residuals: tuple[jax.Array, ...]
 
 
-def constrained_acceleration(problem: Problem, guess: Sequence[Lanes] | None) -> tuple[list[Lanes], list[Lanes]]:
+def constrained_acceleration(
+    problem: Problem, guess: Sequence[Lanes] | None
+) -> tuple[list[Lanes], list[Lanes]]:
     """Acceleration and generalised constraint force, lists of nv [L]; guess: the previous step's acceleration, None for no warm start."""
     structure = problem.constraints.structure
     iterate = Iterate(problem.smooth, problem.force, _residuals(problem, problem.smooth))
     if guess is not None:
         inertial = problem.pin(multiply(structure.pattern, problem.mass, guess))
         warm = Iterate(list(guess), inertial, _residuals(problem, guess))
-        better = problem.pin(jnp.where(_cost(problem, warm) < _cost(problem, iterate), 1.0, 0.0)) > 0.5
+        better = (
+            problem.pin(jnp.where(_cost(problem, warm) < _cost(problem, iterate), 1.0, 0.0)) > 0.5
+        )
         iterate = problem.pin(jax.tree.map(lambda a, b: jnp.where(better, a, b), warm, iterate))
     iterate = _minimised(problem, iterate)
     return iterate.acceleration, _constraint_force(problem, iterate)
@@ -71,7 +75,9 @@ def _minimised(problem: Problem, start: Iterate) -> Iterate:
         kept = jax.tree.map(lambda b, a: jnp.where(going > 0, b, a), new, at)
         return kept, _switched(problem, at, kept), count + 1
 
-    return jax.lax.while_loop(unfinished, body, (start, jnp.ones_like(start.acceleration[0]), jnp.int32(0)))[0]
+    return jax.lax.while_loop(
+        unfinished, body, (start, jnp.ones_like(start.acceleration[0]), jnp.int32(0))
+    )[0]
 
 
 def _switched(problem: Problem, before: Iterate, after: Iterate) -> Lanes:
@@ -83,7 +89,11 @@ def _switched(problem: Problem, before: Iterate, after: Iterate) -> Lanes:
 
 def _residuals(problem: Problem, acceleration: Sequence[Lanes]) -> tuple[jax.Array, ...]:
     c = problem.constraints
-    contact = tuple(a - r for a, r in zip(c.along(acceleration, problem.pin), c.reference, strict=True)) if c.rows else c.reference
+    contact = (
+        tuple(a - r for a, r in zip(c.along(acceleration, problem.pin), c.reference, strict=True))
+        if c.rows
+        else c.reference
+    )
     limit = c.limited(acceleration) - c.limit_reference if c.structure.limits else c.limit_reference
     return problem.pin((*contact, limit))
 
@@ -91,7 +101,13 @@ def _residuals(problem: Problem, acceleration: Sequence[Lanes]) -> tuple[jax.Arr
 def _edges(c: Constraints, values: Sequence[jax.Array]) -> Edges:
     """From the three directions of the contacts to the four edges of the pyramid."""
     normal, first, second, limit = values
-    return [normal + c.friction * first, normal - c.friction * first, normal + c.friction * second, normal - c.friction * second, limit]
+    return [
+        normal + c.friction * first,
+        normal - c.friction * first,
+        normal + c.friction * second,
+        normal - c.friction * second,
+        limit,
+    ]
 
 
 def _weights(c: Constraints) -> Edges:
@@ -116,16 +132,23 @@ def _minus(a: Sequence[Lanes], b: Sequence[Lanes]) -> list[Lanes]:
 def _cost(problem: Problem, at: Iterate) -> Lanes:
     c = problem.constraints
     gauss = _dot(_minus(at.inertial, problem.force), _minus(at.acceleration, problem.smooth))
-    rows = [w * jnp.square(jnp.minimum(r, 0.0)) for w, r in zip(_weights(c), _edges(c, at.residuals), strict=True)]
+    rows = [
+        w * jnp.square(jnp.minimum(r, 0.0))
+        for w, r in zip(_weights(c), _edges(c, at.residuals), strict=True)
+    ]
     return 0.5 * (gauss + _total(rows))
 
 
 def _constraint_force(problem: Problem, at: Iterate) -> list[Lanes]:
     """J^T f with f = -D times the negative residuals."""
     c = problem.constraints
-    f = [-w * jnp.minimum(r, 0.0) for w, r in zip(_weights(c), _edges(c, at.residuals), strict=True)]
+    f = [
+        -w * jnp.minimum(r, 0.0) for w, r in zip(_weights(c), _edges(c, at.residuals), strict=True)
+    ]
     sideways = (c.friction * (f[0] - f[1]), c.friction * (f[2] - f[3]))
-    normal, first, second, limit = problem.pin((f[0] + f[1] + f[2] + f[3], *sideways, c.sign * f[4]))
+    normal, first, second, limit = problem.pin(
+        (f[0] + f[1] + f[2] + f[3], *sideways, c.sign * f[4])
+    )
     terms: list[list[Lanes]] = [[] for _ in problem.force]
     for n, chain in enumerate(c.chains):
         for position, k in enumerate(chain):
@@ -143,26 +166,44 @@ def _improved(problem: Problem, at: Iterate) -> Iterate:
     uphill = _minus(_minus(at.inertial, problem.force), _constraint_force(problem, at))
     step = solve(pattern, factor(pattern, _hessian(problem, at)), [-g for g in uphill])
     inertial = pin(multiply(pattern, problem.mass, step))
-    change = (*(c.along(step, pin) if c.rows else c.reference), c.limited(step) if c.structure.limits else c.limit_reference)
+    change = (
+        *(c.along(step, pin) if c.rows else c.reference),
+        c.limited(step) if c.structure.limits else c.limit_reference,
+    )
     length = _line_search(problem, at, step, inertial, change)
 
     def moved(values: Sequence[jax.Array], changes: Sequence[jax.Array]) -> list[jax.Array]:
         return pin([v + length * d for v, d in zip(values, changes, strict=True)])
 
-    return Iterate(moved(at.acceleration, step), moved(at.inertial, inertial), tuple(moved(at.residuals, change)))
+    return Iterate(
+        moved(at.acceleration, step),
+        moved(at.inertial, inertial),
+        tuple(moved(at.residuals, change)),
+    )
 
 
 def _hessian(problem: Problem, at: Iterate) -> Rows:
     """Rows of M + J^T D J over the rows that are active."""
     c, pin = problem.constraints, problem.pin
-    d = [jnp.where(r < 0, w, 0.0) for w, r in zip(_weights(c), _edges(c, at.residuals), strict=True)]
+    d = [
+        jnp.where(r < 0, w, 0.0) for w, r in zip(_weights(c), _edges(c, at.residuals), strict=True)
+    ]
     mu = c.friction
-    mixed, squares = (mu * (d[0] - d[1]), mu * (d[2] - d[3])), (mu * mu * (d[0] + d[1]), mu * mu * (d[2] + d[3]))
+    mixed, squares = (
+        (mu * (d[0] - d[1]), mu * (d[2] - d[3])),
+        (mu * mu * (d[0] + d[1]), mu * mu * (d[2] + d[3])),
+    )
     nn, n1, n2, t1, t2, limit = pin((d[0] + d[1] + d[2] + d[3], *mixed, *squares, d[4]))
     rows = list(problem.mass)
     for n, chain in enumerate(c.chains):
         normal, first, second = c.rows[n]
-        weighted = pin((nn[n] * normal + n1[n] * first + n2[n] * second, n1[n] * normal + t1[n] * first, n2[n] * normal + t2[n] * second))
+        weighted = pin(
+            (
+                nn[n] * normal + n1[n] * first + n2[n] * second,
+                n1[n] * normal + t1[n] * first,
+                n2[n] * normal + t2[n] * second,
+            )
+        )
         for position, k in enumerate(chain):
             upto = position + 1
             for part, row in zip(weighted, (normal, first, second), strict=True):
@@ -174,7 +215,13 @@ def _hessian(problem: Problem, at: Iterate) -> Rows:
     return tuple(rows)
 
 
-def _line_search(problem: Problem, at: Iterate, step: Sequence[Lanes], inertial: Sequence[Lanes], change: Sequence[jax.Array]) -> Lanes:
+def _line_search(
+    problem: Problem,
+    at: Iterate,
+    step: Sequence[Lanes],
+    inertial: Sequence[Lanes],
+    change: Sequence[jax.Array],
+) -> Lanes:
     """The length [L] that minimises the cost along a step: Newton on its derivative, which grows piecewise linearly, kept in a bracket."""
     c, pin = problem.constraints, problem.pin
     slope = pin(_dot(step, _minus(at.inertial, problem.force)))

@@ -14,7 +14,21 @@ from mjxgait.physics.fast.constraints import Touch, make_constraints, touch
 from mjxgait.physics.fast.dynamics import bias_force, inertias, mass_rows, motion_paths
 from mjxgait.physics.fast.kernel import one_kernel
 from mjxgait.physics.fast.kinematics import WORLD, Pose, motions, posture, unit_quaternion
-from mjxgait.physics.fast.lanes import Constants, Matrix, add, columns, constant, constants, cross, mul, parts, pinned_by, sub, table, turn
+from mjxgait.physics.fast.lanes import (
+    Constants,
+    Matrix,
+    add,
+    columns,
+    constant,
+    constants,
+    cross,
+    mul,
+    parts,
+    pinned_by,
+    sub,
+    table,
+    turn,
+)
 from mjxgait.physics.fast.newton import Problem, constrained_acceleration
 from mjxgait.physics.fast.structure import BALL, FREE, Structure, read_structure
 from mjxgait.physics.fast.treematrix import Rows, factor, solve
@@ -74,19 +88,31 @@ class FastPlant:
         bias = pin(bias + self._resistance(state))
         paths = motion_paths(structure, freedom, pin)
         mass = mass_rows(structure, body, freedom, paths, pin)
-        return self._sense(state, poses, moving, bias), Workings(mass, bias, touch(structure, poses, paths, pin))
+        return self._sense(state, poses, moving, bias), Workings(
+            mass, bias, touch(structure, poses, paths, pin)
+        )
 
     def _resistance(self, state: BodyState) -> jax.Array:
         """Spring and damper forces against the motion, [nv, L]."""
         s = self.structure
-        spring, reference, damping = (np.array(x, state.qpos.dtype)[:, None] for x in (s.spring, s.spring_reference, s.damping))
-        stretched: Any = spring * (take(state.qpos, np.array(s.dof_qpos)) - reference) if np.any(spring) else 0.0
+        spring, reference, damping = (
+            np.array(x, state.qpos.dtype)[:, None]
+            for x in (s.spring, s.spring_reference, s.damping)
+        )
+        stretched: Any = (
+            spring * (take(state.qpos, np.array(s.dof_qpos)) - reference) if np.any(spring) else 0.0
+        )
         return stretched + damping * state.qvel
 
-    def _sense(self, state: BodyState, poses: Sequence[Pose], moving: Sequence[jax.Array], bias: jax.Array) -> Sensed:
+    def _sense(
+        self, state: BodyState, poses: Sequence[Pose], moving: Sequence[jax.Array], bias: jax.Array
+    ) -> Sensed:
         pose, motion = poses[self.layout.trunk - 1], moving[self.layout.trunk - 1]
         seen = [self._look(w, poses) for w in self.watched]
-        shift = [m + c for m, c in zip(motion[3:], cross(tuple(motion[:3]), parts(pose.pos)), strict=True)]
+        shift = [
+            m + c
+            for m, c in zip(motion[3:], cross(tuple(motion[:3]), parts(pose.pos)), strict=True)
+        ]
         like = state.friction
         return Sensed(
             joint_pos=take(state.qpos, self.layout.qpos_adr),
@@ -106,7 +132,11 @@ class FastPlant:
         pos = pose.far_point(geom.pos)
         down = [turn(pose.rot, column)[2] for column in geom.rot]
         box = add(*(mul(b, abs(d)) for b, d in zip(geom.box, down, strict=True)))
-        round_reach = jnp.sqrt(add(*(mul(e * e, d * d) for e, d in zip(geom.ellipsoid, down, strict=True)))) if any(geom.ellipsoid) else 0.0
+        round_reach = (
+            jnp.sqrt(add(*(mul(e * e, d * d) for e, d in zip(geom.ellipsoid, down, strict=True))))
+            if any(geom.ellipsoid)
+            else 0.0
+        )
         return pos, sub(sub(pos[2] - geom.radius, box), round_reach)
 
     def _solve_damped(self, mass: Rows, damping: jax.Array, force: jax.Array) -> list[jax.Array]:
@@ -123,15 +153,21 @@ class FastPlant:
         pattern, pin = structure.pattern, pinned_by(state.friction)
         force = list(torque - workings.bias)
         smooth = solve(pattern, factor(pattern, workings.mass), force)
-        constraints = make_constraints(structure, workings.touch, state.friction, state.qpos, state.qvel, pin)
+        constraints = make_constraints(
+            structure, workings.touch, state.friction, state.qpos, state.qvel, pin
+        )
         if constraints is None:
             acceleration, pushed = smooth, [jnp.zeros_like(state.friction)] * len(smooth)
         else:
             problem = Problem(workings.mass, force, smooth, constraints, pin)
-            acceleration, pushed = constrained_acceleration(problem, list(state.warmstart) if structure.warm_start else None)
+            acceleration, pushed = constrained_acceleration(
+                problem, list(state.warmstart) if structure.warm_start else None
+            )
         warmstart = jnp.stack(acceleration)
         qvel = state.qvel + structure.step * warmstart
-        return BodyState(self._moved(state.qpos, qvel), qvel, warmstart, jnp.stack(pushed), state.friction)
+        return BodyState(
+            self._moved(state.qpos, qvel), qvel, warmstart, jnp.stack(pushed), state.friction
+        )
 
     def _moved(self, qpos: jax.Array, qvel: jax.Array) -> jax.Array:
         """Positions after a step at these velocities (semi-implicit Euler)."""
@@ -179,7 +215,9 @@ def fast_plant(model: mujoco.MjModel, layout: SenseLayout) -> FastPlant:
     Raises:
       UnsupportedModel: it does not; the message says why.
     """
-    return FastPlant(read_structure(model), layout, tuple(_watched(model, int(g)) for g in layout.watched))
+    return FastPlant(
+        read_structure(model), layout, tuple(_watched(model, int(g)) for g in layout.watched)
+    )
 
 
 def _watched(model: mujoco.MjModel, geom: int) -> Watched:

@@ -9,7 +9,9 @@ from mjxgait.physics.fast.lanes import Constants, Matrix, columns, constants
 from mjxgait.physics.fast.support import check_supported
 from mjxgait.physics.fast.treematrix import Sparsity, sparsity
 
-FREE, BALL, SLIDE, HINGE = (int(getattr(mujoco.mjtJoint, f"mjJNT_{name}")) for name in ("FREE", "BALL", "SLIDE", "HINGE"))
+FREE, BALL, SLIDE, HINGE = (
+    int(getattr(mujoco.mjtJoint, f"mjJNT_{name}")) for name in ("FREE", "BALL", "SLIDE", "HINGE")
+)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -123,12 +125,16 @@ def read_structure(model: mujoco.MjModel) -> Structure:
         pattern=sparsity([int(p) for p in model.dof_parentid]),
         body_chain=chains,
         dof_body=tuple(int(b) - 1 for b in model.dof_bodyid),
-        dof_qpos=tuple(int(model.jnt_qposadr[j] + k - model.jnt_dofadr[j]) for k, j in enumerate(joints)),
+        dof_qpos=tuple(
+            int(model.jnt_qposadr[j] + k - model.jnt_dofadr[j]) for k, j in enumerate(joints)
+        ),
         spring=constants(model.jnt_stiffness[joints].reshape(-1)),
         spring_reference=constants(model.qpos_spring[[int(model.jnt_qposadr[j]) for j in joints]]),
         damping=constants(model.dof_damping),
         armature=constants(model.dof_armature),
-        contacts=() if unconstrained or off & flag.mjDSBL_CONTACT else tuple(c for g in contact_geoms for c in _contacts(model, g)),
+        contacts=()
+        if unconstrained or off & flag.mjDSBL_CONTACT
+        else tuple(c for g in contact_geoms for c in _contacts(model, g)),
         limits=() if unconstrained or off & flag.mjDSBL_LIMIT else _limits(model),
         gravity=gravity,
         step=float(model.opt.timestep),
@@ -172,7 +178,9 @@ def _body(model: mujoco.MjModel, b: int) -> Body:
     )
 
 
-def softness(model: mujoco.MjModel, solref: np.ndarray, solimp: np.ndarray, margin: float) -> Softness:
+def softness(
+    model: mujoco.MjModel, solref: np.ndarray, solimp: np.ndarray, margin: float
+) -> Softness:
     """The parameters as MuJoCo's engine uses them (computation docs, "Parameters"; MJX `constraint._kbi`)."""
     time, ratio = (float(x) for x in solref)
     low, high, width, mid, power = (float(x) for x in solimp)
@@ -194,7 +202,11 @@ def _contacts(model: mujoco.MjModel, pair: tuple[int, int]) -> list[Contact]:
     rot = np.array(columns(model.geom_quat[geom])).T
     capsule = int(model.geom_type[geom]) == int(mujoco.mjtGeom.mjGEOM_CAPSULE)
     half = model.geom_size[geom][1] * rot[:, 2]
-    centers = [model.geom_pos[geom] + half, model.geom_pos[geom] - half] if capsule else [model.geom_pos[geom]]
+    centers = (
+        [model.geom_pos[geom] + half, model.geom_pos[geom] - half]
+        if capsule
+        else [model.geom_pos[geom]]
+    )
     return [
         Contact(
             body=body - 1,
@@ -221,7 +233,11 @@ def _mixed(model: mujoco.MjModel, a: int, b: int) -> tuple[float, np.ndarray, np
     else:
         mix = weight_a / (weight_a + weight_b)
     ref_a, ref_b = model.geom_solref[a], model.geom_solref[b]
-    solref = mix * ref_a + (1 - mix) * ref_b if ref_a[0] > 0 and ref_b[0] > 0 else np.minimum(ref_a, ref_b)
+    solref = (
+        mix * ref_a + (1 - mix) * ref_b
+        if ref_a[0] > 0 and ref_b[0] > 0
+        else np.minimum(ref_a, ref_b)
+    )
     solimp = mix * model.geom_solimp[a] + (1 - mix) * model.geom_solimp[b]
     return max(model.geom_friction[a][0], model.geom_friction[b][0]), solref, solimp
 

@@ -5,7 +5,14 @@ from typing import Any
 import mujoco
 import numpy as np
 
-PLANE, SPHERE, CAPSULE = (int(t) for t in (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_SPHERE, mujoco.mjtGeom.mjGEOM_CAPSULE))
+PLANE, SPHERE, CAPSULE = (
+    int(t)
+    for t in (
+        mujoco.mjtGeom.mjGEOM_PLANE,
+        mujoco.mjtGeom.mjGEOM_SPHERE,
+        mujoco.mjtGeom.mjGEOM_CAPSULE,
+    )
+)
 FREE, BALL = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_BALL)
 
 
@@ -37,11 +44,20 @@ def _check_options(model: mujoco.MjModel) -> None:
     _refuse(option.solver != mujoco.mjtSolver.mjSOL_NEWTON, "the solver is not Newton")
     _refuse(option.cone != mujoco.mjtCone.mjCONE_PYRAMIDAL, "the friction cone is not pyramidal")
     implicit_damping = not off & flag.mjDSBL_EULERDAMP and np.any(model.dof_damping)
-    _refuse(implicit_damping, "joints have damping and eulerdamp is on (disable it: damping is explicit)")
+    _refuse(
+        implicit_damping,
+        "joints have damping and eulerdamp is on (disable it: damping is explicit)",
+    )
     _refuse(off & (flag.mjDSBL_SPRING | flag.mjDSBL_DAMPER), "springs or dampers are disabled")
     _refuse(option.noslip_iterations, "noslip iterations")
-    _refuse((option.density, option.viscosity, *option.wind), "fluid forces (density, viscosity or wind)")
-    _refuse(option.enableflags & ~int(mujoco.mjtEnableBit.mjENBL_ENERGY), "an enable flag other than energy")
+    _refuse(
+        (option.density, option.viscosity, *option.wind),
+        "fluid forces (density, viscosity or wind)",
+    )
+    _refuse(
+        option.enableflags & ~int(mujoco.mjtEnableBit.mjENBL_ENERGY),
+        "an enable flag other than energy",
+    )
 
 
 def _check_elements(model: mujoco.MjModel) -> None:
@@ -64,12 +80,18 @@ def _check_elements(model: mujoco.MjModel) -> None:
 def _check_joints(model: mujoco.MjModel) -> None:
     rotates = np.isin(model.jnt_type, (FREE, BALL))
     _refuse(model.jnt_limited.astype(bool) & rotates, "a ball joint has a limit")
-    _refuse((model.jnt_stiffness.reshape(model.njnt, -1) != 0).any(axis=1) & rotates, "a ball or free joint has stiffness")
+    _refuse(
+        (model.jnt_stiffness.reshape(model.njnt, -1) != 0).any(axis=1) & rotates,
+        "a ball or free joint has stiffness",
+    )
     _refuse(model.dof_frictionloss, "joints have dry friction (frictionloss)")
     _refuse(getattr(model, "jnt_stiffnesspoly", 0), "joints have nonlinear stiffness")
     _refuse(getattr(model, "dof_dampingpoly", 0), "joints have nonlinear damping")
     balls = np.nonzero(model.jnt_type == BALL)[0]
-    _refuse(model.body_jntnum[model.jnt_bodyid[balls]] > 1, "a ball joint shares its body with another joint")
+    _refuse(
+        model.body_jntnum[model.jnt_bodyid[balls]] > 1,
+        "a ball joint shares its body with another joint",
+    )
 
 
 def _contact_pairs(model: mujoco.MjModel) -> list[tuple[int, int]]:
@@ -87,7 +109,10 @@ def _contact_pairs(model: mujoco.MjModel) -> list[tuple[int, int]]:
 def _check_pair(model: mujoco.MjModel, floor: int, geom: int) -> None:
     names = " and ".join(model.geom(g).name or f"geom {g}" for g in (floor, geom))
     _refuse(model.geom_type[floor] != PLANE, f"{names} can touch, and neither is a plane")
-    _refuse(not _is_floor(model, floor), f"{names} can touch, and the plane is not the floor z = 0 of the world")
+    _refuse(
+        not _is_floor(model, floor),
+        f"{names} can touch, and the plane is not the floor z = 0 of the world",
+    )
     known = np.isin(model.geom_type[geom], (SPHERE, CAPSULE))
     _refuse(not known, f"{names} can touch: only spheres and capsules may touch the floor")
     condim, priority = model.geom_condim[[floor, geom]], model.geom_priority[[floor, geom]]
@@ -97,19 +122,31 @@ def _check_pair(model: mujoco.MjModel, floor: int, geom: int) -> None:
 
 
 def _is_floor(model: mujoco.MjModel, plane: int) -> bool:
-    level = np.allclose(model.geom_quat[plane], (1, 0, 0, 0)) or np.allclose(model.geom_quat[plane][1:3], 0)
+    level = np.allclose(model.geom_quat[plane], (1, 0, 0, 0)) or np.allclose(
+        model.geom_quat[plane][1:3], 0
+    )
     return bool(model.geom_bodyid[plane] == 0 and model.geom_pos[plane][2] == 0 and level)
 
 
 def _may_touch(model: mujoco.MjModel, a: int, b: int) -> bool:
     """MuJoCo's collision filter (computation docs, "Selection")."""
-    if not (model.geom_contype[a] & model.geom_conaffinity[b] or model.geom_contype[b] & model.geom_conaffinity[a]):
+    if not (
+        model.geom_contype[a] & model.geom_conaffinity[b]
+        or model.geom_contype[b] & model.geom_conaffinity[a]
+    ):
         return False
     body_a, body_b = sorted((int(model.geom_bodyid[a]), int(model.geom_bodyid[b])))
     weld_a, weld_b = model.body_weldid[body_a], model.body_weldid[body_b]
     if weld_a == weld_b or (body_a << 16) + body_b in set(model.exclude_signature):
         return False
-    if model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_FILTERPARENT or weld_a == 0 or weld_b == 0:
+    if (
+        model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_FILTERPARENT
+        or weld_a == 0
+        or weld_b == 0
+    ):
         return True
-    parent_a, parent_b = model.body_weldid[model.body_parentid[weld_a]], model.body_weldid[model.body_parentid[weld_b]]
+    parent_a, parent_b = (
+        model.body_weldid[model.body_parentid[weld_a]],
+        model.body_weldid[model.body_parentid[weld_b]],
+    )
     return bool(weld_a != parent_b and weld_b != parent_a)

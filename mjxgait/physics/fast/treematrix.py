@@ -57,7 +57,9 @@ def factor(pattern: Sparsity, rows: Rows) -> Factor:
             row = row - lower[m][position] * lower[m][: position + 1]
         pivots[k] = jnp.sqrt(row[-1])
         lower[k] = row / pivots[k]
-    return Factor(tuple(lower[k] for k in range(len(rows))), tuple(pivots[k] for k in range(len(rows))))
+    return Factor(
+        tuple(lower[k] for k in range(len(rows))), tuple(pivots[k] for k in range(len(rows)))
+    )
 
 
 def solve(pattern: Sparsity, lower: Factor, rhs: Sequence[jax.Array]) -> list[jax.Array]:
