@@ -1,7 +1,7 @@
 """Contacts with the floor and joint limits as MuJoCo's soft constraints.
 
 A contact of MuJoCo's pyramidal cone has four edges, normal plus or minus friction times each tangent. Here it is kept in its three
-directions (normal, first, second tangent), of which the edges are combinations: a third of the Jacobian, and the friction enters late.
+directions (normal, first, second tangent), of which the edges are combinations, and the friction enters late.
 All contacts' values lie side by side in arrays [C, L], the limits' in [M, L]. Formulas: MuJoCo documentation, "Computation", sections
 "Constraint model" and "Contact", and MJX's constraint.py.
 """
@@ -9,127 +9,122 @@ All contacts' values lie side by side in arrays [C, L], the limits' in [M, L]. F
 import dataclasses
 from collections.abc import Callable, Sequence
 from functools import partial
+from itertools import groupby
+from typing import Any
 
 import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
 
-from mjxgait.physics.fast.kinematics import Pose
+from mjxgait.physics.fast.footing import Directions, Footing, Moves, Touch
+from mjxgait.physics.fast.kinematics import Motion, Pose
 from mjxgait.physics.fast.lanes import Pin, add, turn
-from mjxgait.physics.fast.structure import Contact, Softness, Structure
+from mjxgait.physics.fast.structure import Carriers, Contact, Softness, Structure
 
 SMALLEST_FRICTION = 1e-5
 """mjMINMU, under which MuJoCo's engine lets no friction coefficient fall."""
-
-
-@jax.tree_util.register_dataclass
-@dataclasses.dataclass(frozen=True)
-class Touch:
-    """Geometry of all contacts.
-
-    distance: [C, L] m. rows: per contact its Jacobian along normal and tangents, [n, L] over its chain of degrees of freedom.
-    """
-
-    distance: jax.Array
-    rows: tuple[tuple[jax.Array, jax.Array, jax.Array], ...]
 
 
 @dataclasses.dataclass(frozen=True)
 class Constraints:
     """All that the solver needs to know.
 
-    structure, rows: chains and Jacobians. friction: [C, L]. reference: three [C, L], what the accelerations along normal and tangents are
-    compared with. weight: [C, L] inverse regulariser of an edge, zero where there is no contact. The same of limits: sign, limit_reference,
-    limit_weight [M, L].
+    structure. footing: the contacts' Jacobian, None without contacts. friction: [C, L].
+    reference: what the accelerations along normal and tangents are compared with.
+    weight: [C, L] inverse regulariser of an edge, zero where there is no contact.
+    sign, limit_reference, limit_weight: [M, L], the same of limits.
     """
 
     structure: Structure
-    rows: tuple[tuple[jax.Array, jax.Array, jax.Array], ...]
+    footing: Footing | None
     friction: jax.Array
-    reference: tuple[jax.Array, ...]
+    reference: Directions
     weight: jax.Array
     sign: jax.Array
     limit_reference: jax.Array
     limit_weight: jax.Array
 
-    @property
-    def chains(self) -> list[tuple[int, ...]]:
-        """Per contact the degrees of freedom that move it."""
-        return [self.structure.body_chain[c.body] for c in self.structure.contacts]
-
-    def along(self, vector: Sequence[jax.Array], pin: Pin) -> tuple[jax.Array, ...]:
-        """J x of contacts along normal and tangents, three [C, L]."""
-        return along(self.chains, self.rows, vector, pin)
-
-    def limited(self, vector: Sequence[jax.Array]) -> jax.Array:
-        """J x of limits, [M, L]."""
-        return self.sign * jnp.stack([vector[limit.dof] for limit in self.structure.limits])
-
-
-def along(
-    chains: Sequence[tuple[int, ...]],
-    rows: Sequence[Sequence[jax.Array]],
-    vector: Sequence[jax.Array],
-    pin: Pin,
-) -> tuple[jax.Array, ...]:
-    """Contact Jacobian times a vector over the degrees of freedom: normal and tangents, three [C, L]."""
-
-    def product(row: jax.Array, chain: tuple[int, ...]) -> jax.Array:
-        terms = [row[n] * vector[k] for n, k in enumerate(chain)]
-        return sum(terms[1:], terms[0])
-
-    return tuple(
-        pin(jnp.stack([product(row[d], chain) for row, chain in zip(rows, chains, strict=True)]))
-        for d in range(3)
-    )
+    def along(self, vector: Sequence[jax.Array]) -> tuple[jax.Array, ...]:
+        """J x of contacts along normal and tangents, three [C, L], and of limits [M, L]."""
+        contact = self.footing.along(vector) if self.footing else self.reference
+        limits = self.structure.limits
+        if not limits:
+            return (*contact, self.limit_reference)
+        return (*contact, self.sign * jnp.stack([vector[limit.dof] for limit in limits]))
 
 
 def touch(
-    structure: Structure, poses: Sequence[Pose], paths: dict[int, jax.Array], pin: Pin
+    structure: Structure,
+    poses: Sequence[Pose],
+    freedom: Motion,
+    paths: dict[int, jax.Array],
+    pin: Pin,
 ) -> Touch | None:
-    """Distances and Jacobians of all contacts."""
+    """Where all contacts are and what moves them; paths: see `dynamics.motion_paths`."""
     if not structure.contacts:
         return None
-    found = [
-        _touch_one(structure, contact, poses[contact.body], paths, pin)
-        for contact in structure.contacts
+    places = [
+        _placed(list(contacts), poses[body])
+        for body, contacts in groupby(structure.contacts, key=lambda c: c.body)
     ]
-    return Touch(jnp.stack([distance for distance, _ in found]), tuple(rows for _, rows in found))
+    x, y, z, origin, radius = (pin(jnp.concatenate(column)) for column in zip(*places, strict=True))
+    distance = pin(origin + z - radius)
+    return Touch(
+        distance=distance,
+        # MuJoCo puts the contact point half way between the two surfaces.
+        points=pin((x, y, z - radius - 0.5 * distance)),
+        tangent=_tangents(structure.contacts, poses, pin),
+        moves=_moves(structure.carriers, freedom, paths, pin),
+    )
 
 
-def _touch_one(
-    structure: Structure, contact: Contact, pose: Pose, paths: dict[int, jax.Array], pin: Pin
-) -> tuple[jax.Array, tuple[jax.Array, jax.Array, jax.Array]]:
-    center = pin(pose.point(contact.center))
-    distance = pin(add(pose.origin, center)[2] - contact.radius)
-    # MuJoCo puts the contact point half way between the two surfaces.
-    height = pin(center[2] - contact.radius - 0.5 * distance)
-    chain = structure.body_chain[contact.body]
-    rows = _point_velocity(paths[chain[-1]][: len(chain)], center[0], center[1], height)
-    if contact.axis is not None:
-        rows = _aligned(rows, pin(turn(pose.rot, contact.axis)), pin)
-    return distance, pin((rows[2], rows[0], rows[1]))
+def _moves(tree: Carriers, freedom: Motion, paths: dict[int, jax.Array], pin: Pin) -> Moves:
+    """Of the degrees of freedom that move contacts."""
+    free = tree.root >= 0
+    packed = jnp.stack(freedom.parts, axis=1)
+    return Moves(
+        turns=pin(packed[3:6, :3]) if free else None,
+        freedom=pin(jnp.stack([packed[k] for k in tree.dofs])) if tree.dofs else None,
+        paths=tuple(paths[k][6 if free else 0 :] for k in tree.leaves),
+    )
 
 
-def _point_velocity(
-    path: jax.Array, x: jax.Array, y: jax.Array, z: jax.Array
-) -> tuple[jax.Array, jax.Array, jax.Array]:
-    """World velocity at a point per unit velocity of each degree of freedom, three [n, L]."""
-    wx, wy, wz, vx, vy, vz = (path[:, c] for c in range(6))
-    return vx + wy * z - wz * y, vy + wz * x - wx * z, vz + wx * y - wy * x
+def _placed(contacts: Sequence[Contact], pose: Pose) -> tuple[jax.Array, ...]:
+    """Centres from the origin, height of the origin and radii of the contacts of one body, [c, L] each."""
+    local = np.array([c.center for c in contacts], np.float32)
+    x, y, z = (
+        add(*(pose.rot[j][i] * local[:, j, None] for j in range(3)), _component(pose.pos, i))
+        for i in range(3)
+    )
+    like = jnp.ones_like(x)
+    radius = np.array([c.radius for c in contacts], np.float32)[:, None]
+    return x, y, z, like * _component(pose.origin, 2), like * radius
 
 
-def _aligned(
-    rows: tuple[jax.Array, jax.Array, jax.Array], axis: jax.Array, pin: Pin
-) -> tuple[jax.Array, jax.Array, jax.Array]:
-    """Tangents along and across the capsule's axis as seen from above; along the world's y where it stands upright."""
-    length = jnp.sqrt(axis[0] * axis[0] + axis[1] * axis[1])
+def _component(vector: Any, i: int) -> Any:
+    return vector if isinstance(vector, float) else vector[i]
+
+
+def _tangents(
+    contacts: Sequence[Contact], poses: Sequence[Pose], pin: Pin
+) -> tuple[jax.Array, jax.Array] | None:
+    """Along the capsule's axis as seen from above; the world's y where it stands upright, and x for a sphere."""
+    if all(contact.axis is None for contact in contacts):
+        return None
+    like = poses[contacts[0].body].rot[0][0]
+
+    def heading(contact: Contact) -> tuple[jax.Array, jax.Array]:
+        if contact.axis is None:
+            return jnp.ones_like(like), jnp.zeros_like(like)
+        axis = turn(poses[contact.body].rot, contact.axis)
+        return axis[0], axis[1]
+
+    x, y = pin(tuple(jnp.stack(part) for part in zip(*map(heading, contacts), strict=True)))
+    length = jnp.sqrt(x * x + y * y)
     upright = length < 0.5
     safe = jnp.where(upright, 1.0, length)
-    x, y = jnp.where(upright, 0.0, axis[0] / safe), jnp.where(upright, 1.0, axis[1] / safe)
-    x, y = pin((x, y))
-    return rows[0] * x + rows[1] * y, rows[1] * x - rows[0] * y, rows[2]
+    return pin((jnp.where(upright, 0.0, x / safe), jnp.where(upright, 1.0, y / safe)))
 
 
 def make_constraints(
@@ -150,9 +145,8 @@ def make_constraints(
         else _contact_terms(structure, touch, friction, qvel, pin)
     )
     limit = _limit_terms(structure, qpos, qvel, pin) if structure.limits else (empty, empty, empty)
-    return Constraints(
-        structure, () if touch is None else touch.rows, mu, reference, weight, *limit
-    )
+    footing = None if touch is None else Footing(structure, touch, pin)
+    return Constraints(structure, footing, mu, reference, weight, *limit)
 
 
 def _contact_terms(
@@ -169,8 +163,7 @@ def _contact_terms(
     weight = jnp.where(
         depth < 0, impedance / jnp.maximum(inverse_mass * (1 - impedance), mujoco.mjMINVAL), 0.0
     )
-    chains = [structure.body_chain[c.body] for c in contacts]
-    normal, first, second = along(chains, touch.rows, list(qvel), pin)
+    normal, first, second = Footing(structure, touch, pin).along(list(qvel))
     reference = (
         -damping * normal - stiffness * impedance * depth,
         -damping * first,

@@ -22,6 +22,7 @@ from mjxgait.physics.fast.lanes import (
     mul,
     plus,
     rotation,
+    sin_cos,
     sub,
     table,
     turn,
@@ -133,7 +134,7 @@ def _ball(joint: Joint, pose: Pose, qpos: jax.Array, pin: Pin) -> tuple[Pose, li
 def _hinge(joint: Joint, pose: Pose, qpos: jax.Array, pin: Pin) -> tuple[Pose, list[Freedom]]:
     anchor, axis = pin((pose.point(joint.anchor), turn(pose.rot, joint.axis)))
     angle = qpos[joint.qpos] - joint.reference
-    sin, cos = pin((jnp.sin(angle), jnp.cos(angle)))
+    sin, cos = pin(sin_cos(angle))
     rot = tuple(turn(pose.rot, column) for column in _about(joint.axis, sin, cos))
     return Pose(pose.origin, sub(anchor, turn(rot, joint.anchor)), rot), [
         Freedom(axis=axis, anchor=anchor)

@@ -17,17 +17,20 @@ from mjxgait.physics.fast.lanes import Pin
 from mjxgait.physics.fast.treematrix import Rows, factor, multiply, solve
 
 Lanes = jax.Array
+Search = tuple[Lanes, Lanes, Lanes, Lanes, jax.Array]
+"""Bracket, length, whether the lane goes on, and the number of evaluations."""
+FLAT = 1e-5
+"""Of the slope at the start: where less is left, a line search is over."""
 Edges = list[jax.Array]
 """One value per constraint row: four arrays [C, L] of the contacts' edges, and one [M, L] of the limits."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Problem:
-    """mass: rows of M. force: [nv] list of [L], M a_smooth."""
+    """mass: rows of M. force: [nv] list of [L], all but the constraints'."""
 
     mass: Rows
     force: list[Lanes]
-    smooth: list[Lanes]
     constraints: Constraints
     pin: Pin
 
@@ -43,19 +46,16 @@ class Iterate:
 
 
 def constrained_acceleration(
-    problem: Problem, guess: Sequence[Lanes] | None
+    problem: Problem, guess: Sequence[Lanes]
 ) -> tuple[list[Lanes], list[Lanes]]:
-    """Acceleration and generalised constraint force, lists of nv [L]; guess: the previous step's acceleration, None for no warm start."""
-    structure = problem.constraints.structure
-    iterate = Iterate(problem.smooth, problem.force, _residuals(problem, problem.smooth))
-    if guess is not None:
-        inertial = problem.pin(multiply(structure.pattern, problem.mass, guess))
-        warm = Iterate(list(guess), inertial, _residuals(problem, guess))
-        better = (
-            problem.pin(jnp.where(_cost(problem, warm) < _cost(problem, iterate), 1.0, 0.0)) > 0.5
-        )
-        iterate = problem.pin(jax.tree.map(lambda a, b: jnp.where(better, a, b), warm, iterate))
-    iterate = _minimised(problem, iterate)
+    """Acceleration and generalised constraint force, lists of nv [L].
+
+    guess: where to start, the previous step's acceleration. MuJoCo would try the smooth acceleration too and take the better; where no row
+    is active Newton's first step leads there from anywhere, and elsewhere the guess is the better but for a few steps in a thousand.
+    """
+    inertial = problem.pin(multiply(problem.constraints.structure.pattern, problem.mass, guess))
+    start = Iterate(list(guess), inertial, _residuals(problem, guess))
+    iterate = _minimised(problem, start)
     return iterate.acceleration, _constraint_force(problem, iterate)
 
 
@@ -89,13 +89,9 @@ def _switched(problem: Problem, before: Iterate, after: Iterate) -> Lanes:
 
 def _residuals(problem: Problem, acceleration: Sequence[Lanes]) -> tuple[jax.Array, ...]:
     c = problem.constraints
-    contact = (
-        tuple(a - r for a, r in zip(c.along(acceleration, problem.pin), c.reference, strict=True))
-        if c.rows
-        else c.reference
-    )
-    limit = c.limited(acceleration) - c.limit_reference if c.structure.limits else c.limit_reference
-    return problem.pin((*contact, limit))
+    references = (*c.reference, c.limit_reference)
+    found = zip(c.along(acceleration), references, strict=True)
+    return problem.pin(tuple(a - r for a, r in found))
 
 
 def _edges(c: Constraints, values: Sequence[jax.Array]) -> Edges:
@@ -129,34 +125,26 @@ def _minus(a: Sequence[Lanes], b: Sequence[Lanes]) -> list[Lanes]:
     return [x - y for x, y in zip(a, b, strict=True)]
 
 
-def _cost(problem: Problem, at: Iterate) -> Lanes:
-    c = problem.constraints
-    gauss = _dot(_minus(at.inertial, problem.force), _minus(at.acceleration, problem.smooth))
-    rows = [
-        w * jnp.square(jnp.minimum(r, 0.0))
-        for w, r in zip(_weights(c), _edges(c, at.residuals), strict=True)
-    ]
-    return 0.5 * (gauss + _total(rows))
-
-
 def _constraint_force(problem: Problem, at: Iterate) -> list[Lanes]:
     """J^T f with f = -D times the negative residuals."""
     c = problem.constraints
     f = [
         -w * jnp.minimum(r, 0.0) for w, r in zip(_weights(c), _edges(c, at.residuals), strict=True)
     ]
-    sideways = (c.friction * (f[0] - f[1]), c.friction * (f[2] - f[3]))
     normal, first, second, limit = problem.pin(
-        (f[0] + f[1] + f[2] + f[3], *sideways, c.sign * f[4])
+        (
+            f[0] + f[1] + f[2] + f[3],
+            c.friction * (f[0] - f[1]),
+            c.friction * (f[2] - f[3]),
+            c.sign * f[4],
+        )
     )
-    terms: list[list[Lanes]] = [[] for _ in problem.force]
-    for n, chain in enumerate(c.chains):
-        for position, k in enumerate(chain):
-            row = [direction[position] for direction in c.rows[n]]
-            terms[k].append(row[0] * normal[n] + row[1] * first[n] + row[2] * second[n])
+    gathered = c.footing.gathered((normal, first, second)) if c.footing else {}
+    none = jnp.zeros_like(problem.force[0])
+    force = [gathered.get(k, none) for k in range(len(problem.force))]
     for n, bound in enumerate(c.structure.limits):
-        terms[bound.dof].append(limit[n])
-    return problem.pin([sum(t[1:], t[0]) if t else jnp.zeros_like(problem.force[0]) for t in terms])
+        force[bound.dof] = force[bound.dof] + limit[n]
+    return problem.pin(force)
 
 
 def _improved(problem: Problem, at: Iterate) -> Iterate:
@@ -166,10 +154,7 @@ def _improved(problem: Problem, at: Iterate) -> Iterate:
     uphill = _minus(_minus(at.inertial, problem.force), _constraint_force(problem, at))
     step = solve(pattern, factor(pattern, _hessian(problem, at)), [-g for g in uphill])
     inertial = pin(multiply(pattern, problem.mass, step))
-    change = (
-        *(c.along(step, pin) if c.rows else c.reference),
-        c.limited(step) if c.structure.limits else c.limit_reference,
-    )
+    change = c.along(step)
     length = _line_search(problem, at, step, inertial, change)
 
     def moved(values: Sequence[jax.Array], changes: Sequence[jax.Array]) -> list[jax.Array]:
@@ -193,21 +178,8 @@ def _hessian(problem: Problem, at: Iterate) -> Rows:
         (mu * (d[0] - d[1]), mu * (d[2] - d[3])),
         (mu * mu * (d[0] + d[1]), mu * mu * (d[2] + d[3])),
     )
-    nn, n1, n2, t1, t2, limit = pin((d[0] + d[1] + d[2] + d[3], *mixed, *squares, d[4]))
-    rows = list(problem.mass)
-    for n, chain in enumerate(c.chains):
-        normal, first, second = c.rows[n]
-        weighted = pin(
-            (
-                nn[n] * normal + n1[n] * first + n2[n] * second,
-                n1[n] * normal + t1[n] * first,
-                n2[n] * normal + t2[n] * second,
-            )
-        )
-        for position, k in enumerate(chain):
-            upto = position + 1
-            for part, row in zip(weighted, (normal, first, second), strict=True):
-                rows[k] = rows[k] + part[position] * row[:upto]
+    *stiffness, limit = pin((d[0] + d[1] + d[2] + d[3], *mixed, *squares, d[4]))
+    rows = list(c.footing.stiffened(problem.mass, stiffness) if c.footing else problem.mass)
     for n, bound in enumerate(c.structure.limits):
         last = np.zeros((rows[bound.dof].shape[0], 1), limit.dtype)
         last[-1] = 1.0
@@ -236,13 +208,20 @@ def _line_search(
             stiffs.append(jnp.where(now < 0, w * d * d, 0.0))
         return slope + length * curvature + _total(pulls), curvature + _total(stiffs)
 
-    def narrowed(_: int, bracket: tuple[Lanes, Lanes, Lanes]) -> tuple[Lanes, Lanes, Lanes]:
-        low, high, length = bracket
+    def unfinished(carry: Search) -> jax.Array:
+        return (carry[-1] < c.structure.line_iterations) & jnp.any(carry[-2] > 0)
+
+    def narrowed(carry: Search) -> Search:
+        low, high, length, going, count = carry
         first, second = pin(derivatives(length))
         low, high = jnp.where(first < 0, length, low), jnp.where(first < 0, high, length)
         newton = length - first / jnp.maximum(second, np.finfo(slope.dtype).tiny)
         middle = jnp.where(high < jnp.inf, 0.5 * (low + high), 2.0 * length)
-        return low, high, pin(jnp.where((newton >= low) & (newton <= high), newton, middle))
+        found = jnp.where((newton >= low) & (newton <= high), newton, middle)
+        # A finished lane stands still, so that its result does not depend on its neighbours.
+        going = jnp.where(jnp.abs(first) > FLAT * jnp.abs(slope), going, 0.0)
+        return low, high, pin(jnp.where(going > 0, found, length)), pin(going), count + 1
 
-    bracket = (jnp.zeros_like(slope), jnp.full_like(slope, jnp.inf), jnp.ones_like(slope))
-    return jax.lax.fori_loop(0, c.structure.line_iterations, narrowed, bracket)[2]
+    one = jnp.ones_like(slope)
+    start = (jnp.zeros_like(slope), jnp.full_like(slope, jnp.inf), one, one, jnp.int32(0))
+    return jax.lax.while_loop(unfinished, narrowed, start)[2]

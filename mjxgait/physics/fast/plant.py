@@ -10,8 +10,9 @@ import mujoco
 import numpy as np
 
 from mjxgait.creature import geometry
-from mjxgait.physics.fast.constraints import Touch, make_constraints, touch
+from mjxgait.physics.fast.constraints import make_constraints, touch
 from mjxgait.physics.fast.dynamics import bias_force, inertias, mass_rows, motion_paths
+from mjxgait.physics.fast.footing import Touch
 from mjxgait.physics.fast.kernel import one_kernel
 from mjxgait.physics.fast.kinematics import WORLD, Pose, motions, posture, unit_quaternion
 from mjxgait.physics.fast.lanes import (
@@ -25,6 +26,7 @@ from mjxgait.physics.fast.lanes import (
     mul,
     parts,
     pinned_by,
+    sin_cos,
     sub,
     table,
     turn,
@@ -89,7 +91,7 @@ class FastPlant:
         paths = motion_paths(structure, freedom, pin)
         mass = mass_rows(structure, body, freedom, paths, pin)
         return self._sense(state, poses, moving, bias), Workings(
-            mass, bias, touch(structure, poses, paths, pin)
+            mass, bias, touch(structure, poses, freedom, paths, pin)
         )
 
     def _resistance(self, state: BodyState) -> jax.Array:
@@ -150,19 +152,19 @@ class FastPlant:
 
     def _advance(self, state: BodyState, workings: Workings, torque: jax.Array) -> BodyState:
         structure = self.structure
-        pattern, pin = structure.pattern, pinned_by(state.friction)
-        force = list(torque - workings.bias)
-        smooth = solve(pattern, factor(pattern, workings.mass), force)
+        pin, force = pinned_by(state.friction), list(torque - workings.bias)
         constraints = make_constraints(
             structure, workings.touch, state.friction, state.qpos, state.qvel, pin
         )
-        if constraints is None:
-            acceleration, pushed = smooth, [jnp.zeros_like(state.friction)] * len(smooth)
+        if constraints is None or not structure.warm_start:
+            guess = solve(structure.pattern, factor(structure.pattern, workings.mass), force)
         else:
-            problem = Problem(workings.mass, force, smooth, constraints, pin)
-            acceleration, pushed = constrained_acceleration(
-                problem, list(state.warmstart) if structure.warm_start else None
-            )
+            guess = list(state.warmstart)
+        if constraints is None:
+            acceleration, pushed = guess, [jnp.zeros_like(state.friction)] * len(force)
+        else:
+            problem = Problem(workings.mass, force, constraints, pin)
+            acceleration, pushed = constrained_acceleration(problem, guess)
         warmstart = jnp.stack(acceleration)
         qvel = state.qvel + structure.step * warmstart
         return BodyState(
@@ -190,8 +192,9 @@ def turned(quat: jax.Array, spin: jax.Array, step: float) -> list[jax.Array]:
     w, x, y, z = unit_quaternion(quat)
     speed = jnp.sqrt(spin[0] * spin[0] + spin[1] * spin[1] + spin[2] * spin[2])
     half = 0.5 * step * speed
-    sine = jnp.where(speed > 0, jnp.sin(half) / jnp.where(speed > 0, speed, 1.0), 0.5 * step)
-    a, (b, c, d) = jnp.cos(half), (sine * spin[0], sine * spin[1], sine * spin[2])
+    sin, cos = sin_cos(half)
+    sine = jnp.where(speed > 0, sin / jnp.where(speed > 0, speed, 1.0), 0.5 * step)
+    a, (b, c, d) = cos, (sine * spin[0], sine * spin[1], sine * spin[2])
     product = (
         w * a - x * b - y * c - z * d,
         w * b + x * a + y * d - z * c,

@@ -1,6 +1,8 @@
 """What the fast physics needs of a model, as plain Python constants."""
 
 import dataclasses
+from collections import Counter
+from collections.abc import Sequence
 
 import mujoco
 import numpy as np
@@ -12,6 +14,7 @@ from mjxgait.physics.fast.treematrix import Sparsity, sparsity
 FREE, BALL, SLIDE, HINGE = (
     int(getattr(mujoco.mjtJoint, f"mjJNT_{name}")) for name in ("FREE", "BALL", "SLIDE", "HINGE")
 )
+FREEDOMS = {FREE: 6, BALL: 3, SLIDE: 1, HINGE: 1}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -79,9 +82,33 @@ class Limit:
     softness: Softness
 
 
+@dataclasses.dataclass(frozen=True)
+class Carriers:
+    """The part of the tree that moves contacts.
+
+    root: the body of a free root, -1 where there is none; it is not among the following.
+    bodies: (body, parent, places of its own degrees of freedom in `dofs`), parents first.
+    dofs: degrees of freedom; per one of them body_of: its body, lengths: of its chain down to it,
+      path_of: the place in `leaves` of a chain that it belongs to.
+    leaves: the last degrees of freedom of chains that together hold all of `dofs`.
+    contacts: (body, how many contacts it has), in the order of the contacts.
+    """
+
+    root: int
+    bodies: tuple[tuple[int, int, tuple[int, ...]], ...]
+    dofs: tuple[int, ...]
+    body_of: tuple[int, ...]
+    lengths: tuple[int, ...]
+    path_of: tuple[int, ...]
+    leaves: tuple[int, ...]
+    contacts: tuple[tuple[int, int], ...]
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class Structure:
     """All constants of a model.
+
+    contacts: in the order of their bodies.
 
     body_chain: per body its degrees of freedom from the root, ancestors' included (its row pattern is the chain of the last of them).
     spring, spring_reference, damping, armature: [nv], linear in the joint's position and velocity.
@@ -105,6 +132,7 @@ class Structure:
     line_iterations: int
     tolerance: float
     warm_start: bool
+    carriers: Carriers
 
 
 def read_structure(model: mujoco.MjModel) -> Structure:
@@ -120,9 +148,13 @@ def read_structure(model: mujoco.MjModel) -> Structure:
     gravity = (0.0, 0.0, 0.0) if off & flag.mjDSBL_GRAVITY else constants(model.opt.gravity)
     unconstrained = bool(off & flag.mjDSBL_CONSTRAINT)
     joints = model.dof_jntid
+    bodies = tuple(_body(model, b) for b in range(1, model.nbody))
+    pattern = sparsity([int(p) for p in model.dof_parentid])
+    touching = [] if unconstrained or off & flag.mjDSBL_CONTACT else contact_geoms
+    contacts = sorted((c for g in touching for c in _contacts(model, g)), key=lambda c: c.body)
     return Structure(
-        bodies=tuple(_body(model, b) for b in range(1, model.nbody)),
-        pattern=sparsity([int(p) for p in model.dof_parentid]),
+        bodies=bodies,
+        pattern=pattern,
         body_chain=chains,
         dof_body=tuple(int(b) - 1 for b in model.dof_bodyid),
         dof_qpos=tuple(
@@ -132,9 +164,7 @@ def read_structure(model: mujoco.MjModel) -> Structure:
         spring_reference=constants(model.qpos_spring[[int(model.jnt_qposadr[j]) for j in joints]]),
         damping=constants(model.dof_damping),
         armature=constants(model.dof_armature),
-        contacts=()
-        if unconstrained or off & flag.mjDSBL_CONTACT
-        else tuple(c for g in contact_geoms for c in _contacts(model, g)),
+        contacts=tuple(contacts),
         limits=() if unconstrained or off & flag.mjDSBL_LIMIT else _limits(model),
         gravity=gravity,
         step=float(model.opt.timestep),
@@ -143,6 +173,37 @@ def read_structure(model: mujoco.MjModel) -> Structure:
         line_iterations=int(model.opt.ls_iterations),
         tolerance=float(model.opt.tolerance),
         warm_start=not off & flag.mjDSBL_WARMSTART,
+        carriers=_carriers(bodies, pattern, contacts),
+    )
+
+
+def _carriers(bodies: tuple[Body, ...], pattern: Sparsity, contacts: Sequence[Contact]) -> Carriers:
+    counts = Counter(contact.body for contact in contacts)
+    moved: set[int] = set()
+    for body in counts:
+        while body >= 0:
+            moved.add(body)
+            body = bodies[body].parent
+    trees = [b for b in moved if bodies[b].parent < 0]
+    root = 0 if trees == [0] and [j.kind for j in bodies[0].joints] == [FREE] else -1
+    rest = sorted(moved - {root})
+    own = {b: [j.dof + n for j in bodies[b].joints for n in range(FREEDOMS[j.kind])] for b in rest}
+    dofs = [k for b in rest for k in own[b]]
+    above = 6 if root == 0 else 0
+    leaf_of: dict[int, int] = {}
+    for leaf in reversed(dofs):
+        if leaf not in leaf_of:
+            leaf_of |= {k: leaf for k in pattern.chains[leaf][above:] if k not in leaf_of}
+    leaves = sorted(set(leaf_of.values()))
+    return Carriers(
+        root=root,
+        bodies=tuple((b, bodies[b].parent, tuple(map(dofs.index, own[b]))) for b in rest),
+        dofs=tuple(dofs),
+        body_of=tuple(b for b in rest for _ in own[b]),
+        lengths=tuple(len(pattern.chains[k]) - above for k in dofs),
+        path_of=tuple(leaves.index(leaf_of[k]) for k in dofs),
+        leaves=tuple(leaves),
+        contacts=tuple(sorted(counts.items())),
     )
 
 

@@ -1,0 +1,199 @@
+"""The Jacobian J of all contacts, never written out: each contact is a point of a body, and bodies move as the tree moves them.
+
+J x is the velocity of the points when the bodies are moved by x (a sum down the tree); J^T f is the points' forces gathered at their
+bodies and summed up the tree; J^T D J is the mass matrix's own recursion with the contacts' stiffness in the place of inertia (Featherstone,
+"Rigid Body Dynamics Algorithms", chapter 6). A further contact on a body costs a few dozen operations, however long its chain.
+Contacts' values are [C, L] along normal and two tangents; a body's are slabs [6, L] (angular before linear) or [21, L].
+"""
+
+import dataclasses
+from collections.abc import Sequence
+
+import jax
+import jax.numpy as jnp
+
+from mjxgait.physics.fast.kinematics import Motion
+from mjxgait.physics.fast.lanes import Pin, axes, cross, dot, plus, total
+from mjxgait.physics.fast.structure import Carriers, Structure
+from mjxgait.physics.fast.treematrix import Rows
+
+Directions = tuple[jax.Array, jax.Array, jax.Array]
+"""Normal, first and second tangent, [C, L] each."""
+
+
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass(frozen=True)
+class Moves:
+    """Unit motions of degrees of freedom, about and through the tree's origin.
+
+    turns: [3, 3, L] axes of a free root, which turns about the origin and shifts along the world's
+      axes; None for another root.
+    freedom: [n, 6, L] of the other degrees of freedom.
+    paths: [m, 6, L] along chains of them.
+    """
+
+    turns: jax.Array | None
+    freedom: jax.Array | None
+    paths: tuple[jax.Array, ...]
+
+    def rooted(self, force: Sequence[jax.Array], pin: Pin) -> jax.Array:
+        """What six components of force [n, L] do along the six motions of the root: [n, 6, L]."""
+        turned = total([force[c][:, None] * self.turns[None, :, c] for c in range(3)])
+        return pin(jnp.concatenate([jnp.stack(force[3:], axis=1), turned], axis=1))
+
+    def along_chains(self, tree: Carriers, force: Sequence[jax.Array], pin: Pin) -> list[jax.Array]:
+        """What the force [n, L] of each degree of freedom does along its chain from the root."""
+        head = None if self.turns is None else self.rooted(force, pin)
+        rows = []
+        for place, length in enumerate(tree.lengths):
+            path = self.paths[tree.path_of[place]]
+            own = total([f[place] * path[:length, c] for c, f in enumerate(force)])
+            rows.append(own if head is None else jnp.concatenate([head[place], own]))
+        return rows
+
+
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass(frozen=True)
+class Touch:
+    """Geometry of all contacts.
+
+    distance: [C, L] m. points: x, y, z from the tree's origin, [C, L] m.
+    tangent: x and y of the first tangent, [C, L], or None where it is the world's x for all.
+    moves: of the degrees of freedom that move contacts.
+    """
+
+    distance: jax.Array
+    points: tuple[jax.Array, jax.Array, jax.Array]
+    tangent: tuple[jax.Array, jax.Array] | None
+    moves: Moves
+
+
+@dataclasses.dataclass(frozen=True)
+class Footing:
+    """The operators of one state."""
+
+    structure: Structure
+    touch: Touch
+    pin: Pin
+
+    def along(self, vector: Sequence[jax.Array]) -> Directions:
+        """J x for x [nv] list of [L]."""
+        tree, turns = self.structure.carriers, self.touch.moves.turns
+        moving: dict[int, jax.Array] = {}
+        if turns is not None:
+            spin = total([turns[j] * vector[3 + j] for j in range(3)])
+            moving[tree.root] = self.pin(jnp.concatenate([spin, jnp.stack(vector[:3])]))
+        own = jnp.stack([vector[k] for k in tree.dofs])[:, None] if tree.dofs else None
+        steps = None if own is None else self.pin(self.touch.moves.freedom * own)
+        for body, parent, places in tree.bodies:
+            above = [moving[parent]] if parent in moving else []
+            moving[body] = self.pin(total([*above, *(steps[place] for place in places)]))
+        slabs = [jnp.broadcast_to(moving[b], (n, *moving[b].shape)) for b, n in tree.contacts]
+        motion = self.pin(jnp.concatenate(slabs))
+        vx, vy, vz = plus(axes(motion[:, 3:]), cross(axes(motion), self.touch.points))
+        if self.touch.tangent is None:
+            return self.pin((vz, vx, vy))
+        tx, ty = self.touch.tangent
+        return self.pin((vz, vx * tx + vy * ty, vy * tx - vx * ty))
+
+    def gathered(self, force: Directions) -> dict[int, jax.Array]:
+        """J^T f: per degree of freedom that moves a contact, [L]."""
+        normal, first, second = force
+        sideways = (first, second)
+        if self.touch.tangent is not None:
+            tx, ty = self.touch.tangent
+            sideways = (first * tx - second * ty, first * ty + second * tx)
+        pull = (*sideways, normal)
+        tree, moves = self.structure.carriers, self.touch.moves
+        wrench = self._summed((*cross(self.touch.points, pull), *pull))
+        shares: dict[int, jax.Array] = {}
+        if moves.turns is not None:
+            whole = wrench[tree.root]
+            shares = {k: whole[3 + k] for k in range(3)}
+            shares |= {3 + j: dot(moves.turns[j], whole[:3]) for j in range(3)}
+        if tree.dofs:
+            product = moves.freedom * jnp.stack([wrench[b] for b in tree.body_of])
+            share = self.pin(total([product[:, c] for c in range(6)]))
+            shares |= {k: share[place] for place, k in enumerate(tree.dofs)}
+        return shares
+
+    def stiffened(self, mass: Rows, stiffness: Sequence[jax.Array]) -> Rows:
+        """Rows of M + J^T D J.
+
+        stiffness: of each contact D along nn, n1, n2, 11 and 22 (D is zero along 12), [C, L].
+        """
+        tree, moves = self.structure.carriers, self.touch.moves
+        held = self._summed(_spatial(self._in_world(stiffness), self.touch.points))
+        rows = dict(enumerate(mass))
+        if moves.turns is not None:
+            xx, yy, zz, xy, xz, yz = held[tree.root][15:]
+            slides = [jnp.stack([xx]), jnp.stack([xy, yy]), jnp.stack([xz, yz, zz])]
+            turning = Motion(axes(moves.turns), (0.0, 0.0, 0.0))
+            spatial = [held[tree.root][c] for c in range(21)]
+            added = moves.rooted(_resistance(spatial, turning), self.pin)
+            rows |= {k: mass[k] + slides[k] for k in range(3)}
+            rows |= {3 + j: mass[3 + j] + added[j, : 4 + j] for j in range(3)}
+        if tree.dofs:
+            below = jnp.stack([held[b] for b in tree.body_of])
+            motion = Motion(axes(moves.freedom), axes(moves.freedom[:, 3:]))
+            force = self.pin(_resistance([below[:, c] for c in range(21)], motion))
+            added = moves.along_chains(tree, force, self.pin)
+            rows |= {k: mass[k] + row for k, row in zip(tree.dofs, added, strict=True)}
+        return tuple(rows[k] for k in range(len(mass)))
+
+    def _summed(self, values: Sequence[jax.Array]) -> dict[int, jax.Array]:
+        """Contacts' components [C, L] summed over each body and all below: [components, L]."""
+        tree, packed = self.structure.carriers, self.pin(jnp.stack(values, axis=1))
+        own, first = {}, 0
+        for body, count in tree.contacts:
+            own[body] = [packed[c] for c in range(first, first + count)]
+            first += count
+        sums: dict[int, jax.Array] = {}
+        root = [] if self.touch.moves.turns is None else [(tree.root, -1)]
+        for body, _ in [*((b, parent) for b, parent, _ in tree.bodies)][::-1] + root:
+            below = [sums[b] for b, parent, _ in tree.bodies if parent == body]
+            sums[body] = self.pin(total([*own.get(body, []), *below]))
+        return sums
+
+    def _in_world(self, stiffness: Sequence[jax.Array]) -> tuple[jax.Array, ...]:
+        """D along xx, yy, zz, xy, xz, yz."""
+        nn, n1, n2, t1, t2 = stiffness
+        if self.touch.tangent is None:
+            return t1, t2, nn, jnp.zeros_like(nn), n1, n2
+        tx, ty = self.touch.tangent
+        xx, yy, xy = t1 * tx * tx + t2 * ty * ty, t1 * ty * ty + t2 * tx * tx, (t1 - t2) * tx * ty
+        return xx, yy, nn, xy, n1 * tx - n2 * ty, n1 * ty + n2 * tx
+
+
+def _spatial(stiffness: Sequence[jax.Array], points: Sequence[jax.Array]) -> list[jax.Array]:
+    """A spring's stiffness at a point, as felt at the origin: 6 angular, 9 mixed and 6 linear components.
+
+    Mixed ones are the force along x, y, z per turn about x, then about y, then about z.
+    """
+    xx, yy, zz, xy, xz, yz = stiffness
+    x, y, z = points
+    columns = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
+    # A turn about x moves the point by (0, -z, y), about y by (z, 0, -x), about z by (-y, x, 0).
+    turns = [
+        [columns[2][i] * y - columns[1][i] * z for i in range(3)],
+        [columns[0][i] * z - columns[2][i] * x for i in range(3)],
+        [columns[1][i] * x - columns[0][i] * y for i in range(3)],
+    ]
+    moments = [cross((x, y, z), (force[0], force[1], force[2])) for force in turns]
+    angular = [moments[j][i] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
+    return [*angular, *(component for force in turns for component in force), *stiffness]
+
+
+def _resistance(spatial: Sequence[jax.Array], motion: Motion) -> tuple[jax.Array, ...]:
+    """Moment and force of a spatial stiffness against a motion, as `_spatial` orders its components."""
+    sxx, syy, szz, sxy, sxz, syz = spatial[:6]
+    about = (spatial[6:9], spatial[9:12], spatial[12:15])
+    lxx, lyy, lzz, lxy, lxz, lyz = spatial[15:]
+    spin, shift = motion.spin, motion.shift
+    moment = plus(
+        (dot((sxx, sxy, sxz), spin), dot((sxy, syy, syz), spin), dot((sxz, syz, szz), spin)),
+        tuple(dot(column, shift) for column in about),
+    )
+    turned = tuple(dot([about[j][i] for j in range(3)], spin) for i in range(3))
+    pushed = (dot((lxx, lxy, lxz), shift), dot((lxy, lyy, lyz), shift), dot((lxz, lyz, lzz), shift))
+    return (*moment, *plus(turned, pushed))
