@@ -18,7 +18,7 @@ KINDS = {
 }
 HEAD = """
   <compiler angle="radian" autolimits="false" inertiafromgeom="false"/>
-  <option timestep="0.005" integrator="Euler" cone="pyramidal" solver="Newton" iterations="4" ls_iterations="8">
+  <option timestep="0.005" integrator="Euler" cone="pyramidal" solver="Newton" iterations="3" ls_iterations="8">
     <flag eulerdamp="disable"/>
   </option>
   <visual>

@@ -17,6 +17,7 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 
+from mjxgait.physics.fast.dynamics import root_axes
 from mjxgait.physics.fast.footing import Directions, Footing, Moves, Touch
 from mjxgait.physics.fast.kinematics import Motion, Pose
 from mjxgait.physics.fast.lanes import Pin, add, turn
@@ -81,12 +82,12 @@ def touch(
 
 def _moves(tree: Carriers, freedom: Motion, paths: dict[int, jax.Array], pin: Pin) -> Moves:
     """Of the degrees of freedom that move contacts."""
-    free = tree.root >= 0
+    first = 6 if tree.root >= 0 else 0
     packed = jnp.stack(freedom.parts, axis=1)
     return Moves(
-        turns=pin(packed[3:6, :3]) if free else None,
+        turns=pin(root_axes(freedom)) if first else None,
         freedom=pin(jnp.stack([packed[k] for k in tree.dofs])) if tree.dofs else None,
-        paths=tuple(paths[k][6 if free else 0 :] for k in tree.leaves),
+        paths=tuple(paths[k][first:] for k in tree.leaves),
     )
 
 

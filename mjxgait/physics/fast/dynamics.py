@@ -175,12 +175,38 @@ def mass_rows(
     force = pin(
         Inertia(tuple(parts[:6]), (parts[6], parts[7], parts[8]), parts[9]).times(freedom).parts
     )
+    first = root_freedoms(structure)
+    head = rooted(force, root_axes(freedom), pin) if first else None
     rows = []
     for k, chain in enumerate(structure.pattern.chains):
-        own = np.zeros((len(chain), 1), like.dtype)
-        own[-1] = structure.armature[k]
-        rows.append(total([f[k] * paths[k][: len(chain), c] for c, f in enumerate(force)]) + own)
+        armature = np.zeros((len(chain), 1), like.dtype)
+        armature[-1] = structure.armature[k]
+        path = paths[k][first : len(chain)]
+        row = total([f[k] * path[:, c] for c, f in enumerate(force)])
+        if head is not None:
+            row = head[k, : k + 1] if k < first else jnp.concatenate([head[k], row])
+        rows.append(row + armature)
     return tuple(rows)
+
+
+def root_freedoms(structure: Structure) -> int:
+    """How many degrees of freedom a free root has that everything hangs on; 0 for another root."""
+    alone = sum(body.parent < 0 for body in structure.bodies) == 1
+    return 6 if alone and [j.kind for j in structure.bodies[0].joints] == [FREE] else 0
+
+
+def root_axes(freedom: Motion) -> jax.Array:
+    """The axes [3, 3, L] about which a free root turns; it shifts along the world's."""
+    return jnp.stack([part[3:6] for part in freedom.spin], axis=1)
+
+
+def rooted(force: Sequence[jax.Array], turns: jax.Array, pin: Pin) -> jax.Array:
+    """What forces [n, L] (moment before force) do along the six motions of a free root: [n, 6, L].
+
+    A third of the work of six inner products, for most entries of the root's unit motions are zero.
+    """
+    turned = total([force[c][:, None] * turns[None, :, c] for c in range(3)])
+    return pin(jnp.concatenate([jnp.stack(force[3:], axis=1), turned], axis=1))
 
 
 def motion_paths(structure: Structure, freedom: Motion, pin: Pin) -> dict[int, jax.Array]:

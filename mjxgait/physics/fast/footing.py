@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import jax
 import jax.numpy as jnp
 
+from mjxgait.physics.fast.dynamics import rooted
 from mjxgait.physics.fast.kinematics import Motion
 from mjxgait.physics.fast.lanes import Pin, axes, cross, dot, plus, total
 from mjxgait.physics.fast.structure import Carriers, Structure
@@ -36,14 +37,9 @@ class Moves:
     freedom: jax.Array | None
     paths: tuple[jax.Array, ...]
 
-    def rooted(self, force: Sequence[jax.Array], pin: Pin) -> jax.Array:
-        """What six components of force [n, L] do along the six motions of the root: [n, 6, L]."""
-        turned = total([force[c][:, None] * self.turns[None, :, c] for c in range(3)])
-        return pin(jnp.concatenate([jnp.stack(force[3:], axis=1), turned], axis=1))
-
     def along_chains(self, tree: Carriers, force: Sequence[jax.Array], pin: Pin) -> list[jax.Array]:
         """What the force [n, L] of each degree of freedom does along its chain from the root."""
-        head = None if self.turns is None else self.rooted(force, pin)
+        head = None if self.turns is None else rooted(force, self.turns, pin)
         rows = []
         for place, length in enumerate(tree.lengths):
             path = self.paths[tree.path_of[place]]
@@ -130,7 +126,7 @@ class Footing:
             slides = [jnp.stack([xx]), jnp.stack([xy, yy]), jnp.stack([xz, yz, zz])]
             turning = Motion(axes(moves.turns), (0.0, 0.0, 0.0))
             spatial = [held[tree.root][c] for c in range(21)]
-            added = moves.rooted(_resistance(spatial, turning), self.pin)
+            added = rooted(_resistance(spatial, turning), moves.turns, self.pin)
             rows |= {k: mass[k] + slides[k] for k in range(3)}
             rows |= {3 + j: mass[3 + j] + added[j, : 4 + j] for j in range(3)}
         if tree.dofs:

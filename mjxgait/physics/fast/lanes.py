@@ -164,16 +164,8 @@ def pinned_by(lanes: jax.Array) -> Pin:
     division by one that the compiler cannot know to be one changes nothing else. (`optimization_barrier` is removed before fusion on CPU.)
     lanes: any finite [L] array.
     """
-
-    def pinned(x):
-        if isinstance(x, (float, np.ndarray)):
-            return x
-        one = jnp.where(jax.lax.broadcasted_iota(np.int32, x.shape, 0) > -1, 1.0, 2.0).astype(
-            x.dtype
-        )
-        return x / one
-
-    return lambda tree: jax.tree.map(pinned, tree)
+    one = lanes * 0.0 + 1.0
+    return lambda tree: jax.tree.map(lambda x: x if isinstance(x, float) else x / one, tree)
 
 
 def table(vectors: Sequence[Any], like: jax.Array) -> Any:
