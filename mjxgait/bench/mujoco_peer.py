@@ -13,6 +13,7 @@ from mujoco.batch import Batch
 
 from mjxgait.bench.workload import Workload
 from mjxgait.certify.layout import Layout, LowestPoint
+from mjxgait.config import ControllerConfig
 from mjxgait.creature import Creature
 
 VELOCITY_STAGE = int(mujoco.mjtStage.mjSTAGE_VEL)
@@ -24,19 +25,11 @@ class MujocoPeer:
     """One core's share of a workload: the episodes `first`, `first + stride`, ..."""
 
     def __init__(self, workload: Workload, first: int, stride: int, lanes: int = LANES) -> None:
-        controller = workload.config.controller
-        if (
-            controller.law != "spd"
-            or controller.constraint_forces
-            or (controller.mirror, controller.stiffness, controller.damping) != (True, 1, 1)
-        ):
-            raise ValueError(
-                "the peer knows mirrored poses and stable PD with the gains of the creature only"
-            )
+        check_controller(workload.config.controller)
         self.work, self.creature = workload, workload.creature()
         self.jobs = np.arange(first, workload.episodes, stride)
         self.lanes = min(lanes, len(self.jobs))
-        self.model = _quiet(self.creature.evolution_model)
+        self.model = quiet(self.creature.evolution_model)
         self.batch = Batch(self.model, self.lanes, 1, persistent=True)
         self.friction = self.batch.expand("geom_friction")
         self.usual_friction = self.model.geom_friction[:, 0].copy()
@@ -248,7 +241,19 @@ class DampedSolve:
         return np.linalg.solve(dense, force[..., None])[..., 0]
 
 
-def _quiet(model: mujoco.MjModel) -> mujoco.MjModel:
+def check_controller(settings: ControllerConfig) -> None:
+    """Refuses what the peers do not know, lest they do less work without a word."""
+    if (
+        settings.law != "spd"
+        or settings.constraint_forces
+        or (settings.mirror, settings.stiffness, settings.damping) != (True, 1, 1)
+    ):
+        raise ValueError(
+            "the peers know mirrored poses and stable PD with the gains of the creature only"
+        )
+
+
+def quiet(model: mujoco.MjModel) -> mujoco.MjModel:
     """A simulation that blows up must end, not begin anew; and islands cost more than they save on one creature."""
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET) | int(
         mujoco.mjtDisableBit.mjDSBL_ISLAND
