@@ -23,7 +23,7 @@ typedef struct {
   const double *start, *forward, *left;         // [3] of the standing pose, in the world
   const double *cycle, *tuning;                 // [N, C, J], [N, 7] as in docs/controller.md
   const double *qpos, *qvel, *friction, *push;  // [R, ...]
-  const double *geom_friction;                  // [ngeom], of the model
+  const double *geom_friction, *pair_friction;  // [ngeom], [npair] of the model: sliding
 } Work;
 
 static double clip(double x, double low, double high) { return fmin(fmax(x, low), high); }
@@ -166,6 +166,7 @@ static int live(const Work* w, const mjModel* m, mjData* d, int genome, int star
 // Episodes first, first + stride, ... below count: steps lived in *steps, m forward in *forward.
 void lap(const Work* w, mjModel* m, mjData* d, int first, int stride, int count,
          long long* steps, double* forward) {
+  mjcb_time = NULL;  // the Python package has MuJoCo time every function
   *steps = 0;
   *forward = 0;
   for (int episode = first; episode < count; episode += stride) {
@@ -173,6 +174,9 @@ void lap(const Work* w, mjModel* m, mjData* d, int first, int stride, int count,
     double moved;
     for (int g = 0; g < m->ngeom; g++)
       m->geom_friction[3 * g] = w->geom_friction[g] * w->friction[start];
+    for (int p = 0; p < m->npair; p++)
+      for (int i = 0; i < 2; i++)
+        m->pair_friction[5 * p + i] = w->pair_friction[p] * w->friction[start];
     *steps += live(w, m, d, episode / w->starts, start, &moved);
     *forward += moved;
   }

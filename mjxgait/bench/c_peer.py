@@ -11,6 +11,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+from mjxgait.bench.bare import bare_model
 from mjxgait.bench.mujoco_peer import Law, check_controller, quiet
 from mjxgait.bench.workload import Workload
 from mjxgait.certify.layout import LowestPoint
@@ -55,9 +56,10 @@ class CPeer:
     def __init__(self, workload: Workload, first: int, stride: int, library: Path) -> None:
         check_controller(workload.config.controller)
         creature = workload.creature()
-        self.model = quiet(creature.evolution_model)
-        self.data = mujoco.MjData(self.model)
-        self.work, self.kept = _work(workload, creature, self.model)
+        model, watched = bare_model(creature)
+        self.model = quiet(model)
+        self.data = mujoco.MjData(model)
+        self.work, self.kept = _work(workload, creature, model, watched)
         self.share = (first, stride, workload.episodes)
         self.library = ctypes.CDLL(str(library))
 
@@ -76,11 +78,11 @@ class CPeer:
 
 
 def _work(
-    workload: Workload, creature: Creature, model: mujoco.MjModel
+    workload: Workload, creature: Creature, model: mujoco.MjModel, watched: np.ndarray
 ) -> tuple[ctypes.Structure, list[np.ndarray]]:
     """`Work` of c_peer.c, whose fields are these in this order, and the arrays it points to."""
     law, limits = Law(creature, workload), creature.settings.termination
-    forbidden = creature.watched[len(creature.foot_of) :] if limits.touch else np.zeros(0, int)
+    forbidden = watched[len(creature.foot_of) :] if limits.touch else watched[:0]
     shape = LowestPoint(model, forbidden)
     integers = {
         "joints": len(creature.stand),
@@ -131,6 +133,7 @@ def _work(
         "friction": workload.friction,
         "push": workload.push,
         "geom_friction": model.geom_friction[:, 0],
+        "pair_friction": model.pair_friction[:, 0],
     }
     kept = [np.array(x, np.int32, order="C") for x in addresses.values()]
     kept += [np.array(x, np.float64, order="C") for x in arrays.values()]
