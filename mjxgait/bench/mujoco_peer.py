@@ -254,10 +254,13 @@ def check_controller(settings: ControllerConfig) -> None:
 
 
 def quiet(model: mujoco.MjModel) -> mujoco.MjModel:
-    """A simulation that blows up must end, not begin anew; and islands cost more than they save on one creature."""
-    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET) | int(
-        mujoco.mjtDisableBit.mjDSBL_ISLAND
-    )
+    """A simulation that blows up must end, not begin anew; what costs more than it saves is off."""
+    flag = mujoco.mjtDisableBit
+    off = [flag.mjDSBL_AUTORESET, flag.mjDSBL_ISLAND]
+    if not _has_passive(model):
+        off += [flag.mjDSBL_SPRING, flag.mjDSBL_DAMPER]
+    for bit in off:
+        model.opt.disableflags |= int(bit)
     model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
     return model
 
