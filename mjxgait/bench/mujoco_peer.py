@@ -1,7 +1,8 @@
-"""C MuJoCo by hand: `mujoco.batch` with the controller of docs/controller.md vectorised in NumPy.
+"""NumPy between batched steps of C MuJoCo: `mujoco.batch`, with docs/controller.md in NumPy.
 
-Written for speed: each simulation keeps its MjData, so that the step ends with the velocity stage of the new state and nothing is computed
-twice; an ended simulation takes the next episode at once, and none is stepped when no episode is left; arrays are indexed only then.
+What is fast without leaving Python: each simulation keeps its MjData, so that the step ends with
+the velocity stage of the new state and nothing is computed twice; an ended simulation takes the
+next episode at once, and none is stepped when no episode is left; arrays are indexed only then.
 It keeps no tally but the distance, so it does less than what it is compared with.
 """
 

@@ -119,11 +119,30 @@ def test_dart_walks_the_same_way_for_a_while(workload):
 
 
 def test_ratios_are_medians_of_rounds():
-    laps = {"ours": [Lap(1.0, n, 0.0) for n in (10, 20, 60)], "mujoco_c": [Lap(1.0, 10, 0.0)] * 3}
+    laps = {
+        "ours": [Lap(1.0, n, 0.0, 2.0) for n in (10, 20, 60)],
+        "mujoco_c": [Lap(1.0, 10, 0.0, 6.0)] * 3,
+    }
     found = contest._ratios(laps)
     assert found["ratio_over_mujoco_c"] == 2.0
     assert found["ratio_over_dart"] is None
     assert found["ratio_spread"]["mujoco_c"]["highest"] == 6.0
+    assert found["processor_ratio"]["mujoco_c"] == 6.0
+
+
+def test_the_table_has_a_line_per_creature():
+    costs = {"ours": {"median": 3.0}, "c": {"median": 9.6}}
+    crab = {
+        "creature": "crab",
+        "processor_us_per_step": costs,
+        "processor_ratio": {"c": 3.2},
+        "laps": costs,
+    }
+    head, *lines = contest.ratio_table([crab, crab | {"creature": "duck"}]).splitlines()
+    assert head.split()[-2:] == ["ours", "C"]
+    assert [line.split() for line in lines] == [
+        [name, "3.0", "9.6", "(3.20", "x)"] for name in ("crab", "duck")
+    ]
 
 
 def test_flops_of_loops_and_products():
@@ -152,6 +171,8 @@ def test_history_has_a_line_per_run(tmp_path):
             "ratio_over_dart",
             "creature_steps_per_second",
             "processor_us_per_step",
+            "creature",
+            "ratio_over_c",
         ),
         1,
     )
@@ -164,6 +185,21 @@ def test_history_has_a_line_per_run(tmp_path):
     ]
     assert len(lines) == 2
     assert "laps" not in lines[0]
+    assert lines[0]["ratio_over_c"] == 1
+
+
+@pytest.mark.slow
+def test_the_command_measures_several_creatures(tmp_path):
+    file = tmp_path / "bench.json"
+    arguments = ["bench", "--json", str(file), "--env", "alien", "short_quadruped"]
+    arguments += ["--rounds", "1", "--generations", "1", "--population", "8"]
+    done = subprocess.run(
+        [sys.executable, "-m", "mjxgait", *arguments], check=True, capture_output=True, text=True
+    )
+    found = json.loads(file.read_text(encoding="utf-8"))
+    assert list(found["ratios"]) == list(found["creatures"]) == ["alien", "short_quadruped"]
+    assert found["ratios"]["alien"]["ratio_over_mujoco_c"] > 0
+    assert done.stdout.splitlines()[-2].startswith("short_quadruped")
 
 
 @pytest.mark.slow
@@ -183,6 +219,7 @@ def test_the_command_writes_the_ratios(tmp_path):
     subprocess.run([sys.executable, "-m", "mjxgait", *arguments], check=True, capture_output=True)
     found = json.loads(file.read_text(encoding="utf-8"))
     assert found["ratio_over_mujoco_c"] > 0
+    assert (found["ratio_over_c"] is None) == ("c" in found["left_out"])
     assert found["laps"]["ours"][0]["steps"] == pytest.approx(
         found["laps"]["mujoco_c"][0]["steps"], rel=0.1
     )
