@@ -10,7 +10,7 @@ from mjxgait.creature.load import FLOOR
 
 
 def bare_model(creature: Creature) -> tuple[mujoco.MjModel, np.ndarray]:
-    """The creature's evolution model without shapes that are only drawn, contacts as explicit pairs.
+    """The evolution model without shapes that are only drawn, its contacts as explicit pairs.
 
     Pairs spare MuJoCo the search for what might touch. A model that this cannot be done to is
     returned as it is. Beside it, the ids [G] of the watched geoms in it.

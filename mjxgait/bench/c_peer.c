@@ -1,9 +1,9 @@
 // The contest's rival in C: one mjData, one episode after the other, double precision.
 //
-// The controller is docs/controller.md's. A step calls the parts of mj_step one by one, so that the
-// controller sits between them and nothing is computed twice; what a walker without tendons, cameras
-// and actuators does not need is not called. Compiled and called by c_peer.py, whose `_Work` has the
-// same fields in the same order.
+// The controller is docs/controller.md's. A step calls the parts of mj_step one by one, so that
+// the controller sits between them and nothing is computed twice; what a walker without tendons,
+// cameras and actuators does not need is not called. Compiled and called by c_peer.py, which fills
+// `Work` field by field in this order.
 
 #include <math.h>
 #include <mujoco/mujoco.h>
@@ -53,7 +53,7 @@ static void move(const mjModel* m, mjData* d) {
   mj_Euler(m, d);
 }
 
-// x becomes (M + h diag(kd))^-1 x: L'DL along the tree, in MuJoCo's own sparse rows, diagonals last.
+// x becomes (M + h diag(kd))^-1 x: L'DL along the tree, in MuJoCo's sparse rows, diagonals last.
 static void solve_damped(const Work* w, const mjModel* m, const mjData* d, double* x) {
   double LD[MAX_NV * MAX_NV];
   mju_copy(LD, d->M, m->nC);

@@ -1,4 +1,4 @@
-"""C MuJoCo by hand: `c_peer.c`, compiled for this machine when the contest begins.
+"""C by hand around MuJoCo's functions: `c_peer.c`, compiled when the contest begins.
 
 The shared object of the installed mujoco package does the physics, in double precision as shipped.
 """
@@ -83,7 +83,6 @@ def _work(
     """`Work` of c_peer.c, whose fields are these in this order, and the arrays it points to."""
     law, limits = Law(creature, workload), creature.settings.termination
     forbidden = watched[len(creature.foot_of) :] if limits.touch else watched[:0]
-    shape = LowestPoint(model, forbidden)
     integers = {
         "joints": len(creature.stand),
         "poses": law.poses,
@@ -109,32 +108,7 @@ def _work(
         "geom": forbidden,
         "push_step": workload.push_step,
     }
-    arrays = {
-        "kp": law.kp,
-        "kd": law.kd,
-        "limit": creature.torque_limit,
-        "low": creature.joint_low,
-        "high": creature.joint_high,
-        "stand": creature.stand,
-        "steer_bend": creature.steer_bend,
-        "steer_stride": creature.steer_stride,
-        "balance_pitch": creature.balance_pitch,
-        "balance_roll": creature.balance_roll,
-        "reach": np.column_stack([shape.radius, shape.box, shape.ellipsoid]),
-        "axes": law.axes.T,
-        "up": creature.up,
-        "start": law.start,
-        "forward": law.forward,
-        "left": law.left,
-        "cycle": law.cycle,
-        "tuning": np.stack([workload.tuning[name] for name in TUNING], 1),
-        "qpos": workload.qpos,
-        "qvel": workload.qvel,
-        "friction": workload.friction,
-        "push": workload.push,
-        "geom_friction": model.geom_friction[:, 0],
-        "pair_friction": model.pair_friction[:, 0],
-    }
+    arrays = _body(creature, law, LowestPoint(model, forbidden)) | _episodes(workload, law, model)
     kept = [np.array(x, np.int32, order="C") for x in addresses.values()]
     kept += [np.array(x, np.float64, order="C") for x in arrays.values()]
 
@@ -147,3 +121,37 @@ def _work(
 
     pointers = [x.ctypes.data for x in kept]
     return Work(*integers.values(), *numbers.values(), *pointers), kept
+
+
+def _body(creature: Creature, law: Law, forbidden: LowestPoint) -> dict[str, np.ndarray]:
+    return {
+        "kp": law.kp,
+        "kd": law.kd,
+        "limit": creature.torque_limit,
+        "low": creature.joint_low,
+        "high": creature.joint_high,
+        "stand": creature.stand,
+        "steer_bend": creature.steer_bend,
+        "steer_stride": creature.steer_stride,
+        "balance_pitch": creature.balance_pitch,
+        "balance_roll": creature.balance_roll,
+        "reach": np.column_stack([forbidden.radius, forbidden.box, forbidden.ellipsoid]),
+        "axes": law.axes.T,
+        "up": creature.up,
+        "start": law.start,
+        "forward": law.forward,
+        "left": law.left,
+    }
+
+
+def _episodes(workload: Workload, law: Law, model: mujoco.MjModel) -> dict[str, np.ndarray]:
+    return {
+        "cycle": law.cycle,
+        "tuning": np.stack([workload.tuning[name] for name in TUNING], 1),
+        "qpos": workload.qpos,
+        "qvel": workload.qvel,
+        "friction": workload.friction,
+        "push": workload.push,
+        "geom_friction": model.geom_friction[:, 0],
+        "pair_friction": model.pair_friction[:, 0],
+    }

@@ -54,7 +54,8 @@ def contest(
     """Everything that the benchmark finds out, ready for JSON.
 
     Args:
-      rounds: passes of each contestant. generations: how long the walkers of the workload have evolved.
+      rounds: passes of each contestant.
+      generations: how long the walkers of the workload have evolved.
     """
     facts = machine_facts()
     say("compiling")
@@ -74,7 +75,8 @@ def contest(
     say("timing what a generation does besides simulating")
     besides = overhead(ours)
     say("counting operations, measuring the cores")
-    # By processor time, as if no other work had taken turns: the peaks are the best of short tries and hardly see it either.
+    # By processor time, as if no other work had taken turns: the peaks are the best of short tries
+    # and hardly see it either.
     computed = 1e6 * cores() / (median(lap.cost for lap in laps["ours"]) * share)
     cost, peak = step_cost(ours.experiment), measured_peak()
     return {
@@ -160,7 +162,7 @@ def _interleave(
 
 
 def ratio_table(results: list[dict[str, Any]]) -> str:
-    """A line per creature: us of processor time per useful step, and how often ours goes into it."""
+    """A line per creature: us of processor time per useful step, over ours in brackets."""
     names = [name for name in LABELS if any(name in r["laps"] for r in results)]
     lines = [f"{'us per useful step':18}" + "".join(f"{LABELS[name]:>18}" for name in names)]
     for result in results:

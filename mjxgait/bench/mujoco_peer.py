@@ -138,7 +138,7 @@ class MujocoPeer:
 
 
 class Law:
-    """The pose tracker's side of the controller for many simulations at once; constants are looked up here, once."""
+    """The pose tracker's side of the controller for many simulations; looks constants up once."""
 
     def __init__(self, creature: Creature, workload: Workload) -> None:
         self.creature, settings = creature, workload.config.controller
@@ -220,7 +220,7 @@ class Law:
 
 
 class DampedSolve:
-    """`(M + h diag(kd))^-1 force` through LAPACK, the dense matrices gathered from MuJoCo's stored entries in one look-up."""
+    """`(M + h diag(kd))^-1 force` through LAPACK, from MuJoCo's stored entries in one look-up."""
 
     def __init__(self, model: mujoco.MjModel, creature: Creature) -> None:
         layout = Layout(model)
