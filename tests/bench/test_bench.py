@@ -19,8 +19,10 @@ from mjxgait.bench.scaling import draw
 from mjxgait.bench.workload import Lap, Workload
 from mjxgait.certify.controller import Controller, Senses
 from mjxgait.champion import Champion
-from mjxgait.config import Config, ControllerConfig, find_creature
+from mjxgait.commands import bench
+from mjxgait.config import Config, ControllerConfig, data_folder, find_creature
 from mjxgait.creature import load_creature
+from mjxgait.errors import UserError
 
 NEEDS_DART = pytest.mark.skipif(
     importlib.util.find_spec("dartpy") is None, reason="dartpy is not installed"
@@ -188,18 +190,54 @@ def test_history_has_a_line_per_run(tmp_path):
     assert lines[0]["ratio_over_c"] == 1
 
 
-@pytest.mark.slow
-def test_the_command_measures_several_creatures(tmp_path):
-    file = tmp_path / "bench.json"
-    arguments = ["bench", "--json", str(file), "--env", "alien", "short_quadruped"]
-    arguments += ["--rounds", "1", "--generations", "1", "--population", "8"]
-    done = subprocess.run(
-        [sys.executable, "-m", "mjxgait", *arguments], check=True, capture_output=True, text=True
-    )
+def made_up_result(folder, options):
+    """What a contest would have found out, without one."""
+    costs = {"ours": {"median": 3.0}, "c": {"median": 9.0}}
+    return {
+        "creature": folder.name,
+        "ratio_over_c": 2.9,
+        "ratio_over_dart": None,
+        "creature_steps_per_second": costs,
+        "processor_us_per_step": costs,
+        "processor_ratio": {"c": 3.0},
+        "limit": {"share_of_bound": {"flops": 0.1, "cache_bytes": 0.5}},
+        "left_out": {"dart": "not installed"},
+        "laps": costs,
+    }
+
+
+def test_the_command_measures_several_creatures(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(bench, "_measured", made_up_result)
+    file, history = tmp_path / "bench.json", tmp_path / "history.jsonl"
+    asked = ["--json", str(file), "--history", str(history), "--env", "duck", "alien"]
+    assert bench.bench_command(asked) == 0
     found = json.loads(file.read_text(encoding="utf-8"))
-    assert list(found["ratios"]) == list(found["creatures"]) == ["alien", "short_quadruped"]
-    assert found["ratios"]["alien"]["ratio_over_mujoco_c"] > 0
-    assert done.stdout.splitlines()[-2].startswith("short_quadruped")
+    assert list(found["ratios"]) == list(found["creatures"]) == ["duck", "alien"]
+    assert found["ratios"]["alien"] == {"ratio_over_c": 2.9, "ratio_over_dart": None}
+    kept = [json.loads(line)["creature"] for line in history.read_text().splitlines()]
+    assert kept == ["duck", "alien"]
+    said = capsys.readouterr().out
+    assert "DART           left out: not installed" in said
+    assert [line.split()[0] for line in said.splitlines()[-3:-1]] == ["duck", "alien"]
+
+
+def test_all_means_every_shipped_creature(tmp_path, monkeypatch):
+    monkeypatch.setattr(bench, "_measured", made_up_result)
+    bench.bench_command(["--json", str(tmp_path / "bench.json"), "--env", "all"])
+    found = json.loads((tmp_path / "bench.json").read_text(encoding="utf-8"))
+    assert list(found["ratios"]) == sorted(path.name for path in data_folder("envs").iterdir())
+
+
+def test_one_creature_is_written_as_it_is(tmp_path, monkeypatch):
+    monkeypatch.setattr(bench, "_measured", made_up_result)
+    bench.bench_command(["--json", str(tmp_path / "bench.json")])
+    found = json.loads((tmp_path / "bench.json").read_text(encoding="utf-8"))
+    assert found == made_up_result(find_creature("tall_quadruped"), None)
+
+
+def test_the_curves_are_of_one_creature(tmp_path):
+    with pytest.raises(UserError, match="--scaling measures one creature"):
+        bench.bench_command(["--json", str(tmp_path / "b.json"), "--env", "all", "--scaling"])
 
 
 @pytest.mark.slow
