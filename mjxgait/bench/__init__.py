@@ -1,1 +1,1 @@
-"""Measures the simulation against C MuJoCo by hand, against DART and against the machine itself (docs/performance.md)."""
+"""Measures the simulation against C MuJoCo, DART and the machine itself (docs/performance.md)."""

@@ -1,17 +1,23 @@
-"""The contest: every contestant on the same work, turn by turn in one run, so that what else the machine does falls on all alike."""
+"""The contest: every contestant on the same work, turn by turn in one run.
+
+What else the machine does falls on all alike.
+"""
 
 import dataclasses
 import importlib.metadata
 import importlib.util
 import json
+import tempfile
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from statistics import median
 from typing import Any, Protocol
 
 import numpy as np
 
+from mjxgait.bench.c_peer import CPeer, NoCompiler, build
 from mjxgait.bench.limits import distance_to_limit, step_cost
 from mjxgait.bench.machine import machine_facts, measured_peak
 from mjxgait.bench.ours import Ours, as_workload, half_and_half
@@ -23,6 +29,14 @@ from mjxgait.cores import cores
 
 DART_STRIDE = 4
 """DART is so much slower that it is given every fourth genome only."""
+LABELS = {
+    "ours": "ours",
+    "c": "C",
+    "mujoco_c": "NumPy + C",
+    "dart": "DART",
+    "dart_one_core": "DART, one core",
+}
+"""What the names of the contestants in a result stand for."""
 PACKAGES = ("mjxgait", "jax", "jaxlib", "mujoco", "mujoco-mjx", "numpy", "dartpy")
 
 
@@ -40,7 +54,8 @@ def contest(
     """Everything that the benchmark finds out, ready for JSON.
 
     Args:
-      rounds: passes of each contestant. generations: how long the walkers of the workload have evolved.
+      rounds: passes of each contestant.
+      generations: how long the walkers of the workload have evolved.
     """
     facts = machine_facts()
     say("compiling")
@@ -60,17 +75,18 @@ def contest(
     say("timing what a generation does besides simulating")
     besides = overhead(ours)
     say("counting operations, measuring the cores")
-    # By processor time, as if no other work had taken turns: the peaks are the best of short tries and hardly see it either.
-    computed = cores() / (median(lap.processor / lap.steps for lap in laps["ours"]) * share)
+    # By processor time, as if no other work had taken turns: the peaks are the best of short tries
+    # and hardly see it either.
+    computed = 1e6 * cores() / (median(lap.cost for lap in laps["ours"]) * share)
     cost, peak = step_cost(ours.experiment), measured_peak()
     return {
+        "creature": ours.experiment.creature.name,
         **_ratios(laps),
         "creature_steps_per_second": {
             name: _spread([lap.rate for lap in entry]) for name, entry in laps.items()
         },
         "processor_us_per_step": {
-            name: _spread([1e6 * lap.processor / lap.steps for lap in entry])
-            for name, entry in laps.items()
+            name: _spread([lap.cost for lap in entry]) for name, entry in laps.items()
         },
         "useful_share": {"initial_population": early, "workload": share},
         "startup_s": {"ours": ours.startup, **{name: peer.startup for name, peer in peers.items()}},
@@ -90,6 +106,8 @@ def append_history(result: dict[str, Any], file: Path) -> None:
     """One line with the figures that a regression would show in."""
     kept = (
         "date",
+        "creature",
+        "ratio_over_c",
         "ratio_over_mujoco_c",
         "ratio_over_dart",
         "creature_steps_per_second",
@@ -101,14 +119,23 @@ def append_history(result: dict[str, Any], file: Path) -> None:
     )
     file.parent.mkdir(parents=True, exist_ok=True)
     with file.open("a", encoding="utf-8") as history:
-        history.write(json.dumps({key: result[key] for key in kept}) + "\n")
+        history.write(json.dumps({key: result.get(key) for key in kept}) + "\n")
 
 
 def _peers(work: Workload) -> tuple[dict[str, Workers], dict[str, str]]:
-    """Contestants by name, and why one was left out."""
+    """Contestants by name (`LABELS` says what they are), and why one was left out."""
     from mjxgait.bench.mujoco_peer import MujocoPeer
 
-    peers, left_out = {"mujoco_c": Workers(MujocoPeer, work)}, {}
+    peers: dict[str, Workers] = {}
+    left_out: dict[str, str] = {}
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            library = build(Path(folder))
+        except NoCompiler as error:
+            left_out["c"] = str(error)
+        else:
+            peers["c"] = Workers(partial(CPeer, library=library), work)
+    peers["mujoco_c"] = Workers(MujocoPeer, work)
     if importlib.util.find_spec("dartpy") is None:
         left_out["dart"] = "dartpy is not installed; install the extra mjxgait[peers]"
     else:
@@ -134,15 +161,35 @@ def _interleave(
     return laps
 
 
+def ratio_table(results: list[dict[str, Any]]) -> str:
+    """A line per creature: us of processor time per useful step, over ours in brackets."""
+    names = [name for name in LABELS if any(name in r["laps"] for r in results)]
+    lines = [f"{'us per useful step':18}" + "".join(f"{LABELS[name]:>18}" for name in names)]
+    for result in results:
+        cells = []
+        for name in names:
+            ratio = result["processor_ratio"].get(name)
+            cost = result["processor_us_per_step"].get(name)
+            cell = f"{cost['median']:.1f}" if cost else "-"
+            cells.append(f"{cell + (f' ({ratio:.2f} x)' if ratio else ''):>18}")
+        lines.append(f"{result['creature']:18}" + "".join(cells))
+    return "\n".join(lines)
+
+
 def _ratios(laps: dict[str, list[Lap]]) -> dict[str, Any]:
-    """Medians over the rounds of our rate over theirs in the same round, and their spread; None for who was left out."""
-    result: dict[str, Any] = {"ratio_over_mujoco_c": None, "ratio_over_dart": None}
-    spread = {}
-    for name, theirs in laps.items():
-        if name != "ours":
-            ratios = [a.rate / b.rate for a, b in zip(laps["ours"], theirs, strict=True)]
-            result[f"ratio_over_{name}"], spread[name] = median(ratios), _spread(ratios)
-    return result | {"ratio_spread": spread}
+    """How many times ours is faster within a round: medians, None for who was left out.
+
+    ratio_over_NAME: by wall time, ratio_spread: its quartiles. processor_ratio: by processor time,
+    which other work on the machine changes less.
+    """
+    result: dict[str, Any] = {f"ratio_over_{name}": None for name in ("c", "mujoco_c", "dart")}
+    spread, processor = {}, {}
+    for name in (name for name in laps if name != "ours"):
+        rounds = list(zip(laps["ours"], laps[name], strict=True))
+        ratios = [ours.rate / theirs.rate for ours, theirs in rounds]
+        result[f"ratio_over_{name}"], spread[name] = median(ratios), _spread(ratios)
+        processor[name] = median(theirs.cost / ours.cost for ours, theirs in rounds)
+    return result | {"ratio_spread": spread, "processor_ratio": processor}
 
 
 def _spread(values: list[float]) -> dict[str, float]:

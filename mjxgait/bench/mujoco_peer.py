@@ -1,7 +1,8 @@
-"""C MuJoCo by hand: `mujoco.batch` with the controller of docs/controller.md vectorised in NumPy.
+"""NumPy between batched steps of C MuJoCo: `mujoco.batch`, with docs/controller.md in NumPy.
 
-Written for speed: each simulation keeps its MjData, so that the step ends with the velocity stage of the new state and nothing is computed
-twice; an ended simulation takes the next episode at once, and none is stepped when no episode is left; arrays are indexed only then.
+What is fast without leaving Python: each simulation keeps its MjData, so that the step ends with
+the velocity stage of the new state and nothing is computed twice; an ended simulation takes the
+next episode at once, and none is stepped when no episode is left; arrays are indexed only then.
 It keeps no tally but the distance, so it does less than what it is compared with.
 """
 
@@ -13,6 +14,7 @@ from mujoco.batch import Batch
 
 from mjxgait.bench.workload import Workload
 from mjxgait.certify.layout import Layout, LowestPoint
+from mjxgait.config import ControllerConfig
 from mjxgait.creature import Creature
 
 VELOCITY_STAGE = int(mujoco.mjtStage.mjSTAGE_VEL)
@@ -24,19 +26,11 @@ class MujocoPeer:
     """One core's share of a workload: the episodes `first`, `first + stride`, ..."""
 
     def __init__(self, workload: Workload, first: int, stride: int, lanes: int = LANES) -> None:
-        controller = workload.config.controller
-        if (
-            controller.law != "spd"
-            or controller.constraint_forces
-            or (controller.mirror, controller.stiffness, controller.damping) != (True, 1, 1)
-        ):
-            raise ValueError(
-                "the peer knows mirrored poses and stable PD with the gains of the creature only"
-            )
+        check_controller(workload.config.controller)
         self.work, self.creature = workload, workload.creature()
         self.jobs = np.arange(first, workload.episodes, stride)
         self.lanes = min(lanes, len(self.jobs))
-        self.model = _quiet(self.creature.evolution_model)
+        self.model = quiet(self.creature.evolution_model)
         self.batch = Batch(self.model, self.lanes, 1, persistent=True)
         self.friction = self.batch.expand("geom_friction")
         self.usual_friction = self.model.geom_friction[:, 0].copy()
@@ -144,7 +138,7 @@ class MujocoPeer:
 
 
 class Law:
-    """The pose tracker's side of the controller for many simulations at once; constants are looked up here, once."""
+    """The pose tracker's side of the controller for many simulations; looks constants up once."""
 
     def __init__(self, creature: Creature, workload: Workload) -> None:
         self.creature, settings = creature, workload.config.controller
@@ -226,7 +220,7 @@ class Law:
 
 
 class DampedSolve:
-    """`(M + h diag(kd))^-1 force` through LAPACK, the dense matrices gathered from MuJoCo's stored entries in one look-up."""
+    """`(M + h diag(kd))^-1 force` through LAPACK, from MuJoCo's stored entries in one look-up."""
 
     def __init__(self, model: mujoco.MjModel, creature: Creature) -> None:
         layout = Layout(model)
@@ -248,11 +242,26 @@ class DampedSolve:
         return np.linalg.solve(dense, force[..., None])[..., 0]
 
 
-def _quiet(model: mujoco.MjModel) -> mujoco.MjModel:
-    """A simulation that blows up must end, not begin anew; and islands cost more than they save on one creature."""
-    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET) | int(
-        mujoco.mjtDisableBit.mjDSBL_ISLAND
-    )
+def check_controller(settings: ControllerConfig) -> None:
+    """Refuses what the peers do not know, lest they do less work without a word."""
+    if (
+        settings.law != "spd"
+        or settings.constraint_forces
+        or (settings.mirror, settings.stiffness, settings.damping) != (True, 1, 1)
+    ):
+        raise ValueError(
+            "the peers know mirrored poses and stable PD with the gains of the creature only"
+        )
+
+
+def quiet(model: mujoco.MjModel) -> mujoco.MjModel:
+    """A simulation that blows up must end, not begin anew; what costs more than it saves is off."""
+    flag = mujoco.mjtDisableBit
+    off = [flag.mjDSBL_AUTORESET, flag.mjDSBL_ISLAND]
+    if not _has_passive(model):
+        off += [flag.mjDSBL_SPRING, flag.mjDSBL_DAMPER]
+    for bit in off:
+        model.opt.disableflags |= int(bit)
     model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
     return model
 

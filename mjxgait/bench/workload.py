@@ -68,3 +68,8 @@ class Lap:
     def rate(self) -> float:
         """Useful creature-steps per second."""
         return self.steps / self.seconds
+
+    @property
+    def cost(self) -> float:
+        """us of processor time per useful creature-step."""
+        return 1e6 * self.processor / self.steps

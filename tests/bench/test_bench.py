@@ -19,8 +19,10 @@ from mjxgait.bench.scaling import draw
 from mjxgait.bench.workload import Lap, Workload
 from mjxgait.certify.controller import Controller, Senses
 from mjxgait.champion import Champion
-from mjxgait.config import Config, ControllerConfig, find_creature
+from mjxgait.commands import bench
+from mjxgait.config import Config, ControllerConfig, data_folder, find_creature
 from mjxgait.creature import load_creature
+from mjxgait.errors import UserError
 
 NEEDS_DART = pytest.mark.skipif(
     importlib.util.find_spec("dartpy") is None, reason="dartpy is not installed"
@@ -119,11 +121,30 @@ def test_dart_walks_the_same_way_for_a_while(workload):
 
 
 def test_ratios_are_medians_of_rounds():
-    laps = {"ours": [Lap(1.0, n, 0.0) for n in (10, 20, 60)], "mujoco_c": [Lap(1.0, 10, 0.0)] * 3}
+    laps = {
+        "ours": [Lap(1.0, n, 0.0, 2.0) for n in (10, 20, 60)],
+        "mujoco_c": [Lap(1.0, 10, 0.0, 6.0)] * 3,
+    }
     found = contest._ratios(laps)
     assert found["ratio_over_mujoco_c"] == 2.0
     assert found["ratio_over_dart"] is None
     assert found["ratio_spread"]["mujoco_c"]["highest"] == 6.0
+    assert found["processor_ratio"]["mujoco_c"] == 6.0
+
+
+def test_the_table_has_a_line_per_creature():
+    costs = {"ours": {"median": 3.0}, "c": {"median": 9.6}}
+    crab = {
+        "creature": "crab",
+        "processor_us_per_step": costs,
+        "processor_ratio": {"c": 3.2},
+        "laps": costs,
+    }
+    head, *lines = contest.ratio_table([crab, crab | {"creature": "duck"}]).splitlines()
+    assert head.split()[-2:] == ["ours", "C"]
+    assert [line.split() for line in lines] == [
+        [name, "3.0", "9.6", "(3.20", "x)"] for name in ("crab", "duck")
+    ]
 
 
 def test_flops_of_loops_and_products():
@@ -152,6 +173,8 @@ def test_history_has_a_line_per_run(tmp_path):
             "ratio_over_dart",
             "creature_steps_per_second",
             "processor_us_per_step",
+            "creature",
+            "ratio_over_c",
         ),
         1,
     )
@@ -164,6 +187,57 @@ def test_history_has_a_line_per_run(tmp_path):
     ]
     assert len(lines) == 2
     assert "laps" not in lines[0]
+    assert lines[0]["ratio_over_c"] == 1
+
+
+def made_up_result(folder, options):
+    """What a contest would have found out, without one."""
+    costs = {"ours": {"median": 3.0}, "c": {"median": 9.0}}
+    return {
+        "creature": folder.name,
+        "ratio_over_c": 2.9,
+        "ratio_over_dart": None,
+        "creature_steps_per_second": costs,
+        "processor_us_per_step": costs,
+        "processor_ratio": {"c": 3.0},
+        "limit": {"share_of_bound": {"flops": 0.1, "cache_bytes": 0.5}},
+        "left_out": {"dart": "not installed"},
+        "laps": costs,
+    }
+
+
+def test_the_command_measures_several_creatures(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(bench, "_measured", made_up_result)
+    file, history = tmp_path / "bench.json", tmp_path / "history.jsonl"
+    asked = ["--json", str(file), "--history", str(history), "--env", "duck", "alien"]
+    assert bench.bench_command(asked) == 0
+    found = json.loads(file.read_text(encoding="utf-8"))
+    assert list(found["ratios"]) == list(found["creatures"]) == ["duck", "alien"]
+    assert found["ratios"]["alien"] == {"ratio_over_c": 2.9, "ratio_over_dart": None}
+    kept = [json.loads(line)["creature"] for line in history.read_text().splitlines()]
+    assert kept == ["duck", "alien"]
+    said = capsys.readouterr().out
+    assert "DART           left out: not installed" in said
+    assert [line.split()[0] for line in said.splitlines()[-3:-1]] == ["duck", "alien"]
+
+
+def test_all_means_every_shipped_creature(tmp_path, monkeypatch):
+    monkeypatch.setattr(bench, "_measured", made_up_result)
+    bench.bench_command(["--json", str(tmp_path / "bench.json"), "--env", "all"])
+    found = json.loads((tmp_path / "bench.json").read_text(encoding="utf-8"))
+    assert list(found["ratios"]) == sorted(path.name for path in data_folder("envs").iterdir())
+
+
+def test_one_creature_is_written_as_it_is(tmp_path, monkeypatch):
+    monkeypatch.setattr(bench, "_measured", made_up_result)
+    bench.bench_command(["--json", str(tmp_path / "bench.json")])
+    found = json.loads((tmp_path / "bench.json").read_text(encoding="utf-8"))
+    assert found == made_up_result(find_creature("tall_quadruped"), None)
+
+
+def test_the_curves_are_of_one_creature(tmp_path):
+    with pytest.raises(UserError, match="--scaling measures one creature"):
+        bench.bench_command(["--json", str(tmp_path / "b.json"), "--env", "all", "--scaling"])
 
 
 @pytest.mark.slow
@@ -183,6 +257,7 @@ def test_the_command_writes_the_ratios(tmp_path):
     subprocess.run([sys.executable, "-m", "mjxgait", *arguments], check=True, capture_output=True)
     found = json.loads(file.read_text(encoding="utf-8"))
     assert found["ratio_over_mujoco_c"] > 0
+    assert (found["ratio_over_c"] is None) == ("c" in found["left_out"])
     assert found["laps"]["ours"][0]["steps"] == pytest.approx(
         found["laps"]["mujoco_c"][0]["steps"], rel=0.1
     )

@@ -1,0 +1,157 @@
+"""C by hand around MuJoCo's functions: `c_peer.c`, compiled when the contest begins.
+
+The shared object of the installed mujoco package does the physics, in double precision as shipped.
+"""
+
+import ctypes
+import shutil
+import subprocess
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from mjxgait.bench.bare import bare_model
+from mjxgait.bench.mujoco_peer import Law, check_controller, quiet
+from mjxgait.bench.workload import Workload
+from mjxgait.certify.layout import LowestPoint
+from mjxgait.creature import Creature
+
+SOURCE = Path(__file__).with_suffix(".c")
+COMPILERS = ("cc", "gcc", "clang")
+FLAGS = ("-O3", "-march=native", "-shared", "-fPIC")
+TUNING = ("threshold", "period", "steer", "pitch", "pitch_rate", "roll", "roll_rate")
+"""The order of docs/controller.md, written here so that a peer's process need not import JAX."""
+
+
+class NoCompiler(Exception):
+    """The C peer cannot be built; the message says why."""
+
+
+def build(folder: Path) -> Path:
+    """The shared object, compiled into `folder`.
+
+    Raises:
+      NoCompiler: no C compiler is there, or it fails.
+    """
+    package = Path(mujoco.__file__).parent
+    compiler = next((found for name in COMPILERS if (found := shutil.which(name))), None)
+    if compiler is None:
+        raise NoCompiler(f"no C compiler ({', '.join(COMPILERS)}) was found")
+    libraries = sorted([*package.glob("libmujoco*.so*"), *package.glob("libmujoco*.dylib")])
+    if not libraries:
+        raise NoCompiler("the mujoco package has no shared object to link with")
+    made = folder / "c_peer.so"
+    command = [compiler, *FLAGS, f"-I{package / 'include'}", str(SOURCE), "-o", str(made)]
+    command += [str(libraries[0]), f"-Wl,-rpath,{package}", "-lm"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise NoCompiler(f"{compiler} failed: {' '.join(done.stderr.split())[:300]}")
+    return made
+
+
+class CPeer:
+    """One core's share of a workload: the episodes `first`, `first + stride`, ..."""
+
+    def __init__(self, workload: Workload, first: int, stride: int, library: Path) -> None:
+        check_controller(workload.config.controller)
+        creature = workload.creature()
+        model, watched = bare_model(creature)
+        self.model = quiet(model)
+        self.data = mujoco.MjData(model)
+        self.work, self.kept = _work(workload, creature, model, watched)
+        self.share = (first, stride, workload.episodes)
+        self.library = ctypes.CDLL(str(library))
+
+    def lap(self) -> tuple[int, float]:
+        """Useful steps, and the sum over episodes of the distance forward in m."""
+        steps, forward = ctypes.c_longlong(), ctypes.c_double()
+        self.library.lap(
+            ctypes.byref(self.work),
+            ctypes.c_void_p(self.model._address),
+            ctypes.c_void_p(self.data._address),
+            *self.share,
+            ctypes.byref(steps),
+            ctypes.byref(forward),
+        )
+        return steps.value, forward.value
+
+
+def _work(
+    workload: Workload, creature: Creature, model: mujoco.MjModel, watched: np.ndarray
+) -> tuple[ctypes.Structure, list[np.ndarray]]:
+    """`Work` of c_peer.c, whose fields are these in this order, and the arrays it points to."""
+    law, limits = Law(creature, workload), creature.settings.termination
+    forbidden = watched[len(creature.foot_of) :] if limits.touch else watched[:0]
+    integers = {
+        "joints": len(creature.stand),
+        "poses": law.poses,
+        "interpolation": law.interpolation,
+        "starts": len(workload.qpos),
+        "steps": workload.steps,
+        "by_clock": law.by_clock,
+        "constraint_forces": workload.config.controller.constraint_forces,
+        "forbidden": len(forbidden),
+        "trunk": creature.trunk,
+        "root_dof": law.root,
+    }
+    numbers = {
+        "body_length": creature.body_length,
+        "stand_height": creature.stand_height,
+        "min_up": limits.min_up,
+        "lowest": limits.height[0],
+        "highest": limits.height[1],
+    }
+    addresses = {
+        "qpos_adr": creature.qpos_adr,
+        "dof_adr": creature.dof_adr,
+        "geom": forbidden,
+        "push_step": workload.push_step,
+    }
+    arrays = _body(creature, law, LowestPoint(model, forbidden)) | _episodes(workload, law, model)
+    kept = [np.array(x, np.int32, order="C") for x in addresses.values()]
+    kept += [np.array(x, np.float64, order="C") for x in arrays.values()]
+
+    class Work(ctypes.Structure):
+        _fields_ = [
+            *((name, ctypes.c_int) for name in integers),
+            *((name, ctypes.c_double) for name in numbers),
+            *((name, ctypes.c_void_p) for name in (*addresses, *arrays)),
+        ]
+
+    pointers = [x.ctypes.data for x in kept]
+    return Work(*integers.values(), *numbers.values(), *pointers), kept
+
+
+def _body(creature: Creature, law: Law, forbidden: LowestPoint) -> dict[str, np.ndarray]:
+    return {
+        "kp": law.kp,
+        "kd": law.kd,
+        "limit": creature.torque_limit,
+        "low": creature.joint_low,
+        "high": creature.joint_high,
+        "stand": creature.stand,
+        "steer_bend": creature.steer_bend,
+        "steer_stride": creature.steer_stride,
+        "balance_pitch": creature.balance_pitch,
+        "balance_roll": creature.balance_roll,
+        "reach": np.column_stack([forbidden.radius, forbidden.box, forbidden.ellipsoid]),
+        "axes": law.axes.T,
+        "up": creature.up,
+        "start": law.start,
+        "forward": law.forward,
+        "left": law.left,
+    }
+
+
+def _episodes(workload: Workload, law: Law, model: mujoco.MjModel) -> dict[str, np.ndarray]:
+    return {
+        "cycle": law.cycle,
+        "tuning": np.stack([workload.tuning[name] for name in TUNING], 1),
+        "qpos": workload.qpos,
+        "qvel": workload.qvel,
+        "friction": workload.friction,
+        "push": workload.push,
+        "geom_friction": model.geom_friction[:, 0],
+        "pair_friction": model.pair_friction[:, 0],
+    }
