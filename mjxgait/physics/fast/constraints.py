@@ -140,19 +140,18 @@ def make_constraints(
     if not structure.contacts and not structure.limits:
         return None
     empty = jnp.zeros((0, friction.shape[-1]), friction.dtype)
-    mu, reference, weight = (
-        (empty, (empty,) * 3, empty)
-        if touch is None
-        else _contact_terms(structure, touch, friction, qvel, pin)
-    )
     limit = _limit_terms(structure, qpos, qvel, pin) if structure.limits else (empty, empty, empty)
-    footing = None if touch is None else Footing(structure, touch, pin)
+    if touch is None:
+        return Constraints(structure, None, empty, (empty, empty, empty), empty, *limit)
+    footing = Footing(structure, touch, pin)
+    mu, reference, weight = _contact_terms(footing, friction, qvel)
     return Constraints(structure, footing, mu, reference, weight, *limit)
 
 
 def _contact_terms(
-    structure: Structure, touch: Touch, friction: jax.Array, qvel: jax.Array, pin: Pin
-) -> tuple[jax.Array, tuple[jax.Array, ...], jax.Array]:
+    footing: Footing, friction: jax.Array, qvel: jax.Array
+) -> tuple[jax.Array, Directions, jax.Array]:
+    structure, touch, pin = footing.structure, footing.touch, footing.pin
     contacts = structure.contacts
     column = partial(_column, dtype=friction.dtype)
     mu = jnp.maximum(column([c.friction for c in contacts]) * friction, SMALLEST_FRICTION)
@@ -164,7 +163,7 @@ def _contact_terms(
     weight = jnp.where(
         depth < 0, impedance / jnp.maximum(inverse_mass * (1 - impedance), mujoco.mjMINVAL), 0.0
     )
-    normal, first, second = Footing(structure, touch, pin).along(list(qvel))
+    normal, first, second = footing.along(list(qvel))
     reference = (
         -damping * normal - stiffness * impedance * depth,
         -damping * first,

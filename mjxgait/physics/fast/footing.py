@@ -1,9 +1,13 @@
-"""The Jacobian J of all contacts, never written out: each contact is a point of a body, and bodies move as the tree moves them.
+"""The Jacobian J of all contacts, never written out.
 
-J x is the velocity of the points when the bodies are moved by x (a sum down the tree); J^T f is the points' forces gathered at their
-bodies and summed up the tree; J^T D J is the mass matrix's own recursion with the contacts' stiffness in the place of inertia (Featherstone,
-"Rigid Body Dynamics Algorithms", chapter 6). A further contact on a body costs a few dozen operations, however long its chain.
-Contacts' values are [C, L] along normal and two tangents; a body's are slabs [6, L] (angular before linear) or [21, L].
+Each contact is a point of a body, and bodies move as the tree moves them. J x is the velocity of
+the points when the tree is moved by x: a sum down the tree. J^T f is the points' forces, gathered
+at their bodies and summed up the tree. J^T D J is the mass matrix's own recursion with the
+contacts' stiffness in the place of inertia (Featherstone, "Rigid Body Dynamics Algorithms",
+chapter 6). So a further contact on a body costs a few dozen operations, however long its chain.
+
+Contacts' values are [C, L] along normal and two tangents; a body's are slabs [6, L], angular
+before linear, or [21, L].
 """
 
 import dataclasses
@@ -14,7 +18,7 @@ import jax.numpy as jnp
 
 from mjxgait.physics.fast.dynamics import rooted
 from mjxgait.physics.fast.kinematics import Motion
-from mjxgait.physics.fast.lanes import Pin, axes, cross, dot, plus, total
+from mjxgait.physics.fast.lanes import Pin, axes, cross, dot, parts, plus, total
 from mjxgait.physics.fast.structure import Carriers, Structure
 from mjxgait.physics.fast.treematrix import Rows
 
@@ -74,13 +78,16 @@ class Footing:
 
     def along(self, vector: Sequence[jax.Array]) -> Directions:
         """J x for x [nv] list of [L]."""
-        tree, turns = self.structure.carriers, self.touch.moves.turns
+        tree, moves = self.structure.carriers, self.touch.moves
+        turns, freedom = moves.turns, moves.freedom
         moving: dict[int, jax.Array] = {}
         if turns is not None:
             spin = total([turns[j] * vector[3 + j] for j in range(3)])
             moving[tree.root] = self.pin(jnp.concatenate([spin, jnp.stack(vector[:3])]))
-        own = jnp.stack([vector[k] for k in tree.dofs])[:, None] if tree.dofs else None
-        steps = None if own is None else self.pin(self.touch.moves.freedom * own)
+        steps: list[jax.Array] = []
+        if freedom is not None:
+            own = jnp.stack([vector[k] for k in tree.dofs])[:, None]
+            steps = list(self.pin(freedom * own))
         for body, parent, places in tree.bodies:
             above = [moving[parent]] if parent in moving else []
             moving[body] = self.pin(total([*above, *(steps[place] for place in places)]))
@@ -95,19 +102,18 @@ class Footing:
     def gathered(self, force: Directions) -> dict[int, jax.Array]:
         """J^T f: per degree of freedom that moves a contact, [L]."""
         normal, first, second = force
-        sideways = (first, second)
+        pull = first, second, normal
         if self.touch.tangent is not None:
             tx, ty = self.touch.tangent
-            sideways = (first * tx - second * ty, first * ty + second * tx)
-        pull = (*sideways, normal)
+            pull = first * tx - second * ty, first * ty + second * tx, normal
         tree, moves = self.structure.carriers, self.touch.moves
         wrench = self._summed((*cross(self.touch.points, pull), *pull))
         shares: dict[int, jax.Array] = {}
         if moves.turns is not None:
             whole = wrench[tree.root]
             shares = {k: whole[3 + k] for k in range(3)}
-            shares |= {3 + j: dot(moves.turns[j], whole[:3]) for j in range(3)}
-        if tree.dofs:
+            shares |= {3 + j: dot(parts(moves.turns[j]), parts(whole)) for j in range(3)}
+        if moves.freedom is not None:
             product = moves.freedom * jnp.stack([wrench[b] for b in tree.body_of])
             share = self.pin(total([product[:, c] for c in range(6)]))
             shares |= {k: share[place] for place, k in enumerate(tree.dofs)}
@@ -126,10 +132,10 @@ class Footing:
             slides = [jnp.stack([xx]), jnp.stack([xy, yy]), jnp.stack([xz, yz, zz])]
             turning = Motion(axes(moves.turns), (0.0, 0.0, 0.0))
             spatial = [held[tree.root][c] for c in range(21)]
-            added = rooted(_resistance(spatial, turning), moves.turns, self.pin)
+            turned = rooted(_resistance(spatial, turning), moves.turns, self.pin)
             rows |= {k: mass[k] + slides[k] for k in range(3)}
-            rows |= {3 + j: mass[3 + j] + added[j, : 4 + j] for j in range(3)}
-        if tree.dofs:
+            rows |= {3 + j: mass[3 + j] + turned[j, : 4 + j] for j in range(3)}
+        if moves.freedom is not None:
             below = jnp.stack([held[b] for b in tree.body_of])
             motion = Motion(axes(moves.freedom), axes(moves.freedom[:, 3:]))
             force = self.pin(_resistance([below[:, c] for c in range(21)], motion))
@@ -140,13 +146,14 @@ class Footing:
     def _summed(self, values: Sequence[jax.Array]) -> dict[int, jax.Array]:
         """Contacts' components [C, L] summed over each body and all below: [components, L]."""
         tree, packed = self.structure.carriers, self.pin(jnp.stack(values, axis=1))
-        own, first = {}, 0
+        own: dict[int, list[jax.Array]] = {}
+        first = 0
         for body, count in tree.contacts:
             own[body] = [packed[c] for c in range(first, first + count)]
             first += count
         sums: dict[int, jax.Array] = {}
-        root = [] if self.touch.moves.turns is None else [(tree.root, -1)]
-        for body, _ in [*((b, parent) for b, parent, _ in tree.bodies)][::-1] + root:
+        root = [] if self.touch.moves.turns is None else [tree.root]
+        for body in [*(b for b, _, _ in reversed(tree.bodies)), *root]:
             below = [sums[b] for b, parent, _ in tree.bodies if parent == body]
             sums[body] = self.pin(total([*own.get(body, []), *below]))
         return sums
@@ -162,9 +169,9 @@ class Footing:
 
 
 def _spatial(stiffness: Sequence[jax.Array], points: Sequence[jax.Array]) -> list[jax.Array]:
-    """A spring's stiffness at a point, as felt at the origin: 6 angular, 9 mixed and 6 linear components.
+    """A spring's stiffness at a point, as felt at the origin: 6 angular, 9 mixed, 6 linear.
 
-    Mixed ones are the force along x, y, z per turn about x, then about y, then about z.
+    The mixed ones are the force along x, y, z per turn about x, then about y, then about z.
     """
     xx, yy, zz, xy, xz, yz = stiffness
     x, y, z = points
@@ -181,7 +188,7 @@ def _spatial(stiffness: Sequence[jax.Array], points: Sequence[jax.Array]) -> lis
 
 
 def _resistance(spatial: Sequence[jax.Array], motion: Motion) -> tuple[jax.Array, ...]:
-    """Moment and force of a spatial stiffness against a motion, as `_spatial` orders its components."""
+    """Moment and force of a spatial stiffness, ordered as by `_spatial`, against a motion."""
     sxx, syy, szz, sxy, sxz, syz = spatial[:6]
     about = (spatial[6:9], spatial[9:12], spatial[12:15])
     lxx, lyy, lzz, lxy, lxz, lyz = spatial[15:]
