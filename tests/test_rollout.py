@@ -1,6 +1,7 @@
 """Episodes on lanes: the verdict on a genome depends on nothing but the genome and the start."""
 
 import dataclasses
+from pathlib import Path
 
 import jax
 import jax.numpy as jnp
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 from helpers import small_config
 
-from mjxgait.config import Config
+from mjxgait.config import Config, resolve_config
 from mjxgait.creature import Creature
 from mjxgait.experiment import Experiment, build_experiment, evolution_of
 from mjxgait.fitness import (
@@ -27,6 +28,8 @@ from mjxgait.rollout import Episodes
 from mjxgait.starts import NEVER, Starts, draw_starts
 from mjxgait.tally import Reason
 from mjxgait.variation import Box, uniform
+
+ENDS = (Reason.TIPPED, Reason.TOO_LOW, Reason.TOO_HIGH, Reason.TOUCHED)
 
 
 def genomes(experiment: Experiment, count: int, seed: int = 0) -> Genome:
@@ -129,6 +132,28 @@ def test_an_episode_ends_at_once_and_says_why(experiment: Experiment, start: dic
     assert (found.forward == 0).all()
 
 
+@pytest.mark.parametrize(
+    "ends",
+    [
+        {"terminate": False},
+        {"termination": {"min_up": -1.0, "height": [0.0, 9.0], "touch": False}},
+    ],
+    ids=["never", "as the settings say"],
+)
+def test_the_settings_decide_what_ends_an_episode(stool: Creature, ends: dict):
+    """Upside down, 1 m up: the creature's file would end it for two reasons."""
+    asked = build_experiment(stool, small_config(rollout={"seconds": 0.1, **ends}))
+    found = simulate(asked, genomes(asked, 2), start_at(asked, height=1.0, roll=np.pi)).tally
+    assert (found.reason == Reason.FINISHED).all()
+    assert (found.steps == asked.simulator.steps).all()
+
+
+def test_what_is_not_set_ends_an_episode_as_the_creature_says(stool: Creature):
+    config = small_config(rollout={"termination": {"touch": False}})
+    ends = build_experiment(stool, config).simulator.judge.ends
+    assert ends == dataclasses.replace(stool.settings.termination, touch=False)
+
+
 def test_death_freezes_the_tally(experiment: Experiment, stool: Creature):
     """A longer episode adds nothing to an individual that has died."""
     long = build_experiment(stool, small_config(rollout={"lanes": 3, "seconds": 0.8}))
@@ -218,6 +243,28 @@ def test_beyond_the_wanted_speed_distance_counts_little(experiment: Experiment):
     assert forward_distance(creature, config, horizon * 0.005, term) == pytest.approx(
         3 * lengths * creature.body_length, rel=1e-4
     )
+
+
+def test_a_fall_scores_below_everybody_who_stays_up(experiment: Experiment, stool: Creature):
+    """With the weights of configs/wilson.toml, whatever the distance; by default it costs nothing."""
+    thesis = resolve_config({}, stool.name, Path("wilson"))
+    steps, judge = experiment.simulator.steps, experiment.simulator.judge
+
+    def fitness(config: Config, forward: float, reason: Reason, after: int) -> float:
+        tally = dataclasses.replace(
+            judge.init(),
+            steps=jnp.int32(after),
+            reason=jnp.int32(reason),
+            forward=jnp.float32(forward),
+        )
+        terms = fitness_terms(stool, config.fitness, 0.005, steps, tally)
+        return float(score(terms[None], weight_vector(config.fitness, jnp.int32(0)), 0.0))
+
+    fallen = {reason: fitness(thesis, 50.0, reason, steps - 1) for reason in ENDS}
+    backwards = fitness(thesis, -3.0, Reason.FINISHED, steps)
+    assert all(value < backwards - 100 for value in fallen.values())
+    free = dataclasses.replace(Config(), fitness=dataclasses.replace(Config().fitness, speed=0.0))
+    assert fitness(free, 3.0, Reason.TIPPED, steps) == fitness(free, 3.0, Reason.FINISHED, steps)
 
 
 def test_score_mixes_the_worst_start_and_the_mean():
