@@ -155,38 +155,24 @@ def test_without_a_limit_a_spell_lasts_until_the_population_is_refreshed(limit: 
 
 def test_without_a_limit_a_spell_in_which_nobody_is_fit_does_not_end():
     """Everybody begins near the best there is, and three re-drawn poses are far from it."""
-    near = {"initial_spread": 0.01, "mutation": "pose", "mutation_rate": 0.0, "crossover": 1.0}
-    spells = {
-        limit: lengths_of_spells(
-            run(
-                toy(
-                    forced=ForcedConfig(
-                        window=2, gain=1.0, newcomers=0.0, accept=1.0, limit=limit, patience=0
-                    ),
-                    **near,
-                ),
-                20,
-            )
-        )
-        for limit in (2, 0)
-    }
-    assert set(spells[2][:-1]) == {2}
-    assert len(spells[0]) == 1
-    assert spells[0][0] > 12
+    forced = ForcedConfig(window=2, gain=1.0, newcomers=0.0, accept=1.0, limit=0, patience=0)
+    near = toy(
+        forced=forced, initial_spread=0.01, mutation="pose", mutation_rate=0.0, crossover=1.0
+    )
+    spells = lengths_of_spells(run(near, 20))
+    assert len(spells) == 1
+    assert spells[0] > 12
 
 
 def test_a_growing_pool_evolves_and_simulates_nobody_twice():
     settings = {"selection": "uniform", "crossing": "permute", "crossover": 1.0}
     evolution = toy(mutation_rate=0.0, pool="growing", unique_children=True, **settings)
-    state = run(evolution, 10)[-1][0]
-    proposal = jax.jit(evolution.propose)(state)
-    everybody = jax.tree.map(
-        lambda a, b: jnp.concatenate([a, b]), state.genomes, proposal.offspring
-    )
+    history = run(evolution, 10)
+    assert float(history[-1][1].best) > float(history[0][1].best)
+    state = history[-1][0]
+    offspring = evolution.propose(state).offspring
+    everybody = jax.tree.map(lambda a, b: jnp.concatenate([a, b]), state.genomes, offspring)
     assert first_occurrence(everybody).all()
-    best = [float(metrics.best) for _, metrics in run(evolution, 30)]
-    assert all(later >= earlier for earlier, later in itertools.pairwise(best))
-    assert best[-1] > best[0]
 
 
 def test_growth_keeps_forced_evolution_away():

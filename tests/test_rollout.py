@@ -27,6 +27,7 @@ from mjxgait.gait import Genome
 from mjxgait.rollout import Episodes
 from mjxgait.starts import NEVER, Starts, draw_starts
 from mjxgait.tally import Reason
+from mjxgait.types import BodyState, Sensed
 from mjxgait.variation import Box, uniform
 
 ENDS = (Reason.TIPPED, Reason.TOO_LOW, Reason.TOO_HIGH, Reason.TOUCHED)
@@ -132,26 +133,58 @@ def test_an_episode_ends_at_once_and_says_why(experiment: Experiment, start: dic
     assert (found.forward == 0).all()
 
 
+def reason_to_end(
+    experiment: Experiment, height: float = 1.0, up: float = 1.0, low: float = 0.1
+) -> Reason:
+    """What is said of a creature as high above its stand, its trunk so upright, other parts so low."""
+    creature, joints = experiment.creature, jnp.zeros(len(experiment.creature.joint_names))
+    tilt, zero = np.arccos(up), jnp.zeros(3)
+    turned = [[1, 0, 0], [0, np.cos(tilt), -np.sin(tilt)], [0, np.sin(tilt), np.cos(tilt)]]
+    sensed = Sensed(
+        joint_pos=joints,
+        joint_vel=joints,
+        bias=jnp.zeros(creature.model.nv),
+        trunk_pos=jnp.array([0.0, 0.0, height * creature.stand_height]),
+        trunk_rot=jnp.array(turned),
+        trunk_vel=zero,
+        trunk_angvel=zero,
+        geom_pos=jnp.zeros((len(creature.watched), 3)),
+        geom_low=jnp.full(len(creature.watched), low),
+    )
+    return Reason(int(experiment.simulator.judge.examine(sensed)))
+
+
+WRONG = {
+    Reason.TIPPED: {"up": -1.0},
+    Reason.TOO_LOW: {"height": 0.4},
+    Reason.TOO_HIGH: {"height": 1.9},
+    Reason.TOUCHED: {"low": -0.01},
+}
+
+
 @pytest.mark.parametrize(
-    "ends",
+    ("settings", "ends"),
     [
-        {"terminate": False},
-        {"termination": {"min_up": -1.0, "height": [0.0, 9.0], "touch": False}},
+        ({}, set(ENDS)),
+        ({"terminate": False}, set()),
+        ({"termination": {"touch": False}}, set(ENDS) - {Reason.TOUCHED}),
+        ({"termination": {"min_up": -1.0}}, set(ENDS) - {Reason.TIPPED}),
+        ({"termination": {"height": [0.0, 1.5]}}, set(ENDS) - {Reason.TOO_LOW}),
+        ({"termination": {"height": [0.5, 2.0]}}, set(ENDS) - {Reason.TOO_HIGH}),
     ],
-    ids=["never", "as the settings say"],
 )
-def test_the_settings_decide_what_ends_an_episode(stool: Creature, ends: dict):
-    """Upside down, 1 m up: the creature's file would end it for two reasons."""
-    asked = build_experiment(stool, small_config(rollout={"seconds": 0.1, **ends}))
-    found = simulate(asked, genomes(asked, 2), start_at(asked, height=1.0, roll=np.pi)).tally
-    assert (found.reason == Reason.FINISHED).all()
-    assert (found.steps == asked.simulator.steps).all()
+def test_the_settings_decide_what_ends_an_episode(
+    stool: Creature, settings: dict, ends: set[Reason]
+):
+    """What they do not say is as the creature has it."""
+    asked = build_experiment(stool, small_config(rollout=settings))
+    for reason, moment in WRONG.items():
+        assert reason_to_end(asked, **moment) == (reason if reason in ends else Reason.FINISHED)
 
 
-def test_what_is_not_set_ends_an_episode_as_the_creature_says(stool: Creature):
-    config = small_config(rollout={"termination": {"touch": False}})
-    ends = build_experiment(stool, config).simulator.judge.ends
-    assert ends == dataclasses.replace(stool.settings.termination, touch=False)
+def test_nothing_but_a_failed_computation_ends_an_episode_that_is_not_to_end(stool: Creature):
+    endless = build_experiment(stool, small_config(rollout={"terminate": False}))
+    assert reason_to_end(endless, height=float("nan")) == Reason.NONFINITE
 
 
 def test_death_freezes_the_tally(experiment: Experiment, stool: Creature):
@@ -325,8 +358,6 @@ def test_mjx_agrees_with_c_mujoco(shipped: Creature):
 
 
 def _at_rest(creature: Creature):
-    from mjxgait.types import BodyState
-
     still = jnp.zeros(creature.model.nv)
     return BodyState(
         jnp.asarray(creature.stand_qpos, jnp.float32), still, still, still, jnp.ones(())
