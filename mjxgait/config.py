@@ -79,6 +79,27 @@ class ControllerConfig:
 
 
 @dataclasses.dataclass(frozen=True)
+class TerminationConfig:
+    """What ends an episode early; a key that is not given is as creature.toml has it.
+
+    Attributes:
+      min_up: cosine of the trunk's tilt below which it has tipped over; -1 never ends an episode.
+      height: lowest and highest trunk height, in standing heights.
+      touch: whether an episode ends when a part touches the floor that must not. Only then may
+        evolution leave out the contacts of these parts.
+    """
+
+    __pydantic_config__ = STRICT
+    min_up: Annotated[Annotated[float, pydantic.Field(ge=-1, le=1)] | None, SHAPE] = None
+    height: Annotated[tuple[NonNegative, Positive] | None, SHAPE] = None
+    touch: Annotated[bool | None, SHAPE] = None
+
+    def __post_init__(self) -> None:
+        if self.height is not None and self.height[0] >= self.height[1]:
+            raise ValueError(f"height = {list(self.height)}: the first must be the smaller")
+
+
+@dataclasses.dataclass(frozen=True)
 class RolloutConfig:
     """How individuals are judged.
 
@@ -88,7 +109,8 @@ class RolloutConfig:
       joint_noise, velocity_noise: rad, rad/s; half widths of the uniform perturbation of the start.
       friction: range of the factor on the floor's friction.
       push: sudden change of the trunk's horizontal velocity at a random moment of a perturbed start, in units of sqrt(g * hip height).
-      terminate: whether an episode ends when the creature falls (creature.toml, [termination]).
+      terminate: whether an episode ends when the creature falls; if not, its whole body meets the
+        floor. termination: what counts as falling, where it differs from creature.toml.
       worst: share of the worst start in the score; the mean of the starts has the rest.
       physics: the fast step where the model allows it, or plain MJX.
       lanes: simulations in flight per device; 0 lets the program choose.
@@ -101,7 +123,8 @@ class RolloutConfig:
     velocity_noise: NonNegative = 0.1
     friction: tuple[Positive, Positive] = (0.8, 1.2)
     push: NonNegative = 0.15
-    terminate: bool = True
+    terminate: Annotated[bool, SHAPE] = True
+    termination: TerminationConfig = dataclasses.field(default_factory=TerminationConfig)
     worst: Fraction = 0.5
     physics: Annotated[Literal["auto", "mjx"], SHAPE] = "auto"
     lanes: Annotated[Whole, SHAPE] = 0
@@ -128,6 +151,7 @@ class Weights:
     energy: Finite = 0.05
     saturation: Finite = 0.5
     limits: Finite = 0.5
+    fall: Finite = 0.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -139,7 +163,8 @@ class FitnessConfig:
         not faster. 0 sets no limit.
       clearance: height in hip heights that each foot should reach in each stride.
       frequency: share of the highest stride frequency of an animal of this mass up to which a gait is not hasty.
-      style_ramp: generations over which the style terms (all but distance, alive and foot_height) grow to their full weight.
+      style_ramp: generations over which the style terms (all but distance, alive, foot_height and
+        fall) grow to their full weight.
     """
 
     __pydantic_config__ = STRICT
@@ -159,7 +184,8 @@ class ForcedConfig:
       newcomers: share of new random genomes among a forced generation's offspring, the others are mutants.
       mutations: how many times each mutant is mutated.
       accept: quantile of the population's fitness that an offspring must reach to be taken in.
-      refresh: share of the population to replace; limit: generations a spell lasts at most.
+      refresh: share of the population to replace. limit: generations a spell lasts at most; 0 lets
+        it last until the population is refreshed.
       patience: spells in a row without a better best after which the run stops; 0 never stops it.
     """
 
@@ -171,7 +197,7 @@ class ForcedConfig:
     mutations: Annotated[Count, SHAPE] = 3
     accept: Fraction = 0.25
     refresh: Fraction = 0.5
-    limit: Count = 4
+    limit: Whole = 4
     patience: Annotated[Whole, HOST] = 3
 
 
@@ -183,9 +209,14 @@ class EvolutionConfig:
       population: P. generations: cap on the generations of a run. target: fitness at which a run stops.
       growth: the population grows to this multiple of P, then is culled back to P.
       pose_range: share of each joint's pose range, about its middle, in which key poses lie.
+      pose_span: deg; width of every hinge's pose range, about its middle in creature.toml, as far as
+        the joint's range in creature.xml allows; 0 leaves the ranges of creature.toml.
       initial: uniform draws or a Latin hypercube, over the middle `initial_spread` of each gene's range. selection: how parents are drawn.
       crossover: share of offspring with two parents, the others have one. crossing: `permute` draws K poses from the parents' 2K in any
         order; `align` leaves each pose in its place.
+      pool: whom parents are drawn from: last generation's survivors, or `growing`, which also holds
+        the children born so far (they rank last). unique_children: a child that equals somebody of the
+        pool or a sibling is drawn anew before it is simulated (mjxgait/breeding.py).
       mutation: `redraw` re-draws two joints of one pose, `single` one joint, `pose` a whole pose, `gaussian` moves every joint of one pose
         by sigma, in units of its range, `mixed` is one or the other of the first and the last. `bit` and `byte` read the value of one joint
         as 8 bits over its range and flip one of them, or re-draw all eight, as classic GAs do. mutation_rate: share of offspring mutated.
@@ -198,11 +229,14 @@ class EvolutionConfig:
     target: Annotated[Finite | None, HOST] = None
     growth: Annotated[Positive, SHAPE] = 2.0
     pose_range: Annotated[float, pydantic.Field(gt=0, le=1)] = 1.0
+    pose_span: Annotated[NonNegative, SHAPE] = 0.0
     initial: Literal["uniform", "latin"] = "uniform"
     initial_spread: Fraction = 0.6
     selection: Literal["uniform", "rank", "tournament"] = "rank"
     crossover: Fraction = 0.7
     crossing: Literal["permute", "align"] = "align"
+    pool: Annotated[Literal["parents", "growing"], SHAPE] = "parents"
+    unique_children: Annotated[bool, SHAPE] = False
     mutation: Literal["redraw", "single", "pose", "gaussian", "mixed", "bit", "byte"] = "mixed"
     mutation_rate: Fraction = 0.8
     sigma: Positive = 0.12
@@ -276,21 +310,51 @@ def resolve_config(
 ) -> Config:
     """The layers, each over the one before: `configs/default.toml`, the creature's `[train]`, the user's file.
 
+    A file may begin with `standalone = true`: then nothing but the built-in defaults lies under it.
+    Its tables `[creature.NAME]` hold keys for the creature of that name, laid over the rest of it.
+
     Raises:
       UserError: names the layer and the key.
     """
     default = data_folder("configs") / "default.toml"
-    table = read_toml(default)
-    build(Config, table, str(default))
-    layers: list[tuple[str, Mapping[str, Any]]] = [
-        (f"{creature_name}/creature.toml: [train]", creature_table)
-    ]
-    if file is not None:
-        layers.append((str(file), read_toml(_find_config(file))))
-    for where, layer in layers:
+    standalone, mine = _file_layers(file, creature_name) if file is not None else (False, [])
+    layers: list[tuple[str, Mapping[str, Any]]] = []
+    if not standalone:
+        layers.append((str(default), read_toml(default)))
+        layers.append((f"{creature_name}/creature.toml: [train]", creature_table))
+    table: dict[str, Any] = {}
+    for where, layer in (*layers, *mine):
         table = merge(table, layer)
         build(Config, table, where)
     return build(Config, table, "the settings taken together")
+
+
+def _file_layers(
+    file: Path, creature_name: str
+) -> tuple[bool, list[tuple[str, Mapping[str, Any]]]]:
+    """Whether a user's file stands alone, and its layers: what it says to all, then to this creature.
+
+    The tables of other creatures are checked too: a mistake shows whoever is trained.
+    """
+    path = _find_config(file)
+    general = read_toml(path)
+    standalone, creatures = general.pop("standalone", False), general.pop("creature", {})
+    if not isinstance(standalone, bool):
+        raise UserError(f"{path}: standalone = {standalone!r}: give true or false")
+    if not isinstance(creatures, Mapping):
+        raise UserError(f"{path}: creature = {creatures!r}: give tables such as [creature.crab]")
+    known = {creature_name, *shipped_creatures()}
+    for name, own in creatures.items():
+        if name not in known:
+            raise UserError(
+                f'{path}: creature.{name}: "{name}" is neither the creature at hand nor a shipped'
+                f" one; {did_you_mean(name, sorted(known))}"
+            )
+        if not isinstance(own, Mapping):
+            raise UserError(f"{path}: creature.{name} = {own!r}: give a table of config keys")
+        build(Config, own, f"{path}: [creature.{name}]")
+    mine = creatures.get(creature_name, {})
+    return standalone, [(str(path), general), (f"{path}: [creature.{creature_name}]", mine)]
 
 
 def _find_config(file: Path) -> Path:
@@ -305,13 +369,18 @@ def _find_config(file: Path) -> Path:
     return file
 
 
+def shipped_creatures() -> list[str]:
+    """Names of the creatures that come with the program."""
+    return sorted(path.parent.name for path in data_folder("envs").glob("*/creature.toml"))
+
+
 def find_creature(name: str) -> Path:
     """The folder of a shipped creature, or the folder at a path.
 
     Raises:
       UserError: lists the known creatures.
     """
-    known = sorted(path.parent.name for path in data_folder("envs").glob("*/creature.toml"))
+    known = shipped_creatures()
     if name in known:
         return data_folder("envs") / name
     folder = Path(name)

@@ -12,8 +12,8 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
+from mjxgait.breeding import Nursery, parents
 from mjxgait.config import EvolutionConfig
-from mjxgait.hyper import chosen
 from mjxgait.types import pytree
 from mjxgait.variation import Variation, first_occurrence
 
@@ -181,6 +181,9 @@ class Evolution:
 
     def _children(self, key: jax.Array, state: EvolutionState) -> tuple[Any, jax.Array]:
         config, count = self.config, self.config.offspring
+        if config.pool == "growing" or config.unique_children:
+            bred, of_two = Nursery(config, self.variation).children(key, state.genomes)
+            return bred, jnp.where(of_two, int(Origin.CROSSOVER), int(Origin.MUTATION))
         key_parents, key_cross, key_whether, key_mutate, key_mutated = jax.random.split(key, 5)
         mothers, fathers = parents(key_parents, count, config.population, config.selection)
         mother, father = (
@@ -296,7 +299,8 @@ class Evolution:
             jnp.append(state.mean_history[1:], mean),
         )
         age = jnp.where(state.forced, state.spell_age + 1, 0)
-        ends = state.forced & ((age >= config.limit) | (state.refreshed >= self._room()))
+        spent = (jnp.asarray(config.limit) > 0) & (age >= config.limit)
+        ends = state.forced & (spent | (state.refreshed >= self._room()))
         quiet = jnp.where(state.forced | (state.generation <= 0), 0, state.quiet + 1)
         stalled = (
             (quiet >= config.window) & ~_grown(bests, config.gain) & ~_grown(means, config.gain)
@@ -345,31 +349,6 @@ class Evolution:
             computed_steps=judged.computed_steps,
             best_terms=jnp.mean(state.terms[0], axis=0),
         )
-
-
-def parents(
-    key: jax.Array, count: int, population: int, selection: Any
-) -> tuple[jax.Array, jax.Array]:
-    """Places [count] of mothers and fathers in a population sorted best first; never the same individual twice.
-
-    `uniform` draws all alike; `rank` falls linearly to zero with rank (Baker 1985, pressure 2); `tournament` takes the better of two.
-    """
-    key_mother, key_father = jax.random.split(key)
-
-    def draw(key: jax.Array, among: int) -> jax.Array:
-        uniformly = jax.random.randint(key, (count,), 0, among)
-        best_of_two = jnp.min(jax.random.randint(key, (count, 2), 0, among), axis=1)
-        by_rank = jnp.floor(among * (1 - jnp.sqrt(1 - jax.random.uniform(key, (count,))))).astype(
-            jnp.int32
-        )
-        return jnp.where(
-            chosen(selection, "uniform"),
-            uniformly,
-            jnp.where(chosen(selection, "tournament"), best_of_two, by_rank),
-        )
-
-    mothers, others = draw(key_mother, population), draw(key_father, population - 1)
-    return mothers, others + (others >= mothers)
 
 
 def stop_reason(state: EvolutionState, config: EvolutionConfig) -> str | None:

@@ -12,8 +12,9 @@ import numpy as np
 from jax.sharding import Mesh, NamedSharding, PartitionSpec
 
 from mjxgait.champion import Champion
-from mjxgait.config import Config
+from mjxgait.config import Config, RolloutConfig
 from mjxgait.creature import Creature
+from mjxgait.creature.settings import Termination
 from mjxgait.errors import UserError
 from mjxgait.evolution import Evolution, EvolutionState, GenerationMetrics, Judged, Proposal
 from mjxgait.fitness import TERMS, fitness_terms, forward_distance, score, weight_vector
@@ -202,7 +203,8 @@ def build_experiment(creature: Creature, config: Config) -> Experiment:
     Raises:
       UserError: the physics does not support the creature's model.
     """
-    return _experiment(creature, config, _simulator(creature, config))
+    simulator = _simulator(creature, config)
+    return _experiment(simulator, config)
 
 
 def build_batch(creature: Creature, configs: Sequence[Config]) -> Batch:
@@ -216,7 +218,7 @@ def build_batch(creature: Creature, configs: Sequence[Config]) -> Batch:
             "these settings need programs of different shapes: run them in batches of their own"
         )
     simulator = _simulator(creature, configs[0])
-    return Batch(tuple(_experiment(creature, config, simulator) for config in configs))
+    return Batch(tuple(_experiment(simulator, config) for config in configs))
 
 
 def evolution_of(simulator: Simulator, settings: Config) -> Evolution:
@@ -278,7 +280,8 @@ def _verdict(
     )
 
 
-def _experiment(creature: Creature, config: Config, simulator: Simulator) -> Experiment:
+def _experiment(simulator: Simulator, config: Config) -> Experiment:
+    creature = simulator.creature
     starts = draw_starts(
         jax.random.fold_in(jax.random.key(config.seed), 1), creature, config.rollout
     )
@@ -308,15 +311,26 @@ def _compiler_options() -> dict[str, str | bool]:
     return {"xla_cpu_prefer_vector_width": "512"} if jax.default_backend() == "cpu" else {}
 
 
+def _ends(creature: Creature, config: RolloutConfig) -> Termination:
+    """What ends an episode: what the creature says, where the config says nothing else."""
+    if not config.terminate:
+        return Termination(min_up=-1.0, height=(-np.inf, np.inf), touch=False)
+    given = dataclasses.asdict(config.termination)
+    return dataclasses.replace(
+        creature.settings.termination, **{k: v for k, v in given.items() if v is not None}
+    )
+
+
 def _simulator(creature: Creature, config: Config) -> Simulator:
+    creature, ends = creature.spanned(config.evolution.pose_span), _ends(creature, config.rollout)
     step = float(creature.model.opt.timestep)
     steps = max(round(config.rollout.seconds / step), 1)
-    plant, lanes = make_plant(creature, config.rollout.physics)
+    plant, lanes = make_plant(creature, config.rollout.physics, ends.touch)
     return Simulator(
         creature=creature,
         plant=plant,
         tracker=PoseTracker(creature, step),
-        judge=Judge(creature, step, steps // 2),
+        judge=Judge(creature, step, steps // 2, ends),
         steps=steps,
         lanes=config.rollout.lanes or lanes,
         mesh=Mesh(np.array(jax.devices()), (AXIS,)),

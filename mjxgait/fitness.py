@@ -8,11 +8,11 @@ import optax
 
 from mjxgait.config import FitnessConfig, Weights
 from mjxgait.creature import Creature
-from mjxgait.tally import Tally
+from mjxgait.tally import Reason, Tally
 
 TERMS = tuple(field.name for field in dataclasses.fields(Weights))
 REWARDS = ("distance", "alive")
-STYLE = tuple(name for name in TERMS if name not in (*REWARDS, "foot_height"))
+STYLE = tuple(name for name in TERMS if name not in (*REWARDS, "foot_height", "fall"))
 """What makes a gait good to look at: counted in proportion to the walk that there is, and may ramp in over generations."""
 
 BEYOND = 0.02
@@ -67,6 +67,7 @@ def fitness_terms(
         "energy": tally.work / (creature.mass * 9.81 * moved),
         "saturation": tally.saturation / lived,
         "limits": tally.limits / lived,
+        "fall": jnp.where(tally.reason == Reason.FINISHED, 0.0, 1.0),
     }
     # Style counts as far as there is a walk: a creature that has yet to learn walking must not be punished for trying.
     walked = jnp.where(

@@ -42,14 +42,13 @@ class Rules:
     """What the settings say about an episode; all [].
 
     stable: stable PD, else plain PD. constraint_forces: whether it counts them. stiffness, damping: factors on kp and kd.
-    terminate: whether a fall ends the episode. clearance: m wanted of each foot in each stride.
+    clearance: m wanted of each foot in each stride.
     """
 
     stable: jax.Array
     constraint_forces: jax.Array
     stiffness: jax.Array
     damping: jax.Array
-    terminate: jax.Array
     clearance: jax.Array
 
 
@@ -194,7 +193,6 @@ class Simulator:
             constraint_forces=jnp.asarray(law.constraint_forces),
             stiffness=jnp.asarray(law.stiffness, jnp.float32),
             damping=jnp.asarray(law.damping, jnp.float32),
-            terminate=jnp.asarray(settings.rollout.terminate),
             clearance=jnp.asarray(
                 settings.fitness.clearance * self.creature.hip_height, jnp.float32
             ),
@@ -245,8 +243,7 @@ class Simulator:
         self, rules: Rules, tally: Tally, sensed: Any, torque: jax.Array, stride: jax.Array
     ) -> Tally:
         going = (tally.reason == Reason.FINISHED) & (tally.steps < self.steps)
-        found = self.judge.examine(sensed)
-        reason = jnp.where(rules.terminate | (found == Reason.NONFINITE), found, Reason.FINISHED)
+        reason = self.judge.examine(sensed)
         updated = self.judge.update(tally, sensed, torque, stride, rules.clearance)
         kept = dataclasses.replace(tally, reason=jnp.where(going, reason, tally.reason))
         return _choose(going & (reason == Reason.FINISHED), updated, kept)

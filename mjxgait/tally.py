@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from mjxgait.creature import Creature
+from mjxgait.creature.settings import Termination
 from mjxgait.gait import start_axes, start_position
 from mjxgait.types import Sensed, pytree
 
@@ -72,11 +73,15 @@ class Tally:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Judge:
-    """Keeps the tally of one creature's episodes. half_time: step."""
+    """Keeps the tally of one creature's episodes.
+
+    half_time: step. ends: what ends an episode, if it is not what the creature says.
+    """
 
     creature: Creature
     step: float
     half_time: int
+    ends: Termination | None = None
 
     def init(self) -> Tally:
         """The empty tally."""
@@ -94,7 +99,7 @@ class Judge:
 
     def examine(self, sensed: Sensed) -> jax.Array:
         """The reason [] to end the episode at this moment; `FINISHED` while all is well."""
-        limits = self.creature.settings.termination
+        limits = self.ends or self.creature.settings.termination
         up = (sensed.trunk_rot @ self.creature.up.astype(np.float32))[2]
         height = sensed.trunk_pos[2] / self.creature.stand_height
         reason = jnp.zeros((), jnp.int32)
@@ -102,7 +107,9 @@ class Judge:
             reason = jnp.where(self._touches(sensed), Reason.TOUCHED, reason)
         reason = jnp.where(height > limits.height[1], Reason.TOO_HIGH, reason)
         reason = jnp.where(height < limits.height[0], Reason.TOO_LOW, reason)
-        reason = jnp.where(up < limits.min_up, Reason.TIPPED, reason)
+        # Rounding may put a trunk that is wholly upside down below -1.
+        if limits.min_up > -1.0:
+            reason = jnp.where(up < limits.min_up, Reason.TIPPED, reason)
         finite = jnp.isfinite(
             jnp.sum(sensed.joint_vel)
             + jnp.sum(sensed.trunk_pos)

@@ -15,8 +15,11 @@ from mjxgait.tables import build, dump_toml, read_toml
 )
 def test_every_shipped_config_loads(path: Path):
     table = read_toml(path)
-    if path.stem != "certificate":
-        assert isinstance(build(Config, table, str(path)), Config)
+    own = {
+        key: table.pop(key, default) for key, default in (("standalone", False), ("creature", {}))
+    }
+    for name, part in (("", table), *own["creature"].items()):
+        assert isinstance(build(Config, part, f"{path}: {name}"), Config)
 
 
 def test_a_config_survives_its_own_file(tmp_path: Path):
@@ -55,6 +58,76 @@ def test_layers_creature_over_default_and_file_over_creature(tmp_path: Path):
     assert resolve_config({"rollout": {"starts": 7, "seconds": 3.0}}, "x").rollout.starts == 7
     both = resolve_config({"rollout": {"starts": 7, "seconds": 3.0}}, "x", file)
     assert (both.rollout.starts, both.rollout.seconds) == (9, 3.0)
+
+
+MINE = """
+[rollout]
+starts = 9
+
+[creature.crab.rollout]
+starts = 5
+termination = { min_up = -1.0 }
+"""
+
+
+def test_a_file_may_say_something_else_to_one_creature(tmp_path: Path):
+    file = tmp_path / "mine.toml"
+    file.write_text(MINE)
+    train = {"rollout": {"starts": 7, "seconds": 3.0}}
+    crab, other = (resolve_config(train, name, file).rollout for name in ("crab", "my dog"))
+    assert (crab.starts, crab.seconds, crab.termination.min_up) == (5, 3.0, -1.0)
+    assert (other.starts, other.seconds, other.termination.min_up) == (9, 3.0, None)
+
+
+def test_under_a_file_that_stands_alone_lies_nothing(tmp_path: Path):
+    file = tmp_path / "mine.toml"
+    file.write_text("standalone = true\n[rollout]\nstarts = 9\n")
+    found = resolve_config({"rollout": {"seconds": 3.0}, "seed": 4}, "x", file)
+    assert found == build(Config, {"rollout": {"starts": 9}}, "test")
+    assert found.controller.tuning != resolve_config({}, "x").controller.tuning
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[creature.crb.rollout]\nstarts = 2", 'creature.crb: "crb" is neither'),
+        ("[creature.crb.rollout]\nstarts = 2", 'did you mean "crab"?'),
+        ("[creature.crab.rollout]\nstart = 2", "[creature.crab]: unknown key"),
+        ("[creature]\ncrab = 3", "creature.crab = 3: give a table"),
+        ("creature = 3", "creature = 3: give tables"),
+        ('standalone = "yes"', "standalone = 'yes': give true or false"),
+        ("[rollout.termination]\nheight = [2.0, 1.0]", "the first must be the smaller"),
+    ],
+)
+def test_a_mistake_in_a_table_of_any_creature_is_named(tmp_path: Path, text: str, words: str):
+    file = tmp_path / "mine.toml"
+    file.write_text(text)
+    with pytest.raises(UserError) as error:
+        resolve_config({}, "duck", file)
+    assert words in str(error.value)
+    assert str(file) in str(error.value)
+
+
+def wilson(creature: str) -> Config:
+    folder = find_creature(creature)
+    train = read_toml(folder / "creature.toml").get("train", {})
+    return resolve_config(train, creature, Path("wilson"))
+
+
+def test_the_thesis_is_the_same_for_all_but_for_what_it_says_of_single_creatures():
+    quadruped, crab, duck, alien = map(wilson, ("tall_quadruped", "crab", "duck", "alien"))
+    assert wilson("short_quadruped") == quadruped
+    assert alien == duck
+    assert quadruped.fitness.weights.foot_height > 0 == duck.fitness.weights.foot_height
+    assert crab.rollout.termination.min_up == -1.0
+    assert duck.rollout.termination.min_up < 0
+    for config in (quadruped, crab, duck, alien):
+        rewarded = {name: w for name, w in vars(config.fitness.weights).items() if w}
+        assert rewarded.keys() <= {"distance", "fall", "foot_height"}
+        assert config.rollout.termination.touch is False
+        assert 5 <= config.rollout.seconds <= 8
+        assert 2 <= config.controller.key_poses <= 4
+        assert 30 <= config.evolution.population <= 50
 
 
 def test_a_broken_file_is_named(tmp_path: Path):

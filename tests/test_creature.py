@@ -31,6 +31,25 @@ def test_shipped_creatures_are_believable_animals(shipped: Creature):
     assert np.degrees(shipped.pose_high - shipped.pose_low).max() <= 100
 
 
+def test_a_pose_span_is_as_wide_as_the_joint_allows(shipped: Creature):
+    """About the middle of the creature's own range, moved where that would leave the joint's."""
+    wide = shipped.spanned(90.0)
+    room = shipped.joint_high - shipped.joint_low
+    assert np.allclose(wide.pose_high - wide.pose_low, np.minimum(np.pi / 2, room))
+    assert (wide.pose_low >= shipped.joint_low - 1e-9).all()
+    assert (wide.pose_high <= shipped.joint_high + 1e-9).all()
+    free = (wide.pose_low > shipped.joint_low) & (wide.pose_high < shipped.joint_high)
+    middle, own = (c.pose_low + c.pose_high for c in (wide, shipped))
+    assert free.any()
+    assert np.allclose(middle[free], own[free])
+
+
+def test_without_a_span_pose_ranges_are_those_of_the_file(shipped: Creature):
+    same = shipped.spanned(0.0)
+    assert (same.pose_low == shipped.pose_low).all()
+    assert (same.pose_high == shipped.pose_high).all()
+
+
 def test_mirroring_twice_is_nothing(shipped: Creature):
     pose = np.random.default_rng(0).uniform(-1, 1, len(shipped.joint_names))
     once = shipped.sign * pose[shipped.partner]

@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from mjxgait.breeding import parents
 from mjxgait.config import EvolutionConfig, ForcedConfig
 from mjxgait.evolution import (
     Evolution,
@@ -16,11 +17,10 @@ from mjxgait.evolution import (
     GenerationMetrics,
     Judged,
     Origin,
-    parents,
     stop_reason,
 )
 from mjxgait.gait import Genome
-from mjxgait.variation import Box, pose_variation
+from mjxgait.variation import Box, first_occurrence, pose_variation
 
 K, J = 2, 3
 BOX = Box(Genome(-jnp.ones((K, J)), jnp.zeros(1)), Genome(jnp.ones((K, J)), jnp.zeros(1)))
@@ -139,6 +139,40 @@ def test_stagnation_starts_a_spell_that_refreshes_and_ends():
     assert int(newborn.sum()) == 10
     assert set(np.asarray(after.origin)[newborn].tolist()) == {Origin.NEWCOMER, Origin.MUTATION}
     assert float(after.fitness[0]) >= float(before.fitness[0])
+
+
+def lengths_of_spells(history: list[tuple[EvolutionState, GenerationMetrics]]) -> list[int]:
+    flags = [bool(metrics.forced) for _, metrics in history]
+    return [len(list(spell)) for forced, spell in itertools.groupby(flags) if forced]
+
+
+@pytest.mark.parametrize(("limit", "length"), [(3, 3), (0, 5)])
+def test_without_a_limit_a_spell_lasts_until_the_population_is_refreshed(limit: int, length: int):
+    """Four a generation are taken in, 19 of 20 are to be replaced."""
+    forced = ForcedConfig(window=3, refresh=1.0, limit=limit, patience=0)
+    assert lengths_of_spells(run(toy(flat, growth=1.2, forced=forced), 12))[0] == length
+
+
+def test_without_a_limit_a_spell_in_which_nobody_is_fit_does_not_end():
+    """Everybody begins near the best there is, and three re-drawn poses are far from it."""
+    forced = ForcedConfig(window=2, gain=1.0, newcomers=0.0, accept=1.0, limit=0, patience=0)
+    near = toy(
+        forced=forced, initial_spread=0.01, mutation="pose", mutation_rate=0.0, crossover=1.0
+    )
+    spells = lengths_of_spells(run(near, 20))
+    assert len(spells) == 1
+    assert spells[0] > 12
+
+
+def test_a_growing_pool_evolves_and_simulates_nobody_twice():
+    settings = {"selection": "uniform", "crossing": "permute", "crossover": 1.0}
+    evolution = toy(mutation_rate=0.0, pool="growing", unique_children=True, **settings)
+    history = run(evolution, 10)
+    assert float(history[-1][1].best) > float(history[0][1].best)
+    state = history[-1][0]
+    offspring = evolution.propose(state).offspring
+    everybody = jax.tree.map(lambda a, b: jnp.concatenate([a, b]), state.genomes, offspring)
+    assert first_occurrence(everybody).all()
 
 
 def test_growth_keeps_forced_evolution_away():

@@ -32,8 +32,8 @@ def shape(**tables: dict) -> object:
         },
         {"evolution": {"forced": {"enabled": False, "patience": 9}}},
         {"controller": {"law": "pd", "advance": "clock", "mirror": False, "stiffness": 2.0}},
-        {"rollout": {"terminate": False, "push": 0.0, "worst": 0.0}},
-        {"fitness": {"speed": 0.0, "weights": {"slip": 3.0}}},
+        {"rollout": {"push": 0.0, "worst": 0.0}},
+        {"fitness": {"speed": 0.0, "weights": {"slip": 3.0, "fall": 9.0}}},
     ],
     ids=["evolution", "forced", "controller", "rollout", "fitness"],
 )
@@ -49,10 +49,24 @@ def test_numbers_and_switches_do_not_shape_the_program(tables: dict):
         {"evolution": {"growth": 1.5}},
         {"rollout": {"starts": 3}},
         {"rollout": {"seconds": 0.6}},
+        {"rollout": {"terminate": False}},
+        {"rollout": {"termination": {"touch": False}}},
+        {"evolution": {"pose_span": 90.0}},
+        {"evolution": {"pool": "growing"}},
     ],
-    ids=["key poses", "population", "growth", "starts", "seconds"],
+    ids=[
+        "key poses",
+        "population",
+        "growth",
+        "starts",
+        "seconds",
+        "no end",
+        "no end by touch",
+        "pose span",
+        "growing pool",
+    ],
 )
-def test_sizes_shape_the_program(tables: dict):
+def test_sizes_and_what_is_built_in_shape_the_program(tables: dict):
     assert shape(**tables) != shape()
 
 

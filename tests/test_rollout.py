@@ -1,6 +1,7 @@
 """Episodes on lanes: the verdict on a genome depends on nothing but the genome and the start."""
 
 import dataclasses
+from pathlib import Path
 
 import jax
 import jax.numpy as jnp
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 from helpers import small_config
 
-from mjxgait.config import Config
+from mjxgait.config import Config, resolve_config
 from mjxgait.creature import Creature
 from mjxgait.experiment import Experiment, build_experiment, evolution_of
 from mjxgait.fitness import (
@@ -26,7 +27,10 @@ from mjxgait.gait import Genome
 from mjxgait.rollout import Episodes
 from mjxgait.starts import NEVER, Starts, draw_starts
 from mjxgait.tally import Reason
+from mjxgait.types import BodyState, Sensed
 from mjxgait.variation import Box, uniform
+
+ENDS = (Reason.TIPPED, Reason.TOO_LOW, Reason.TOO_HIGH, Reason.TOUCHED)
 
 
 def genomes(experiment: Experiment, count: int, seed: int = 0) -> Genome:
@@ -129,6 +133,60 @@ def test_an_episode_ends_at_once_and_says_why(experiment: Experiment, start: dic
     assert (found.forward == 0).all()
 
 
+def reason_to_end(
+    experiment: Experiment, height: float = 1.0, up: float = 1.0, low: float = 0.1
+) -> Reason:
+    """What is said of a creature as high above its stand, its trunk so upright, other parts so low."""
+    creature, joints = experiment.creature, jnp.zeros(len(experiment.creature.joint_names))
+    tilt, zero = np.arccos(up), jnp.zeros(3)
+    turned = [[1, 0, 0], [0, np.cos(tilt), -np.sin(tilt)], [0, np.sin(tilt), np.cos(tilt)]]
+    sensed = Sensed(
+        joint_pos=joints,
+        joint_vel=joints,
+        bias=jnp.zeros(creature.model.nv),
+        trunk_pos=jnp.array([0.0, 0.0, height * creature.stand_height]),
+        trunk_rot=jnp.array(turned),
+        trunk_vel=zero,
+        trunk_angvel=zero,
+        geom_pos=jnp.zeros((len(creature.watched), 3)),
+        geom_low=jnp.full(len(creature.watched), low),
+    )
+    return Reason(int(experiment.simulator.judge.examine(sensed)))
+
+
+WRONG = {
+    Reason.TIPPED: {"up": -1.0},
+    Reason.TOO_LOW: {"height": 0.4},
+    Reason.TOO_HIGH: {"height": 1.9},
+    Reason.TOUCHED: {"low": -0.01},
+}
+
+
+@pytest.mark.parametrize(
+    ("settings", "ends"),
+    [
+        ({}, set(ENDS)),
+        ({"terminate": False}, set()),
+        ({"termination": {"touch": False}}, set(ENDS) - {Reason.TOUCHED}),
+        ({"termination": {"min_up": -1.0}}, set(ENDS) - {Reason.TIPPED}),
+        ({"termination": {"height": [0.0, 1.5]}}, set(ENDS) - {Reason.TOO_LOW}),
+        ({"termination": {"height": [0.5, 2.0]}}, set(ENDS) - {Reason.TOO_HIGH}),
+    ],
+)
+def test_the_settings_decide_what_ends_an_episode(
+    stool: Creature, settings: dict, ends: set[Reason]
+):
+    """What they do not say is as the creature has it."""
+    asked = build_experiment(stool, small_config(rollout=settings))
+    for reason, moment in WRONG.items():
+        assert reason_to_end(asked, **moment) == (reason if reason in ends else Reason.FINISHED)
+
+
+def test_nothing_but_a_failed_computation_ends_an_episode_that_is_not_to_end(stool: Creature):
+    endless = build_experiment(stool, small_config(rollout={"terminate": False}))
+    assert reason_to_end(endless, height=float("nan")) == Reason.NONFINITE
+
+
 def test_death_freezes_the_tally(experiment: Experiment, stool: Creature):
     """A longer episode adds nothing to an individual that has died."""
     long = build_experiment(stool, small_config(rollout={"lanes": 3, "seconds": 0.8}))
@@ -220,6 +278,28 @@ def test_beyond_the_wanted_speed_distance_counts_little(experiment: Experiment):
     )
 
 
+def test_a_fall_scores_below_everybody_who_stays_up(experiment: Experiment, stool: Creature):
+    """With the weights of configs/wilson.toml, whatever the distance; by default it costs nothing."""
+    thesis = resolve_config({}, stool.name, Path("wilson"))
+    steps, judge = experiment.simulator.steps, experiment.simulator.judge
+
+    def fitness(config: Config, forward: float, reason: Reason, after: int) -> float:
+        tally = dataclasses.replace(
+            judge.init(),
+            steps=jnp.int32(after),
+            reason=jnp.int32(reason),
+            forward=jnp.float32(forward),
+        )
+        terms = fitness_terms(stool, config.fitness, 0.005, steps, tally)
+        return float(score(terms[None], weight_vector(config.fitness, jnp.int32(0)), 0.0))
+
+    fallen = {reason: fitness(thesis, 50.0, reason, steps - 1) for reason in ENDS}
+    backwards = fitness(thesis, -3.0, Reason.FINISHED, steps)
+    assert all(value < backwards - 100 for value in fallen.values())
+    free = dataclasses.replace(Config(), fitness=dataclasses.replace(Config().fitness, speed=0.0))
+    assert fitness(free, 3.0, Reason.TIPPED, steps) == fitness(free, 3.0, Reason.FINISHED, steps)
+
+
 def test_score_mixes_the_worst_start_and_the_mean():
     terms = jnp.array([[[1.0], [3.0]]])
     assert float(score(terms, jnp.ones(1), 0.0)[0]) == 2.0
@@ -278,8 +358,6 @@ def test_mjx_agrees_with_c_mujoco(shipped: Creature):
 
 
 def _at_rest(creature: Creature):
-    from mjxgait.types import BodyState
-
     still = jnp.zeros(creature.model.nv)
     return BodyState(
         jnp.asarray(creature.stand_qpos, jnp.float32), still, still, still, jnp.ones(())

@@ -18,12 +18,16 @@ Measure = Literal["walk", "up", "certified", "fitness", "area", "generations"]
 
 @dataclasses.dataclass(frozen=True)
 class VariantTable:
-    """One variant: what it is called, the config keys that it changes, and its own number of generations where it needs one."""
+    """One variant: what it is called, the config keys that it changes, and its own number of generations where it needs one.
+
+    config: file or name of a shipped config that it runs instead of the study's config and base.
+    """
 
     __pydantic_config__ = STRICT
     name: Annotated[str, pydantic.Field(min_length=1, max_length=60)]
     settings: dict[str, Any] = dataclasses.field(default_factory=dict)
     generations: Count | None = None
+    config: str | None = None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -129,17 +133,14 @@ def make_plan(study: Study, creature: Creature, where: str) -> Plan:
       UserError: an unknown key, a bad value, two variants of one name, or two that are equal.
     """
     tables = list(study.variant) or _grid(study, where)
-    config = resolve_config(
-        creature.settings.train, creature.name, Path(study.config) if study.config else None
-    )
-    base = dataclasses.asdict(_settled(_lay(config, study.base, f"{where}: [base]")))
+    base = _lay(_config(study.config, creature, where), study.base, f"{where}: [base]")
     configs: dict[str, Config] = {}
     for table in tables:
         if table.name in configs:
             raise UserError(f'{where}: two variants are called "{table.name}"; name them apart')
-        new = _settled(
-            _lay(build(Config, base, where), table.settings, f'{where}: variant "{table.name}"')
-        )
+        here = f'{where}: variant "{table.name}"'
+        own = _config(table.config, creature, here) if table.config else base
+        new = _settled(_lay(own, table.settings, here))
         new = dataclasses.replace(
             new,
             evolution=dataclasses.replace(
@@ -167,6 +168,13 @@ def make_plan(study: Study, creature: Creature, where: str) -> Plan:
                 )
             )
     return Plan(study, tuple(configs), tuple(runs))
+
+
+def _config(file: str | None, creature: Creature, where: str) -> Config:
+    try:
+        return resolve_config(creature.settings.train, creature.name, Path(file) if file else None)
+    except UserError as error:
+        raise UserError(f"{where}: {error}") from None
 
 
 def _settled(config: Config) -> Config:

@@ -97,8 +97,32 @@ class Creature:
 
     @property
     def evolution_model(self) -> mujoco.MjModel:
-        """The model with contacts on feet and ground geoms only: where any other touch ends the episode, its force never matters."""
-        if not self.settings.termination.touch:
+        """The model in which evolution simulates, unless its settings say what ends an episode."""
+        return self.model_where(self.settings.termination.touch)
+
+    def spanned(self, degrees: float) -> "Creature":
+        """The creature with every hinge's pose range so wide, about its middle; 0 changes nothing.
+
+        A range that would reach beyond the joint's own is moved inwards, or cut where it is wider.
+        """
+        kinds = np.array([self.model.joint(name).type[0] for name in self.joint_names])
+        half = np.minimum(np.radians(degrees), self.joint_high - self.joint_low) / 2
+        middle = np.clip(
+            (self.pose_low + self.pose_high) / 2, self.joint_low + half, self.joint_high - half
+        )
+        changes = (kinds == HINGE) & (degrees > 0)
+        return dataclasses.replace(
+            self,
+            pose_low=np.where(changes, middle - half, self.pose_low),
+            pose_high=np.where(changes, middle + half, self.pose_high),
+        )
+
+    def model_where(self, touch_ends: bool) -> mujoco.MjModel:
+        """The model in which evolution simulates, depending on whether a touch ends an episode.
+
+        If so it has contacts on feet and ground geoms only: the force of another never matters.
+        """
+        if not touch_ends:
             return self.model
         model = mujoco.MjModel.from_xml_string(self.files["creature.xml"])
         allowed = {*self.watched[: len(self.foot_of)], *self.ground, model.geom(FLOOR).id}

@@ -120,7 +120,7 @@ def read_snapshot(path: Path, generation: int | None = None) -> Snapshot:
     return Snapshot(
         run=run,
         manifest=manifest,
-        creature=creature,
+        creature=creature.spanned(config.evolution.pose_span),
         config=config,
         arrays=arrays,
         lines=_lines(run / METRICS, wanted),

@@ -10,13 +10,18 @@ from mjxgait.physics.plain import mjx_plant
 from mjxgait.types import Plant
 
 
-def make_plant(creature: Creature, physics: Literal["auto", "mjx"]) -> tuple[Plant, int]:
+def make_plant(
+    creature: Creature, physics: Literal["auto", "mjx"], touch_ends: bool
+) -> tuple[Plant, int]:
     """The plant of a creature, and how many lanes per device suit it.
+
+    Args:
+      touch_ends: whether an episode ends when a part touches the floor that must not.
 
     Raises:
       UserError: MJX does not support something in the model; in its words.
     """
-    model, layout = creature.evolution_model, sense_layout(creature)
+    model, layout = creature.model_where(touch_ends), sense_layout(creature)
     if physics == "auto":
         try:
             return fast_plant(model, layout), 64

@@ -1,5 +1,6 @@
 """What a study file may say, and how mistakes in it are told before anything runs."""
 
+import dataclasses
 from pathlib import Path
 
 import pytest
@@ -7,7 +8,7 @@ from helpers import STOOL
 
 from mjxgait.ablation.plan import Plan, Study, make_plan, read_study
 from mjxgait.ablation.rows import groups
-from mjxgait.config import data_folder
+from mjxgait.config import data_folder, resolve_config
 from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import UserError
 from mjxgait.tables import build
@@ -47,6 +48,25 @@ def test_unpaired_variants_have_seeds_of_their_own(stool: Creature):
     ]
 
 
+def test_a_variant_may_run_a_config_of_its_own_and_nothing_else(stool: Creature):
+    """The study's config and base are not laid under it; what is peculiar to a study remains."""
+    tables = [
+        {"name": "base"},
+        {"name": "thesis", "config": "wilson"},
+        {"name": "long", "config": "wilson", "settings": {"rollout": {"seconds": 8.0}}},
+    ]
+    found = plan(stool, variant=tables, base={"rollout": {"starts": 5}})
+    shipped = resolve_config({}, stool.name, Path("wilson"))
+    asked = (dataclasses.asdict(found.of(name)[1].config) for name in ("thesis", "long"))
+    for table, seconds in zip(asked, (6.0, 8.0), strict=True):
+        wanted = dataclasses.asdict(shipped) | {"seed": 1}
+        wanted["evolution"] |= {"generations": 5}
+        wanted["evolution"]["forced"] |= {"patience": 0}
+        wanted["rollout"] |= {"seconds": seconds}
+        assert table == wanted
+    assert found.of("base")[0].config.rollout.starts == 5
+
+
 def test_a_grid_is_the_base_and_every_combination(stool: Creature):
     found = plan(stool, grid={"evolution.mutation_rate": [0.2, 0.6], "controller.law": ["pd"]})
     assert found.variants == (
@@ -70,10 +90,12 @@ def test_values_share_a_program_and_shapes_need_one_each(stool: Creature):
         {"name": "more", "generations": 9},
     ]
     variants[3]["settings"] = {"fitness": {"speed": 0.5}}
+    variants.append({"name": "no end", "settings": {"rollout": {"terminate": False}}})
     parts = groups(plan(stool, variant=variants))
     assert [sorted({run.variant for run in part}) for part in parts] == [
         ["base", "half", "more"],
         ["poses"],
+        ["no end"],
     ]
 
 
@@ -90,6 +112,7 @@ def test_values_share_a_program_and_shapes_need_one_each(stool: Creature):
         ),
         ({"variant": [TWO[0], {"name": "x"}]}, ['"base" and "x" are equal', "allow_equal"]),
         ({"variant": [TWO[0], TWO[0]]}, ["two variants", '"base"']),
+        ({"variant": [TWO[0], {"name": "x", "config": "wilsn"}]}, ["wilsn", "wilson"]),
         ({"variant": TWO[:1]}, ["two variants"]),
         (
             {"variant": [TWO[0], {"name": "x", "settings": {"seed": 3}}]},
