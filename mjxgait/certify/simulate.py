@@ -173,6 +173,8 @@ class _Run:
         self._lift()
         self.position = np.zeros(len(starts), dtype=int)
         self.last_force = np.zeros_like(self.qvel)
+        # What the controller has sent last, for those whose torques come late.
+        self.sent = np.zeros((int(starts.delay.max()) + 1, *starts.stiffness.shape))
 
     def to_the_end(self, steps: int, heading: np.ndarray | None) -> Outcome:
         """Steps until the end, leaving out what has fallen and is not recorded."""
@@ -205,7 +207,7 @@ class _Run:
         kept = running[running < self.record]
         film.qpos[kept, k], film.qvel[kept, k] = self.qpos[kept], self.qvel[kept]
         film.position[kept, k] = self.position[kept]
-        target, reached, torque = self._physics_step(running, heading)
+        target, reached, torque = self._physics_step(running, k, heading)
         film.torque[kept, k] = torque[: len(kept)]
         for _ in range(self.refine - 1):
             self.batch.step(running, stage=VELOCITY_STAGE)
@@ -214,12 +216,22 @@ class _Run:
         )
 
     def _physics_step(
-        self, running: np.ndarray, heading: float | None
+        self, running: np.ndarray, k: int, heading: float | None
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Target, joint positions before the step, and torque, [running, J] each."""
+        """Target, joint positions before the step, and torque that acts, [running, J] each."""
         senses = self._senses(running)
         target = self.controller.target(self.position[running], senses, heading)
-        torque = self.controller.torque(target, senses, self.creature.model.opt.timestep)
+        starts = self.starts
+        self.sent[k % len(self.sent), running] = self.controller.torque(
+            target,
+            senses,
+            self.creature.model.opt.timestep,
+            starts.stiffness[running],
+            starts.damping[running],
+        )
+        # Before the first torque has arrived it acts already, as if the body had been held so.
+        arrived = np.maximum(k - starts.delay[running], 0) % len(self.sent)
+        torque = self.sent[arrived, running]
         self.applied[running[:, None], self.creature.dof_adr] = torque
         self.batch.step(running, stage=VELOCITY_STAGE)
         self.last_force[running] = self.constraint[running]
@@ -310,6 +322,10 @@ def _batch(creature: Creature, model: mujoco.MjModel, starts: Starts) -> Batch:
     batch.expand("geom_friction")[:, :, 0] *= starts.friction[:, None]
     batch.expand("body_mass")[:] *= starts.mass
     batch.expand("body_inertia")[:] *= starts.mass[:, :, None]
+    batch.expand("opt.gravity")[:] = _gravity(model, starts.slope)
+    # The impedance and not the time constant, which is as short as the time step allows already.
+    impedance = batch.expand("geom_solimp")[:, :, :2]
+    impedance /= impedance + starts.floor[:, None, None] * (1 - impedance)
     batch.set_const()
     batch.reset(stage=int(mujoco.mjtStage.mjSTAGE_NONE))
     qpos = batch.bind("qpos")
@@ -317,3 +333,11 @@ def _batch(creature: Creature, model: mujoco.MjModel, starts: Starts) -> Batch:
     qpos[:, creature.qpos_adr] += starts.joint_offset
     batch.bind("qvel")[:, creature.dof_adr] = starts.joint_velocity
     return batch
+
+
+def _gravity(model: mujoco.MjModel, slope: np.ndarray) -> np.ndarray:
+    """[S, 3] on slopes [S, 2]: gravity is tilted instead of the floor, see `worlds.sloping`."""
+    angle = np.linalg.norm(slope, axis=1, keepdims=True)
+    uphill = slope / np.where(angle > 0, angle, 1.0)
+    change = np.concatenate([-np.sin(angle) * uphill, 1 - np.cos(angle)], 1)
+    return model.opt.gravity + np.linalg.norm(model.opt.gravity) * change

@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+from mjxgait.certify.criteria import CRITERIA
 from mjxgait.champion import Champion
 from mjxgait.errors import UserError
 
@@ -38,5 +39,10 @@ def outdated(document: dict[str, Any], champion: Champion) -> str | None:
     if "champion" not in document:
         return "The certificate is outdated: it does not say which champion was examined, as those of earlier versions."
     if document["champion"] != champion.fingerprint:
-        return "The certificate is outdated: it was given to another champion than the one that is here now."
+        return (
+            "The certificate is outdated: "
+            "it was given to another champion than the one that is here now."
+        )
+    if {c["number"] for c in document["criteria"]} != set(range(1, CRITERIA + 1)):
+        return "The certificate is outdated: it was given under other criteria than today's."
     return None
