@@ -70,7 +70,7 @@ class Examiner:
         wanted = enough(config, generation)
         champion = self.experiment.champion(state, self.versions)
         name = champion.fingerprint
-        if self._margins.get(name, np.inf) < wanted or self.exams.failed(name):
+        if self._margins.get(name, np.inf) < wanted or self.exams.failed(name, generation):
             return None
         if self.exams.attempt(name, generation) >= config.examination.attempts:
             return None
@@ -90,7 +90,7 @@ class Examiner:
         chosen: list[Seen] = []
         for rank in self.experiment.candidates(state):
             champion = self.experiment.champion(state, self.versions, rank)
-            if self.exams.failed(champion.fingerprint):
+            if self.exams.failed(champion.fingerprint, int(state.generation) - 1):
                 known.append(champion)
                 continue
             chosen.append(self._look(champion, 0.0))

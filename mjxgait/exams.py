@@ -18,9 +18,12 @@ class Exams:
 
     path: Path
 
-    def failed(self, champion: str) -> bool:
-        """Whether the champion of this fingerprint has failed."""
-        return any(line["champion"] == champion and not line["passed"] for line in self._lines())
+    def failed(self, champion: str, generation: int) -> bool:
+        """Whether the champion of this fingerprint has failed up to this generation."""
+        failures = (line for line in self._lines() if not line["passed"])
+        return any(
+            line["champion"] == champion and line["generation"] <= generation for line in failures
+        )
 
     def taken(self, generation: int) -> int:
         """Examinations up to this generation."""

@@ -37,7 +37,7 @@ class StartsConfig:
       joints, velocities, masses, gains: half widths in rad, rad/s, and as a share of each body's mass
         and of each joint's kp and kd.
       friction: range of the factor. latency: most control steps by which torques come late.
-      slope: steepest, in degrees. floor: range of the factor on how deep a body at rest sinks in.
+      slope: steepest, in degrees. floor: range of the factor on the softness of the floor.
       upright: share that must stay up.
     """
 

@@ -18,7 +18,7 @@ class Starts:
     friction: [S] factor on the sliding friction. mass: [S, nbody] factor on each body's mass and inertia.
     stiffness, damping: [S, J] factors on kp and kd. delay: [S] control steps by which a torque comes too late.
     slope: [S, 2] rad, how steeply the floor rises along the world's x and y.
-    floor: [S] factor on how deep a body at rest sinks into the floor.
+    floor: [S] factor on the softness of the floor, (1 - d) / d with the impedance d of MuJoCo.
     push_time: [S] s, infinite for none.
     push: [S, 2] m/s, sudden change of the trunk's horizontal velocity in the world.
     end: [S] s, from which nobody looks any more: who is up until then has stayed up.
@@ -113,8 +113,8 @@ def unfamiliar(
 
     Args:
       gains: half width of each joint's kp and kd, as a share. latency: most control steps of delay.
-      slope: rad, steepest, in any direction. floor: range of the factor on how deep a body sinks in,
-        as many times softer as harder where its ends are each other's inverse.
+      slope: rad, steepest, in any direction. floor: range of the softness factor, as many times
+        softer as harder where its ends are each other's inverse.
     """
     count, direction = len(starts), rng.uniform(0, 2 * np.pi, len(starts))
     return dataclasses.replace(
