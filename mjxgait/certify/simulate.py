@@ -163,6 +163,7 @@ class _Run:
         self.forbidden = LowestPoint(self.model, creature.watched[len(creature.foot_of) :])
         bind = self.batch.bind
         self.qpos, self.qvel, self.applied = bind("qpos"), bind("qvel"), bind("qfrc_applied")
+        self.warm_start = bind("qacc_warmstart")
         self.xpos, self.xmat, self.mass = bind("xpos"), bind("xmat"), bind("M")
         self.bias, self.passive, self.constraint = (
             bind("qfrc_bias"),
@@ -181,11 +182,16 @@ class _Run:
         count, time_step = len(self.starts), self.creature.model.opt.timestep
         fell = np.full(count, np.inf)
         travel = np.zeros((count, 2))
-        running = np.arange(count)
+        leader, waiting = self._alike()
+        running = np.setdiff1d(np.arange(count), waiting)
         film = self._empty_film(steps)
         for k in range(steps):
             if not len(running):
                 break
+            if len(waiting) and np.isinf(fell[leader]):
+                released = waiting[self._pushed(waiting, k)]
+                self._follow(released, leader)
+                running, waiting = np.union1d(running, released), np.setdiff1d(waiting, released)
             self._push(running, k)
             commanded = None if heading is None else float(heading[k])
             self._control_step(running, k, commanded, film)
@@ -199,7 +205,25 @@ class _Run:
                     & self._sane(running)
                     & ((running < self.record) | np.isinf(fell[running]))
                 ]
+        fell[waiting], travel[waiting] = fell[leader], travel[leader]
         return Outcome(fell, travel, film)
+
+    def _alike(self) -> tuple[int, np.ndarray]:
+        """One simulation that stands for others until they are pushed, and those others.
+
+        Nothing tells them apart before, so a quarter of all steps need not be taken.
+        """
+        alike = np.flatnonzero(self.starts.undisturbed)
+        if not len(alike):
+            return 0, alike
+        leader = int(alike[self.starts.push_time[alike].argmax()])
+        return leader, alike[(alike != leader) & (alike >= self.record)]
+
+    def _follow(self, rows: np.ndarray, leader: int) -> None:
+        """Puts simulations where another one is."""
+        for state in (self.qpos, self.qvel, self.warm_start, self.last_force, self.position):
+            state[rows] = state[leader]
+        self.sent[:, rows] = self.sent[:, [leader]]
 
     def _control_step(
         self, running: np.ndarray, k: int, heading: float | None, film: Trajectory
@@ -269,13 +293,17 @@ class _Run:
         self.batch.forward(stage=VELOCITY_STAGE)
 
     def _push(self, running: np.ndarray, k: int) -> None:
-        time_step = self.creature.model.opt.timestep
-        pushed = running[np.floor(self.starts.push_time[running] / time_step) == k]
+        pushed = running[self._pushed(running, k)]
         if len(pushed):
             self.qvel[pushed, self.layout.root_dof : self.layout.root_dof + 2] += self.starts.push[
                 pushed
             ]
             self.batch.forward(pushed, stage=VELOCITY_STAGE)
+
+    def _pushed(self, rows: np.ndarray, k: int) -> np.ndarray:
+        """Which of some simulations are pushed at a step."""
+        time_step = self.creature.model.opt.timestep
+        return np.floor(self.starts.push_time[rows] / time_step) == k
 
     def _travel(self, running: np.ndarray) -> np.ndarray:
         moved = self.xpos[running, self.creature.trunk] - self.controller.start

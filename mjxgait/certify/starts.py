@@ -41,6 +41,14 @@ class Starts:
     def __len__(self) -> int:
         return len(self.friction)
 
+    @property
+    def undisturbed(self) -> np.ndarray:
+        """[S] whether nothing disturbs them until they are pushed."""
+        plain = {"friction": 1, "mass": 1, "stiffness": 1, "damping": 1, "floor": 1}
+        plain |= {"joint_offset": 0, "joint_velocity": 0, "delay": 0, "slope": 0}
+        same = [getattr(self, name) == value for name, value in plain.items()]
+        return np.all([s.reshape(len(self), -1).all(1) for s in same], axis=0)
+
     def rows(self, index: slice | np.ndarray) -> "Starts":
         """Some of the simulations."""
         return Starts(

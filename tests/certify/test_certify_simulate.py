@@ -135,6 +135,25 @@ def test_leaving_out_the_fallen_changes_nothing_for_the_others(tiny, trotter, mi
     np.testing.assert_array_equal(dropped.travel[standing], outcome.travel[standing])
 
 
+def test_those_alike_until_their_push_are_simulated_once_and_come_out_as_if_alone(tiny, trotter):
+    pushed = pushed_starts(tiny, 6, np.random.default_rng(5), 1.2, (0.2, 1.2))
+    pushed.push_time[-1] = 99.0
+    together = simulate(tiny, trotter, pushed, SECONDS, threads=1)
+    alone = [simulate(tiny, trotter, pushed.rows(slice(i, i + 1)), SECONDS) for i in range(6)]
+    np.testing.assert_array_equal(together.fell, [a.fell[0] for a in alone])
+    np.testing.assert_array_equal(together.travel, [a.travel[0] for a in alone])
+    assert len(set(together.travel[:, 0])) == 6
+
+
+def test_who_falls_before_its_push_has_fallen_when_its_leader_fell(tiny):
+    flat = make_champion(tiny, np.tile([1.0, 1.4], (2, 4)))
+    pushed = pushed_starts(tiny, 3, np.random.default_rng(5), 0.1, (1.0, 1.4))
+    together = simulate(tiny, flat, pushed, SECONDS, threads=1)
+    alone = simulate(tiny, flat, nominal_starts(tiny, 1), SECONDS)
+    np.testing.assert_array_equal(together.fell, np.repeat(alone.fell, 3))
+    np.testing.assert_array_equal(together.travel, np.repeat(alone.travel, 3, axis=0))
+
+
 def test_the_same_again_is_the_same(tiny, trotter, mixed, outcome):
     again = simulate(tiny, trotter, mixed, SECONDS, record=len(mixed), threads=1)
     np.testing.assert_array_equal(again.trajectory.qpos, outcome.trajectory.qpos)
