@@ -18,7 +18,8 @@ from mjxgait.certify.starts import join, nominal_starts, perturbed_starts
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 
-SCHEMA = 1
+SCHEMA = 2
+"""Of the file and of the rules: those of 1 had eight criteria, and chose on what they examined."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -20,8 +20,6 @@ from mjxgait.certify.config import (
 from mjxgait.certify.measure import Recording
 from mjxgait.certify.simulate import Fall
 
-CRITERIA = 9
-
 
 @dataclasses.dataclass(frozen=True)
 class Measure:

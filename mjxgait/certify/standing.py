@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from mjxgait.certify.criteria import CRITERIA
+from mjxgait.certify.certificate import SCHEMA
 from mjxgait.champion import Champion
 from mjxgait.errors import UserError
 
@@ -43,6 +43,6 @@ def outdated(document: dict[str, Any], champion: Champion) -> str | None:
             "The certificate is outdated: "
             "it was given to another champion than the one that is here now."
         )
-    if {c["number"] for c in document["criteria"]} != set(range(1, CRITERIA + 1)):
-        return "The certificate is outdated: it was given under other criteria than today's."
+    if document.get("schema") != SCHEMA:
+        return "The certificate is outdated: it was given under other rules than today's."
     return None
