@@ -1,4 +1,4 @@
-"""Who of a population walks: looks at the best few in C MuJoCo, chooses one, and has it examined."""
+"""Who of a population walks: looks at the best few in C MuJoCo and has one of them examined."""
 
 import dataclasses
 from collections.abc import Callable
@@ -81,7 +81,7 @@ class Examiner:
         return None
 
     def best(self, state: EvolutionState) -> Examined | None:
-        """One of the best few with its certificate, whether it passes or not; None if there are none.
+        """One of the best few with its certificate, passed or not; None if there are none.
 
         Chosen is the first that has room to spare, else the one with the best margin. Only that one
         is examined; one that has failed on the way only if there is no other.

@@ -220,7 +220,7 @@ def certify(
 def record(
     creature: Creature, champion: Champion, seconds: float, refine: int = 1, threads: int = 0
 ) -> Recording:
-    """The undisturbed walk, measured."""
+    """The undisturbed walk, measured; parts in each other only at the usual time step."""
     outcome = simulate(
         creature,
         champion,
@@ -230,7 +230,7 @@ def record(
         refine=refine,
         threads=threads,
     )
-    return measure(creature, champion, outcome.trajectory)
+    return measure(creature, champion, outcome.trajectory, inside=refine == 1)
 
 
 def survival(

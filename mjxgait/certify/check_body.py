@@ -1,4 +1,4 @@
-"""Derives a second time what the examiner takes from the shared loader, from the two files of the creature alone.
+"""Derives a second time what the examiner takes from the shared loader, from the creature's files.
 
 Hip height, axes and mirror map decide what counts as forward, fast and symmetric: an error in them
 would pass evolution and examination alike. Nothing here uses `mjxgait.creature` but the value that
@@ -144,7 +144,7 @@ class _Body:
         return float(np.mean(heights))
 
     def check_length(self, creature: Creature) -> None:
-        """The body's length lies between that of the geoms' centres and of the spheres about them."""
+        """The length lies between that of the geoms' centres and of the spheres about them."""
         if stated := self.identity.get("body_length"):
             low = high = float(stated)
         else:
@@ -195,7 +195,10 @@ class _Body:
                     )
 
     def _parts(self, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Of the body that each joint moves: its centre of mass [J, 3] from the trunk's place, and rotation [J, 3, 3]."""
+        """Of the body that each joint moves: its place [J, 3] and rotation [J, 3, 3].
+
+        The place is that of its centre of mass, from the trunk's, in m.
+        """
         qpos = self.stand.copy()
         qpos[[j.qposadr[0] for j in self.joints]] = pose
         self.pose(qpos)

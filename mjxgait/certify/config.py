@@ -34,8 +34,8 @@ class StartsConfig:
     """4. Perturbed starts.
 
     Attributes:
-      joints, velocities, masses, gains: half widths in rad, rad/s, and as a share of each body's mass
-        and of each joint's kp and kd.
+      joints, velocities, masses, gains: half widths in rad, rad/s, and as a share of each body's
+        mass and of each joint's kp and kd.
       friction: range of the factor. latency: most control steps by which torques come late.
       slope: steepest, in degrees. floor: range of the factor on the softness of the floor.
       upright: share that must stay up.
@@ -115,7 +115,7 @@ class PhysicsConfig:
 
 @dataclasses.dataclass(frozen=True)
 class PartsConfig:
-    """9. overlap: hip heights, deepest that parts may stand in each other that are no neighbours."""
+    """9. overlap: hip heights, how deep parts may stand in each other but neighbours."""
 
     __pydantic_config__ = STRICT
     overlap: Positive = 0.02

@@ -31,7 +31,7 @@ def describe(window: Recording, clearance: float) -> dict[str, Any]:
 
 
 def worst_overlap(window: Recording) -> dict[str, Any] | None:
-    """The two parts that stand deepest in each other: how deep in m, and in which share of frames."""
+    """The two parts deepest in each other: how deep in m, and in which share of frames."""
     depth = np.nan_to_num(window.overlap)
     if not depth.any():
         return None

@@ -1,4 +1,4 @@
-"""Which starts and pushes: one draw for everybody to be chosen on, and one of his own for each champion to be examined on.
+"""Which starts and pushes: one draw to choose on, and each champion's own to be examined on.
 
 A champion's draw follows from his fingerprint, which nobody knows before he is complete: evolution
 cannot tune for it, and the same champion is examined on the same draw, whenever and by whomever.
@@ -21,7 +21,7 @@ class Draw:
     words: tuple[int, ...]
 
     def generator(self, purpose: int) -> np.random.Generator:
-        """A source of its own for each purpose: 0 starts, 1 pushes, 2 the ladder of larger pushes."""
+        """A source for each purpose: 0 starts, 1 pushes, 2 the ladder of larger pushes."""
         return np.random.default_rng([*self.words, purpose])
 
 

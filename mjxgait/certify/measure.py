@@ -121,11 +121,18 @@ def dimensions(creature: Creature) -> Dimensions:
 
 
 def measure(
-    creature: Creature, champion: Champion, trajectory: Trajectory, row: int = 0
+    creature: Creature,
+    champion: Champion,
+    trajectory: Trajectory,
+    row: int = 0,
+    inside: bool = True,
 ) -> Recording:
     """Looks at one undisturbed simulation again: every stored frame is given to C MuJoCo, whose contacts are then read.
 
     Frames after a simulation blew up are NaN, which no criterion accepts.
+
+    Args:
+      inside: whether to look for parts in each other, which takes a quarter of the time with meshes.
     """
     controller = Controller(creature, champion)
     qpos, qvel, torque = trajectory.qpos[row], trajectory.qvel[row], trajectory.torque[row]
@@ -138,7 +145,7 @@ def measure(
         sight.trunk_rot @ axis for axis in (creature.forward, creature.left, creature.up)
     )
     moved = sight.trunk_pos - controller.start * [1, 1, 0]
-    inside = overlaps(creature, qpos)
+    crossed = overlaps(creature, qpos if inside else qpos[:0])
     return Recording(
         dimensions=dimensions(creature),
         time_step=trajectory.time_step,
@@ -159,8 +166,8 @@ def measure(
         touch=sight.touch,
         penetration=sight.penetration,
         body_speed=sight.body_speed,
-        overlap_pairs=inside.pairs,
-        overlap=inside.depth,
+        overlap_pairs=crossed.pairs,
+        overlap=crossed.depth if inside else np.zeros((len(qpos), 0)),
     )
 
 

@@ -62,7 +62,7 @@ def colliding_with_itself(creature: Creature) -> mujoco.MjModel:
 
 
 def neighbours(model: mujoco.MjModel, creature: Creature) -> list[tuple[int, int]]:
-    """Pairs of bodies that one joint joins, or several at one place; bodies welded together are one.
+    """Pairs of bodies that one joint joins, or several at one place; those welded are one.
 
     MuJoCo leaves parent and child out by itself; they are listed all the same.
     """

@@ -1,4 +1,4 @@
-"""Every fact that decides about a certificate is derived a second time: each planted error is caught."""
+"""Every fact that decides about a certificate is derived twice: each planted error is caught."""
 
 import dataclasses
 

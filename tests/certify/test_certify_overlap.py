@@ -41,7 +41,7 @@ def short(tmp_path_factory):
 
 
 def test_legs_that_cross_are_as_deep_in_each_other_as_they_are_thick(short):
-    # Both thighs swing by asin(0.5) towards each other: their middles (70 mm down) are in one place.
+    # Both thighs swing by asin(0.5) towards each other: their middles are in one place.
     angle = np.arcsin(0.5)
     qpos = standing(short, 3, front_left_hip=angle, hind_left_hip=-angle)
     found = overlaps(short, qpos)
