@@ -3,7 +3,7 @@
 import dataclasses
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +45,25 @@ class Champion:
             "controller": dataclasses.asdict(self.controller),
         }
         return hashlib.sha256(json.dumps(moves, sort_keys=True).encode()).hexdigest()[:16]
+
+    def check_finite(self, joint_names: Sequence[str]) -> None:
+        """Refuses numbers that no joint can follow and that MuJoCo would complain of step by step.
+
+        Raises:
+          UserError: names the first.
+        """
+        for place in np.argwhere(~np.isfinite(self.key_poses)):
+            k, j = map(int, place)
+            raise UserError(
+                f'key pose {k + 1} has {self.key_poses[k, j]} rad for joint "{joint_names[j]}": '
+                "this champion cannot move; take one of another generation"
+            )
+        for name, value in self.tuning.items():
+            if not np.isfinite(value):
+                raise UserError(
+                    f'the tuning "{name}" is {value}: this champion cannot move; '
+                    "take one of another generation"
+                )
 
 
 def write_champion(champion: Champion, creature: Creature, path: Path) -> None:
@@ -93,7 +112,7 @@ def read_champion(path: Path, creature: Creature) -> Champion:
         settings = {
             key: value for key, value in document["controller"].items() if key != "mirrored"
         }
-        return Champion(
+        champion = Champion(
             creature=document["creature"],
             digest=document["creature_digest"],
             key_poses=np.array(
@@ -109,3 +128,8 @@ def read_champion(path: Path, creature: Creature) -> Champion:
         raise UserError(f"{path}: no such file; the run has no champion yet") from None
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise UserError(f"{path}: not a champion file ({error!r})") from None
+    try:
+        champion.check_finite(creature.joint_names)
+    except UserError as error:
+        raise UserError(f"{path}: {error}") from None
+    return champion

@@ -261,18 +261,25 @@ class EvolutionConfig:
 
 @dataclasses.dataclass(frozen=True)
 class ExaminationConfig:
-    """The examination in C MuJoCo that ends a run.
+    """Who is chosen for the examination in C MuJoCo that ends a run.
 
     Attributes:
-      every: generations between looks on the way at the best, if it is promising; 0 examines only after the last generation.
-      enough: margin of the certificate that ends a run in the first half of its generations; in the second any pass does.
-      candidates: so many of the best, different from each other, are looked at in the end, until one passes; 0 leaves all examinations out.
+      every: generations between looks on the way at the best, if it is promising; 0 examines only
+        after the last generation.
+      enough: margin on the draw to choose on that leads to an examination in the first half of the
+        generations; in the second any pass does.
+      draws: perturbed starts, and as many pushes, to choose on; the examination draws others.
+      attempts: examinations of a run, the one at its end included.
+      candidates: so many of the best, different from each other, are looked at in the end, until
+        one has enough margin; 0 leaves all examinations out.
       difference: in units of each gene's range, root mean square; what counts as different.
     """
 
     __pydantic_config__ = STRICT
     every: Annotated[Whole, HOST] = 5
     enough: Annotated[Finite, HOST] = 0.2
+    draws: Annotated[Count, HOST] = 32
+    attempts: Annotated[Count, HOST] = 3
     candidates: Annotated[Whole, HOST] = 12
     difference: Annotated[NonNegative, HOST] = 0.02
 

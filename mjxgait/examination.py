@@ -1,14 +1,16 @@
-"""Who of a population walks: the best few before the examiner in C MuJoCo, at the end of a run and on the way there."""
+"""Who of a population walks: looks at the best few in C MuJoCo and has one of them examined."""
 
 import dataclasses
 from collections.abc import Callable
 
 import numpy as np
 
-from mjxgait.certify import Certificate, CertificateConfig, Glance, certify, glance
+from mjxgait.certify import Certificate, CertificateConfig, Glance, certify, glance, rehearse
 from mjxgait.champion import Champion
+from mjxgait.checkpoint import disk_errors
 from mjxgait.config import Config, ExaminationConfig
 from mjxgait.evolution import EvolutionState
+from mjxgait.exams import Exams
 from mjxgait.experiment import Experiment
 from mjxgait.fitness import TERMS
 
@@ -30,68 +32,102 @@ def why_ended(generation: int, margin: float) -> str:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
+class Seen:
+    """A champion that is looked at before it is examined; margin: by which it is chosen."""
+
+    champion: Champion
+    glance: Glance
+    margin: float
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
 class Examiner:
-    """Examines individuals of a run. versions: of the packages, for the champions. tell: called with what is about to be done."""
+    """Chooses individuals of a run on one draw of starts and pushes, and examines them on another.
+
+    Attributes:
+      versions: of the packages, for the champions. tell: called with what is about to be done.
+      exams: the run's examinations so far. Each is one more try, and the certificate says which.
+    """
 
     experiment: Experiment
     versions: dict[str, str]
     tell: Callable[[str], None]
+    exams: Exams
     _margins: dict[str, float] = dataclasses.field(default_factory=dict)
     """Of the champions that did not do on the way, by fingerprint, at most: another look would say the same."""
 
     def early(self, state: EvolutionState) -> Examined | None:
-        """The best individual with its certificate, if it is time to look and it passes with the margin that ends a run.
+        """The best individual with its certificate, if it is time to look and it passes.
 
-        Depends on nothing but the state and the settings, so that a resumed run ends where it would have ended. An examination takes as
-        long as ten generations: first comes what evolution knows already, then the undisturbed walk alone.
+        Depends on nothing but the state, the settings and the examinations that led here, so that a
+        resumed run ends where it would have ended. Looking takes as long as five generations: first
+        comes what evolution knows already, then the undisturbed walk, then the draw to choose on.
+        The last examination that the settings allow is kept for the end.
         """
         config, generation = self.experiment.config, int(state.generation)
         if not due(config.examination, generation) or not _promising(state, config.rollout.seconds):
             return None
         wanted = enough(config, generation)
         champion = self.experiment.champion(state, self.versions)
-        if self._margins.get(champion.fingerprint, np.inf) < wanted:
+        name = champion.fingerprint
+        if self._margins.get(name, np.inf) < wanted or self.exams.failed(name, generation):
             return None
-        seen = glance(self.experiment.creature, champion)
-        margin = seen.margin
-        if margin >= wanted:
-            examined = self._examine(champion, seen, "the best")
-            margin = examined.certificate.margin
-            if examined.certificate.passed and margin >= wanted:
-                return examined
-        self._margins[champion.fingerprint] = margin
+        if self.exams.attempt(name, generation) >= config.examination.attempts:
+            return None
+        seen = self._look(champion, wanted)
+        if seen.margin >= wanted and (examined := self._examine(seen)).certificate.passed:
+            return examined
+        self._margins[name] = seen.margin
         return None
 
     def best(self, state: EvolutionState) -> Examined | None:
-        """The first of the best few that passes; if none does, the one that comes nearest. None if nobody is to be examined.
+        """One of the best few with its certificate, passed or not; None if there are none.
 
-        Who fails undisturbed is not examined further, but for the one that comes nearest when nobody passes.
+        Chosen is the first that has room to spare, else the one with the best margin. Only that one
+        is examined; one that has failed on the way only if there is no other.
         """
-        examined: list[Examined] = []
-        failed: list[tuple[Champion, Glance]] = []
+        known: list[Champion] = []
+        chosen: list[Seen] = []
         for rank in self.experiment.candidates(state):
             champion = self.experiment.champion(state, self.versions, rank)
-            seen = glance(self.experiment.creature, champion)
-            if seen.margin < 0:
-                failed.append((champion, seen))
+            if self.exams.failed(champion.fingerprint, int(state.generation) - 1):
+                known.append(champion)
                 continue
-            examined.append(
-                self._examine(champion, seen, "the next best" if examined or failed else "the best")
-            )
-            if examined[-1].certificate.passed:
-                return examined[-1]
-        nearest = max(failed, key=lambda pair: pair[1].margin, default=None)
-        if nearest and all(e.certificate.margin < nearest[1].margin for e in examined):
-            examined.append(self._examine(*nearest, "who comes nearest"))
-        return max(examined, key=lambda e: e.certificate.margin, default=None)
+            chosen.append(self._look(champion, 0.0))
+            if chosen[-1].margin >= self.experiment.config.examination.enough:
+                break
+        chosen = chosen or [self._look(champion, np.inf) for champion in known[:1]]
+        return self._examine(max(chosen, key=lambda seen: seen.margin)) if chosen else None
 
-    def _examine(self, champion: Champion, seen: Glance, who: str) -> Examined:
-        self.tell(f"Generation {champion.origin['generation']}: examining {who} in C MuJoCo…")
-        return Examined(certify(self.experiment.creature, champion, seen=seen), champion)
+    def _look(self, champion: Champion, wanted: float) -> Seen:
+        """At the undisturbed walk, and if its margin is what is wanted, at the disturbed ones."""
+        creature = self.experiment.creature
+        seen = glance(creature, champion)
+        margin = seen.margin
+        if margin >= wanted:
+            count = self.experiment.config.examination.draws
+            margin = min(margin, rehearse(creature, champion, count))
+        return Seen(champion, seen, margin)
+
+    def _examine(self, seen: Seen) -> Examined:
+        name, generation = seen.champion.fingerprint, int(seen.champion.origin["generation"])
+        attempt = self.exams.attempt(name, generation)
+        self.tell(
+            f"Generation {generation}: examining the champion in C MuJoCo, attempt {attempt}…"
+        )
+        certificate = certify(
+            self.experiment.creature, seen.champion, seen=seen.glance, attempts=attempt
+        )
+        with disk_errors(self.exams.path.parent):
+            self.exams.add(name, generation, certificate.passed)
+        return Examined(certificate, seen.champion)
 
 
 def enough(config: Config, generation: int) -> float:
-    """The margin with which a run ends early: room to spare in the first half of its generations, any pass after that."""
+    """The margin that is worth an examination on the way.
+
+    Room to spare in the first half of a run's generations, any in the second.
+    """
     return config.examination.enough if 2 * generation <= config.evolution.generations else 0.0
 
 

@@ -10,7 +10,7 @@ from mjxgait.errors import UserError
 from mjxgait.tables import build, dump_toml, read_toml
 
 CONFIG, CREATURE, METRICS, CHAMPION = "config.toml", "creature", "metrics.jsonl", "champion.json"
-CERTIFICATE, PLOT = "certificate.json", "fitness.png"
+CERTIFICATE, EXAMS, PLOT = "certificate.json", "exams.jsonl", "fitness.png"
 
 
 def create_run(folder: Path, creature: Creature, config: Config) -> None:

@@ -22,9 +22,18 @@ from mjxgait.config import Config
 from mjxgait.creature import Creature
 from mjxgait.evolution import EvolutionState, GenerationMetrics, stop_reason
 from mjxgait.examination import Examined, Examiner, why_ended
+from mjxgait.exams import Exams
 from mjxgait.experiment import Step, build_experiment
 from mjxgait.fitness import TERMS
-from mjxgait.folder import CERTIFICATE, CHAMPION, METRICS, PLOT, read_metrics, truncate_metrics
+from mjxgait.folder import (
+    CERTIFICATE,
+    CHAMPION,
+    EXAMS,
+    METRICS,
+    PLOT,
+    read_metrics,
+    truncate_metrics,
+)
 from mjxgait.screen import Screen
 
 
@@ -53,7 +62,7 @@ def train(
     with screen.compiling(creature.name, experiment):
         step = experiment.compile()
     began = time.perf_counter()
-    examiner = Examiner(experiment, versions(), screen.say)
+    examiner = Examiner(experiment, versions(), screen.say, Exams(folder / EXAMS))
     try:
         with interruptible() as interrupted:
             state, reason, examined = _evolve(

@@ -81,6 +81,14 @@ class Screen:
         self.console.print(table)
         verdict = "Certified: it walks" if certificate.passed else "Not certified"
         report = certificate.report
+        if certificate.attempts > 1:
+            self.console.print(f"This was examination {certificate.attempts} of its run.")
+        if (worst := report["overlap"]) and not certificate.criteria[-1].passed:
+            one, other = worst["parts"]
+            self.console.print(
+                f"{other} stands up to {1000 * worst['depth']:.0f} mm deep in {one}, "
+                f"and in it in {worst['share']:.0%} of the frames."
+            )
         self.console.print(
             f"{verdict} (margin {certificate.margin:.2f}). {report['gait']}, {report['speed']:.2f} m/s; {certificate.seconds:.0f} s."
         )

@@ -2,9 +2,12 @@
 
 import dataclasses
 import io
+import json
+import shutil
 from pathlib import Path
 from types import SimpleNamespace
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -17,16 +20,17 @@ from mjxgait.config import ExaminationConfig
 from mjxgait.creature import load_creature
 from mjxgait.evolution import EvolutionState
 from mjxgait.examination import Examiner, due
+from mjxgait.exams import Exams
 from mjxgait.experiment import Experiment, build_experiment
 from mjxgait.fitness import TERMS
-from mjxgait.folder import CERTIFICATE, create_run, read_metrics
+from mjxgait.folder import CERTIFICATE, EXAMS, create_run, read_metrics
 from mjxgait.inspect.snapshot import read_snapshot
 from mjxgait.screen import Screen
 
 SECONDS = 0.4
 
 
-def certificate(margin: float) -> Certificate:
+def certificate(margin: float, attempts: int = 1) -> Certificate:
     """One that depends on a single measure."""
     measure = Measure("speed", 0.5 + margin, ">=", 0.5, 1.0)
     return Certificate(
@@ -34,9 +38,10 @@ def certificate(margin: float) -> Certificate:
         "",
         "",
         (Criterion(2, "progress", (measure,)),),
-        {"gait": "walk", "speed": 1.0},
+        {"gait": "walk", "speed": 1.0, "overlap": None},
         CertificateConfig(),
         1.0,
+        attempts,
     )
 
 
@@ -62,24 +67,39 @@ def state_with(
     )
 
 
+class Looks:
+    """What the examiner will say, the last of a list over and over, and what it was asked."""
+
+    def __init__(self) -> None:
+        self.glances, self.rehearsals, self.certificates = [0.3], [0.3], [0.3]
+        self.asked: list[str] = []
+
+    def answer(self, kind: str, answers: list[float]) -> float:
+        self.asked.append(kind)
+        return answers[min(self.asked.count(kind), len(answers)) - 1]
+
+
 @pytest.fixture
-def looks(monkeypatch: pytest.MonkeyPatch) -> dict[str, list[float]]:
-    """What the examiner will say (`glance`, `certify`), and how often it was asked."""
-    said: dict[str, list[float]] = {"glance": [0.3], "certify": [0.3], "asked": []}
+def looks(monkeypatch: pytest.MonkeyPatch) -> Looks:
+    said = Looks()
 
     def glance(*_: object) -> SimpleNamespace:
-        said["asked"].append(0.1)
-        return SimpleNamespace(
-            margin=said["glance"][min(said["asked"].count(0.1), len(said["glance"])) - 1]
-        )
+        return SimpleNamespace(margin=said.answer("glance", said.glances))
+
+    def certify(*_: object, attempts: int, **__: object) -> Certificate:
+        return certificate(said.answer("exam", said.certificates), attempts)
 
     monkeypatch.setattr(examination, "glance", glance)
     monkeypatch.setattr(
-        examination,
-        "certify",
-        lambda *_, seen: said["asked"].append(1.0) or certificate(said["certify"][0]),
+        examination, "rehearse", lambda *_: said.answer("rehearsal", said.rehearsals)
     )
+    monkeypatch.setattr(examination, "certify", certify)
     return said
+
+
+@pytest.fixture
+def exams(tmp_path: Path) -> Exams:
+    return Exams(tmp_path / "exams.jsonl")
 
 
 def test_it_looks_every_few_generations_and_not_at_the_first():
@@ -89,87 +109,136 @@ def test_it_looks_every_few_generations_and_not_at_the_first():
     assert not any(due(ExaminationConfig(candidates=0), g) for g in range(20))
 
 
-def test_a_promising_best_that_passes_with_room_ends_the_run(
-    experiment: Experiment, looks: dict[str, list[float]]
-):
-    examined = Examiner(experiment, {}, lambda _: None).early(state_with(experiment, 3))
+def examiner(experiment: Experiment, exams: Exams, **settings: float) -> Examiner:
+    """One of a run with other settings of the examination."""
+    examination = dataclasses.replace(experiment.config.examination, **settings)
+    config = dataclasses.replace(experiment.config, examination=examination)
+    return Examiner(dataclasses.replace(experiment, config=config), {}, lambda _: None, exams)
+
+
+def ranked(experiment: Experiment, generation: int = 9) -> EvolutionState:
+    """A population at its last generation, the first the best."""
+    return dataclasses.replace(
+        experiment.init(), fitness=jnp.arange(6.0)[::-1], generation=jnp.int32(generation)
+    )
+
+
+def test_a_promising_best_with_room_is_examined_and_ends_the_run(experiment, looks, exams):
+    examined = examiner(experiment, exams).early(state_with(experiment, 3))
     assert examined is not None
+    assert looks.asked == ["glance", "rehearsal", "exam"]
     assert examined.certificate.margin == pytest.approx(0.3)
     assert examined.champion.origin["generation"] == 3
 
 
 @pytest.mark.parametrize(
-    ("generation", "speed", "alive", "glance", "certify", "asked"),
+    ("generation", "speed", "alive", "glance", "rehearsal", "asked"),
     [
         (4, 0.7, 1.0, 0.3, 0.3, 0),  # not the generation to look
         (3, 0.55, 1.0, 0.3, 0.3, 0),  # hardly faster than it must be
         (3, 0.7, 0.9, 0.3, 0.3, 0),  # falls on one of its starts
         (3, 0.7, 1.0, 0.1, 0.3, 1),  # fails, or nearly, when nobody disturbs it
-        (3, 0.7, 1.0, 0.3, 0.1, 2),  # passes, but with too little room
+        (3, 0.7, 1.0, 0.3, 0.1, 2),  # stays up, but with too little room
     ],
 )
 def test_else_it_goes_on_and_spares_what_it_can(
-    experiment: Experiment, looks, generation, speed, alive, glance, certify, asked
+    experiment, looks, exams, generation, speed, alive, glance, rehearsal, asked
 ):
-    looks["glance"], looks["certify"] = [glance], [certify]
-    assert (
-        Examiner(experiment, {}, lambda _: None).early(
-            state_with(experiment, generation, speed, alive)
-        )
-        is None
-    )
-    assert len(looks["asked"]) == asked
+    looks.glances, looks.rehearsals = [glance], [rehearsal]
+    state = state_with(experiment, generation, speed, alive)
+    assert examiner(experiment, exams).early(state) is None
+    assert len(looks.asked) == asked
+    assert exams.taken(9) == 0
 
 
-def test_who_did_not_do_is_not_looked_at_again(
-    experiment: Experiment, looks: dict[str, list[float]]
-):
-    looks["certify"] = [0.1]
-    examiner = Examiner(experiment, {}, lambda _: None)
+def test_who_did_not_do_is_not_looked_at_again(experiment, looks, exams):
+    looks.rehearsals = [0.1]
+    same = examiner(experiment, exams)
     for _ in range(2):
-        assert examiner.early(state_with(experiment, 3)) is None
-    assert looks["asked"] == [0.1, 1.0]
+        assert same.early(state_with(experiment, 3)) is None
+    assert looks.asked == ["glance", "rehearsal"]
 
 
-def test_in_the_second_half_any_pass_will_do(experiment: Experiment, looks: dict[str, list[float]]):
-    looks["certify"] = [0.1]
-    examiner = Examiner(experiment, {}, lambda _: None)
-    assert examiner.early(state_with(experiment, 3)) is None
-    assert examiner.early(state_with(experiment, 6)) is not None
-    looks["certify"] = [-0.1]
-    assert Examiner(experiment, {}, lambda _: None).early(state_with(experiment, 6)) is None
+def test_in_the_second_half_any_margin_is_worth_an_examination(experiment, looks, exams):
+    looks.rehearsals = [0.1]
+    same = examiner(experiment, exams)
+    assert same.early(state_with(experiment, 3)) is None
+    assert same.early(state_with(experiment, 6)) is not None
+    looks.rehearsals = [-0.1]
+    assert examiner(experiment, exams).early(state_with(experiment, 6)) is None
 
 
-def test_in_the_end_nobody_is_examined_further_who_fails_undisturbed(
-    experiment: Experiment, looks: dict[str, list[float]]
+def test_any_pass_ends_a_run_that_was_worth_an_examination(experiment, looks, exams):
+    looks.certificates = [0.01]
+    assert examiner(experiment, exams).early(state_with(experiment, 3)) is not None
+
+
+def test_who_fails_the_examination_is_not_examined_again_and_the_next_is_the_second_try(
+    experiment, looks, exams
 ):
-    config = dataclasses.replace(
-        experiment.config, examination=ExaminationConfig(candidates=3, difference=0.0)
-    )
-    judged = dataclasses.replace(
-        experiment.init(), fitness=jnp.arange(6.0)[::-1], generation=jnp.int32(9)
-    )
-    examiner = Examiner(dataclasses.replace(experiment, config=config), {}, lambda _: None)
-    assert examiner.best(judged).certificate.passed
-    assert looks["asked"] == [0.1, 1.0]  # the first does
-    looks["asked"].clear()
-    looks["glance"] = [-0.3]
-    assert examiner.best(judged) is not None
-    assert looks["asked"] == [
-        0.1,
-        0.1,
-        0.1,
-        1.0,
-    ]  # none of three does, and one is examined to say why
-    looks["asked"].clear()
-    looks["glance"], looks["certify"] = [0.3, -0.3, -0.5], [-3.0]
-    assert examiner.best(judged) is not None
-    # The first falls when disturbed; the second, which fails by less, may be the nearest.
-    assert looks["asked"] == [0.1, 1.0, 0.1, 0.1, 1.0]
+    looks.certificates = [-0.1, 0.3]
+    assert examiner(experiment, exams).early(state_with(experiment, 3)) is None
+    # A run that is resumed knows it from the file.
+    assert examiner(experiment, exams).early(state_with(experiment, 6)) is None
+    assert looks.asked.count("exam") == 1
+    other = other_best(state_with(experiment, 6))
+    examined = examiner(experiment, exams).early(other)
+    assert examined is not None
+    assert examined.certificate.attempts == 2
+
+
+def other_best(state: EvolutionState) -> EvolutionState:
+    """The same with another genome in front."""
+    genomes = jax.tree.map(lambda leaf: leaf.at[0].set(leaf[1]), state.genomes)
+    return dataclasses.replace(state, genomes=genomes)
+
+
+def test_the_last_examination_is_kept_for_the_end(experiment, looks, exams):
+    looks.certificates = [-0.1]
+    state = state_with(experiment, 3)
+    two = examiner(experiment, exams, attempts=2)
+    assert two.early(state) is None
+    assert two.early(other_best(state)) is None
+    assert looks.asked.count("exam") == 1
+    assert two.best(ranked(experiment)).certificate.attempts == 2
+
+
+def test_in_the_end_the_first_with_room_is_examined_and_nobody_else(experiment, looks, exams):
+    settings = {"candidates": 3, "difference": 0.0}
+    looks.rehearsals, looks.certificates = [0.1, 0.25, 0.9], [-0.5]
+    examined = examiner(experiment, exams, **settings).best(ranked(experiment))
+    assert not examined.certificate.passed
+    assert looks.asked == ["glance", "rehearsal"] * 2 + ["exam"]
+    assert examined.champion.fitness == 4.0
+
+
+def test_in_the_end_the_best_margin_is_examined_where_nobody_has_room(experiment, looks, exams):
+    settings = {"candidates": 3, "difference": 0.0}
+    looks.glances, looks.rehearsals = [-0.3, 0.3, 0.3], [0.05, 0.15]
+    examined = examiner(experiment, exams, **settings).best(ranked(experiment))
+    assert examined.champion.fitness == 3.0
+    # Who fails undisturbed is not disturbed.
+    assert looks.asked == ["glance", *["glance", "rehearsal"] * 2, "exam"]
+
+
+def test_in_the_end_one_that_has_failed_before_is_not_chosen(experiment, looks, exams):
+    settings = {"candidates": 2, "difference": 0.0}
+    looks.certificates = [-0.1]
+    # The same two in three generations.
+    chosen = [
+        examiner(experiment, exams, **settings).best(ranked(experiment, generation))
+        for generation in (7, 8, 9)
+    ]
+    assert [c.champion.fitness for c in chosen] == [5.0, 4.0, 5.0]
+    # Nobody was left in the last: the failure stands, and is no further try.
+    assert [c.certificate.attempts for c in chosen] == [1, 2, 1]
+    assert exams.taken(9) == 2
+    # Once more is the same once more.
+    assert examiner(experiment, exams, **settings).best(ranked(experiment, 8)).champion.fitness == 4
 
 
 @pytest.fixture
-def promising(monkeypatch: pytest.MonkeyPatch, looks: dict[str, list[float]]) -> None:
+def promising(monkeypatch: pytest.MonkeyPatch, looks: Looks) -> None:
     """Everybody is promising, so that the small run is looked at."""
     monkeypatch.setattr(examination, "_promising", lambda *_: True)
 
@@ -200,11 +269,19 @@ def test_a_certified_run_ends_early_and_stays_ended(
 
 
 def test_one_that_never_passes_goes_on_to_the_end(
-    tmp_path: Path, experiment: Experiment, promising: None, looks: dict[str, list[float]]
+    tmp_path: Path, experiment: Experiment, promising: None, looks: Looks
 ):
-    looks["certify"] = [-0.5]
+    looks.certificates = [-0.5]
     folder = tmp_path / "run"
     create_run(folder, experiment.creature, experiment.config)
-    assert "All 9 generations are done" in trained(folder, experiment)
-    assert (folder / CERTIFICATE).exists()
-    assert looks["asked"].count(1.0) >= 2  # generation 3, and the best few at the end
+    said = trained(folder, experiment)
+    assert "All 9 generations are done" in said
+    tries = looks.asked.count("exam")
+    assert 2 <= tries <= experiment.config.examination.attempts
+    assert f"This was examination {tries} of its run" in said
+    written = (folder / CERTIFICATE).read_text(), (folder / EXAMS).read_text()
+    assert json.loads(written[0])["attempts"] == tries
+    # Resumed from an earlier checkpoint it does the same again, and that is no further try.
+    shutil.rmtree(folder / "checkpoints" / "9")
+    trained(folder, experiment, resume=True)
+    assert written == ((folder / CERTIFICATE).read_text(), (folder / EXAMS).read_text())

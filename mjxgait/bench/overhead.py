@@ -18,8 +18,10 @@ from mjxgait.bench.ours import Ours
 from mjxgait.checkpoint import Checkpoints
 from mjxgait.evolution import EvolutionState, GenerationMetrics, Judged
 from mjxgait.examination import Examiner
+from mjxgait.exams import Exams
 from mjxgait.experiment import Experiment, evolution_of
 from mjxgait.fitness import TERMS
+from mjxgait.folder import EXAMS
 from mjxgait.screen import Screen
 
 REPEATS = 30
@@ -100,7 +102,7 @@ def _host_loop(ours: Ours, generations: int) -> tuple[float, float, float]:
         began = time.perf_counter()
         run._evolve(
             Path(folder),
-            Examiner(experiment, {}, screen.say),
+            Examiner(experiment, {}, screen.say, Exams(Path(folder) / EXAMS)),
             step,
             ours.first,
             checkpoints,

@@ -8,6 +8,7 @@ from mjxgait.certify.certificate import (
     glance,
     push_ladder,
     record,
+    rehearse,
     survival,
 )
 from mjxgait.certify.config import CertificateConfig
@@ -27,5 +28,6 @@ __all__ = [
     "push_ladder",
     "read_certificate",
     "record",
+    "rehearse",
     "survival",
 ]

@@ -8,21 +8,27 @@ from typing import Any
 
 import numpy as np
 
-from mjxgait.certify import criteria, describe
+from mjxgait.certify import criteria, describe, draws
+from mjxgait.certify.check_body import check_body
 from mjxgait.certify.config import CertificateConfig
 from mjxgait.certify.criteria import Criterion
 from mjxgait.certify.measure import Recording, measure
 from mjxgait.certify.simulate import simulate
-from mjxgait.certify.starts import Starts, join, nominal_starts, perturbed_starts, pushed_starts
+from mjxgait.certify.starts import join, nominal_starts, perturbed_starts
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 
-SCHEMA = 1
+SCHEMA = 2
+"""Of the file and of the rules: those of 1 had eight criteria, and chose on what they examined."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Certificate:
-    """The verdict. champion: fingerprint of the one examined. report: the numbers without a threshold. seconds: that it took."""
+    """The verdict.
+
+    champion: fingerprint of the one examined. report: the numbers without a threshold.
+    seconds: that it took. attempts: examinations that its run has taken, this one included.
+    """
 
     creature: str
     digest: str
@@ -31,6 +37,7 @@ class Certificate:
     report: dict[str, Any]
     config: CertificateConfig
     seconds: float
+    attempts: int = 1
 
     @property
     def passed(self) -> bool:
@@ -65,6 +72,7 @@ class Certificate:
             "champion": self.champion,
             "passed": self.passed,
             "margin": self.margin,
+            "attempts": self.attempts,
             "criteria": [
                 {
                     "number": c.number,
@@ -84,7 +92,7 @@ class Certificate:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Glance:
-    """The undisturbed walk, and the criteria that it alone decides, half the time step among them (all but 4 and 5)."""
+    """The undisturbed walk, and the criteria that it alone decides: all but 4 and 5."""
 
     whole: Recording
     criteria: tuple[Criterion, ...]
@@ -101,8 +109,13 @@ def glance(
     config: CertificateConfig | None = None,
     threads: int = 0,
 ) -> Glance:
-    """The part of the examination that nobody disturbs: a third of its time."""
+    """The part of the examination that nobody disturbs: a third of its time.
+
+    Raises:
+      UserError: the creature's facts contradict its own files, or the champion is not finite.
+    """
     config = config or CertificateConfig()
+    check_body(creature)
     whole, halved = (
         record(creature, champion, config.seconds, refine, threads) for refine in (1, 2)
     )
@@ -112,8 +125,38 @@ def glance(
         criteria.half_step(whole, halved, config),
         criteria.gait(window, config.gait),
         criteria.physics(window, config.physics),
+        criteria.parts(window, config.parts),
     )
     return Glance(whole, judged)
+
+
+def rehearse(
+    creature: Creature,
+    champion: Champion,
+    count: int,
+    config: CertificateConfig | None = None,
+    threads: int = 0,
+) -> float:
+    """The worst margin of criteria 4 and 5 on the draw that is the same for all champions.
+
+    Champions are chosen by it, and examined on another draw. It ends when those pushed last have
+    had time to fall.
+
+    Args:
+      count: perturbed starts, and as many pushes.
+    """
+    config = config or CertificateConfig()
+    draw = draws.common(config)
+    groups = (
+        draws.starts(creature, config, draw, count),
+        draws.pushes(creature, config, draw, count),
+    )
+    seconds = min(config.seconds, config.pushes.window[1] + config.pushes.ladder_seconds)
+    outcome = simulate(
+        creature, champion, join(*groups), seconds, fall=config.upright, threads=threads
+    )
+    started, pushed = (float(up.mean()) for up in np.split(outcome.stayed_up, 2))
+    return min(criteria.starts(started, config).margin, criteria.pushes(pushed, config).margin)
 
 
 def certify(
@@ -122,12 +165,27 @@ def certify(
     config: CertificateConfig | None = None,
     threads: int = 0,
     seen: Glance | None = None,
+    attempts: int = 1,
 ) -> Certificate:
-    """Examines a champion against all eight criteria. seen: what a glance with the same config has found, to save looking again."""
+    """Examines a champion against all nine criteria, on starts and pushes drawn for it alone.
+
+    Args:
+      seen: what a glance with the same config has found, to save looking again.
+      attempts: examinations that its run has taken, this one included.
+
+    Raises:
+      UserError: the creature's facts contradict its own files, or the champion is not finite.
+    """
     config = config or CertificateConfig()
     began = time.perf_counter()
     seen = seen or glance(creature, champion, config, threads)
-    groups = (nominal_starts(creature, 1), *_starts(creature, config), *_ladder(creature, config))
+    draw = draws.own(champion, config)
+    groups = (
+        nominal_starts(creature, 1),
+        draws.starts(creature, config, draw, config.starts.count),
+        draws.pushes(creature, config, draw, config.pushes.count),
+        *draws.ladder(creature, config, draw),
+    )
     outcome = simulate(
         creature, champion, join(*groups), config.seconds, fall=config.upright, threads=threads
     )
@@ -155,13 +213,14 @@ def certify(
         report,
         config,
         time.perf_counter() - began,
+        attempts,
     )
 
 
 def record(
     creature: Creature, champion: Champion, seconds: float, refine: int = 1, threads: int = 0
 ) -> Recording:
-    """The undisturbed walk, measured."""
+    """The undisturbed walk, measured; parts in each other only at the usual time step."""
     outcome = simulate(
         creature,
         champion,
@@ -171,7 +230,7 @@ def record(
         refine=refine,
         threads=threads,
     )
-    return measure(creature, champion, outcome.trajectory)
+    return measure(creature, champion, outcome.trajectory, inside=refine == 1)
 
 
 def survival(
@@ -196,8 +255,11 @@ def distance(creature: Creature, champion: Champion, seconds: float) -> float:
 def push_ladder(
     creature: Creature, champion: Champion, config: CertificateConfig, threads: int = 0
 ) -> dict[float, float]:
-    """Share that stays up after each of the larger pushes, whose speeds are in units of sqrt(g * hip height)."""
-    groups = _ladder(creature, config)
+    """Share that stays up after each of the larger pushes, the same for all champions.
+
+    Their speeds are in units of sqrt(g * hip height).
+    """
+    groups = draws.ladder(creature, config, draws.common(config))
     outcome = simulate(
         creature, champion, join(*groups), config.seconds, fall=config.upright, threads=threads
     )
@@ -217,48 +279,6 @@ def half_point(shares: dict[float, float]) -> float | None:
         if share0 > 0.5 >= share1:
             return s0 + (share0 - 0.5) / (share0 - share1) * (s1 - s0)
     return 0.0 if steps[0][1] <= 0.5 else None
-
-
-def _starts(creature: Creature, config: CertificateConfig) -> tuple[Starts, Starts]:
-    """The perturbed ones and the pushed ones."""
-    noise, push = config.starts, config.pushes
-    return (
-        perturbed_starts(
-            creature,
-            noise.count,
-            np.random.default_rng([config.seed, 0]),
-            noise.joints,
-            noise.velocities,
-            noise.friction,
-            noise.masses,
-        ),
-        pushed_starts(
-            creature,
-            push.count,
-            np.random.default_rng([config.seed, 1]),
-            push.speed * _unit_speed(creature),
-            push.window,
-        ),
-    )
-
-
-def _ladder(creature: Creature, config: CertificateConfig) -> list[Starts]:
-    """The larger pushes, a group for each size, all within two seconds; none is watched for longer than it takes to fall."""
-    settings = config.pushes
-    rng = np.random.default_rng([config.seed, 2])
-    begin, end = settings.window[0], min(settings.window[0] + 2.0, settings.window[1])
-    watched = np.full(settings.ladder_count, end + settings.ladder_seconds)
-    speeds = [size * _unit_speed(creature) for size in settings.ladder]
-    return [
-        dataclasses.replace(
-            pushed_starts(creature, settings.ladder_count, rng, speed, (begin, end)), end=watched
-        )
-        for speed in speeds
-    ]
-
-
-def _unit_speed(creature: Creature) -> float:
-    return float(np.sqrt(-creature.model.opt.gravity[2] * creature.hip_height))
 
 
 def _entry(measure: criteria.Measure) -> dict[str, Any]:

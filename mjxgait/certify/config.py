@@ -1,4 +1,7 @@
-"""What the certificate demands: the eight criteria, one table each, with the defaults. The first table is `simulate.Fall`."""
+"""What the certificate demands: the nine criteria, one table each, with the defaults.
+
+The first table is `simulate.Fall`.
+"""
 
 import dataclasses
 
@@ -28,7 +31,15 @@ class PeriodConfig:
 
 @dataclasses.dataclass(frozen=True)
 class StartsConfig:
-    """4. Half widths of the noise: joints in rad, velocities in rad/s, masses as a share. friction: range of the factor."""
+    """4. Perturbed starts.
+
+    Attributes:
+      joints, velocities, masses, gains: half widths in rad, rad/s, and as a share of each body's
+        mass and of each joint's kp and kd.
+      friction: range of the factor. latency: most control steps by which torques come late.
+      slope: steepest, in degrees. floor: range of the factor on the softness of the floor.
+      upright: share that must stay up.
+    """
 
     __pydantic_config__ = STRICT
     count: Count = 64
@@ -36,6 +47,10 @@ class StartsConfig:
     velocities: NonNegative = 0.1
     friction: tuple[Positive, Positive] = (0.8, 1.2)
     masses: Fraction = 0.05
+    gains: Fraction = 0.1
+    latency: Whole = 1
+    slope: NonNegative = 1.0
+    floor: tuple[Positive, Positive] = (0.25, 4.0)
     upright: Fraction = 0.9
 
 
@@ -99,8 +114,21 @@ class PhysicsConfig:
 
 
 @dataclasses.dataclass(frozen=True)
+class PartsConfig:
+    """9. overlap: hip heights, how deep parts may stand in each other but neighbours."""
+
+    __pydantic_config__ = STRICT
+    overlap: Positive = 0.02
+
+
+@dataclasses.dataclass(frozen=True)
 class CertificateConfig:
-    """The examination. seconds: of each simulation; warmup: s at its start that do not count. seed: of starts and pushes."""
+    """The examination.
+
+    Attributes:
+      seconds: of each simulation. warmup: s at its start that do not count.
+      seed: of starts and pushes, together with the champion's fingerprint.
+    """
 
     __pydantic_config__ = STRICT
     seconds: Positive = 22.0
@@ -114,6 +142,7 @@ class CertificateConfig:
     half_step: HalfStepConfig = dataclasses.field(default_factory=HalfStepConfig)
     gait: GaitConfig = dataclasses.field(default_factory=GaitConfig)
     physics: PhysicsConfig = dataclasses.field(default_factory=PhysicsConfig)
+    parts: PartsConfig = dataclasses.field(default_factory=PartsConfig)
 
     def __post_init__(self) -> None:
         if self.warmup >= self.seconds:

@@ -36,9 +36,13 @@ class Controller:
     """Tracks a champion's pose cycle.
 
     It holds constants only; the positions in the cycle are the caller's.
+
+    Raises:
+      UserError: a key pose or a tuning value is not a finite number.
     """
 
     def __init__(self, creature: Creature, champion: Champion) -> None:
+        champion.check_finite(creature.joint_names)
         self.creature = creature
         self.settings = champion.controller
         self.tuning = champion.tuning
@@ -108,29 +112,43 @@ class Controller:
             np.clip(roll, -0.5, 0.5),
         )
 
-    def torque(self, target: np.ndarray, senses: Senses, time_step: float) -> np.ndarray:
-        """Joint torques [S, J] in N·m that pull towards the target [S, J]; stable PD (Tan, Liu & Turk 2011) or plain PD."""
-        creature = self.creature
+    def torque(
+        self,
+        target: np.ndarray,
+        senses: Senses,
+        time_step: float,
+        stiffness: np.ndarray | float = 1.0,
+        damping: np.ndarray | float = 1.0,
+    ) -> np.ndarray:
+        """Joint torques [S, J] in N·m towards the target [S, J], stable PD or plain PD.
+
+        Stable PD is that of Tan, Liu & Turk (2011). stiffness, damping: factors on kp and kd,
+        [S, J] or one for all.
+        """
+        creature, kp, kd = self.creature, stiffness * self.kp, damping * self.kd
         v = senses.velocity[:, creature.dof_adr]
         if self.settings.law == "pd":
-            wanted = -self.kp * (senses.joint_pos - target) - self.kd * v
+            wanted = -kp * (senses.joint_pos - target) - kd * v
         else:
-            spring_damper = -self.kp * (senses.joint_pos + time_step * v - target) - self.kd * v
-            acceleration = self._predicted_acceleration(spring_damper, senses, time_step)
-            wanted = spring_damper - time_step * self.kd * acceleration
+            spring_damper = -kp * (senses.joint_pos + time_step * v - target) - kd * v
+            acceleration = self._predicted_acceleration(spring_damper, senses, time_step * kd)
+            wanted = spring_damper - time_step * kd * acceleration
         return np.clip(wanted, -creature.torque_limit, creature.torque_limit)
 
     def _predicted_acceleration(
-        self, spring_damper: np.ndarray, senses: Senses, time_step: float
+        self, spring_damper: np.ndarray, senses: Senses, damping: np.ndarray
     ) -> np.ndarray:
-        """Of the actuated joints [S, J], with the damping of the coming step taken implicitly."""
+        """Of the actuated joints [S, J], with the coming step's damping taken implicitly.
+
+        damping: [J] or [S, J], time step times kd.
+        """
         dof = self.creature.dof_adr
         force = -senses.bias
         if self.settings.constraint_forces:
             force = force + senses.constraint_force
         force[:, dof] += spring_damper
         damped = senses.mass_matrix.copy()
-        damped[:, dof, dof] += time_step * self.kd
+        damped[:, dof, dof] += damping
         return np.linalg.solve(damped, force[..., None])[:, dof, 0]
 
     def advance(

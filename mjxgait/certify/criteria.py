@@ -12,6 +12,7 @@ import numpy as np
 from mjxgait.certify.config import (
     CertificateConfig,
     GaitConfig,
+    PartsConfig,
     PeriodConfig,
     PhysicsConfig,
     ProgressConfig,
@@ -309,6 +310,12 @@ def physics(window: Recording, config: PhysicsConfig) -> Criterion:
             ),
         ),
     )
+
+
+def parts(window: Recording, config: PartsConfig) -> Criterion:
+    """9. No part stands in another but its neighbours, more than in the standing pose."""
+    deepest = window.overlap.max(initial=0.0) / window.dimensions.hip_height
+    return Criterion(9, "parts", (at_most("overlap / hip height", deepest, config.overlap),))
 
 
 def joint_overrun(window: Recording) -> np.ndarray:

@@ -26,6 +26,20 @@ def describe(window: Recording, clearance: float) -> dict[str, Any]:
         "footfall_diagram": dict(zip(size.foot_names, footfall_diagram(window), strict=True)),
         "slip": dict(zip(size.foot_names, map(float, slip_distance(window)), strict=True)),
         "gait": gait_name(size, duty, phases),
+        "overlap": worst_overlap(window),
+    }
+
+
+def worst_overlap(window: Recording) -> dict[str, Any] | None:
+    """The two parts deepest in each other: how deep in m, and in which share of frames."""
+    depth = np.nan_to_num(window.overlap)
+    if not depth.any():
+        return None
+    worst = int(depth.max(0).argmax())
+    return {
+        "parts": list(window.overlap_pairs[worst]),
+        "depth": float(depth[:, worst].max()),
+        "share": float((depth[:, worst] > 0).mean()),
     }
 
 

@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+from mjxgait.certify.certificate import SCHEMA
 from mjxgait.champion import Champion
 from mjxgait.errors import UserError
 
@@ -38,5 +39,10 @@ def outdated(document: dict[str, Any], champion: Champion) -> str | None:
     if "champion" not in document:
         return "The certificate is outdated: it does not say which champion was examined, as those of earlier versions."
     if document["champion"] != champion.fingerprint:
-        return "The certificate is outdated: it was given to another champion than the one that is here now."
+        return (
+            "The certificate is outdated: "
+            "it was given to another champion than the one that is here now."
+        )
+    if document.get("schema") != SCHEMA:
+        return "The certificate is outdated: it was given under other rules than today's."
     return None

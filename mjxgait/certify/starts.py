@@ -1,4 +1,7 @@
-"""How simulations begin and are disturbed: joint noise, friction, masses, pushes. `S` simulations, `J` actuated joints."""
+"""How simulations begin and are disturbed: starts, bodies, drives, ground and pushes.
+
+Letters: `S` simulations, `J` actuated joints.
+"""
 
 import dataclasses
 
@@ -13,20 +16,39 @@ class Starts:
 
     joint_offset, joint_velocity: [S, J] rad, rad/s; added to the standing pose.
     friction: [S] factor on the sliding friction. mass: [S, nbody] factor on each body's mass and inertia.
-    push_time: [S] s, infinite for none. push: [S, 2] m/s, sudden change of the trunk's horizontal velocity in the world.
-    end: [S] s, from which nobody looks any more: who is up until then has stayed up. Infinite for the end of the simulation.
+    stiffness, damping: [S, J] factors on kp and kd.
+    delay: [S] control steps by which a torque comes too late.
+    slope: [S, 2] rad, how steeply the floor rises along the world's x and y.
+    floor: [S] factor on the softness of the floor, (1 - d) / d with the impedance d of MuJoCo.
+    push_time: [S] s, infinite for none.
+    push: [S, 2] m/s, sudden change of the trunk's horizontal velocity in the world.
+    end: [S] s, from which nobody looks any more: who is up until then has stayed up.
+      Infinite for the end of the simulation.
     """
 
     joint_offset: np.ndarray
     joint_velocity: np.ndarray
     friction: np.ndarray
     mass: np.ndarray
+    stiffness: np.ndarray
+    damping: np.ndarray
+    delay: np.ndarray
+    slope: np.ndarray
+    floor: np.ndarray
     push_time: np.ndarray
     push: np.ndarray
     end: np.ndarray
 
     def __len__(self) -> int:
         return len(self.friction)
+
+    @property
+    def undisturbed(self) -> np.ndarray:
+        """[S] whether nothing disturbs them until they are pushed."""
+        plain = {"friction": 1, "mass": 1, "stiffness": 1, "damping": 1, "floor": 1}
+        plain |= {"joint_offset": 0, "joint_velocity": 0, "delay": 0, "slope": 0}
+        same = [getattr(self, name) == value for name, value in plain.items()]
+        return np.all([s.reshape(len(self), -1).all(1) for s in same], axis=0)
 
     def rows(self, index: slice | np.ndarray) -> "Starts":
         """Some of the simulations."""
@@ -53,6 +75,11 @@ def nominal_starts(creature: Creature, count: int) -> Starts:
         joint_velocity=np.zeros((count, joints)),
         friction=np.ones(count),
         mass=np.ones((count, creature.model.nbody)),
+        stiffness=np.ones((count, joints)),
+        damping=np.ones((count, joints)),
+        delay=np.zeros(count, dtype=int),
+        slope=np.zeros((count, 2)),
+        floor=np.ones(count),
         push_time=np.full(count, np.inf),
         push=np.zeros((count, 2)),
         end=np.full(count, np.inf),
@@ -68,7 +95,10 @@ def perturbed_starts(
     friction: tuple[float, float] = (0.8, 1.2),
     mass: float = 0.05,
 ) -> Starts:
-    """Uniform noise of these half widths (rad, rad/s, share of each body's mass), and a friction factor between two numbers."""
+    """Noise of these half widths (rad, rad/s, share of each body's mass), a friction factor.
+
+    All of it is uniform.
+    """
     plain = nominal_starts(creature, count)
     return dataclasses.replace(
         plain,
@@ -79,6 +109,34 @@ def perturbed_starts(
     )
 
 
+def unfamiliar(
+    starts: Starts,
+    rng: np.random.Generator,
+    *,
+    gains: float = 0.0,
+    latency: int = 0,
+    slope: float = 0.0,
+    floor: tuple[float, float] = (1.0, 1.0),
+) -> Starts:
+    """The same starts, disturbed besides in ways that evolution never tries.
+
+    Args:
+      gains: half width of each joint's kp and kd, as a share. latency: most control steps of delay.
+      slope: rad, steepest, in any direction. floor: range of the softness factor, as many times
+        softer as harder where its ends are each other's inverse.
+    """
+    count, direction = len(starts), rng.uniform(0, 2 * np.pi, len(starts))
+    return dataclasses.replace(
+        starts,
+        stiffness=rng.uniform(1 - gains, 1 + gains, starts.stiffness.shape),
+        damping=rng.uniform(1 - gains, 1 + gains, starts.damping.shape),
+        delay=rng.integers(latency, size=count, endpoint=True),
+        slope=rng.uniform(0, slope, (count, 1))
+        * np.stack([np.cos(direction), np.sin(direction)], 1),
+        floor=np.exp(rng.uniform(np.log(floor[0]), np.log(floor[1]), count)),
+    )
+
+
 def pushed_starts(
     creature: Creature,
     count: int,
@@ -86,7 +144,10 @@ def pushed_starts(
     speed: float | np.ndarray,
     window: tuple[float, float],
 ) -> Starts:
-    """Pushes of a speed in m/s ([] or [count]) at uniform moments of a window in s, each quarter of the compass equally often."""
+    """Pushes of a speed in m/s ([] or [count]) at uniform moments of a window in s.
+
+    Each quarter of the compass has equally many.
+    """
     sector = (np.arange(count) + rng.random(count)) / count
     direction = 2 * np.pi * rng.permutation(sector)
     push = np.broadcast_to(speed, (count,))[:, None] * np.stack(

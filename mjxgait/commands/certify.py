@@ -8,7 +8,8 @@ import tyro
 
 from mjxgait.certify import CertificateConfig, certify
 from mjxgait.champion import read_champion
-from mjxgait.folder import CERTIFICATE, CHAMPION, open_run
+from mjxgait.exams import Exams
+from mjxgait.folder import CERTIFICATE, CHAMPION, EXAMS, open_run
 from mjxgait.tables import build, read_toml
 
 
@@ -39,7 +40,10 @@ def certify_command(arguments: Sequence[str]) -> int:
     )
     from mjxgait.screen import Screen  # rich is slow to import
 
-    certificate = certify(creature, champion, config)
+    attempt = Exams(options.run / EXAMS).attempt(
+        champion.fingerprint, int(champion.origin.get("generation", 0))
+    )
+    certificate = certify(creature, champion, config, attempts=attempt)
     (options.run / CERTIFICATE).write_text(certificate.to_json(), encoding="utf-8")
     Screen().certificate(certificate)
     return 0

@@ -23,7 +23,7 @@ from mjxgait.config import Config
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.evolution import EvolutionState, stop_reason
-from mjxgait.examination import due, enough, why_ended
+from mjxgait.examination import due, why_ended
 from mjxgait.folder import CERTIFICATE, CHAMPION, CONFIG, METRICS, open_run, read_metrics
 
 
@@ -86,8 +86,8 @@ class Snapshot:
                 return None
         except UserError:
             return None
-        does = document["passed"] and document["margin"] >= enough(self.config, self.generation)
-        return why_ended(self.generation, document["margin"]) if does else None
+        passed = document["passed"]
+        return why_ended(self.generation, document["margin"]) if passed else None
 
 
 def read_snapshot(path: Path, generation: int | None = None) -> Snapshot:

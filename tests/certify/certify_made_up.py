@@ -126,4 +126,6 @@ def walk(
         touch=still.astype(bool),
         penetration=still + 0.001,
         body_speed=still + 2.0,
+        overlap_pairs=(("trunk", "hind_left"), ("front_left", "hind_left")),
+        overlap=np.zeros((len(time), 2)),
     )

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from certify_made_up import DOG, make_champion, walk
 
-from mjxgait.certify import CertificateConfig, certify, glance
+from mjxgait.certify import CertificateConfig, certify, draws, glance, rehearse
 from mjxgait.certify.describe import cost_of_transport, describe, footfall_phases, gait_name
 from mjxgait.certify.measure import dimensions
+from mjxgait.certify.starts import nominal_starts
 from mjxgait.errors import UserError
 from mjxgait.tables import build, read_toml
 
@@ -33,10 +34,10 @@ def certificate(tiny, trotter):
     return certify(tiny, trotter, build(CertificateConfig, SMALL, "test"))
 
 
-def test_a_walk_is_examined_against_all_eight(certificate):
+def test_a_walk_is_examined_against_all_nine(certificate):
     verdicts = {c.number: c.passed for c in certificate.criteria}
-    assert set(verdicts) == set(range(1, 9))
-    assert [n for n in (1, 3, 4, 5, 8) if not verdicts[n]] == []
+    assert set(verdicts) == set(range(1, 10))
+    assert [n for n in (1, 3, 4, 5, 8, 9) if not verdicts[n]] == []
     assert certificate.passed == all(verdicts.values())
     assert certificate.margin == min(c.margin for c in certificate.criteria)
 
@@ -56,12 +57,67 @@ def test_standing_is_no_walk(tiny):
 def test_the_file_is_strict_json_with_value_threshold_and_verdict(certificate):
     document = json.loads(certificate.to_json(), parse_constant=lambda name: pytest.fail(name))
     assert document["passed"] is certificate.passed
-    assert [c["number"] for c in document["criteria"]] == list(range(1, 9))
+    assert [c["number"] for c in document["criteria"]] == list(range(1, 10))
     for measure in (m for c in document["criteria"] for m in c["measures"]):
         assert set(measure) == {"name", "value", "sense", "threshold", "passed", "margin"}
     assert document["report"]["gait"] in ("trot", "walk", "running walk")
     assert document["report"]["push_survival"]["2"] < 0.5
     assert 0.1 < document["report"]["push_that_fells_half"] <= 2.0
+
+
+def test_every_champion_is_examined_on_a_draw_of_its_own(tiny, trotter):
+    config, other = CertificateConfig(), make_champion(tiny)
+    mine, again, others, common = (
+        draws.starts(tiny, config, draw, 8).joint_offset
+        for draw in (
+            draws.own(trotter, config),
+            draws.own(dataclasses.replace(trotter, fitness=3.0, origin={"seed": 4}), config),
+            draws.own(other, config),
+            draws.common(config),
+        )
+    )
+    np.testing.assert_array_equal(mine, again)
+    for draw in (others, common):
+        assert not np.isin(mine, draw).any()
+    reseeded = dataclasses.replace(config, seed=1)
+    for draw in (draws.own(trotter, reseeded), draws.common(reseeded)):
+        assert not np.isin(draws.pushes(tiny, config, draw, 8).push_time, common).any()
+        assert not np.isin(draws.starts(tiny, config, draw, 8).joint_offset, (mine, common)).any()
+
+
+def test_the_starts_are_disturbed_in_every_way_that_the_settings_name(tiny):
+    starts = draws.starts(tiny, CertificateConfig(), draws.Draw((0,)), 16)
+    plain = nominal_starts(tiny, 16)
+    changed = {
+        field.name
+        for field in dataclasses.fields(starts)
+        if not np.array_equal(getattr(starts, field.name), getattr(plain, field.name))
+    }
+    assert changed == {
+        "joint_offset",
+        "joint_velocity",
+        "friction",
+        "mass",
+        "stiffness",
+        "damping",
+        "delay",
+        "slope",
+        "floor",
+    }
+
+
+def test_one_is_chosen_on_the_margin_of_criteria_4_and_5(tiny, trotter):
+    config = build(CertificateConfig, SMALL, "test")
+    assert rehearse(tiny, trotter, 4, config) == 1.0
+    flat = make_champion(tiny, np.tile([1.0, 1.4], (2, 4)))
+    assert rehearse(tiny, flat, 2, config) == pytest.approx(-9.0)
+
+
+def test_the_file_says_which_examination_of_its_run_it_was(tiny, trotter, certificate):
+    assert json.loads(certificate.to_json())["attempts"] == 1
+    third = certify(tiny, trotter, certificate.config, attempts=3)
+    assert json.loads(third.to_json())["attempts"] == 3
+    assert third.criteria == certificate.criteria
 
 
 def test_the_table_has_a_row_per_measure(certificate):

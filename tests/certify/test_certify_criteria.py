@@ -23,8 +23,9 @@ def failures(recording, halved=None, started=1.0, pushed=1.0):
         criteria.half_step(recording, halved or recording, CONFIG),
         criteria.gait(window, CONFIG.gait),
         criteria.physics(window, CONFIG.physics),
+        criteria.parts(window, CONFIG.parts),
     )
-    assert [c.number for c in judged] == list(range(1, 9))
+    assert [c.number for c in judged] == list(range(1, 10))
     return {c.number for c in judged if not c.passed}
 
 
@@ -264,6 +265,21 @@ def test_criterion_8_knows_joints_without_a_range():
     )
 
 
+def crossing_legs(depth):
+    """A shin goes through another in a few frames."""
+    overlap = np.zeros((4400, 2))
+    overlap[3000:3100, 1] = depth
+    return changed(walk(), overlap=overlap)
+
+
+def test_criterion_9_parts():
+    hip_height = DOG.hip_height
+    assert failures(crossing_legs(0.03 * hip_height)) == {9}
+    assert failures(crossing_legs(0.01 * hip_height)) == set()
+    half = criteria.parts(crossing_legs(0.01 * hip_height).window(2.0), CONFIG.parts)
+    assert half.margin == pytest.approx(0.5)
+
+
 def test_a_walk_that_blew_up_fails_everything_measured_on_it():
     good = walk()
     broken = {
@@ -277,7 +293,7 @@ def test_a_walk_that_blew_up_fails_everything_measured_on_it():
         and isinstance(getattr(good, f.name), np.ndarray)
         and f.name not in ("position", "touch")
     }
-    assert failures(changed(good, **broken)) >= {1, 2, 3, 6, 7, 8}
+    assert failures(changed(good, **broken)) >= {1, 2, 3, 6, 7, 8, 9}
 
 
 def test_no_stride_at_all_fails_without_an_error():

@@ -1,5 +1,6 @@
 """The simulator: right rows, no leaks, the same as a plain loop over MuJoCo, and what is measured from it."""
 
+import dataclasses
 import subprocess
 import sys
 
@@ -8,20 +9,34 @@ import numpy as np
 import pytest
 from certify_made_up import make_champion
 
-from mjxgait.certify import distance, record, survival
+from mjxgait.certify import distance, glance, record, survival
 from mjxgait.certify.controller import Controller, Senses
 from mjxgait.certify.measure import measure
 from mjxgait.certify.simulate import Fall, examined_model, simulate
-from mjxgait.certify.starts import join, nominal_starts, perturbed_starts, pushed_starts
+from mjxgait.certify.starts import (
+    join,
+    nominal_starts,
+    perturbed_starts,
+    pushed_starts,
+    unfamiliar,
+)
+from mjxgait.errors import UserError
 
 SECONDS = 1.5
 
 
 @pytest.fixture(scope="module")
 def mixed(tiny):
-    """Perturbed starts that are pushed as well, and two that must fall early."""
+    """Perturbed starts of every kind that are pushed as well, and two that must fall early."""
     rng = np.random.default_rng(3)
-    noisy = perturbed_starts(tiny, 4, rng, friction=(0.3, 1.5), mass=0.3)
+    noisy = unfamiliar(
+        perturbed_starts(tiny, 4, rng, friction=(0.3, 1.5), mass=0.3),
+        rng,
+        gains=0.2,
+        slope=0.05,
+        floor=(0.2, 5.0),
+    )
+    noisy.delay[:] = [0, 1, 2, 1]
     noisy.push_time[:] = [0.2, 0.503, 0.9, np.inf]
     noisy.push[:] = rng.normal(0, 0.3, (4, 2))
     return join(noisy, pushed_starts(tiny, 2, rng, 6.0, (0.1, 0.3)), perturbed_starts(tiny, 2, rng))
@@ -38,10 +53,18 @@ def plain_loop(creature, champion, starts, row, seconds):
     model.geom_friction[:, 0] *= starts.friction[row]
     model.body_mass[:] *= starts.mass[row]
     model.body_inertia[:] *= starts.mass[row][:, None]
+    rise = np.hypot(*starts.slope[row])
+    uphill = np.array([*starts.slope[row], 0.0]) / max(rise, 1e-12)
+    model.opt.gravity[:] = -9.81 * (np.sin(rise) * uphill + [0.0, 0.0, np.cos(rise)])
+    softness = (1 / model.geom_solimp[:, :2] - 1) * starts.floor[row]
+    model.geom_solimp[:, :2] = 1 / (1 + softness)
     data = mujoco.MjData(model)
     mujoco.mj_setConst(model, data)
     mujoco.mj_resetData(model, data)
     control, position, states = Controller(creature, champion), np.zeros(1, int), []
+    control.kp = control.kp * starts.stiffness[row]
+    control.kd = control.kd * starts.damping[row]
+    torques = []
     data.qpos[:] = creature.stand_qpos
     mujoco.mj_kinematics(model, data)
     feet = creature.watched[:4]
@@ -70,7 +93,8 @@ def plain_loop(creature, champion, starts, row, seconds):
             last[None],
         )
         target = control.target(position, senses)
-        data.qfrc_applied[creature.dof_adr] = control.torque(target, senses, model.opt.timestep)[0]
+        torques.append(control.torque(target, senses, model.opt.timestep)[0])
+        data.qfrc_applied[creature.dof_adr] = torques[max(k - starts.delay[row], 0)]
         position = control.advance(
             position, target, senses.joint_pos.copy(), (k + 1) * model.opt.timestep
         )
@@ -80,9 +104,7 @@ def plain_loop(creature, champion, starts, row, seconds):
 
 @pytest.mark.parametrize("row", [0, 1, 2, 3, 7])
 @pytest.mark.parametrize("advance", ["clock", "error"])
-def test_friction_mass_noise_and_push_reach_the_right_simulation(
-    tiny, trotter, mixed, row, advance
-):
+def test_every_disturbance_reaches_the_right_simulation(tiny, trotter, mixed, row, advance):
     champion = make_champion(
         tiny,
         trotter.key_poses,
@@ -111,6 +133,25 @@ def test_leaving_out_the_fallen_changes_nothing_for_the_others(tiny, trotter, mi
     np.testing.assert_array_equal(dropped.fell, outcome.fell)
     standing = dropped.stayed_up
     np.testing.assert_array_equal(dropped.travel[standing], outcome.travel[standing])
+
+
+def test_those_alike_until_their_push_are_simulated_once_and_come_out_as_if_alone(tiny, trotter):
+    pushed = pushed_starts(tiny, 6, np.random.default_rng(5), 1.2, (0.2, 1.2))
+    pushed.push_time[-1] = 99.0
+    together = simulate(tiny, trotter, pushed, SECONDS, threads=1)
+    alone = [simulate(tiny, trotter, pushed.rows(slice(i, i + 1)), SECONDS) for i in range(6)]
+    np.testing.assert_array_equal(together.fell, [a.fell[0] for a in alone])
+    np.testing.assert_array_equal(together.travel, [a.travel[0] for a in alone])
+    assert len(set(together.travel[:, 0])) == 6
+
+
+def test_who_falls_before_its_push_has_fallen_when_its_leader_fell(tiny):
+    flat = make_champion(tiny, np.tile([1.0, 1.4], (2, 4)))
+    pushed = pushed_starts(tiny, 3, np.random.default_rng(5), 0.1, (1.0, 1.4))
+    together = simulate(tiny, flat, pushed, SECONDS, threads=1)
+    alone = simulate(tiny, flat, nominal_starts(tiny, 1), SECONDS)
+    np.testing.assert_array_equal(together.fell, np.repeat(alone.fell, 3))
+    np.testing.assert_array_equal(together.travel, np.repeat(alone.travel, 3, axis=0))
 
 
 def test_the_same_again_is_the_same(tiny, trotter, mixed, outcome):
@@ -237,6 +278,72 @@ def test_perturbations_stay_within_their_bounds(tiny):
     assert np.abs(pushed.push.mean(0)).max() < 0.02
     assert pushed.push_time.min() >= 2.0
     assert pushed.push_time.max() <= 10.0
+
+
+def test_unfamiliar_disturbances_stay_within_their_bounds_and_leave_the_others_alone(tiny):
+    familiar = perturbed_starts(tiny, 500, np.random.default_rng(0))
+    starts = unfamiliar(
+        familiar,
+        np.random.default_rng(1),
+        gains=0.1,
+        latency=1,
+        slope=np.radians(1.0),
+        floor=(0.25, 4.0),
+    )
+    for factor in (starts.stiffness, starts.damping):
+        assert (factor.min(), factor.max()) == pytest.approx((0.9, 1.1), abs=1e-3)
+    assert np.bincount(starts.delay) == pytest.approx([250, 250], abs=40)
+    steepness = np.degrees(np.hypot(*starts.slope.T))
+    assert 0.99 < steepness.max() <= 1.0
+    assert np.abs(starts.slope.mean(0)).max() < 0.1 * np.radians(1.0)
+    assert (starts.floor.min(), starts.floor.max()) == pytest.approx((0.25, 4.0), rel=0.05)
+    assert np.median(starts.floor) == pytest.approx(1.0, rel=0.2)
+    for name in ("joint_offset", "joint_velocity", "friction", "mass", "push"):
+        np.testing.assert_array_equal(getattr(starts, name), getattr(familiar, name))
+
+
+def test_what_is_not_asked_for_changes_nothing(tiny):
+    plain = nominal_starts(tiny, 3)
+    same = unfamiliar(plain, np.random.default_rng(0))
+    for name in ("stiffness", "damping", "delay", "slope", "floor"):
+        np.testing.assert_allclose(getattr(same, name), getattr(plain, name), atol=1e-15)
+
+
+def resting(creature, **changes):
+    """Forward way in m, and depth of the feet in m, after 2 s of standing on a changed start."""
+    starts = dataclasses.replace(nominal_starts(creature, 1), **changes)
+    outcome = simulate(creature, make_champion(creature), starts, 2.0, record=1)
+    recording = measure(creature, make_champion(creature), outcome.trajectory)
+    return outcome.travel[0, 0], -recording.foot_height[-1].mean()
+
+
+def test_a_body_sinks_deeper_into_a_softer_floor_and_less_into_a_harder_one(tiny):
+    hard, usual, soft = (resting(tiny, floor=np.array([f]))[1] for f in (0.25, 1.0, 4.0))
+    assert 1e-5 < 2 * hard < usual < soft / 1.5
+
+
+def test_what_stands_leans_down_the_slope(tiny):
+    uphill, downhill = (resting(tiny, slope=np.array([[s, 0.0]]))[0] for s in (0.2, -0.2))
+    assert uphill < -1e-3 < 1e-3 < downhill
+
+
+@pytest.mark.parametrize(
+    ("poses", "tuning", "words"),
+    [
+        (np.full((2, 8), np.nan), {}, 'key pose 1 has nan rad for joint "front_left_hip"'),
+        (np.full((2, 8), np.inf), {}, "inf rad"),
+        (None, {"period": np.nan}, 'tuning "period" is nan'),
+    ],
+)
+def test_what_is_not_a_number_is_refused_in_one_sentence(
+    tiny, tmp_path, monkeypatch, capfd, poses, tuning, words
+):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(UserError, match=words):
+        glance(tiny, make_champion(tiny, poses, tuning))
+    # MuJoCo would leave a log where it is run, and say the same a thousand times.
+    assert not list(tmp_path.iterdir())
+    assert capfd.readouterr() == ("", "")
 
 
 def test_the_examiner_never_imports_jax():

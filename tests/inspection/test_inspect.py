@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from inspection.made_up import FORCED, LAST, POPULATION
 
+from mjxgait.certify.certificate import SCHEMA
 from mjxgait.champion import read_champion
 from mjxgait.cli import main
 from mjxgait.folder import CERTIFICATE, CHAMPION
@@ -63,6 +64,7 @@ def test_tells_whether_the_certificate_is_the_champions(run):
     snapshot = read_snapshot(run)
     fingerprint = read_champion(run / CHAMPION, snapshot.creature).fingerprint
     certificate = {
+        "schema": SCHEMA,
         "passed": False,
         "margin": -1.0,
         "champion": fingerprint,
@@ -77,6 +79,8 @@ def test_tells_whether_the_certificate_is_the_champions(run):
     assert said() == "The champion is certified, margin 0.25."
     (run / CERTIFICATE).write_text(json.dumps(certificate | {"champion": "other"}))
     assert "outdated" in said()
+    (run / CERTIFICATE).write_text(json.dumps(certificate | {"schema": 1}))
+    assert said().endswith("it was given under other rules than today's.")
     (run / CERTIFICATE).write_text("[]")
     assert "not a certificate" in said()
 

@@ -10,12 +10,14 @@ import pytest
 from viewing.browser import canvas, is_blank, watched_tab
 from viewing.made_up import treading, write_run
 
+from mjxgait.certify.certificate import SCHEMA
 from mjxgait.cli import main
 from mjxgait.errors import UserError
 from mjxgait.folder import CERTIFICATE
 from mjxgait.viewing.page import certificate_table
 
 CERTIFIED = {
+    "schema": SCHEMA,
     "passed": False,
     "criteria": [
         {

@@ -1,0 +1,239 @@
+"""Derives a second time what the examiner takes from the shared loader, from the creature's files.
+
+Hip height, axes and mirror map decide what counts as forward, fast and symmetric: an error in them
+would pass evolution and examination alike. Nothing here uses `mjxgait.creature` but the value that
+is checked; geometry comes from C MuJoCo, settings from the text of creature.toml.
+Letters: `J` actuated joints.
+"""
+
+import fnmatch
+import tomllib
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from mjxgait.creature import Creature
+from mjxgait.errors import UserError
+
+EXACT = 1e-9
+LIKENESS = 0.15
+"""Of a body and its mirror image: rad, and hip heights. Drawn bodies are not quite symmetric."""
+SWING = 0.6
+"""rad, of the random poses that are mirrored."""
+
+
+def check_body(creature: Creature) -> None:
+    """Compares every fact that decides about a certificate.
+
+    Raises:
+      UserError: names the first that differs from what the files say, and both values.
+    """
+    body = _Body(creature.files)
+    for name, value, expected in body.facts(creature):
+        same = np.shape(value) == np.shape(expected) and np.allclose(
+            value, expected, rtol=EXACT, atol=EXACT
+        )
+        if not same:
+            raise UserError(
+                f"{creature.name}: its {name} is {_show(value)}, but by its files it is "
+                f"{_show(expected)}; nothing it does can be examined"
+            )
+    body.check_length(creature)
+    if body.symmetric:
+        body.check_mirror(creature)
+
+
+class _Body:
+    """What the files say, standing in C MuJoCo."""
+
+    def __init__(self, files: Mapping[str, str]) -> None:
+        self.table: dict[str, Any] = tomllib.loads(files["creature.toml"])
+        self.identity = self.table["creature"]
+        self.symmetric = bool(self.table.get("mirror", {}).get("symmetric", True))
+        self.model = mujoco.MjModel.from_xml_string(files["creature.xml"])
+        self.stand = self.model.key(self.identity.get("keyframe", "stand")).qpos.copy()
+        self.data = mujoco.MjData(self.model)
+        self.pose(self.stand)
+        self.trunk = self.model.body(self.identity["trunk"])
+        self.trunk_rot = self.data.xmat[self.trunk.id].reshape(3, 3).copy()
+        free = mujoco.mjtJoint.mjJNT_FREE, mujoco.mjtJoint.mjJNT_BALL
+        joints = map(self.model.joint, range(self.model.njnt))
+        self.joints = [j for j in joints if j.type[0] not in free and j.bodyid[0] != self.trunk.id]
+        self.names = [j.name for j in self.joints]
+        self.feet = list(
+            dict.fromkeys(int(self.model.geom(g).bodyid[0]) for g in self.identity["feet"])
+        )
+
+    def pose(self, qpos: np.ndarray) -> None:
+        self.data.qpos[:] = qpos
+        mujoco.mj_kinematics(self.model, self.data)
+
+    def facts(self, creature: Creature) -> Iterator[tuple[str, Any, Any]]:
+        """Names, values of the creature, and values by its files."""
+        forward, left, up = self.axes()
+        stand = np.array([self.stand[j.qposadr[0]] for j in self.joints])
+        yield "trunk", creature.trunk, self.trunk.id
+        yield "standing pose", creature.stand_qpos, self.stand
+        yield "standing trunk's place", creature.stand_pos, self.data.xpos[self.trunk.id]
+        yield "standing trunk's rotation", creature.stand_rot, self.trunk_rot
+        yield "forward axis", creature.forward, forward
+        yield "left axis", creature.left, left
+        yield "up axis", creature.up, up
+        yield "hip height in m", creature.hip_height, self.hip_height()
+        yield "mass in kg", creature.mass, mujoco.mj_getTotalmass(self.model)
+        yield "number of joints", len(creature.joint_names), len(self.joints)
+        yield "feet", list(map(self._body_id, creature.foot_names)), self.feet
+        yield "positions' places", creature.qpos_adr, [j.qposadr[0] for j in self.joints]
+        yield "velocities' places", creature.dof_adr, [j.dofadr[0] for j in self.joints]
+        yield "standing angles", creature.stand, stand
+        for key, value in self.drives(creature, stand):
+            for name, mine, expected in zip(self.names, *value, strict=True):
+                yield f'{key} of joint "{name}"', mine, expected
+
+    def drives(
+        self, creature: Creature, stand: np.ndarray
+    ) -> Iterator[tuple[str, tuple[np.ndarray, np.ndarray]]]:
+        """Gains, limits and weights [J] of the creature, and by its files."""
+        low, high = np.array([self._range(j) for j in self.joints]).T
+        pose = np.radians([self.setting(name, "range", [-45.0, 45.0]) for name in self.names])
+        yield "lower limit", (creature.joint_low, low)
+        yield "upper limit", (creature.joint_high, high)
+        yield "lowest pose", (creature.pose_low, np.maximum(stand + pose[:, 0], low))
+        yield "highest pose", (creature.pose_high, np.minimum(stand + pose[:, 1], high))
+        for key in ("kp", "kd", "torque_limit"):
+            values = np.array([self.setting(name, key) for name in self.names], float)
+            yield key, (getattr(creature, key), values)
+        for group, key in (
+            ("steering", "bend"),
+            ("steering", "stride"),
+            ("balance", "pitch"),
+            ("balance", "roll"),
+        ):
+            field = f"{'steer' if group == 'steering' else group}_{key}"
+            weights = np.array([self.weight(name, group, key) for name in self.names])
+            yield f"{group} weight ({key})", (getattr(creature, field), weights)
+
+    def axes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Forward, left and up in the trunk's frame, from cross products in the world."""
+        forward = self.trunk_rot @ np.array(self.identity.get("forward", [1.0, 0.0, 0.0]), float)
+        left = np.cross([0.0, 0.0, 1.0], forward)
+        up = np.cross(forward, left)
+        axes = (axis / np.linalg.norm(axis) for axis in (forward, left, up))
+        forward, left, up = (self.trunk_rot.T @ axis for axis in axes)
+        return forward, left, up
+
+    def hip_height(self) -> float:
+        """Mean height in m of the legs' first joints, found from the trunk downwards.
+
+        A leg begins with the first body below the trunk that carries a single foot.
+        """
+        self.pose(self.stand)
+        carried = np.zeros(self.model.nbody, int)
+        carried[self.feet] = 1
+        for body in range(self.model.nbody - 1, 0, -1):
+            carried[self.model.body_parentid[body]] += carried[body]
+        heights = []
+        for foot in self.feet:
+            body, hips = foot, []
+            while body and (carried[body] == 1):
+                hips += [self.data.xanchor[j.id][2] for j in self.joints if j.bodyid[0] == body]
+                body = int(self.model.body_parentid[body])
+            heights.append(max(hips, default=self.data.xpos[foot][2]))
+        return float(np.mean(heights))
+
+    def check_length(self, creature: Creature) -> None:
+        """The length lies between that of the geoms' centres and of the spheres about them."""
+        if stated := self.identity.get("body_length"):
+            low = high = float(stated)
+        else:
+            self.pose(self.stand)
+            forward = self.trunk_rot @ self.axes()[0]
+            parts = self.model.geom_bodyid != 0
+            along = self.data.geom_xpos[parts] @ forward
+            reach = self.model.geom_rbound[parts]
+            low, high = np.ptp(along), (along + reach).max() - (along - reach).min()
+        if not low - EXACT <= creature.body_length <= high + EXACT:
+            raise UserError(
+                f"{creature.name}: its body length is {creature.body_length:g} m, but by its files "
+                f"it is {low:.3g} to {high:.3g} m; nothing it does can be examined"
+            )
+
+    def check_mirror(self, creature: Creature) -> None:
+        """Random poses and their mirror images, part by part: where each is and how it has turned.
+
+        Joints whose partner the file states are only compared with it, and stand still.
+        """
+        rng, stated = np.random.default_rng(0), self.table.get("mirror", {}).get("pairs", [])
+        for pair in stated:
+            j = self.names.index(pair["joint"])
+            found = self.names[creature.partner[j]], int(creature.sign[j])
+            if found != (said := (pair["partner"], pair.get("sign", 1))):
+                raise UserError(
+                    f'{creature.name}: joint "{pair["joint"]}" mirrors {found[0]} with sign '
+                    f"{found[1]}, but [mirror] pairs says {said[0]} with sign {said[1]}"
+                )
+        free = ~np.isin(self.names, [pair["joint"] for pair in stated])
+        stand = np.array([self.stand[j.qposadr[0]] for j in self.joints])
+        left = self.trunk_rot @ self.axes()[1]
+        flip = np.eye(3) - 2 * np.outer(left, left)
+        base, base_image = self._parts(stand), self._parts(_mirrored(creature, stand))
+        for _ in range(4):
+            pose = stand + free * rng.uniform(-SWING, SWING, len(stand))
+            parts, image = self._parts(pose), self._parts(_mirrored(creature, pose))
+            for j, partner in enumerate(creature.partner):
+                turned = parts[1][partner] @ base[1][partner].T
+                image_turned = image[1][j] @ base_image[1][j].T
+                angle = np.linalg.norm(flip @ turned @ flip - image_turned) / np.sqrt(2)
+                away = np.linalg.norm(flip @ parts[0][partner] - image[0][j])
+                if angle > LIKENESS or away > LIKENESS * creature.hip_height:
+                    raise UserError(
+                        f'{creature.name}: joint "{self.names[j]}" does not mirror '
+                        f'"{self.names[partner]}" with sign {creature.sign[j]}: in a random pose '
+                        f"it is {away:.3g} m and {angle:.2g} rad off; settle it in [mirror] pairs"
+                    )
+
+    def _parts(self, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Of the body that each joint moves: its place [J, 3] and rotation [J, 3, 3].
+
+        The place is that of its centre of mass, from the trunk's, in m.
+        """
+        qpos = self.stand.copy()
+        qpos[[j.qposadr[0] for j in self.joints]] = pose
+        self.pose(qpos)
+        moved = [j.bodyid[0] for j in self.joints]
+        place = self.data.xipos[moved] - self.data.xpos[self.trunk.id]
+        return place, self.data.xmat[moved].reshape(-1, 3, 3).copy()
+
+    def setting(self, joint: str, key: str, default: Any = None) -> Any:
+        """A joint's setting: that of all joints, and over it the exceptions in their order."""
+        value = self.table["joints"].get(key, default)
+        for exception in self.table.get("joint", []):
+            if key in exception and fnmatch.fnmatchcase(joint, exception["match"]):
+                value = exception[key]
+        return value
+
+    def weight(self, joint: str, group: str, key: str) -> float:
+        """A joint's weight in a correction; 0 where no pattern names it."""
+        weight = 0.0
+        for pattern, value in self.table.get(group, {}).get(key, {}).items():
+            if fnmatch.fnmatchcase(joint, pattern):
+                weight = float(value)
+        return weight
+
+    def _range(self, joint: Any) -> tuple[float, float]:
+        low, high = joint.range
+        return (low, high) if low or high else (-np.inf, np.inf)
+
+    def _body_id(self, name: str) -> int:
+        return int(self.model.body(name).id)
+
+
+def _mirrored(creature: Creature, pose: np.ndarray) -> np.ndarray:
+    """[J] the mirror image of a pose, as the creature's map says."""
+    return creature.sign * pose[creature.partner]
+
+
+def _show(value: Any) -> str:
+    return np.array2string(np.asarray(value), precision=6, threshold=8)

@@ -1,0 +1,102 @@
+"""Every fact that decides about a certificate is derived twice: each planted error is caught."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from certify_made_up import make_champion
+
+from mjxgait.certify import glance
+from mjxgait.certify.check_body import check_body
+from mjxgait.creature import load_creature
+from mjxgait.errors import UserError
+
+
+def changed(values, index, value):
+    copy = np.array(values)
+    copy[index] = value
+    return copy
+
+
+ERRORS = {
+    "hip height": lambda c: {"hip_height": 1.1 * c.hip_height},
+    "body length": lambda c: {"body_length": 0.5 * c.body_length},
+    "mass": lambda c: {"mass": c.mass - 0.1},
+    "forward axis": lambda c: {"forward": -c.forward},
+    "left axis": lambda c: {"left": -c.left},
+    "up axis": lambda c: {"up": np.array([0.1, 0.0, 0.995])},
+    "standing pose": lambda c: {"stand_qpos": changed(c.stand_qpos, 9, 0.1)},
+    "standing trunk's place": lambda c: {"stand_pos": c.stand_pos + 0.05},
+    "standing angles": lambda c: {"stand": changed(c.stand, 3, 0.1)},
+    "trunk": lambda c: {"trunk": c.trunk + 1},
+    "feet": lambda c: {"foot_names": c.foot_names[::-1]},
+    "velocities' places": lambda c: {"dof_adr": c.dof_adr[::-1]},
+    'kp of joint "front_left_knee"': lambda c: {"kp": changed(c.kp, 1, 90.0)},
+    'kd of joint "front_left_hip"': lambda c: {"kd": changed(c.kd, 0, 1.0)},
+    'torque_limit of joint "front_right_hip"': lambda c: {
+        "torque_limit": changed(c.torque_limit, 2, 1e3)
+    },
+    'upper limit of joint "front_left_hip"': lambda c: {"joint_high": changed(c.joint_high, 0, 2)},
+    'lowest pose of joint "front_left_hip"': lambda c: {"pose_low": changed(c.pose_low, 0, -1)},
+    'weight \\(stride\\) of joint "front_right_hip"': lambda c: {
+        "steer_stride": np.abs(c.steer_stride)
+    },
+    'weight \\(pitch\\) of joint "front_left_hip"': lambda c: {"balance_pitch": -c.balance_pitch},
+    'does not mirror "front_left_hip" with sign 1': lambda c: {"partner": np.arange(8)},
+    'does not mirror "front_right_knee" with sign -1': lambda c: {"sign": changed(c.sign, 1, -1)},
+    'does not mirror "hind_right_hip"': lambda c: {"partner": np.roll(c.partner, 4)},
+}
+
+
+@pytest.mark.parametrize("thing", ERRORS)
+def test_an_error_in_the_shared_loader_is_named(tiny, thing):
+    wrong = dataclasses.replace(tiny, **ERRORS[thing](tiny))
+    with pytest.raises(UserError, match=thing):
+        check_body(wrong)
+
+
+def test_nothing_is_examined_on_wrong_facts(tiny):
+    with pytest.raises(UserError, match="hip height"):
+        glance(dataclasses.replace(tiny, hip_height=0.1), make_champion(tiny))
+
+
+def test_the_shipped_creatures_are_what_their_files_say(shipped):
+    check_body(shipped)
+
+
+def test_exceptions_and_stated_partners_are_read_from_the_text(tiny, tmp_path):
+    toml = (
+        tiny.files["creature.toml"]
+        + """
+[[joint]]
+match = "*_knee"
+kp = 50.0
+range = [-20, 60]
+
+[[joint]]
+match = "front_*"
+kd = 3.0
+
+[mirror]
+pairs = [
+    { joint = "front_left_knee", partner = "front_right_knee" },
+    { joint = "front_right_knee", partner = "front_left_knee" },
+]
+"""
+    )
+    (tmp_path / "creature.toml").write_text(toml)
+    (tmp_path / "creature.xml").write_text(tiny.files["creature.xml"])
+    creature = load_creature(tmp_path)
+    assert (creature.kp[1], creature.kd[1], creature.kd[5]) == (50.0, 3.0, 2.0)
+    check_body(creature)
+    wrong = dataclasses.replace(creature, sign=changed(creature.sign, 1, -1))
+    with pytest.raises(UserError, match=r"\[mirror\] pairs says front_right_knee with sign 1"):
+        check_body(wrong)
+
+
+def test_a_body_without_symmetry_has_no_mirror_to_check(tiny, tmp_path):
+    (tmp_path / "creature.toml").write_text(
+        tiny.files["creature.toml"] + "\n[mirror]\nsymmetric = false\n"
+    )
+    (tmp_path / "creature.xml").write_text(tiny.files["creature.xml"])
+    check_body(load_creature(tmp_path))

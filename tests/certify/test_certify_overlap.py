@@ -1,0 +1,133 @@
+"""Parts that stand in each other: which pairs count, and how deep they are."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from certify_made_up import LEGS, TOML, XML, make_champion
+
+from mjxgait.certify import CertificateConfig, criteria, glance, record
+from mjxgait.certify.describe import worst_overlap
+from mjxgait.certify.overlap import colliding_with_itself, neighbours, overlaps
+from mjxgait.creature import load_creature
+from mjxgait.tables import build
+
+SHORT = build(CertificateConfig, {"seconds": 2.0, "warmup": 0.5}, "test")
+
+
+def loaded(folder, xml, toml=TOML):
+    (folder / "creature.xml").write_text(xml)
+    (folder / "creature.toml").write_text(toml)
+    return load_creature(folder)
+
+
+def standing(creature, count=1, **angles):
+    """[count, nq]; angles of joints by name in the last frame."""
+    qpos = np.tile(creature.stand_qpos, (count, 1))
+    for name, angle in angles.items():
+        qpos[-1, creature.qpos_adr[creature.joint_names.index(name)]] = angle
+    return qpos
+
+
+@pytest.fixture(scope="module")
+def short(tmp_path_factory):
+    """The tiny quadruped with its legs so near behind each other that they meet when they swing."""
+    return loaded(
+        tmp_path_factory.mktemp("short"),
+        XML.replace('pos="-0.2 0.11 0"', 'pos="0.06 0.11 0"').replace(
+            'pos="-0.2 -0.11 0"', 'pos="0.06 -0.11 0"'
+        ),
+    )
+
+
+def test_legs_that_cross_are_as_deep_in_each_other_as_they_are_thick(short):
+    # Both thighs swing by asin(0.5) towards each other: their middles are in one place.
+    angle = np.arcsin(0.5)
+    qpos = standing(short, 3, front_left_hip=angle, hind_left_hip=-angle)
+    found = overlaps(short, qpos)
+    thighs = found.pairs.index(("front_left_upper", "hind_left_upper"))
+    assert found.depth[:2].max() == 0
+    assert found.depth[2, thighs] == pytest.approx(2 * 0.02, abs=1e-6)
+    assert not any("right" in name for pair in found.pairs for name in pair)
+
+
+def test_every_shape_counts_but_the_floor(short):
+    model = colliding_with_itself(short)
+    assert (model.geom_contype[model.geom_bodyid > 0] == 1).all()
+    assert model.geom("floor").contype == model.geom("floor").conaffinity == 0
+    sunk = standing(short)
+    sunk[:, 2] -= 0.2
+    assert overlaps(short, sunk).pairs == ()
+
+
+def test_a_knee_that_folds_puts_no_part_into_its_neighbour(short):
+    assert overlaps(short, standing(short, 2, front_left_knee=-1.2)).pairs == ()
+
+
+YOKE = (
+    '<body name="front_left_yoke" pos="0.2 {y} 0"><joint name="front_left_yaw" axis="0 0 1"/>'
+    '<geom type="sphere" size="0.001" mass="0.01" contype="0" conaffinity="0"/>'
+    '<body name="front_left_upper" pos="0 {offset} 0">'
+)
+"""A second joint between trunk and thigh, on a body of its own."""
+
+
+@pytest.mark.parametrize(("offset", "one_joint"), [(0.0, True), (0.05, False)])
+def test_joints_at_one_place_make_neighbours_of_all_parts_between(tmp_path, offset, one_joint):
+    begin = XML.index('<body name="front_left_upper"')
+    end = XML.index('<body name="front_right_upper"')
+    yoke = YOKE.format(y=0.11 - offset, offset=offset)
+    leg = XML[begin:end].replace('<body name="front_left_upper" pos="0.2 0.11 0">', yoke)
+    xml = XML[:begin] + leg + "</body>" + XML[end:]
+    toml = TOML + "\n[mirror]\nsymmetric = false\n"
+    creature = loaded(tmp_path, xml.replace("0 " * 8, "0 " * 9), toml)
+    model = creature.model
+    pairs = {(model.body(a).name, model.body(b).name) for a, b in neighbours(model, creature)}
+    assert {("trunk", "front_left_yoke"), ("front_left_yoke", "front_left_upper")} <= pairs
+    assert (("trunk", "front_left_upper") in pairs) == one_joint
+    assert ("trunk", "front_left_lower") not in pairs
+
+
+def test_what_is_built_in_counts_from_its_depth_when_standing(tmp_path):
+    """A shin that stands 5 mm deep in a fender of the trunk, and deeper when the knee stretches."""
+    fender = (
+        '<geom name="fender" type="box" size="0.01 0.02 0.03" pos="0.22 0.11 -0.2" mass="0"'
+        ' contype="0" conaffinity="0"/>'
+    )
+    creature = loaded(tmp_path, XML.replace("<freejoint/>", "<freejoint/>" + fender))
+    found = overlaps(creature, standing(creature, 2, front_left_knee=-0.05))
+    assert found.pairs == (("trunk", "front_left_lower"),)
+    # The fender's lower edge is 90 mm below the knee.
+    assert found.depth[:, 0] == pytest.approx([0.0, 0.09 * np.sin(0.05)], abs=5e-4)
+
+
+def test_frames_that_are_not_finite_are_not_looked_at(short):
+    qpos = standing(short, 3, front_left_hip=0.5, hind_left_hip=-0.5)
+    qpos[1] = np.nan
+    assert np.isnan(overlaps(short, qpos).depth[1]).all()
+
+
+def test_a_body_whose_legs_cross_fails_the_ninth_criterion_and_is_told_which(short):
+    column = {name: i for i, name in enumerate(short.joint_names)}
+    poses = np.zeros((2, 8))
+    for leg in LEGS:
+        poses[:, column[f"{leg}_hip"]] = 0.5 if leg.startswith("front") else -0.5
+    crossed = make_champion(short, poses)
+    judged = {c.number: c for c in glance(short, crossed, SHORT).criteria}
+    assert not judged[9].passed
+    worst = worst_overlap(record(short, crossed, 2.0).window(0.5))
+    assert {part.split("_")[0] for part in worst["parts"]} == {"front", "hind"}
+    assert worst["depth"] > 0.02 * short.hip_height
+    assert worst["share"] > 0.5
+
+
+def test_a_body_that_stands_free_passes_the_ninth(short):
+    window = record(short, make_champion(short), 2.0).window(0.5)
+    assert criteria.parts(window, SHORT.parts).margin == 1.0
+    assert worst_overlap(window) is None
+
+
+def test_the_ninth_measures_what_exceeds_in_hip_heights(short):
+    window = record(short, make_champion(short), 2.0)
+    deep = dataclasses.replace(window, overlap=np.array([[0.0, 0.003], [0.001, 0.0]]))
+    assert criteria.parts(deep, SHORT.parts).measures[0].value == 0.003 / short.hip_height
