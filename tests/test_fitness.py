@@ -62,7 +62,10 @@ def terms_of(body: Creature, tally: dict, **fitness: float) -> dict[str, float]:
     return dict(zip(TERMS, np.asarray(terms).tolist(), strict=True))
 
 
-@pytest.mark.parametrize(("name", "value", "tally"), CASES)
+IDS = [f"{name} of {' and '.join(tally) or 'a whole walk'}" for name, _, tally in CASES]
+
+
+@pytest.mark.parametrize(("name", "value", "tally"), CASES, ids=IDS)
 def test_a_term_is_what_its_tally_says(body: Creature, name: str, value: float, tally: dict):
     assert terms_of(body, tally)[name] == pytest.approx(value, rel=1e-4, abs=1e-5)
 
