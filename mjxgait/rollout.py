@@ -205,15 +205,18 @@ class Simulator:
         target, control, stride = self._per_lane(self.tracker.target)(
             lane.cycle, lane.control, sensed
         )
-        torque = self._torque(lane.rules, body, sensed, workings, target)
+        torque = self.torque(lane.rules, body, sensed, workings, target)
         tally = self._per_lane(self._judge)(lane.rules, lane.tally, sensed, torque, stride)
         body = self.plant.advance(body, workings, self._per_lane(self._lift)(torque))
         return dataclasses.replace(lane, body=body, control=control, tally=tally)
 
-    def _torque(
+    def torque(
         self, rules: Rules, body: BodyState, sensed: Any, workings: Any, target: jax.Array
     ) -> jax.Array:
-        """Joint torques, [J] per lane. Plain PD is stable PD that looks no step ahead."""
+        """Joint torques in N·m, [J] per lane; rules, states and target [J] per lane, too.
+
+        Plain PD is stable PD that looks no step ahead.
+        """
         creature, step = self.creature, self.tracker.step
         limit = creature.torque_limit.astype(np.float32)
 

@@ -85,6 +85,15 @@ def test_a_joint_without_partner_is_named():
         )
 
 
+def test_pose_ranges_are_degrees_about_the_standing_angle_within_the_joints(
+    stool: Creature, tmp_path: Path
+):
+    assert np.allclose(stool.pose_low, stool.stand - np.radians(40))
+    assert np.allclose(stool.pose_high, stool.stand + np.radians(40))
+    wide = load_creature(edited(tmp_path, "creature.toml", "[-40, 40]", "[-40, 80]"))
+    assert np.allclose(wide.pose_high, 1.05)
+
+
 def test_the_mirror_map_can_be_overridden(tmp_path: Path):
     ends = ("front", "hind")
     pairs = [

@@ -12,7 +12,9 @@ from mjxgait.creature import Creature
 from mjxgait.gait import (
     PERIOD,
     PITCH,
+    PITCH_RATE,
     ROLL,
+    ROLL_RATE,
     STEER,
     THRESHOLD,
     TUNING,
@@ -182,6 +184,40 @@ def test_signs_of_the_corrections(
         sensed(stool, stool.stand, rotation, offset),
     )
     assert np.allclose(change, [expected[1], 0, 0, 0], atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("gene", "weight", "expected"),
+    [(PITCH_RATE, "balance_pitch", 0.3), (ROLL_RATE, "balance_roll", 0.2)],
+    ids=["nose falling", "right side falling"],
+)
+def test_rates_of_the_trunk_are_its_own(stool: Creature, gene: int, weight: str, expected: float):
+    """About the trunk's axes, wherever it heads: it looks left, and turns in the world's frame."""
+    creature = dataclasses.replace(stool, **{weight: np.array([1.0, 0, 0, 0])})
+    left_turned = turned(2, np.pi / 2)
+    still = sensed(stool, stool.stand, left_turned)
+    spinning = jnp.asarray(left_turned @ [0.2, 0.3, 5.0], jnp.float32)
+    moving = dataclasses.replace(still, trunk_angvel=spinning)
+    genes, stand = jnp.zeros(len(TUNING)).at[gene].set(1.0), jnp.asarray(stool.stand, jnp.float32)
+    change = corrections(creature, genes, stand, moving)
+    assert np.allclose(change, [expected, 0, 0, 0], atol=1e-5)
+
+
+def test_steering_lengthens_the_stride(stool: Creature):
+    """What a pose is away from the standing one counts more on the outer side of the turn."""
+    creature = dataclasses.replace(stool, steer_stride=np.array([1.0, -1.0, 0.5, 0]))
+    genes, pose = jnp.zeros(len(TUNING)).at[STEER].set(1.0), np.array([0.3, 0.3, -0.2, 0.1])
+    target = jnp.asarray(stool.stand + pose, jnp.float32)
+    change = corrections(creature, genes, target, sensed(stool, stool.stand, turned(2, 0.2)))
+    assert np.allclose(change, [0.06, -0.06, -0.02, 0], atol=1e-5)
+
+
+def test_the_target_keeps_to_the_joint_ranges(stool: Creature):
+    narrow = dataclasses.replace(stool, joint_low=np.full(4, -0.1), joint_high=np.full(4, 0.2))
+    control, poses = tracker(narrow), jnp.array([[3.0, -3.0, 0.1, 0.0]] * 2)
+    cycle = control.prepare(Genome(poses, tuning()), settings(key_poses=2, mirror=False))
+    target, _, _ = control.target(cycle, control.init(), sensed(stool, stool.stand))
+    assert np.allclose(target, [0.2, -0.1, 0.1, 0.0], atol=1e-6)
 
 
 def test_without_genes_there_is_no_correction(shipped: Creature):

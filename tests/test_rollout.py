@@ -105,6 +105,16 @@ def test_not_finite_means_the_lowest_score(experiment: Experiment):
     assert np.isfinite(np.delete(fitness, 2)).all()
 
 
+def test_physics_that_breaks_at_once_means_the_lowest_score_too(experiment: Experiment):
+    """Nothing has been counted then, and nothing must come of it."""
+    starts = experiment.starts
+    broken = dataclasses.replace(starts, qvel=starts.qvel.at[1, 0].set(jnp.nan))
+    row = dataclasses.replace(experiment.row, starts=broken)
+    judged = jax.jit(dataclasses.replace(experiment, row=row).judge)(genomes(experiment, 7))
+    assert np.isnan(judged.terms[:, 1]).all()
+    assert np.isfinite(judged.terms[:, 0]).all()
+
+
 def start_at(experiment: Experiment, height: float = 0.0, roll: float = 0.0) -> Starts:
     """The starts with the trunk moved up and rolled over."""
     starts = experiment.starts

@@ -1,16 +1,28 @@
-"""Stable PD against float64 formulas, and where plain PD fails."""
+"""Stable PD as the rollout computes it, against float64 formulas, and where plain PD fails."""
 
+import dataclasses
+import shutil
+from pathlib import Path
+
+import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
+from helpers import STOOL, small_config
 
-from mjxgait.creature import Creature
-from mjxgait.spd import limited_torque, pd_force, stable_pd
+from mjxgait.creature import Creature, load_creature
+from mjxgait.experiment import build_experiment
+from mjxgait.rollout import Rules, Simulator
+from mjxgait.spd import limited_torque, pd_force
+from mjxgait.types import BodyState
+
+SLIM = {"xla_backend_optimization_level": 0}
+"""Compiling is what takes the time here."""
 
 
 def reference(mass, bias, q, v, target, kp, kd, limit, h, dofs, constraint) -> np.ndarray:
-    """Tan, Liu & Turk 2011 in float64 over all degrees of freedom, the unactuated ones with zero gain."""
+    """Tan, Liu & Turk 2011 in float64 over all freedoms, the unactuated ones with zero gain."""
     nv = len(bias)
     kp_full, kd_full, q_full, v_full, target_full = (np.zeros(nv) for _ in range(5))
     kp_full[dofs], kd_full[dofs], q_full[dofs], v_full[dofs], target_full[dofs] = (
@@ -26,81 +38,153 @@ def reference(mass, bias, q, v, target, kp, kd, limit, h, dofs, constraint) -> n
     return np.clip((p + d - h * kd_full * acceleration)[dofs], -limit, limit)
 
 
-@pytest.fixture(scope="module")
-def moment(stool: Creature) -> dict[str, np.ndarray]:
-    """A moment of a falling, moving stool, in float64."""
-    rng = np.random.default_rng(3)
-    data = mujoco.MjData(stool.model)
-    data.qpos[:] = stool.stand_qpos
+@dataclasses.dataclass(frozen=True)
+class Case:
+    """A moment of a falling, moving stool under one law. constraint: [nv] of the previous step."""
+
+    stable: bool = True
+    counts: bool = False
+    stiffness: float = 1.0
+    damping: float = 1.0
+    seed: int = 0
+
+
+CASES = {
+    "as shipped": Case(),
+    "another moment": Case(seed=1),
+    "with constraint forces": Case(counts=True),
+    "soft and slow": Case(stiffness=0.2, damping=3.0, counts=True, seed=2),
+    "at its limit": Case(stiffness=4.0, seed=3),
+    "plain": Case(stable=False, counts=True, seed=4),
+}
+H, TARGET = 0.005, np.array([0.3, -0.2, 0.1, 0.4])
+
+
+def moment(creature: Creature, case: Case) -> tuple[mujoco.MjData, np.ndarray]:
+    """The state in C MuJoCo, and the constraint force of the step before."""
+    rng, data = np.random.default_rng(case.seed), mujoco.MjData(creature.model)
+    data.qpos[:] = creature.stand_qpos
     data.qpos[2] += 0.5
-    data.qpos[stool.qpos_adr] += rng.uniform(-0.5, 0.5, 4)
-    data.qvel[:] = rng.uniform(-1, 1, stool.model.nv)
-    mujoco.mj_forward(stool.model, data)
-    mass = np.zeros((stool.model.nv, stool.model.nv))
-    mujoco.mj_fullM(stool.model, data, mass)
-    return {
-        "mass": mass,
-        "bias": data.qfrc_bias,
-        "q": data.qpos[stool.qpos_adr],
-        "v": data.qvel[stool.dof_adr],
+    data.qpos[creature.qpos_adr] += rng.uniform(-0.5, 0.5, 4)
+    data.qvel[:] = rng.uniform(-1, 1, creature.model.nv)
+    mujoco.mj_forward(creature.model, data)
+    return data, rng.uniform(-5, 5, creature.model.nv)
+
+
+def wanted(creature: Creature, case: Case) -> np.ndarray:
+    """The torque [J] by the paper, or by the textbook."""
+    (data, constraint), joints = moment(creature, case), creature.dof_adr
+    q, v = data.qpos[creature.qpos_adr], data.qvel[joints]
+    kp, kd, limit = case.stiffness * creature.kp, case.damping * creature.kd, creature.torque_limit
+    if not case.stable:
+        return np.clip(-kp * (q - TARGET) - kd * v, -limit, limit)
+    mass = np.zeros((creature.model.nv, creature.model.nv))
+    mujoco.mj_fullM(creature.model, data, mass)
+    counted = constraint if case.counts else np.zeros_like(constraint)
+    bias = data.qfrc_bias - data.qfrc_passive
+    return reference(mass, bias, q, v, TARGET, kp, kd, limit, H, joints, counted)
+
+
+def rules(cases: list[Case]) -> Rules:
+    """As the rollout has them, [L]."""
+    of_torque = {
+        "stable": jnp.array([case.stable for case in cases]),
+        "constraint_forces": jnp.array([case.counts for case in cases]),
+        "stiffness": jnp.array([case.stiffness for case in cases]),
+        "damping": jnp.array([case.damping for case in cases]),
     }
+    others = {field.name: jnp.ones(len(cases)) for field in dataclasses.fields(Rules)}
+    return Rules(**(others | of_torque))
 
 
-@pytest.mark.parametrize(
-    "force", [0.0, 5.0], ids=["without constraint forces", "with them, as in DART's tutorial"]
-)
-@pytest.mark.parametrize("limit", [1e9, 3.0], ids=["unlimited", "limited"])
+def simulator_of(creature: Creature, physics: str) -> Simulator:
+    return build_experiment(creature, small_config(rollout={"physics": physics})).simulator
+
+
+@pytest.fixture(scope="module", params=["auto", "mjx"], ids=["the fast step", "plain MJX"])
+def torques(request: pytest.FixtureRequest, stool: Creature) -> dict[str, np.ndarray]:
+    """What the rollout's torque is in every case, all lanes of one program."""
+    simulator, cases = simulator_of(stool, request.param), list(CASES.values())
+    lanes = simulator.plant.lane_axis
+    moments = [moment(stool, case) for case in cases]
+    arrays = [
+        [data.qpos for data, _ in moments],
+        [data.qvel for data, _ in moments],
+        np.zeros((len(cases), stool.model.nv)),
+        [constraint for _, constraint in moments],
+    ]
+    arrays = [jnp.moveaxis(jnp.asarray(rows, jnp.float32), 0, lanes) for rows in arrays]
+    state = BodyState(*arrays, jnp.ones(len(cases)))
+
+    def torque(state: BodyState, rules: Rules, target: jax.Array) -> jax.Array:
+        sensed, workings = simulator.plant.forward(state)
+        return simulator.torque(rules, state, sensed, workings, target)
+
+    target = jnp.moveaxis(jnp.tile(jnp.float32(TARGET), (len(cases), 1)), 0, lanes)
+    program = jax.jit(torque).lower(state, rules(cases), target).compile(compiler_options=SLIM)
+    found = program(state, rules(cases), target)
+    return dict(zip(CASES, np.asarray(jnp.moveaxis(found, lanes, 0)), strict=True))
+
+
+@pytest.mark.parametrize("name", CASES)
 def test_agrees_with_the_paper_in_float64(
-    stool: Creature, moment: dict, force: float, limit: float
+    stool: Creature, torques: dict[str, np.ndarray], name: str
 ):
-    constraint = force * np.linspace(-1, 1, stool.model.nv)
-    target = np.array([0.3, -0.2, 0.1, 0.4])
-    state, limits = (moment["mass"], moment["bias"], moment["q"], moment["v"]), np.full(4, limit)
-    arguments = (*state, target, stool.kp, stool.kd, limits, 0.005, stool.dof_adr)
-    torque = stable_pd(*(jnp.asarray(a) for a in arguments), constraint)
-    assert np.allclose(torque, reference(*arguments, constraint), rtol=2e-4, atol=2e-4)
+    np.testing.assert_allclose(torques[name], wanted(stool, CASES[name]), rtol=2e-4, atol=2e-4)
+
+
+def test_the_cases_reach_the_limit_and_do_not(stool: Creature):
+    share = {name: np.abs(wanted(stool, case)) / stool.torque_limit for name, case in CASES.items()}
+    assert (share["at its limit"] == 1).any()
+    assert (share["soft and slow"] < 1).all()
 
 
 def test_the_limit_comes_last():
-    """The damping that counts is that of the limited torque, so clamping before it would be another controller."""
-    force = pd_force(
-        np.array([0.0]), np.array([0.0]), np.array([1.0]), np.array([100.0]), np.array([1.0]), 0.01
-    )
-    assert (
-        float(limited_torque(force, np.array([2000.0]), np.array([0.01]), np.array([50.0]))[0])
-        == 50.0
-    )
+    """The damping is that of the limited torque: clamping before it would be another controller."""
+    pos, vel, target = np.array([0.0]), np.array([0.0]), np.array([1.0])
+    force = pd_force(pos, vel, target, np.array([100.0]), np.array([1.0]), 0.01)
+    limited = limited_torque(force, np.array([2000.0]), np.array([0.01]), np.array([50.0]))
+    assert float(limited[0]) == 50.0
 
 
-def stand(creature: Creature, stable: bool, kp: float, kd: float, h: float) -> float:
-    """Fastest joint in rad/s over the last half of a second of standing on the floor in C MuJoCo."""
-    model = mujoco.MjModel.from_xml_string(creature.files["creature.xml"])
-    model.opt.timestep = h
-    data = mujoco.MjData(model)
-    data.qpos[:] = creature.stand_qpos
-    dofs, fastest = creature.dof_adr, 0.0
-    gains, limit = (np.full(4, kp), np.full(4, kd)), np.full(4, 1e6)
-    mass = np.zeros((model.nv, model.nv))
-    for step in range(round(1.0 / h)):
-        mujoco.mj_forward(model, data)
-        q, v = data.qpos[creature.qpos_adr], data.qvel[dofs]
-        if stable:
-            mujoco.mj_fullM(model, data, mass)
-            torque = reference(
-                mass, data.qfrc_bias, q, v, creature.stand, *gains, limit, h, dofs, 0.0
-            )
-        else:
-            torque = -kp * (q - creature.stand) - kd * v
-        data.qfrc_applied[dofs] = torque
-        mujoco.mj_step(model, data)
-        if not np.isfinite(data.qvel).all() or np.abs(data.qvel).max() > 1e3:
-            return np.inf
-        if step * h > 0.5:
-            fastest = max(fastest, float(np.abs(data.qvel[dofs]).max()))
-    return fastest
+@pytest.fixture(scope="module")
+def stiff(tmp_path_factory: pytest.TempPathFactory) -> Creature:
+    """The stool with a damping that explicit integration cannot bear at its step."""
+    folder: Path = tmp_path_factory.mktemp("spd") / "stool"
+    shutil.copytree(STOOL, folder)
+    for file, edits in {
+        "creature.xml": (('timestep="0.005"', 'timestep="0.01"'),),
+        "creature.toml": (
+            ("kp = 40.0", "kp = 400.0"),
+            ("kd = 2.0", "kd = 20.0"),
+            ("= 20.0", "= 1e6"),
+        ),
+    }.items():
+        text = (folder / file).read_text()
+        for old, new in edits:
+            text = text.replace(old, new)
+        (folder / file).write_text(text)
+    return load_creature(folder)
 
 
-def test_stands_where_plain_pd_blows_up(stool: Creature):
-    """On the floor, with a damping that explicit integration cannot bear at this step."""
-    assert stand(stool, stable=True, kp=400.0, kd=20.0, h=0.01) < 0.5
-    assert stand(stool, stable=False, kp=400.0, kd=20.0, h=0.01) > 50
+def test_stands_where_plain_pd_blows_up(stiff: Creature):
+    """Our torque on our plant for a second on the floor: stable in one lane, plain in the other."""
+    simulator, lanes = simulator_of(stiff, "auto"), [Case(stable=True), Case(stable=False)]
+    law, target = rules(lanes), jnp.tile(jnp.float32(stiff.stand)[:, None], 2)
+
+    def step(state: BodyState) -> tuple[BodyState, jax.Array]:
+        sensed, workings = simulator.plant.forward(state)
+        torque = simulator.torque(law, state, sensed, workings, target)
+        force = jnp.zeros((stiff.model.nv, 2)).at[stiff.dof_adr].set(torque)
+        return simulator.plant.advance(state, workings, force), sensed.joint_vel
+
+    still = jnp.zeros((stiff.model.nv, 2))
+    qpos = jnp.tile(jnp.float32(stiff.stand_qpos)[:, None], 2)
+    state, fastest = BodyState(qpos, still, still, still, jnp.ones(2)), np.zeros(2)
+    program = jax.jit(step).lower(state).compile(compiler_options=SLIM)
+    for k in range(100):
+        state, speed = program(state)
+        if k >= 50:
+            fastest = np.maximum(fastest, np.abs(speed).max(axis=0))
+    assert fastest[0] < 0.5
+    assert not fastest[1] < 50

@@ -1,0 +1,150 @@
+"""Every measure of every criterion on a made-up walk that violates just this one."""
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from certify_made_up import DOG, walk
+from test_certify_criteria import (
+    aimless,
+    belly_slider,
+    changed,
+    creeper,
+    dragger,
+    drifter,
+    flier,
+    foot_slider,
+    knee_toucher,
+    moved,
+    rocker,
+    stander,
+    time_of,
+    tripper,
+    unsteady,
+)
+
+from mjxgait.certify import CertificateConfig, criteria
+from mjxgait.certify.criteria import Criterion
+from mjxgait.certify.measure import Recording
+
+CONFIG = CertificateConfig()
+AT = 3000
+"""A frame within the window."""
+
+
+def leaner() -> Recording:
+    good = walk()
+    return changed(good, trunk_up=np.where(np.arange(4400) == AT, 0.4, good.trunk_up))
+
+
+def ducker() -> Recording:
+    return moved(walk(), up=np.where(np.arange(4400) == AT, 0.15, 0.4))
+
+
+def leaper() -> Recording:
+    return moved(walk(), up=np.where(np.arange(4400) == AT, 0.65, 0.4))
+
+
+def fader() -> Recording:
+    good = walk()
+    late = np.maximum(time_of(good) - 12, 0)
+    return moved(good, forward=good.trunk_pos[:, 0] - 0.25 * late)
+
+
+def once(name: str, value: float) -> Callable[[], Recording]:
+    """A walk of which one array has a value of its own in one frame."""
+
+    def fraud() -> Recording:
+        good = walk()
+        values = getattr(good, name).copy()
+        values[AT] = value
+        return changed(good, **{name: values})
+
+    return fraud
+
+
+FRAUDS: dict[str, Callable[[], Recording]] = {
+    "least upright": leaner,
+    "least height": ducker,
+    "greatest height": leaper,
+    "time on wrong parts": knee_toucher,
+    "strides": lambda: walk(period=2.9),
+    "shortest stride / mean stride": rocker,
+    "speed (body lengths/s)": creeper,
+    "drift / distance": drifter,
+    "second half / first half": fader,
+    "autocorrelation at stride period": aimless,
+    "variation of stride period": unsteady,
+    "stride frequency / animal's": lambda: walk(period=0.25, speed=0.9),
+    "stride length / hip height": tripper,
+    "least clearance / hip height": dragger,
+    "worst foot's slip / distance": foot_slider,
+    "least duty factor": flier,
+    "greatest duty factor": stander,
+    "joint speed (rad/s)": once("joint_vel", -21.0),
+    "joint past its range (rad)": once("joint_pos", -0.95),
+    "body speed / sqrt(g h)": once("body_speed", 6.0),
+    "penetration / hip height": once("penetration", 0.03),
+    "torque / limit": once("torque", -31.0),
+}
+
+
+def judged(recording: Recording) -> list[Criterion]:
+    """All criteria that one recording decides by itself."""
+    window = recording.window(CONFIG.warmup)
+    return [
+        *criteria.basic(recording, CONFIG),
+        criteria.gait(window, CONFIG.gait),
+        criteria.physics(window, CONFIG.physics),
+    ]
+
+
+def failed(*of: Criterion) -> set[str]:
+    return {
+        measure.name for criterion in of for measure in criterion.measures if not measure.passed
+    }
+
+
+def test_every_measure_has_its_fraud():
+    names = [measure.name for criterion in judged(walk()) for measure in criterion.measures]
+    assert set(names) == set(FRAUDS)
+    assert len(names) == len(set(names))
+
+
+@pytest.mark.parametrize("name", FRAUDS)
+def test_one_measure_fails_alone(name: str):
+    assert failed(*judged(FRAUDS[name]())) == {name}
+
+
+def test_a_good_walk_fails_none():
+    assert failed(*judged(walk())) == set()
+
+
+def test_a_joint_may_not_pass_either_end_of_its_range():
+    assert failed(*judged(once("joint_pos", 0.65)())) == {"joint past its range (rad)"}
+
+
+def test_shares_of_starts_and_pushes():
+    for judge, least in ((criteria.starts, 0.9), (criteria.pushes, 0.8)):
+        assert failed(judge(least, CONFIG)) == set()
+        assert failed(judge(least - 0.01, CONFIG)) == {"share that stays up"}
+
+
+@pytest.mark.parametrize(
+    ("halved", "name"),
+    [
+        (belly_slider, "failures in criteria 1 to 3"),
+        (lambda: walk(speed=0.6), "change of distance"),
+        (lambda: walk(speed=1.0), "change of distance"),
+    ],
+    ids=["another verdict", "shorter", "longer"],
+)
+def test_half_the_time_step(halved: Callable[[], Recording], name: str):
+    assert failed(criteria.half_step(walk(), halved(), CONFIG)) == {name}
+    assert failed(criteria.half_step(walk(), walk(), CONFIG)) == set()
+
+
+def test_a_longer_body_is_slower_in_its_own_lengths():
+    long = dataclasses.replace(DOG, body_length=2.0)
+    assert failed(*judged(changed(walk(), dimensions=long))) == {"speed (body lengths/s)"}

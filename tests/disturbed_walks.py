@@ -1,0 +1,145 @@
+"""A small body that walks, disturbed in every way a start can be: what parity is tested on."""
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+from certify_made_up import LEGS, TOML, XML, make_champion
+from helpers import small_config
+
+from mjxgait.certify import starts as examined
+from mjxgait.certify.simulate import Outcome, simulate
+from mjxgait.champion import Champion
+from mjxgait.config import Config
+from mjxgait.creature import Creature, load_creature
+from mjxgait.tally import Tally
+
+STEP, SECONDS = 0.005, 1.2
+STEPS = round(SECONDS / STEP)
+
+BUMPER = (
+    '<geom name="bumper" type="sphere" size="0.02" pos="-0.2 0 -0.262" mass="0.1" '
+    'contype="4" conaffinity="0"/>'
+)
+"""Touches the floor in livelier moments. Neither it nor the trunk is carried by the floor: in
+evolution nothing but feet is, and the examiner must not see another world."""
+BODY = XML.replace(
+    'mass="4" contype="0" conaffinity="1"/>', f'mass="4" contype="4" conaffinity="0"/>{BUMPER}'
+)
+TABLE = TOML.replace("torque_limit = 12.0", "torque_limit = 8.0").replace("[-45, 45]", "[-25, 40]")
+
+GENES_OF_THE_GAIT = {
+    "period": 0.4837,  # no pose falls on a step: float32 would decide which
+    "steer": 1.0,
+    "pitch": 0.3,
+    "pitch_rate": 0.05,
+    "roll": 0.4,
+    "roll_rate": 0.03,
+}
+SETTINGS: dict[str, dict] = {
+    "stable PD": {"controller": {"advance": "clock"}},
+    "with constraint forces": {"controller": {"advance": "clock", "constraint_forces": True}},
+    "by the pose error, soft, without an end": {
+        "controller": {"stiffness": 0.7, "damping": 1.5},
+        "rollout": {"terminate": False},
+    },
+    "plain PD, without the mirror": {
+        "controller": {"advance": "clock", "law": "pd", "mirror": False},
+    },
+}
+PUSH_AT = 60
+
+
+@dataclasses.dataclass(frozen=True)
+class Disturbance:
+    """What is not nominal about a start. push: m/s forward and left."""
+
+    friction: float = 1.0
+    push: tuple[float, float] = (0.0, 0.0)
+    joints: float = 0.0
+    spin: float = 0.0
+
+
+DISTURBANCES = {
+    "nominal": Disturbance(),
+    "half the friction": Disturbance(friction=0.5),
+    "pushed forward": Disturbance(push=(0.3, 0.0)),
+    "pushed to the left": Disturbance(push=(0.0, 0.25)),
+    "joints displaced": Disturbance(joints=0.08),
+    "joints moving": Disturbance(spin=0.8),
+    "all at once": Disturbance(0.6, (-0.2, -0.2), 0.05, 0.5),
+    "knocked over": Disturbance(push=(0.0, 3.0)),
+}
+EPISODES = [(settings, disturbance) for settings in SETTINGS for disturbance in DISTURBANCES]
+CONFIGS = [small_config(**tables) for tables in SETTINGS.values()]
+"""One per row of settings."""
+
+
+def make_body(folder: Path) -> Creature:
+    """The creature, written into a folder and loaded."""
+    (folder / "creature.xml").write_text(BODY)
+    (folder / "creature.toml").write_text(TABLE)
+    return load_creature(folder)
+
+
+def poses(creature: Creature) -> np.ndarray:
+    """A trot: one diagonal pair swings while the other pushes."""
+    column = {name: i for i, name in enumerate(creature.joint_names)}
+    found = np.zeros((2, 8))
+    for leg in LEGS:
+        swings = leg in ("front_left", "hind_right")
+        found[:, column[f"{leg}_hip"]] = (-0.5, -0.2) if swings else (0.0, 0.2)
+        found[:, column[f"{leg}_knee"]] = (0.75, 0.1) if swings else (0.1, 0.1)
+    return found
+
+
+def disturbed(creature: Creature) -> examined.Starts:
+    """The disturbances as the examiner knows them."""
+    rng = np.random.default_rng(1)
+    plain = examined.nominal_starts(creature, len(DISTURBANCES))
+    rows = list(DISTURBANCES.values())
+    noise = rng.uniform(-1, 1, (2, 8))
+    return dataclasses.replace(
+        plain,
+        joint_offset=np.array([row.joints * noise[0] for row in rows]),
+        joint_velocity=np.array([row.spin * noise[1] for row in rows]),
+        friction=np.array([row.friction for row in rows]),
+        push=np.array([row.push for row in rows]),
+        push_time=np.array([(PUSH_AT + 0.5) * STEP if any(row.push) else np.inf for row in rows]),
+    )
+
+
+def champion_of(creature: Creature, config: Config) -> Champion:
+    """The gait under the controller's settings."""
+    champion = make_champion(creature, poses(creature), GENES_OF_THE_GAIT)
+    return dataclasses.replace(champion, controller=config.controller)
+
+
+def watched(creature: Creature) -> list[Outcome]:
+    """The examiner's, per settings; a frame more than an episode, for where the cycle goes next."""
+    rows = disturbed(creature)
+    return [
+        simulate(creature, champion_of(creature, config), rows, SECONDS + STEP, record=len(rows))
+        for config in CONFIGS
+    ]
+
+
+COUNTS = {
+    "contact": 2,
+    "airborne": 2,
+    "touch": 2,
+    "stride_steps": 2,
+    "saturation": 0.5,
+    "limits": 0.5,
+}
+EXACT = ("steps", "reason", "strides", "swings", "swinging", "foot_down")
+TOLERANCE = COUNTS | dict.fromkeys(EXACT, 0)
+"""Of what is counted, in steps; all else may differ by 0.1 mm, or rad, or ..., and 0.2 %."""
+UNCOMPARED: dict[str, str] = {}
+"""Fields of the tally that have no counterpart in `recorded_tally`, with the reason."""
+FIELDS = [field.name for field in dataclasses.fields(Tally) if field.name not in UNCOMPARED]
+
+
+def tolerance(name: str, value: np.ndarray | float) -> float:
+    """By which another way may differ from a value."""
+    return TOLERANCE.get(name, 1e-4 + 2e-3 * float(np.abs(value).max()))

@@ -1,0 +1,153 @@
+"""The same episodes through the fast step, plain MJX and the examiner: every figure must agree.
+
+The examiner is C MuJoCo in float64 under a controller of its own; what its recording means for the
+tally is worked out once more, in plain NumPy (`recorded_tally`). Nothing that changes the motion,
+or what is counted of it, on one of the three ways can stay unseen.
+"""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from certify_made_up import TUNING
+from disturbed_walks import (
+    CONFIGS,
+    DISTURBANCES,
+    EPISODES,
+    FIELDS,
+    GENES_OF_THE_GAIT,
+    PUSH_AT,
+    SECONDS,
+    SETTINGS,
+    STEP,
+    STEPS,
+    disturbed,
+    make_body,
+    poses,
+    tolerance,
+    watched,
+)
+from helpers import small_config
+from recorded_tally import Frames, end, tally_of
+
+from mjxgait.certify.simulate import Outcome
+from mjxgait.creature import Creature
+from mjxgait.experiment import build_experiment
+from mjxgait.gait import TUNING as GENES
+from mjxgait.gait import Genome
+from mjxgait.hyper import traced
+from mjxgait.starts import NEVER, Starts
+from mjxgait.tally import Reason, Tally
+
+SLIM = {"xla_backend_optimization_level": 0}
+"""Compiling is what takes the time here."""
+
+
+@pytest.fixture(scope="module")
+def body(tmp_path_factory: pytest.TempPathFactory) -> Creature:
+    return make_body(tmp_path_factory.mktemp("parity"))
+
+
+@pytest.fixture(scope="module")
+def outcomes(body: Creature) -> list[Outcome]:
+    return watched(body)
+
+
+def starts_of(creature: Creature, films: list[Outcome]) -> Starts:
+    """The same starts for evolution, [B, R]; the examiner lifts bodies with displaced joints."""
+    rows, wanted = disturbed(creature), []
+    push = np.zeros((len(rows), creature.model.nv))
+    push[:, :2] = rows.push
+    for outcome in films:
+        film = outcome.trajectory
+        at = np.where(np.isfinite(rows.push_time), PUSH_AT, NEVER)
+        arrays = (film.qpos[:, 0], film.qvel[:, 0], rows.friction, push)
+        wanted.append(Starts(*(jnp.asarray(a, jnp.float32) for a in arrays), jnp.int32(at)))
+    return jax.tree.map(lambda *leaves: jnp.stack(leaves), *wanted)
+
+
+@pytest.fixture(scope="module", params=["auto", "mjx"], ids=["the fast step", "plain MJX"])
+def tallies(request: pytest.FixtureRequest, body: Creature, outcomes: list[Outcome]) -> Tally:
+    """Evolution's, leaves [B, 1, R, ...]."""
+    rollout = {"seconds": SECONDS, "lanes": 3, "physics": request.param}
+    simulator = build_experiment(body, small_config(rollout=rollout)).simulator
+    genes = TUNING | GENES_OF_THE_GAIT
+    genome = Genome(jnp.float32(poses(body)), jnp.float32([genes[name] for name in GENES]))
+    genomes = jax.tree.map(lambda leaf: jnp.stack([leaf[None]] * len(CONFIGS)), genome)
+    settings = jax.tree.map(lambda *leaves: jnp.stack(leaves), *map(traced, CONFIGS))
+    arguments = (genomes, starts_of(body, outcomes), settings)
+    program = jax.jit(simulator.simulate).lower(*arguments).compile(compiler_options=SLIM)
+    return jax.device_get(program(*arguments)).tally
+
+
+@pytest.fixture(scope="module")
+def expected(
+    body: Creature, outcomes: list[Outcome]
+) -> dict[tuple[str, str], dict[str, np.ndarray]]:
+    """What the examiner's recordings mean for the tally, by settings and disturbance."""
+    found = {}
+    for name, config, outcome in zip(SETTINGS, CONFIGS, outcomes, strict=True):
+        clearance = config.fitness.clearance * body.hip_height
+        for row, disturbance in enumerate(DISTURBANCES):
+            frames = Frames(body, outcome.trajectory, row)
+            steps, reason = end(frames)
+            if steps > STEPS or not config.rollout.terminate:
+                steps, reason = STEPS, Reason.FINISHED
+            tally = tally_of(frames, steps, STEPS // 2, clearance)
+            found[name, disturbance] = {**tally, "reason": reason}
+    return found
+
+
+def test_every_field_of_the_tally_is_compared(expected: dict):
+    for name in FIELDS:
+        assert all(name in tally for tally in expected.values()), (
+            f"Tally.{name} is compared with nothing: work it out in recorded_tally.py, or say in "
+            f"UNCOMPARED why not"
+        )
+
+
+@pytest.mark.parametrize("name", FIELDS)
+def test_the_tally_is_what_the_examiner_saw(tallies: Tally, expected: dict, name: str):
+    rows = dict(zip(EPISODES, np.reshape(getattr(tallies, name), (len(EPISODES), -1)), strict=True))
+    for episode, ours in rows.items():
+        theirs = np.ravel(np.asarray(expected[episode][name], float))
+        most = tolerance(name, theirs)
+        np.testing.assert_allclose(ours, theirs, rtol=0, atol=most, err_msg=str(episode))
+
+
+@pytest.mark.parametrize("name", [name for name in FIELDS if name != "reason"])
+def test_every_field_has_something_to_show(expected: dict, name: str):
+    """A figure that is next to zero in all episodes would agree with anything."""
+    values = [np.asarray(tally[name], float) for tally in expected.values()]
+    assert any(np.abs(value).max() > 3 * tolerance(name, value) for value in values)
+
+
+def apart(one: dict, other: dict) -> float:
+    """How many tolerances two episodes differ by in where they lead."""
+    places = ("forward", "left", "heading")
+    return max(abs(one[name] - other[name]) / tolerance(name, one[name]) for name in places)
+
+
+@pytest.mark.parametrize("disturbance", list(DISTURBANCES)[1:])
+def test_every_disturbance_shows(expected: dict, disturbance: str):
+    one, other = (expected["stable PD", name] for name in (disturbance, "nominal"))
+    assert apart(one, other) > 5
+
+
+@pytest.mark.parametrize("settings", list(SETTINGS)[1:])
+def test_all_settings_show(expected: dict, settings: str):
+    one, other = (expected[name, "pushed to the left"] for name in (settings, "stable PD"))
+    assert apart(one, other) > 5
+
+
+def test_a_fall_ends_the_episode_where_the_examiner_sees_it(
+    outcomes: list[Outcome], tallies: Tally
+):
+    """Why it ended has been compared above; the examiner dates a fall by the end of its step."""
+    knocked = list(DISTURBANCES).index("knocked over")
+    ends = {name: n for n, name in enumerate(SETTINGS) if "without an end" not in name}
+    for name, row in ends.items():
+        fell = round(outcomes[row].fell[knocked] / STEP)
+        assert PUSH_AT < fell < STEPS, name
+        assert tallies.steps[row, 0, knocked] == fell, name
+        assert tallies.reason[row, 0, knocked] != Reason.FINISHED

@@ -1,0 +1,133 @@
+"""What an examiner's recording means for the tally, in NumPy: a second reading of tally.py."""
+
+import itertools
+
+import mujoco
+import numpy as np
+
+from mjxgait.certify.simulate import Trajectory
+from mjxgait.creature import Creature
+from mjxgait.tally import CONTACT_GAP, SWING, Reason
+
+
+class Frames:
+    """A row of a recording, seen again by MuJoCo; frames are states before their torque acts.
+
+    trunk_pos: [T, 3] m. trunk_rot: [T, 3, 3]. spin: [T, 3] rad/s, world.
+    low, place: [T, G], [T, G, 2] m, of the watched spheres and boxes.
+    """
+
+    def __init__(self, creature: Creature, film: Trajectory, row: int) -> None:
+        self.creature = creature
+        model, data = creature.model, mujoco.MjData(creature.model)
+        self.qpos, self.qvel, self.torque = film.qpos[row], film.qvel[row], film.torque[row]
+        self.position = film.position[row]
+        velocity = np.zeros(6)
+        pos, rot, spin, low, place = [], [], [], [], []
+        for qpos, qvel in zip(self.qpos, self.qvel, strict=True):
+            data.qpos[:], data.qvel[:] = qpos, qvel
+            mujoco.mj_kinematics(model, data)
+            mujoco.mj_comPos(model, data)
+            mujoco.mj_comVel(model, data)
+            kind = mujoco.mjtObj.mjOBJ_XBODY
+            mujoco.mj_objectVelocity(model, data, kind, creature.trunk, velocity, 0)
+            pos.append(data.xpos[creature.trunk].copy())
+            rot.append(data.xmat[creature.trunk].reshape(3, 3).copy())
+            spin.append(velocity[:3].copy())
+            low.append([lowest(model, data, g) for g in creature.watched])
+            place.append(data.geom_xpos[creature.watched, :2].copy())
+        self.trunk_pos, self.trunk_rot, self.spin = np.array(pos), np.array(rot), np.array(spin)
+        self.low, self.place = np.array(low), np.array(place)
+        self.joints, self.speeds = self.qpos[:, creature.qpos_adr], self.qvel[:, creature.dof_adr]
+        self.up = self.trunk_rot[:, 2] @ creature.up
+        self.touch = self.low[:, 4:].min(1) < 0
+
+
+def lowest(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> float:
+    """m; of a sphere, or of a box by its corners."""
+    if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_SPHERE:
+        return float(data.geom_xpos[geom, 2] - model.geom_size[geom, 0])
+    assert model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_BOX
+    corners = model.geom_size[geom] * (2 * np.indices((2, 2, 2)).reshape(3, 8).T - 1)
+    return float(
+        (data.geom_xpos[geom] + corners @ data.geom_xmat[geom].reshape(3, 3).T)[:, 2].min()
+    )
+
+
+def end(frames: Frames) -> tuple[int, Reason]:
+    """The first frame that ends an episode, and why; the number of frames where none does."""
+    settings, height = (
+        frames.creature.settings.termination,
+        frames.trunk_pos[:, 2] / frames.creature.stand_height,
+    )
+    # Where several hold, the one further down counts.
+    found = np.full(len(height), Reason.FINISHED)
+    found[frames.touch] = Reason.TOUCHED
+    found[height > settings.height[1]] = Reason.TOO_HIGH
+    found[height < settings.height[0]] = Reason.TOO_LOW
+    found[frames.up < settings.min_up] = Reason.TIPPED
+    ends = np.flatnonzero(found != Reason.FINISHED)
+    return (int(ends[0]), Reason(found[ends[0]])) if len(ends) else (len(height), Reason.FINISHED)
+
+
+def tally_of(frames: Frames, steps: int, half: int, clearance: float) -> dict[str, np.ndarray]:
+    """The tally of the first `steps` frames by name, without `reason`; there must be a frame more.
+
+    half: frame whose distance is that of half time. clearance: m wanted of each foot per stride.
+    """
+    creature, torque = frames.creature, frames.torque[:steps]
+    joints, speeds = frames.joints[:steps], frames.speeds[:steps]
+    low, place = frames.low[:steps, :4], frames.place[:steps, :4]
+    forward, left = frames.trunk_pos[:steps, :2].T - creature.stand_pos[:2, None]
+    nose = frames.trunk_rot[steps - 1] @ creature.forward
+    down = low < CONTACT_GAP
+    slid = np.linalg.norm(np.diff(place, axis=0), axis=2) * (down[1:] & down[:-1])
+    outside = (joints < creature.pose_low) | (joints > creature.pose_high)
+    ends = np.flatnonzero(np.diff(frames.position[: steps + 1]) < 0)
+    return {
+        "steps": steps,
+        "forward": forward[-1],
+        "left": left[-1],
+        "forward_half": forward[min(half, steps) - 1],
+        "heading": np.arctan2(nose[1], nose[0]),
+        "strides": len(ends),
+        "stride_steps": ends[-1] + 1 if len(ends) else 0,
+        "contact": down.sum(0),
+        "slip": slid.sum(0),
+        "airborne": (~down.any(1)).sum(),
+        "foot_height": low.mean(1).sum(),
+        "foot_pos": place[-1],
+        "foot_down": down[-1],
+        "tilt": (1 - frames.up[:steps]).sum(),
+        "wobble": (frames.spin[:steps] ** 2).sum(),
+        "touch": frames.touch[:steps].sum(),
+        "work": np.maximum(torque * speeds, 0).sum() * creature.model.opt.timestep,
+        "saturation": (np.abs(torque) >= creature.torque_limit).mean(1).sum(),
+        "limits": outside.mean(1).sum(),
+        **_swings(low, SWING * creature.hip_height),
+        **_strides(low, ends, clearance),
+    }
+
+
+def _swings(low: np.ndarray, rise: float) -> dict[str, np.ndarray]:
+    count, swinging = np.zeros(4), np.zeros(4, bool)
+    for heights in low:
+        for foot, height in enumerate(heights):
+            if height > rise:
+                swinging[foot] = True
+            elif height < rise / 2 and swinging[foot]:
+                swinging[foot] = False
+                count[foot] += 1
+    return {"swings": count, "swinging": swinging}
+
+
+def _strides(low: np.ndarray, ends: np.ndarray, clearance: float) -> dict[str, np.ndarray]:
+    """A stride lasts from the end of the one before to its own; the first does not count."""
+    shortfall = 0.0
+    for before, last in itertools.pairwise(ends):
+        reached = low[before : last + 1].max(0)
+        shortfall += np.clip(1 - reached / clearance, 0, 1).mean()
+    begin = ends[-1] if len(ends) else 0
+    # The feet begin on the floor, at zero.
+    peak = low[begin:].max(0) if len(ends) else np.maximum(low.max(0), 0)
+    return {"shortfall": shortfall, "peak": peak}

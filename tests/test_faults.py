@@ -1,0 +1,96 @@
+"""The list of faults stays true, and the script that plants them can tell who catches what."""
+
+import ast
+import importlib.util
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+
+
+def _script() -> ModuleType:
+    spec = importlib.util.spec_from_file_location(
+        "plant_faults", ROOT / "scripts" / "plant_faults.py"
+    )
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+script = _script()
+FAULTS = {fault.name: fault for fault in script.read_faults()}
+
+
+def test_the_list_is_long_and_names_each_fault_once():
+    assert len(FAULTS) == len(script.read_faults()) >= 30
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_a_fault_can_be_planted(name: str):
+    """Its text is there exactly once, what comes of it is Python, and the tests named exist."""
+    fault = FAULTS[name]
+    assert fault.why
+    ast.parse(script.planted(fault))
+    assert fault.tests
+    for test in fault.tests:
+        assert (ROOT / test.partition("::")[0]).is_file(), test
+
+
+TOY = {
+    "toy.py": "def double(x):\n    return 2 * x\n\n\ndef half(x):\n    return x / 2\n",
+    "tests/test_toy.py": "import toy\n\n\ndef test_double():\n    assert toy.double(3) == 6\n",
+    "tests/test_rest.py": "def test_nothing():\n    pass\n",
+    "pytest.ini": "[pytest]\nmarkers = slow\n",
+}
+CAUGHT = ("wrong factor", "return 2 * x", "return 3 * x", "tests/test_toy.py")
+BY_THE_REST = ("found late", "return 2 * x", "return 0", "tests/test_rest.py")
+MISSED = ("wrong divisor", "return x / 2", "return x / 3", "tests/test_toy.py")
+ROTTEN = ("gone", "return 4 * x", "return 5 * x", "tests/test_toy.py")
+
+
+def planting(folder: Path, *faults: tuple[str, str, str, str]) -> list[str]:
+    """The arguments with which the script plants these faults in a toy tree."""
+    for name, text in TOY.items():
+        (folder / "tree" / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / "tree" / name).write_text(text)
+    rows = [
+        f'[[fault]]\nname = "{name}"\nfile = "toy.py"\nold = "{old}"\nnew = "{new}"\n'
+        f'tests = ["{test}"]\nwhy = "it is wrong"\n'
+        for name, old, new, test in faults
+    ]
+    (folder / "faults.toml").write_text("\n".join(rows))
+    return ["--list", str(folder / "faults.toml"), "--root", str(folder / "tree")]
+
+
+def test_it_names_the_test_that_catches_a_fault(tmp_path: Path, capsys: pytest.CaptureFixture):
+    assert script.main(planting(tmp_path, CAUGHT, BY_THE_REST)) == 0
+    rows = [line for line in capsys.readouterr().out.splitlines() if line.startswith("| ")]
+    assert len(rows) == 3
+    assert all("`tests/test_toy.py::test_double`" in row for row in rows[1:])
+    assert (tmp_path / "tree" / "toy.py").read_text() == TOY["toy.py"]
+
+
+def test_it_fails_when_nothing_catches_a_fault(tmp_path: Path, capsys: pytest.CaptureFixture):
+    assert script.main(planting(tmp_path, MISSED)) == 1
+    assert "0 of 1 caught" in capsys.readouterr().out
+
+
+def test_it_refuses_a_fault_whose_text_is_gone(tmp_path: Path):
+    with pytest.raises(SystemExit, match=r'"gone": its old text is 0 times in toy\.py'):
+        script.main(planting(tmp_path, ROTTEN))
+
+
+def test_it_refuses_to_begin_where_the_tests_fail_anyway(tmp_path: Path):
+    arguments = planting(tmp_path, CAUGHT)
+    (tmp_path / "tree" / "toy.py").write_text("def double(x):\n    return 2 * x + 1\n")
+    (tmp_path / "faults.toml").write_text(
+        (tmp_path / "faults.toml").read_text().replace("return 2 * x", "return 2 * x + 1", 1)
+    )
+    with pytest.raises(SystemExit, match="fail without a fault"):
+        script.main(arguments)

@@ -1,0 +1,113 @@
+"""Every fitness term by hand from a made-up tally, and what becomes of the terms."""
+
+import dataclasses
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from helpers import small_config
+
+from mjxgait.creature import Creature
+from mjxgait.fitness import REWARDS, TERMS, fitness_terms, score, weight_vector
+from mjxgait.tally import Judge
+
+STEP, HORIZON = 0.005, 1000
+LIVED = {"steps": 1000, "forward": 2.0}
+"""A whole episode of 5 s in which a body of 1 m came 2 m forward."""
+
+CASES: list[tuple[str, float, dict]] = [
+    ("distance", 2.0, {}),
+    ("distance", -1.0, {"forward": -1.0}),
+    ("alive", 1.0, {}),
+    ("alive", 0.25, {"steps": 250}),
+    ("drift", 0.3 + np.sin(0.5), {"left": -0.3, "heading": -1.0}),
+    ("drift", 0.3 + np.sin(0.5), {"left": 0.3, "heading": 1.0}),
+    ("fade", 0.8, {"forward_half": 1.4}),
+    ("fade", 0.0, {"forward_half": 0.6}),
+    ("slip", 0.25, {"slip": [0.1, 0.5, 0.2, 0.3]}),
+    ("slip", 2.0, {"slip": [0.1, 0.5, 0.2, 0.3], "forward": 0.1}),
+    ("clearance", 0.3, {"strides": 5, "shortfall": 1.2}),
+    ("clearance", 1.0, {"strides": 1}),
+    # 6 and 8 Hz against 0.7 of 1.2 * 4.48 * 20^-0.14 = 3.5344 Hz
+    ("frequency", 6 / 3.5344 - 0.7, {"strides": 27, "stride_steps": 900}),
+    ("frequency", 8 / 3.5344 - 0.7, {"strides": 5, "stride_steps": 1000, "swings": [40.0] * 4}),
+    ("frequency", 0.0, {"strides": 10, "stride_steps": 1000, "swings": [12.0] * 4}),
+    ("duty", 0.5, {"contact": [900.0, 500, 500, 500]}),
+    ("duty", 0.75, {"contact": [500.0, 100, 500, 800]}),
+    ("airborne", 0.15, {"airborne": 150.0}),
+    ("foot_height", 0.15, {"foot_height": 200.0}),
+    ("foot_height", 0.0, {"foot_height": 100.0}),
+    ("tilt", 0.12, {"tilt": 120.0}),
+    ("tilt", 0.24, {"tilt": 120.0, "steps": 500}),
+    ("wobble", 3.0, {"wobble": 9000.0}),
+    ("touch", 0.04, {"touch": 40.0}),
+    ("energy", 2.0, {"work": 2.0 * 20 * 9.81 * 2}),
+    ("energy", 16.0, {"work": 2.0 * 20 * 9.81 * 2, "forward": -3.0}),
+    ("saturation", 0.3, {"saturation": 300.0}),
+    ("limits", 0.07, {"limits": 70.0}),
+]
+
+
+@pytest.fixture(scope="module")
+def body(stool: Creature) -> Creature:
+    """Of round measures."""
+    return dataclasses.replace(stool, body_length=1.0, hip_height=0.5, mass=20.0)
+
+
+def terms_of(body: Creature, tally: dict, **fitness: float) -> dict[str, float]:
+    config = small_config(fitness={"speed": 0.0, **fitness}).fitness
+    arrays = {name: jnp.asarray(value) for name, value in (LIVED | tally).items()}
+    filled = dataclasses.replace(Judge(body, STEP, HORIZON // 2).init(), **arrays)
+    terms = fitness_terms(body, config, STEP, HORIZON, filled)
+    return dict(zip(TERMS, np.asarray(terms).tolist(), strict=True))
+
+
+IDS = [f"{name} of {' and '.join(tally) or 'a whole walk'}" for name, _, tally in CASES]
+
+
+@pytest.mark.parametrize(("name", "value", "tally"), CASES, ids=IDS)
+def test_a_term_is_what_its_tally_says(body: Creature, name: str, value: float, tally: dict):
+    assert terms_of(body, tally)[name] == pytest.approx(value, rel=1e-4, abs=1e-5)
+
+
+@pytest.mark.parametrize("name", TERMS)
+def test_every_term_has_a_case_that_is_not_zero(name: str):
+    assert any(term == name and value for term, value, _ in CASES), (
+        f'"{name}" is a fitness term that nothing computes by hand: add a row to CASES'
+    )
+
+
+def test_a_case_changes_no_other_penalty(body: Creature):
+    """What is counted for one term is not counted for a second one."""
+    shared = {"distance", "alive", "fade", "clearance", "duty"}
+    for name, _, tally in CASES:
+        if set(tally) & {"steps", "forward", "strides"}:
+            continue
+        plain, changed = terms_of(body, {}), terms_of(body, tally)
+        differ = {term for term in TERMS if changed[term] != pytest.approx(plain[term])}
+        assert differ <= {name} | shared, name
+
+
+def test_style_counts_by_the_share_of_the_wanted_walk(body: Creature):
+    """2 m are four ninths of 5 s at 0.9 body lengths a second; distance and posture are no style."""
+    tally = {"tilt": 120.0, "foot_height": 200.0, "airborne": 150.0}
+    terms = terms_of(body, tally, speed=0.9)
+    assert terms["tilt"] == pytest.approx(0.12 * 4 / 9, rel=1e-4)
+    assert terms["airborne"] == pytest.approx(0.15 * 4 / 9, rel=1e-4)
+    assert terms["foot_height"] == pytest.approx(0.15, rel=1e-4)
+    assert (terms["distance"], terms["alive"]) == (pytest.approx(2.0), 1.0)
+
+
+def test_each_weight_meets_its_own_term_with_its_own_sign():
+    weights = {name: 1.0 + 0.5 * place for place, name in enumerate(TERMS)}
+    vector = weight_vector(small_config(fitness={"weights": weights}).fitness, jnp.int32(0))
+    expected = [weights[name] if name in REWARDS else -weights[name] for name in TERMS]
+    assert np.allclose(vector, expected)
+    assert {"distance", "alive"} == set(REWARDS)
+
+
+def test_the_score_is_the_weighted_sum_of_each_start():
+    terms, weights = jnp.array([[1.0, 2.0], [3.0, 0.5]]), jnp.array([2.0, -1.0])
+    assert float(score(terms, weights, 0.0)) == pytest.approx((0.0 + 5.5) / 2)
+    assert float(score(terms, weights, 0.25)) == pytest.approx(0.75 * 2.75)
+    assert np.isneginf(score(terms.at[0, 0].set(jnp.nan), weights, 0.5))

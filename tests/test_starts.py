@@ -1,0 +1,72 @@
+"""Each perturbation of the starts, alone; that they reach the motion, the episode parity shows."""
+
+import dataclasses
+
+import jax
+import numpy as np
+import pytest
+from helpers import small_config
+
+from mjxgait.creature import Creature
+from mjxgait.starts import NEVER, Starts, draw_starts
+
+NONE = {"joint_noise": 0.0, "velocity_noise": 0.0, "friction": (1.0, 1.0), "push": 0.0}
+COUNT = 40
+
+
+def drawn(creature: Creature, **perturbation: object) -> Starts:
+    config = small_config(rollout={**NONE, "starts": COUNT, "seconds": 2.0, **perturbation})
+    return jax.device_get(draw_starts(jax.random.key(5), creature, config.rollout))
+
+
+def differing(one: Starts, other: Starts) -> set[str]:
+    names = [field.name for field in dataclasses.fields(Starts)]
+    return {n for n in names if not np.array_equal(getattr(one, n), getattr(other, n))}
+
+
+@pytest.mark.parametrize(
+    ("perturbation", "field"),
+    [
+        ({"joint_noise": 0.1}, "qpos"),
+        ({"velocity_noise": 0.5}, "qvel"),
+        ({"friction": (0.6, 1.4)}, "friction"),
+        ({"push": 0.2}, "push"),
+    ],
+    ids=["joints displaced", "joints moving", "friction", "push"],
+)
+def test_a_perturbation_changes_its_own_field_of_all_but_the_first_start(
+    stool: Creature, perturbation: dict, field: str
+):
+    starts, none = drawn(stool, **perturbation), drawn(stool)
+    assert differing(starts, none) == {field}
+    values, nominal = getattr(starts, field), getattr(none, field)
+    assert np.array_equal(values[0], nominal[0])
+    assert all(not np.array_equal(row, nominal[0]) for row in values[1:])
+
+
+def test_noise_fills_its_width_to_both_sides_and_is_that_of_joints_only(stool: Creature):
+    starts = drawn(stool, joint_noise=0.1, velocity_noise=0.5)
+    shift = starts.qpos - np.float32(stool.stand_qpos)
+    for noise, places, width in (
+        (shift, stool.qpos_adr, 0.1),
+        (starts.qvel, stool.dof_adr, 0.5),
+    ):
+        assert width * 0.95 < noise[1:, places].max() <= width
+        assert -width * 0.95 > noise[1:, places].min() >= -width
+        assert not np.delete(noise, places, axis=1).any()
+
+
+def test_friction_lies_within_its_range(stool: Creature):
+    friction = drawn(stool, friction=(0.6, 1.4)).friction[1:]
+    assert 0.6 <= friction.min() < 0.65
+    assert 1.35 < friction.max() <= 1.4
+
+
+def test_pushes_go_all_ways_along_the_ground_in_the_middle_of_the_episode(stool: Creature):
+    starts = drawn(stool, push=0.2)
+    push = starts.push[1:]
+    assert not push[:, 2:].any()
+    assert np.allclose(np.hypot(*push[:, :2].T), 0.2 * np.sqrt(9.81 * stool.hip_height))
+    assert all((np.sign(push[:, :2]) == way).all(1).any() for way in ((1, 1), (1, -1), (-1, 1)))
+    assert starts.push_step[0] == NEVER
+    assert ((starts.push_step[1:] >= 100) & (starts.push_step[1:] < 300)).all()

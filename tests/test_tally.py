@@ -1,0 +1,103 @@
+"""The running sums of an episode, and its end, against the same from whole recordings."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from disturbed_walks import (
+    CONFIGS,
+    DISTURBANCES,
+    EPISODES,
+    FIELDS,
+    STEP,
+    STEPS,
+    make_body,
+    tolerance,
+    watched,
+)
+from recorded_tally import Frames, end, tally_of
+
+from mjxgait.creature import Creature
+from mjxgait.tally import Judge, Reason, Tally
+from mjxgait.types import Sensed
+
+
+@pytest.fixture(scope="module")
+def body(tmp_path_factory: pytest.TempPathFactory) -> Creature:
+    return make_body(tmp_path_factory.mktemp("tally"))
+
+
+@pytest.fixture(scope="module")
+def recordings(body: Creature) -> list[Frames]:
+    """Of all episodes, falls and what comes after them included."""
+    films = [outcome.trajectory for outcome in watched(body)]
+    return [Frames(body, film, row) for film in films for row in range(len(DISTURBANCES))]
+
+
+def clearance_of(body: Creature) -> float:
+    return CONFIGS[0].fitness.clearance * body.hip_height
+
+
+def sensed_of(frames: Frames) -> Sensed:
+    """What a controller would have sensed, [T, ...]; the tally reads no bias and no velocity."""
+    count, nothing = len(frames.qpos), np.zeros((len(frames.qpos), 3))
+    heights = np.zeros((count, frames.low.shape[1], 1))
+    sensed = Sensed(
+        joint_pos=frames.joints,
+        joint_vel=frames.speeds,
+        bias=nothing,
+        trunk_pos=frames.trunk_pos,
+        trunk_rot=frames.trunk_rot,
+        trunk_vel=nothing,
+        trunk_angvel=frames.spin,
+        geom_pos=np.concatenate([frames.place, heights], axis=2),
+        geom_low=frames.low,
+    )
+    return jax.tree.map(lambda leaf: jnp.asarray(leaf[:STEPS], jnp.float32), sensed)
+
+
+@pytest.fixture(scope="module")
+def judged(body: Creature, recordings: list[Frames]) -> tuple[Tally, jax.Array]:
+    """The tallies [E, ...] of whole episodes, and what would have ended them, [E, T]."""
+    judge, clearance = Judge(body, STEP, STEPS // 2), jnp.float32(clearance_of(body))
+
+    def episode(sensed: Sensed, torque: jax.Array, stride: jax.Array) -> tuple[Tally, jax.Array]:
+        def step(tally: Tally, now: tuple) -> tuple[Tally, jax.Array]:
+            return judge.update(tally, *now, clearance), judge.examine(now[0])
+
+        return jax.lax.scan(step, judge.init(), (sensed, torque, stride))
+
+    sensed = jax.tree.map(lambda *rows: jnp.stack(rows), *map(sensed_of, recordings))
+    torque = jnp.float32([frames.torque[:STEPS] for frames in recordings])
+    stride = jnp.array([np.diff(frames.position) < 0 for frames in recordings])
+    return jax.device_get(jax.jit(jax.vmap(episode))(sensed, torque, stride))
+
+
+@pytest.fixture(scope="module")
+def expected(body: Creature, recordings: list[Frames]) -> list[dict]:
+    return [tally_of(frames, STEPS, STEPS // 2, clearance_of(body)) for frames in recordings]
+
+
+@pytest.mark.parametrize("name", [name for name in FIELDS if name != "reason"])
+def test_the_running_sum_is_the_sum(
+    judged: tuple[Tally, jax.Array], expected: list[dict], name: str
+):
+    rows = zip(EPISODES, getattr(judged[0], name), expected, strict=True)
+    for episode, ours, tally in rows:
+        theirs = np.asarray(tally[name], float)
+        most = tolerance(name, theirs)
+        np.testing.assert_allclose(ours, theirs, rtol=0, atol=most, err_msg=str(episode))
+
+
+def test_an_episode_ends_where_the_recording_does(
+    judged: tuple[Tally, jax.Array], recordings: list[Frames]
+):
+    found = set()
+    for episode, reasons, frames in zip(EPISODES, judged[1], recordings, strict=True):
+        steps, why = end(frames)
+        ends = np.flatnonzero(reasons)
+        assert (ends[0] if len(ends) else STEPS) == min(steps, STEPS), episode
+        if len(ends):
+            assert reasons[ends[0]] == why, episode
+            found.add(why)
+    assert Reason.TIPPED in found
