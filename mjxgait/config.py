@@ -128,6 +128,7 @@ class Weights:
     energy: Finite = 0.05
     saturation: Finite = 0.5
     limits: Finite = 0.5
+    overlap: Finite = 4.0
 
 
 @dataclasses.dataclass(frozen=True)
