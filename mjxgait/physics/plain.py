@@ -14,7 +14,7 @@ import numpy as np
 from mjxgait.creature import geometry
 from mjxgait.creature.overlap import Crossings
 from mjxgait.physics.layout import SenseLayout
-from mjxgait.physics.overlap import pair_depths
+from mjxgait.physics.overlap import deepest
 from mjxgait.types import BodyState, Sensed
 
 with contextlib.redirect_stdout(
@@ -72,7 +72,7 @@ class MjxPlant:
         centre, half = (
             jnp.einsum("sij,sj->si", rot, np.float32(x)) for x in (crossings.centre, crossings.half)
         )
-        return jnp.max(pair_depths(crossings, data.xpos[crossings.body] + centre, half))
+        return deepest(crossings, data.xpos[crossings.body] + centre, half)
 
     def _with_friction(self, friction: jax.Array) -> mjx.Model:
         return self.model.replace(

@@ -36,7 +36,7 @@ from mjxgait.physics.fast.overlap import bar_places
 from mjxgait.physics.fast.structure import BALL, FREE, Structure, read_structure
 from mjxgait.physics.fast.treematrix import Rows, factor, solve
 from mjxgait.physics.layout import SenseLayout
-from mjxgait.physics.overlap import pair_depths
+from mjxgait.physics.overlap import deepest
 from mjxgait.types import BodyState, Sensed, pytree
 
 
@@ -89,7 +89,7 @@ class FastPlant:
         if self.crossings is None or not len(self.crossings.first):
             return jnp.full_like(state.friction, -jnp.inf)
         places = one_kernel(partial(bar_places, self.structure, self.crossings))
-        return jnp.max(pair_depths(self.crossings, *places(state.qpos, state.friction)), axis=0)
+        return deepest(self.crossings, *places(state.qpos, state.friction))
 
     def _forward(self, state: BodyState) -> tuple[Sensed, Workings]:
         structure, like = self.structure, state.friction
