@@ -148,7 +148,7 @@ def _assemble(
     settings: CreatureSettings, files: Mapping[str, str], model: mujoco.MjModel
 ) -> Creature:
     trunk = _id(model, mujoco.mjtObj.mjOBJ_BODY, settings.creature.trunk, "creature.trunk")
-    check_world(model, trunk, FLOOR)
+    check_world(model, trunk, _id(model, mujoco.mjtObj.mjOBJ_GEOM, FLOOR, "the floor"))
     data = _standing(model, settings.creature.keyframe)
     axes = _trunk_axes(data.xmat[trunk].reshape(3, 3), np.array(settings.creature.forward))
     joints = [

@@ -8,8 +8,11 @@ from mjxgait.errors import UserError
 WAY_OUT = "evolution knows one creature on a flat floor and nothing else"
 
 
-def check_world(model: mujoco.MjModel, trunk: int, floor: str) -> None:
+def check_world(model: mujoco.MjModel, trunk: int, floor: int) -> None:
     """Refuses what evolution would ignore: what else moves, or can be touched and is not the floor.
+
+    Args:
+      trunk: body id. floor: geom id.
 
     Raises:
       UserError: names the body or geom, and the way out.
@@ -24,7 +27,7 @@ def check_world(model: mujoco.MjModel, trunk: int, floor: str) -> None:
             )
     still = model.body_weldid[model.geom_bodyid] == 0
     for geom in np.flatnonzero(still):
-        if model.geom(geom).name != floor and _can_be_touched(model, int(geom), still):
+        if geom != floor and _can_be_touched(model, int(geom), still):
             raise UserError(
                 f"{_called(model, int(geom))} stands in the world where the creature can touch it: "
                 f"{WAY_OUT}; take the geom out of creature.xml, or make it decoration with "
