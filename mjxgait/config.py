@@ -151,6 +151,7 @@ class Weights:
     energy: Finite = 0.05
     saturation: Finite = 0.5
     limits: Finite = 0.5
+    overlap: Finite = 4.0
     fall: Finite = 0.0
 
 

@@ -68,6 +68,11 @@ class Experiment:
         """The starts [R] on which everybody is judged."""
         return self.row.starts
 
+    @property
+    def plant_note(self) -> str:
+        """What a user should know about the physics; empty if there is nothing to say."""
+        return self.simulator.plant.note
+
     def init(self) -> EvolutionState:
         """The state of generation -1: a population that nobody has judged."""
         return _initial(

@@ -18,6 +18,12 @@ STYLE = tuple(name for name in TERMS if name not in (*REWARDS, "foot_height", "f
 BEYOND = 0.02
 """What a body length counts that goes beyond the wanted speed."""
 
+TOUCHING = 0.005
+"""Hip heights; parts that are less deep in each other than this only touch."""
+DEEP = 0.05
+"""Hip heights beyond `TOUCHING` at which an overlap counts half: it must not cost more than a walk
+brings."""
+
 
 def stride_limit(mass: float) -> float:
     """Hz; 1.2 times the trot-gallop transition frequency of an animal of this mass, `4.48 m^-0.14` (Heglund, Taylor & McMahon 1974)."""
@@ -47,6 +53,7 @@ def fitness_terms(
     )
     duty = tally.contact / lived
     second_half = tally.forward - tally.forward_half
+    crossed = jnp.maximum(tally.overlap / creature.hip_height - TOUCHING, 0.0)
     enough = _enough(config.speed, horizon * step)
     values = {
         "distance": _counted(tally.forward / length, enough),
@@ -67,6 +74,7 @@ def fitness_terms(
         "energy": tally.work / (creature.mass * 9.81 * moved),
         "saturation": tally.saturation / lived,
         "limits": tally.limits / lived,
+        "overlap": crossed / (crossed + DEEP),
         "fall": jnp.where(tally.reason == Reason.FINISHED, 0.0, 1.0),
     }
     # Style counts as far as there is a walk: a creature that has yet to learn walking must not be punished for trying.

@@ -25,7 +25,8 @@ from mjxgait.tally import Judge, Reason, Tally
 from mjxgait.types import BodyState, Plant, pytree
 
 CHECK_EVERY = 16
-"""Steps between two looks at which lanes are free: a look costs about as much as a step."""
+"""Steps between two looks at which lanes are free (a look costs about as much as a step),
+and at how deep parts are in each other."""
 AXIS = "lanes"
 
 
@@ -135,6 +136,7 @@ class Simulator:
         ) -> tuple[Lane, Tally, jax.Array, jax.Array]:
             lane, results, taken, rounds = carry
             lane = jax.lax.fori_loop(0, CHECK_EVERY, lambda _, lane: self._step(lane), lane)
+            lane = self._look_for_overlap(lane)
             done = (lane.tally.steps >= self.steps) | (lane.tally.reason != Reason.FINISHED)
             results = store(results, jnp.where(done, lane.job, queue), lane.tally)
             lane = self._per_lane(_choose)(done, fresh(taken + jnp.cumsum(done) - 1), lane)
@@ -209,6 +211,14 @@ class Simulator:
         tally = self._per_lane(self._judge)(lane.rules, lane.tally, sensed, torque, stride)
         body = self.plant.advance(body, workings, self._per_lane(self._lift)(torque))
         return dataclasses.replace(lane, body=body, control=control, tally=tally)
+
+    def _look_for_overlap(self, lane: Lane) -> Lane:
+        """The lanes with the deepest that parts were in each other, where an episode goes on."""
+        tally, depth = lane.tally, self.plant.overlap(lane.body)
+        going = (tally.reason == Reason.FINISHED) & (tally.steps < self.steps)
+        # A comparison, not a maximum: a state that is NaN is for the next step to find.
+        deeper = jnp.where(going & (depth > tally.overlap), depth, tally.overlap)
+        return dataclasses.replace(lane, tally=dataclasses.replace(tally, overlap=deeper))
 
     def torque(
         self, rules: Rules, body: BodyState, sensed: Any, workings: Any, target: jax.Array

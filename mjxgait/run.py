@@ -59,6 +59,8 @@ def train(
     else:
         truncate_metrics(folder / METRICS, -1)
         state = experiment.init()
+    if experiment.plant_note:
+        screen.say(experiment.plant_note)
     with screen.compiling(creature.name, experiment):
         step = experiment.compile()
     began = time.perf_counter()

@@ -43,6 +43,7 @@ class Tally:
     foot_height: [] m·steps, mean height of the feet. foot_pos: [F, 2], foot_down: [F] of the previous step.
     tilt: [] of 1 - up.z. wobble: [] (rad/s)² of the trunk. touch: [] steps on which another part touches.
     work: [] J, positive. saturation, limits: [] share of joints at their torque limit, beyond their pose range.
+    overlap: [] m, the deepest that parts were in each other of the times that they were looked at.
     """
 
     steps: jax.Array
@@ -69,6 +70,7 @@ class Tally:
     work: jax.Array
     saturation: jax.Array
     limits: jax.Array
+    overlap: jax.Array
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -175,6 +177,7 @@ class Judge:
             saturation=tally.saturation
             + jnp.mean(jnp.abs(torque) >= creature.torque_limit.astype(np.float32)),
             limits=tally.limits + jnp.mean(outside),
+            overlap=tally.overlap,
         )
 
     def _touches(self, sensed: Sensed) -> jax.Array:

@@ -69,6 +69,11 @@ class Plant(Protocol):
         """Where the axis of the lanes is."""
         ...
 
+    @property
+    def note(self) -> str:
+        """What a user should know about the choice of this plant; empty if nothing."""
+        ...
+
     def forward(self, state: BodyState) -> tuple[Sensed, Any]:
         """Position and velocity dependent terms of the current state, and the plant's own workings for the two calls below."""
         ...
@@ -79,4 +84,11 @@ class Plant(Protocol):
 
     def advance(self, state: BodyState, workings: Any, torque: jax.Array) -> BodyState:
         """The state one `sim_dt` later under applied generalised forces `torque` `[nv]`; friction passes through."""
+        ...
+
+    def overlap(self, state: BodyState) -> jax.Array:
+        """The deepest [] m that parts are in each other, beyond their depth when standing.
+
+        Parts that are neighbours do not count; negative where all are apart.
+        """
         ...

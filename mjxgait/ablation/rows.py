@@ -73,7 +73,7 @@ class _Group:
         batch = build_batch(self.creature, [run.config for run in self.runs])
         checkpoints = Checkpoints(self.folder, keep_every=self.last + 1)
         states = self._begin(batch, checkpoints)
-        tell({"compiling": len(self.runs)})
+        tell({"compiling": len(self.runs), "note": batch.experiments[0].plant_note})
         step = batch.compile()
         states = batch.place(states)
         try:

@@ -114,6 +114,8 @@ class _Progress:
     def generation(self, group: int, count: int, news: dict[str, Any]) -> None:
         where = f"program {group + 1} of {count}" if count > 1 else "all runs"
         if "compiling" in news:
+            if news["note"]:
+                print(news["note"], flush=True)
             print(f"{where}: compiling for {news['compiling']} runs side by side", flush=True)
             return
         left = (news["of"] - news["generation"]) * news["seconds"]

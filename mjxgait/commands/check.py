@@ -35,7 +35,11 @@ def check_command(arguments: Sequence[str]) -> int:
     out = options.out or Path(f"{creature.name}-check.png")
     if out.suffix.lower() != ".png":
         raise UserError(f"{out}: the picture is a PNG; name it something.png")
+    from mjxgait.physics import fallback_note
+
     print("\n".join(facts(creature)))
+    if note := fallback_note(creature.evolution_model):
+        print(note)
     try:
         portrait(creature).save(out)
     except OSError as error:

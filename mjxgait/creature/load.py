@@ -12,6 +12,7 @@ import numpy as np
 
 from mjxgait.creature import geometry
 from mjxgait.creature.settings import CreatureSettings, JointException
+from mjxgait.creature.world import check_world
 from mjxgait.errors import UserError, did_you_mean
 from mjxgait.tables import build, read_toml
 
@@ -171,6 +172,7 @@ def _assemble(
     settings: CreatureSettings, files: Mapping[str, str], model: mujoco.MjModel
 ) -> Creature:
     trunk = _id(model, mujoco.mjtObj.mjOBJ_BODY, settings.creature.trunk, "creature.trunk")
+    check_world(model, trunk, _id(model, mujoco.mjtObj.mjOBJ_GEOM, FLOOR, "the floor"))
     data = _standing(model, settings.creature.keyframe)
     axes = _trunk_axes(data.xmat[trunk].reshape(3, 3), np.array(settings.creature.forward))
     joints = [

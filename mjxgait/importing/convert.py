@@ -17,7 +17,7 @@ from mjxgait.importing.body import Puppet
 from mjxgait.importing.drive import Drive, plan_drive
 from mjxgait.importing.hold import Held, hold
 from mjxgait.importing.mjcf import clean_mjcf
-from mjxgait.importing.notes import Notes
+from mjxgait.importing.notes import Notes, listed
 from mjxgait.importing.orient import find_forward, find_mirror, is_planar, yaw_to
 from mjxgait.importing.parts import Body, plain_names, rotation
 from mjxgait.importing.same import check_same
@@ -104,6 +104,7 @@ def _import(path: Path, choices: ImportChoices, notes: Notes) -> Imported:
         notes.change(what, why)
     _tell_dropped(model, notes)
     anatomy = find_anatomy(model, source.coupled, choices.keep, choices.freeze, choices.up, notes)
+    _tell_left_out(model, anatomy, notes)
     bodies = build_bodies(model, anatomy, source.efforts, notes)
     puppet = Puppet(
         bodies, [anatomy.bodies.index(b) for b in anatomy.feet], in_plane(model, anatomy.root)
@@ -166,6 +167,22 @@ def _tell_dropped(model: mujoco.MjModel, notes: Notes) -> None:
         "the floor and all options replaced",
         "a flat floor; time step 5 ms, Newton solver, pyramidal friction: what every physics here can do",
     )
+
+
+def _tell_left_out(model: mujoco.MjModel, anatomy: Anatomy, notes: Notes) -> None:
+    """Tells what else is in the file's world: other bodies, geoms that can be touched."""
+    own = {*anatomy.bodies, *geometry.ancestors(model, anatomy.root)}
+    others = [b for b in range(1, model.nbody) if b not in own and model.body_parentid[b] == 0]
+    touchable = (model.geom_contype | model.geom_conaffinity) != 0
+    things = [
+        g
+        for g in np.flatnonzero(touchable & (model.geom_bodyid == 0))
+        if int(model.geom_type[g]) != mujoco.mjtGeom.mjGEOM_PLANE
+    ]
+    names = [f'body "{model.body(b).name}"' for b in others]
+    names += [f'geom "{model.geom(g).name or g}"' for g in things]
+    if names:
+        notes.change(f"left out: {listed(names)}", "a walk is evolved on a flat floor, alone")
 
 
 def _start(puppet: Puppet, model: mujoco.MjModel, anatomy: Anatomy) -> np.ndarray:

@@ -3,6 +3,7 @@
 import contextlib
 import dataclasses
 import io
+from functools import partial
 from typing import Any
 
 import jax
@@ -11,7 +12,9 @@ import mujoco
 import numpy as np
 
 from mjxgait.creature import geometry
+from mjxgait.creature.overlap import Crossings
 from mjxgait.physics.layout import SenseLayout
+from mjxgait.physics.overlap import deepest
 from mjxgait.types import BodyState, Sensed
 
 with contextlib.redirect_stdout(
@@ -28,12 +31,16 @@ class MjxPlant:
       model, data: of MJX; data is the template whose state each lane replaces.
       layout: which parts of the model are sensed.
       reach: r [G], b [G, 3], e [G, 3] of the watched geoms' support functions.
+      crossings: which parts may be in each other; None looks at none.
+      note: see `Plant.note`.
     """
 
     model: mjx.Model
     data: mjx.Data
     layout: SenseLayout
     reach: tuple[np.ndarray, np.ndarray, np.ndarray]
+    crossings: Crossings | None = None
+    note: str = ""
     lane_axis: int = 0
 
     def forward(self, state: BodyState) -> tuple[Sensed, Any]:
@@ -52,6 +59,20 @@ class MjxPlant:
     def advance(self, state: BodyState, workings: Any, torque: jax.Array) -> BodyState:
         """See `Plant.advance`."""
         return jax.vmap(self._advance)(state, workings, torque)
+
+    def overlap(self, state: BodyState) -> jax.Array:
+        """See `Plant.overlap`."""
+        if self.crossings is None or not len(self.crossings.first):
+            return jnp.full_like(state.friction, -jnp.inf)
+        return jax.vmap(partial(self._overlap, self.crossings))(state.qpos)
+
+    def _overlap(self, crossings: Crossings, qpos: jax.Array) -> jax.Array:
+        data = mjx.kinematics(self.model, self.data.replace(qpos=qpos))
+        rot = data.xmat[crossings.body]
+        centre, half = (
+            jnp.einsum("sij,sj->si", rot, np.float32(x)) for x in (crossings.centre, crossings.half)
+        )
+        return deepest(crossings, data.xpos[crossings.body] + centre, half)
 
     def _with_friction(self, friction: jax.Array) -> mjx.Model:
         return self.model.replace(
@@ -99,7 +120,12 @@ class MjxPlant:
         )
 
 
-def mjx_plant(model: mujoco.MjModel, layout: SenseLayout) -> MjxPlant:
+def mjx_plant(
+    model: mujoco.MjModel,
+    layout: SenseLayout,
+    crossings: Crossings | None = None,
+    note: str = "",
+) -> MjxPlant:
     """A plant for any model that MJX accepts.
 
     Raises:
@@ -111,4 +137,4 @@ def mjx_plant(model: mujoco.MjModel, layout: SenseLayout) -> MjxPlant:
         geometry.support_extents(model.geom_type[g], model.geom_size[g]) for g in layout.watched
     ]
     r, box, ellipsoid = (np.array(column, np.float32) for column in zip(*extents, strict=True))
-    return MjxPlant(device_model, data, layout, (r, box, ellipsoid))
+    return MjxPlant(device_model, data, layout, (r, box, ellipsoid), crossings, note)

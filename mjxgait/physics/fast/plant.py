@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import jax
@@ -10,6 +11,7 @@ import mujoco
 import numpy as np
 
 from mjxgait.creature import geometry
+from mjxgait.creature.overlap import Crossings
 from mjxgait.physics.fast.constraints import make_constraints, touch
 from mjxgait.physics.fast.dynamics import bias_force, inertias, mass_rows, motion_paths
 from mjxgait.physics.fast.footing import Touch
@@ -32,9 +34,11 @@ from mjxgait.physics.fast.lanes import (
     turn,
 )
 from mjxgait.physics.fast.newton import Problem, constrained_acceleration
+from mjxgait.physics.fast.overlap import bar_places
 from mjxgait.physics.fast.structure import BALL, FREE, Structure, read_structure
 from mjxgait.physics.fast.treematrix import Rows, factor, solve
 from mjxgait.physics.layout import SenseLayout
+from mjxgait.physics.overlap import deepest
 from mjxgait.types import BodyState, Sensed, pytree
 
 
@@ -66,6 +70,8 @@ class FastPlant:
     structure: Structure
     layout: SenseLayout
     watched: tuple[Watched, ...]
+    crossings: Crossings | None = None
+    note: str = ""
     lane_axis: int = -1
 
     def forward(self, state: BodyState) -> tuple[Sensed, Workings]:
@@ -79,6 +85,13 @@ class FastPlant:
     def advance(self, state: BodyState, workings: Workings, torque: jax.Array) -> BodyState:
         """See `Plant.advance`."""
         return one_kernel(self._advance)(state, workings, torque)
+
+    def overlap(self, state: BodyState) -> jax.Array:
+        """See `Plant.overlap`."""
+        if self.crossings is None or not len(self.crossings.first):
+            return jnp.full_like(state.friction, -jnp.inf)
+        places = one_kernel(partial(bar_places, self.structure, self.crossings))
+        return deepest(self.crossings, *places(state.qpos, state.friction))
 
     def _forward(self, state: BodyState) -> tuple[Sensed, Workings]:
         structure, like = self.structure, state.friction
@@ -212,15 +225,16 @@ def take(rows: jax.Array, addresses: np.ndarray) -> jax.Array:
     return jnp.stack([rows[int(a)] for a in addresses])
 
 
-def fast_plant(model: mujoco.MjModel, layout: SenseLayout) -> FastPlant:
+def fast_plant(
+    model: mujoco.MjModel, layout: SenseLayout, crossings: Crossings | None = None
+) -> FastPlant:
     """A plant for a model that the fast physics knows.
 
     Raises:
       UnsupportedModel: it does not; the message says why.
     """
-    return FastPlant(
-        read_structure(model), layout, tuple(_watched(model, int(g)) for g in layout.watched)
-    )
+    watched = tuple(_watched(model, int(g)) for g in layout.watched)
+    return FastPlant(read_structure(model), layout, watched, crossings)
 
 
 def _watched(model: mujoco.MjModel, geom: int) -> Watched:

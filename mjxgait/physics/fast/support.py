@@ -1,5 +1,6 @@
 """Which models the fast physics can simulate."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import mujoco
@@ -32,9 +33,12 @@ def check_supported(model: mujoco.MjModel) -> list[tuple[int, int]]:
     return _contact_pairs(model)
 
 
-def _refuse(when: Any, reason: str) -> None:
+def _refuse(when: Any, reason: str, names: Sequence[str] = ()) -> None:
+    """names: of the elements that `when` [n] is about; those that it holds for are told."""
     if np.any(when):
-        raise UnsupportedModel(reason)
+        told = [name for name, guilty in zip(names, np.ravel(when), strict=False) if guilty]
+        some = ", ".join(told[:3]) + (f" and {len(told) - 3} more" if len(told) > 3 else "")
+        raise UnsupportedModel(f"{reason}: {some}" if told else reason)
 
 
 def _check_options(model: mujoco.MjModel) -> None:
@@ -43,10 +47,10 @@ def _check_options(model: mujoco.MjModel) -> None:
     _refuse(option.integrator != mujoco.mjtIntegrator.mjINT_EULER, "the integrator is not Euler")
     _refuse(option.solver != mujoco.mjtSolver.mjSOL_NEWTON, "the solver is not Newton")
     _refuse(option.cone != mujoco.mjtCone.mjCONE_PYRAMIDAL, "the friction cone is not pyramidal")
-    implicit_damping = not off & flag.mjDSBL_EULERDAMP and np.any(model.dof_damping)
     _refuse(
-        implicit_damping,
+        (model.dof_damping != 0) & (not off & flag.mjDSBL_EULERDAMP),
         "joints have damping and eulerdamp is on (disable it: damping is explicit)",
+        _dof_names(model),
     )
     _refuse(off & (flag.mjDSBL_SPRING | flag.mjDSBL_DAMPER), "springs or dampers are disabled")
     _refuse(option.noslip_iterations, "noslip iterations")
@@ -79,19 +83,27 @@ def _check_elements(model: mujoco.MjModel) -> None:
 
 def _check_joints(model: mujoco.MjModel) -> None:
     rotates = np.isin(model.jnt_type, (FREE, BALL))
-    _refuse(model.jnt_limited.astype(bool) & rotates, "a ball joint has a limit")
+    joints = [model.joint(j).name for j in range(model.njnt)]
+    _refuse(model.jnt_limited.astype(bool) & rotates, "a ball joint has a limit", joints)
     _refuse(
         (model.jnt_stiffness.reshape(model.njnt, -1) != 0).any(axis=1) & rotates,
         "a ball or free joint has stiffness",
+        joints,
     )
-    _refuse(model.dof_frictionloss, "joints have dry friction (frictionloss)")
+    _refuse(model.dof_frictionloss, "joints have dry friction (frictionloss)", _dof_names(model))
     _refuse(getattr(model, "jnt_stiffnesspoly", 0), "joints have nonlinear stiffness")
     _refuse(getattr(model, "dof_dampingpoly", 0), "joints have nonlinear damping")
     balls = np.nonzero(model.jnt_type == BALL)[0]
     _refuse(
         model.body_jntnum[model.jnt_bodyid[balls]] > 1,
         "a ball joint shares its body with another joint",
+        [joints[j] for j in balls],
     )
+
+
+def _dof_names(model: mujoco.MjModel) -> list[str]:
+    """The joint of each degree of freedom."""
+    return [model.joint(j).name for j in model.dof_jntid]
 
 
 def _contact_pairs(model: mujoco.MjModel) -> list[tuple[int, int]]:

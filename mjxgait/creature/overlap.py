@@ -1,0 +1,251 @@
+"""Which parts of a creature can pass through each other, and how deep two bars are in one another.
+
+Parts do not collide in evolution: contacts there would cost too much. Their depth is measured
+instead, on bars (capsules, spheres) inside each shape, between parts that are not neighbours.
+Letters: `S` bars, `Q` pairs of bars.
+"""
+
+import collections
+import dataclasses
+import functools
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from mjxgait.creature.bars import Bar, bars_of
+from mjxgait.creature.load import Creature
+
+NEAR = 0.1
+"""Hip heights; joints nearer to each other are at one place, like the three of an Euler hip."""
+SAMPLES = 384
+BEYOND = 0.1
+"""Share of a pose range by which joints may leave it: balance corrections and lag do that."""
+CLOSE = 0.05
+"""Hip heights; pairs that stay farther apart in all sampled poses are left out."""
+MOST_PAIRS = 256
+"""Of bars that are watched."""
+
+Numbers = Any
+"""np.ndarray | jax.Array"""
+Vector = tuple[Numbers, Numbers, Numbers]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Crossings:
+    """What to look at.
+
+    body: [S] ids. centre, half: [S, 3] m in the body's frame, a bar's middle and from there to an
+    end. radius: [S] m. first, second: [Q] the bars of each pair. allowed: [Q] m, the depth at which
+    their shapes already stand.
+    """
+
+    body: np.ndarray
+    centre: np.ndarray
+    half: np.ndarray
+    radius: np.ndarray
+    first: np.ndarray
+    second: np.ndarray
+    allowed: np.ndarray
+
+    @property
+    def reach(self) -> np.ndarray:
+        """[Q] m; a pair's depth is this minus the distance of the two axes."""
+        return self.radius[self.first] + self.radius[self.second] - self.allowed
+
+    def only(self, pairs: np.ndarray | list[int]) -> "Crossings":
+        """Some of the pairs."""
+        chosen = {name: getattr(self, name)[pairs] for name in ("first", "second", "allowed")}
+        return dataclasses.replace(self, **chosen)
+
+    def lengths(self) -> tuple[np.ndarray, np.ndarray]:
+        """[Q] squared half lengths of the first and the second bars; m²."""
+        squared = (self.half**2).sum(1)
+        return squared[self.first], squared[self.second]
+
+
+def bar_distance(
+    apart: Vector, first: Vector, second: Vector, lengths: tuple[np.ndarray, np.ndarray]
+) -> Numbers:
+    """Distance of two segments in m, elementwise, of NumPy or JAX arrays.
+
+    Ericson 2005, "Real-Time Collision Detection", section 5.1.9.
+
+    Args:
+      apart: from the second's middle to the first's, three components.
+      first, second: from each middle to its end.
+      lengths: squared, of `first` and `second`; constants, zero for a point.
+    """
+    inverse = [np.divide(1.0, x, out=np.zeros_like(x), where=x > 0) for x in lengths]
+    along = _dot(first, second)
+    lead, back = _dot(first, apart), _dot(second, apart)
+    # Of parallel segments any place will do to begin with: the two projections find the nearest.
+    skew = (lengths[0] * lengths[1] - along * along).clip(1e-12, None)
+    s = ((along * back - lead * lengths[1]) / skew).clip(-1.0, 1.0)
+    t = ((along * s + back) * inverse[1]).clip(-1.0, 1.0)
+    s = ((along * t - lead) * inverse[0]).clip(-1.0, 1.0)
+    gap = [a + s * u - t * v for a, u, v in zip(apart, first, second, strict=True)]
+    return (_dot(gap, gap)) ** 0.5
+
+
+def find_crossings(creature: Creature) -> Crossings:
+    """The pairs of bars that come near each other in the pose ranges; always the same."""
+    model, data = creature.model, mujoco.MjData(creature.model)
+    data.qpos[:] = creature.stand_qpos
+    mujoco.mj_kinematics(model, data)
+    geoms, bars = all_bars(model)
+    strangers = ~neighbours(model, data, NEAR * creature.hip_height)
+    body = model.geom_bodyid[geoms]
+    first, second = np.nonzero(np.triu(strangers[body][:, body], 1))
+    everything = _joined(model, geoms, bars, first, second)
+    stand, deepest = _standing_and_deepest(creature, everything)
+    shapes = geoms[first] * model.ngeom + geoms[second]
+    allowed = _of_their_shapes(shapes, stand)
+    kept = _deepest_of_each(shapes, deepest - allowed, -CLOSE * creature.hip_height)
+    return _joined(model, geoms, bars, first[kept], second[kept], allowed[kept])
+
+
+def all_bars(model: mujoco.MjModel) -> tuple[np.ndarray, list[Bar]]:
+    """The bars of everything that moves: geom id [S] and bar of each."""
+    moving = np.flatnonzero(model.body_weldid[model.geom_bodyid] != 0)
+    pairs = [(int(g), bar) for g in moving for bar in bars_of(model, int(g))]
+    return np.array([g for g, _ in pairs], dtype=int), [bar for _, bar in pairs]
+
+
+def neighbours(model: mujoco.MjModel, data: mujoco.MjData, near: float) -> np.ndarray:
+    """[nbody, nbody] whether two bodies are one, parent and child, or have all joints at one place.
+
+    near: m, how far apart joints at one place may be in the pose of `data`.
+    """
+    weld = model.body_weldid
+    joined = np.zeros((model.nbody, model.nbody), dtype=bool)
+    for a in range(model.nbody):
+        for b in range(a + 1):
+            links = _links(model, int(weld[a]), int(weld[b]))
+            anchors = [_anchors(model, data, link) for link in links]
+            spots = np.concatenate(anchors) if anchors else np.zeros((0, 3))
+            spread = np.ptp(spots, axis=0) if len(spots) else np.zeros(3)
+            joined[a, b] = joined[b, a] = len(links) < 2 or np.linalg.norm(spread) < near
+    return joined
+
+
+def _links(model: mujoco.MjModel, a: int, b: int) -> list[int]:
+    """The bodies whose joints lie between two others; all of them welded to nothing above."""
+    links = []
+    while a != b:
+        links.append(max(a, b))  # a parent's id is smaller than its child's
+        parent = int(model.body_weldid[model.body_parentid[links[-1]]])
+        a, b = (parent, b) if a > b else (a, parent)
+    return links
+
+
+def _anchors(model: mujoco.MjModel, data: mujoco.MjData, body: int) -> np.ndarray:
+    start = int(model.body_jntadr[body])
+    return np.asarray(data.xanchor[start : start + int(model.body_jntnum[body])])
+
+
+def _joined(
+    model: mujoco.MjModel,
+    geoms: np.ndarray,
+    bars: list[Bar],
+    first: np.ndarray,
+    second: np.ndarray,
+    allowed: np.ndarray | None = None,
+) -> Crossings:
+    """Crossings of these pairs, with no bar that no pair needs."""
+    used, places = np.unique(np.concatenate([first, second]), return_inverse=True)
+    chosen = [bars[i] for i in used]
+    return Crossings(
+        body=model.geom_bodyid[geoms[used]],
+        centre=np.array([bar.centre for bar in chosen]).reshape(-1, 3),
+        half=np.array([bar.half for bar in chosen]).reshape(-1, 3),
+        radius=np.array([bar.radius for bar in chosen]),
+        first=places[: len(first)],
+        second=places[len(first) :],
+        allowed=np.zeros(len(first)) if allowed is None else allowed,
+    )
+
+
+def _standing_and_deepest(creature: Creature, pairs: Crossings) -> tuple[np.ndarray, np.ndarray]:
+    """Depth [Q] in the standing pose, and the greatest over random poses too.
+
+    Negative: a gap. -inf where the bars stay far apart.
+    """
+    poses = _poses(creature)
+    length = np.linalg.norm(pairs.half, axis=1) + pairs.radius
+    most = length[pairs.first] + length[pairs.second] + CLOSE * creature.hip_height
+    near = np.zeros(len(pairs.first), dtype=bool)
+    placed = [bar_places(creature.model, qpos, pairs) for qpos in poses]
+    for centre, _ in placed:
+        apart = centre[pairs.first] - centre[pairs.second]
+        near |= (apart**2).sum(1) < most**2
+    some = np.flatnonzero(near)
+    chosen = pairs.only(some)
+    stand, deepest = np.full(len(near), -np.inf), np.full(len(near), -np.inf)
+    depths = (pair_depths(chosen, *place) for place in placed)
+    stand[some] = next(depths)
+    deepest[some] = functools.reduce(np.maximum, depths, stand[some])
+    return stand, deepest
+
+
+def _poses(creature: Creature) -> list[np.ndarray]:
+    """The standing pose [nq], then random ones in the pose ranges and somewhat beyond.
+
+    They are uniform, and every other one is at the ends of all ranges.
+    """
+    rng = np.random.default_rng(0)
+    wide = BEYOND * (creature.pose_high - creature.pose_low)
+    low = np.maximum(creature.pose_low - wide, creature.joint_low)
+    high = np.minimum(creature.pose_high + wide, creature.joint_high)
+    share = rng.uniform(size=(SAMPLES, len(low)))
+    share[::2] = np.round(share[::2])
+    poses = np.tile(creature.stand_qpos, (SAMPLES + 1, 1))
+    poses[1:, creature.qpos_adr] = low + share * (high - low)
+    return list(poses)
+
+
+def bar_places(
+    model: mujoco.MjModel, qpos: np.ndarray, pairs: Crossings
+) -> tuple[np.ndarray, np.ndarray]:
+    """Middle and half of every bar in a pose [nq], both [S, 3] m in the world."""
+    data = mujoco.MjData(model)
+    data.qpos[:] = qpos
+    mujoco.mj_kinematics(model, data)
+    rot = data.xmat[pairs.body].reshape(-1, 3, 3)
+    turned = [np.einsum("sij,sj->si", rot, x) for x in (pairs.centre, pairs.half)]
+    return data.xpos[pairs.body] + turned[0], turned[1]
+
+
+def pair_depths(pairs: Crossings, centre: np.ndarray, half: np.ndarray) -> np.ndarray:
+    """[Q] m; how much deeper than standing each two are in each other, negative where apart."""
+    apart = _parts((centre[pairs.first] - centre[pairs.second]).T)
+    first, second = _parts(half[pairs.first].T), _parts(half[pairs.second].T)
+    return np.asarray(pairs.reach - bar_distance(apart, first, second, pairs.lengths()))
+
+
+def _of_their_shapes(shapes: np.ndarray, stand: np.ndarray) -> np.ndarray:
+    """[Q] the standing depth of the two shapes that a pair of bars belongs to, at least 0."""
+    _, group = np.unique(shapes, return_inverse=True)
+    depth = np.zeros(group.max(initial=-1) + 1)
+    np.maximum.at(depth, group, stand)
+    return depth[group]
+
+
+def _deepest_of_each(shapes: np.ndarray, depth: np.ndarray, least: float) -> np.ndarray:
+    """The pairs to watch: every two shapes' deepest first, then their second, up to our limit."""
+    order = [k for k in np.argsort(-depth, kind="stable") if depth[k] > least]
+    turn = collections.Counter[int]()
+    ranks = []
+    for k in order:
+        ranks.append(turn[int(shapes[k])])
+        turn[int(shapes[k])] += 1
+    chosen = np.argsort(ranks, kind="stable")[:MOST_PAIRS]
+    return np.sort(np.array(order, dtype=int)[chosen])
+
+
+def _parts(rows: np.ndarray) -> Vector:
+    return rows[0], rows[1], rows[2]
+
+
+def _dot(a: Any, b: Any) -> Numbers:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

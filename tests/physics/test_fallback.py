@@ -1,0 +1,81 @@
+"""Who simulates a creature in plain MJX because the fast physics does not know it, is told so."""
+
+import shutil
+from contextlib import contextmanager
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from helpers import STOOL, small_config
+
+from mjxgait import run
+from mjxgait.commands.check import check_command
+from mjxgait.creature import Creature, load_creature
+from mjxgait.physics import SLOWER, fallback_note, make_plant
+from mjxgait.physics.fast import FastPlant
+from mjxgait.physics.plain import MjxPlant
+
+
+@pytest.fixture
+def rusty(tmp_path: Path) -> Path:
+    """A stool with dry friction in one hip."""
+    folder = tmp_path / "rusty"
+    shutil.copytree(STOOL, folder)
+    text = (folder / "creature.xml").read_text()
+    hip = '<joint name="front_left_hip"'
+    (folder / "creature.xml").write_text(text.replace(hip, f'{hip} frictionloss="0.1"'))
+    return folder
+
+
+def test_the_note_names_the_element_and_the_cost(rusty: Path):
+    plant, _ = make_plant(load_creature(rusty), "auto")
+    assert isinstance(plant, MjxPlant)
+    assert "dry friction (frictionloss): front_left_hip" in plant.note
+    assert f"{SLOWER} times" in plant.note
+    assert "\n" not in plant.note
+
+
+def test_who_gets_what_he_asked_for_is_told_nothing(stool: Creature, rusty: Path):
+    fast, _ = make_plant(stool, "auto")
+    assert isinstance(fast, FastPlant)
+    assert fast.note == ""
+    assert make_plant(load_creature(rusty), "mjx")[0].note == ""
+    assert fallback_note(stool.evolution_model) == ""
+
+
+def test_check_says_so(rusty: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    check_command([str(rusty), "--out", str(tmp_path / "picture.png")])
+    assert fallback_note(load_creature(rusty).evolution_model) in capsys.readouterr().out
+    check_command([str(STOOL), "--out", str(tmp_path / "picture.png")])
+    assert "Plain MJX" not in capsys.readouterr().out
+
+
+class Ready(Exception):
+    """The run is about to compile."""
+
+
+class Listener:
+    """A screen that remembers what is said, up to the compilation."""
+
+    def __init__(self) -> None:
+        self.said: list[str] = []
+
+    def say(self, text: str) -> None:
+        self.said.append(text)
+
+    @contextmanager
+    def compiling(self, *_: object):
+        raise Ready
+        yield
+
+
+@pytest.mark.parametrize(("note", "said"), [("It is slow.", ["It is slow."]), ("", [])])
+def test_a_run_says_so_before_it_compiles(
+    note: str, said: list[str], stool: Creature, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    experiment = SimpleNamespace(plant_note=note, init=lambda: None)
+    monkeypatch.setattr(run, "build_experiment", lambda *_: experiment)
+    screen = Listener()
+    with pytest.raises(Ready):
+        run.train(tmp_path, stool, small_config(), screen)
+    assert screen.said == said

@@ -1,0 +1,305 @@
+"""The depth of parts in each other is C MuJoCo's, for no neighbours, beyond the standing pose."""
+
+import dataclasses
+import shutil
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+import pytest
+from helpers import STOOL, small_config
+
+from mjxgait.config import FitnessConfig
+from mjxgait.creature import Creature, load_creature
+from mjxgait.creature.bars import bars_of
+from mjxgait.creature.overlap import (
+    bar_distance,
+    bar_places,
+    find_crossings,
+    neighbours,
+    pair_depths,
+)
+from mjxgait.fitness import DEEP, TERMS, TOUCHING, fitness_terms
+from mjxgait.physics.fast import fast_plant
+from mjxgait.physics.layout import sense_layout
+from mjxgait.physics.plain import mjx_plant
+from mjxgait.rollout import CHECK_EVERY, Lane, Simulator
+from mjxgait.tally import Judge, Reason, Tally
+from mjxgait.types import BodyState
+
+LANES = 6
+SLIM = {"xla_backend_optimization_level": 0}
+"""Compiling is what takes the time here."""
+
+
+def depth_in_c(creature: Creature, qpos: np.ndarray) -> float:
+    """m; the deepest of shapes on bodies that are not one nor parent and child, beyond standing."""
+    model, data = creature.model, mujoco.MjData(creature.model)
+
+    def depths(qpos: np.ndarray) -> np.ndarray:
+        data.qpos[:] = qpos
+        mujoco.mj_kinematics(model, data)
+        return np.array(
+            [-mujoco.mj_geomDistance(model, data, a, b, 1.0, None) for a, b in strangers]
+        )
+
+    body, parent = model.geom_bodyid, model.body_parentid
+    strangers = [
+        (a, b)
+        for a in range(model.ngeom)
+        for b in range(a)
+        if 0 not in (body[a], body[b])
+        and body[a] != body[b]
+        and body[a] != parent[body[b]]
+        and body[b] != parent[body[a]]
+    ]
+    return float((depths(qpos) - np.maximum(depths(creature.stand_qpos), 0)).max())
+
+
+def crossed(creature: Creature, rng: np.random.Generator) -> np.ndarray:
+    """[nq] a pose in which the legs of one side cross, somewhere in the world."""
+    qpos = creature.stand_qpos.copy()
+    qpos[:3] += rng.normal(size=3)
+    turn = rng.normal(size=4)
+    qpos[3:7] = turn / np.linalg.norm(turn)
+    toward = {"front": 1.0, "hind": -1.0}
+    signs = np.array([toward[name.split("_")[0]] for name in creature.joint_names])
+    qpos[creature.qpos_adr] = signs * rng.uniform(0.7, 0.8, len(signs))
+    return qpos
+
+
+@pytest.fixture(scope="module")
+def poses(stool: Creature) -> np.ndarray:
+    rng = np.random.default_rng(0)
+    return np.array([crossed(stool, rng) for _ in range(LANES)])
+
+
+def edited(tmp_path: Path, *changes: tuple[str, str]) -> Creature:
+    shutil.copytree(STOOL, tmp_path / "stool")
+    file = tmp_path / "stool" / "creature.xml"
+    text = file.read_text()
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    file.write_text(text)
+    return load_creature(tmp_path / "stool")
+
+
+@pytest.mark.parametrize("kinds", [("capsule", "capsule"), ("capsule", "sphere")])
+def test_distance_of_two_bars_is_that_of_c_mujoco(kinds: tuple[str, str]):
+    """Crossing, beside each other, end to end, far away, and parallel."""
+    geoms = "".join(
+        f'<body mocap="true"><geom type="{kind}" size="0.05 {half}"/></body>'
+        for kind, half in zip(kinds, (0.3, 0.2), strict=True)
+    )
+    model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{geoms}</worldbody></mujoco>")
+    data, rng = mujoco.MjData(model), np.random.default_rng(1)
+    halves = [0.3 * (kinds[0] == "capsule"), 0.2 * (kinds[1] == "capsule")]
+    for trial in range(200):
+        data.mocap_pos[:] = rng.uniform(-0.3, 0.3, (2, 3))
+        data.mocap_quat[:] = rng.normal(size=(2, 4))
+        if trial % 5 == 0:
+            data.mocap_quat[1] = data.mocap_quat[0]
+        data.mocap_quat /= np.linalg.norm(data.mocap_quat, axis=1, keepdims=True)
+        mujoco.mj_kinematics(model, data)
+        axes = data.geom_xmat.reshape(2, 3, 3)[:, :, 2]
+        first, second = axes[0] * halves[0], axes[1] * halves[1]
+        squared = (np.array(halves[0] ** 2), np.array(halves[1] ** 2))
+        apart = data.geom_xpos[0] - data.geom_xpos[1]
+        ours = bar_distance(tuple(apart), tuple(first), tuple(second), squared)
+        theirs = mujoco.mj_geomDistance(model, data, 0, 1, 9.0, None)
+        assert ours - 0.1 == pytest.approx(theirs, abs=1e-6)
+
+
+@pytest.mark.parametrize("make", [fast_plant, mjx_plant], ids=["fast", "mjx"])
+def test_both_plants_measure_what_c_mujoco_measures(make: Any, stool: Creature, poses: np.ndarray):
+    plant = make(stool.evolution_model, sense_layout(stool), find_crossings(stool))
+    state = states(stool, poses)
+    if plant.lane_axis:
+        state = jax.tree.map(lambda leaf: jnp.moveaxis(leaf, 0, -1), state)
+    depth = jax.jit(plant.overlap).lower(state).compile(compiler_options=SLIM)(state)
+    expected = [depth_in_c(stool, qpos) for qpos in poses]
+    assert min(expected) > 0.01
+    assert np.ptp(expected) > 0.005
+    np.testing.assert_allclose(depth, expected, atol=1e-6)
+
+
+def states(creature: Creature, poses: np.ndarray) -> BodyState:
+    """States at poses [L, nq], lanes in front."""
+    still = jnp.zeros((len(poses), creature.model.nv))
+    return BodyState(jnp.asarray(poses, jnp.float32), still, still, still, jnp.ones(len(poses)))
+
+
+def test_who_stands_in_himself_is_judged_by_what_comes_on_top(tmp_path: Path):
+    """Front feet that stand 1 cm in each other are not deep."""
+    wide = edited(
+        tmp_path,
+        (
+            '<geom name="front_left_foot" type="sphere" pos="0 0 -0.27" size="0.03"',
+            '<geom name="front_left_foot" type="sphere" pos="0 -0.19 -0.27" size="0.03"',
+        ),
+    )
+    pairs = find_crossings(wide)
+    names = [wide.model.body(b).name for b in pairs.body]
+    feet = [
+        k
+        for k in range(len(pairs.first))
+        if {names[pairs.first[k]], names[pairs.second[k]]} == {"front_left", "front_right"}
+    ]
+    assert pairs.allowed[feet].max() == pytest.approx(0.01, abs=1e-6)
+    assert pair_depths(pairs, *bar_places(wide.model, wide.stand_qpos, pairs)).max() <= 1e-9
+
+
+def test_the_pairs_are_the_same_each_time_and_no_neighbours(shipped: Creature):
+    pairs, again = find_crossings(shipped), find_crossings(shipped)
+    assert 0 < len(pairs.first) <= 256
+    for field in dataclasses.fields(pairs):
+        assert np.array_equal(getattr(pairs, field.name), getattr(again, field.name))
+    parent = shipped.model.body_parentid
+    first, second = pairs.body[pairs.first], pairs.body[pairs.second]
+    assert (first != second).all()
+    assert (first != parent[second]).all()
+    assert (second != parent[first]).all()
+
+
+def test_the_crabs_claws_are_seen_by_its_front_legs():
+    from mjxgait.config import find_creature
+
+    crab = load_creature(find_creature("crab"))
+    qpos = crab.stand_qpos.copy()
+    for side in ("left", "right"):
+        for joint, degrees in (("swing", 30), ("lift", 0), ("knee", -30)):
+            index = crab.joint_names.index(f"front_{side}_{joint}")
+            qpos[crab.qpos_adr[index]] += np.radians(degrees)
+    pairs = find_crossings(crab)
+    assert pair_depths(pairs, *bar_places(crab.model, qpos, pairs)).max() > 0.02
+
+
+CHAIN = """
+<mujoco><worldbody><body name="trunk"><freejoint/><geom size="0.1"/>
+  <body name="ring"><joint axis="0 0 1"/><geom size="0.01"/>
+    <body name="hip"><joint axis="1 0 0" pos="0.005 0 0"/><geom size="0.01"/>
+      <body name="thigh"><joint axis="0 1 0"/><geom size="0.01" pos="0 0 -0.2"/>
+        <body name="plate"><geom size="0.01" pos="0 0 -0.3"/>
+          <body name="shin" pos="0 0 -0.4"><joint axis="0 1 0"/><geom size="0.01"/></body>
+        </body></body></body></body>
+  <body name="tail" pos="-0.3 0 0"><joint axis="0 1 0"/><geom size="0.01"/></body>
+</body></worldbody></mujoco>"""
+
+
+def test_neighbours_are_joined_at_one_place():
+    model = mujoco.MjModel.from_xml_string(CHAIN)
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    near = neighbours(model, data, 0.02)
+
+    def joined(a: str, b: str) -> bool:
+        return bool(near[model.body(a).id, model.body(b).id])
+
+    for pair in (("trunk", "thigh"), ("trunk", "plate"), ("thigh", "shin"), ("plate", "shin")):
+        assert joined(*pair), pair
+    for pair in (("trunk", "shin"), ("hip", "shin"), ("tail", "thigh")):
+        assert not joined(*pair), pair
+    assert joined("tail", "trunk")
+
+
+@pytest.mark.parametrize(
+    ("shape", "least"),
+    [
+        ('type="box" size="0.3 0.2 0.05"', 3),
+        ('type="ellipsoid" size="0.2 0.06 0.05"', 1),
+        ('type="cylinder" size="0.03 0.2"', 1),
+        ('type="cylinder" size="0.2 0.02"', 3),
+        ('type="mesh" mesh="wedge"', 1),
+    ],
+)
+def test_the_bars_of_a_shape_lie_inside_it_and_fill_it(shape: str, least: int):
+    """A grain on the surface of a bar is nowhere outside; they reach most of the shape's length."""
+    model = mujoco.MjModel.from_xml_string(f"""
+    <mujoco><asset><mesh name="wedge"
+        vertex="0 0 0 .3 0 0 .3 .1 0 0 .1 0 0 0 .1 0 .1 .1 .3 0 .02 .3 .1 .02"/></asset>
+      <worldbody><body><geom {shape}/></body>
+      <body mocap="true"><geom size="0.001"/></body></worldbody></mujoco>""")
+    data, rng = mujoco.MjData(model), np.random.default_rng(2)
+    bars = bars_of(model, 0)
+    assert len(bars) >= least
+    for bar in bars:
+        for _ in range(50):
+            way = rng.normal(size=3)
+            at = bar.centre + rng.choice([-1, 1]) * bar.half
+            data.mocap_pos[0] = at + bar.radius * 0.98 * way / np.linalg.norm(way)
+            mujoco.mj_kinematics(model, data)
+            assert mujoco.mj_geomDistance(model, data, 0, 1, 1.0, None) < 1e-3
+    ends = [bar.centre + sign * bar.half for bar in bars for sign in (-1, 1)]
+    size = 2 * model.geom_aabb[0, 3:].max()
+    assert np.ptp(ends, axis=0).max() + 2 * min(bar.radius for bar in bars) > 0.65 * size
+
+
+def test_the_tally_keeps_the_deepest_of_the_time_that_counts(stool: Creature):
+    """Not of a lane whose episode has ended, nor of one whose state is not a number."""
+    judge = Judge(stool, 0.005, 8)
+    steps = jnp.array([CHECK_EVERY, CHECK_EVERY, 100, CHECK_EVERY, CHECK_EVERY])
+    reasons = [Reason.FINISHED, Reason.FINISHED, Reason.FINISHED, Reason.TIPPED, Reason.FINISHED]
+    tally = jax.tree.map(lambda leaf: jnp.stack([leaf] * 5), judge.init())
+    tally = dataclasses.replace(
+        tally,
+        steps=steps,
+        reason=jnp.array(reasons),
+        overlap=jnp.array([0.0, 0.04, 0.0, 0.0, 0.01]),
+    )
+    depth = jnp.array([0.03, 0.03, 0.03, 0.03, jnp.nan])
+    simulator = cast(
+        Any, SimpleNamespace(plant=SimpleNamespace(overlap=lambda _: depth), steps=100)
+    )
+    lane = cast(Any, Lane)(*[None] * 4, tally, *[None] * 3)
+    found = Simulator._look_for_overlap(simulator, lane).tally
+    np.testing.assert_allclose(found.overlap, [0.03, 0.04, 0.0, 0.0, 0.01])
+
+
+def term(creature: Creature, tally: Tally, forward: float) -> float:
+    config = FitnessConfig(speed=1.0)
+    tally = dataclasses.replace(
+        tally, forward=jnp.float32(forward * creature.body_length), steps=jnp.int32(200)
+    )
+    return float(fitness_terms(creature, config, 0.005, 200, tally)[TERMS.index("overlap")])
+
+
+def test_the_term_grows_with_depth_and_counts_as_far_as_there_is_a_walk(stool: Creature):
+    empty = Judge(stool, 0.005, 8).init()
+
+    def at(depth: float, forward: float = 1.0) -> float:
+        metres = jnp.float32(depth * stool.hip_height)
+        return term(stool, dataclasses.replace(empty, overlap=metres), forward)
+
+    assert at(0.0) == at(0.9 * TOUCHING) == 0.0
+    assert at(TOUCHING + DEEP) == pytest.approx(0.5, abs=1e-5)
+    assert 0.5 < at(0.2) < at(0.5) < 1.0
+    assert at(TOUCHING + DEEP, forward=0.5) == pytest.approx(0.25, abs=1e-5)
+    assert at(0.5, forward=0.0) == 0.0
+
+
+def test_a_walker_whose_legs_cross_is_seen_and_nobody_else(stool: Creature):
+    """On fewer lanes than individuals, one whose legs meet among others that stand still."""
+    from mjxgait.experiment import build_experiment
+
+    experiment = build_experiment(stool, small_config(rollout={"lanes": 3, "starts": 1}))
+    low, high = experiment.simulator.tracker.bounds(experiment.config.controller)
+    signs = np.array([1.0 if "front" in name else -1.0 for name in stool.joint_names])
+    standing = np.broadcast_to(stool.stand, low.key_poses.shape)
+    poses = np.stack([standing] * 5)
+    poses[2] = np.where(signs > 0, high.key_poses, low.key_poses)
+    genomes = dataclasses.replace(
+        low,
+        **{
+            field.name: jnp.stack([getattr(low, field.name)] * 5)
+            for field in dataclasses.fields(low)
+        },
+    )
+    genomes = dataclasses.replace(genomes, key_poses=jnp.asarray(poses, jnp.float32))
+    depth = jax.jit(experiment.simulate)(genomes).tally.overlap[:, 0]
+    assert depth[2] > 0.001
+    assert (np.delete(np.asarray(depth), 2) == 0).all()
