@@ -226,6 +226,15 @@ def test_one_generation_is_traced_once():
     assert len(traces) == 1
 
 
+def test_no_generation_draws_the_numbers_of_another():
+    evolution, states = toy(), [state for state, _ in run(toy(), 6)]
+    keys = {tuple(np.asarray(jax.random.key_data(state.key)).tolist()) for state in states}
+    assert len(keys) == 6
+    later = dataclasses.replace(states[0], key=states[1].key)
+    one, other = (evolution.propose(state).offspring.key_poses for state in (states[0], later))
+    assert not np.array_equal(one, other)
+
+
 def test_the_same_seed_gives_the_same_run_and_another_seed_another():
     one, same, other = (run(toy(), 5, seed)[-1][0].genomes.key_poses for seed in (1, 1, 2))
     assert np.array_equal(one, same)
