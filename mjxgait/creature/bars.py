@@ -4,7 +4,6 @@ import dataclasses
 
 import mujoco
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 
 GEOM = mujoco.mjtGeom
 MOST = 5
@@ -84,6 +83,9 @@ def _fill(points: np.ndarray) -> list[Bar]:
 
     The origin must lie inside. It does for primitive shapes; a mesh has its centre of mass there.
     """
+    # Slow to import, and inspecting a run needs no bars.
+    from scipy.spatial import ConvexHull, QhullError
+
     low, high = points.min(0), points.max(0)
     size = (high - low) / 2
     thin, broad, long = np.argsort(size)
