@@ -8,7 +8,7 @@ from certify_made_up import LEGS, TOML, XML, make_champion
 from helpers import small_config
 
 from mjxgait.certify import starts as examined
-from mjxgait.certify.simulate import Outcome, simulate
+from mjxgait.certify.simulate import Fall, Outcome, simulate
 from mjxgait.champion import Champion
 from mjxgait.config import Config
 from mjxgait.creature import Creature, load_creature
@@ -18,7 +18,7 @@ STEP, SECONDS = 0.005, 1.2
 STEPS = round(SECONDS / STEP)
 
 BUMPER = (
-    '<geom name="bumper" type="sphere" size="0.02" pos="-0.2 0 -0.262" mass="0.1" '
+    '<geom name="bumper" type="sphere" size="0.02" pos="-0.2 0 -0.279" mass="0.1" '
     'contype="4" conaffinity="0"/>'
 )
 """Touches the floor in livelier moments. Neither it nor the trunk is carried by the floor: in
@@ -39,10 +39,7 @@ GENES_OF_THE_GAIT = {
 SETTINGS: dict[str, dict] = {
     "stable PD": {"controller": {"advance": "clock"}},
     "with constraint forces": {"controller": {"advance": "clock", "constraint_forces": True}},
-    "by the pose error, soft, without an end": {
-        "controller": {"stiffness": 0.7, "damping": 1.5},
-        "rollout": {"terminate": False},
-    },
+    "by the pose error, soft": {"controller": {"stiffness": 0.7, "damping": 1.5}},
     "plain PD, without the mirror": {
         "controller": {"advance": "clock", "law": "pd", "mirror": False},
     },
@@ -71,7 +68,10 @@ DISTURBANCES = {
     "knocked over": Disturbance(push=(0.0, 3.0)),
 }
 EPISODES = [(settings, disturbance) for settings in SETTINGS for disturbance in DISTURBANCES]
-CONFIGS = [small_config(**tables) for tables in SETTINGS.values()]
+FALL = Fall(touch=False)
+"""Lenient: where a touch ends an episode there are none to count."""
+LENIENT = {"termination": {"touch": FALL.touch}}
+CONFIGS = [small_config(**tables, rollout=LENIENT) for tables in SETTINGS.values()]
 """One per row of settings."""
 
 
@@ -119,7 +119,14 @@ def watched(creature: Creature) -> list[Outcome]:
     """The examiner's, per settings; a frame more than an episode, for where the cycle goes next."""
     rows = disturbed(creature)
     return [
-        simulate(creature, champion_of(creature, config), rows, SECONDS + STEP, record=len(rows))
+        simulate(
+            creature,
+            champion_of(creature, config),
+            rows,
+            SECONDS + STEP,
+            record=len(rows),
+            fall=FALL,
+        )
         for config in CONFIGS
     ]
 

@@ -5,8 +5,9 @@ import itertools
 import mujoco
 import numpy as np
 
-from mjxgait.certify.simulate import Trajectory
+from mjxgait.certify.simulate import Fall, Trajectory
 from mjxgait.creature import Creature
+from mjxgait.creature.settings import Termination
 from mjxgait.tally import CONTACT_GAP, SWING, Reason
 
 
@@ -54,18 +55,17 @@ def lowest(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> float:
     )
 
 
-def end(frames: Frames) -> tuple[int, Reason]:
+def end(frames: Frames, fall: Termination | Fall | None = None) -> tuple[int, Reason]:
     """The first frame that ends an episode, and why; the number of frames where none does."""
-    settings, height = (
-        frames.creature.settings.termination,
-        frames.trunk_pos[:, 2] / frames.creature.stand_height,
-    )
+    limits = fall or frames.creature.settings.termination
+    height = frames.trunk_pos[:, 2] / frames.creature.stand_height
     # Where several hold, the one further down counts.
     found = np.full(len(height), Reason.FINISHED)
-    found[frames.touch] = Reason.TOUCHED
-    found[height > settings.height[1]] = Reason.TOO_HIGH
-    found[height < settings.height[0]] = Reason.TOO_LOW
-    found[frames.up < settings.min_up] = Reason.TIPPED
+    if limits.touch:
+        found[frames.touch] = Reason.TOUCHED
+    found[height > limits.height[1]] = Reason.TOO_HIGH
+    found[height < limits.height[0]] = Reason.TOO_LOW
+    found[frames.up < limits.min_up] = Reason.TIPPED
     ends = np.flatnonzero(found != Reason.FINISHED)
     return (int(ends[0]), Reason(found[ends[0]])) if len(ends) else (len(height), Reason.FINISHED)
 
