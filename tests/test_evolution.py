@@ -81,6 +81,14 @@ def test_the_best_survives_forced_evolution_too(seed: int):
     assert all(later >= earlier for earlier, later in itertools.pairwise(best))
 
 
+def test_the_best_of_old_and_new_survive():
+    evolution, state = toy(), run(toy(), 3)[-1][0]
+    born = near_zero(evolution.propose(state).offspring)
+    best = np.unique(np.concatenate([state.fitness, born]))[::-1][:20]
+    assert np.allclose(evolution.step(state)[0].fitness, best)
+    assert not np.allclose(state.fitness, best)
+
+
 def test_the_population_is_sorted_and_without_duplicates():
     for state, metrics in run(toy(mutation_rate=0.2, crossover=1.0)):
         assert np.all(np.diff(state.fitness) <= 0)

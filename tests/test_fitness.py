@@ -89,7 +89,7 @@ def test_a_case_changes_no_other_penalty(body: Creature):
 
 
 def test_style_counts_by_the_share_of_the_wanted_walk(body: Creature):
-    """2 m are four ninths of 5 s at 0.9 body lengths a second; distance and posture are no style."""
+    """2 m are four ninths of 5 s at 0.9 lengths a second; distance and posture are no style."""
     tally = {"tilt": 120.0, "foot_height": 200.0, "airborne": 150.0}
     terms = terms_of(body, tally, speed=0.9)
     assert terms["tilt"] == pytest.approx(0.12 * 4 / 9, rel=1e-4)

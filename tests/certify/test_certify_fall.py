@@ -1,0 +1,50 @@
+"""Each way of being down, alone: a simulation that is down in one way only."""
+
+import numpy as np
+import pytest
+from certify_made_up import make_champion
+
+from mjxgait.certify.simulate import Fall, simulate
+from mjxgait.certify.starts import Starts, nominal_starts, pushed_starts
+from mjxgait.champion import Champion
+from mjxgait.creature import Creature
+
+ANYHOW = {"min_up": -1.0, "height": (0.001, 100.0), "touch": False}
+
+
+def flat(creature: Creature) -> Champion:
+    """Lies down on its belly, upright."""
+    return make_champion(creature, np.tile([1.0, 1.4], (2, 4)))
+
+
+def knocked(creature: Creature) -> Starts:
+    return pushed_starts(creature, 1, np.random.default_rng(0), 6.0, (0.1, 0.1))
+
+
+def falls(creature: Creature, champion: Champion, starts: Starts, **fall: object) -> bool:
+    outcome = simulate(creature, champion, starts, 1.5, fall=Fall(**{**ANYHOW, **fall}))
+    return bool(np.isfinite(outcome.fell[0]))
+
+
+@pytest.mark.parametrize(
+    "fall", [{"touch": True}, {"height": (0.5, 100.0)}], ids=["touches", "too low"]
+)
+def test_on_its_belly(tiny: Creature, fall: dict):
+    starts = nominal_starts(tiny, 1)
+    assert falls(tiny, flat(tiny), starts, **fall)
+    assert not falls(tiny, flat(tiny), starts)
+    assert not falls(tiny, make_champion(tiny), starts, **fall)
+
+
+def test_tipped_over(tiny: Creature):
+    still = make_champion(tiny)
+    assert falls(tiny, still, knocked(tiny), min_up=0.5)
+    assert not falls(tiny, still, knocked(tiny))
+    assert not falls(tiny, still, nominal_starts(tiny, 1), min_up=0.5)
+
+
+def test_too_high(tiny: Creature):
+    """Knocked against its feet, it is thrown up."""
+    still = make_champion(tiny)
+    assert falls(tiny, still, knocked(tiny), height=(0.001, 1.05))
+    assert not falls(tiny, still, nominal_starts(tiny, 1), height=(0.001, 1.05))
