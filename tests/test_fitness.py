@@ -9,7 +9,7 @@ from helpers import small_config
 
 from mjxgait.creature import Creature
 from mjxgait.fitness import REWARDS, TERMS, fitness_terms, score, weight_vector
-from mjxgait.tally import Judge
+from mjxgait.tally import Judge, Reason
 
 STEP, HORIZON = 0.005, 1000
 LIVED = {"steps": 1000, "forward": 2.0}
@@ -45,6 +45,10 @@ CASES: list[tuple[str, float, dict]] = [
     ("energy", 16.0, {"work": 2.0 * 20 * 9.81 * 2, "forward": -3.0}),
     ("saturation", 0.3, {"saturation": 300.0}),
     ("limits", 0.07, {"limits": 70.0}),
+    # 0.05 hip heights beyond the 0.005 at which parts only touch
+    ("overlap", 0.5, {"overlap": 0.055 * 0.5}),
+    ("overlap", 0.0, {"overlap": 0.004 * 0.5}),
+    ("fall", 1.0, {"reason": int(Reason.TIPPED)}),
 ]
 
 

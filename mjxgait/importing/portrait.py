@@ -79,7 +79,10 @@ def portrait(creature: Creature) -> Image.Image:
     _mark_feet(draw, camera, creature, data)
     _mark_joints(draw, camera, creature, data)
     _mark_axes(draw, camera, creature, data)
-    legend = "red forward, green left, blue up; rings: feet; a number: joints that mirror each other (- with the opposite sign); white: alone"
+    legend = (
+        "red forward, green left, blue up; rings: feet; "
+        "a number: joints that mirror each other (- with the opposite sign); white: alone"
+    )
     draw.text((12, 10), f"{creature.name}\n{legend}", fill=DARK_INK, font=font(15))
     return picture
 

@@ -28,7 +28,7 @@ def rusty(tmp_path: Path) -> Path:
 
 
 def test_the_note_names_the_element_and_the_cost(rusty: Path):
-    plant, _ = make_plant(load_creature(rusty), "auto")
+    plant, _ = make_plant(load_creature(rusty), "auto", True)
     assert isinstance(plant, MjxPlant)
     assert "dry friction (frictionloss): front_left_hip" in plant.note
     assert f"{SLOWER} times" in plant.note
@@ -36,10 +36,10 @@ def test_the_note_names_the_element_and_the_cost(rusty: Path):
 
 
 def test_who_gets_what_he_asked_for_is_told_nothing(stool: Creature, rusty: Path):
-    fast, _ = make_plant(stool, "auto")
+    fast, _ = make_plant(stool, "auto", True)
     assert isinstance(fast, FastPlant)
     assert fast.note == ""
-    assert make_plant(load_creature(rusty), "mjx")[0].note == ""
+    assert make_plant(load_creature(rusty), "mjx", True)[0].note == ""
     assert fallback_note(stool.evolution_model) == ""
 
 
