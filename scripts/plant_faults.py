@@ -107,7 +107,7 @@ def examine(fault: Fault, root: Path, cache: Path) -> Finding:
             if status == 1 and failed:
                 return Finding(fault, failed.group(1), seconds)
             if status != 0:
-                return Finding(fault, None, seconds, output[-2000:])
+                return Finding(fault, None, seconds, f"status {status}: {output[-2000:]}")
     return Finding(fault, None, seconds)
 
 
@@ -116,7 +116,7 @@ def check_sound(faults: list[Fault], root: Path, cache: Path) -> None:
     named = dict.fromkeys(test for fault in faults for test in fault.tests)
     status, output = run_tests(root, ("-p", "no:cacheprovider", *named), cache, longest=None)
     if status != 0:
-        sys.exit(f"the tests fail without a fault:\n{output[-3000:]}")
+        sys.exit(f"the tests fail without a fault, with status {status}:\n{output[-3000:]}")
 
 
 def table(findings: list[Finding]) -> str:
