@@ -138,9 +138,14 @@ def _peers(work: Workload) -> tuple[dict[str, Workers], dict[str, str]]:
     peers["mujoco_c"] = Workers(MujocoPeer, work)
     if importlib.util.find_spec("dartpy") is None:
         left_out["dart"] = "dartpy is not installed; install the extra mjxgait[peers]"
-    else:
-        from mjxgait.bench.dart_peer import DartPeer
+        return peers, left_out
+    from mjxgait.bench.dart_peer import DartPeer, Unsupported, check_supported
 
+    try:
+        check_supported(work.creature())
+    except Unsupported as error:
+        left_out["dart"] = str(error)
+    else:
         peers["dart"] = Workers(DartPeer, work.every(DART_STRIDE))
         peers["dart_one_core"] = Workers(DartPeer, work.every(2 * DART_STRIDE), count=1)
     return peers, left_out

@@ -21,6 +21,19 @@ TOUCH_EVERY = 4
 """Steps between two looks at whether a forbidden part touches: each look costs a call per part."""
 
 
+class Unsupported(ValueError):
+    """A creature that this peer cannot rebuild."""
+
+
+def check_supported(creature: Creature) -> None:
+    """Whether DART can simulate this creature.
+
+    Raises:
+      Unsupported: it cannot; the message says why.
+    """
+    _Lane(creature)
+
+
 class DartPeer:
     """One core's share of a workload: the episodes `first`, `first + stride`, ..."""
 
@@ -189,7 +202,7 @@ def _node(skeleton: Any, model: mujoco.MjModel, body: int, parent: Any) -> Any:
     if len(joints) not in (1, 2) or any(
         model.jnt_type[j] != mujoco.mjtJoint.mjJNT_HINGE or np.any(model.jnt_pos[j]) for j in joints
     ):
-        raise ValueError(
+        raise Unsupported(
             "the DART peer knows one hinge or two crossing ones per body, at the body's origin"
         )
     properties = (
@@ -215,7 +228,7 @@ def _node(skeleton: Any, model: mujoco.MjModel, body: int, parent: Any) -> Any:
 
 def _sphere(node: Any, model: mujoco.MjModel, geom: int) -> None:
     if model.geom_type[geom] != mujoco.mjtGeom.mjGEOM_SPHERE:
-        raise ValueError("the DART peer knows spheres as feet only")
+        raise Unsupported("the DART peer knows spheres as feet only")
     shape = node.createShapeNode(dartpy.dynamics.SphereShape(float(model.geom_size[geom, 0])))
     shape.setRelativeTranslation(model.geom_pos[geom])
     shape.createCollisionAspect()
@@ -247,7 +260,7 @@ def _forbidden_spheres(
         )
         shape = mujoco.mjtGeom(model.geom_type[geom])
         if shape not in (mujoco.mjtGeom.mjGEOM_SPHERE, mujoco.mjtGeom.mjGEOM_CAPSULE):
-            raise ValueError("the DART peer knows spheres and capsules only")
+            raise Unsupported("the DART peer knows spheres and capsules only")
         along = _rotation(model.geom_quat[geom])[:, 2] * (
             size[1] if shape == mujoco.mjtGeom.mjGEOM_CAPSULE else 0.0
         )

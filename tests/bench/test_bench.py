@@ -120,6 +120,15 @@ def test_dart_walks_the_same_way_for_a_while(workload):
     assert forward / 6 == pytest.approx(peer_forward / 6, abs=0.03)
 
 
+@NEEDS_DART
+def test_dart_says_which_creature_it_cannot_rebuild(creature):
+    from mjxgait.bench.dart_peer import Unsupported, check_supported
+
+    check_supported(creature)
+    with pytest.raises(Unsupported, match="two crossing ones"):
+        check_supported(load_creature(find_creature("duck")))
+
+
 def test_ratios_are_medians_of_rounds():
     laps = {
         "ours": [Lap(1.0, n, 0.0, 2.0) for n in (10, 20, 60)],
