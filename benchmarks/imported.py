@@ -19,7 +19,7 @@ from typing import Any
 sys.path.append(str(Path(__file__).parents[1] / "tests"))
 from importing.packages import MODELS, model_file
 
-from mjxgait.folder import CERTIFICATE, METRICS, read_metrics
+from mjxgait.runs.folder import CERTIFICATE, METRICS, read_metrics
 
 HEADER = (
     "model",

@@ -17,7 +17,7 @@ from mjxgait.certify.starts import nominal_starts
 from mjxgait.champion import read_champion
 from mjxgait.creature import Creature
 from mjxgait.creature.overlap import NEAR, neighbours
-from mjxgait.folder import CERTIFICATE, CHAMPION, open_run
+from mjxgait.runs.folder import CERTIFICATE, CHAMPION, open_run
 
 SECONDS = 20.0
 EVERY = 2

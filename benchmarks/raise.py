@@ -36,7 +36,7 @@ from mjxgait.certify.starts import Starts, join, nominal_starts, perturbed_start
 from mjxgait.certify.worlds import slippery, sloping, uneven
 from mjxgait.champion import Champion, read_champion
 from mjxgait.creature import Creature
-from mjxgait.folder import CHAMPION, open_run
+from mjxgait.runs.folder import CHAMPION, open_run
 
 SECONDS = 22.0
 SEED = 7

@@ -14,9 +14,11 @@ from statistics import median
 
 import jax
 
-from mjxgait.config import Config, find_creature, resolve_config
 from mjxgait.creature import load_creature
-from mjxgait.experiment import build_batch, build_experiment, prepare_devices
+from mjxgait.runs.experiment import build_batch, build_experiment, prepare_devices
+from mjxgait.settings.config import Config
+from mjxgait.settings.layers import resolve_config
+from mjxgait.settings.shipped import find_creature
 
 
 def main() -> None:

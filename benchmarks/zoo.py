@@ -17,7 +17,7 @@ from pathlib import Path
 
 from mjxgait.certify import distance, outdated, read_certificate, survival
 from mjxgait.champion import read_champion
-from mjxgait.folder import CERTIFICATE, CHAMPION, METRICS, open_run, read_metrics
+from mjxgait.runs.folder import CERTIFICATE, CHAMPION, METRICS, open_run, read_metrics
 
 HEADER = (
     "creature",

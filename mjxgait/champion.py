@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from mjxgait.config import ControllerConfig
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
-from mjxgait.tables import build
+from mjxgait.settings.config import ControllerConfig
+from mjxgait.settings.tables import build
 
 SCHEMA = 1
 

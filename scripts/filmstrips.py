@@ -9,7 +9,7 @@ from PIL import Image
 from mjxgait.certify import read_certificate
 from mjxgait.cli import main
 from mjxgait.errors import UserError
-from mjxgait.folder import CERTIFICATE, open_run
+from mjxgait.runs.folder import CERTIFICATE, open_run
 
 DOCS = Path(__file__).parents[1] / "docs"
 WIDTH = 1100

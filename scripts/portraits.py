@@ -4,7 +4,7 @@ import sys
 from pathlib import Path
 
 from mjxgait.cli import main
-from mjxgait.folder import open_run
+from mjxgait.runs.folder import open_run
 
 PICTURES = Path(__file__).parents[1] / "docs" / "images"
 

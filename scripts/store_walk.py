@@ -14,7 +14,7 @@ import numpy as np
 from mjxgait.certify import CertificateConfig, certify, record
 from mjxgait.certify.measure import Recording
 from mjxgait.champion import read_champion
-from mjxgait.folder import CERTIFICATE, CHAMPION, open_run
+from mjxgait.runs.folder import CERTIFICATE, CHAMPION, open_run
 
 
 def main() -> None:

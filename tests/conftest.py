@@ -9,8 +9,8 @@ import jax
 import pytest
 from helpers import STOOL
 
-from mjxgait.config import data_folder
 from mjxgait.creature import Creature, load_creature
+from mjxgait.settings.shipped import data_folder
 
 jax.config.update("jax_num_cpu_devices", 2)
 

@@ -10,9 +10,9 @@ from helpers import small_config
 from mjxgait.certify import starts as examined
 from mjxgait.certify.simulate import Fall, Outcome, simulate
 from mjxgait.champion import Champion
-from mjxgait.config import Config
 from mjxgait.creature import Creature, load_creature
-from mjxgait.tally import Tally
+from mjxgait.settings.config import Config
+from mjxgait.tasks.walk.tally import Tally
 
 STEP, SECONDS = 0.005, 1.2
 STEPS = round(SECONDS / STEP)

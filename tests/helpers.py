@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from mjxgait.config import Config
-from mjxgait.tables import build
+from mjxgait.settings.config import Config
+from mjxgait.settings.tables import build
 
 STOOL = Path(__file__).parent / "data" / "stool"
 

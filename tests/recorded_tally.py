@@ -8,7 +8,7 @@ import numpy as np
 from mjxgait.certify.simulate import Fall, Trajectory
 from mjxgait.creature import Creature
 from mjxgait.creature.settings import Termination
-from mjxgait.tally import CONTACT_GAP, SWING, Reason
+from mjxgait.tasks.walk.tally import CONTACT_GAP, SWING, Reason
 
 
 class Frames:

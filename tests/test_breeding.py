@@ -7,10 +7,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from mjxgait.breeding import Nursery
-from mjxgait.config import EvolutionConfig
-from mjxgait.gait import Genome
-from mjxgait.variation import Box, first_occurrence, pose_variation
+from mjxgait.control.poses import Genome
+from mjxgait.search.breeding import Nursery
+from mjxgait.search.variation import Box, first_occurrence, pose_variation
+from mjxgait.settings.config import EvolutionConfig
 
 THESIS = EvolutionConfig(
     population=12,

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from test_evolution import toy
 
-from mjxgait.checkpoint import FOLDER, Checkpoints
 from mjxgait.errors import UserError
-from mjxgait.evolution import EvolutionState
+from mjxgait.runs.checkpoint import FOLDER, Checkpoints
+from mjxgait.search.evolution import EvolutionState
 
 DIGEST = "0123456789abcdef"
 

@@ -5,9 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from mjxgait.config import Config, data_folder, find_creature, resolve_config
 from mjxgait.errors import UserError
-from mjxgait.tables import build, dump_toml, read_toml
+from mjxgait.settings.config import Config
+from mjxgait.settings.layers import resolve_config
+from mjxgait.settings.shipped import data_folder, find_creature
+from mjxgait.settings.tables import build, dump_toml, read_toml
 
 
 @pytest.mark.parametrize(

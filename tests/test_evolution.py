@@ -9,9 +9,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from mjxgait.breeding import parents
-from mjxgait.config import EvolutionConfig, ForcedConfig
-from mjxgait.evolution import (
+from mjxgait.control.poses import Genome
+from mjxgait.search.breeding import parents
+from mjxgait.search.evolution import (
     Evolution,
     EvolutionState,
     GenerationMetrics,
@@ -19,8 +19,8 @@ from mjxgait.evolution import (
     Origin,
     stop_reason,
 )
-from mjxgait.gait import Genome
-from mjxgait.variation import Box, first_occurrence, pose_variation
+from mjxgait.search.variation import Box, first_occurrence, pose_variation
+from mjxgait.settings.config import EvolutionConfig, ForcedConfig
 
 K, J = 2, 3
 BOX = Box(Genome(-jnp.ones((K, J)), jnp.zeros(1)), Genome(jnp.ones((K, J)), jnp.zeros(1)))

@@ -14,18 +14,18 @@ import pytest
 from helpers import STOOL, small_config
 from rich.console import Console
 
-from mjxgait import examination, run
 from mjxgait.certify import Certificate, CertificateConfig, Criterion, Measure
-from mjxgait.config import ExaminationConfig
 from mjxgait.creature import load_creature
-from mjxgait.evolution import EvolutionState
-from mjxgait.examination import Examiner, due
-from mjxgait.exams import Exams
-from mjxgait.experiment import Experiment, build_experiment
-from mjxgait.fitness import TERMS
-from mjxgait.folder import CERTIFICATE, EXAMS, create_run, read_metrics
 from mjxgait.inspect.snapshot import read_snapshot
-from mjxgait.screen import Screen
+from mjxgait.runs import examination, loop
+from mjxgait.runs.examination import Examiner, due
+from mjxgait.runs.exams import Exams
+from mjxgait.runs.experiment import Experiment, build_experiment
+from mjxgait.runs.folder import CERTIFICATE, EXAMS, create_run, read_metrics
+from mjxgait.runs.screen import Screen
+from mjxgait.search.evolution import EvolutionState
+from mjxgait.settings.config import ExaminationConfig
+from mjxgait.tasks.walk.fitness import TERMS
 
 SECONDS = 0.4
 
@@ -245,7 +245,7 @@ def promising(monkeypatch: pytest.MonkeyPatch, looks: Looks) -> None:
 
 def trained(folder: Path, experiment: Experiment, resume: bool = False) -> str:
     said = io.StringIO()
-    run.train(
+    loop.train(
         folder,
         experiment.creature,
         experiment.config,

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from mjxgait.exams import Exams
+from mjxgait.runs.exams import Exams
 
 
 @pytest.fixture

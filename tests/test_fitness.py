@@ -8,8 +8,8 @@ import pytest
 from helpers import small_config
 
 from mjxgait.creature import Creature
-from mjxgait.fitness import REWARDS, TERMS, fitness_terms, score, weight_vector
-from mjxgait.tally import Judge, Reason
+from mjxgait.tasks.walk.fitness import REWARDS, TERMS, fitness_terms, score, weight_vector
+from mjxgait.tasks.walk.tally import Judge, Reason
 
 STEP, HORIZON = 0.005, 1000
 LIVED = {"steps": 1000, "forward": 2.0}

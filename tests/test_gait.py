@@ -7,9 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from mjxgait.config import ControllerConfig
-from mjxgait.creature import Creature
-from mjxgait.gait import (
+from mjxgait.control.poses import (
     PERIOD,
     PITCH,
     PITCH_RATE,
@@ -25,6 +23,8 @@ from mjxgait.gait import (
     interpolate,
     pose_cycle,
 )
+from mjxgait.creature import Creature
+from mjxgait.settings.config import ControllerConfig
 from mjxgait.types import Sensed
 
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from helpers import small_config
 
-from mjxgait.config import Config, EvolutionConfig
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
-from mjxgait.experiment import build_batch, build_experiment
-from mjxgait.hyper import chosen, traced
+from mjxgait.runs.experiment import build_batch, build_experiment
+from mjxgait.settings.config import Config, EvolutionConfig
+from mjxgait.settings.traced import chosen, traced
 
 
 def shape(**tables: dict) -> object:

@@ -10,10 +10,15 @@ import numpy as np
 import pytest
 from helpers import small_config
 
-from mjxgait.config import Config, resolve_config
+from mjxgait.control.poses import Genome
 from mjxgait.creature import Creature
-from mjxgait.experiment import Experiment, build_experiment, evolution_of
-from mjxgait.fitness import (
+from mjxgait.runs.experiment import Experiment, build_experiment, evolution_of
+from mjxgait.search.variation import Box, uniform
+from mjxgait.settings.config import Config
+from mjxgait.settings.layers import resolve_config
+from mjxgait.simulation.rollout import Episodes
+from mjxgait.simulation.starts import NEVER, Starts, draw_starts
+from mjxgait.tasks.walk.fitness import (
     BEYOND,
     REWARDS,
     TERMS,
@@ -23,12 +28,8 @@ from mjxgait.fitness import (
     stride_limit,
     weight_vector,
 )
-from mjxgait.gait import Genome
-from mjxgait.rollout import Episodes
-from mjxgait.starts import NEVER, Starts, draw_starts
-from mjxgait.tally import Reason
+from mjxgait.tasks.walk.tally import Reason
 from mjxgait.types import BodyState, Sensed
-from mjxgait.variation import Box, uniform
 
 ENDS = (Reason.TIPPED, Reason.TOO_LOW, Reason.TOO_HIGH, Reason.TOUCHED)
 

@@ -15,7 +15,7 @@ from helpers import STOOL
 
 from mjxgait.champion import read_champion
 from mjxgait.creature import load_creature
-from mjxgait.folder import open_run, read_metrics
+from mjxgait.runs.folder import open_run, read_metrics
 
 SMALL = [
     "--env",

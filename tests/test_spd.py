@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from helpers import STOOL, small_config
 
+from mjxgait.control.spd import limited_torque, pd_force
 from mjxgait.creature import Creature, load_creature
-from mjxgait.experiment import build_experiment
-from mjxgait.rollout import Rules, Simulator
-from mjxgait.spd import limited_torque, pd_force
+from mjxgait.runs.experiment import build_experiment
+from mjxgait.simulation.rollout import Rules, Simulator
 from mjxgait.types import BodyState
 
 SLIM = {"xla_backend_optimization_level": 0}

@@ -18,7 +18,7 @@ from disturbed_walks import (
 from recorded_tally import Frames, end, tally_of
 
 from mjxgait.creature import Creature
-from mjxgait.tally import Judge, Reason, Tally
+from mjxgait.tasks.walk.tally import Judge, Reason, Tally
 from mjxgait.types import Sensed
 
 

@@ -5,10 +5,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from mjxgait import variation
-from mjxgait.config import EvolutionConfig
-from mjxgait.gait import Genome
-from mjxgait.variation import Box, first_occurrence, pose_variation
+from mjxgait.control.poses import Genome
+from mjxgait.search import variation
+from mjxgait.search.variation import Box, first_occurrence, pose_variation
+from mjxgait.settings.config import EvolutionConfig
 
 K, J, E = 3, 5, 7
 BOX = Box(

@@ -2,21 +2,19 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy.stats import trim_mean
 
+from mjxgait.ablation.findings import Finding
 from mjxgait.ablation.plan import Plan
 from mjxgait.viewing.style import ACCENT, DARK, figure
-
-if TYPE_CHECKING:
-    from mjxgait.ablation.report import Finding
 
 LINES = ("-", "--", "-.", ":")
 
 
-def draw_intervals(findings: "Sequence[Finding]", measure: str, path: Path) -> None:
+def draw_intervals(findings: Sequence[Finding], measure: str, path: Path) -> None:
     """Each run as a dot, interquartile mean and interval beside it; the base's interval shaded."""
     with figure((8, 1.2 + 0.45 * len(findings))) as drawing:
         axes = drawing.subplots()

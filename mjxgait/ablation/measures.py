@@ -16,10 +16,10 @@ from mjxgait.certify import certify
 from mjxgait.certify.simulate import simulate
 from mjxgait.certify.starts import join, nominal_starts, perturbed_starts
 from mjxgait.champion import Champion, read_champion
-from mjxgait.checkpoint import disk_errors
 from mjxgait.cores import process_per_core
 from mjxgait.creature import Creature
-from mjxgait.folder import METRICS, read_metrics
+from mjxgait.runs.checkpoint import disk_errors
+from mjxgait.runs.folder import METRICS, read_metrics
 
 MEASURED = "measured.jsonl"
 SECONDS, STARTS, SEED = 22.0, 16, 1000

@@ -8,10 +8,12 @@ from typing import Annotated, Any, Literal
 
 import pydantic
 
-from mjxgait.config import Config, data_folder, resolve_config
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError, did_you_mean
-from mjxgait.tables import STRICT, Count, Finite, Whole, build, merge, read_toml
+from mjxgait.settings.config import Config
+from mjxgait.settings.layers import resolve_config
+from mjxgait.settings.shipped import data_folder
+from mjxgait.settings.tables import STRICT, Count, Finite, Whole, build, merge, read_toml
 
 Measure = Literal["walk", "up", "certified", "fitness", "area", "generations"]
 

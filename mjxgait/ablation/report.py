@@ -15,10 +15,11 @@ import pyarrow.parquet
 from markdown_it import MarkdownIt
 
 from mjxgait.ablation.figures import draw_curves, draw_intervals
+from mjxgait.ablation.findings import Finding, find, trim_of
 from mjxgait.ablation.measures import Result
 from mjxgait.ablation.plan import Plan
-from mjxgait.ablation.statistics import TRIM, Comparison, Estimate, compare, estimate, share
-from mjxgait.checkpoint import disk_errors
+from mjxgait.ablation.statistics import Estimate, share
+from mjxgait.runs.checkpoint import disk_errors
 
 NAMES = {
     "walk": "body lengths per second covered before a fall or the end of 22 s, mean over 16 unseen perturbed starts in C MuJoCo",
@@ -28,7 +29,6 @@ NAMES = {
     "area": "best fitness, mean over the generations (area under the curve)",
     "generations": "generations until the best reaches the threshold; fewer is better",
 }
-LOWER_IS_BETTER = ("generations",)
 OWN_SCALE = ("fitness", "area", "generations")
 """Measured by each variant's own fitness."""
 LEVEL = 0.05
@@ -36,16 +36,6 @@ STYLE = (
     "body{font:16px/1.5 system-ui,sans-serif;max-width:60em;margin:2em auto;padding:0 1em}table{border-collapse:collapse}\
 td,th{border:1px solid #bbb;padding:.2em .6em;text-align:left}img{max-width:100%}"
 )
-
-
-@dataclasses.dataclass(frozen=True)
-class Finding:
-    """A variant with its estimate and, for all but the base, its comparison with the base."""
-
-    name: str
-    values: np.ndarray
-    estimate: Estimate
-    comparison: Comparison | None
 
 
 def write_report(
@@ -72,36 +62,12 @@ def write_report(
     return folder / "report.md"
 
 
-def find(plan: Plan, results: Sequence[Result]) -> list[Finding]:
-    """What the study's measure says of every variant, the base first."""
-    measure = plan.study.measure
-    sign = -1.0 if measure in LOWER_IS_BETTER else 1.0
-    values = {
-        name: np.array([r.value(measure) for r in results if r.variant == name])
-        for name in plan.variants
-    }
-    base, *others = plan.variants
-    trim = _trim(measure)
-    comparisons = compare(
-        sign * values[base], [sign * values[name] for name in others], plan.study.paired, trim
-    )
-    return [
-        Finding(name, values[name], estimate(values[name], trim), comparison)
-        for name, comparison in zip(plan.variants, [None, *comparisons], strict=True)
-    ]
-
-
-def _trim(measure: str) -> float:
-    """Yes and no have no middle half: of them the mean is taken."""
-    return 0.0 if measure == "certified" else TRIM
-
-
 def markdown(
     plan: Plan, results: Sequence[Result], findings: Sequence[Finding], command: str
 ) -> str:
     """The report."""
     study, base = plan.study, plan.variants[0]
-    means = "Interquartile means" if _trim(study.measure) else "Means"
+    means = "Interquartile means" if trim_of(study.measure) else "Means"
     lines = [
         f"# {study.question}",
         "",

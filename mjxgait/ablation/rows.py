@@ -13,13 +13,13 @@ import numpy as np
 
 from mjxgait.ablation.plan import Plan, Run
 from mjxgait.champion import write_champion
-from mjxgait.checkpoint import Checkpoints, disk_errors
 from mjxgait.creature import Creature
-from mjxgait.evolution import EvolutionState
-from mjxgait.experiment import Batch, build_batch
-from mjxgait.folder import METRICS, truncate_metrics
-from mjxgait.hyper import traced
-from mjxgait.run import interruptible, metrics_line, versions
+from mjxgait.runs.checkpoint import Checkpoints, disk_errors
+from mjxgait.runs.experiment import Batch, build_batch
+from mjxgait.runs.folder import METRICS, truncate_metrics
+from mjxgait.runs.loop import interruptible, metrics_line, versions
+from mjxgait.search.evolution import EvolutionState
+from mjxgait.settings.traced import traced
 
 GROUPS, CHAMPIONS = "groups", "champions"
 

@@ -7,8 +7,8 @@ import jax
 import jax.numpy as jnp
 
 from mjxgait.bench.flops import count_flops
-from mjxgait.experiment import Experiment
-from mjxgait.rollout import Lane
+from mjxgait.runs.experiment import Experiment
+from mjxgait.simulation.rollout import Lane
 
 
 def step_cost(experiment: Experiment) -> dict[str, float]:

@@ -9,12 +9,12 @@ import jax.numpy as jnp
 import numpy as np
 
 from mjxgait.bench.workload import Lap, Workload
-from mjxgait.config import Config
+from mjxgait.control.poses import TUNING, Genome
 from mjxgait.creature import load_creature
-from mjxgait.evolution import EvolutionState
-from mjxgait.experiment import Experiment, build_experiment, prepare_devices
-from mjxgait.fitness import TERMS, forward_distance
-from mjxgait.gait import TUNING, Genome
+from mjxgait.runs.experiment import Experiment, build_experiment, prepare_devices
+from mjxgait.search.evolution import EvolutionState
+from mjxgait.settings.config import Config
+from mjxgait.tasks.walk.fitness import TERMS, forward_distance
 
 
 class Ours:

@@ -13,16 +13,16 @@ import jax
 import jax.numpy as jnp
 from rich.console import Console
 
-from mjxgait import run
 from mjxgait.bench.ours import Ours
-from mjxgait.checkpoint import Checkpoints
-from mjxgait.evolution import EvolutionState, GenerationMetrics, Judged
-from mjxgait.examination import Examiner
-from mjxgait.exams import Exams
-from mjxgait.experiment import Experiment, evolution_of
-from mjxgait.fitness import TERMS
-from mjxgait.folder import EXAMS
-from mjxgait.screen import Screen
+from mjxgait.runs import loop
+from mjxgait.runs.checkpoint import Checkpoints
+from mjxgait.runs.examination import Examiner
+from mjxgait.runs.exams import Exams
+from mjxgait.runs.experiment import Experiment, evolution_of
+from mjxgait.runs.folder import EXAMS
+from mjxgait.runs.screen import Screen
+from mjxgait.search.evolution import EvolutionState, GenerationMetrics, Judged
+from mjxgait.tasks.walk.fitness import TERMS
 
 REPEATS = 30
 
@@ -100,7 +100,7 @@ def _host_loop(ours: Ours, generations: int) -> tuple[float, float, float]:
         checkpoints = _TimedCheckpoints(Path(folder), experiment.config.keep_every)
         screen = Screen(Console(file=io.StringIO()))
         began = time.perf_counter()
-        run._evolve(
+        loop._evolve(
             Path(folder),
             Examiner(experiment, {}, screen.say, Exams(Path(folder) / EXAMS)),
             step,

@@ -10,7 +10,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from mjxgait.config import RolloutConfig
+from mjxgait.settings.config import RolloutConfig
 
 POPULATIONS = (32, 128, 512, 2048, 8192)
 LANES = (8, 16, 32, 64, 128, 256)
@@ -69,8 +69,9 @@ def measure(creature: str, point: Point) -> dict[str, Any]:
 def measure_here(creature: str, point: Point) -> dict[str, Any]:
     """One point, in this process: an initial population is judged again and again. Memory in MiB, at most."""
     from mjxgait.bench.ours import Ours
-    from mjxgait.config import find_creature, resolve_config
     from mjxgait.creature import load_creature
+    from mjxgait.settings.layers import resolve_config
+    from mjxgait.settings.shipped import find_creature
 
     folder = find_creature(creature)
     settings = load_creature(folder).settings

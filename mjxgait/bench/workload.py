@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from mjxgait.certify.controller import pose_cycle
-from mjxgait.config import Config
 from mjxgait.creature import Creature, load_creature
+from mjxgait.settings.config import Config
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ The first table is `simulate.Fall`.
 import dataclasses
 
 from mjxgait.certify.simulate import Fall
-from mjxgait.tables import STRICT, Count, Fraction, NonNegative, Positive, Whole
+from mjxgait.settings.tables import STRICT, Count, Fraction, NonNegative, Positive, Whole
 
 
 @dataclasses.dataclass(frozen=True)

@@ -19,7 +19,7 @@ from mjxgait.certify.starts import Starts
 from mjxgait.champion import Champion
 from mjxgait.cores import cores
 from mjxgait.creature import Creature
-from mjxgait.tables import STRICT, NonNegative, Positive
+from mjxgait.settings.tables import STRICT, NonNegative, Positive
 
 VELOCITY_STAGE = int(mujoco.mjtStage.mjSTAGE_VEL)
 

@@ -8,11 +8,11 @@ from typing import Any
 
 import tyro
 
-from mjxgait.config import find_creature
 from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import INTERRUPTED, UserError
-from mjxgait.folder import CREATURE
-from mjxgait.tables import build, dump_toml, read_toml
+from mjxgait.runs.folder import CREATURE
+from mjxgait.settings.shipped import find_creature
+from mjxgait.settings.tables import build, dump_toml, read_toml
 
 STUDY = "study.toml"
 OVER = ("env", "seeds", "first_seed", "generations", "config")
@@ -79,7 +79,7 @@ def ablate_command(arguments: Sequence[str]) -> int:
         groups,
         run_study,
     )  # JAX takes a second to import: only once the study is known to be good
-    from mjxgait.experiment import prepare_devices
+    from mjxgait.runs.experiment import prepare_devices
 
     prepare_devices()
     hours = _hours(plan.upper_bound(creature), len(parts := groups(plan)))

@@ -8,9 +8,10 @@ from typing import Any
 
 import tyro
 
-from mjxgait.config import data_folder, find_creature, resolve_config
 from mjxgait.creature import load_creature
 from mjxgait.errors import UserError
+from mjxgait.settings.layers import resolve_config
+from mjxgait.settings.shipped import data_folder, find_creature
 
 
 @dataclasses.dataclass(frozen=True)

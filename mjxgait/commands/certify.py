@@ -8,9 +8,9 @@ import tyro
 
 from mjxgait.certify import CertificateConfig, certify
 from mjxgait.champion import read_champion
-from mjxgait.exams import Exams
-from mjxgait.folder import CERTIFICATE, CHAMPION, EXAMS, open_run
-from mjxgait.tables import build, read_toml
+from mjxgait.runs.exams import Exams
+from mjxgait.runs.folder import CERTIFICATE, CHAMPION, EXAMS, open_run
+from mjxgait.settings.tables import build, read_toml
 
 
 @dataclasses.dataclass(frozen=True)
@@ -38,7 +38,7 @@ def certify_command(arguments: Sequence[str]) -> int:
         if options.config
         else CertificateConfig()
     )
-    from mjxgait.screen import Screen  # rich is slow to import
+    from mjxgait.runs.screen import Screen  # rich is slow to import
 
     attempt = Exams(options.run / EXAMS).attempt(
         champion.fingerprint, int(champion.origin.get("generation", 0))

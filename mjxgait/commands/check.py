@@ -6,9 +6,10 @@ from pathlib import Path
 
 import tyro
 
-from mjxgait.config import find_creature, resolve_config
 from mjxgait.creature import load_creature
 from mjxgait.errors import UserError
+from mjxgait.settings.layers import resolve_config
+from mjxgait.settings.shipped import find_creature
 
 
 @dataclasses.dataclass(frozen=True)

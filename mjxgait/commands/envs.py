@@ -5,8 +5,8 @@ from collections.abc import Sequence
 
 import tyro
 
-from mjxgait.config import data_folder
 from mjxgait.creature import load_creature
+from mjxgait.settings.shipped import data_folder
 
 
 @dataclasses.dataclass(frozen=True)

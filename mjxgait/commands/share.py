@@ -29,7 +29,7 @@ def share_command(arguments: Sequence[str]) -> int:
         raise UserError(
             f'{options.out}: cannot write "{options.out.suffix}"; end the name with .html'
         )
-    from mjxgait.viewing.page import write_page
+    from mjxgait.web.page import write_page
 
     write_page(options.run, options.out)
     print(f"{options.out} ({options.out.stat().st_size / 1024:,.0f} KiB)")

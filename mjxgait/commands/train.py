@@ -10,11 +10,13 @@ from typing import Annotated
 
 import tyro
 
-from mjxgait.config import Config, ExaminationConfig, find_creature, resolve_config
 from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import INTERRUPTED, UserError
-from mjxgait.folder import create_run, open_run
-from mjxgait.tables import build, merge
+from mjxgait.runs.folder import METRICS, PLOT, create_run, open_run, read_metrics
+from mjxgait.settings.config import Config, ExaminationConfig
+from mjxgait.settings.layers import resolve_config
+from mjxgait.settings.shipped import find_creature
+from mjxgait.settings.tables import build, merge
 
 
 @dataclasses.dataclass(frozen=True)
@@ -60,12 +62,11 @@ def train_command(arguments: Sequence[str]) -> int:
         default=TrainOptions(settings=default),
     )
     config = _settings(options)
-    from mjxgait import (
-        run,
-    )  # JAX takes a second to import: only once the options are known to be good
+    # JAX takes a second to import: only once the options are known to be good.
     from mjxgait.commands.view import following
-    from mjxgait.experiment import prepare_devices
-    from mjxgait.screen import Screen
+    from mjxgait.runs import loop
+    from mjxgait.runs.experiment import prepare_devices
+    from mjxgait.runs.screen import Screen
     from mjxgait.viewing.plots import PLOTS, plot_run
 
     if options.resume:
@@ -79,7 +80,7 @@ def train_command(arguments: Sequence[str]) -> int:
         create_run(folder, creature, config)
     prepare_devices()
     with following(folder) if options.view else contextlib.nullcontext():
-        ended = run.train(
+        ended = loop.train(
             folder,
             creature,
             config,
@@ -87,10 +88,19 @@ def train_command(arguments: Sequence[str]) -> int:
             resume=options.resume is not None,
             generation=options.generation,
         )
+    _plot_fitness(folder)
     if ended and options.plots:
         plot_run(folder)
         print(f"plots         {folder / PLOTS}/")
     return 0 if ended else INTERRUPTED
+
+
+def _plot_fitness(folder: Path) -> None:
+    """After the result is on the screen: matplotlib is slow to import."""
+    if lines := read_metrics(folder / METRICS):
+        from mjxgait.viewing.curves import plot_fitness
+
+        plot_fitness(lines, folder / PLOT)
 
 
 def _layers(arguments: Sequence[str]) -> tuple[Creature, Config]:

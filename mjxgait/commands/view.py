@@ -27,7 +27,7 @@ class ViewOptions:
 def view_command(arguments: Sequence[str]) -> int:
     """Returns the exit code; runs until interrupted."""
     options = tyro.cli(ViewOptions, args=list(arguments), prog="mjxgait view")
-    from mjxgait.viewing.live import serve
+    from mjxgait.web.live import serve
 
     # What a script starts in the background ignores interrupts, and Python leaves it so: without this nothing but a kill would end it.
     signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -14,7 +14,7 @@ from mjxgait.creature import geometry
 from mjxgait.creature.settings import CreatureSettings, JointException
 from mjxgait.creature.world import check_world
 from mjxgait.errors import UserError, did_you_mean
-from mjxgait.tables import build, read_toml
+from mjxgait.settings.tables import build, read_toml
 
 HINGE, SLIDE = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
 FLOOR = "floor"

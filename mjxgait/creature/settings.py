@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal
 
 import pydantic
 
-from mjxgait.tables import STRICT, Finite, NonNegative, Positive
+from mjxgait.settings.tables import STRICT, Finite, NonNegative, Positive
 
 Pattern = str
 Degrees = tuple[Finite, Finite]

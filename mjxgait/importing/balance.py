@@ -5,11 +5,11 @@ from collections.abc import Callable
 import mujoco
 import numpy as np
 
-from mjxgait.config import resolve_config
 from mjxgait.importing.drive import Drive
 from mjxgait.importing.hold import Held, hold
 from mjxgait.importing.notes import Notes
 from mjxgait.importing.parts import rotation
+from mjxgait.settings.layers import resolve_config
 
 MOST = 0.5
 """rad, where the controller clips the feedback (docs/controller.md)."""

@@ -12,12 +12,13 @@ import numpy as np
 
 from mjxgait.certify import outdated, read_certificate
 from mjxgait.champion import read_champion
-from mjxgait.config import TuningRanges, resolve_config
 from mjxgait.errors import UserError
-from mjxgait.evolution import Origin
-from mjxgait.fitness import TERMS, weight_vector
-from mjxgait.folder import CERTIFICATE, CHAMPION
 from mjxgait.inspect.snapshot import Snapshot
+from mjxgait.runs.folder import CERTIFICATE, CHAMPION
+from mjxgait.search.evolution import Origin
+from mjxgait.settings.config import TuningRanges
+from mjxgait.settings.layers import resolve_config
+from mjxgait.tasks.walk.fitness import TERMS, weight_vector
 
 TUNING = tuple(field.name for field in dataclasses.fields(TuningRanges))
 KINDS = {

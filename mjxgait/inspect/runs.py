@@ -8,10 +8,10 @@ from rich.console import Console
 from rich.table import Table
 
 from mjxgait.errors import UserError
-from mjxgait.folder import CONFIG
 from mjxgait.inspect.facts import facts
 from mjxgait.inspect.snapshot import read_snapshot
 from mjxgait.inspect.text import ago, show
+from mjxgait.runs.folder import CONFIG
 
 
 def runs_in(folder: Path) -> list[Path]:

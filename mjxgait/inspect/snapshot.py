@@ -18,13 +18,13 @@ import orbax.checkpoint as ocp
 
 from mjxgait.certify import outdated, read_certificate
 from mjxgait.champion import read_champion
-from mjxgait.checkpoint import FOLDER, SCHEMA, Manifest, array_hash
-from mjxgait.config import Config
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
-from mjxgait.evolution import EvolutionState, stop_reason
-from mjxgait.examination import due, why_ended
-from mjxgait.folder import CERTIFICATE, CHAMPION, CONFIG, METRICS, open_run, read_metrics
+from mjxgait.runs.checkpoint import FOLDER, SCHEMA, Manifest, array_hash
+from mjxgait.runs.examination import due, why_ended
+from mjxgait.runs.folder import CERTIFICATE, CHAMPION, CONFIG, METRICS, open_run, read_metrics
+from mjxgait.search.evolution import EvolutionState, stop_reason
+from mjxgait.settings.config import Config
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

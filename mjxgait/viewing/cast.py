@@ -7,7 +7,7 @@ import numpy as np
 
 from mjxgait.champion import Champion, read_champion
 from mjxgait.errors import UserError
-from mjxgait.folder import CHAMPION, open_run
+from mjxgait.runs.folder import CHAMPION, open_run
 from mjxgait.viewing.video import Runner
 from mjxgait.viewing.walk import record_walk
 

@@ -7,10 +7,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from mjxgait.champion import read_champion
-from mjxgait.config import Config
 from mjxgait.errors import UserError
-from mjxgait.fitness import TERMS, weight_vector
-from mjxgait.folder import CHAMPION, METRICS, open_run, read_metrics
+from mjxgait.runs.folder import CHAMPION, METRICS, open_run, read_metrics
+from mjxgait.settings.config import Config
+from mjxgait.tasks.walk.fitness import TERMS, weight_vector
 from mjxgait.viewing.curves import Lines, progress_figures
 from mjxgait.viewing.filmstrip import draw_filmstrip
 from mjxgait.viewing.gaitplots import gait_figures

@@ -12,7 +12,7 @@ import pyarrow.parquet
 import pytest
 from helpers import STOOL
 
-from mjxgait.folder import read_metrics
+from mjxgait.runs.folder import read_metrics
 
 STUDY = f"""
 question = "Does plain PD do as well?"

@@ -8,10 +8,11 @@ from helpers import STOOL
 
 from mjxgait.ablation.plan import Plan, Study, make_plan, read_study
 from mjxgait.ablation.rows import groups
-from mjxgait.config import data_folder, resolve_config
 from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import UserError
-from mjxgait.tables import build
+from mjxgait.settings.layers import resolve_config
+from mjxgait.settings.shipped import data_folder
+from mjxgait.settings.tables import build
 
 TWO = [{"name": "base"}, {"name": "half", "settings": {"evolution": {"mutation_rate": 0.4}}}]
 

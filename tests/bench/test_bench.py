@@ -20,9 +20,10 @@ from mjxgait.bench.workload import Lap, Workload
 from mjxgait.certify.controller import Controller, Senses
 from mjxgait.champion import Champion
 from mjxgait.commands import bench
-from mjxgait.config import Config, ControllerConfig, data_folder, find_creature
 from mjxgait.creature import load_creature
 from mjxgait.errors import UserError
+from mjxgait.settings.config import Config, ControllerConfig
+from mjxgait.settings.shipped import data_folder, find_creature
 
 NEEDS_DART = pytest.mark.skipif(
     importlib.util.find_spec("dartpy") is None, reason="dartpy is not installed"

@@ -12,8 +12,9 @@ from mjxgait.bench.bare import bare_model
 from mjxgait.bench.c_peer import COMPILERS, CPeer, NoCompiler, build
 from mjxgait.bench.mujoco_peer import MujocoPeer
 from mjxgait.bench.workload import Workload
-from mjxgait.config import Config, find_creature
 from mjxgait.creature import load_creature
+from mjxgait.settings.config import Config
+from mjxgait.settings.shipped import find_creature
 
 TUNING = {
     "threshold": 0.12,

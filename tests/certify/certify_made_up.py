@@ -4,7 +4,7 @@ import numpy as np
 
 from mjxgait.certify.measure import Dimensions, Recording
 from mjxgait.champion import Champion
-from mjxgait.config import ControllerConfig
+from mjxgait.settings.config import ControllerConfig
 
 LEG = """
       <body name="{name}_upper" pos="{x} {y} 0">

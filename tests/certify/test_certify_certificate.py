@@ -13,7 +13,7 @@ from mjxgait.certify.describe import cost_of_transport, describe, footfall_phase
 from mjxgait.certify.measure import dimensions
 from mjxgait.certify.starts import nominal_starts
 from mjxgait.errors import UserError
-from mjxgait.tables import build, read_toml
+from mjxgait.settings.tables import build, read_toml
 
 SMALL = {
     "seconds": 7.0,

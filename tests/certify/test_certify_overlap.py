@@ -10,7 +10,7 @@ from mjxgait.certify import CertificateConfig, criteria, glance, record
 from mjxgait.certify.describe import worst_overlap
 from mjxgait.certify.overlap import colliding_with_itself, neighbours, overlaps
 from mjxgait.creature import load_creature
-from mjxgait.tables import build
+from mjxgait.settings.tables import build
 
 SHORT = build(CertificateConfig, {"seconds": 2.0, "warmup": 0.5}, "test")
 

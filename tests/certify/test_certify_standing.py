@@ -10,7 +10,7 @@ import pytest
 from mjxgait.certify import CertificateConfig, certify, outdated, read_certificate
 from mjxgait.champion import read_champion, write_champion
 from mjxgait.errors import UserError
-from mjxgait.tables import build
+from mjxgait.settings.tables import build
 
 BRIEF = {
     "seconds": 1.5,

@@ -7,10 +7,10 @@ from pathlib import Path
 from importing.fuzz_inputs import model_inputs, own_xml_inputs, toml_inputs
 from importing.models import QUADRUPED
 
-from mjxgait.config import resolve_config
 from mjxgait.creature import load_creature
 from mjxgait.errors import UserError
 from mjxgait.importing import ImportChoices, import_model
+from mjxgait.settings.layers import resolve_config
 
 
 def main(scratch: Path, share: int, shares: int) -> None:

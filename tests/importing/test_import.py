@@ -14,11 +14,12 @@ from mjxgait.champion import Champion
 from mjxgait.cli import main
 from mjxgait.commands.import_ import write_folder
 from mjxgait.commands.train import _layers
-from mjxgait.config import ControllerConfig, resolve_config
 from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import UserError
 from mjxgait.importing import ImportChoices, Imported, import_model
 from mjxgait.importing.portrait import facts, portrait, standing
+from mjxgait.settings.config import ControllerConfig
+from mjxgait.settings.layers import resolve_config
 
 
 def bring(folder: Path, text: str, kind: str = "xml", **choices) -> tuple[Creature, Imported]:

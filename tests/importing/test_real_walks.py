@@ -9,7 +9,7 @@ import pytest
 from importing.packages import model_file
 
 from mjxgait.certify import read_certificate
-from mjxgait.folder import CERTIFICATE
+from mjxgait.runs.folder import CERTIFICATE
 
 WALKERS = os.environ.get("MJXGAIT_TEST_WALKERS", "unitree a1").split(",")
 """A minute each. `benchmarks/imported.py` walks the whole list; docs/your-own-creature.md has what came of it."""

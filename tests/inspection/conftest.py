@@ -8,11 +8,12 @@ import pytest
 from inspection.made_up import FORCED, LAST, POPULATION, make_state
 
 from mjxgait.champion import Champion, write_champion
-from mjxgait.checkpoint import Checkpoints
-from mjxgait.config import Config, EvolutionConfig, find_creature
+from mjxgait.control.poses import TUNING
 from mjxgait.creature import load_creature
-from mjxgait.folder import CHAMPION, METRICS, create_run
-from mjxgait.gait import TUNING
+from mjxgait.runs.checkpoint import Checkpoints
+from mjxgait.runs.folder import CHAMPION, METRICS, create_run
+from mjxgait.settings.config import Config, EvolutionConfig
+from mjxgait.settings.shipped import find_creature
 
 
 @pytest.fixture(scope="session")

@@ -4,9 +4,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from mjxgait.evolution import EvolutionState, Origin
-from mjxgait.fitness import TERMS, score, weight_vector
-from mjxgait.gait import TUNING, Genome
+from mjxgait.control.poses import TUNING, Genome
+from mjxgait.search.evolution import EvolutionState, Origin
+from mjxgait.tasks.walk.fitness import TERMS, score, weight_vector
 
 POPULATION = 6
 LAST = 3

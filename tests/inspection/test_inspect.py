@@ -13,8 +13,8 @@ from inspection.made_up import FORCED, LAST, POPULATION
 from mjxgait.certify.certificate import SCHEMA
 from mjxgait.champion import read_champion
 from mjxgait.cli import main
-from mjxgait.folder import CERTIFICATE, CHAMPION
 from mjxgait.inspect import facts, individual_facts, read_snapshot
+from mjxgait.runs.folder import CERTIFICATE, CHAMPION
 
 
 def tell(capsys, *arguments):

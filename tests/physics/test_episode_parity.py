@@ -33,13 +33,13 @@ from helpers import small_config
 from recorded_tally import Frames, end, tally_of
 
 from mjxgait.certify.simulate import Outcome
+from mjxgait.control.poses import TUNING as GENES
+from mjxgait.control.poses import Genome
 from mjxgait.creature import Creature
-from mjxgait.experiment import build_experiment
-from mjxgait.gait import TUNING as GENES
-from mjxgait.gait import Genome
-from mjxgait.hyper import traced
-from mjxgait.starts import NEVER, Starts
-from mjxgait.tally import Reason, Tally
+from mjxgait.runs.experiment import build_experiment
+from mjxgait.settings.traced import traced
+from mjxgait.simulation.starts import NEVER, Starts
+from mjxgait.tasks.walk.tally import Reason, Tally
 
 SLIM = {"xla_backend_optimization_level": 0}
 """Compiling is what takes the time here."""

@@ -8,12 +8,12 @@ from types import SimpleNamespace
 import pytest
 from helpers import STOOL, small_config
 
-from mjxgait import run
 from mjxgait.commands.check import check_command
 from mjxgait.creature import Creature, load_creature
 from mjxgait.physics import SLOWER, fallback_note, make_plant
 from mjxgait.physics.fast import FastPlant
 from mjxgait.physics.plain import MjxPlant
+from mjxgait.runs import loop
 
 
 @pytest.fixture
@@ -74,8 +74,8 @@ def test_a_run_says_so_before_it_compiles(
     note: str, said: list[str], stool: Creature, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     experiment = SimpleNamespace(plant_note=note, init=lambda: None)
-    monkeypatch.setattr(run, "build_experiment", lambda *_: experiment)
+    monkeypatch.setattr(loop, "build_experiment", lambda *_: experiment)
     screen = Listener()
     with pytest.raises(Ready):
-        run.train(tmp_path, stool, small_config(), screen)
+        loop.train(tmp_path, stool, small_config(), screen)
     assert screen.said == said

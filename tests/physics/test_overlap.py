@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 from helpers import STOOL, small_config
 
-from mjxgait.config import FitnessConfig
 from mjxgait.creature import Creature, load_creature
 from mjxgait.creature.bars import bars_of
 from mjxgait.creature.overlap import (
@@ -23,12 +22,13 @@ from mjxgait.creature.overlap import (
     neighbours,
     pair_depths,
 )
-from mjxgait.fitness import DEEP, TERMS, TOUCHING, fitness_terms
 from mjxgait.physics.fast import fast_plant
 from mjxgait.physics.layout import sense_layout
 from mjxgait.physics.plain import mjx_plant
-from mjxgait.rollout import CHECK_EVERY, Lane, Simulator
-from mjxgait.tally import Judge, Reason, Tally
+from mjxgait.settings.config import FitnessConfig
+from mjxgait.simulation.rollout import CHECK_EVERY, Lane, Simulator
+from mjxgait.tasks.walk.fitness import DEEP, TERMS, TOUCHING, fitness_terms
+from mjxgait.tasks.walk.tally import Judge, Reason, Tally
 from mjxgait.types import BodyState
 
 LANES = 6
@@ -167,7 +167,7 @@ def test_the_pairs_are_the_same_each_time_and_no_neighbours(shipped: Creature):
 
 
 def test_the_crabs_claws_are_seen_by_its_front_legs():
-    from mjxgait.config import find_creature
+    from mjxgait.settings.shipped import find_creature
 
     crab = load_creature(find_creature("crab"))
     qpos = crab.stand_qpos.copy()
@@ -284,7 +284,7 @@ def test_the_term_grows_with_depth_and_counts_as_far_as_there_is_a_walk(stool: C
 
 def test_a_walker_whose_legs_cross_is_seen_and_nobody_else(stool: Creature):
     """On fewer lanes than individuals, one whose legs meet among others that stand still."""
-    from mjxgait.experiment import build_experiment
+    from mjxgait.runs.experiment import build_experiment
 
     experiment = build_experiment(stool, small_config(rollout={"lanes": 3, "starts": 1}))
     low, high = experiment.simulator.tracker.bounds(experiment.config.controller)

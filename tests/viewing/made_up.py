@@ -6,9 +6,9 @@ import json
 import numpy as np
 
 from mjxgait.champion import Champion, write_champion
-from mjxgait.config import Config, ControllerConfig
-from mjxgait.folder import CHAMPION, METRICS, create_run
-from mjxgait.gait import TUNING
+from mjxgait.control.poses import TUNING
+from mjxgait.runs.folder import CHAMPION, METRICS, create_run
+from mjxgait.settings.config import Config, ControllerConfig
 
 
 def treading(creature, degrees=4.0, period=0.5):

@@ -16,9 +16,9 @@ from viewing.made_up import falling, metrics_line, treading, write_run
 from mjxgait.champion import write_champion
 from mjxgait.commands.view import following
 from mjxgait.errors import UserError
-from mjxgait.folder import CHAMPION, METRICS
-from mjxgait.viewing.live import HERE, SHARE, Watcher, open_server
+from mjxgait.runs.folder import CHAMPION, METRICS
 from mjxgait.viewing.walk import record_walk
+from mjxgait.web.live import HERE, SHARE, Watcher, open_server
 
 
 @pytest.fixture
@@ -66,8 +66,8 @@ def test_it_follows_the_run(site, run, stool):
 
 
 def test_a_champion_that_falls_is_shown_falling(tmp_path):
-    from mjxgait.config import find_creature
     from mjxgait.creature import load_creature
+    from mjxgait.settings.shipped import find_creature
 
     creature = load_creature(find_creature("tall_quadruped"))
     watcher = Watcher(write_run(tmp_path / "run", creature, falling(creature)))
@@ -81,7 +81,7 @@ def test_the_longer_a_look_takes_the_longer_the_pause(run, stool, monkeypatch):
     watcher = Watcher(run)
     improve(run, stool, treading(stool))
     began_and_ended = iter([100.0, 103.0])
-    monkeypatch.setattr("mjxgait.viewing.live.time.process_time", lambda: next(began_and_ended))
+    monkeypatch.setattr("mjxgait.web.live.time.process_time", lambda: next(began_and_ended))
     assert 3.0 / (3.0 + watcher.look()) == pytest.approx(SHARE)
     assert SHARE <= 0.05
 
@@ -93,7 +93,7 @@ def test_only_a_new_champion_is_simulated(run, stool, monkeypatch):
         seen.append(champion)
         return record_walk(creature, champion, seconds)
 
-    monkeypatch.setattr("mjxgait.viewing.live.record_walk", counted)
+    monkeypatch.setattr("mjxgait.web.live.record_walk", counted)
     watcher = Watcher(run)
     for champions in (1, 2):
         improve(run, stool, treading(stool))

@@ -13,8 +13,8 @@ from viewing.made_up import treading, write_run
 from mjxgait.certify.certificate import SCHEMA
 from mjxgait.cli import main
 from mjxgait.errors import UserError
-from mjxgait.folder import CERTIFICATE
-from mjxgait.viewing.page import certificate_table
+from mjxgait.runs.folder import CERTIFICATE
+from mjxgait.web.page import certificate_table
 
 CERTIFIED = {
     "schema": SCHEMA,

@@ -8,7 +8,7 @@ from PIL import Image
 from viewing.made_up import falling, metrics_line, treading, write_run
 
 from mjxgait.errors import UserError
-from mjxgait.folder import METRICS
+from mjxgait.runs.folder import METRICS
 from mjxgait.viewing.curves import columns, plot_fitness
 from mjxgait.viewing.filmstrip import filmstrip
 from mjxgait.viewing.gaitplots import gait_window
@@ -44,8 +44,8 @@ def test_a_run_without_a_champion_has_its_curves(stool, tmp_path):
 
 
 def test_a_champion_that_falls_can_be_plotted(tmp_path):
-    from mjxgait.config import find_creature
     from mjxgait.creature import load_creature
+    from mjxgait.settings.shipped import find_creature
 
     creature = load_creature(find_creature("tall_quadruped"))
     assert len(

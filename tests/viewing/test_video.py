@@ -8,8 +8,8 @@ from PIL import Image, ImageSequence
 from viewing.made_up import falling
 
 from mjxgait.cli import main
-from mjxgait.config import find_creature
 from mjxgait.creature import load_creature
+from mjxgait.settings.shipped import find_creature
 from mjxgait.viewing.stage import Stage, smooth
 from mjxgait.viewing.video import Runner, condition, moving_pictures
 from mjxgait.viewing.walk import record_walk

@@ -24,8 +24,8 @@ def test_targets_are_those_of_the_examiner(stool_walk):
 
 
 def test_a_walk_that_falls_ends_soon_after():
-    from mjxgait.config import find_creature
     from mjxgait.creature import load_creature
+    from mjxgait.settings.shipped import find_creature
 
     walk = record_walk(
         creature := load_creature(find_creature("tall_quadruped")), falling(creature), 6.0

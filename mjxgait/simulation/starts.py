@@ -2,11 +2,11 @@
 
 import jax
 import jax.numpy as jnp
-import mujoco
 import numpy as np
 
-from mjxgait.config import RolloutConfig
 from mjxgait.creature import Creature
+from mjxgait.creature.frame import horizontal_freedoms
+from mjxgait.settings.config import RolloutConfig
 from mjxgait.types import pytree
 
 NEVER = -1
@@ -56,21 +56,6 @@ def draw_starts(key: jax.Array, creature: Creature, config: RolloutConfig) -> St
         qpos=qpos.at[:, creature.qpos_adr].add(noise),
         qvel=jnp.zeros((count, creature.model.nv)).at[:, creature.dof_adr].set(spin),
         friction=jnp.where(perturbed[:, 0], friction, 1.0),
-        push=speed * direction @ _horizontal_dofs(creature),
+        push=speed * direction @ horizontal_freedoms(creature),
         push_step=jnp.where(perturbed[:, 0], moment, NEVER),
     )
-
-
-def _horizontal_dofs(creature: Creature) -> jax.Array:
-    """[2, nv] generalised velocity of the trunk moving at 1 m/s along the world's x and y; zero where the root cannot move so."""
-    model = creature.model
-    moves = np.zeros((2, model.nv))
-    for joint in range(model.njnt):
-        if model.jnt_bodyid[joint] != creature.trunk:
-            continue
-        dof = model.jnt_dofadr[joint]
-        if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE:
-            moves[:, dof : dof + 2] = np.eye(2)
-        elif model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE:
-            moves[:, dof] = model.jnt_axis[joint][:2]
-    return jnp.asarray(moves, jnp.float32)

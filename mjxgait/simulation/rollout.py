@@ -15,13 +15,13 @@ import numpy as np
 from jax.sharding import Mesh, PartitionSpec
 from jax.typing import ArrayLike
 
-from mjxgait import spd
-from mjxgait.config import Config
+from mjxgait.control import spd
+from mjxgait.control.poses import PoseTracker
 from mjxgait.creature import Creature
-from mjxgait.gait import PoseTracker
-from mjxgait.hyper import chosen
-from mjxgait.starts import Starts
-from mjxgait.tally import Judge, Reason, Tally
+from mjxgait.settings.config import Config
+from mjxgait.settings.traced import chosen
+from mjxgait.simulation.starts import Starts
+from mjxgait.tasks.walk.tally import Judge, Reason, Tally
 from mjxgait.types import BodyState, Plant, pytree
 
 CHECK_EVERY = 16

@@ -15,7 +15,7 @@ from mjxgait.certify import outdated, read_certificate
 from mjxgait.champion import Champion, read_champion
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
-from mjxgait.folder import CERTIFICATE, CHAMPION, METRICS, open_run, read_metrics
+from mjxgait.runs.folder import CERTIFICATE, CHAMPION, METRICS, open_run, read_metrics
 from mjxgait.viewing.curves import draw_fitness
 from mjxgait.viewing.gaitplots import gait_figures
 from mjxgait.viewing.style import Figures, figure
@@ -44,7 +44,7 @@ def write_page(run: Path, out: Path) -> None:
 
 def build_page(walk: Walk, loop: WalkLoop, sections: str) -> str:
     """The text of the page; sections: HTML below the walk."""
-    web = resources.files("mjxgait.viewing") / "web"
+    web = resources.files("mjxgait.web") / "assets"
     # Without the reference to a source map, which a browser's tools would ask for.
     viewer = (
         (web / "model-viewer.min.js")

@@ -9,9 +9,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from mjxgait.config import ControllerConfig, TuningRanges
 from mjxgait.creature import Creature
-from mjxgait.hyper import chosen
+from mjxgait.creature.frame import start_axes, start_position
+from mjxgait.settings.config import ControllerConfig, TuningRanges
+from mjxgait.settings.traced import chosen
 from mjxgait.types import Sensed, pytree
 
 TUNING = tuple(field.name for field in dataclasses.fields(TuningRanges))
@@ -161,18 +162,6 @@ def corrections(
         )
     )
     return (target - stand) * steer * stride + steer * bend + pitch * on_pitch + roll * on_roll
-
-
-def start_axes(creature: Creature) -> tuple[np.ndarray, np.ndarray]:
-    """Horizontal unit vectors [3] forward and left of the nominal standing pose, in the world."""
-    forward = (creature.stand_rot @ creature.forward) * [1, 1, 0]
-    forward = forward / np.linalg.norm(forward)
-    return forward.astype(np.float32), np.cross([0, 0, 1], forward).astype(np.float32)
-
-
-def start_position(creature: Creature) -> np.ndarray:
-    """[3] m, where the trunk stands at the start."""
-    return creature.stand_pos.astype(np.float32)
 
 
 def _clip(correction: jax.Array) -> jax.Array:

@@ -10,7 +10,7 @@ from typing import Any, Literal, get_args, get_origin, get_type_hints
 import jax
 import jax.numpy as jnp
 
-from mjxgait.config import HOST, SHAPE, Config
+from mjxgait.settings.config import HOST, SHAPE, Config
 from mjxgait.types import pytree
 
 

@@ -6,9 +6,9 @@ import jax
 import jax.numpy as jnp
 import optax
 
-from mjxgait.config import FitnessConfig, Weights
 from mjxgait.creature import Creature
-from mjxgait.tally import Reason, Tally
+from mjxgait.settings.config import FitnessConfig, Weights
+from mjxgait.tasks.walk.tally import Reason, Tally
 
 TERMS = tuple(field.name for field in dataclasses.fields(Weights))
 REWARDS = ("distance", "alive")

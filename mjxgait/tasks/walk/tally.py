@@ -8,8 +8,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from mjxgait.creature import Creature
+from mjxgait.creature.frame import start_axes, start_position
 from mjxgait.creature.settings import Termination
-from mjxgait.gait import start_axes, start_position
 from mjxgait.types import Sensed, pytree
 
 CONTACT_GAP = 0.002

@@ -4,10 +4,10 @@ import json
 from pathlib import Path
 from typing import Any
 
-from mjxgait.config import Config
+from mjxgait.settings.config import Config
 from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import UserError
-from mjxgait.tables import build, dump_toml, read_toml
+from mjxgait.settings.tables import build, dump_toml, read_toml
 
 CONFIG, CREATURE, METRICS, CHAMPION = "config.toml", "creature", "metrics.jsonl", "champion.json"
 CERTIFICATE, EXAMS, PLOT = "certificate.json", "exams.jsonl", "fitness.png"

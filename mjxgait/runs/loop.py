@@ -17,24 +17,23 @@ import jax
 import numpy as np
 
 from mjxgait.champion import write_champion
-from mjxgait.checkpoint import Checkpoints, disk_errors
-from mjxgait.config import Config
+from mjxgait.runs.checkpoint import Checkpoints, disk_errors
+from mjxgait.settings.config import Config
 from mjxgait.creature import Creature
-from mjxgait.evolution import EvolutionState, GenerationMetrics, stop_reason
-from mjxgait.examination import Examined, Examiner, why_ended
-from mjxgait.exams import Exams
-from mjxgait.experiment import Step, build_experiment
-from mjxgait.fitness import TERMS
-from mjxgait.folder import (
+from mjxgait.search.evolution import EvolutionState, GenerationMetrics, stop_reason
+from mjxgait.runs.examination import Examined, Examiner, why_ended
+from mjxgait.runs.exams import Exams
+from mjxgait.runs.experiment import Step, build_experiment
+from mjxgait.tasks.walk.fitness import TERMS
+from mjxgait.runs.folder import (
     CERTIFICATE,
     CHAMPION,
     EXAMS,
     METRICS,
-    PLOT,
     read_metrics,
     truncate_metrics,
 )
-from mjxgait.screen import Screen
+from mjxgait.runs.screen import Screen
 
 
 def train(
@@ -80,11 +79,6 @@ def train(
         screen.certificate(examined.certificate)
     lines = read_metrics(folder / METRICS)
     if lines:
-        from mjxgait.viewing.curves import (
-            plot_fitness,
-        )  # matplotlib is slow to import, and nothing needed it until now
-
-        plot_fitness(lines, folder / PLOT)
         screen.report(
             folder,
             reason or "interrupted",

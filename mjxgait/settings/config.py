@@ -1,15 +1,11 @@
-"""Everything a run can be told, as frozen dataclasses, and how the layers of settings are laid over each other."""
+"""Everything a run can be told, as frozen dataclasses."""
 
 import dataclasses
-from collections.abc import Mapping
-from importlib import resources
-from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import pydantic
 
-from mjxgait.errors import UserError, did_you_mean
-from mjxgait.tables import (
+from mjxgait.settings.tables import (
     STRICT,
     Count,
     Finite,
@@ -17,9 +13,6 @@ from mjxgait.tables import (
     NonNegative,
     Positive,
     Whole,
-    build,
-    merge,
-    read_toml,
 )
 
 SHAPE = "shape"
@@ -132,7 +125,7 @@ class RolloutConfig:
 
 @dataclasses.dataclass(frozen=True)
 class Weights:
-    """Weight of each fitness term (mjxgait/fitness.py says what each measures); all but `distance` and `alive` are penalties."""
+    """Weight of each fitness term (mjxgait/tasks/walk/fitness.py says what each measures); all but `distance` and `alive` are penalties."""
 
     __pydantic_config__ = STRICT
     distance: Finite = 1.0
@@ -217,7 +210,7 @@ class EvolutionConfig:
         order; `align` leaves each pose in its place.
       pool: whom parents are drawn from: last generation's survivors, or `growing`, which also holds
         the children born so far (they rank last). unique_children: a child that equals somebody of the
-        pool or a sibling is drawn anew before it is simulated (mjxgait/breeding.py).
+        pool or a sibling is drawn anew before it is simulated (mjxgait/search/breeding.py).
       mutation: `redraw` re-draws two joints of one pose, `single` one joint, `pose` a whole pose, `gaussian` moves every joint of one pose
         by sigma, in units of its range, `mixed` is one or the other of the first and the last. `bit` and `byte` read the value of one joint
         as 8 bits over its range and flip one of them, or re-draw all eight, as classic GAs do. mutation_rate: share of offspring mutated.
@@ -304,96 +297,3 @@ class Config:
     fitness: FitnessConfig = dataclasses.field(default_factory=FitnessConfig)
     evolution: EvolutionConfig = dataclasses.field(default_factory=EvolutionConfig)
     examination: ExaminationConfig = dataclasses.field(default_factory=ExaminationConfig)
-
-
-def data_folder(kind: Literal["envs", "configs"]) -> Path:
-    """Where the shipped creatures or configs lie: inside the installed package, or beside it in a checkout."""
-    package = Path(str(resources.files("mjxgait")))
-    packaged = package / "data" / kind
-    return packaged if packaged.is_dir() else package.parent / kind
-
-
-def resolve_config(
-    creature_table: Mapping[str, Any], creature_name: str, file: Path | None = None
-) -> Config:
-    """The layers, each over the one before: `configs/default.toml`, the creature's `[train]`, the user's file.
-
-    A file may begin with `standalone = true`: then nothing but the built-in defaults lies under it.
-    Its tables `[creature.NAME]` hold keys for the creature of that name, laid over the rest of it.
-
-    Raises:
-      UserError: names the layer and the key.
-    """
-    default = data_folder("configs") / "default.toml"
-    standalone, mine = _file_layers(file, creature_name) if file is not None else (False, [])
-    layers: list[tuple[str, Mapping[str, Any]]] = []
-    if not standalone:
-        layers.append((str(default), read_toml(default)))
-        layers.append((f"{creature_name}/creature.toml: [train]", creature_table))
-    table: dict[str, Any] = {}
-    for where, layer in (*layers, *mine):
-        table = merge(table, layer)
-        build(Config, table, where)
-    return build(Config, table, "the settings taken together")
-
-
-def _file_layers(
-    file: Path, creature_name: str
-) -> tuple[bool, list[tuple[str, Mapping[str, Any]]]]:
-    """Whether a user's file stands alone, and its layers: what it says to all, then to this creature.
-
-    The tables of other creatures are checked too: a mistake shows whoever is trained.
-    """
-    path = _find_config(file)
-    general = read_toml(path)
-    standalone, creatures = general.pop("standalone", False), general.pop("creature", {})
-    if not isinstance(standalone, bool):
-        raise UserError(f"{path}: standalone = {standalone!r}: give true or false")
-    if not isinstance(creatures, Mapping):
-        raise UserError(f"{path}: creature = {creatures!r}: give tables such as [creature.crab]")
-    known = {creature_name, *shipped_creatures()}
-    for name, own in creatures.items():
-        if name not in known:
-            raise UserError(
-                f'{path}: creature.{name}: "{name}" is neither the creature at hand nor a shipped'
-                f" one; {did_you_mean(name, sorted(known))}"
-            )
-        if not isinstance(own, Mapping):
-            raise UserError(f"{path}: creature.{name} = {own!r}: give a table of config keys")
-        build(Config, own, f"{path}: [creature.{name}]")
-    mine = creatures.get(creature_name, {})
-    return standalone, [(str(path), general), (f"{path}: [creature.{creature_name}]", mine)]
-
-
-def _find_config(file: Path) -> Path:
-    shipped = data_folder("configs") / f"{file}.toml"
-    if not file.exists() and shipped.exists():
-        return shipped
-    if not file.exists():
-        known = [path.stem for path in data_folder("configs").glob("*.toml")]
-        raise UserError(
-            f"{file}: no such file and no shipped config of that name; {did_you_mean(str(file), known)}"
-        )
-    return file
-
-
-def shipped_creatures() -> list[str]:
-    """Names of the creatures that come with the program."""
-    return sorted(path.parent.name for path in data_folder("envs").glob("*/creature.toml"))
-
-
-def find_creature(name: str) -> Path:
-    """The folder of a shipped creature, or the folder at a path.
-
-    Raises:
-      UserError: lists the known creatures.
-    """
-    known = shipped_creatures()
-    if name in known:
-        return data_folder("envs") / name
-    folder = Path(name)
-    if (folder / "creature.toml").is_file():
-        return folder
-    raise UserError(
-        f'unknown creature "{name}"; shipped: {", ".join(known)}; or give the path of a folder with creature.xml and creature.toml'
-    )

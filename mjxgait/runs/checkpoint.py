@@ -12,7 +12,7 @@ import numpy as np
 import orbax.checkpoint as ocp
 
 from mjxgait.errors import UserError
-from mjxgait.evolution import EvolutionState
+from mjxgait.search.evolution import EvolutionState
 
 SCHEMA = 1
 FOLDER = "checkpoints"

@@ -12,9 +12,9 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
-from mjxgait.config import EvolutionConfig
-from mjxgait.hyper import chosen
-from mjxgait.variation import Variation
+from mjxgait.search.variation import Variation
+from mjxgait.settings.config import EvolutionConfig
+from mjxgait.settings.traced import chosen
 
 TRIES = 16
 """Drawings of a child that must be new; if all bring somebody who is there, the first is mutated."""

@@ -12,20 +12,20 @@ import numpy as np
 from jax.sharding import Mesh, NamedSharding, PartitionSpec
 
 from mjxgait.champion import Champion
-from mjxgait.config import Config, RolloutConfig
+from mjxgait.settings.config import Config, RolloutConfig
 from mjxgait.creature import Creature
 from mjxgait.creature.settings import Termination
 from mjxgait.errors import UserError
-from mjxgait.evolution import Evolution, EvolutionState, GenerationMetrics, Judged, Proposal
-from mjxgait.fitness import TERMS, fitness_terms, forward_distance, score, weight_vector
-from mjxgait.gait import TUNING, Genome, PoseTracker
-from mjxgait.hyper import traced
+from mjxgait.search.evolution import Evolution, EvolutionState, GenerationMetrics, Judged, Proposal
+from mjxgait.tasks.walk.fitness import TERMS, fitness_terms, forward_distance, score, weight_vector
+from mjxgait.control.poses import TUNING, Genome, PoseTracker
+from mjxgait.settings.traced import traced
 from mjxgait.physics import make_plant
-from mjxgait.rollout import AXIS, Episodes, Simulator
-from mjxgait.starts import Starts, draw_starts
-from mjxgait.tally import Judge, Reason, Tally
+from mjxgait.simulation.rollout import AXIS, Episodes, Simulator
+from mjxgait.simulation.starts import Starts, draw_starts
+from mjxgait.tasks.walk.tally import Judge, Reason, Tally
 from mjxgait.types import pytree
-from mjxgait.variation import Box, pose_variation
+from mjxgait.search.variation import Box, pose_variation
 
 Step = Callable[[EvolutionState], tuple[EvolutionState, GenerationMetrics]]
 """A compiled generation."""

@@ -12,10 +12,10 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
-from mjxgait.breeding import Nursery, parents
-from mjxgait.config import EvolutionConfig
+from mjxgait.search.breeding import Nursery, parents
+from mjxgait.search.variation import Variation, first_occurrence
+from mjxgait.settings.config import EvolutionConfig
 from mjxgait.types import pytree
-from mjxgait.variation import Variation, first_occurrence
 
 
 class Origin(IntEnum):

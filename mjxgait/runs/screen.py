@@ -12,7 +12,7 @@ from rich.status import Status
 from rich.table import Table
 
 from mjxgait.certify import Certificate
-from mjxgait.folder import CHAMPION, CONFIG, CREATURE, METRICS, PLOT
+from mjxgait.runs.folder import CHAMPION, CONFIG, CREATURE, METRICS, PLOT
 
 
 class Screen:

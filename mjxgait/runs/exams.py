@@ -5,7 +5,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from mjxgait.folder import read_metrics
+from mjxgait.runs.folder import read_metrics
 
 
 @dataclasses.dataclass(frozen=True)

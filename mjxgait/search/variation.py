@@ -12,8 +12,8 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
-from mjxgait.config import EvolutionConfig
-from mjxgait.hyper import chosen
+from mjxgait.settings.config import EvolutionConfig
+from mjxgait.settings.traced import chosen
 from mjxgait.types import pytree
 
 

@@ -22,7 +22,7 @@ import numpy as np
 from mjxgait.animation import build_glb, walk_loop, walk_take
 from mjxgait.champion import read_champion
 from mjxgait.errors import UserError
-from mjxgait.folder import CHAMPION, METRICS, open_run, read_metrics
+from mjxgait.runs.folder import CHAMPION, METRICS, open_run, read_metrics
 from mjxgait.viewing.walk import record_walk
 
 HERE = "127.0.0.1"
@@ -156,7 +156,7 @@ class _Handler(BaseHTTPRequestHandler):
         if self.headers.get("Host", "").rsplit(":", 1)[0] not in (HERE, "localhost"):
             self.send_error(HTTPStatus.FORBIDDEN)
             return
-        web = resources.files("mjxgait.viewing") / "web"
+        web = resources.files("mjxgait.web") / "assets"
         match self.path.split("?")[0]:
             case "/":
                 self._send((web / "live.html").read_bytes(), "text/html; charset=utf-8")

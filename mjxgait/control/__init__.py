@@ -1,0 +1,1 @@
+"""Controllers: from what a creature senses to what its joints are told."""

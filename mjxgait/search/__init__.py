@@ -1,0 +1,1 @@
+"""Evolution: whom to try next, and who survives."""

@@ -1,0 +1,1 @@
+"""Walking: the tally of an episode, and the terms of the fitness."""
