@@ -47,7 +47,6 @@ def arrays(window: Recording) -> dict[str, np.ndarray]:
         "hip_height": np.array(size.hip_height),
         "body_length": np.array(size.body_length),
         "foot_names": np.array(size.foot_names),
-        "position": window.position.astype(np.int16),
         "trunk": millionths(window.trunk_pos),
         "pitch": millionths(window.pitch),
         "roll": millionths(window.roll),

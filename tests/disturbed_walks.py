@@ -135,11 +135,10 @@ COUNTS = {
     "contact": 2,
     "airborne": 2,
     "touch": 2,
-    "stride_steps": 2,
     "saturation": 0.5,
     "limits": 0.5,
 }
-EXACT = ("steps", "reason", "strides", "swings", "swinging", "foot_down")
+EXACT = ("steps", "reason", "swings", "swinging", "foot_down")
 TOLERANCE = COUNTS | dict.fromkeys(EXACT, 0)
 """Of what is counted, in steps; all else may differ by 0.1 mm, or rad, or ..., and 0.2 %."""
 UNCOMPARED = {

@@ -1,7 +1,5 @@
 """What an examiner's recording means for the tally, in NumPy: a second reading of tally.py."""
 
-import itertools
-
 import mujoco
 import numpy as np
 
@@ -22,7 +20,6 @@ class Frames:
         self.creature = creature
         model, data = creature.model, mujoco.MjData(creature.model)
         self.qpos, self.qvel, self.torque = film.qpos[row], film.qvel[row], film.torque[row]
-        self.position = film.position[row]
         velocity = np.zeros(6)
         pos, rot, spin, low, place = [], [], [], [], []
         for qpos, qvel in zip(self.qpos, self.qvel, strict=True):
@@ -73,7 +70,7 @@ def end(frames: Frames, fall: Termination | Fall | None = None) -> tuple[int, Re
 def tally_of(frames: Frames, steps: int, half: int, clearance: float) -> dict[str, np.ndarray]:
     """The tally of the first `steps` frames by name, without `reason`; there must be a frame more.
 
-    half: frame whose distance is that of half time. clearance: m wanted of each foot per stride.
+    half: frame whose distance is that of half time. clearance: m wanted of each foot in each swing.
     """
     creature, torque = frames.creature, frames.torque[:steps]
     joints, speeds = frames.joints[:steps], frames.speeds[:steps]
@@ -83,15 +80,12 @@ def tally_of(frames: Frames, steps: int, half: int, clearance: float) -> dict[st
     down = low < CONTACT_GAP
     slid = np.linalg.norm(np.diff(place, axis=0), axis=2) * (down[1:] & down[:-1])
     outside = (joints < creature.pose_low) | (joints > creature.pose_high)
-    ends = np.flatnonzero(np.diff(frames.position[: steps + 1]) < 0)
     return {
         "steps": steps,
         "forward": forward[-1],
         "left": left[-1],
         "forward_half": forward[min(half, steps) - 1],
         "heading": np.arctan2(nose[1], nose[0]),
-        "strides": len(ends),
-        "stride_steps": ends[-1] + 1 if len(ends) else 0,
         "contact": down.sum(0),
         "slip": slid.sum(0),
         "airborne": (~down.any(1)).sum(),
@@ -104,30 +98,25 @@ def tally_of(frames: Frames, steps: int, half: int, clearance: float) -> dict[st
         "work": np.maximum(torque * speeds, 0).sum() * creature.model.opt.timestep,
         "saturation": (np.abs(torque) >= creature.torque_limit).mean(1).sum(),
         "limits": outside.mean(1).sum(),
-        **_swings(low, SWING * creature.hip_height),
-        **_strides(low, ends, clearance),
+        **_swings(low, SWING * creature.hip_height, clearance),
     }
 
 
-def _swings(low: np.ndarray, rise: float) -> dict[str, np.ndarray]:
-    count, swinging = np.zeros(4), np.zeros(4, bool)
-    for heights in low:
-        for foot, height in enumerate(heights):
+def _swings(low: np.ndarray, rise: float, clearance: float) -> dict[str, np.ndarray]:
+    """Swings of each foot, from when it is above `rise` to when it is below half of it."""
+    count, shortfall, peak = np.zeros(4), np.zeros(4), np.zeros(4)
+    swinging = np.zeros(4, bool)
+    for foot, heights in enumerate(low.T):
+        begin = 0
+        for frame, height in enumerate(heights):
             if height > rise:
                 swinging[foot] = True
             elif height < rise / 2 and swinging[foot]:
                 swinging[foot] = False
                 count[foot] += 1
-    return {"swings": count, "swinging": swinging}
-
-
-def _strides(low: np.ndarray, ends: np.ndarray, clearance: float) -> dict[str, np.ndarray]:
-    """A stride lasts from the end of the one before to its own; the first does not count."""
-    shortfall = 0.0
-    for before, last in itertools.pairwise(ends):
-        reached = low[before : last + 1].max(0)
-        shortfall += np.clip(1 - reached / clearance, 0, 1).mean()
-    begin = ends[-1] if len(ends) else 0
-    # The feet begin on the floor, at zero.
-    peak = low[begin:].max(0) if len(ends) else np.maximum(low.max(0), 0)
-    return {"shortfall": shortfall, "peak": peak}
+                highest = heights[begin : frame + 1].max()
+                shortfall[foot] += np.clip(1 - highest / clearance, 0, 1)
+                begin = frame
+        # The feet begin on the floor, at zero.
+        peak[foot] = heights[begin:].max(initial=-np.inf if begin else 0)
+    return {"swings": count, "swinging": swinging, "shortfall": shortfall, "peak": peak}

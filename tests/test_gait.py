@@ -123,21 +123,9 @@ def test_a_blocked_creature_stays_and_a_following_one_moves_on(stool: Creature):
         Genome(jnp.asarray(random_poses(stool)), tuning(threshold=0.1)), settings()
     )
     target = np.asarray(cycle.poses[0])
-    _, blocked, _ = control.target(cycle, control.init(), sensed(stool, target + 0.11))
-    _, moved, stride = control.target(cycle, control.init(), sensed(stool, target + 0.09))
-    assert (int(blocked.position), int(moved.position), bool(stride)) == (0, 1, False)
-
-
-def test_a_stride_is_completed_when_the_cycle_begins_anew(stool: Creature):
-    control = tracker(stool)
-    cycle = control.prepare(
-        Genome(jnp.asarray(random_poses(stool)), tuning(threshold=9.0)), settings()
-    )
-    state, strides = control.init(), []
-    for _ in range(48):
-        _, state, stride = control.target(cycle, state, sensed(stool, stool.stand))
-        strides.append(bool(stride))
-    assert [i for i, stride in enumerate(strides) if stride] == [23, 47]
+    _, blocked = control.target(cycle, control.init(), sensed(stool, target + 0.11))
+    _, moved = control.target(cycle, control.init(), sensed(stool, target + 0.09))
+    assert (int(blocked.position), int(moved.position)) == (0, 1)
 
 
 def test_the_clock_moves_on_whatever_the_creature_does(stool: Creature):
@@ -146,7 +134,7 @@ def test_the_clock_moves_on_whatever_the_creature_does(stool: Creature):
         Genome(jnp.asarray(random_poses(stool)), tuning(period=0.8)), settings(advance="clock")
     )
     state = GaitState(jnp.int32(0), jnp.float32(0.395))
-    _, state, _ = control.target(cycle, state, sensed(stool, stool.stand + 1))
+    _, state = control.target(cycle, state, sensed(stool, stool.stand + 1))
     assert int(state.position) == 12
 
 
@@ -216,7 +204,7 @@ def test_the_target_keeps_to_the_joint_ranges(stool: Creature):
     narrow = dataclasses.replace(stool, joint_low=np.full(4, -0.1), joint_high=np.full(4, 0.2))
     control, poses = tracker(narrow), jnp.array([[3.0, -3.0, 0.1, 0.0]] * 2)
     cycle = control.prepare(Genome(poses, tuning()), settings(key_poses=2, mirror=False))
-    target, _, _ = control.target(cycle, control.init(), sensed(stool, stool.stand))
+    target, _ = control.target(cycle, control.init(), sensed(stool, stool.stand))
     assert np.allclose(target, [0.2, -0.1, 0.1, 0.0], atol=1e-6)
 
 

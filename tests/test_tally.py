@@ -61,16 +61,15 @@ def judged(body: Creature, recordings: list[Frames]) -> tuple[Tally, jax.Array]:
     """The tallies [E, ...] of whole episodes, and what would have ended them, [E, T]."""
     judge, clearance = Judge(body, STEP, STEPS // 2), jnp.float32(clearance_of(body))
 
-    def episode(sensed: Sensed, torque: jax.Array, stride: jax.Array) -> tuple[Tally, jax.Array]:
+    def episode(sensed: Sensed, torque: jax.Array) -> tuple[Tally, jax.Array]:
         def step(tally: Tally, now: tuple) -> tuple[Tally, jax.Array]:
             return judge.update(tally, *now, clearance), judge.examine(now[0])
 
-        return jax.lax.scan(step, judge.init(), (sensed, torque, stride))
+        return jax.lax.scan(step, judge.init(), (sensed, torque))
 
     sensed = jax.tree.map(lambda *rows: jnp.stack(rows), *map(sensed_of, recordings))
     torque = jnp.float32([frames.torque[:STEPS] for frames in recordings])
-    stride = jnp.array([np.diff(frames.position) < 0 for frames in recordings])
-    return jax.device_get(jax.jit(jax.vmap(episode))(sensed, torque, stride))
+    return jax.device_get(jax.jit(jax.vmap(episode))(sensed, torque))
 
 
 @pytest.fixture(scope="module")

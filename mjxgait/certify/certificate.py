@@ -230,7 +230,7 @@ def record(
         refine=refine,
         threads=threads,
     )
-    return measure(creature, champion, outcome.trajectory, inside=refine == 1)
+    return measure(creature, outcome.trajectory, inside=refine == 1)
 
 
 def survival(

@@ -5,9 +5,9 @@ Letters: `S` simulations, `J` actuated joints, `C` poses in the cycle, `nv` degr
 
 import dataclasses
 
-import mujoco
 import numpy as np
 
+from mjxgait.certify.layout import start_frame
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 
@@ -56,13 +56,7 @@ class Controller:
             champion.controller.damping * creature.kd,
         )
         self.length = len(self.cycle) * champion.controller.interpolation
-        data = mujoco.MjData(creature.model)
-        data.qpos[:] = creature.stand_qpos
-        mujoco.mj_kinematics(creature.model, data)
-        rot = data.xmat[creature.trunk].reshape(3, 3)
-        self.start = data.xpos[creature.trunk].copy()
-        self.start_forward = _horizontal(rot @ creature.forward)
-        self.start_left = _horizontal(rot @ creature.left)
+        self.start = start_frame(creature)
 
     def planned(self, position: np.ndarray) -> np.ndarray:
         """Uncorrected target [S, J] in rad at cycle positions [S]."""
@@ -93,11 +87,11 @@ class Controller:
         """`u`, `p` and `r` of docs/controller.md, [S] each."""
         creature, gain = self.creature, self.tuning
         forward, left = senses.trunk_rot @ creature.forward, senses.trunk_rot @ creature.left
-        wrong = np.arctan2(forward @ self.start_left, forward @ self.start_forward)
+        start = self.start
+        wrong = np.arctan2(forward @ start.left, forward @ start.forward)
         if heading is None:
-            wrong = wrong + (senses.trunk_pos - self.start) @ self.start_left / (
-                2 * creature.body_length
-            )
+            aside = (senses.trunk_pos - start.place) @ start.left
+            wrong = wrong + aside / (2 * creature.body_length)
         else:
             wrong = wrong - heading
         nose_down = -np.arcsin(np.clip(forward[:, 2], -1, 1))
@@ -169,8 +163,3 @@ def pose_cycle(key_poses: np.ndarray, creature: Creature) -> np.ndarray:
     if not creature.symmetric:
         return key_poses
     return np.concatenate([key_poses, creature.sign * key_poses[:, creature.partner]])
-
-
-def _horizontal(vector: np.ndarray) -> np.ndarray:
-    flat = vector * [1.0, 1.0, 0.0]
-    return flat / np.linalg.norm(flat)

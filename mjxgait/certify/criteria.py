@@ -1,10 +1,9 @@
 """The criteria of the certificate: pure functions from what was measured to values, thresholds and verdicts.
 
-Letters: `T` frames, `N` feet, `R` strides.
+Letters: `T` frames, `N` feet.
 """
 
 import dataclasses
-import itertools
 from typing import Literal
 
 import numpy as np
@@ -19,6 +18,7 @@ from mjxgait.certify.config import (
 )
 from mjxgait.certify.measure import Recording
 from mjxgait.certify.simulate import Fall
+from mjxgait.certify.strides import clearances, stride_frequency, stride_starts
 
 
 @dataclasses.dataclass(frozen=True)
@@ -84,11 +84,6 @@ def at_least(name: str, value: float, threshold: float, best: float | None = Non
 def at_most(name: str, value: float, threshold: float) -> Measure:
     """A measure that should be small, at best zero."""
     return Measure(name, float(value), "<=", threshold, threshold)
-
-
-def stride_starts(recording: Recording) -> np.ndarray:
-    """[R + 1] frames at which the position in the pose cycle comes round to its beginning; stride `i` is from one to the next."""
-    return np.flatnonzero(np.diff(recording.position) < 0) + 1
 
 
 def upright(whole: Recording, window: Recording, config: Fall) -> Criterion:
@@ -253,28 +248,6 @@ def gait(window: Recording, config: GaitConfig) -> Criterion:
     )
 
 
-def stride_frequency(window: Recording, clearance: float) -> float:
-    """Hz; cycles of the pose cycle, or swings of the median foot where it takes several within a cycle, whichever are more.
-
-    clearance: height in hip heights that makes a swing; the foot must come down to half of it in between.
-    """
-    starts = stride_starts(window)
-    if len(starts) < 2:
-        return np.nan
-    cycles = 1 / (float(np.diff(starts).mean()) * window.time_step)
-    swings = [
-        _swings(height, clearance * window.dimensions.hip_height) for height in window.foot_height.T
-    ]
-    return max(cycles, float(np.median(swings)) / (len(window.position) * window.time_step))
-
-
-def clearances(window: Recording) -> np.ndarray:
-    """[R, N] m, highest that each foot's lowest point gets in each stride."""
-    starts = stride_starts(window)
-    peaks = [window.foot_height[a:b].max(0) for a, b in itertools.pairwise(starts)]
-    return np.array(peaks) if peaks else np.full((1, window.foot_height.shape[1]), np.nan)
-
-
 def slip_distance(window: Recording) -> np.ndarray:
     """[N] m, path that each foot slides on the floor while it carries weight."""
     return (window.foot_slip * window.contact).sum(0) * window.time_step
@@ -336,10 +309,3 @@ def _distance(window: Recording) -> float:
 def _ratio(part: float, distance: float) -> float:
     """Of a nuisance to the distance; not a number where there is no way forward to compare it with."""
     return part / distance if distance > 0 else np.nan
-
-
-def _swings(height: np.ndarray, threshold: float) -> int:
-    """How often a height [T] rises to the threshold after having been below half of it."""
-    state = np.where(height >= threshold, 1, np.where(height < threshold / 2, 0, -1))
-    state = state[state >= 0]
-    return int((np.diff(state) > 0).sum())

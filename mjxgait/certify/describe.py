@@ -5,8 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from mjxgait.certify.criteria import slip_distance, speed, stride_frequency, stride_starts
+from mjxgait.certify.criteria import slip_distance, speed
 from mjxgait.certify.measure import Dimensions, Recording
+from mjxgait.certify.strides import stride_frequency, stride_starts
 
 
 def describe(window: Recording, clearance: float) -> dict[str, Any]:

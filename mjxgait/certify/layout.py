@@ -1,8 +1,11 @@
 """Where things lie in a MuJoCo model, and how low they reach."""
 
+import dataclasses
+
 import mujoco
 import numpy as np
 
+from mjxgait.creature import Creature
 from mjxgait.creature.geometry import support_extents
 
 
@@ -23,6 +26,30 @@ class Layout:
         full[:, self.mass_row, self.mass_column] = lower
         full[:, self.mass_column, self.mass_row] = lower
         return full
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class StartFrame:
+    """Where the trunk starts, and its horizontal directions forward and left there; [3] each."""
+
+    place: np.ndarray
+    forward: np.ndarray
+    left: np.ndarray
+
+
+def start_frame(creature: Creature) -> StartFrame:
+    """From the standing pose, through MuJoCo's kinematics."""
+    data = mujoco.MjData(creature.model)
+    data.qpos[:] = creature.stand_qpos
+    mujoco.mj_kinematics(creature.model, data)
+    rot = data.xmat[creature.trunk].reshape(3, 3)
+    forward, left = (_horizontal(rot @ axis) for axis in (creature.forward, creature.left))
+    return StartFrame(data.xpos[creature.trunk].copy(), forward, left)
+
+
+def _horizontal(vector: np.ndarray) -> np.ndarray:
+    flat = vector * [1.0, 1.0, 0.0]
+    return flat / np.linalg.norm(flat)
 
 
 class LowestPoint:

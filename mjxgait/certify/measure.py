@@ -8,11 +8,9 @@ import dataclasses
 import mujoco
 import numpy as np
 
-from mjxgait.certify.controller import Controller
-from mjxgait.certify.layout import LowestPoint
+from mjxgait.certify.layout import LowestPoint, start_frame
 from mjxgait.certify.overlap import overlaps
 from mjxgait.certify.simulate import Trajectory, examined_model
-from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 
 CARRIES = 1e-3
@@ -44,7 +42,7 @@ class Dimensions:
 class Recording:
     """One simulation, frame by frame.
 
-    time_step: s. cycle_length: positions in the pose cycle. position: [T] in the pose cycle.
+    time_step: s.
     trunk_pos: [T, 3] m along the start's forward, left and up. trunk_up: [T] trunk's up axis . world up. pitch, roll: [T] rad.
     joint_pos, joint_vel, torque: [T, J] rad, rad/s, N·m.
     foot_force: [T, N] N, normal. foot_slip: [T, N] m/s, tangential, of the foot's material at the contact; 0 without contact.
@@ -57,8 +55,6 @@ class Recording:
 
     dimensions: Dimensions
     time_step: float
-    cycle_length: int
-    position: np.ndarray
     trunk_pos: np.ndarray
     trunk_up: np.ndarray
     pitch: np.ndarray
@@ -122,7 +118,6 @@ def dimensions(creature: Creature) -> Dimensions:
 
 def measure(
     creature: Creature,
-    champion: Champion,
     trajectory: Trajectory,
     row: int = 0,
     inside: bool = True,
@@ -134,7 +129,7 @@ def measure(
     Args:
       inside: whether to look for parts in each other, which takes a quarter of the time with meshes.
     """
-    controller = Controller(creature, champion)
+    start = start_frame(creature)
     qpos, qvel, torque = trajectory.qpos[row], trajectory.qvel[row], trajectory.torque[row]
     sight = _Sight(creature, len(qpos))
     for k in range(len(qpos)):
@@ -144,16 +139,12 @@ def measure(
     forward, left, up = (
         sight.trunk_rot @ axis for axis in (creature.forward, creature.left, creature.up)
     )
-    moved = sight.trunk_pos - controller.start * [1, 1, 0]
+    moved = sight.trunk_pos - start.place * [1, 1, 0]
     crossed = overlaps(creature, qpos if inside else qpos[:0])
     return Recording(
         dimensions=dimensions(creature),
         time_step=trajectory.time_step,
-        cycle_length=controller.length,
-        position=trajectory.position[row],
-        trunk_pos=np.stack(
-            [moved @ controller.start_forward, moved @ controller.start_left, moved[:, 2]], 1
-        ),
+        trunk_pos=np.stack([moved @ start.forward, moved @ start.left, moved[:, 2]], 1),
         trunk_up=up[:, 2],
         pitch=-np.arcsin(np.clip(forward[:, 2], -1, 1)),
         roll=np.arcsin(np.clip(left[:, 2], -1, 1)),

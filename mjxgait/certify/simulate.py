@@ -306,10 +306,9 @@ class _Run:
         return np.floor(self.starts.push_time[rows] / time_step) == k
 
     def _travel(self, running: np.ndarray) -> np.ndarray:
-        moved = self.xpos[running, self.creature.trunk] - self.controller.start
-        return np.stack(
-            [moved @ self.controller.start_forward, moved @ self.controller.start_left], 1
-        )
+        start = self.controller.start
+        moved = self.xpos[running, self.creature.trunk] - start.place
+        return np.stack([moved @ start.forward, moved @ start.left], 1)
 
     def _sane(self, running: np.ndarray) -> np.ndarray:
         return (np.abs(self.qvel[running]) < BLOWN_UP).all(1)

@@ -93,8 +93,8 @@ class PoseTracker:
 
     def target(
         self, cycle: PoseCycle, state: GaitState, sensed: Sensed
-    ) -> tuple[jax.Array, GaitState, jax.Array]:
-        """Target pose [J] of this moment, the state of the next, and whether a stride has just been completed []."""
+    ) -> tuple[jax.Array, GaitState]:
+        """Target pose [J] of this moment, and the state of the next."""
         creature = self.creature
         target = interpolate(cycle.poses, state.position, cycle.interpolation, cycle.count)
         target = target + corrections(creature, cycle.tuning, target, sensed)
@@ -106,7 +106,7 @@ class PoseTracker:
         reached = jnp.mean((target - sensed.joint_pos) ** 2) < cycle.tuning[THRESHOLD] ** 2
         by_clock = jnp.floor(positions * time / cycle.tuning[PERIOD]).astype(jnp.int32)
         position = jnp.where(cycle.clocked, by_clock, state.position + reached) % positions
-        return target, GaitState(position, time), position < state.position
+        return target, GaitState(position, time)
 
 
 def pose_cycle(creature: Creature, key_poses: jax.Array) -> jax.Array:

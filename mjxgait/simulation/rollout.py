@@ -204,11 +204,9 @@ class Simulator:
         """All lanes one control step on. A lane whose episode has ended moves on too, but its tally stands still."""
         body = self._per_lane(_push)(lane)
         sensed, workings = self.plant.forward(body)
-        target, control, stride = self._per_lane(self.tracker.target)(
-            lane.cycle, lane.control, sensed
-        )
+        target, control = self._per_lane(self.tracker.target)(lane.cycle, lane.control, sensed)
         torque = self.torque(lane.rules, body, sensed, workings, target)
-        tally = self._per_lane(self._judge)(lane.rules, lane.tally, sensed, torque, stride)
+        tally = self._per_lane(self._judge)(lane.rules, lane.tally, sensed, torque)
         body = self.plant.advance(body, workings, self._per_lane(self._lift)(torque))
         return dataclasses.replace(lane, body=body, control=control, tally=tally)
 
@@ -252,12 +250,10 @@ class Simulator:
             force, acceleration, braked
         )
 
-    def _judge(
-        self, rules: Rules, tally: Tally, sensed: Any, torque: jax.Array, stride: jax.Array
-    ) -> Tally:
+    def _judge(self, rules: Rules, tally: Tally, sensed: Any, torque: jax.Array) -> Tally:
         going = (tally.reason == Reason.FINISHED) & (tally.steps < self.steps)
         reason = self.judge.examine(sensed)
-        updated = self.judge.update(tally, sensed, torque, stride, rules.clearance)
+        updated = self.judge.update(tally, sensed, torque, rules.clearance)
         kept = dataclasses.replace(tally, reason=jnp.where(going, reason, tally.reason))
         return _choose(going & (reason == Reason.FINISHED), updated, kept)
 

@@ -10,10 +10,10 @@ import mujoco
 import numpy as np
 
 from mjxgait.certify.controller import Controller, Senses
-from mjxgait.certify.criteria import stride_starts
 from mjxgait.certify.measure import Recording, measure
 from mjxgait.certify.simulate import Trajectory, simulate
 from mjxgait.certify.starts import nominal_starts
+from mjxgait.certify.strides import stride_starts
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 
@@ -50,7 +50,7 @@ class Walk:
     @cached_property
     def recording(self) -> Recording:
         """What a look at every frame measured."""
-        return measure(self.creature, self.champion, self.trajectory)
+        return measure(self.creature, self.trajectory)
 
     @cached_property
     def forward(self) -> np.ndarray:

@@ -99,7 +99,7 @@ def walk(
     period=0.8, speed=0.8, duty=0.6, lift=0.05, phases=(0.0, 0.5, 0.5, 0.0), seconds=22.0
 ) -> Recording:
     """A made-up steady walk of a dog without physics: every number is a plain function of the phase."""
-    time_step, positions = 0.005, 40
+    time_step = 0.005
     time = np.arange(round(seconds / time_step)) * time_step
     phase = time / period
     foot_phase = (phase[:, None] + phases) % 1.0
@@ -111,8 +111,6 @@ def walk(
     return Recording(
         dimensions=DOG,
         time_step=time_step,
-        cycle_length=positions,
-        position=(np.floor(phase * positions + 1e-6) % positions).astype(int),
         trunk_pos=np.stack([speed * time, 0.01 * np.sin(sway), 0.4 + 0.01 * np.sin(2 * sway)], 1),
         trunk_up=np.full_like(time, 0.99),
         pitch=0.02 * np.sin(2 * sway),

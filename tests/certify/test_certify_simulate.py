@@ -217,7 +217,7 @@ def test_the_recording_looks_along_the_start(tiny, trotter):
 def test_half_the_time_step_has_the_same_frames_and_nearly_the_same_walk(tiny, trotter):
     whole, halved = record(tiny, trotter, 2.0), record(tiny, trotter, 2.0, refine=2)
     assert halved.time_step == whole.time_step
-    np.testing.assert_array_equal(halved.position, whole.position)
+    assert len(halved.trunk_pos) == len(whole.trunk_pos)
     assert halved.trunk_pos[-1, 0] == pytest.approx(whole.trunk_pos[-1, 0], rel=0.5)
     assert not np.array_equal(halved.joint_pos, whole.joint_pos)
 
@@ -254,7 +254,7 @@ def test_a_simulation_that_blows_up_is_down_and_does_not_come_back(
     assert outcome.stayed_up.tolist() == [True, False]
     assert np.isfinite(outcome.trajectory.qpos[0]).all()
     assert np.isnan(outcome.trajectory.qpos[1, -1]).all()
-    recording = measure(tiny, trotter, outcome.trajectory, row=1)
+    recording = measure(tiny, outcome.trajectory, row=1)
     assert np.isnan(recording.trunk_up[-1])
     assert recording.touch[-1]
     # MuJoCo leaves a log where it is run when it meets numbers that are not finite.
@@ -313,7 +313,7 @@ def resting(creature, **changes):
     """Forward way in m, and depth of the feet in m, after 2 s of standing on a changed start."""
     starts = dataclasses.replace(nominal_starts(creature, 1), **changes)
     outcome = simulate(creature, make_champion(creature), starts, 2.0, record=1)
-    recording = measure(creature, make_champion(creature), outcome.trajectory)
+    recording = measure(creature, outcome.trajectory)
     return outcome.travel[0, 0], -recording.foot_height[-1].mean()
 
 

@@ -43,14 +43,11 @@ def fitness_terms(
     lived = jnp.maximum(tally.steps, 1)
     length = creature.body_length
     moved = jnp.maximum(tally.forward, 0.25 * length)
-    strides = jnp.maximum(tally.strides, 1)
-    # Several swings in one cycle of poses must not hide a buzz.
-    rate = (
-        jnp.maximum(
-            tally.strides / jnp.maximum(tally.stride_steps, 1), jnp.mean(tally.swings) / lived
-        )
-        / step
-    )
+    rate = jnp.mean(tally.swings) / lived / step
+    # As often as the foot in the middle; one that swings less often has not left the floor.
+    strides = jnp.sort(tally.swings)[tally.swings.shape[0] // 2]
+    dragged = tally.shortfall + jnp.maximum(strides - tally.swings, 0.0)
+    low_feet = jnp.mean(dragged / jnp.maximum(jnp.maximum(tally.swings, strides), 1.0))
     duty = tally.contact / lived
     second_half = tally.forward - tally.forward_half
     crossed = jnp.maximum(tally.overlap / creature.hip_height - TOUCHING, 0.0)
@@ -61,9 +58,7 @@ def fitness_terms(
         "drift": jnp.abs(tally.left) / length + jnp.abs(jnp.sin(0.5 * tally.heading)),
         "fade": jnp.maximum(tally.forward_half - second_half, 0.0) / length,
         "slip": jnp.max(tally.slip) / moved,
-        "clearance": jnp.where(
-            tally.strides > 1, tally.shortfall / jnp.maximum(strides - 1, 1), 1.0
-        ),
+        "clearance": jnp.where(strides > 0, low_feet, 1.0),
         "frequency": jnp.maximum(rate / stride_limit(creature.mass) - config.frequency, 0.0),
         "duty": jnp.max(jnp.maximum(duty - 0.8, 0.0) + jnp.maximum(0.25 - duty, 0.0)) / 0.2,
         "airborne": tally.airborne / lived,

@@ -36,9 +36,10 @@ class Tally:
 
     steps: [] steps survived. reason: [] why the episode ended. forward, left: [] m from the start to the latest position.
     forward_half: [] m, `forward` at half time. heading: [] rad.
-    strides: [] completed cycles. stride_steps: [] steps up to the last completion.
-    swings: [F] completed swings, swinging: [F] whether in one: a swing rises above `SWING` and comes down to half of it.
-    shortfall: [] missing foot clearance, share of the wanted, summed over strides. peak: [F] m, highest in this stride.
+    swings: [F] completed swings, swinging: [F] whether in one: a swing rises above `SWING` and
+      comes down to half of it; there it ends in a footfall.
+    shortfall: [F] missing clearance, share of the wanted, summed over swings. peak: [F] m, highest
+      since the latest footfall.
     contact: [F] steps in contact. slip: [F] m slid while in contact. airborne: [] steps without any foot on the floor.
     foot_height: [] m·steps, mean height of the feet. foot_pos: [F, 2], foot_down: [F] of the previous step.
     tilt: [] of 1 - up.z. wobble: [] (rad/s)² of the trunk. touch: [] steps on which another part touches.
@@ -52,8 +53,6 @@ class Tally:
     left: jax.Array
     forward_half: jax.Array
     heading: jax.Array
-    strides: jax.Array
-    stride_steps: jax.Array
     swings: jax.Array
     swinging: jax.Array
     shortfall: jax.Array
@@ -89,14 +88,9 @@ class Judge:
         """The empty tally."""
         feet = len(self.creature.foot_names)
         values = {field.name: jnp.zeros(()) for field in dataclasses.fields(Tally)}
-        counts = {
-            name: jnp.zeros((), jnp.int32)
-            for name in ("steps", "reason", "strides", "stride_steps")
-        }
-        per_foot = {
-            name: jnp.zeros(feet)
-            for name in ("swings", "swinging", "peak", "contact", "slip", "foot_down")
-        }
+        counts = {name: jnp.zeros((), jnp.int32) for name in ("steps", "reason")}
+        names = ("swings", "swinging", "shortfall", "peak", "contact", "slip", "foot_down")
+        per_foot = {name: jnp.zeros(feet) for name in names}
         return Tally(**(values | counts | per_foot | {"foot_pos": jnp.zeros((feet, 2))}))
 
     def examine(self, sensed: Sensed) -> jax.Array:
@@ -125,13 +119,12 @@ class Judge:
         tally: Tally,
         sensed: Sensed,
         torque: jax.Array,
-        stride: jax.Array,
         clearance: jax.Array,
     ) -> Tally:
         """The tally after one more step.
 
         Args:
-          torque: [J] N·m. stride: [] whether the controller completed its cycle. clearance: [] m wanted of each foot per stride.
+          torque: [J] N·m. clearance: [] m wanted of each foot in each of its swings.
         """
         creature = self.creature
         start_forward, start_left = start_axes(creature)
@@ -141,11 +134,11 @@ class Judge:
         low, pos = self._feet(sensed)
         down = (low < CONTACT_GAP).astype(jnp.float32)
         peak = jnp.maximum(tally.peak, low)
-        missing = jnp.mean(jnp.clip(1.0 - peak / jnp.maximum(clearance, 1e-6), 0.0, 1.0))
+        missing = jnp.clip(1.0 - peak / jnp.maximum(clearance, 1e-6), 0.0, 1.0)
         slid = jnp.linalg.norm(pos - tally.foot_pos, axis=1) * down * tally.foot_down
         rise = SWING * creature.hip_height
         swinging = jnp.where(low > rise, 1.0, jnp.where(low < 0.5 * rise, 0.0, tally.swinging))
-        first = tally.strides == 0
+        fallen = jnp.maximum(tally.swinging - swinging, 0.0)
         outside = (sensed.joint_pos < creature.pose_low.astype(np.float32)) | (
             sensed.joint_pos > creature.pose_high.astype(np.float32)
         )
@@ -158,12 +151,10 @@ class Judge:
             left=moved @ start_left,
             forward_half=jnp.where(steps <= self.half_time, forward, tally.forward_half),
             heading=jnp.arctan2(forward_axis @ start_left, forward_axis @ start_forward),
-            strides=tally.strides + stride,
-            stride_steps=jnp.where(stride, steps, tally.stride_steps),
-            swings=tally.swings + jnp.maximum(tally.swinging - swinging, 0.0),
+            swings=tally.swings + fallen,
             swinging=swinging,
-            shortfall=tally.shortfall + jnp.where(stride & ~first, missing, 0.0),
-            peak=jnp.where(stride, low, peak),
+            shortfall=tally.shortfall + fallen * missing,
+            peak=jnp.where(fallen > 0, low, peak),
             contact=tally.contact + down,
             slip=tally.slip + slid,
             airborne=tally.airborne + (jnp.max(down) == 0.0),
