@@ -88,13 +88,13 @@ def train(folder: Path, name: str, seed: int, config: str | None, candidates: in
 
 def row(folder: Path, seed: int, wall: float) -> list[str]:
     """What the run folder and two more looks in C MuJoCo say."""
-    creature, _ = open_run(folder)
+    creature, config = open_run(folder)
     champion = read_champion(folder / CHAMPION, creature)
     certificate = read_certificate(folder / CERTIFICATE) or sys.exit(
         f"{folder}: no certificate; delete it, and it is made again"
     )
-    seconds = champion.origin["nominal_seconds"]
-    evolved, examined = champion.origin["nominal_forward"], distance(creature, champion, seconds)
+    seconds, evolved = config.rollout.seconds, champion.origin["nominal"]["forward"]
+    examined = distance(creature, champion, seconds)
     starts = next(c for c in certificate["criteria"] if c["number"] == 4)["measures"][0]["value"]
     margin = certificate["margin"]
     return [

@@ -58,6 +58,21 @@ class Sensed:
     geom_low: jax.Array
 
 
+@pytree
+class Judged:
+    """The verdict on N genomes in R trials each.
+
+    terms: [N, R, F], of the fitness. outcome: [N, R, O], what a person would measure. failed: [N, R]
+    whether the episode ended early. sim_steps, computed_steps: [].
+    """
+
+    terms: jax.Array
+    outcome: jax.Array
+    failed: jax.Array
+    sim_steps: jax.Array
+    computed_steps: jax.Array
+
+
 class Plant(Protocol):
     """Batched physics of one creature, one step split around the controller.
 

@@ -2,8 +2,12 @@
 
 from pathlib import Path
 
-from mjxgait.settings.config import Config
+import jax
+
+from mjxgait.settings.config import Config, FitnessConfig
 from mjxgait.settings.tables import build
+from mjxgait.tasks.score import in_order
+from mjxgait.tasks.walk.fitness import TERMS, signed_weights
 
 STOOL = Path(__file__).parent / "data" / "stool"
 
@@ -17,3 +21,8 @@ def small_config(**tables: dict) -> Config:
     for name, values in tables.items():
         table[name] = {**table.get(name, {}), **values}
     return build(Config, table, "test")
+
+
+def weight_vector(config: FitnessConfig, generation: jax.Array) -> jax.Array:
+    """The weights [F] of walking in the order of its terms."""
+    return in_order(signed_weights(config, generation), TERMS)

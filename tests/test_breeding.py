@@ -7,9 +7,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from mjxgait.control.pose_variation import pose_variation
 from mjxgait.control.poses import Genome
 from mjxgait.search.breeding import Nursery
-from mjxgait.search.variation import Box, first_occurrence, pose_variation
+from mjxgait.search.variation import Box, first_occurrence
 from mjxgait.settings.config import EvolutionConfig
 
 THESIS = EvolutionConfig(

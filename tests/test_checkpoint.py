@@ -25,7 +25,7 @@ def evolution():
 @pytest.fixture(scope="module")
 def states(evolution) -> list[EvolutionState]:
     """The states of generations 0 to 6."""
-    state, step = evolution.init(jax.random.key(0), 1, 1), jax.jit(evolution.step)
+    state, step = evolution.init(jax.random.key(0), 1, 1, 1), jax.jit(evolution.step)
     found = []
     for _ in range(7):
         state, _ = step(state)
@@ -45,7 +45,7 @@ def run(tmp_path: Path, states: list[EvolutionState]) -> Path:
 
 def restore(run: Path, evolution, digest: str = DIGEST, **where) -> EvolutionState:
     return Checkpoints(run).restore(
-        jax.eval_shape(lambda: evolution.init(jax.random.key(0), 1, 1)), digest, **where
+        jax.eval_shape(lambda: evolution.init(jax.random.key(0), 1, 1, 1)), digest, **where
     )
 
 
@@ -118,7 +118,7 @@ def test_another_body_is_refused(run: Path, evolution):
 def test_another_schema_is_refused(run: Path, evolution):
     manifest = run / FOLDER / "6" / "manifest" / "metadata"
     manifest.write_text(json.dumps(json.loads(manifest.read_text()) | {"schema": 99}))
-    with pytest.raises(UserError, match="written with schema 99, this version reads 1"):
+    with pytest.raises(UserError, match="written with schema 99, this version reads 2"):
         restore(run, evolution)
 
 

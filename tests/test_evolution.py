@@ -9,18 +9,19 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from mjxgait.control.pose_variation import pose_variation
 from mjxgait.control.poses import Genome
 from mjxgait.search.breeding import parents
 from mjxgait.search.evolution import (
     Evolution,
     EvolutionState,
     GenerationMetrics,
-    Judged,
     Origin,
     stop_reason,
 )
-from mjxgait.search.variation import Box, first_occurrence, pose_variation
+from mjxgait.search.variation import Box, first_occurrence
 from mjxgait.settings.config import EvolutionConfig, ForcedConfig
+from mjxgait.types import Judged
 
 K, J = 2, 3
 BOX = Box(Genome(-jnp.ones((K, J)), jnp.zeros(1)), Genome(jnp.ones((K, J)), jnp.zeros(1)))
@@ -41,6 +42,7 @@ class Toy(Evolution):
         terms = self.value(proposal.offspring)[:, None, None]
         judged = Judged(
             terms=terms,
+            outcome=terms,
             failed=~jnp.isfinite(terms[..., 0]),
             sim_steps=jnp.int32(0),
             computed_steps=jnp.int32(0),
@@ -59,7 +61,7 @@ def toy(value: Callable[[Genome], jax.Array] = near_zero, **settings) -> Toy:
 def run(
     evolution: Toy, generations: int = 30, seed: int = 0
 ) -> list[tuple[EvolutionState, GenerationMetrics]]:
-    state, step = evolution.init(jax.random.key(seed), 1, 1), jax.jit(evolution.step)
+    state, step = evolution.init(jax.random.key(seed), 1, 1, 1), jax.jit(evolution.step)
     history = []
     while len(history) < generations:
         state, metrics = step(state)
@@ -104,7 +106,7 @@ def test_duplicates_fill_the_population_when_they_may_stay():
 @pytest.mark.parametrize("growth", [1.2, 1.5, 2.0, 3.0])
 def test_everybody_of_the_initial_population_is_judged_before_generation_zero(growth: float):
     evolution = toy(growth=growth)
-    created = evolution.init(jax.random.key(0), 1, 1)
+    created = evolution.init(jax.random.key(0), 1, 1, 1)
     first = run(evolution, 1)[0][0]
     assert int(first.generation) == 0
     assert np.allclose(first.fitness, np.sort(near_zero(created.genomes))[::-1])

@@ -5,10 +5,11 @@ import dataclasses
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from helpers import small_config
+from helpers import small_config, weight_vector
 
 from mjxgait.creature import Creature
-from mjxgait.tasks.walk.fitness import REWARDS, TERMS, fitness_terms, score, weight_vector
+from mjxgait.tasks.score import score
+from mjxgait.tasks.walk.fitness import REWARDS, TERMS, fitness_terms
 from mjxgait.tasks.walk.tally import Judge, Reason
 
 STEP, HORIZON = 0.005, 1000
@@ -67,7 +68,7 @@ def terms_of(body: Creature, tally: dict, **fitness: float) -> dict[str, float]:
     arrays = {name: jnp.asarray(value) for name, value in (LIVED | tally).items()}
     filled = dataclasses.replace(Judge(body, STEP, HORIZON // 2).init(), **arrays)
     terms = fitness_terms(body, config, STEP, HORIZON, filled)
-    return dict(zip(TERMS, np.asarray(terms).tolist(), strict=True))
+    return {name: float(value) for name, value in terms.items()}
 
 
 IDS = [f"{name} of {' and '.join(tally) or 'a whole walk'}" for name, _, tally in CASES]

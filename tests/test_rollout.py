@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
-from helpers import small_config
+from helpers import small_config, weight_vector
 
 from mjxgait.control.poses import Genome
 from mjxgait.creature import Creature
@@ -17,16 +17,14 @@ from mjxgait.search.variation import Box, uniform
 from mjxgait.settings.config import Config
 from mjxgait.settings.layers import resolve_config
 from mjxgait.simulation.rollout import Episodes
-from mjxgait.simulation.starts import NEVER, Starts, draw_starts
+from mjxgait.tasks.score import in_order, score
+from mjxgait.tasks.trials import NEVER, Starts, draw_starts
 from mjxgait.tasks.walk.fitness import (
     BEYOND,
     REWARDS,
     TERMS,
     fitness_terms,
-    forward_distance,
-    score,
     stride_limit,
-    weight_vector,
 )
 from mjxgait.tasks.walk.tally import Reason
 from mjxgait.types import BodyState, Sensed
@@ -37,7 +35,7 @@ ENDS = (Reason.TIPPED, Reason.TOO_LOW, Reason.TOO_HIGH, Reason.TOUCHED)
 def genomes(experiment: Experiment, count: int, seed: int = 0) -> Genome:
     return uniform(
         jax.random.key(seed),
-        Box(*experiment.simulator.tracker.bounds(experiment.config.controller)),
+        Box(*experiment.simulator.controller.bounds(experiment.config.controller)),
         count,
     )
 
@@ -162,7 +160,7 @@ def reason_to_end(
         geom_pos=jnp.zeros((len(creature.watched), 3)),
         geom_low=jnp.full(len(creature.watched), low),
     )
-    return Reason(int(experiment.simulator.judge.examine(sensed)))
+    return Reason(int(experiment.simulator.reason(sensed, ())))
 
 
 WRONG = {
@@ -244,7 +242,7 @@ def standing_terms(experiment: Experiment) -> dict[str, float]:
     terms = fitness_terms(
         experiment.creature, experiment.config.fitness, 0.005, experiment.simulator.steps, tally
     )
-    return dict(zip(TERMS, np.asarray(terms).tolist(), strict=True))
+    return {name: float(value) for name, value in terms.items()}
 
 
 def test_terms_of_one_that_stands_still(experiment: Experiment):
@@ -264,12 +262,12 @@ def test_style_counts_in_proportion_to_the_walk(experiment: Experiment):
     enough = config.speed * horizon * 0.005 * creature.body_length
     for share in (0.0, 0.5, 1.0):
         tally = dataclasses.replace(
-            experiment.simulator.judge.init(),
+            experiment.simulator.task.init(),
             steps=jnp.int32(horizon),
             forward=jnp.float32(share * enough),
         )
         terms = fitness_terms(creature, config, 0.005, horizon, tally)
-        assert float(terms[TERMS.index("clearance")]) == pytest.approx(share, abs=1e-5)
+        assert float(terms["clearance"]) == pytest.approx(share, abs=1e-5)
 
 
 def test_beyond_the_wanted_speed_distance_counts_little(experiment: Experiment):
@@ -280,19 +278,18 @@ def test_beyond_the_wanted_speed_distance_counts_little(experiment: Experiment):
     )
     lengths = config.speed * horizon * 0.005
     tally = dataclasses.replace(
-        experiment.simulator.judge.init(), forward=jnp.float32(3 * lengths * creature.body_length)
+        experiment.simulator.task.init(), forward=jnp.float32(3 * lengths * creature.body_length)
     )
-    term = float(fitness_terms(creature, config, 0.005, horizon, tally)[TERMS.index("distance")])
+    term = float(fitness_terms(creature, config, 0.005, horizon, tally)["distance"])
     assert term == pytest.approx(lengths * (1 + 2 * BEYOND), rel=1e-5)
-    assert forward_distance(creature, config, horizon * 0.005, term) == pytest.approx(
-        3 * lengths * creature.body_length, rel=1e-4
-    )
+    metres = experiment.simulator.task.outcome(tally)["forward"]
+    assert float(metres) == pytest.approx(3 * lengths * creature.body_length, rel=1e-4)
 
 
 def test_a_fall_scores_below_everybody_who_stays_up(experiment: Experiment, stool: Creature):
     """With the weights of configs/wilson.toml, whatever the distance; by default it costs nothing."""
     thesis = resolve_config({}, stool.name, Path("wilson"))
-    steps, judge = experiment.simulator.steps, experiment.simulator.judge
+    steps, judge = experiment.simulator.steps, experiment.simulator.task
 
     def fitness(config: Config, forward: float, reason: Reason, after: int) -> float:
         tally = dataclasses.replace(
@@ -301,7 +298,7 @@ def test_a_fall_scores_below_everybody_who_stays_up(experiment: Experiment, stoo
             reason=jnp.int32(reason),
             forward=jnp.float32(forward),
         )
-        terms = fitness_terms(stool, config.fitness, 0.005, steps, tally)
+        terms = in_order(fitness_terms(stool, config.fitness, 0.005, steps, tally), TERMS)
         return float(score(terms[None], weight_vector(config.fitness, jnp.int32(0)), 0.0))
 
     fallen = {reason: fitness(thesis, 50.0, reason, steps - 1) for reason in ENDS}

@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 from helpers import STOOL, small_config
 
+from mjxgait.control.drive import Rules
 from mjxgait.control.spd import limited_torque, pd_force
 from mjxgait.creature import Creature, load_creature
 from mjxgait.runs.experiment import build_experiment
-from mjxgait.simulation.rollout import Rules, Simulator
+from mjxgait.simulation.rollout import Simulator
 from mjxgait.types import BodyState
 
 SLIM = {"xla_backend_optimization_level": 0}
@@ -87,14 +88,12 @@ def wanted(creature: Creature, case: Case) -> np.ndarray:
 
 def rules(cases: list[Case]) -> Rules:
     """As the rollout has them, [L]."""
-    of_torque = {
-        "stable": jnp.array([case.stable for case in cases]),
-        "constraint_forces": jnp.array([case.counts for case in cases]),
-        "stiffness": jnp.array([case.stiffness for case in cases]),
-        "damping": jnp.array([case.damping for case in cases]),
-    }
-    others = {field.name: jnp.ones(len(cases)) for field in dataclasses.fields(Rules)}
-    return Rules(**(others | of_torque))
+    return Rules(
+        stable=jnp.array([case.stable for case in cases]),
+        constraint_forces=jnp.array([case.counts for case in cases]),
+        stiffness=jnp.array([case.stiffness for case in cases]),
+        damping=jnp.array([case.damping for case in cases]),
+    )
 
 
 def simulator_of(creature: Creature, physics: str) -> Simulator:
@@ -118,7 +117,7 @@ def torques(request: pytest.FixtureRequest, stool: Creature) -> dict[str, np.nda
 
     def torque(state: BodyState, rules: Rules, target: jax.Array) -> jax.Array:
         sensed, workings = simulator.plant.forward(state)
-        return simulator.torque(rules, state, sensed, workings, target)
+        return simulator.drive.torque(simulator.plant, rules, state, sensed, workings, target)
 
     target = jnp.moveaxis(jnp.tile(jnp.float32(TARGET), (len(cases), 1)), 0, lanes)
     program = jax.jit(torque).lower(state, rules(cases), target).compile(compiler_options=SLIM)

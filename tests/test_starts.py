@@ -8,7 +8,7 @@ import pytest
 from helpers import small_config
 
 from mjxgait.creature import Creature
-from mjxgait.simulation.starts import NEVER, Starts, draw_starts
+from mjxgait.tasks.trials import NEVER, Starts, draw_starts
 
 NONE = {"joint_noise": 0.0, "velocity_noise": 0.0, "friction": (1.0, 1.0), "push": 0.0}
 COUNT = 40

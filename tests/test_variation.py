@@ -5,9 +5,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from mjxgait.control.pose_variation import pose_variation
 from mjxgait.control.poses import Genome
 from mjxgait.search import variation
-from mjxgait.search.variation import Box, first_occurrence, pose_variation
+from mjxgait.search.variation import Box, first_occurrence
 from mjxgait.settings.config import EvolutionConfig
 
 K, J, E = 3, 5, 7

@@ -75,7 +75,7 @@ class _Group:
         states = self._begin(batch, checkpoints)
         tell({"compiling": len(self.runs), "note": batch.experiments[0].plant_note})
         step = batch.compile()
-        states = batch.place(states)
+        states, task = batch.place(states), batch.experiments[0].simulator.task
         try:
             while (generation := int(np.max(states.generation))) < self.last and not stopped():
                 began = time.perf_counter()
@@ -85,7 +85,7 @@ class _Group:
                 if now < 0:
                     continue
                 lines = [
-                    metrics_line(jax.tree.map(lambda leaf, i=i: leaf[i], metrics), 1.0)
+                    metrics_line(jax.tree.map(lambda leaf, i=i: leaf[i], metrics), 1.0, task)
                     for i in range(len(self.runs))
                 ]
                 self._log(lines)

@@ -52,8 +52,7 @@ def distance_to_limit(
 def _lanes(experiment: Experiment, lanes: int) -> Lane:
     """Simulations at the start, as many as a device holds."""
     simulator = experiment.simulator
-    low, _ = simulator.tracker.bounds(experiment.config.controller)
-    genomes = jax.tree.map(lambda leaf: leaf[None, None], low)
+    genomes = jax.tree.map(lambda leaf: leaf[None, :1], experiment.init().genomes)
     starts, settings = jax.tree.map(
         lambda leaf: leaf[None], (experiment.row.starts, experiment.row.settings)
     )

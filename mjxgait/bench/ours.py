@@ -14,7 +14,6 @@ from mjxgait.creature import load_creature
 from mjxgait.runs.experiment import Experiment, build_experiment, prepare_devices
 from mjxgait.search.evolution import EvolutionState
 from mjxgait.settings.config import Config
-from mjxgait.tasks.walk.fitness import TERMS, forward_distance
 
 
 class Ours:
@@ -58,16 +57,8 @@ class Ours:
 
     def _mean_forward(self, state: EvolutionState) -> float:
         """m, over all episodes."""
-        creature, config = self.experiment.creature, self.experiment.config
-        distances = np.asarray(state.terms[..., TERMS.index("distance")]).ravel()
-        return float(
-            np.nanmean(
-                [
-                    forward_distance(creature, config.fitness, config.rollout.seconds, float(d))
-                    for d in distances
-                ]
-            )
-        )
+        place = self.experiment.simulator.task.outcomes.index("forward")
+        return float(np.nanmean(np.asarray(state.outcome[..., place])))
 
     def useful_share(self) -> float:
         """Of all computed steps, how many were lived, in the generation that a lap computes."""

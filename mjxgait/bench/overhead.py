@@ -22,7 +22,6 @@ from mjxgait.runs.experiment import Experiment, evolution_of
 from mjxgait.runs.folder import EXAMS
 from mjxgait.runs.screen import Screen
 from mjxgait.search.evolution import EvolutionState, GenerationMetrics, Judged
-from mjxgait.tasks.walk.fitness import TERMS
 
 REPEATS = 30
 
@@ -44,13 +43,16 @@ def overhead(ours: Ours, generations: int = 8) -> dict[str, float]:
 
 def _operators(experiment: Experiment) -> float:
     """Of a generation whose judge answers at once."""
-    rollout, count = experiment.config.rollout, experiment.config.evolution.offspring
+    task, count = experiment.simulator.task, experiment.config.evolution.offspring
+    trials = experiment.config.rollout.starts
 
     def stub(genomes: Any) -> Judged:
         terms = jnp.mean(genomes.key_poses, axis=(1, 2))[:, None, None] * jnp.ones(
-            (1, rollout.starts, len(TERMS))
+            (1, trials, len(task.terms))
         )
-        return Judged(terms, jnp.zeros((count, rollout.starts), bool), jnp.int32(1), jnp.int32(1))
+        outcome = jnp.zeros((count, trials, len(task.outcomes)))
+        failed = jnp.zeros((count, trials), bool)
+        return Judged(terms, outcome, failed, jnp.int32(1), jnp.int32(1))
 
     evolution = evolution_of(experiment.simulator, experiment.row.settings)
 

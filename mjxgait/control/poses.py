@@ -4,16 +4,20 @@ Every function is for one creature; the rollout maps them over its lanes.
 """
 
 import dataclasses
+from typing import ClassVar
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
+from mjxgait.control.pose_variation import pose_variation
+from mjxgait.control.protocol import Command, Senses
 from mjxgait.creature import Creature
 from mjxgait.creature.frame import start_axes, start_position
-from mjxgait.settings.config import ControllerConfig, TuningRanges
+from mjxgait.search.variation import Box, Variation, in_ranges
+from mjxgait.settings.config import ControllerConfig, EvolutionConfig, TuningRanges
 from mjxgait.settings.traced import chosen
-from mjxgait.types import Sensed, pytree
+from mjxgait.types import pytree
 
 TUNING = tuple(field.name for field in dataclasses.fields(TuningRanges))
 THRESHOLD, PERIOD, STEER, PITCH, PITCH_RATE, ROLL, ROLL_RATE = range(len(TUNING))
@@ -56,11 +60,13 @@ class GaitState:
 class PoseTracker:
     """A controller: the cycle of key poses of one creature.
 
-    The rollout needs three things of any controller: `prepare` (genome and settings to what an episode keeps), `init` and `target`.
+    step: s between two control steps.
     """
 
     creature: Creature
     step: float
+    reads = ("joint_pos", "trunk_pos", "trunk_rot", "trunk_angvel")
+    command: ClassVar[Command] = "pose"
 
     def bounds(self, config: ControllerConfig) -> tuple[Genome, Genome]:
         """Lowest and highest genome: key_poses [K, J], tuning [E]."""
@@ -74,6 +80,14 @@ class PoseTracker:
             return Genome(jnp.asarray(np.broadcast_to(pose, shape), jnp.float32), tuning)
 
         return genome(self.creature.pose_low, low), genome(self.creature.pose_high, high)
+
+    def variation(self, settings: ControllerConfig, evolution: EvolutionConfig) -> Variation:
+        """See `Controller`."""
+        return pose_variation(Box(*self.bounds(settings)), evolution)
+
+    def genes(self, genomes: Genome, settings: ControllerConfig) -> np.ndarray:
+        """See `Controller`."""
+        return in_ranges(genomes, Box(*self.bounds(settings)))
 
     def prepare(self, genome: Genome, config: ControllerConfig) -> PoseCycle:
         """The whole cycle of a genome [K, J] under the settings, plain or traced."""
@@ -91,19 +105,19 @@ class PoseTracker:
         """The state at the start of an episode."""
         return GaitState(position=jnp.zeros((), jnp.int32), time=jnp.zeros((), jnp.float32))
 
-    def target(
-        self, cycle: PoseCycle, state: GaitState, sensed: Sensed
+    def act(
+        self, cycle: PoseCycle, state: GaitState, senses: Senses
     ) -> tuple[jax.Array, GaitState]:
         """Target pose [J] of this moment, and the state of the next."""
         creature = self.creature
         target = interpolate(cycle.poses, state.position, cycle.interpolation, cycle.count)
-        target = target + corrections(creature, cycle.tuning, target, sensed)
+        target = target + corrections(creature, cycle.tuning, target, senses)
         target = jnp.clip(
             target, creature.joint_low.astype(np.float32), creature.joint_high.astype(np.float32)
         )
         time = state.time + self.step
         positions = cycle.count * cycle.interpolation
-        reached = jnp.mean((target - sensed.joint_pos) ** 2) < cycle.tuning[THRESHOLD] ** 2
+        reached = jnp.mean((target - senses["joint_pos"]) ** 2) < cycle.tuning[THRESHOLD] ** 2
         by_clock = jnp.floor(positions * time / cycle.tuning[PERIOD]).astype(jnp.int32)
         position = jnp.where(cycle.clocked, by_clock, state.position + reached) % positions
         return target, GaitState(position, time)
@@ -132,25 +146,25 @@ def interpolate(
     return jnp.sum(weight[:, None] * poses, axis=0)
 
 
-def heading_error(creature: Creature, sensed: Sensed) -> tuple[jax.Array, jax.Array, jax.Array]:
+def heading_error(creature: Creature, senses: Senses) -> tuple[jax.Array, jax.Array, jax.Array]:
     """Forward [3] and left [3] of the trunk in the world, and its heading [] in rad, left of the start's forward."""
     forward, left = (
-        sensed.trunk_rot @ axis.astype(np.float32) for axis in (creature.forward, creature.left)
+        senses["trunk_rot"] @ axis.astype(np.float32) for axis in (creature.forward, creature.left)
     )
     start_forward, start_left = start_axes(creature)
     return forward, left, jnp.arctan2(forward @ start_left, forward @ start_forward)
 
 
 def corrections(
-    creature: Creature, tuning: jax.Array, target: jax.Array, sensed: Sensed
+    creature: Creature, tuning: jax.Array, target: jax.Array, senses: Senses
 ) -> jax.Array:
     """Change [J] of the target pose by steering and balance; zero where the genes are zero."""
-    forward, left, heading = heading_error(creature, sensed)
-    offset = (sensed.trunk_pos - start_position(creature)) @ start_axes(creature)[1]
+    forward, left, heading = heading_error(creature, senses)
+    offset = (senses["trunk_pos"] - start_position(creature)) @ start_axes(creature)[1]
     steer = _clip(tuning[STEER] * (heading + offset / (2 * creature.body_length)))
     pitch, roll = -jnp.arcsin(jnp.clip(forward[2], -1, 1)), jnp.arcsin(jnp.clip(left[2], -1, 1))
-    pitch = _clip(tuning[PITCH] * pitch + tuning[PITCH_RATE] * (sensed.trunk_angvel @ left))
-    roll = _clip(tuning[ROLL] * roll + tuning[ROLL_RATE] * (sensed.trunk_angvel @ forward))
+    pitch = _clip(tuning[PITCH] * pitch + tuning[PITCH_RATE] * (senses["trunk_angvel"] @ left))
+    roll = _clip(tuning[ROLL] * roll + tuning[ROLL_RATE] * (senses["trunk_angvel"] @ forward))
     bend, stride, on_pitch, on_roll, stand = (
         value.astype(np.float32)
         for value in (

@@ -18,7 +18,7 @@ from mjxgait.runs.folder import CERTIFICATE, CHAMPION
 from mjxgait.search.evolution import Origin
 from mjxgait.settings.config import TuningRanges
 from mjxgait.settings.layers import resolve_config
-from mjxgait.tasks.walk.fitness import TERMS, weight_vector
+from mjxgait.tasks.walk.fitness import TERMS, signed_weights
 
 TUNING = tuple(field.name for field in dataclasses.fields(TuningRanges))
 KINDS = {
@@ -154,9 +154,8 @@ def forced_spells(lines: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
 def contributions(snapshot: Snapshot) -> np.ndarray:
     """[P, F] what each term gives to or takes from the fitness of each individual; a row's sum is its fitness."""
     terms = np.asarray(snapshot.arrays["terms"], float)
-    weights = np.asarray(
-        weight_vector(snapshot.config.fitness, jnp.int32(snapshot.generation)), float
-    )
+    counted = signed_weights(snapshot.config.fitness, jnp.int32(snapshot.generation))
+    weights = np.array([float(counted[name]) for name in TERMS])
     worst = snapshot.config.rollout.worst
     scores = terms @ weights
     lowest = np.argmin(np.where(np.isnan(scores), -np.inf, scores), axis=1)

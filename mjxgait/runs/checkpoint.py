@@ -14,7 +14,7 @@ import orbax.checkpoint as ocp
 from mjxgait.errors import UserError
 from mjxgait.search.evolution import EvolutionState
 
-SCHEMA = 1
+SCHEMA = 2
 FOLDER = "checkpoints"
 
 

@@ -12,7 +12,6 @@ from mjxgait.settings.config import Config, ExaminationConfig
 from mjxgait.search.evolution import EvolutionState
 from mjxgait.runs.exams import Exams
 from mjxgait.runs.experiment import Experiment
-from mjxgait.tasks.walk.fitness import TERMS
 
 SPARE = 1.2
 """How much faster than the certificate's least speed a gait should be in evolution before it is worth an examination."""
@@ -65,7 +64,7 @@ class Examiner:
         The last examination that the settings allow is kept for the end.
         """
         config, generation = self.experiment.config, int(state.generation)
-        if not due(config.examination, generation) or not _promising(state, config.rollout.seconds):
+        if not due(config.examination, generation) or not _promising(self.experiment, state):
             return None
         wanted = enough(config, generation)
         champion = self.experiment.champion(state, self.versions)
@@ -140,8 +139,11 @@ def due(settings: ExaminationConfig, generation: int) -> bool:
     )
 
 
-def _promising(state: EvolutionState, seconds: float) -> bool:
-    """Whether the best individual was up to the end on all its starts, and clearly faster than it must be."""
-    wanted = SPARE * CertificateConfig().progress.speed * seconds
-    terms = dict(zip(TERMS, np.asarray(state.terms[0]).T, strict=True))
-    return bool((terms["alive"] >= 1).all() and (terms["distance"] >= wanted).all())
+def _promising(experiment: Experiment, state: EvolutionState) -> bool:
+    """Whether the best individual was up to the end in all its trials, and clearly faster than it must be."""
+    names, seconds = experiment.simulator.task.outcomes, experiment.config.rollout.seconds
+    outcome = dict(zip(names, np.asarray(state.outcome[0]).T, strict=True))
+    wanted = SPARE * CertificateConfig().progress.speed * seconds * experiment.creature.body_length
+    # Half a step, for an episode lasts a whole number of them.
+    whole = seconds - 0.5 * experiment.creature.model.opt.timestep
+    return bool((outcome["seconds"] > whole).all() and (outcome["forward"] >= wanted).all())

@@ -16,16 +16,18 @@ from mjxgait.settings.config import Config, RolloutConfig
 from mjxgait.creature import Creature
 from mjxgait.creature.settings import Termination
 from mjxgait.errors import UserError
-from mjxgait.search.evolution import Evolution, EvolutionState, GenerationMetrics, Judged, Proposal
-from mjxgait.tasks.walk.fitness import TERMS, fitness_terms, forward_distance, score, weight_vector
+from mjxgait.search.evolution import Evolution, EvolutionState, GenerationMetrics, Proposal
+from mjxgait.control.drive import Drive
 from mjxgait.control.poses import TUNING, Genome, PoseTracker
 from mjxgait.settings.traced import traced
 from mjxgait.physics import make_plant
+from mjxgait.senses import check_senses
+from mjxgait.simulation.evaluator import Local
 from mjxgait.simulation.rollout import AXIS, Episodes, Simulator
-from mjxgait.simulation.starts import Starts, draw_starts
-from mjxgait.tasks.walk.tally import Judge, Reason, Tally
-from mjxgait.types import pytree
-from mjxgait.search.variation import Box, pose_variation
+from mjxgait.tasks.trials import Starts
+from mjxgait.tasks.score import in_order, score
+from mjxgait.tasks.walk.task import Walk
+from mjxgait.types import Judged, pytree
 
 Step = Callable[[EvolutionState], tuple[EvolutionState, GenerationMetrics]]
 """A compiled generation."""
@@ -89,8 +91,7 @@ class Experiment:
 
     def judge(self, genomes: Genome) -> Judged:
         """The verdict on genomes [N, ...]."""
-        episodes = self.simulate(genomes)
-        return _verdict(self.simulator, self.row.settings, episodes.tally, episodes.computed_steps)
+        return Local(self.simulator).verdict(self.row.settings, self.simulate(genomes))
 
     def compile(self) -> Step:
         """The generation as one compiled program."""
@@ -104,16 +105,7 @@ class Experiment:
 
     def candidates(self, state: EvolutionState) -> list[int]:
         """Ranks of the best individuals that differ from each other, as many as the config asks for; best first."""
-        low, high = self.simulator.tracker.bounds(self.config.controller)
-        genes = jax.tree.map(
-            lambda leaf, a, b: np.asarray((leaf - a) / jnp.maximum(b - a, 1e-9)),
-            state.genomes,
-            low,
-            high,
-        )
-        rows = np.concatenate(
-            [leaf.reshape(leaf.shape[0], -1) for leaf in jax.tree.leaves(genes)], axis=1
-        )
+        rows = self.simulator.controller.genes(state.genomes, self.config.controller)
         chosen: list[int] = []
         for rank in np.flatnonzero(np.isfinite(state.fitness)):
             apart = np.sqrt(np.mean((rows[chosen] - rows[rank]) ** 2, axis=1))
@@ -130,23 +122,17 @@ class Experiment:
     def champion(self, state: EvolutionState, versions: dict[str, str], rank: int = 0) -> Champion:
         """An individual of a state; rank 0 is the best."""
         # One transfer instead of one per array: it happens in every generation.
-        genomes, every_term, fitness, born, generation = jax.device_get(
-            (state.genomes, state.terms, state.fitness, state.born, state.generation)
+        genomes, every_term, outcome, fitness, born, generation = jax.device_get(
+            (state.genomes, state.terms, state.outcome, state.fitness, state.born, state.generation)
         )
+        task = self.simulator.task
         best = jax.tree.map(lambda leaf: leaf[rank], genomes)
         terms = every_term[rank].mean(axis=0)
-        nominal = forward_distance(
-            self.creature,
-            self.config.fitness,
-            self.config.rollout.seconds,
-            float(every_term[rank, 0, TERMS.index("distance")]),
-        )
         origin = {
             "generation": int(generation),
             "born": int(born[rank]),
             "seed": self.config.seed,
-            "nominal_forward": nominal,
-            "nominal_seconds": self.config.rollout.seconds,
+            "nominal": dict(zip(task.outcomes, map(float, outcome[rank, 0]), strict=True)),
             "versions": versions,
         }
         return Champion(
@@ -156,7 +142,7 @@ class Experiment:
             tuning=dict(zip(TUNING, map(float, best.tuning), strict=True)),
             controller=self.config.controller,
             fitness=float(fitness[rank]),
-            terms=dict(zip(TERMS, map(float, terms), strict=True)),
+            terms=dict(zip(task.terms, map(float, terms), strict=True)),
             origin=origin,
         )
 
@@ -228,18 +214,21 @@ def build_batch(creature: Creature, configs: Sequence[Config]) -> Batch:
 
 def evolution_of(simulator: Simulator, settings: Config) -> Evolution:
     """The genetic algorithm under settings, plain or traced."""
-    box = Box(*simulator.tracker.bounds(settings.controller))
+    task = simulator.task
 
     def rank(terms: jax.Array, generation: jax.Array) -> jax.Array:
-        return score(terms, weight_vector(settings.fitness, generation), settings.rollout.worst)
+        weights = in_order(task.weights(settings.fitness, generation), task.terms)
+        return score(terms, weights, settings.rollout.worst)
 
-    return Evolution(settings.evolution, pose_variation(box, settings.evolution), rank)
+    variation = simulator.controller.variation(settings.controller, settings.evolution)
+    return Evolution(settings.evolution, variation, rank)
 
 
 @partial(jax.jit, static_argnums=0)
 def _initial(simulator: Simulator, settings: Config, key: jax.Array) -> EvolutionState:
     """The same compiled function for every run, alone or beside others, so that they begin with the same bits."""
-    return evolution_of(simulator, settings).init(key, settings.rollout.starts, len(TERMS))
+    task, trials = simulator.task, settings.rollout.starts
+    return evolution_of(simulator, settings).init(key, trials, len(task.terms), len(task.outcomes))
 
 
 def _generation(
@@ -252,44 +241,20 @@ def _generation(
         return evolution_of(simulator, row.settings).propose(state)
 
     def absorb(
-        of_row: tuple[Row, EvolutionState, Proposal, Tally, jax.Array],
+        of_row: tuple[Row, EvolutionState, Proposal, Judged],
     ) -> tuple[EvolutionState, GenerationMetrics]:
-        row, state, proposal, tally, computed = of_row
-        return evolution_of(simulator, row.settings).absorb(
-            state, proposal, _verdict(simulator, row.settings, tally, computed)
-        )
+        row, state, proposal, judged = of_row
+        return evolution_of(simulator, row.settings).absorb(state, proposal, judged)
 
     proposals = jax.lax.map(propose, (rows, states))
-    episodes = simulator.simulate(proposals.offspring, rows.starts, rows.settings)
-    lived = jnp.sum(episodes.tally.steps, axis=(1, 2))
-    # Idle lanes are nobody's: each row bears a part of them in proportion to the steps that it lived.
-    computed = jnp.round(episodes.computed_steps * (lived / jnp.maximum(jnp.sum(lived), 1))).astype(
-        jnp.int32
-    )
-    return jax.lax.map(absorb, (rows, states, proposals, episodes.tally, computed))
-
-
-def _verdict(
-    simulator: Simulator, settings: Config, tally: Tally, computed_steps: jax.Array
-) -> Judged:
-    """Terms and outcome of one row's episodes; tally with leaves [N, R, ...]."""
-    terms_of = partial(
-        fitness_terms, simulator.creature, settings.fitness, simulator.tracker.step, simulator.steps
-    )
-    terms = jax.vmap(jax.vmap(terms_of))(tally)
-    return Judged(
-        terms=jnp.where((tally.reason == Reason.NONFINITE)[..., None], jnp.nan, terms),
-        failed=tally.reason != Reason.FINISHED,
-        sim_steps=jnp.sum(tally.steps),
-        computed_steps=computed_steps,
-    )
+    judged = Local(simulator).judge(proposals.offspring, rows.starts, rows.settings)
+    return jax.lax.map(absorb, (rows, states, proposals, judged))
 
 
 def _experiment(simulator: Simulator, config: Config) -> Experiment:
     creature = simulator.creature
-    starts = draw_starts(
-        jax.random.fold_in(jax.random.key(config.seed), 1), creature, config.rollout
-    )
+    key = jax.random.fold_in(jax.random.key(config.seed), 1)
+    starts = simulator.task.trials(key, config.rollout)
     return Experiment(creature, config, simulator, Row(traced(config), starts))
 
 
@@ -331,11 +296,15 @@ def _simulator(creature: Creature, config: Config) -> Simulator:
     step = float(creature.model.opt.timestep)
     steps = max(round(config.rollout.seconds / step), 1)
     plant, lanes = make_plant(creature, config.rollout.physics, ends.touch)
+    controller = PoseTracker(creature, step)
+    task = Walk(creature, step, steps, ends)
+    check_senses(controller.reads, task.adds)
     return Simulator(
         creature=creature,
         plant=plant,
-        tracker=PoseTracker(creature, step),
-        judge=Judge(creature, step, steps // 2, ends),
+        controller=controller,
+        drive=Drive(creature, step, controller.command),
+        task=task,
         steps=steps,
         lanes=config.rollout.lanes or lanes,
         mesh=Mesh(np.array(jax.devices()), (AXIS,)),

@@ -8,7 +8,7 @@ import platform
 import signal
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ from mjxgait.search.evolution import EvolutionState, GenerationMetrics, stop_rea
 from mjxgait.runs.examination import Examined, Examiner, why_ended
 from mjxgait.runs.exams import Exams
 from mjxgait.runs.experiment import Step, build_experiment
-from mjxgait.tasks.walk.fitness import TERMS
+from mjxgait.tasks.protocol import Task
 from mjxgait.runs.folder import (
     CERTIFICATE,
     CHAMPION,
@@ -110,7 +110,7 @@ def _evolve(
         metrics = jax.device_get(metrics)
         if metrics.generation < 0:
             continue
-        line = metrics_line(metrics, time.perf_counter() - began)
+        line = metrics_line(metrics, time.perf_counter() - began, experiment.simulator.task)
         # The log first: a kill before the checkpoint leaves a line too many, which a resumed run takes out.
         with disk_errors(folder), (folder / METRICS).open("a", encoding="utf-8") as log:
             log.write(json.dumps(line) + "\n")
@@ -126,19 +126,23 @@ def _evolve(
     return state, reason, examined
 
 
-def metrics_line(metrics: GenerationMetrics, seconds: float) -> dict[str, Any]:
+def metrics_line(metrics: GenerationMetrics, seconds: float, task: Task) -> dict[str, Any]:
     """What `metrics.jsonl` holds of one generation; numbers that are not finite become null."""
     line = {
         field.name: getattr(metrics, field.name).item()
         for field in dataclasses.fields(metrics)
-        if field.name != "best_terms"
+        if field.name not in ("best_terms", "best_outcome")
     }
     line["forced"] = bool(line["forced"])
     line |= {"steps_per_second": round(line["sim_steps"] / seconds), "wall_s": round(seconds, 4)}
-    line |= {
-        f"term_{name}": float(value) for name, value in zip(TERMS, metrics.best_terms, strict=True)
-    }
+    line |= named("term", task.terms, metrics.best_terms)
+    line |= named("outcome", task.outcomes, metrics.best_outcome)
     return {key: value if np.isfinite(value) else None for key, value in line.items()}
+
+
+def named(kind: str, names: Sequence[str], values: jax.Array) -> dict[str, float]:
+    """Numbers of a kind under the names that a log line has for them."""
+    return {f"{kind}_{name}": float(value) for name, value in zip(names, values, strict=True)}
 
 
 @functools.cache

@@ -102,7 +102,7 @@ class Screen:
         table = Table(box=None, show_header=False, pad_edge=False)
         rows = {
             "best fitness": f"{last['best']:.3f} in generation {last['generation']}",
-            "forward": f"{last['term_distance']:.2f} body lengths per episode, mean of the starts",
+            "forward": f"{last['outcome_forward']:.2f} m per episode, mean of the starts",
             "champion": str(folder / CHAMPION),
             "metrics": f"{folder / METRICS}, {folder / PLOT}",
             "settings": f"{folder / CONFIG}, {folder / CREATURE}/",

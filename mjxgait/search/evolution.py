@@ -15,7 +15,7 @@ import jax.numpy as jnp
 from mjxgait.search.breeding import Nursery, parents
 from mjxgait.search.variation import Variation, first_occurrence
 from mjxgait.settings.config import EvolutionConfig
-from mjxgait.types import pytree
+from mjxgait.types import Judged, pytree
 
 
 class Origin(IntEnum):
@@ -28,20 +28,10 @@ class Origin(IntEnum):
 
 
 @pytree
-class Judged:
-    """The verdict on N genomes. terms: [N, R, F]; failed: [N, R] whether the episode ended early; sim_steps, computed_steps: []."""
-
-    terms: jax.Array
-    failed: jax.Array
-    sim_steps: jax.Array
-    computed_steps: jax.Array
-
-
-@pytree
 class EvolutionState:
     """Everything that the next generation reads. The population is sorted, best first, once it has been judged.
 
-    genomes: leaves [P, ...]. terms: [P, R, F]. fitness: [P]. born: [P] generation of birth. origin: [P] an `Origin`.
+    genomes: leaves [P, ...]. terms: [P, R, F]. outcome: [P, R, O]. fitness: [P]. born: [P] generation of birth. origin: [P] an `Origin`.
     key: of all coming randomness. generation: [] -1 while seeding. seeded: [] how many of the initial population have been judged.
     best_history, mean_history: [W] of the latest generations, newest last. quiet: [] generations since the last spell.
     forced: [] whether the next generation is forced. spell_age, refreshed: [] of the current spell.
@@ -50,6 +40,7 @@ class EvolutionState:
 
     genomes: Any
     terms: jax.Array
+    outcome: jax.Array
     fitness: jax.Array
     born: jax.Array
     origin: jax.Array
@@ -68,7 +59,8 @@ class EvolutionState:
 
 @pytree
 class GenerationMetrics:
-    """What there is to tell of a generation; scalars but for best_terms [F], the mean over starts of the best individual's terms.
+    """What there is to tell of a generation; scalars but for best_terms [F] and best_outcome [O],
+    the mean over the trials of the best individual's terms and outcome.
 
     unique: different genomes. spread: mean standard deviation of a gene. failures: how many of the offspring's episodes ended early.
     """
@@ -89,6 +81,7 @@ class GenerationMetrics:
     sim_steps: jax.Array
     computed_steps: jax.Array
     best_terms: jax.Array
+    best_outcome: jax.Array
 
 
 @pytree
@@ -111,14 +104,15 @@ class Evolution:
     variation: Variation
     rank: Callable[[jax.Array, jax.Array], jax.Array]
 
-    def init(self, key: jax.Array, starts: int, terms: int) -> EvolutionState:
-        """The state before anybody has been judged."""
+    def init(self, key: jax.Array, trials: int, terms: int, outcomes: int) -> EvolutionState:
+        """The state before anybody has been judged. trials, terms, outcomes: R, F, O."""
         key, key_create = jax.random.split(key)
         count, window = self.config.population, self.config.forced.window
         integer = jnp.zeros((), jnp.int32)
         return EvolutionState(
             genomes=self.variation.create(key_create, count),
-            terms=jnp.zeros((count, starts, terms)),
+            terms=jnp.zeros((count, trials, terms)),
+            outcome=jnp.zeros((count, trials, outcomes)),
             fitness=jnp.full(count, -jnp.inf, jnp.float32),
             born=jnp.zeros(count, jnp.int32),
             origin=jnp.full(count, int(Origin.INITIAL), jnp.int32),
@@ -147,8 +141,8 @@ class Evolution:
         """The rest of a generation: survival, and the decision whether the next one is forced."""
         seeding = self._seeding(state)
         generation = jnp.where(seeding, jnp.where(self._filled(state), 0, -1), state.generation + 1)
-        grown = self._survive(state, proposal.offspring, judged.terms, proposal.origin, generation)
-        planted = self._plant(state, judged.terms, generation)
+        grown = self._survive(state, proposal, judged, generation)
+        planted = self._plant(state, judged, generation)
         state = jax.tree.map(
             lambda a, b: jnp.where(seeding, a, b), _without_key(planted), _without_key(grown)
         )
@@ -217,36 +211,34 @@ class Evolution:
         )
 
     def _plant(
-        self, state: EvolutionState, terms: jax.Array, generation: jax.Array
+        self, state: EvolutionState, judged: Judged, generation: jax.Array
     ) -> EvolutionState:
         """The initial population with the verdict on its next members in their places."""
         places = state.seeded + jnp.arange(self.config.offspring)
-        terms = state.terms.at[places].set(terms, mode="drop")
+        terms = state.terms.at[places].set(judged.terms, mode="drop")
+        outcome = state.outcome.at[places].set(judged.outcome, mode="drop")
         seeded = jnp.minimum(state.seeded + self.config.offspring, self.config.population)
-        judged = jnp.arange(self.config.population) < seeded
-        fitness = jnp.where(judged, self.rank(terms, jnp.maximum(generation, 0)), -jnp.inf)
+        known = jnp.arange(self.config.population) < seeded
+        fitness = jnp.where(known, self.rank(terms, jnp.maximum(generation, 0)), -jnp.inf)
         order = jnp.where(
             self._filled(state),
             jnp.argsort(-fitness, stable=True),
             jnp.arange(self.config.population),
         )
-        planted = dataclasses.replace(state, terms=terms, fitness=fitness, seeded=seeded)
+        planted = dataclasses.replace(
+            state, terms=terms, outcome=outcome, fitness=fitness, seeded=seeded
+        )
         return _reordered(planted, order)
 
     def _survive(
-        self,
-        state: EvolutionState,
-        offspring: Any,
-        terms: jax.Array,
-        origin: jax.Array,
-        generation: jax.Array,
+        self, state: EvolutionState, proposal: Proposal, judged: Judged, generation: jax.Array
     ) -> EvolutionState:
         """The P best of the grown population, without duplicates; in a forced generation what was fit enough goes before the old."""
         count, born = self.config.population, jnp.full(self.config.offspring, generation)
         pool = jax.tree.map(
             lambda a, b: jnp.concatenate([a, b]),
-            (state.genomes, state.terms, state.born, state.origin),
-            (offspring, terms, born, origin),
+            (state.genomes, state.terms, state.outcome, state.born, state.origin),
+            (proposal.offspring, judged.terms, judged.outcome, born, proposal.origin),
         )
         fitness = self.rank(pool[1], generation)
         fresh = jnp.arange(fitness.shape[0]) >= count
@@ -257,12 +249,13 @@ class Evolution:
         tier = jnp.where((jnp.arange(fitness.shape[0]) == jnp.argmax(fitness)) & distinct, 3, tier)
         kept = jnp.lexsort((-fitness, -tier))[:count]
         kept = kept[jnp.argsort(-fitness[kept], stable=True)]
-        genomes, terms, born, origin = jax.tree.map(lambda leaf: leaf[kept], pool)
+        genomes, terms, outcome, born, origin = jax.tree.map(lambda leaf: leaf[kept], pool)
         refreshed = state.refreshed + jnp.where(state.forced, jnp.sum(admitted), 0)
         return dataclasses.replace(
             state,
             genomes=genomes,
             terms=terms,
+            outcome=outcome,
             born=born,
             origin=origin,
             fitness=fitness[kept],
@@ -348,6 +341,7 @@ class Evolution:
             sim_steps=judged.sim_steps,
             computed_steps=judged.computed_steps,
             best_terms=jnp.mean(state.terms[0], axis=0),
+            best_outcome=jnp.mean(state.outcome[0], axis=0),
         )
 
 
@@ -389,11 +383,9 @@ def _pick(condition: jax.Array, yes: Any, no: Any) -> Any:
 
 
 def _reordered(state: EvolutionState, order: jax.Array) -> EvolutionState:
-    rows = (state.genomes, state.terms, state.fitness, state.born, state.origin)
-    genomes, terms, fitness, born, origin = jax.tree.map(lambda leaf: leaf[order], rows)
-    return dataclasses.replace(
-        state, genomes=genomes, terms=terms, fitness=fitness, born=born, origin=origin
-    )
+    names = ("genomes", "terms", "outcome", "fitness", "born", "origin")
+    rows = {name: getattr(state, name) for name in names}
+    return dataclasses.replace(state, **jax.tree.map(lambda leaf: leaf[order], rows))
 
 
 def _without_key(state: EvolutionState) -> EvolutionState:

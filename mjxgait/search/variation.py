@@ -1,6 +1,7 @@
 """How genomes are made from nothing and from other genomes: arrays in, arrays out.
 
-Functions for one genome, mapped over the offspring where they are called. A genome is key poses [K, J] and tuning [E] within a box.
+Functions for one genome, mapped over the offspring where they are called. What every kind of genome
+may use is here; operators of a kind of its own are beside its controller.
 """
 
 import dataclasses
@@ -11,6 +12,7 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from mjxgait.settings.config import EvolutionConfig
 from mjxgait.settings.traced import chosen
@@ -37,63 +39,49 @@ class Variation:
     mutate: Callable[[jax.Array, Any], Any]
 
 
-def pose_variation(box: Box, config: EvolutionConfig) -> Variation:
-    """The operators of a genome of key poses and tuning, as chosen in the config, which may be plain or traced.
+def box_variation(box: Box, config: EvolutionConfig) -> Variation:
+    """Operators for a genome of real numbers within a box, plain or traced config.
 
-    All options of a choice are computed and one is taken: they cost next to nothing beside the simulations.
+    Each gene of a child comes from the one or the other parent; a mutation moves each, with
+    probability `tuning_rate`, by a Gaussian of `sigma` ranges.
     """
-    poses = narrowed(box, config.pose_range)
-    box = Box(
-        *(
-            dataclasses.replace(edge, key_poses=part.key_poses)
-            for edge, part in ((box.low, poses.low), (box.high, poses.high))
-        )
-    )
     middle = narrowed(box, config.initial_spread)
 
-    def create(key: jax.Array, count: int) -> Any:
-        uniformly = chosen(config.initial, "uniform")
-        return jax.tree.map(
-            partial(jnp.where, uniformly),
-            uniform(key, middle, count),
-            latin_hypercube(key, middle, count),
-        )
-
     def cross(key: jax.Array, mother: Any, father: Any) -> Any:
-        key_poses, key_tuning = jax.random.split(key)
-        permuted, aligned = (
-            f(key_poses, mother.key_poses, father.key_poses)
-            for f in (permuted_poses, aligned_poses)
-        )
-        from_mother = jax.random.bernoulli(key_tuning, 0.5, mother.tuning.shape)
-        return dataclasses.replace(
-            mother,
-            key_poses=jnp.where(chosen(config.crossing, "permute"), permuted, aligned),
-            tuning=jnp.where(from_mother, mother.tuning, father.tuning),
-        )
+        def pick(key: jax.Array, a: jax.Array, b: jax.Array) -> jax.Array:
+            return jnp.where(jax.random.bernoulli(key, 0.5, a.shape), a, b)
+
+        return _leafwise(key, pick, mother, father)
 
     def mutate(key: jax.Array, genome: Any) -> Any:
-        key_poses, key_tuning = jax.random.split(key)
-        low, high = box.low, box.high
-        poses = mutated_poses(
-            key_poses,
-            genome.key_poses,
-            low.key_poses,
-            high.key_poses,
-            config.mutation,
-            config.sigma,
-        )
-        tuning = jittered(
-            key_tuning,
-            genome.tuning,
-            low.tuning,
-            high.tuning,
-            config.tuning_rate,
-            config.tuning_sigma,
-        )
-        return dataclasses.replace(genome, key_poses=poses, tuning=tuning)
+        def move(key: jax.Array, value: jax.Array, low: jax.Array, high: jax.Array) -> jax.Array:
+            return jittered(key, value, low, high, config.tuning_rate, config.sigma)
 
-    return Variation(create=create, cross=cross, mutate=mutate)
+        return _leafwise(key, move, genome, box.low, box.high)
+
+    return Variation(create=creation(middle, config), cross=cross, mutate=mutate)
+
+
+def creation(box: Box, config: EvolutionConfig) -> Callable[[jax.Array, int], Any]:
+    """How the first genomes are drawn from a box: uniformly or as a Latin hypercube."""
+
+    def create(key: jax.Array, count: int) -> Any:
+        return jax.tree.map(
+            partial(jnp.where, chosen(config.initial, "uniform")),
+            uniform(key, box, count),
+            latin_hypercube(key, box, count),
+        )
+
+    return create
+
+
+def _leafwise(key: jax.Array, function: Callable[..., jax.Array], *trees: Any) -> Any:
+    """A function of a key and one leaf of each tree, applied to all leaves."""
+    leaves, shape = zip(*(jax.tree.flatten(tree) for tree in trees), strict=True)
+    keys = jax.random.split(key, len(leaves[0]))
+    return jax.tree.unflatten(
+        shape[0], [function(*parts) for parts in zip(keys, *leaves, strict=True)]
+    )
 
 
 def narrowed(box: Box, share: jax.Array | float) -> Box:
@@ -103,6 +91,17 @@ def narrowed(box: Box, share: jax.Array | float) -> Box:
         return jax.tree.map(lambda a, b: a + 0.5 * (1 - share) * (b - a), near, far)
 
     return Box(edge(box.low, box.high), edge(box.high, box.low))
+
+
+def in_ranges(genomes: Any, box: Box) -> np.ndarray:
+    """Genomes [N, ...] as rows [N, genes], each gene in units of its range."""
+    scaled = jax.tree.map(
+        lambda leaf, low, high: np.asarray((leaf - low) / jnp.maximum(high - low, 1e-9)),
+        genomes,
+        box.low,
+        box.high,
+    )
+    return np.concatenate([leaf.reshape(len(leaf), -1) for leaf in jax.tree.leaves(scaled)], 1)
 
 
 def uniform(key: jax.Array, box: Box, count: int) -> Any:
@@ -123,52 +122,6 @@ def latin_hypercube(key: jax.Array, box: Box, count: int) -> Any:
         return ((slices + jax.random.uniform(key_within, slices.shape)) / count).reshape(shape)
 
     return _draw(key, box, count, draw)
-
-
-def permuted_poses(key: jax.Array, mother: jax.Array, father: jax.Array) -> jax.Array:
-    """K poses [K, J] drawn without repetition from the parents' 2K, in any order (Wilson)."""
-    both = jnp.concatenate([mother, father])
-    return jax.random.permutation(key, both)[: mother.shape[0]]
-
-
-def aligned_poses(key: jax.Array, mother: jax.Array, father: jax.Array) -> jax.Array:
-    """K poses [K, J], each from the one or the other parent, in its place."""
-    return jnp.where(jax.random.bernoulli(key, 0.5, (mother.shape[0], 1)), mother, father)
-
-
-def mutated_poses(
-    key: jax.Array,
-    poses: jax.Array,
-    low: jax.Array,
-    high: jax.Array,
-    kind: Any,
-    sigma: jax.Array | float,
-) -> jax.Array:
-    """Key poses [K, J] with a change in one of them; see `EvolutionConfig.mutation` for the kinds. Never leaves the box."""
-    key_pose, key_joint, key_value, key_kind = jax.random.split(key, 4)
-    count, joints = poses.shape
-    here = jnp.arange(count) == jax.random.randint(key_pose, (), 0, count)
-    order = jax.random.permutation(key_joint, jnp.arange(joints))
-    moves = chosen(kind, "gaussian") | (chosen(kind, "mixed") & jax.random.bernoulli(key_kind))
-    coded, code = chosen(kind, "bit") | chosen(kind, "byte"), eight_bits(poses, low, high)
-    flipped = code ^ jnp.where(
-        chosen(kind, "bit"),
-        1 << jax.random.randint(key_kind, (), 0, 8),
-        jax.random.randint(key_kind, (), 0, 256),
-    )
-    moved = poses + sigma * (high - low) * jax.random.normal(key_value, poses.shape)
-    drawn = low + (high - low) * jax.random.uniform(key_value, poses.shape)
-    value = jnp.where(moves, moved, jnp.where(coded, low + flipped / 255 * (high - low), drawn))
-    every = moves | chosen(kind, "pose")
-    joints_changed = jnp.where(every, joints, jnp.where(coded | chosen(kind, "single"), 1, 2))
-    return jnp.clip(jnp.where(here[:, None] & (order < joints_changed), value, poses), low, high)
-
-
-def eight_bits(values: jax.Array, low: jax.Array, high: jax.Array) -> jax.Array:
-    """The nearest of 256 levels between low and high, as integers."""
-    return jnp.round(
-        255 * jnp.clip((values - low) / jnp.maximum(high - low, 1e-9), 0.0, 1.0)
-    ).astype(jnp.int32)
 
 
 def jittered(

@@ -13,16 +13,15 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.sharding import Mesh, PartitionSpec
-from jax.typing import ArrayLike
 
-from mjxgait.control import spd
-from mjxgait.control.poses import PoseTracker
+from mjxgait.control.drive import Drive, Rules, per_lane
+from mjxgait.control.protocol import Controller
 from mjxgait.creature import Creature
+from mjxgait.senses import sense
 from mjxgait.settings.config import Config
-from mjxgait.settings.traced import chosen
-from mjxgait.simulation.starts import Starts
-from mjxgait.tasks.walk.tally import Judge, Reason, Tally
-from mjxgait.types import BodyState, Plant, pytree
+from mjxgait.tasks.protocol import FINISHED, NONFINITE, Task
+from mjxgait.tasks.trials import Starts
+from mjxgait.types import BodyState, Plant, Sensed, pytree
 
 CHECK_EVERY = 16
 """Steps between two looks at which lanes are free (a look costs about as much as a step),
@@ -34,34 +33,25 @@ AXIS = "lanes"
 class Episodes:
     """All episodes of a generation: tally with leaves [B, N, R, ...], and the steps computed [] for them, those of idle lanes included."""
 
-    tally: Tally
+    tally: Any
     computed_steps: jax.Array
 
 
 @pytree
-class Rules:
-    """What the settings say about an episode; all [].
-
-    stable: stable PD, else plain PD. constraint_forces: whether it counts them. stiffness, damping: factors on kp and kd.
-    clearance: m wanted of each foot in each stride.
-    """
-
-    stable: jax.Array
-    constraint_forces: jax.Array
-    stiffness: jax.Array
-    damping: jax.Array
-    clearance: jax.Array
-
-
-@pytree
 class Lane:
-    """One simulation in flight. job: [] place in the device's queue; cycle and control: the controller's own; push as in `Starts`."""
+    """One simulation in flight.
+
+    job: [] place in the device's queue. plan, memory: the controller's. tally, aim, standards: the
+    task's. rules: the drive's. push as in `Starts`.
+    """
 
     job: jax.Array
     body: BodyState
-    cycle: Any
-    control: Any
-    tally: Tally
+    plan: Any
+    memory: Any
+    tally: Any
+    aim: Any
+    standards: Any
     rules: Rules
     push: jax.Array
     push_step: jax.Array
@@ -69,12 +59,16 @@ class Lane:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Simulator:
-    """Everything static about the episodes of one creature. steps: T per episode; lanes: L per device; mesh: the devices."""
+    """Everything static about the episodes of one creature.
+
+    steps: T per episode. lanes: L per device. mesh: the devices.
+    """
 
     creature: Creature
     plant: Plant
-    tracker: PoseTracker
-    judge: Judge
+    controller: Controller
+    drive: Drive
+    task: Task
     steps: int
     lanes: int
     mesh: Mesh
@@ -109,7 +103,7 @@ class Simulator:
 
     def _run_queue(
         self, jobs: jax.Array, genomes: Any, starts: Starts, settings: Config, *, total: int
-    ) -> tuple[Tally, jax.Array]:
+    ) -> tuple[Any, jax.Array]:
         """Works off one device's queue of jobs [Q]: tally with leaves [Q, ...], and the computed steps [1]."""
         queue = jobs.shape[0]
         lanes = min(self.lanes, queue)
@@ -122,7 +116,7 @@ class Simulator:
             )
             return jax.tree.map(lambda leaf: jnp.moveaxis(leaf, 0, self.plant.lane_axis), lane)
 
-        def store(results: Tally, place: jax.Array, tally: Tally) -> Tally:
+        def store(results: Any, place: jax.Array, tally: Any) -> Any:
             return jax.tree.map(
                 lambda rows, leaf: rows.at[place].set(
                     jnp.moveaxis(leaf, self.plant.lane_axis, 0), mode="drop"
@@ -132,18 +126,18 @@ class Simulator:
             )
 
         def body(
-            carry: tuple[Lane, Tally, jax.Array, jax.Array],
-        ) -> tuple[Lane, Tally, jax.Array, jax.Array]:
+            carry: tuple[Lane, Any, jax.Array, jax.Array],
+        ) -> tuple[Lane, Any, jax.Array, jax.Array]:
             lane, results, taken, rounds = carry
             lane = jax.lax.fori_loop(0, CHECK_EVERY, lambda _, lane: self._step(lane), lane)
             lane = self._look_for_overlap(lane)
-            done = (lane.tally.steps >= self.steps) | (lane.tally.reason != Reason.FINISHED)
+            done = (lane.tally.steps >= self.steps) | (lane.tally.reason != FINISHED)
             results = store(results, jnp.where(done, lane.job, queue), lane.tally)
             lane = self._per_lane(_choose)(done, fresh(taken + jnp.cumsum(done) - 1), lane)
             return lane, results, taken + jnp.sum(done), rounds + 1
 
         results = jax.tree.map(
-            lambda leaf: jnp.zeros((queue, *leaf.shape), leaf.dtype), self.judge.init()
+            lambda leaf: jnp.zeros((queue, *leaf.shape), leaf.dtype), self.task.init()
         )
         carry = (fresh(jnp.arange(lanes)), results, jnp.int32(lanes), jnp.int32(0))
         # Not a while_loop: XLA's CPU compiler aborts on the fast plant's kernels in a loop whose length it does not know. Whenever a lane
@@ -178,94 +172,65 @@ class Simulator:
                 constraint_force=still,
                 friction=start.friction,
             ),
-            cycle=self.tracker.prepare(
+            plan=self.controller.prepare(
                 jax.tree.map(lambda leaf: leaf[row, individual], genomes), mine.controller
             ),
-            control=self.tracker.init(),
-            tally=self.judge.init(),
-            rules=self._rules(mine),
+            memory=self.controller.init(),
+            tally=self.task.init(),
+            aim=self.task.aim(start),
+            standards=self.task.standards(mine.fitness),
+            rules=self.drive.rules(mine.controller),
             push=start.push,
             push_step=start.push_step,
-        )
-
-    def _rules(self, settings: Config) -> Rules:
-        law = settings.controller
-        return Rules(
-            stable=chosen(law.law, "spd"),
-            constraint_forces=jnp.asarray(law.constraint_forces),
-            stiffness=jnp.asarray(law.stiffness, jnp.float32),
-            damping=jnp.asarray(law.damping, jnp.float32),
-            clearance=jnp.asarray(
-                settings.fitness.clearance * self.creature.hip_height, jnp.float32
-            ),
         )
 
     def _step(self, lane: Lane) -> Lane:
         """All lanes one control step on. A lane whose episode has ended moves on too, but its tally stands still."""
         body = self._per_lane(_push)(lane)
         sensed, workings = self.plant.forward(body)
-        target, control = self._per_lane(self.tracker.target)(lane.cycle, lane.control, sensed)
-        torque = self.torque(lane.rules, body, sensed, workings, target)
-        tally = self._per_lane(self._judge)(lane.rules, lane.tally, sensed, torque)
-        body = self.plant.advance(body, workings, self._per_lane(self._lift)(torque))
-        return dataclasses.replace(lane, body=body, control=control, tally=tally)
+        command, memory = self._per_lane(self._act)(lane, sensed)
+        torque = self.drive.torque(self.plant, lane.rules, body, sensed, workings, command)
+        tally = self._per_lane(self._judge)(lane, sensed, torque)
+        body = self.plant.advance(body, workings, self._per_lane(self.drive.lift)(torque))
+        return dataclasses.replace(lane, body=body, memory=memory, tally=tally)
+
+    def _act(self, lane: Lane, sensed: Sensed) -> tuple[jax.Array, Any]:
+        """The controller's command [J] and its memory."""
+        time, names = lane.tally.steps * self.drive.step, self.controller.reads
+        senses = sense(self.creature, sensed, time, names)
+        senses |= self.task.senses(lane.aim, sensed)
+        return self.controller.act(lane.plan, lane.memory, senses)
 
     def _look_for_overlap(self, lane: Lane) -> Lane:
         """The lanes with the deepest that parts were in each other, where an episode goes on."""
         tally, depth = lane.tally, self.plant.overlap(lane.body)
-        going = (tally.reason == Reason.FINISHED) & (tally.steps < self.steps)
+        going = (tally.reason == FINISHED) & (tally.steps < self.steps)
         # A comparison, not a maximum: a state that is NaN is for the next step to find.
         deeper = jnp.where(going & (depth > tally.overlap), depth, tally.overlap)
         return dataclasses.replace(lane, tally=dataclasses.replace(tally, overlap=deeper))
 
-    def torque(
-        self, rules: Rules, body: BodyState, sensed: Any, workings: Any, target: jax.Array
-    ) -> jax.Array:
-        """Joint torques in N·m, [J] per lane; rules, states and target [J] per lane, too.
+    def reason(self, sensed: Sensed, aim: Any) -> jax.Array:
+        """Why [] an episode ends at this moment; `FINISHED` while all is well."""
+        ended = self.task.ended(sensed, aim)
+        return jnp.where(_finite(sensed), ended, NONFINITE).astype(jnp.int32)
 
-        Plain PD is stable PD that looks no step ahead.
-        """
-        creature, step = self.creature, self.tracker.step
-        limit = creature.torque_limit.astype(np.float32)
-
-        def pull(
-            rules: Rules, pos: jax.Array, vel: jax.Array, goal: jax.Array
-        ) -> tuple[jax.Array, jax.Array, jax.Array]:
-            kp, kd = (
-                creature.kp.astype(np.float32) * rules.stiffness,
-                creature.kd.astype(np.float32) * rules.damping,
-            )
-            ahead = jnp.where(rules.stable, step, 0.0)
-            return spd.pd_force(pos, vel, goal, kp, kd, ahead), ahead * kd, self._lift(step * kd)
-
-        force, braked, damping = self._per_lane(pull)(
-            rules, sensed.joint_pos, sensed.joint_vel, target
-        )
-        pushed = jnp.where(rules.constraint_forces, 1.0, 0.0)
-        total = self._per_lane(lambda f, c, on, bias: self._lift(f) + on * c - bias)(
-            force, body.constraint_force, pushed, sensed.bias
-        )
-        acceleration = self.plant.solve_damped(workings, damping, total)
-        return self._per_lane(lambda f, a, b: spd.limited_torque(f, a[creature.dof_adr], b, limit))(
-            force, acceleration, braked
-        )
-
-    def _judge(self, rules: Rules, tally: Tally, sensed: Any, torque: jax.Array) -> Tally:
-        going = (tally.reason == Reason.FINISHED) & (tally.steps < self.steps)
-        reason = self.judge.examine(sensed)
-        updated = self.judge.update(tally, sensed, torque, rules.clearance)
+    def _judge(self, lane: Lane, sensed: Sensed, torque: jax.Array) -> Any:
+        """The tally after a step; one that has ended stands still."""
+        tally = lane.tally
+        going = (tally.reason == FINISHED) & (tally.steps < self.steps)
+        reason = self.reason(sensed, lane.aim)
+        updated = self.task.update(tally, sensed, torque, lane.standards, lane.aim)
         kept = dataclasses.replace(tally, reason=jnp.where(going, reason, tally.reason))
-        return _choose(going & (reason == Reason.FINISHED), updated, kept)
-
-    def _lift(self, joints: ArrayLike) -> jax.Array:
-        """Joint values [J] at their places among the degrees of freedom [nv], zero elsewhere."""
-        adr, nv = self.creature.dof_adr, self.creature.model.nv
-        if np.array_equal(adr, np.arange(adr[0], adr[0] + len(adr))):
-            return jnp.pad(jnp.asarray(joints), (adr[0], nv - adr[-1] - 1))
-        return jnp.zeros(nv, jnp.float32).at[adr].set(joints)
+        return _choose(going & (reason == FINISHED), updated, kept)
 
     def _per_lane(self, function: Callable[..., Any]) -> Callable[..., Any]:
-        return jax.vmap(function, in_axes=self.plant.lane_axis, out_axes=self.plant.lane_axis)
+        return per_lane(self.plant, function)
+
+
+def _finite(sensed: Sensed) -> jax.Array:
+    """Whether [] all that a step depends on is finite."""
+    seen = (sensed.joint_vel, sensed.trunk_pos, sensed.trunk_rot, sensed.bias)
+    return jnp.isfinite(sum(jnp.sum(part) for part in seen))
 
 
 def _choose(condition: jax.Array, yes: Any, no: Any) -> Any:

@@ -10,7 +10,7 @@ from mjxgait.champion import read_champion
 from mjxgait.errors import UserError
 from mjxgait.runs.folder import CHAMPION, METRICS, open_run, read_metrics
 from mjxgait.settings.config import Config
-from mjxgait.tasks.walk.fitness import TERMS, weight_vector
+from mjxgait.tasks.walk.fitness import TERMS, signed_weights
 from mjxgait.viewing.curves import Lines, progress_figures
 from mjxgait.viewing.filmstrip import draw_filmstrip
 from mjxgait.viewing.gaitplots import gait_figures
@@ -55,7 +55,5 @@ def plot_run(run: Path, out: Path | None = None, formats: Sequence[str] = FORMAT
 
 def _weights(config: Config, lines: Lines) -> dict[str, np.ndarray]:
     """Signed weight of each term, [generations]."""
-    rows = np.array(
-        [weight_vector(config.fitness, jnp.int32(line["generation"])) for line in lines]
-    )
-    return dict(zip(TERMS, rows.T, strict=True))
+    rows = [signed_weights(config.fitness, jnp.int32(line["generation"])) for line in lines]
+    return {name: np.array([float(row[name]) for row in rows]) for name in TERMS}

@@ -3,10 +3,13 @@
 import jax
 import jax.numpy as jnp
 import numpy as np
+from helpers import weight_vector
 
 from mjxgait.control.poses import TUNING, Genome
 from mjxgait.search.evolution import EvolutionState, Origin
-from mjxgait.tasks.walk.fitness import TERMS, score, weight_vector
+from mjxgait.tasks.score import score
+from mjxgait.tasks.walk.fitness import TERMS
+from mjxgait.tasks.walk.task import Walk
 
 POPULATION = 6
 LAST = 3
@@ -32,6 +35,7 @@ def make_state(creature, config, generation):
             jnp.asarray(poses, jnp.float32), jnp.ones((POPULATION, len(TUNING)), jnp.float32)
         ),
         terms=jnp.asarray(terms),
+        outcome=jnp.zeros((*terms.shape[:2], len(Walk.outcomes))),
         fitness=score(
             terms, weight_vector(config.fitness, jnp.int32(generation)), config.rollout.worst
         ),

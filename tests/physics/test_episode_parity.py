@@ -38,7 +38,7 @@ from mjxgait.control.poses import Genome
 from mjxgait.creature import Creature
 from mjxgait.runs.experiment import build_experiment
 from mjxgait.settings.traced import traced
-from mjxgait.simulation.starts import NEVER, Starts
+from mjxgait.tasks.trials import NEVER, Starts
 from mjxgait.tasks.walk.tally import Reason, Tally
 
 SLIM = {"xla_backend_optimization_level": 0}

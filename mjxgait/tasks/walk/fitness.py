@@ -1,4 +1,4 @@
-"""From the tally of an episode to named fitness terms, and from terms to one number. Higher is better."""
+"""From the tally of a walk to named fitness terms, and what each of them counts."""
 
 import dataclasses
 
@@ -32,8 +32,8 @@ def stride_limit(mass: float) -> float:
 
 def fitness_terms(
     creature: Creature, config: FitnessConfig, step: float, horizon: int, tally: Tally
-) -> jax.Array:
-    """The terms [F] of one episode in the order of `TERMS`, each without unit and before its weight. The config may be traced.
+) -> dict[str, jax.Array]:
+    """The terms [] of one episode, each without unit and before its weight. The config may be traced.
 
     Every penalty is at least zero and every sum ended with the creature's life, so an individual that has died gains nothing more.
 
@@ -76,7 +76,7 @@ def fitness_terms(
     walked = jnp.where(
         jnp.isfinite(enough), jnp.clip(tally.forward / length / enough, 0.0, 1.0), 1.0
     )
-    return jnp.stack([values[name] * (walked if name in STYLE else 1.0) for name in TERMS])
+    return {name: values[name] * (walked if name in STYLE else 1.0) for name in TERMS}
 
 
 def _enough(speed: jax.Array | float, seconds: float) -> jax.Array:
@@ -89,30 +89,13 @@ def _counted(distance: jax.Array, enough: jax.Array) -> jax.Array:
     return jnp.minimum(distance, enough) + BEYOND * jnp.maximum(distance - enough, 0.0)
 
 
-def forward_distance(
-    creature: Creature, config: FitnessConfig, horizon_seconds: float, term: float
-) -> float:
-    """Metres forward that a `distance` term stands for."""
-    enough = config.speed * horizon_seconds
-    lengths = enough + (term - enough) / BEYOND if enough and term > enough else term
-    return lengths * creature.body_length
-
-
-def weight_vector(config: FitnessConfig, generation: jax.Array) -> jax.Array:
-    """Signed weights [F] at a generation []: penalties negative, style terms ramped in by an optax schedule."""
-    base = jnp.stack(
-        [
-            jnp.float32(getattr(config.weights, name) * (1 if name in REWARDS else -1))
-            for name in TERMS
-        ]
-    )
+def signed_weights(config: FitnessConfig, generation: jax.Array) -> dict[str, jax.Array]:
+    """Signed weight [] of each term at a generation []: penalties negative, style terms ramped in."""
     grown = optax.linear_schedule(0.0, 1.0, 1)(generation / jnp.maximum(config.style_ramp, 1))
     ramp = jnp.where(jnp.asarray(config.style_ramp) > 0, grown, 1.0)
-    return jnp.where(jnp.array([name in STYLE for name in TERMS]), base * ramp, base)
 
+    def weight(name: str) -> jax.Array:
+        signed = jnp.float32(getattr(config.weights, name) * (1 if name in REWARDS else -1))
+        return signed * ramp if name in STYLE else signed
 
-def score(terms: jax.Array, weights: jax.Array, worst: jax.Array | float) -> jax.Array:
-    """Fitness [...] of terms [..., R, F]: a mix of the worst start and the mean of the starts. Not finite scores as -inf."""
-    starts = jnp.sum(terms * weights, axis=-1)
-    value = worst * jnp.min(starts, axis=-1) + (1 - worst) * jnp.mean(starts, axis=-1)
-    return jnp.where(jnp.isfinite(value), value, -jnp.inf)
+    return {name: weight(name) for name in TERMS}

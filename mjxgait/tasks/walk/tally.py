@@ -10,10 +10,9 @@ import numpy as np
 from mjxgait.creature import Creature
 from mjxgait.creature.frame import start_axes, start_position
 from mjxgait.creature.settings import Termination
+from mjxgait.senses import CONTACT_GAP, foot_geoms, foot_heights
+from mjxgait.tasks import protocol
 from mjxgait.types import Sensed, pytree
-
-CONTACT_GAP = 0.002
-"""m; a foot nearer to the floor than this is in contact. A resting foot sinks in by about a millimetre."""
 
 SWING = 0.03
 """Hip heights; a foot that rises less has not left the floor, it has trembled. The certificate counts swings alike."""
@@ -22,19 +21,19 @@ SWING = 0.03
 class Reason(IntEnum):
     """Why an episode ended."""
 
-    FINISHED = 0
+    FINISHED = protocol.FINISHED
     TIPPED = 1
     TOO_LOW = 2
     TOO_HIGH = 3
     TOUCHED = 4
-    NONFINITE = 5
+    NONFINITE = protocol.NONFINITE
 
 
 @pytree
-class Tally:
+class Tally(protocol.Tally):
     """Sums over the steps that a creature was up. `F` here counts feet, not their geoms.
 
-    steps: [] steps survived. reason: [] why the episode ended. forward, left: [] m from the start to the latest position.
+    reason: a `Reason`. forward, left: [] m from the start to the latest position.
     forward_half: [] m, `forward` at half time. heading: [] rad.
     swings: [F] completed swings, swinging: [F] whether in one: a swing rises above `SWING` and
       comes down to half of it; there it ends in a footfall.
@@ -44,11 +43,8 @@ class Tally:
     foot_height: [] m·steps, mean height of the feet. foot_pos: [F, 2], foot_down: [F] of the previous step.
     tilt: [] of 1 - up.z. wobble: [] (rad/s)² of the trunk. touch: [] steps on which another part touches.
     work: [] J, positive. saturation, limits: [] share of joints at their torque limit, beyond their pose range.
-    overlap: [] m, the deepest that parts were in each other of the times that they were looked at.
     """
 
-    steps: jax.Array
-    reason: jax.Array
     forward: jax.Array
     left: jax.Array
     forward_half: jax.Array
@@ -69,7 +65,6 @@ class Tally:
     work: jax.Array
     saturation: jax.Array
     limits: jax.Array
-    overlap: jax.Array
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -106,13 +101,7 @@ class Judge:
         # Rounding may put a trunk that is wholly upside down below -1.
         if limits.min_up > -1.0:
             reason = jnp.where(up < limits.min_up, Reason.TIPPED, reason)
-        finite = jnp.isfinite(
-            jnp.sum(sensed.joint_vel)
-            + jnp.sum(sensed.trunk_pos)
-            + jnp.sum(sensed.trunk_rot)
-            + jnp.sum(sensed.bias)
-        )
-        return jnp.where(finite, reason, Reason.NONFINITE).astype(jnp.int32)
+        return reason
 
     def update(
         self,
@@ -177,10 +166,8 @@ class Judge:
 
     def _feet(self, sensed: Sensed) -> tuple[jax.Array, jax.Array]:
         """Lowest point [F] of each foot and its horizontal position [F, 2], the mean of its geoms."""
-        groups = [
-            np.flatnonzero(self.creature.foot_of == foot)
-            for foot in range(len(self.creature.foot_names))
-        ]
-        low = jnp.stack([jnp.min(sensed.geom_low[g[0] : g[-1] + 1]) for g in groups])
-        pos = jnp.stack([jnp.mean(sensed.geom_pos[g[0] : g[-1] + 1, :2], axis=0) for g in groups])
+        low = foot_heights(self.creature, sensed)
+        pos = jnp.stack(
+            [jnp.mean(sensed.geom_pos[g, :2], axis=0) for g in foot_geoms(self.creature)]
+        )
         return low, pos

@@ -1,0 +1,92 @@
+"""The senses: what a controller may know of a moment, by name.
+
+Letters: `J` actuated joints, `F` feet.
+"""
+
+from collections.abc import Callable, Collection, Mapping
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from mjxgait.creature import Creature
+from mjxgait.creature.frame import start_axes, start_position
+from mjxgait.errors import UserError, did_you_mean
+from mjxgait.types import Sensed
+
+CONTACT_GAP = 0.002
+"""m; a foot nearer to the floor is in contact. A resting foot sinks in by about a millimetre."""
+
+Sense = Callable[[Creature, Sensed, jax.Array], jax.Array]
+"""From creature, state of the body and time [] in s to an array."""
+
+
+def _heading(creature: Creature, sensed: Sensed, time: jax.Array) -> jax.Array:
+    nose = sensed.trunk_rot @ creature.forward.astype(np.float32)
+    forward, left = start_axes(creature)
+    return jnp.arctan2(nose @ left, nose @ forward)
+
+
+def _along(creature: Creature, sensed: Sensed, axis: int) -> jax.Array:
+    return (sensed.trunk_pos - start_position(creature)) @ start_axes(creature)[axis]
+
+
+def _attitude(creature: Creature, sensed: Sensed, axis: np.ndarray) -> jax.Array:
+    """Sine of the angle of one of the trunk's axes above the horizon."""
+    return jnp.clip((sensed.trunk_rot @ axis.astype(np.float32))[2], -1.0, 1.0)
+
+
+SENSES: Mapping[str, Sense] = {
+    "time": lambda creature, sensed, time: time,
+    "joint_pos": lambda creature, sensed, time: sensed.joint_pos,
+    "joint_vel": lambda creature, sensed, time: sensed.joint_vel,
+    "foot_height": lambda creature, sensed, time: foot_heights(creature, sensed),
+    "contact": lambda creature, sensed, time: contacts(creature, sensed),
+    "trunk_pos": lambda creature, sensed, time: sensed.trunk_pos,
+    "trunk_rot": lambda creature, sensed, time: sensed.trunk_rot,
+    "trunk_vel": lambda creature, sensed, time: sensed.trunk_vel,
+    "trunk_angvel": lambda creature, sensed, time: sensed.trunk_angvel,
+    "heading": _heading,
+    "forward": lambda creature, sensed, time: _along(creature, sensed, 0),
+    "aside": lambda creature, sensed, time: _along(creature, sensed, 1),
+    "pitch": lambda creature, sensed, time: (
+        -jnp.arcsin(_attitude(creature, sensed, creature.forward))
+    ),
+    "roll": lambda creature, sensed, time: jnp.arcsin(_attitude(creature, sensed, creature.left)),
+}
+"""Names, with shapes and units in docs/controller.md."""
+
+
+def sense(
+    creature: Creature, sensed: Sensed, time: jax.Array, names: Collection[str]
+) -> dict[str, jax.Array]:
+    """The senses of these names."""
+    return {name: SENSES[name](creature, sensed, time) for name in names if name in SENSES}
+
+
+def check_senses(reads: Collection[str], added: Collection[str] = ()) -> None:
+    """Refuses a name that is neither a sense nor what a task adds.
+
+    Raises:
+      UserError: names it and the nearest that there are.
+    """
+    known = [*SENSES, *added]
+    for name in reads:
+        if name not in known:
+            raise UserError(f'there is no sense "{name}"; {did_you_mean(name, known)}')
+
+
+def foot_heights(creature: Creature, sensed: Sensed) -> jax.Array:
+    """Height [F] in m of each foot's lowest point above the floor."""
+    return jnp.stack([jnp.min(sensed.geom_low[geoms]) for geoms in foot_geoms(creature)])
+
+
+def contacts(creature: Creature, sensed: Sensed) -> jax.Array:
+    """Whether [F] each foot touches the floor, 0 or 1."""
+    return (foot_heights(creature, sensed) < CONTACT_GAP).astype(jnp.float32)
+
+
+def foot_geoms(creature: Creature) -> list[slice]:
+    """Of each foot, its places among the watched geoms."""
+    groups = [np.flatnonzero(creature.foot_of == foot) for foot in range(len(creature.foot_names))]
+    return [slice(int(group[0]), int(group[-1]) + 1) for group in groups]

@@ -1,0 +1,63 @@
+"""Genomes in, verdict out: the one contract between evolution and whoever simulates."""
+
+import dataclasses
+from functools import partial
+from typing import Any, Protocol
+
+import jax
+import jax.numpy as jnp
+
+from mjxgait.settings.config import Config
+from mjxgait.simulation.rollout import Episodes, Simulator
+from mjxgait.tasks.protocol import FINISHED, NONFINITE
+from mjxgait.tasks.score import in_order
+from mjxgait.tasks.trials import Starts
+from mjxgait.types import Judged
+
+
+class Evaluator(Protocol):
+    """Judges the genomes of several evolution runs, the rows `B`."""
+
+    def judge(self, genomes: Any, trials: Starts, settings: Config) -> Judged:
+        """The verdict, leaves [B, N, ...], on genomes [B, N, ...] in the trials [B, R] of their row.
+
+        settings: traced, leaves [B, ...].
+        """
+        ...
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Local:
+    """On this machine's devices, as a part of the program that calls it."""
+
+    simulator: Simulator
+
+    def judge(self, genomes: Any, trials: Starts, settings: Config) -> Judged:
+        """See `Evaluator`. Row by row but for the simulations: no row depends on its neighbours."""
+        episodes = self.simulator.simulate(genomes, trials, settings)
+        lived = jnp.sum(episodes.tally.steps, axis=(1, 2))
+        # Idle lanes are nobody's: each row bears a part in proportion to the steps that it lived.
+        share = lived / jnp.maximum(jnp.sum(lived), 1)
+        computed = jnp.round(episodes.computed_steps * share).astype(jnp.int32)
+
+        def of_row(row: tuple[Config, Any, jax.Array]) -> Judged:
+            settings, tally, computed = row
+            return self.verdict(settings, Episodes(tally, computed))
+
+        return jax.lax.map(of_row, (settings, episodes.tally, computed))
+
+    def verdict(self, settings: Config, episodes: Episodes) -> Judged:
+        """On one row's episodes, tally with leaves [N, R, ...]."""
+        task, tally = self.simulator.task, episodes.tally
+
+        def each(function: Any, names: tuple[str, ...]) -> jax.Array:
+            return jax.vmap(jax.vmap(lambda one: in_order(function(one), names)))(tally)
+
+        terms = each(partial(task.judge, settings=settings.fitness), task.terms)
+        return Judged(
+            terms=jnp.where((tally.reason == NONFINITE)[..., None], jnp.nan, terms),
+            outcome=each(task.outcome, task.outcomes),
+            failed=tally.reason != FINISHED,
+            sim_steps=jnp.sum(tally.steps),
+            computed_steps=episodes.computed_steps,
+        )

@@ -1,0 +1,21 @@
+"""From the terms of several trials to one number: higher is better."""
+
+from collections.abc import Mapping, Sequence
+
+import jax
+import jax.numpy as jnp
+
+
+def in_order(named: Mapping[str, jax.Array], names: Sequence[str]) -> jax.Array:
+    """Numbers [] by name as one array [F]."""
+    return jnp.stack([jnp.asarray(named[name], jnp.float32) for name in names])
+
+
+def score(terms: jax.Array, weights: jax.Array, worst: jax.Array | float) -> jax.Array:
+    """Fitness [...] of terms [..., R, F] under weights [F]; what is not finite scores -inf.
+
+    A mix of the worst trial and the mean of the trials.
+    """
+    trials = jnp.sum(terms * weights, axis=-1)
+    value = worst * jnp.min(trials, axis=-1) + (1 - worst) * jnp.mean(trials, axis=-1)
+    return jnp.where(jnp.isfinite(value), value, -jnp.inf)
