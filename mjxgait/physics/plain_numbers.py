@@ -41,12 +41,12 @@ OPTIONS = ("gravity", "impratio")
 """Of a model's options, likewise."""
 UNSEEN = ("cam_", "light_", "mat_", "tex_", "name", "site_", "key_", "text_", "tuple_", "numeric_")
 """Beginnings of what moves nothing."""
-UNUSED = frozenset(
-    (
-        *("geom_rgba", "geom_matid", "geom_aabb", "geom_sameframe", "dof_M0", "body_gravcomp"),
-        *("body_simple", "body_sameframe", "stat", "_impl", "opt", "names", "paths", "signature"),
-    )
-)
+UNUSED = {
+    *("geom_rgba", "geom_matid", "geom_aabb", "geom_sameframe", "geom_rbound_hfield", "dof_M0"),
+    *("body_margin", "body_simple", "body_sameframe", "stat", "names", "paths", "signature"),
+}
+PARTS_OF_MODEL = {"opt", "_impl"}
+"""Which are compared by themselves."""
 
 
 @pytree
@@ -91,8 +91,8 @@ def read_numbers(
 
 def model_difference(own: mjx.Model, other: mjx.Model) -> str:
     """The first thing but numbers in which `other` is not as `own`; empty if there is none."""
-    left_out = {*NUMBERS, *OPTIONS} | UNUSED
-    pairs = [(own, other), (own.opt, other.opt)]
+    left_out = {*NUMBERS, *OPTIONS} | UNUSED | PARTS_OF_MODEL
+    pairs = [(own, other), (own.opt, other.opt), (own._impl, other._impl)]
     for mine, theirs in pairs:
         for name in (field.name for field in dataclasses.fields(mine)):
             if name in left_out or name.startswith(UNSEEN):
