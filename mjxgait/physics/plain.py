@@ -54,7 +54,8 @@ class MjxPlant:
         told = told or _sense_difference(self.layout, layout, self.crossings, crossings)
         if told:
             raise OtherTopology(told)
-        return read_numbers(model, device_model, layout, crossings)
+        # In NumPy, for arrays of MJX belong to one device.
+        return jax.device_get(read_numbers(model, device_model, layout, crossings))
 
     def with_parameters(self, parameters: ModelNumbers) -> Self:
         """See `Plant.with_parameters`."""

@@ -65,7 +65,8 @@ class ModelNumbers:
 
     def put_in(self, model: mjx.Model) -> mjx.Model:
         """A model with these numbers."""
-        return model.replace(**self.model, opt=model.opt.replace(**self.options))
+        numbers, options = jax.tree.map(jnp.asarray, (self.model, self.options))
+        return model.replace(**numbers, opt=model.opt.replace(**options))
 
 
 def read_numbers(
