@@ -1,5 +1,6 @@
 """How two topologies differ, in words."""
 
+import dataclasses
 from collections.abc import Iterator
 
 from mjxgait.physics.fast.slots import BALL, FREE, HINGE, SLIDE
@@ -40,13 +41,12 @@ def _differences(own: Topology, other: Topology) -> Iterator[str]:
         yield from _slots(own, other, b, name)
     if own.trunk != other.trunk:
         yield f"its trunk is {_named(other, other.trunk)}, not {_named(other, own.trunk)}"
-    for field in vars(own):
-        if field in own.__dataclass_fields__ and field != "names":
-            ours, theirs = getattr(own, field), getattr(other, field)
-            short = isinstance(ours, int | float)
-            if ours != theirs:
-                told = f" ({theirs}, not {ours})" if short else ""
-                yield f"{WORDS.get(field, field)} differ{'s' if short else ''}{told}"
+    for name in (field.name for field in dataclasses.fields(own) if field.compare):
+        had, has = getattr(own, name), getattr(other, name)
+        if isinstance(had, int | float) and has != had:
+            yield f"{WORDS.get(name, name)} differs ({has}, not {had})"
+        elif has != had:
+            yield f"{WORDS.get(name, name)} differ"
 
 
 def _slots(own: Topology, other: Topology, b: int, name: str) -> Iterator[str]:

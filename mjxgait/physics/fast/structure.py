@@ -9,6 +9,7 @@ import functools
 from typing import Any
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 
 from mjxgait.creature import geometry
@@ -150,12 +151,16 @@ class Structure:
 def join(
     topology: Topology, parameters: Parameters, dtype: np.dtype, per_lane: bool = False
 ) -> Structure:
-    """The body with these numbers. per_lane: whether their last axis is the lanes."""
+    """The body with these numbers.
+
+    per_lane: whether their last axis is the lanes; then they are no constants.
+    """
 
     def columned(number: Number, precision: np.dtype | None = None) -> Number:
+        if per_lane:
+            return jnp.asarray(number, dtype)
         constant = isinstance(number, np.ndarray)
-        cast = np.asarray(number, precision) if constant else number
-        return cast if per_lane else cast[..., None]
+        return (np.asarray(number, precision) if constant else number)[..., None]
 
     exact = jax.tree.map(columned, parameters)
     columns = jax.tree.map(lambda number: columned(number, dtype), parameters)
