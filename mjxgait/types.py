@@ -5,11 +5,14 @@ flight), `K` key poses, `J` actuated joints, `G` watched geoms (the `F` feet fir
 """
 
 import dataclasses
-from typing import Any, Protocol, TypeVar, dataclass_transform
+from typing import Any, Protocol, Self, TypeVar, dataclass_transform
 
 import jax
+import numpy as np
 
 T = TypeVar("T")
+Number = jax.Array | np.ndarray
+"""A constant of the program where it is of NumPy."""
 
 
 @dataclass_transform(frozen_default=True)
@@ -27,6 +30,8 @@ class BodyState:
     warmstart: [nv] previous acceleration, where the contact solver starts.
     constraint_force: [nv] N, N·m; generalised force of the previous contact solve.
     friction: [] factor on the floor's sliding friction.
+    parameters: the numbers of this lane's own body, as `Plant.parameters_of` reads them; None
+      where it has the plant's.
     """
 
     qpos: jax.Array
@@ -34,6 +39,7 @@ class BodyState:
     warmstart: jax.Array
     constraint_force: jax.Array
     friction: jax.Array
+    parameters: Any = None
 
 
 @pytree
@@ -85,8 +91,36 @@ class Plant(Protocol):
         ...
 
     @property
+    def parameters(self) -> Any:
+        """The numbers of the body that all lanes have: the plant's own pytree, without lanes.
+
+        They are constants of the program, or its inputs (`with_parameters`). A `BodyState` with
+        parameters has its own instead.
+        """
+        ...
+
+    @property
     def note(self) -> str:
         """What a user should know about the choice of this plant; empty if nothing."""
+        ...
+
+    def parameters_of(self, model: Any, layout: Any, crossings: Any = None) -> Any:
+        """The numbers of another body of the same topology, from what this plant was made of.
+
+        Raises:
+          OtherTopology: more than numbers differs; the message says what.
+        """
+        ...
+
+    def with_parameters(self, parameters: Any) -> Self:
+        """The plant of another body: constants as `parameters_of` reads them, or traced arrays."""
+        ...
+
+    def heavier(self, parameters: Any, factor: Number) -> Any:
+        """One body's numbers with its masses and inertias times factor, [] or [nbody - 1].
+
+        What follows from them (the weights of constraints) is computed anew.
+        """
         ...
 
     def forward(self, state: BodyState) -> tuple[Sensed, Any]:

@@ -65,7 +65,7 @@ class Crossings:
 
 
 def bar_distance(
-    apart: Vector, first: Vector, second: Vector, lengths: tuple[np.ndarray, np.ndarray]
+    apart: Vector, first: Vector, second: Vector, lengths: tuple[Numbers, Numbers]
 ) -> Numbers:
     """Distance of two segments in m, elementwise, of NumPy or JAX arrays.
 
@@ -74,9 +74,9 @@ def bar_distance(
     Args:
       apart: from the second's middle to the first's, three components.
       first, second: from each middle to its end.
-      lengths: squared, of `first` and `second`; constants, zero for a point.
+      lengths: squared, of `first` and `second`; zero for a point.
     """
-    inverse = [np.divide(1.0, x, out=np.zeros_like(x), where=x > 0) for x in lengths]
+    inverse = [(x > 0) / (x + (x == 0)) for x in lengths]
     along = _dot(first, second)
     lead, back = _dot(first, apart), _dot(second, apart)
     # Of parallel segments any place will do to begin with: the two projections find the nearest.

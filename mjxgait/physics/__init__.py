@@ -1,15 +1,17 @@
 """Batched rigid-body physics behind the `Plant` protocol."""
 
-from typing import Literal
+import copy
+from typing import Any, Literal
 
 import mujoco
+from numpy.typing import ArrayLike
 
 from mjxgait.creature import Creature
 from mjxgait.creature.overlap import find_crossings
 from mjxgait.errors import UserError
 from mjxgait.physics.fast import UnsupportedModel, fast_plant
 from mjxgait.physics.fast.support import check_supported
-from mjxgait.physics.layout import sense_layout
+from mjxgait.physics.layout import OtherTopology, sense_layout
 from mjxgait.physics.plain import mjx_plant
 from mjxgait.types import Plant
 
@@ -42,6 +44,33 @@ def make_plant(
         raise UserError(
             f"{creature.name}: creature.xml uses what MJX does not support: {error}"
         ) from None
+
+
+def parameters_of(plant: Plant, creature: Creature, touch_ends: bool) -> Any:
+    """The numbers of a creature, for the plant of another one of the same topology.
+
+    Raises:
+      UserError: more than numbers differs.
+    """
+    model, layout = creature.model_where(touch_ends), sense_layout(creature)
+    try:
+        return plant.parameters_of(model, layout, find_crossings(creature))
+    except OtherTopology as reason:
+        raise UserError(
+            f"{creature.name} needs a program of its own, for its topology is another: {reason}"
+        ) from None
+
+
+def heavier_model(model: mujoco.MjModel, factor: ArrayLike) -> mujoco.MjModel:
+    """A copy whose masses and inertias are times factor, [] or [nbody - 1].
+
+    What follows from them is MuJoCo's own reckoning (`mj_setConst`).
+    """
+    heavy = copy.deepcopy(model)
+    heavy.body_mass[1:] *= factor
+    heavy.body_inertia[1:] = (heavy.body_inertia[1:].T * factor).T
+    mujoco.mj_setConst(heavy, mujoco.MjData(heavy))
+    return heavy
 
 
 def fallback_note(model: mujoco.MjModel) -> str:

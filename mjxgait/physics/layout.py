@@ -9,12 +9,19 @@ from mjxgait.creature import Creature
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class SenseLayout:
-    """trunk: body id. qpos_adr, dof_adr: [J] addresses of the actuated joints. watched: [G] geom ids."""
+    """What is sensed.
+
+    trunk: body id. qpos_adr, dof_adr: [J] addresses of the actuated joints. watched: [G] geom ids.
+    """
 
     trunk: int
     qpos_adr: np.ndarray
     dof_adr: np.ndarray
     watched: np.ndarray
+
+
+class OtherTopology(Exception):
+    """A body does not fit a plant made for another; the message says in what."""
 
 
 def sense_layout(creature: Creature) -> SenseLayout:

@@ -3,17 +3,47 @@
 import jax
 import jax.numpy as jnp
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mjxgait.creature.overlap import Crossings, bar_distance
+from mjxgait.types import Number, pytree
 
 
-def deepest(crossings: Crossings, centre: jax.Array, half: jax.Array) -> jax.Array:
+@pytree
+class Bars:
+    """The numbers of `Crossings`; lanes, where they are, innermost.
+
+    centre, half: [S, 3] m in the body's frame, a bar's middle and from there to an end. reach: [Q]
+    m; a pair's depth is this minus the distance of the two axes.
+    """
+
+    centre: Number
+    half: Number
+    reach: Number
+
+
+def read_bars(crossings: Crossings | None) -> Bars:
+    """Of these; none of None."""
+    if crossings is None or not len(crossings.first):
+        return Bars(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0))
+    return Bars(crossings.centre, crossings.half, crossings.reach)
+
+
+def deepest(
+    first: ArrayLike,
+    second: ArrayLike,
+    bars: Bars,
+    centre: jax.Array,
+    half: jax.Array,
+) -> jax.Array:
     """[...] m; how much deeper than standing the deepest two are in each other, negative if apart.
 
     Args:
+      first, second: [Q] the bars of each pair.
+      bars: with as many axes as the following, 1 long where the numbers are the same.
       centre, half: [S, 3, ...] m; each bar's middle and from there to one end, in any one frame.
     """
-    depth = _pair_depths(crossings, centre, half)
+    depth = _pair_depths(np.array(first), np.array(second), bars, centre, half)
     # Halves laid on each other; a maximum over this axis takes three times as long on CPU.
     while depth.shape[0] > 1:
         rows = (depth.shape[0] + 1) // 2
@@ -21,17 +51,25 @@ def deepest(crossings: Crossings, centre: jax.Array, half: jax.Array) -> jax.Arr
     return depth[0]
 
 
-def _pair_depths(crossings: Crossings, centre: jax.Array, half: jax.Array) -> jax.Array:
+def _pair_depths(
+    first: np.ndarray, second: np.ndarray, bars: Bars, centre: jax.Array, half: jax.Array
+) -> jax.Array:
     """[Q, ...] of each pair."""
-    first, second = crossings.first, crossings.second
-    column = (slice(None), *[None] * (centre.ndim - 2))
 
     def parts(rows: jax.Array) -> tuple[jax.Array, jax.Array, jax.Array]:
         return rows[:, 0], rows[:, 1], rows[:, 2]
 
-    lengths = tuple(np.asarray(x, np.float32)[column] for x in crossings.lengths())
+    lengths = (bars.half**2).sum(1)
     apart = parts(centre[first] - centre[second])
     distance = bar_distance(
-        apart, parts(half[first]), parts(half[second]), (lengths[0], lengths[1])
+        apart,
+        parts(half[first]),
+        parts(half[second]),
+        (single(lengths[first]), single(lengths[second])),
     )
-    return np.asarray(crossings.reach, np.float32)[column] - distance
+    return single(bars.reach) - distance
+
+
+def single(numbers: Number) -> Number:
+    """Numbers, constants among them as float32, so that nothing widens."""
+    return np.asarray(numbers, np.float32) if isinstance(numbers, np.ndarray) else numbers

@@ -1,26 +1,28 @@
-"""The reference plant: MJX's own functions, one step split around the controller, mapped over lanes in front."""
+"""The reference plant: MJX's own functions, mapped over lanes in front.
 
-import contextlib
+One step is split around the controller.
+"""
+
 import dataclasses
-import io
-from functools import partial
-from typing import Any
+from typing import Any, Self
 
 import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
 
-from mjxgait.creature import geometry
 from mjxgait.creature.overlap import Crossings
-from mjxgait.physics.layout import SenseLayout
-from mjxgait.physics.overlap import deepest
-from mjxgait.types import BodyState, Sensed
-
-with contextlib.redirect_stdout(
-    io.StringIO()
-):  # MJX prints that Warp, which nobody asked for, is not installed
-    from mujoco import mjx
+from mjxgait.physics.layout import OtherTopology, SenseLayout
+from mjxgait.physics.overlap import deepest, single
+from mjxgait.physics.plain_numbers import (
+    ModelNumbers,
+    heavier,
+    mjx,
+    model_difference,
+    read_numbers,
+    reweighed,
+)
+from mjxgait.types import BodyState, Number, Sensed
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -30,7 +32,7 @@ class MjxPlant:
     Attributes:
       model, data: of MJX; data is the template whose state each lane replaces.
       layout: which parts of the model are sensed.
-      reach: r [G], b [G, 3], e [G, 3] of the watched geoms' support functions.
+      parameters: of the body that all lanes have.
       crossings: which parts may be in each other; None looks at none.
       note: see `Plant.note`.
     """
@@ -38,10 +40,30 @@ class MjxPlant:
     model: mjx.Model
     data: mjx.Data
     layout: SenseLayout
-    reach: tuple[np.ndarray, np.ndarray, np.ndarray]
+    parameters: ModelNumbers
     crossings: Crossings | None = None
     note: str = ""
     lane_axis: int = 0
+
+    def parameters_of(
+        self, model: mujoco.MjModel, layout: SenseLayout, crossings: Crossings | None = None
+    ) -> ModelNumbers:
+        """See `Plant.parameters_of`."""
+        device_model = mjx.put_model(model, impl="jax")
+        told = model_difference(self.model, device_model)
+        told = told or _sense_difference(self.layout, layout, self.crossings, crossings)
+        if told:
+            raise OtherTopology(told)
+        # In NumPy, for arrays of MJX belong to one device.
+        return jax.device_get(read_numbers(model, device_model, layout, crossings))
+
+    def with_parameters(self, parameters: ModelNumbers) -> Self:
+        """See `Plant.with_parameters`."""
+        return dataclasses.replace(self, parameters=parameters)
+
+    def heavier(self, parameters: ModelNumbers, factor: Number) -> ModelNumbers:
+        """See `Plant.heavier`."""
+        return reweighed(self.model, self.data, heavier(parameters, factor))
 
     def forward(self, state: BodyState) -> tuple[Sensed, Any]:
         """See `Plant.forward`."""
@@ -62,25 +84,31 @@ class MjxPlant:
 
     def overlap(self, state: BodyState) -> jax.Array:
         """See `Plant.overlap`."""
-        if self.crossings is None or not len(self.crossings.first):
+        crossings = self.crossings
+        if crossings is None or not len(crossings.first):
             return jnp.full_like(state.friction, -jnp.inf)
-        return jax.vmap(partial(self._overlap, self.crossings))(state.qpos)
+        return jax.vmap(lambda state: self._overlap(state, crossings))(state)
 
-    def _overlap(self, crossings: Crossings, qpos: jax.Array) -> jax.Array:
-        data = mjx.kinematics(self.model, self.data.replace(qpos=qpos))
-        rot = data.xmat[crossings.body]
-        centre, half = (
-            jnp.einsum("sij,sj->si", rot, np.float32(x)) for x in (crossings.centre, crossings.half)
-        )
-        return deepest(crossings, data.xpos[crossings.body] + centre, half)
+    def _overlap(self, state: BodyState, crossings: Crossings) -> jax.Array:
+        numbers = self._numbers(state)
+        data = mjx.kinematics(numbers.put_in(self.model), self.data.replace(qpos=state.qpos))
+        rot, bars = data.xmat[crossings.body], numbers.bars
+        centre, half = (jnp.einsum("sij,sj->si", rot, single(x)) for x in (bars.centre, bars.half))
+        middle = data.xpos[crossings.body] + centre
+        return deepest(crossings.first, crossings.second, bars, middle, half)
 
-    def _with_friction(self, friction: jax.Array) -> mjx.Model:
-        return self.model.replace(
-            geom_friction=self.model.geom_friction * jnp.stack([friction, 1.0, 1.0])
+    def _numbers(self, state: BodyState) -> ModelNumbers:
+        """Of this lane's body: its own, or the plant's."""
+        return self.parameters if state.parameters is None else state.parameters
+
+    def _model(self, state: BodyState) -> mjx.Model:
+        model = self._numbers(state).put_in(self.model)
+        return model.replace(
+            geom_friction=model.geom_friction * jnp.stack([state.friction, 1.0, 1.0])
         )
 
     def _forward(self, state: BodyState) -> tuple[Sensed, mjx.Data]:
-        model = self._with_friction(state.friction)
+        model = self._model(state)
         data = self.data.replace(qpos=state.qpos, qvel=state.qvel, qacc_warmstart=state.warmstart)
         data = mjx.fwd_velocity(model, mjx.fwd_position(model, data))
         layout = self.layout
@@ -95,29 +123,51 @@ class MjxPlant:
             trunk_vel=shift + jnp.cross(spin, offset),
             trunk_angvel=spin,
             geom_pos=data.geom_xpos[layout.watched],
-            geom_low=self._lowest(data.geom_xpos[layout.watched], data.geom_xmat[layout.watched]),
+            geom_low=_lowest(
+                self._numbers(state), data.geom_xpos[layout.watched], data.geom_xmat[layout.watched]
+            ),
         )
         return sensed, data
 
-    def _lowest(self, pos: jax.Array, rot: jax.Array) -> jax.Array:
-        r, box, ellipsoid = self.reach
-        down = rot[:, 2, :]
-        return (
-            pos[:, 2]
-            - r
-            - jnp.sum(jnp.abs(down) * box, axis=1)
-            - jnp.linalg.norm(down * ellipsoid, axis=1)
-        )
-
     def _advance(self, state: BodyState, data: mjx.Data, torque: jax.Array) -> BodyState:
-        model = self._with_friction(state.friction)
+        model = self._model(state)
         data = mjx.fwd_acceleration(model, data.replace(qfrc_applied=torque))
         touches = data._impl.efc_J.size > 0
         data = mjx.solve(model, data) if touches else data.replace(qacc=data.qacc_smooth)
         data = mjx.euler(model, data)
         return BodyState(
-            data.qpos, data.qvel, data.qacc_warmstart, data.qfrc_constraint, state.friction
+            data.qpos,
+            data.qvel,
+            data.qacc_warmstart,
+            data.qfrc_constraint,
+            state.friction,
+            state.parameters,
         )
+
+
+def _lowest(numbers: ModelNumbers, pos: jax.Array, rot: jax.Array) -> jax.Array:
+    """[G] m of geoms at these places, by their support functions."""
+    down = rot[:, 2, :]
+    return (
+        pos[:, 2]
+        - numbers.radius
+        - jnp.sum(jnp.abs(down) * numbers.box, axis=1)
+        - jnp.linalg.norm(down * numbers.ellipsoid, axis=1)
+    )
+
+
+def _sense_difference(
+    own: SenseLayout, other: SenseLayout, pairs: Crossings | None, others: Crossings | None
+) -> str:
+    """The first thing that is looked at elsewhere; empty if there is none."""
+    for field in dataclasses.fields(SenseLayout):
+        if not np.array_equal(getattr(own, field.name), getattr(other, field.name)):
+            return f"other parts of it are sensed ({field.name})"
+    for name in ("body", "first", "second"):
+        mine, theirs = ([] if x is None else getattr(x, name) for x in (pairs, others))
+        if not np.array_equal(mine, theirs):
+            return "other pairs of its parts are watched for overlap"
+    return ""
 
 
 def mjx_plant(
@@ -133,8 +183,5 @@ def mjx_plant(
     """
     device_model = mjx.put_model(model, impl="jax")
     data = mjx.make_data(device_model, impl="jax")
-    extents = [
-        geometry.support_extents(model.geom_type[g], model.geom_size[g]) for g in layout.watched
-    ]
-    r, box, ellipsoid = (np.array(column, np.float32) for column in zip(*extents, strict=True))
-    return MjxPlant(device_model, data, layout, (r, box, ellipsoid), crossings, note)
+    numbers = read_numbers(model, device_model, layout, crossings)
+    return MjxPlant(device_model, data, layout, numbers, crossings, note)

@@ -8,7 +8,6 @@ All contacts' values lie side by side in arrays [C, L], the limits' in [M, L]. F
 
 import dataclasses
 from collections.abc import Callable, Sequence
-from functools import partial
 from itertools import groupby
 from typing import Any
 
@@ -17,11 +16,13 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 
+from mjxgait.physics.fast.carriers import Carriers
 from mjxgait.physics.fast.dynamics import root_axes
 from mjxgait.physics.fast.footing import Directions, Footing, Moves, Touch
 from mjxgait.physics.fast.kinematics import Motion, Pose
 from mjxgait.physics.fast.lanes import Pin, add, turn
-from mjxgait.physics.fast.structure import Carriers, Contact, Softness, Structure
+from mjxgait.physics.fast.parameters import Softness
+from mjxgait.physics.fast.structure import Structure, scalars
 
 SMALLEST_FRICTION = 1e-5
 """mjMINMU, under which MuJoCo's engine lets no friction coefficient fall."""
@@ -65,9 +66,10 @@ def touch(
     """Where all contacts are and what moves them; paths: see `dynamics.motion_paths`."""
     if not structure.contacts:
         return None
+    numbered = enumerate(structure.contacts)
     places = [
-        _placed(list(contacts), poses[body])
-        for body, contacts in groupby(structure.contacts, key=lambda c: c.body)
+        _placed(structure, [n for n, _ in contacts], poses[body])
+        for body, contacts in groupby(numbered, key=lambda c: c[1].body)
     ]
     x, y, z, origin, radius = (pin(jnp.concatenate(column)) for column in zip(*places, strict=True))
     distance = pin(origin + z - radius)
@@ -75,7 +77,7 @@ def touch(
         distance=distance,
         # MuJoCo puts the contact point half way between the two surfaces.
         points=pin((x, y, z - radius - 0.5 * distance)),
-        tangent=_tangents(structure.contacts, poses, pin),
+        tangent=_tangents(structure, poses, pin),
         moves=_moves(structure.carriers, freedom, paths, pin),
     )
 
@@ -91,15 +93,15 @@ def _moves(tree: Carriers, freedom: Motion, paths: dict[int, jax.Array], pin: Pi
     )
 
 
-def _placed(contacts: Sequence[Contact], pose: Pose) -> tuple[jax.Array, ...]:
+def _placed(structure: Structure, places: Sequence[int], pose: Pose) -> tuple[jax.Array, ...]:
     """Centres from the origin, height of the origin and radii of the contacts of one body, [c, L] each."""
-    local = np.array([c.center for c in contacts], np.float32)
+    own = slice(places[0], places[-1] + 1)
+    local, radius = structure.columns.contacts.center[own], structure.columns.contacts.radius[own]
     x, y, z = (
-        add(*(pose.rot[j][i] * local[:, j, None] for j in range(3)), _component(pose.pos, i))
+        add(*(pose.rot[j][i] * local[:, j] for j in range(3)), _component(pose.pos, i))
         for i in range(3)
     )
     like = jnp.ones_like(x)
-    radius = np.array([c.radius for c in contacts], np.float32)[:, None]
     return x, y, z, like * _component(pose.origin, 2), like * radius
 
 
@@ -108,20 +110,22 @@ def _component(vector: Any, i: int) -> Any:
 
 
 def _tangents(
-    contacts: Sequence[Contact], poses: Sequence[Pose], pin: Pin
+    structure: Structure, poses: Sequence[Pose], pin: Pin
 ) -> tuple[jax.Array, jax.Array] | None:
     """Along the capsule's axis as seen from above; the world's y where it stands upright, and x for a sphere."""
-    if all(contact.axis is None for contact in contacts):
+    contacts = structure.contacts
+    if not any(contact.capsule for contact in contacts):
         return None
     like = poses[contacts[0].body].rot[0][0]
 
-    def heading(contact: Contact) -> tuple[jax.Array, jax.Array]:
-        if contact.axis is None:
+    def heading(n: int) -> tuple[jax.Array, jax.Array]:
+        if not contacts[n].capsule:
             return jnp.ones_like(like), jnp.zeros_like(like)
-        axis = turn(poses[contact.body].rot, contact.axis)
+        axis = turn(poses[contacts[n].body].rot, scalars(structure.exact.contacts.axis[n]))
         return axis[0], axis[1]
 
-    x, y = pin(tuple(jnp.stack(part) for part in zip(*map(heading, contacts), strict=True)))
+    headings = map(heading, range(len(contacts)))
+    x, y = pin(tuple(jnp.stack(part) for part in zip(*headings, strict=True)))
     length = jnp.sqrt(x * x + y * y)
     upright = length < 0.5
     safe = jnp.where(upright, 1.0, length)
@@ -152,14 +156,12 @@ def _contact_terms(
     footing: Footing, friction: jax.Array, qvel: jax.Array
 ) -> tuple[jax.Array, Directions, jax.Array]:
     structure, touch, pin = footing.structure, footing.touch, footing.pin
-    contacts = structure.contacts
-    column = partial(_column, dtype=friction.dtype)
-    mu = jnp.maximum(column([c.friction for c in contacts]) * friction, SMALLEST_FRICTION)
-    stiffness, damping, impedance, depth = _soften([c.softness for c in contacts], touch.distance)
+    contacts = structure.columns.contacts
+    mu = jnp.maximum(contacts.friction * friction, SMALLEST_FRICTION)
+    impedance, depth = _soften(contacts.softness, structure.topology.contact_power, touch.distance)
+    stiffness, damping = contacts.softness.stiffness, contacts.softness.damping
     # Regulariser of all edges (MJX `_efc_contact_pyramidal`): inverse mass along an edge, scaled by friction.
-    inverse_mass = (
-        column([c.weight for c in contacts]) * (1 + mu * mu) * 2 * mu * mu / structure.impratio
-    )
+    inverse_mass = contacts.weight * (1 + mu * mu) * 2 * mu * mu / structure.impratio
     weight = jnp.where(
         depth < 0, impedance / jnp.maximum(inverse_mass * (1 - impedance), mujoco.mjMINVAL), 0.0
     )
@@ -175,47 +177,34 @@ def _contact_terms(
 def _limit_terms(
     structure: Structure, qpos: jax.Array, qvel: jax.Array, pin: Pin
 ) -> tuple[jax.Array, jax.Array, jax.Array]:
-    limits = structure.limits
-    column = partial(_column, dtype=qpos.dtype)
-    pos = jnp.stack([qpos[limit.qpos] for limit in limits])
-    vel = jnp.stack([qvel[limit.dof] for limit in limits])
-    over_low, under_high = (
-        pos - column([limit.low for limit in limits]),
-        column([limit.high for limit in limits]) - pos,
-    )
+    slots, limits = structure.limits, structure.columns.limits
+    pos = jnp.stack([qpos[limit.qpos] for limit in slots])
+    vel = jnp.stack([qvel[limit.dof] for limit in slots])
+    over_low, under_high = pos - limits.low, limits.high - pos
     sign = jnp.where(over_low < under_high, 1.0, -1.0)
-    stiffness, damping, impedance, depth = _soften(
-        [limit.softness for limit in limits], jnp.minimum(over_low, under_high)
+    stiffness, damping = limits.softness.stiffness, limits.softness.damping
+    impedance, depth = _soften(
+        limits.softness, structure.topology.limit_power, jnp.minimum(over_low, under_high)
     )
-    inverse_mass = column([limit.weight for limit in limits])
     weight = jnp.where(
-        depth < 0, impedance / jnp.maximum(inverse_mass * (1 - impedance), mujoco.mjMINVAL), 0.0
+        depth < 0, impedance / jnp.maximum(limits.weight * (1 - impedance), mujoco.mjMINVAL), 0.0
     )
     return pin(sign), pin(-damping * sign * vel - stiffness * impedance * depth), pin(weight)
 
 
-def _column(values: Sequence[float], dtype: np.dtype) -> np.ndarray:
-    return np.array(values, dtype)[:, None]
-
-
 def _soften(
-    softness: Sequence[Softness], distance: jax.Array
-) -> tuple[np.ndarray, np.ndarray, jax.Array, jax.Array]:
-    """Stiffness, damping, impedance and distance less margin of constraints [C, L] (computation docs, "Impedance")."""
-    column = partial(_column, dtype=distance.dtype)
-    low, high, width, mid, power = (column([s.impedance[n] for s in softness]) for n in range(5))
-    depth = distance - column([s.margin for s in softness])
+    softness: Softness, powers: Sequence[float], distance: jax.Array
+) -> tuple[Any, jax.Array]:
+    """Impedance and distance less margin of constraints [C, L] (computation docs, "Impedance")."""
+    low, high, width, mid = (softness.impedance[:, n] for n in range(4))
+    power = np.array(powers, distance.dtype)[:, None]
+    depth = distance - softness.margin
     x = jnp.minimum(jnp.abs(depth) / width, 1.0)
     raised = _power(power)
     y = jnp.where(
         x < mid, raised(x) / raised(mid) * mid, 1 - raised(1 - x) / raised(1 - mid) * (1 - mid)
     )
-    return (
-        column([s.stiffness for s in softness]),
-        column([s.damping for s in softness]),
-        low + y * (high - low),
-        depth,
-    )
+    return low + y * (high - low), depth
 
 
 def _power(power: np.ndarray) -> Callable[..., jax.Array]:

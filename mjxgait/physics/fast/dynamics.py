@@ -18,6 +18,7 @@ from mjxgait.physics.fast.lanes import (
     Scalar,
     Vector,
     axes,
+    column,
     cross,
     dot,
     minus,
@@ -26,8 +27,10 @@ from mjxgait.physics.fast.lanes import (
     table,
     total,
 )
-from mjxgait.physics.fast.structure import BALL, FREE, HINGE, SLIDE, Body, Structure
-from mjxgait.physics.fast.treematrix import Rows
+from mjxgait.physics.fast.slots import BALL, FREE, HINGE, SLIDE, BodySlot
+from mjxgait.physics.fast.structure import Structure
+from mjxgait.physics.fast.treematrix import Rows, on_pivot
+from mjxgait.types import Number
 
 CARRIES = {FREE: ((0, 3), (3, 3)), BALL: ((0, 3),), SLIDE: ((0, 1),), HINGE: ((0, 1),)}
 """Per joint type the groups (first, count) of its degrees of freedom in the order in which one group carries the next."""
@@ -55,24 +58,18 @@ class Inertia:
 
 def inertias(structure: Structure, poses: Sequence[Pose], like: jax.Array, pin: Pin) -> Inertia:
     """Of all bodies."""
-    bodies = structure.bodies
+    x = structure.columns
     pos = pin(table([pose.pos for pose in poses], like))
     rot = [pin(table([pose.rot[j] for pose in poses], like)) for j in range(3)]
 
-    def column(values: Sequence[float]) -> np.ndarray:
-        return np.array(values, like.dtype)[:, None]
+    def turned(local: Number) -> Vector:
+        return tuple(total([local[:, j] * rot[j][:, i] for j in range(3)]) for i in range(3))
 
-    def turned(local: Sequence[Sequence[float]]) -> Vector:
-        return tuple(
-            total([column([v[j] for v in local]) * rot[j][:, i] for j in range(3)])
-            for i in range(3)
-        )
-
-    center = pin(plus(axes(pos), turned([b.com for b in bodies])))
-    first, second = pin((turned([b.axes[0] for b in bodies]), turned([b.axes[1] for b in bodies])))
+    center = pin(plus(axes(pos), turned(x.com)))
+    first, second = pin((turned(x.axes[:, 0]), turned(x.axes[:, 1])))
     # Two principal axes carry what their moments differ from the third; the third's goes to the identity.
-    a, b, least = (column([body.inertia[j] for body in bodies]) for j in range(3))
-    a, b, mass = a - least, b - least, column([body.mass for body in bodies])
+    least, mass = x.inertia[:, 2], x.mass
+    a, b = x.inertia[:, 0] - least, x.inertia[:, 1] - least
 
     def entry(i: int, j: int) -> jax.Array:
         own = a * first[i] * first[j] + b * second[i] * second[j] - mass * center[i] * center[j]
@@ -93,15 +90,15 @@ def unpack(packed: jax.Array) -> Motion:
 
 
 def down(
-    structure: Structure, steps: jax.Array, start: np.ndarray, pin: Pin
+    structure: Structure, steps: jax.Array, start: Number, pin: Pin
 ) -> tuple[list[jax.Array], jax.Array]:
     """Sums from the root: per body its sum [6, L], and per degree of freedom the sum before it [nv, 6, L].
 
-    steps: [nv, 6, L], what each degree of freedom adds. start: [6, 1], of the world.
+    steps: [nv, 6, L], what each degree of freedom adds. start: [6, 1 or L], of the world.
     """
     after: list[jax.Array] = []
     before: list[jax.Array] = []
-    for body in structure.bodies:
+    for body in structure.topology.bodies:
         value = jnp.broadcast_to(start, steps.shape[1:]) if body.parent < 0 else after[body.parent]
         for group in _groups(body):
             before.extend([value] * len(group))
@@ -114,12 +111,12 @@ def up(structure: Structure, own: jax.Array, pin: Pin) -> list[jax.Array]:
     """Per body the sum [components, L] over itself and all below; own: [B, components, L]."""
     sums = list(own)
     for b in reversed(range(len(sums))):
-        below = [sums[c] for c, body in enumerate(structure.bodies) if body.parent == b]
+        below = [sums[c] for c, body in enumerate(structure.topology.bodies) if body.parent == b]
         sums[b] = pin(total([own[b], *below])) if below else own[b]
     return sums
 
 
-def _groups(body: Body) -> list[range]:
+def _groups(body: BodySlot) -> list[range]:
     return [
         range(j.dof + first, j.dof + first + count)
         for j in body.joints
@@ -146,7 +143,7 @@ def bias_force(
     steps = Motion(scale(qvel, freedom.spin), scale(qvel, freedom.shift))
     moving, before = down(structure, pack(steps.parts, pin), np.zeros((6, 1), qvel.dtype), pin)
     carried = _motion_cross(unpack(before), steps)
-    upwards = -np.array((0, 0, 0, *structure.gravity), qvel.dtype)[:, None]
+    upwards = -column((0.0, 0.0, 0.0, *structure.gravity), qvel.dtype)
     swept, _ = down(structure, pack(carried.parts, pin), upwards, pin)
     velocity = unpack(pin(jnp.stack(moving)))
     momentum = body.times(velocity)
@@ -159,7 +156,7 @@ def bias_force(
 
 def by_dof(structure: Structure, bodies: Sequence[jax.Array], pin: Pin) -> jax.Array:
     """Per degree of freedom the value [components, L] of the body it moves."""
-    return pin(jnp.stack([bodies[b] for b in structure.dof_body]))
+    return pin(jnp.stack([bodies[b] for b in structure.topology.dof_body]))
 
 
 def mass_rows(
@@ -179,20 +176,19 @@ def mass_rows(
     head = rooted(force, root_axes(freedom), pin) if first else None
     rows = []
     for k, chain in enumerate(structure.pattern.chains):
-        armature = np.zeros((len(chain), 1), like.dtype)
-        armature[-1] = structure.armature[k]
         path = paths[k][first : len(chain)]
         row = total([f[k] * path[:, c] for c, f in enumerate(force)])
         if head is not None:
             row = head[k, : k + 1] if k < first else jnp.concatenate([head[k], row])
-        rows.append(row + armature)
+        rows.append(on_pivot(row, structure.columns.armature[k]))
     return tuple(rows)
 
 
 def root_freedoms(structure: Structure) -> int:
     """How many degrees of freedom a free root has that everything hangs on; 0 for another root."""
-    alone = sum(body.parent < 0 for body in structure.bodies) == 1
-    return 6 if alone and [j.kind for j in structure.bodies[0].joints] == [FREE] else 0
+    bodies = structure.topology.bodies
+    alone = sum(body.parent < 0 for body in bodies) == 1
+    return 6 if alone and [j.kind for j in bodies[0].joints] == [FREE] else 0
 
 
 def root_axes(freedom: Motion) -> jax.Array:

@@ -16,10 +16,11 @@ from collections.abc import Sequence
 import jax
 import jax.numpy as jnp
 
+from mjxgait.physics.fast.carriers import Carriers
 from mjxgait.physics.fast.dynamics import rooted
 from mjxgait.physics.fast.kinematics import Motion
 from mjxgait.physics.fast.lanes import Pin, axes, cross, dot, parts, plus, total
-from mjxgait.physics.fast.structure import Carriers, Structure
+from mjxgait.physics.fast.structure import Structure
 from mjxgait.physics.fast.treematrix import Rows
 
 Directions = tuple[jax.Array, jax.Array, jax.Array]

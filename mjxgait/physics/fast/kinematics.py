@@ -13,22 +13,25 @@ import jax.numpy as jnp
 import numpy as np
 
 from mjxgait.physics.fast.lanes import (
-    Constants,
     Pin,
     Scalar,
+    Vector,
     add,
     axes,
     cross,
     mul,
     plus,
     rotation,
+    scale,
     sin_cos,
     sub,
     table,
     turn,
 )
-from mjxgait.physics.fast.structure import BALL, FREE, HINGE, SLIDE, Body, Joint, Structure
+from mjxgait.physics.fast.slots import BALL, FREE, HINGE, SLIDE
+from mjxgait.physics.fast.structure import Body, Joint, Structure
 
+UNITS: tuple[Vector, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 IDENTITY: Any = tuple(np.eye(3, dtype=np.float32)[:, j : j + 1] for j in range(3))
 
 
@@ -40,11 +43,11 @@ class Pose:
     pos: Any
     rot: Any
 
-    def point(self, local: Constants) -> Any:
+    def point(self, local: Vector) -> Any:
         """A point of the body, from the origin."""
         return add(self.pos, turn(self.rot, local))
 
-    def far_point(self, local: Constants) -> Any:
+    def far_point(self, local: Vector) -> Any:
         """A point of the body in the world."""
         return add(self.origin, self.point(local))
 
@@ -150,13 +153,14 @@ def _slide(joint: Joint, pose: Pose, qpos: jax.Array, pin: Pin) -> tuple[Pose, l
 _MOVES = {FREE: _free, BALL: _ball, HINGE: _hinge, SLIDE: _slide}
 
 
-def _about(axis: Constants, sin: jax.Array, cos: jax.Array) -> list[tuple[Scalar, ...]]:
-    """Rotation about a constant unit axis (Rodrigues): cos 1 + sin [axis]x + (1 - cos) axis axis^T, as columns."""
-    unit = np.eye(3)
+def _about(axis: Vector, sin: jax.Array, cos: jax.Array) -> list[tuple[Scalar, ...]]:
+    """Rotation about a unit axis (Rodrigues): cos 1 + sin [axis]x + (1 - cos) axis axis^T, as columns."""
 
-    def entry(i: int, j: int) -> Scalar:
-        outer = axis[i] * axis[j]
-        skew = float(np.cross(axis, unit[j])[i])
-        return add(outer, mul(float(unit[i, j]) - outer, cos), mul(skew, sin))
+    def column(unit: Vector, along: Scalar) -> tuple[Scalar, ...]:
+        skew = cross(axis, unit)
+        outer = scale(along, axis)
+        return tuple(
+            add(outer[i], mul(sub(unit[i], outer[i]), cos), mul(skew[i], sin)) for i in range(3)
+        )
 
-    return [tuple(entry(i, j) for i in range(3)) for j in range(3)]
+    return [column(unit, axis[j]) for j, unit in enumerate(UNITS)]

@@ -1,8 +1,10 @@
 """Arithmetic over lanes, with the numbers of the model folded in while tracing.
 
-All arrays have the lanes last, so that every operation is a contiguous vector instruction. A `Scalar` is an array ([L], or [n, L] for n
-bodies at once), or a Python number where all lanes share it: the many zeros and ones of a model then cost nothing. Three scalars make
-a `Vector`; `turn` and `plus` also serve vectors that are one array [3, L].
+All arrays have the lanes last, so that every operation is a contiguous vector instruction. A
+`Scalar` is an array ([L], or [n, L] for n bodies at once; 1 for L where all lanes share it), or a
+Python number where it is a constant of the program: the many zeros and ones of a model then cost
+nothing. Three scalars make a `Vector`; `turn` and `plus` also serve vectors that are one array
+[3, L].
 """
 
 from collections.abc import Callable, Sequence
@@ -11,6 +13,8 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+
+from mjxgait.types import Number
 
 Scalar = Any
 """float | jax.Array"""
@@ -168,6 +172,14 @@ def pinned_by(lanes: jax.Array) -> Pin:
     return lambda tree: jax.tree.map(lambda x: x if isinstance(x, float) else x / one, tree)
 
 
+def column(values: Sequence[Scalar], dtype: np.dtype) -> Number:
+    """Scalars, constants among them, below each other: [n, 1], or [n, L] where one has lanes."""
+    if all(isinstance(value, float) for value in values):
+        return np.array(values, dtype)[:, None]
+    wide = jnp.broadcast_shapes((1,), *(np.shape(value) for value in values))
+    return jnp.stack([jnp.broadcast_to(jnp.asarray(v, dtype), wide) for v in values])
+
+
 def table(vectors: Sequence[Any], like: jax.Array) -> Any:
     """Vectors [3, L], some of them constants ([3] or zero), as one array [n, 3, L]; [n, 3, 1] in NumPy if all are constants."""
     if all(not isinstance(v, jax.Array) for v in vectors):
@@ -175,10 +187,8 @@ def table(vectors: Sequence[Any], like: jax.Array) -> Any:
     shape = (3, like.shape[-1])
 
     def full(vector: Any) -> jax.Array:
-        return (
-            vector
-            if isinstance(vector, jax.Array)
-            else jnp.broadcast_to(np.reshape(np.broadcast_to(vector, 3), (3, 1)), shape)
-        )
+        if isinstance(vector, jax.Array):
+            return jnp.broadcast_to(vector, shape)
+        return jnp.broadcast_to(np.reshape(np.broadcast_to(vector, 3), (3, 1)), shape)
 
     return jnp.stack([full(v) for v in vectors])

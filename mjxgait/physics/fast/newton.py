@@ -14,7 +14,7 @@ import numpy as np
 
 from mjxgait.physics.fast.constraints import Constraints
 from mjxgait.physics.fast.lanes import Pin
-from mjxgait.physics.fast.treematrix import Rows, factor, multiply, solve
+from mjxgait.physics.fast.treematrix import Rows, factor, multiply, on_pivot, solve
 
 Lanes = jax.Array
 Search = tuple[Lanes, Lanes, Lanes, Lanes, jax.Array]
@@ -61,7 +61,7 @@ def constrained_acceleration(
 
 def _minimised(problem: Problem, start: Iterate) -> Iterate:
     """Newton steps until no lane's active rows change any more (the step before was then exact), or the model's number of iterations."""
-    limit = problem.constraints.structure.iterations
+    limit = problem.constraints.structure.topology.iterations
     if limit == 1:
         return _improved(problem, start)
 
@@ -181,9 +181,7 @@ def _hessian(problem: Problem, at: Iterate) -> Rows:
     *stiffness, limit = pin((d[0] + d[1] + d[2] + d[3], *mixed, *squares, d[4]))
     rows = list(c.footing.stiffened(problem.mass, stiffness) if c.footing else problem.mass)
     for n, bound in enumerate(c.structure.limits):
-        last = np.zeros((rows[bound.dof].shape[0], 1), limit.dtype)
-        last[-1] = 1.0
-        rows[bound.dof] = rows[bound.dof] + last * limit[n]
+        rows[bound.dof] = on_pivot(rows[bound.dof], limit[n])
     return tuple(rows)
 
 
@@ -209,7 +207,7 @@ def _line_search(
         return slope + length * curvature + _total(pulls), curvature + _total(stiffs)
 
     def unfinished(carry: Search) -> jax.Array:
-        return (carry[-1] < c.structure.line_iterations) & jnp.any(carry[-2] > 0)
+        return (carry[-1] < c.structure.topology.line_iterations) & jnp.any(carry[-2] > 0)
 
     def narrowed(carry: Search) -> Search:
         low, high, length, going, count = carry

@@ -3,27 +3,22 @@
 import dataclasses
 from collections.abc import Sequence
 from functools import partial
-from typing import Any
+from typing import Any, Self
 
 import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
 
-from mjxgait.creature import geometry
 from mjxgait.creature.overlap import Crossings
 from mjxgait.physics.fast.constraints import make_constraints, touch
+from mjxgait.physics.fast.difference import difference
 from mjxgait.physics.fast.dynamics import bias_force, inertias, mass_rows, motion_paths
 from mjxgait.physics.fast.footing import Touch
 from mjxgait.physics.fast.kernel import one_kernel
 from mjxgait.physics.fast.kinematics import WORLD, Pose, motions, posture, unit_quaternion
 from mjxgait.physics.fast.lanes import (
-    Constants,
-    Matrix,
     add,
-    columns,
-    constant,
-    constants,
     cross,
     mul,
     parts,
@@ -35,11 +30,16 @@ from mjxgait.physics.fast.lanes import (
 )
 from mjxgait.physics.fast.newton import Problem, constrained_acceleration
 from mjxgait.physics.fast.overlap import bar_places
-from mjxgait.physics.fast.structure import BALL, FREE, Structure, read_structure
-from mjxgait.physics.fast.treematrix import Rows, factor, solve
-from mjxgait.physics.layout import SenseLayout
+from mjxgait.physics.fast.parameters import Parameters, read_parameters
+from mjxgait.physics.fast.slots import BALL, FREE
+from mjxgait.physics.fast.structure import Geom, Structure, join
+from mjxgait.physics.fast.support import UnsupportedModel
+from mjxgait.physics.fast.topology import Topology, read_topology
+from mjxgait.physics.fast.treematrix import Rows, factor, on_pivot, solve
+from mjxgait.physics.fast.weights import reweighed
+from mjxgait.physics.layout import OtherTopology, SenseLayout
 from mjxgait.physics.overlap import deepest
-from mjxgait.types import BodyState, Sensed, pytree
+from mjxgait.types import BodyState, Number, Sensed, pytree
 
 
 @pytree
@@ -51,28 +51,49 @@ class Workings:
     touch: Touch | None
 
 
-@dataclasses.dataclass(frozen=True)
-class Watched:
-    """A geom: its body (-1: world), centre and axes in the body's frame, and the radius, box and ellipsoid of its support function."""
-
-    body: int
-    pos: Constants
-    rot: Matrix
-    radius: float
-    box: Constants
-    ellipsoid: Constants
-
-
 @dataclasses.dataclass(frozen=True, eq=False)
 class FastPlant:
-    """One MuJoCo step with the lanes innermost; see the package's docstring."""
+    """One MuJoCo step with the lanes innermost; see the package's docstring.
 
-    structure: Structure
-    layout: SenseLayout
-    watched: tuple[Watched, ...]
-    crossings: Crossings | None = None
+    parameters: of the body that all lanes have. In NumPy they are constants of the program, else
+      its inputs.
+    """
+
+    topology: Topology
+    parameters: Parameters
     note: str = ""
     lane_axis: int = -1
+
+    @property
+    def structure(self) -> Structure:
+        """The body that all lanes have."""
+        return join(self.topology, self.parameters, np.dtype(np.float32))
+
+    def parameters_of(
+        self, model: mujoco.MjModel, layout: SenseLayout, crossings: Crossings | None = None
+    ) -> Parameters:
+        """See `Plant.parameters_of`."""
+        try:
+            told = difference(self.topology, read_topology(model, layout, crossings))
+        except UnsupportedModel as reason:
+            told = f"the fast physics does not know this: {reason}"
+        if told:
+            raise OtherTopology(told)
+        return read_parameters(model, layout, crossings)
+
+    def with_parameters(self, parameters: Parameters) -> Self:
+        """See `Plant.with_parameters`."""
+        return dataclasses.replace(self, parameters=parameters)
+
+    def heavier(self, parameters: Parameters, factor: Number) -> Parameters:
+        """See `Plant.heavier`."""
+        factor = jnp.broadcast_to(factor, np.shape(parameters.mass))
+        heavy = dataclasses.replace(
+            parameters,
+            mass=parameters.mass * factor,
+            inertia=parameters.inertia * factor[:, None],
+        )
+        return reweighed(self.topology, heavy)
 
     def forward(self, state: BodyState) -> tuple[Sensed, Workings]:
         """See `Plant.forward`."""
@@ -84,92 +105,51 @@ class FastPlant:
 
     def advance(self, state: BodyState, workings: Workings, torque: jax.Array) -> BodyState:
         """See `Plant.advance`."""
-        return one_kernel(self._advance)(state, workings, torque)
+        # Numbers do not go through the kernel, which would copy them.
+        after = one_kernel(self._advance)(state, workings, torque)
+        return dataclasses.replace(after, parameters=state.parameters)
 
     def overlap(self, state: BodyState) -> jax.Array:
         """See `Plant.overlap`."""
-        if self.crossings is None or not len(self.crossings.first):
+        topology = self.topology
+        if not topology.first:
             return jnp.full_like(state.friction, -jnp.inf)
-        places = one_kernel(partial(bar_places, self.structure, self.crossings))
-        return deepest(self.crossings, *places(state.qpos, state.friction))
+        structure = self._body(state)
+        places = one_kernel(partial(bar_places, structure))(state.qpos, state.friction)
+        return deepest(topology.first, topology.second, structure.exact.bars, *places)
+
+    def _body(self, state: BodyState) -> Structure:
+        """The body of these lanes: their own, or the plant's."""
+        if state.parameters is None:
+            return join(self.topology, self.parameters, state.qpos.dtype)
+        return join(self.topology, state.parameters, state.qpos.dtype, per_lane=True)
 
     def _forward(self, state: BodyState) -> tuple[Sensed, Workings]:
-        structure, like = self.structure, state.friction
+        structure, like = self._body(state), state.friction
         pin = pinned_by(like)
         poses, freedoms = posture(structure, state.qpos, pin)
         freedom = motions(freedoms, like, pin)
         body = inertias(structure, poses, like, pin)
         bias, moving = bias_force(structure, body, freedom, state.qvel, pin)
-        bias = pin(bias + self._resistance(state))
+        bias = pin(bias + _resistance(structure, state))
         paths = motion_paths(structure, freedom, pin)
         mass = mass_rows(structure, body, freedom, paths, pin)
-        return self._sense(state, poses, moving, bias), Workings(
+        return _sense(structure, state, poses, moving, bias), Workings(
             mass, bias, touch(structure, poses, freedom, paths, pin)
         )
 
-    def _resistance(self, state: BodyState) -> jax.Array:
-        """Spring and damper forces against the motion, [nv, L]."""
-        s = self.structure
-        spring, reference, damping = (
-            np.array(x, state.qpos.dtype)[:, None]
-            for x in (s.spring, s.spring_reference, s.damping)
-        )
-        stretched: Any = (
-            spring * (take(state.qpos, np.array(s.dof_qpos)) - reference) if np.any(spring) else 0.0
-        )
-        return stretched + damping * state.qvel
-
-    def _sense(
-        self, state: BodyState, poses: Sequence[Pose], moving: Sequence[jax.Array], bias: jax.Array
-    ) -> Sensed:
-        pose, motion = poses[self.layout.trunk - 1], moving[self.layout.trunk - 1]
-        seen = [self._look(w, poses) for w in self.watched]
-        shift = [
-            m + c
-            for m, c in zip(motion[3:], cross(tuple(motion[:3]), parts(pose.pos)), strict=True)
-        ]
-        like = state.friction
-        return Sensed(
-            joint_pos=take(state.qpos, self.layout.qpos_adr),
-            joint_vel=take(state.qvel, self.layout.dof_adr),
-            bias=bias,
-            trunk_pos=table([pose.far_point((0.0, 0.0, 0.0))], like)[0],
-            trunk_rot=jnp.moveaxis(table(pose.rot, like), 0, 1),
-            trunk_vel=jnp.stack(shift),
-            trunk_angvel=motion[:3],
-            geom_pos=table([pos for pos, _ in seen], like),
-            geom_low=jnp.stack([low for _, low in seen]),
-        )
-
-    def _look(self, geom: Watched, poses: Sequence[Pose]) -> tuple[Any, jax.Array]:
-        """Centre of a geom and the height of its lowest point."""
-        pose = WORLD if geom.body < 0 else poses[geom.body]
-        pos = pose.far_point(geom.pos)
-        down = [turn(pose.rot, column)[2] for column in geom.rot]
-        box = add(*(mul(b, abs(d)) for b, d in zip(geom.box, down, strict=True)))
-        round_reach = (
-            jnp.sqrt(add(*(mul(e * e, d * d) for e, d in zip(geom.ellipsoid, down, strict=True))))
-            if any(geom.ellipsoid)
-            else 0.0
-        )
-        return pos, sub(sub(pos[2] - geom.radius, box), round_reach)
-
     def _solve_damped(self, mass: Rows, damping: jax.Array, force: jax.Array) -> list[jax.Array]:
-        pattern = self.structure.pattern
-        damped = []
-        for k, row in enumerate(mass):
-            last = np.zeros((row.shape[0], 1), row.dtype)
-            last[-1] = 1.0
-            damped.append(row + last * damping[k])
-        return solve(pattern, factor(pattern, tuple(damped)), list(force))
+        pattern = self.topology.pattern
+        damped = tuple(on_pivot(row, damping[k]) for k, row in enumerate(mass))
+        return solve(pattern, factor(pattern, damped), list(force))
 
     def _advance(self, state: BodyState, workings: Workings, torque: jax.Array) -> BodyState:
-        structure = self.structure
+        structure = self._body(state)
         pin, force = pinned_by(state.friction), list(torque - workings.bias)
         constraints = make_constraints(
             structure, workings.touch, state.friction, state.qpos, state.qvel, pin
         )
-        if constraints is None or not structure.warm_start:
+        if constraints is None or not self.topology.warm_start:
             guess = solve(structure.pattern, factor(structure.pattern, workings.mass), force)
         else:
             guess = list(state.warmstart)
@@ -179,16 +159,16 @@ class FastPlant:
             problem = Problem(workings.mass, force, constraints, pin)
             acceleration, pushed = constrained_acceleration(problem, guess)
         warmstart = jnp.stack(acceleration)
-        qvel = state.qvel + structure.step * warmstart
+        qvel = state.qvel + self.topology.step * warmstart
         return BodyState(
             self._moved(state.qpos, qvel), qvel, warmstart, jnp.stack(pushed), state.friction
         )
 
     def _moved(self, qpos: jax.Array, qvel: jax.Array) -> jax.Array:
         """Positions after a step at these velocities (semi-implicit Euler)."""
-        step = self.structure.step
+        step = self.topology.step
         parts = []
-        for joint in (j for body in self.structure.bodies for j in body.joints):
+        for joint in self.topology.joints:
             q, v = joint.qpos, joint.dof
             if joint.kind == FREE:
                 parts += [qpos[q + n] + step * qvel[v + n] for n in range(3)]
@@ -198,6 +178,52 @@ class FastPlant:
             else:
                 parts.append(qpos[q] + step * qvel[v])
         return jnp.stack(parts)
+
+
+def _resistance(structure: Structure, state: BodyState) -> jax.Array:
+    """Spring and damper forces against the motion, [nv, L]."""
+    x: Any = structure.columns
+    resistance = x.damping * state.qvel
+    if not isinstance(x.spring, np.ndarray) or np.any(x.spring):
+        position = take(state.qpos, structure.topology.dof_qpos)
+        return x.spring * (position - x.spring_reference) + resistance
+    return 0.0 + resistance
+
+
+def _sense(
+    structure: Structure,
+    state: BodyState,
+    poses: Sequence[Pose],
+    moving: Sequence[jax.Array],
+    bias: jax.Array,
+) -> Sensed:
+    topology, like = structure.topology, state.friction
+    pose, motion = poses[topology.trunk], moving[topology.trunk]
+    seen = [_look(geom, poses) for geom in structure.geoms]
+    lever = cross(tuple(motion[:3]), parts(pose.pos))
+    shift = [m + c for m, c in zip(motion[3:], lever, strict=True)]
+    return Sensed(
+        joint_pos=take(state.qpos, topology.joint_qpos),
+        joint_vel=take(state.qvel, topology.joint_dof),
+        bias=bias,
+        trunk_pos=table([pose.far_point((0.0, 0.0, 0.0))], like)[0],
+        trunk_rot=jnp.moveaxis(table(pose.rot, like), 0, 1),
+        trunk_vel=jnp.stack(shift),
+        trunk_angvel=motion[:3],
+        geom_pos=table([pos for pos, _ in seen], like),
+        geom_low=jnp.stack([low for _, low in seen]),
+    )
+
+
+def _look(geom: Geom, poses: Sequence[Pose]) -> tuple[Any, jax.Array]:
+    """Centre of a geom and the height of its lowest point."""
+    pose = WORLD if geom.body < 0 else poses[geom.body]
+    pos = pose.far_point(geom.pos)
+    down = [turn(pose.rot, column)[2] for column in geom.rot]
+    box = add(*(mul(b, abs(d)) for b, d in zip(geom.box, down, strict=True)))
+    square = add(*(mul(mul(e, e), mul(d, d)) for e, d in zip(geom.ellipsoid, down, strict=True)))
+    round_reach = 0.0 if isinstance(square, float) else jnp.sqrt(square)
+    return pos, sub(sub(pos[2] - geom.radius, box), round_reach)
 
 
 def turned(quat: jax.Array, spin: jax.Array, step: float) -> list[jax.Array]:
@@ -217,12 +243,12 @@ def turned(quat: jax.Array, spin: jax.Array, step: float) -> list[jax.Array]:
     return list(unit_quaternion(product))
 
 
-def take(rows: jax.Array, addresses: np.ndarray) -> jax.Array:
+def take(rows: jax.Array, addresses: Sequence[int]) -> jax.Array:
     """Rows at constant addresses; neighbouring ones as a slice, which costs nothing."""
-    first, count = int(addresses[0]), len(addresses)
-    if np.array_equal(addresses, np.arange(first, first + count)):
+    first, count = addresses[0], len(addresses)
+    if addresses == tuple(range(first, first + count)):
         return rows[first : first + count]
-    return jnp.stack([rows[int(a)] for a in addresses])
+    return jnp.stack([rows[a] for a in addresses])
 
 
 def fast_plant(
@@ -233,17 +259,5 @@ def fast_plant(
     Raises:
       UnsupportedModel: it does not; the message says why.
     """
-    watched = tuple(_watched(model, int(g)) for g in layout.watched)
-    return FastPlant(read_structure(model), layout, watched, crossings)
-
-
-def _watched(model: mujoco.MjModel, geom: int) -> Watched:
-    radius, box, ellipsoid = geometry.support_extents(model.geom_type[geom], model.geom_size[geom])
-    return Watched(
-        body=int(model.geom_bodyid[geom]) - 1,
-        pos=constants(model.geom_pos[geom]),
-        rot=columns(model.geom_quat[geom]),
-        radius=constant(radius),
-        box=constants(np.asarray(box)),
-        ellipsoid=constants(np.asarray(ellipsoid)),
-    )
+    topology = read_topology(model, layout, crossings)
+    return FastPlant(topology, read_parameters(model, layout, crossings))

@@ -11,6 +11,9 @@ from collections.abc import Sequence
 
 import jax
 import jax.numpy as jnp
+import numpy as np
+
+from mjxgait.types import Number
 
 Rows = tuple[jax.Array, ...]
 
@@ -77,6 +80,13 @@ def solve(pattern: Sparsity, lower: Factor, rhs: Sequence[jax.Array]) -> list[ja
             value = value - lower.rows[k][position] * solution[i]
         solution.append(value / lower.pivots[k])
     return solution
+
+
+def on_pivot(row: jax.Array, value: Number) -> jax.Array:
+    """A row [n, L] with something [1 or L] added to its last entry."""
+    last = np.zeros((row.shape[0], 1), row.dtype)
+    last[-1] = 1.0
+    return row + last * value
 
 
 def multiply(pattern: Sparsity, rows: Rows, vector: Sequence[jax.Array]) -> list[jax.Array]:

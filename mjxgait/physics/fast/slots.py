@@ -1,0 +1,60 @@
+"""The places of a topology: bodies, joints, contacts, limits, watched geoms; no numbers."""
+
+import dataclasses
+
+import mujoco
+
+FREE, BALL, SLIDE, HINGE = (
+    int(getattr(mujoco.mjtJoint, f"mjJNT_{name}")) for name in ("FREE", "BALL", "SLIDE", "HINGE")
+)
+FREEDOMS = {FREE: 6, BALL: 3, SLIDE: 1, HINGE: 1}
+
+
+@dataclasses.dataclass(frozen=True)
+class JointSlot:
+    """kind: FREE, BALL, SLIDE or HINGE. qpos, dof: addresses."""
+
+    kind: int
+    qpos: int
+    dof: int
+
+
+@dataclasses.dataclass(frozen=True)
+class BodySlot:
+    """parent: index among the bodies, -1 for the world. joints: from the first that moves it."""
+
+    parent: int
+    joints: tuple[JointSlot, ...]
+
+
+@dataclasses.dataclass(frozen=True)
+class ContactSlot:
+    """A sphere of a body that may touch the floor; capsule: whether it is an end of one."""
+
+    body: int
+    capsule: bool
+
+
+@dataclasses.dataclass(frozen=True)
+class LimitSlot:
+    """A hinge or slide whose range ends; addresses."""
+
+    dof: int
+    qpos: int
+
+
+@dataclasses.dataclass(frozen=True)
+class WatchedSlot:
+    """A geom that is sensed. body: -1 for the world's. shape: MuJoCo's type."""
+
+    body: int
+    shape: int
+
+
+@dataclasses.dataclass(frozen=True)
+class Ends:
+    """Where a contact's numbers are: the two geoms; side: 1, -1 of a capsule, 0 of a sphere."""
+
+    floor: int
+    geom: int
+    side: int

@@ -1,0 +1,164 @@
+"""The numbers of a body as plain MJX reads them: leaves of its model, and what is sensed of it."""
+
+import contextlib
+import dataclasses
+import io
+from collections.abc import Mapping
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+
+from mjxgait.creature import geometry
+from mjxgait.creature.overlap import Crossings
+from mjxgait.physics.layout import SenseLayout
+from mjxgait.physics.overlap import Bars, read_bars
+from mjxgait.physics.weights import inverse_weights
+from mjxgait.types import Number, pytree
+
+with contextlib.redirect_stdout(
+    io.StringIO()
+):  # MJX prints that Warp, which nobody asked for, is not installed
+    from mujoco import mjx
+
+PARTS = {
+    "body": ("pos", "quat", "ipos", "iquat", "mass", "subtreemass", "inertia", "invweight0"),
+    "jnt": ("pos", "axis", "range", "stiffness", "margin", "solref", "solimp"),
+    "dof": ("armature", "damping", "frictionloss", "solref", "solimp", "invweight0"),
+    "geom": ("pos", "quat", "size", "rbound", "friction", "margin", "gap", "solmix"),
+}
+NUMBERS = (
+    "qpos0",
+    "qpos_spring",
+    "geom_solref",
+    "geom_solimp",
+    *(f"{part}_{name}" for part, names in PARTS.items() for name in names),
+)
+"""Of a model; all else must be the same in two models that share a program."""
+OPTIONS = ("gravity", "impratio")
+"""Of a model's options, likewise."""
+UNSEEN = ("cam_", "light_", "mat_", "tex_", "name", "site_", "key_", "text_", "tuple_", "numeric_")
+"""Beginnings of what moves nothing."""
+UNUSED = {
+    *("geom_rgba", "geom_matid", "geom_aabb", "geom_sameframe", "geom_rbound_hfield", "dof_M0"),
+    *("body_margin", "body_simple", "body_sameframe", "stat", "names", "paths", "signature"),
+}
+PARTS_OF_MODEL = {"opt", "_impl"}
+"""Which are compared by themselves."""
+
+
+@pytree
+class ModelNumbers:
+    """model: `NUMBERS` and options: `OPTIONS` by name, as in MJX.
+
+    radius [G], box, ellipsoid [G, 3]: of the watched geoms' support functions. bars: see `Bars`.
+    """
+
+    model: Mapping[str, Number]
+    options: Mapping[str, Number]
+    radius: Number
+    box: Number
+    ellipsoid: Number
+    bars: Bars
+
+    def put_in(self, model: mjx.Model) -> mjx.Model:
+        """A model with these numbers."""
+        numbers, options = jax.tree.map(jnp.asarray, (self.model, self.options))
+        return model.replace(**numbers, opt=model.opt.replace(**options))
+
+
+def read_numbers(
+    model: mujoco.MjModel,
+    device_model: mjx.Model,
+    layout: SenseLayout,
+    crossings: Crossings | None,
+) -> ModelNumbers:
+    """Of a model, and the same put on the device."""
+    extents = [
+        geometry.support_extents(model.geom_type[g], model.geom_size[g]) for g in layout.watched
+    ]
+    radius, box, ellipsoid = (np.array(part, np.float32) for part in zip(*extents, strict=True))
+    return ModelNumbers(
+        {name: getattr(device_model, name) for name in NUMBERS},
+        {name: getattr(device_model.opt, name) for name in OPTIONS},
+        radius,
+        box,
+        ellipsoid,
+        read_bars(crossings),
+    )
+
+
+def model_difference(own: mjx.Model, other: mjx.Model) -> str:
+    """The first thing but numbers in which `other` is not as `own`; empty if there is none."""
+    left_out = {*NUMBERS, *OPTIONS} | UNUSED | PARTS_OF_MODEL
+    pairs = [(own, other), (own.opt, other.opt), (own._impl, other._impl)]
+    for mine, theirs in pairs:
+        for name in (field.name for field in dataclasses.fields(mine)):
+            if name in left_out or name.startswith(UNSEEN):
+                continue
+            if not _equal(getattr(mine, name), getattr(theirs, name)):
+                return f"its {name} differs"
+    shapes = ((name, getattr(own, name), getattr(other, name)) for name in NUMBERS)
+    return next((f"its {name} differs in shape" for name, a, b in shapes if a.shape != b.shape), "")
+
+
+def _equal(a: Any, b: Any) -> bool:
+    ours, theirs = jax.tree.leaves(a), jax.tree.leaves(b)
+    return len(ours) == len(theirs) and all(map(np.array_equal, ours, theirs))
+
+
+def reweighed(model: mjx.Model, data: mjx.Data, numbers: ModelNumbers) -> ModelNumbers:
+    """One body's numbers with what follows from its masses and lengths computed anew.
+
+    data: any of this model.
+    """
+    below = _below(model)
+    subtree = jnp.dot(below, numbers.model["body_mass"], precision="highest")
+    numbers = _with(numbers, body_subtreemass=subtree)
+    model = numbers.put_in(model)
+    data = mjx.com_pos(model, mjx.kinematics(model, data.replace(qpos=model.qpos0)))
+    mass = mjx.full_m(model, mjx.crb(model, data))
+    turn, shift = data.cdof[:, :3], data.cdof[:, 3:]
+    lever = data.xipos - data.subtree_com[model.body_rootid]
+    moved = shift + jnp.cross(turn, lever[:, None])
+    moves = below.T[:, model.dof_bodyid] > 0
+    jacobian = jnp.concatenate([moved, jnp.broadcast_to(turn, moved.shape)], axis=2)
+    jacobian = jnp.where(moves[:, :, None], jacobian, 0.0).swapaxes(1, 2)
+    bodies, dofs = inverse_weights(mass, jacobian, _groups(model))
+    return _with(numbers, body_invweight0=bodies, dof_invweight0=dofs)
+
+
+def _with(numbers: ModelNumbers, **changed: Number) -> ModelNumbers:
+    return dataclasses.replace(numbers, model={**numbers.model, **changed})
+
+
+def heavier(numbers: ModelNumbers, factor: Number) -> ModelNumbers:
+    """With masses and inertias times factor, [] or [nbody - 1]; nothing else follows yet."""
+    bodies = len(numbers.model["body_mass"]) - 1
+    every = jnp.concatenate([jnp.ones(1), jnp.broadcast_to(factor, (bodies,))])
+    return _with(
+        numbers,
+        body_mass=numbers.model["body_mass"] * every,
+        body_inertia=numbers.model["body_inertia"] * every[:, None],
+    )
+
+
+def _below(model: mjx.Model) -> np.ndarray:
+    """[nbody, nbody] whether the second body is the first or hangs on it."""
+    below = np.eye(model.nbody, dtype=np.float32)
+    for b in range(model.nbody - 1, 0, -1):
+        below[model.body_parentid[b]] += below[b]
+    return below
+
+
+def _groups(model: mjx.Model) -> list[range]:
+    """Degrees of freedom that share a weight: the shifts of a free joint, the turns of a joint."""
+    sizes = {mujoco.mjtJoint.mjJNT_FREE: (3, 3), mujoco.mjtJoint.mjJNT_BALL: (3,)}
+    groups: list[range] = []
+    for kind, start in zip(model.jnt_type, model.jnt_dofadr, strict=True):
+        for size in sizes.get(int(kind), (1,)):
+            groups.append(range(int(start), int(start) + size))
+            start += size
+    return groups

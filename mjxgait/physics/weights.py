@@ -1,0 +1,37 @@
+"""The inverse masses that constraints see, from the numbers of a body.
+
+MuJoCo scales the softness of contacts and limits with them (`body_invweight0`, `dof_invweight0`;
+computation docs, "Parameters"). They are those of the body at rest, so they change with its masses
+and lengths.
+
+Not followed: for a body that slides on the world, turns about nothing and carries nothing, MuJoCo
+takes its inverse mass instead of the mean. No part of a creature is one.
+"""
+
+from collections.abc import Sequence
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+
+def inverse_weights(
+    mass: jax.Array, jacobian: jax.Array, joints: Sequence[Sequence[int]]
+) -> tuple[jax.Array, jax.Array]:
+    """As `mj_setConst` computes them: means over the axes of J M^-1 J^T.
+
+    Args:
+      mass: [nv, nv] matrix at rest.
+      jacobian: [B, 6, nv] of the bodies' centres of mass, three shifts before three turns.
+      joints: groups of degrees of freedom that share one weight.
+
+    Returns:
+      [B, 2] 1/kg of shifts and 1/(kg·m²) of turns; [nv] of the degrees of freedom.
+    """
+    inverse = jax.scipy.linalg.cho_solve(jax.scipy.linalg.cho_factor(mass), jnp.eye(len(mass)))
+    seen = jnp.einsum("bik,kl,bil->bi", jacobian, inverse, jacobian, precision="highest")
+    bodies = jnp.stack([seen[:, :3].mean(1), seen[:, 3:].mean(1)], axis=1)
+    share = np.zeros(mass.shape, np.float32)
+    for group in joints:
+        share[np.ix_(group, group)] = 1 / len(group)
+    return bodies, jnp.dot(share, jnp.diagonal(inverse), precision="highest")

@@ -1,0 +1,174 @@
+"""One program, many bodies: lanes whose bodies differ, against each body alone and C MuJoCo."""
+
+import dataclasses
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+import pytest
+from jax.tree_util import keystr
+from many_bodies import (
+    WATCHED,
+    XML,
+    Moment,
+    compiled,
+    everything,
+    in_front,
+    layout_of,
+    moments,
+    one_in_c,
+    stacked,
+    varied,
+)
+
+from mjxgait.physics.fast import fast_plant
+from mjxgait.physics.plain import mjx_plant
+from mjxgait.types import Plant
+
+BODIES = 6
+PLANTS = {"fast": fast_plant, "mjx": mjx_plant}
+TIGHT = {"fast": 1.0, "mjx": 50.0}
+"""Factor on the tolerances of the fast physics: MJX loses more in single precision."""
+
+BARS = {".bars.centre", ".bars.half", ".bars.reach"}
+RARE = {"dof_frictionloss", "dof_solref", "dof_solimp", "geom_gap", "geom_solmix"}
+ALIKE = {"fast": BARS, "mjx": BARS | {f".model['{name}']" for name in RARE}}
+"""What is the same in all the bodies: none is watched for overlap, none has dry friction."""
+
+
+@pytest.fixture(scope="module")
+def models() -> list[mujoco.MjModel]:
+    return [varied(XML, seed) for seed in range(BODIES)]
+
+
+@pytest.fixture(scope="module")
+def moment(models: list[mujoco.MjModel]) -> Moment:
+    return moments(models)
+
+
+@pytest.fixture(scope="module", params=PLANTS)
+def plant(request: pytest.FixtureRequest) -> Plant:
+    """Made of a body that none of the lanes has."""
+    model = mujoco.MjModel.from_xml_string(XML)
+    return PLANTS[request.param](model, layout_of(model))
+
+
+@pytest.fixture(scope="module")
+def tight(plant: Plant) -> float:
+    return TIGHT["fast" if plant.lane_axis else "mjx"]
+
+
+@pytest.fixture(scope="module")
+def numbers(plant: Plant, models: list[mujoco.MjModel]) -> list[Any]:
+    return [plant.parameters_of(model, layout_of(model)) for model in models]
+
+
+@pytest.fixture(scope="module")
+def together(plant: Plant, numbers: list[Any], moment: Moment) -> Any:
+    """All bodies in one batch; lanes in front."""
+    arguments = moment.for_plant(plant, stacked(numbers))
+    return in_front(plant, compiled(everything(plant), *arguments)(*arguments))
+
+
+def close(ours: Any, theirs: Any, tolerance: float) -> None:
+    """Equal to a fraction of the largest entry."""
+    most = tolerance * max(np.abs(theirs).max(initial=0), 1e-2)
+    np.testing.assert_allclose(ours, theirs, rtol=0, atol=most)
+
+
+def test_the_bodies_differ_in_every_number(numbers: list[Any], plant: Plant):
+    found = jax.tree_util.tree_leaves_with_path(stacked(numbers))
+    alike = {keystr(path) for path, x in found if np.ptp(x, axis=0).max(initial=0) == 0}
+    assert alike == ALIKE["fast" if plant.lane_axis else "mjx"]
+
+
+def test_some_touch_the_floor_and_some_do_not(models: list[mujoco.MjModel], moment: Moment):
+    data = [one_in_c(model, moment.of(lane)) for lane, model in enumerate(models)]
+    assert {0} < {d.ncon for d in data}
+
+
+def test_each_is_what_it_is_in_c(
+    models: list[mujoco.MjModel], moment: Moment, together: Any, tight: float
+):
+    sensed, solved, after = together
+    for lane, model in enumerate(models):
+        data, layout = one_in_c(model, moment.of(lane)), layout_of(model)
+        mass = np.zeros((model.nv, model.nv))
+        mujoco.mj_fullM(model, data, mass)
+        damped = np.linalg.solve(mass + np.diag(moment.damping[lane]), moment.torque[lane])
+        close(sensed.bias[lane], data.qfrc_bias - data.qfrc_passive, 1e-5 * tight)
+        close(sensed.trunk_rot[lane], data.xmat[layout.trunk].reshape(3, 3), 1e-6 * tight)
+        close(sensed.geom_pos[lane], data.geom_xpos[layout.watched], 1e-6 * tight)
+        close(solved[lane], damped, 1e-5 * tight)
+        close(after.warmstart[lane], data.qacc, 2e-5 * tight)
+        close(after.constraint_force[lane], data.qfrc_constraint, 2e-4 * tight)
+
+
+def test_each_geom_is_as_low_as_in_c(models: list[mujoco.MjModel], moment: Moment, together: Any):
+    """Against MuJoCo's distance of spheres and capsules from a plane; see test_fast_parity."""
+    for lane, model in enumerate(models):
+        data = one_in_c(model, moment.of(lane))
+        for n, name in enumerate(WATCHED[:2]):
+            floor, geom = (model.geom(g).id for g in ("floor", name))
+            low = mujoco.mj_geomDistance(model, data, floor, geom, 9.0, None)
+            assert together[0].geom_low[lane, n] == pytest.approx(low, abs=1e-5)
+
+
+def test_each_is_what_it_is_alone(
+    plant: Plant, numbers: list[Any], moment: Moment, together: Any, tight: float
+):
+    """One body for all lanes, its numbers the inputs of one program."""
+
+    def alone(parameters: Any, *arguments: Any) -> Any:
+        return everything(plant.with_parameters(parameters))(*arguments)
+
+    inputs = [jax.tree.map(jnp.float32, each) for each in numbers]
+    rows = [moment.of(lane).for_plant(plant) for lane in range(BODIES)]
+    program = compiled(alone, inputs[0], *rows[0])
+    for lane, (parameters, row) in enumerate(zip(inputs, rows, strict=True)):
+        theirs = in_front(plant, program(parameters, *row))
+        ours = dataclasses.replace(together[2], parameters=None)
+        for a, b in zip(
+            jax.tree.leaves((*together[:2], ours)), jax.tree.leaves(theirs), strict=True
+        ):
+            close(a[lane], b[0], 2e-5 * tight)
+
+
+def test_a_lane_keeps_its_body(plant: Plant, numbers: list[Any], together: Any):
+    after, before = together[2].parameters, stacked(numbers)
+    for a, b in zip(jax.tree.leaves(after), jax.tree.leaves(before), strict=True):
+        np.testing.assert_array_equal(a, np.float32(b))
+
+
+def test_none_is_the_plants_own(plant: Plant, moment: Moment, tight: float):
+    """Constants and inputs of the same numbers give the same."""
+    one = moment.of(0)
+    own = jax.tree.map(lambda x: np.asarray(x)[None], plant.parameters)
+    given, none = one.for_plant(plant, own), one.for_plant(plant)
+    ours = compiled(everything(plant), *none)(*none)
+    theirs = compiled(everything(plant), *given)(*given)
+    assert ours[2].parameters is None
+    theirs = (*theirs[:2], dataclasses.replace(theirs[2], parameters=None))
+    for a, b in zip(jax.tree.leaves(ours), jax.tree.leaves(theirs), strict=True):
+        close(np.asarray(a), np.asarray(b), 2e-5 * tight)
+
+
+def test_numbers_as_inputs_leave_one_program(plant: Plant, numbers: list[Any], moment: Moment):
+    def text(parameters: Any) -> str:
+        def program(parameters: Any, *arguments: Any) -> Any:
+            return everything(plant.with_parameters(parameters))(*arguments)
+
+        inputs = jax.tree.map(jnp.float32, parameters)
+        return jax.jit(program).lower(inputs, *moment.of(0).for_plant(plant)).as_text()
+
+    assert text(numbers[0]) == text(numbers[1])
+
+
+def test_constants_make_a_program_each(plant: Plant, numbers: list[Any], moment: Moment):
+    def text(parameters: Any) -> str:
+        program = everything(plant.with_parameters(parameters))
+        return jax.jit(program).lower(*moment.of(0).for_plant(plant)).as_text()
+
+    assert text(numbers[0]) != text(numbers[1])

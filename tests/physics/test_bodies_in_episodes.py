@@ -1,0 +1,86 @@
+"""Episodes whose lanes refill with other bodies, against those of one body at a time."""
+
+import dataclasses
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from helpers import small_config
+from many_bodies import SLIM, stacked
+
+from mjxgait.control.poses import Genome
+from mjxgait.creature import Creature
+from mjxgait.runs.experiment import build_experiment
+from mjxgait.search.variation import Box, uniform
+from mjxgait.settings.traced import traced
+from mjxgait.simulation.rollout import Lane, Simulator
+from mjxgait.tasks.walk.tally import Tally
+
+BODIES = (1.0, 0.6, 1.7)
+"""Factors on the masses."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class BodyPerStart(Simulator):
+    """numbers: leaves [R, ...], of the bodies that the starts belong to."""
+
+    numbers: Any = None
+
+    def _fresh_lane(
+        self, genomes: Any, starts: Any, settings: Any, job: jax.Array, episode: jax.Array
+    ) -> Lane:
+        lane = super()._fresh_lane(genomes, starts, settings, job, episode)
+        own = jax.tree.map(lambda leaf: leaf[episode % len(BODIES)], self.numbers)
+        return dataclasses.replace(lane, body=dataclasses.replace(lane.body, parameters=own))
+
+
+@pytest.fixture(scope="module", params=["auto", "mjx"])
+def tallies(request: pytest.FixtureRequest, stool: Creature) -> tuple[Tally, list[Tally]]:
+    """Of three starts with three bodies, together; and of all starts with each body."""
+    settings = {"physics": request.param, "lanes": 2, "starts": len(BODIES), "terminate": False}
+    experiment = build_experiment(stool, small_config(rollout=settings))
+    simulator, plant = experiment.simulator, experiment.simulator.plant
+    numbers = jax.device_get([plant.heavier(plant.parameters, factor) for factor in BODIES])
+    box = Box(*simulator.tracker.bounds(experiment.config.controller))
+    arguments = jax.tree.map(
+        lambda leaf: leaf[None],
+        (
+            uniform(jax.random.key(0), box, 3),
+            experiment.row.starts,
+            traced(experiment.config),
+        ),
+    )
+
+    def mixed(numbers: Any, genomes: Genome, *rest: Any) -> Tally:
+        fields = {f.name: getattr(simulator, f.name) for f in dataclasses.fields(Simulator)}
+        return BodyPerStart(**fields, numbers=numbers).simulate(genomes, *rest).tally
+
+    def one(numbers: Any, genomes: Genome, *rest: Any) -> Tally:
+        own = dataclasses.replace(simulator, plant=plant.with_parameters(numbers))
+        return own.simulate(genomes, *rest).tally
+
+    def run(function: Any, *numbers: Any) -> list[Tally]:
+        numbers = jax.tree.map(jnp.float32, numbers)
+        lowered = jax.jit(function).lower(numbers[0], *arguments)
+        program = lowered.compile(compiler_options=SLIM)
+        return [jax.device_get(program(each, *arguments)) for each in numbers]
+
+    same = [stacked([each] * len(BODIES)) for each in numbers]
+    together, *alone = run(mixed, stacked(numbers), *same)
+    # Another program of the fast step would take long to compile.
+    return together, run(one, *numbers) if request.param == "mjx" else alone
+
+
+def test_every_episode_has_its_own_body(tallies: tuple[Tally, list[Tally]]):
+    together, alone = tallies
+    for start, theirs in enumerate(alone):
+        ours = together.forward[0, :, start]
+        np.testing.assert_allclose(ours, theirs.forward[0, :, start], atol=1e-4)
+
+
+def test_the_bodies_walk_differently(tallies: tuple[Tally, list[Tally]]):
+    _, (own, light, heavy) = tallies
+    for other in (light, heavy):
+        assert np.abs(own.forward - other.forward).max() > 1e-3

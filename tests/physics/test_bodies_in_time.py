@@ -1,0 +1,82 @@
+"""Lanes with bodies of their own for many steps, among them a shipped quadruped's variants."""
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+import pytest
+from many_bodies import XML, compiled, layout_of, moments, one_in_c, stacked, varied
+
+from mjxgait.creature import load_creature
+from mjxgait.physics import heavier_model
+from mjxgait.physics.fast import fast_plant
+from mjxgait.physics.layout import sense_layout
+from mjxgait.settings.shipped import find_creature
+from mjxgait.types import BodyState, Plant
+
+
+def after(plant: Plant, state: BodyState, torque: jax.Array, steps: int) -> np.ndarray:
+    """qpos [L, nq] after so many steps under a torque [nv, L] that stays."""
+
+    def step(_: int, state: BodyState) -> BodyState:
+        return plant.advance(state, plant.forward(state)[1], torque)
+
+    def program(state: BodyState) -> BodyState:
+        return jax.lax.fori_loop(0, steps, step, state)
+
+    return np.asarray(compiled(program, state)(state).qpos).T
+
+
+def test_eighty_steps_are_those_of_c():
+    """Through impacts, each body with its own; to what float32 keeps of them."""
+    models = [varied(XML, seed) for seed in range(10, 18)]
+    plant = fast_plant(mujoco.MjModel.from_xml_string(XML), layout_of(models[0]))
+    numbers = stacked([plant.parameters_of(model, layout_of(model)) for model in models])
+    moment = moments(models, seed=2)
+    state, torque, _ = moment.for_plant(plant, numbers)
+    ours = after(plant, state, 0.1 * torque, 80)
+    moment = dataclasses.replace(moment, torque=0.1 * moment.torque)
+    theirs = [one_in_c(model, moment.of(lane), 80).qpos for lane, model in enumerate(models)]
+    apart = np.abs(ours - theirs).max(axis=1)
+    assert np.median(apart) < 2e-3
+    assert apart.max() < 5e-2
+
+
+@pytest.fixture(scope="module")
+def quadrupeds() -> list[mujoco.MjModel]:
+    """The tall quadruped with its parts' masses, armatures and lengths changed."""
+    model = load_creature(find_creature("tall_quadruped")).evolution_model
+    rng, variants = np.random.default_rng(0), []
+    for _ in range(4):
+        variant = heavier_model(model, rng.uniform(0.7, 1.4, model.nbody - 1))
+        variant.body_pos[2:] *= rng.uniform(0.9, 1.1, variant.body_pos[2:].shape)
+        variant.dof_armature[6:] *= rng.uniform(0.7, 1.4, model.nv - 6)
+        touching = variant.geom_type == mujoco.mjtGeom.mjGEOM_SPHERE
+        variant.geom_size[touching, 0] *= rng.uniform(0.9, 1.1)
+        mujoco.mj_setConst(variant, mujoco.MjData(variant))
+        variants.append(variant)
+    return variants
+
+
+def test_a_shipped_quadruped_whose_body_is_varied(quadrupeds: list[mujoco.MjModel]):
+    creature = load_creature(find_creature("tall_quadruped"))
+    layout = sense_layout(creature)
+    plant = fast_plant(creature.evolution_model, layout)
+    numbers = stacked([plant.parameters_of(model, layout) for model in quadrupeds])
+    qpos = np.tile(creature.stand_qpos, (4, 1))
+    qpos[:, creature.qpos_adr] += 0.1 * np.random.default_rng(1).normal(
+        size=(4, len(creature.qpos_adr))
+    )
+    qpos[:, 2] -= 0.01
+    still = np.zeros((4, creature.model.nv))
+    rows = BodyState(qpos, still, still, still, np.ones(4), numbers)
+    state = jax.tree.map(lambda x: jnp.moveaxis(jnp.asarray(x, jnp.float32), 0, -1), rows)
+    ours = after(plant, state, jnp.zeros_like(state.qvel), 20)
+    for lane, model in enumerate(quadrupeds):
+        data = mujoco.MjData(model)
+        data.qpos[:] = np.float32(qpos[lane])
+        mujoco.mj_step(model, data, 20)
+        assert data.ncon > 0
+        np.testing.assert_allclose(ours[lane], data.qpos, atol=2e-4)

@@ -1,0 +1,76 @@
+"""What follows from a body's masses is MuJoCo's own reckoning, in both plants."""
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+import pytest
+from jax.tree_util import keystr
+from many_bodies import XML, layout_of, stacked, varied
+
+from mjxgait.creature import Creature
+from mjxgait.physics import heavier_model
+from mjxgait.physics.fast import fast_plant
+from mjxgait.physics.layout import sense_layout
+from mjxgait.physics.plain import mjx_plant
+from mjxgait.types import Plant
+
+MODELS = [varied(XML, seed) for seed in (3, 4)]
+
+
+@pytest.fixture(scope="module", params=[fast_plant, mjx_plant], ids=["fast", "mjx"])
+def plant(request: pytest.FixtureRequest) -> Plant:
+    return request.param(MODELS[0], layout_of(MODELS[0]))
+
+
+def assert_same(ours: Any, theirs: Any) -> None:
+    for (path, a), b in zip(
+        jax.tree_util.tree_leaves_with_path(ours), jax.tree.leaves(theirs), strict=True
+    ):
+        most = 1e-5 * np.abs(b).max(initial=1e-9)
+        np.testing.assert_allclose(a, b, rtol=0, atol=most, err_msg=keystr(path))
+
+
+def factors(model: mujoco.MjModel, seed: int) -> np.ndarray:
+    return np.random.default_rng(seed).uniform(0.4, 2.5, model.nbody - 1)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_heavier_bodies_are_those_of_mujoco(plant: Plant, model: mujoco.MjModel):
+    factor, layout = factors(model, 5), layout_of(model)
+    ours = plant.heavier(plant.parameters_of(model, layout), jnp.float32(factor))
+    assert_same(ours, plant.parameters_of(heavier_model(model, factor), layout))
+
+
+def test_one_factor_does_for_all_bodies(plant: Plant):
+    ours = plant.heavier(plant.parameters, 1.3)
+    model = heavier_model(MODELS[0], 1.3)
+    assert_same(ours, plant.parameters_of(model, layout_of(model)))
+
+
+def test_a_body_per_lane(plant: Plant):
+    """Many factors at once are one `vmap`, the lanes where the plant has them."""
+    rows = np.stack([factors(MODELS[0], seed) for seed in range(3)])
+    every = jax.jit(jax.vmap(lambda f: plant.heavier(plant.parameters, f)))(jnp.float32(rows))
+    variants = [heavier_model(MODELS[0], row) for row in rows]
+    assert_same(every, stacked([plant.parameters_of(m, layout_of(m)) for m in variants]))
+
+
+def test_the_weights_of_constraints_change(plant: Plant):
+    """Half the weight of all bodies is twice the inverse mass, but for rotors."""
+    before, after = plant.parameters, plant.heavier(plant.parameters, 0.5)
+    if plant.lane_axis:
+        ratio = np.asarray(after.contacts.weight) / before.contacts.weight
+    else:
+        ratio = after.model["body_invweight0"][1:] / before.model["body_invweight0"][1:]
+    assert np.all((ratio > 1.2) & (ratio < 2.01))
+
+
+def test_shipped_creatures(shipped: Creature):
+    model, layout = shipped.evolution_model, sense_layout(shipped)
+    factor = factors(model, 6)
+    plant = fast_plant(model, layout)
+    ours = plant.heavier(plant.parameters, jnp.float32(factor))
+    assert_same(ours, plant.parameters_of(heavier_model(model, factor), layout))
