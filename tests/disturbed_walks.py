@@ -49,12 +49,13 @@ PUSH_AT = 60
 
 @dataclasses.dataclass(frozen=True)
 class Disturbance:
-    """What is not nominal about a start. push: m/s forward and left."""
+    """What is not nominal about a start. push: m/s forward and left. gains: share of kp and kd."""
 
     friction: float = 1.0
     push: tuple[float, float] = (0.0, 0.0)
     joints: float = 0.0
     spin: float = 0.0
+    gains: float = 0.0
 
 
 DISTURBANCES = {
@@ -64,7 +65,8 @@ DISTURBANCES = {
     "pushed to the left": Disturbance(push=(0.0, 0.25)),
     "joints displaced": Disturbance(joints=0.08),
     "joints moving": Disturbance(spin=0.8),
-    "all at once": Disturbance(0.6, (-0.2, -0.2), 0.05, 0.5),
+    "other gains": Disturbance(gains=0.3),
+    "all at once": Disturbance(0.6, (-0.2, -0.2), 0.05, 0.5, 0.2),
     "knocked over": Disturbance(push=(0.0, 3.0)),
 }
 EPISODES = [(settings, disturbance) for settings in SETTINGS for disturbance in DISTURBANCES]
@@ -98,11 +100,13 @@ def disturbed(creature: Creature) -> examined.Starts:
     rng = np.random.default_rng(1)
     plain = examined.nominal_starts(creature, len(DISTURBANCES))
     rows = list(DISTURBANCES.values())
-    noise = rng.uniform(-1, 1, (2, 8))
+    noise = rng.uniform(-1, 1, (4, 8))
     return dataclasses.replace(
         plain,
         joint_offset=np.array([row.joints * noise[0] for row in rows]),
         joint_velocity=np.array([row.spin * noise[1] for row in rows]),
+        stiffness=np.array([1 + row.gains * noise[2] for row in rows]),
+        damping=np.array([1 + row.gains * noise[3] for row in rows]),
         friction=np.array([row.friction for row in rows]),
         push=np.array([row.push for row in rows]),
         push_time=np.array([(PUSH_AT + 0.5) * STEP if any(row.push) else np.inf for row in rows]),

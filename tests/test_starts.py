@@ -10,7 +10,13 @@ from helpers import small_config
 from mjxgait.creature import Creature
 from mjxgait.tasks.trials import NEVER, Starts, draw_starts
 
-NONE = {"joint_noise": 0.0, "velocity_noise": 0.0, "friction": (1.0, 1.0), "push": 0.0}
+NONE = {
+    "joint_noise": 0.0,
+    "velocity_noise": 0.0,
+    "friction": (1.0, 1.0),
+    "push": 0.0,
+    "gains": 0.0,
+}
 COUNT = 40
 
 
@@ -54,6 +60,16 @@ def test_noise_fills_its_width_to_both_sides_and_is_that_of_joints_only(stool: C
         assert width * 0.95 < noise[1:, places].max() <= width
         assert -width * 0.95 > noise[1:, places].min() >= -width
         assert not np.delete(noise, places, axis=1).any()
+
+
+def test_each_joint_has_gains_of_its_own(stool: Creature):
+    starts = drawn(stool, gains=0.2)
+    for factors in (starts.stiffness, starts.damping):
+        assert (factors[0] == 1).all()
+        assert 0.8 <= factors.min() < 0.82
+        assert 1.18 < factors.max() <= 1.2
+        assert all(len(set(row)) == len(row) for row in factors[1:].tolist())
+    assert not np.array_equal(starts.stiffness, starts.damping)
 
 
 def test_friction_lies_within_its_range(stool: Creature):

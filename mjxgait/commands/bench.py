@@ -84,7 +84,9 @@ def _measured(folder: Path, options: BenchOptions) -> dict[str, Any]:
     settings = load_creature(folder).settings
     config = resolve_config(settings.train, settings.creature.name)
     evolution = dataclasses.replace(config.evolution, population=options.population)
-    config = dataclasses.replace(config, evolution=evolution)
+    # The rivals' joints all have the creature's own gains.
+    rollout = dataclasses.replace(config.rollout, gains=0.0)
+    config = dataclasses.replace(config, evolution=evolution, rollout=rollout)
     _say(settings.creature.name)
     return contest(folder, config, options.rounds, options.generations, _say)
 

@@ -22,10 +22,10 @@ from mjxgait.types import BodyState, Plant, Sensed, pytree
 
 @pytree
 class Rules:
-    """What the settings say of the drive; all [].
+    """How an episode's drive differs from the creature's.
 
-    stable: stable PD, else plain PD. constraint_forces: whether it counts them.
-    stiffness, damping: factors on kp and kd.
+    stable: [] stable PD, else plain PD. constraint_forces: [] whether it counts them.
+    stiffness, damping: [J] factors on kp and kd.
     """
 
     stable: jax.Array
@@ -42,13 +42,13 @@ class Drive:
     step: float
     command: Command
 
-    def rules(self, settings: ControllerConfig) -> Rules:
-        """What an episode keeps of the settings, plain or traced."""
+    def rules(self, settings: ControllerConfig, stiffness: jax.Array, damping: jax.Array) -> Rules:
+        """What an episode keeps of the settings, plain or traced, and of its factors [J] on the gains."""
         return Rules(
             stable=chosen(settings.law, "spd"),
             constraint_forces=jnp.asarray(settings.constraint_forces),
-            stiffness=jnp.asarray(settings.stiffness, jnp.float32),
-            damping=jnp.asarray(settings.damping, jnp.float32),
+            stiffness=settings.stiffness * stiffness,
+            damping=settings.damping * damping,
         )
 
     def torque(

@@ -102,6 +102,7 @@ class RolloutConfig:
       joint_noise, velocity_noise: rad, rad/s; half widths of the uniform perturbation of the start.
       friction: range of the factor on the floor's friction.
       push: sudden change of the trunk's horizontal velocity at a random moment of a perturbed start, in units of sqrt(g * hip height).
+      gains: half width of the uniform change of each joint's kp and kd in a perturbed start, as a share.
       terminate: whether an episode ends when the creature falls; if not, its whole body meets the
         floor. termination: what counts as falling, where it differs from creature.toml.
       worst: share of the worst start in the score; the mean of the starts has the rest.
@@ -116,6 +117,7 @@ class RolloutConfig:
     velocity_noise: NonNegative = 0.1
     friction: tuple[Positive, Positive] = (0.8, 1.2)
     push: NonNegative = 0.15
+    gains: Fraction = 0.1
     terminate: Annotated[bool, SHAPE] = True
     termination: TerminationConfig = dataclasses.field(default_factory=TerminationConfig)
     worst: Fraction = 0.5

@@ -18,6 +18,7 @@ class Starts:
 
     qpos: [R, nq]. qvel: [R, nv]. friction: [R] factor on the floor's friction.
     push: [R, nv] added to qvel at step push_step [R] (never when it is `NEVER`).
+    stiffness, damping: [R, J] factors on the joints' kp and kd.
     """
 
     qpos: jax.Array
@@ -25,12 +26,15 @@ class Starts:
     friction: jax.Array
     push: jax.Array
     push_step: jax.Array
+    stiffness: jax.Array
+    damping: jax.Array
 
 
 def draw_starts(key: jax.Array, creature: Creature, config: RolloutConfig) -> Starts:
     """R starts; the same key gives the same starts. Perturbations are uniform within the half widths of the config."""
     count = config.starts
     key_pos, key_vel, key_friction, key_direction, key_moment = jax.random.split(key, 5)
+    key_stiffness, key_damping = jax.random.split(jax.random.fold_in(key, 1))
     perturbed = (jnp.arange(count) > 0)[:, None]
     joints = len(creature.joint_names)
     qpos = jnp.tile(jnp.asarray(creature.stand_qpos, jnp.float32), (count, 1))
@@ -52,10 +56,17 @@ def draw_starts(key: jax.Array, creature: Creature, config: RolloutConfig) -> St
     moment = jax.random.randint(
         key_moment, (count,), steps // 4, max(3 * steps // 4, steps // 4 + 1)
     )
+
+    def factors(key: jax.Array) -> jax.Array:
+        spread = jax.random.uniform(key, (count, joints), minval=-1.0)
+        return 1.0 + perturbed * config.gains * spread
+
     return Starts(
         qpos=qpos.at[:, creature.qpos_adr].add(noise),
         qvel=jnp.zeros((count, creature.model.nv)).at[:, creature.dof_adr].set(spin),
         friction=jnp.where(perturbed[:, 0], friction, 1.0),
         push=speed * direction @ horizontal_freedoms(creature),
         push_step=jnp.where(perturbed[:, 0], moment, NEVER),
+        stiffness=factors(key_stiffness),
+        damping=factors(key_damping),
     )

@@ -63,8 +63,16 @@ def starts_of(creature: Creature, films: list[Outcome]) -> Starts:
     for outcome in films:
         film = outcome.trajectory
         at = np.where(np.isfinite(rows.push_time), PUSH_AT, NEVER)
-        arrays = (film.qpos[:, 0], film.qvel[:, 0], rows.friction, push)
-        wanted.append(Starts(*(jnp.asarray(a, jnp.float32) for a in arrays), jnp.int32(at)))
+        arrays = {
+            "qpos": film.qpos[:, 0],
+            "qvel": film.qvel[:, 0],
+            "friction": rows.friction,
+            "push": push,
+            "stiffness": rows.stiffness,
+            "damping": rows.damping,
+        }
+        floats = {name: jnp.asarray(array, jnp.float32) for name, array in arrays.items()}
+        wanted.append(Starts(**floats, push_step=jnp.int32(at)))
     return jax.tree.map(lambda *leaves: jnp.stack(leaves), *wanted)
 
 
