@@ -1,6 +1,7 @@
 """The config as the compiled program reads it, and runs side by side in one program."""
 
 import dataclasses
+from collections.abc import Callable
 
 import jax
 import jax.numpy as jnp
@@ -139,3 +140,11 @@ def test_one_program_serves_every_value(stool: Creature):
 def test_settings_of_different_shapes_are_refused(stool: Creature):
     with pytest.raises(UserError, match="different shapes"):
         build_batch(stool, [small_config(), small_config(controller={"key_poses": 3})])
+
+
+@pytest.mark.parametrize("use", [bool, lambda x: x + 1, lambda x: x < 1, jnp.asarray, float])
+def test_a_setting_of_the_host_is_not_there_for_the_program(use: Callable[[object], object]):
+    program = traced(small_config(evolution={"generations": 9}))
+    for setting in (program.evolution.generations, program.seed, program.examination.every):
+        with pytest.raises(TypeError):
+            use(setting)

@@ -22,6 +22,16 @@ class Choice:
     options: tuple[str, ...] = dataclasses.field(metadata={"static": True})
 
 
+@dataclasses.dataclass(frozen=True)
+class HostOnly:
+    """In the place of a setting that the compiled program must not read: it is no number and no truth."""
+
+    name: str
+
+    def __bool__(self) -> bool:
+        raise TypeError(f'"{self.name}" is read by the host only: the program has no such setting')
+
+
 def chosen(value: Any, option: str) -> jax.Array:
     """Whether [] a choice of the config, plain or traced, is this option."""
     if isinstance(value, Choice):
@@ -30,7 +40,7 @@ def chosen(value: Any, option: str) -> jax.Array:
 
 
 def traced(config: Config) -> Config:
-    """The config with arrays as numbers and `Choice` as choices; what only the host reads is at its default."""
+    """The config with arrays as numbers and `Choice` as choices; what only the host reads is not in it."""
     return _traced(config)
 
 
@@ -41,7 +51,7 @@ def _traced(config: Any) -> Any:
         if dataclasses.is_dataclass(value):
             values[field.name] = _traced(value)
         elif role is HOST:
-            values[field.name] = field.default
+            values[field.name] = HostOnly(field.name)
         elif role is SHAPE:
             values[field.name] = value
         else:
