@@ -18,7 +18,7 @@ from mjxgait.certify.starts import join, nominal_starts, perturbed_starts
 from mjxgait.champion import Champion, read_champion
 from mjxgait.cores import process_per_core
 from mjxgait.creature import Creature
-from mjxgait.runs.checkpoint import disk_errors
+from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.folder import METRICS, read_metrics
 
 MEASURED = "measured.jsonl"
