@@ -17,7 +17,8 @@ import jax
 import numpy as np
 
 from mjxgait.champion import write_champion
-from mjxgait.runs.checkpoint import Checkpoints, disk_errors
+from mjxgait.runs.checkpoint import Checkpoints
+from mjxgait.runs.disk import disk_errors
 from mjxgait.settings.config import Config
 from mjxgait.creature import Creature
 from mjxgait.search.evolution import EvolutionState, GenerationMetrics, stop_reason
@@ -54,10 +55,11 @@ def train(
     # A run that was killed before its first checkpoint begins anew: it will do what it would have done.
     if resume and (checkpoints.generations() or generation is not None):
         state = checkpoints.restore(jax.eval_shape(experiment.init), creature.digest, generation)
-        truncate_metrics(folder / METRICS, int(state.generation))
+        begun = int(state.generation)
     else:
-        truncate_metrics(folder / METRICS, -1)
-        state = experiment.init()
+        state, begun = experiment.init(), -1
+    with disk_errors(folder):
+        truncate_metrics(folder / METRICS, begun)
     if experiment.plant_note:
         screen.say(experiment.plant_note)
     with screen.compiling(creature.name, experiment):
