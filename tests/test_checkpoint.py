@@ -143,6 +143,34 @@ def test_a_half_written_checkpoint_does_not_count(run: Path, evolution):
     assert int(restore(run, evolution).generation) == 6
 
 
+def test_going_on_from_an_earlier_checkpoint_drops_the_later_ones(
+    run: Path, states: list[EvolutionState], evolution
+):
+    (run / FOLDER / "notes.txt").write_text("the user's own")
+    checkpoints = Checkpoints(run)
+    assert checkpoints.drop_after(3) == [4, 5, 6]
+    checkpoints.save(states[4], "toy", DIGEST)
+    checkpoints.close()
+    assert Checkpoints(run).generations() == [0, 3, 4]
+    assert int(restore(run, evolution).generation) == 4
+    assert (run / FOLDER / "notes.txt").exists()
+
+
+def test_nothing_is_dropped_where_nothing_is_later(run: Path):
+    assert Checkpoints(run).drop_after(6) == []
+    assert Checkpoints(run).generations() == [0, 3, 4, 5, 6]
+
+
+def test_a_damaged_checkpoint_is_dropped_too(run: Path, states: list[EvolutionState]):
+    """The way out that a damaged checkpoint is answered with is a way."""
+    corrupt(run, 6)
+    checkpoints = Checkpoints(run)
+    assert checkpoints.drop_after(5) == [6]
+    checkpoints.save(states[6], "toy", DIGEST)
+    checkpoints.close()
+    assert Checkpoints(run).generations()[-1] == 6
+
+
 def test_a_mistake_of_ours_is_not_blamed_on_the_disk(
     tmp_path: Path, states: list[EvolutionState], monkeypatch: pytest.MonkeyPatch
 ):

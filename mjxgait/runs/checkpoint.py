@@ -50,6 +50,14 @@ class Checkpoints:
         """The generations there are checkpoints of, oldest first."""
         return stored_generations(self._run)
 
+    def drop_after(self, generation: int) -> list[int]:
+        """Deletes the checkpoints of later generations; returns which, oldest first."""
+        later = [known for known in self.generations() if known > generation]
+        with disk_errors(self._folder):
+            for known in reversed(later):
+                self._manager.delete(known)
+        return later
+
     def save(self, state: EvolutionState, creature: str, digest: str) -> None:
         """Starts to write the state, of one run or of several side by side.
 

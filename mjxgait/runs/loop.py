@@ -58,6 +58,10 @@ def train(
         begun = int(state.generation)
     else:
         state, begun = experiment.init(), -1
+    # First the checkpoints: a kill in between leaves lines too many, never a log with a gap.
+    if later := checkpoints.drop_after(begun):
+        names = ", ".join(map(str, later))
+        screen.say(f"Dropped the checkpoints after generation {begun}: {names}; they come anew.")
     with disk_errors(folder):
         truncate_metrics(folder / METRICS, begun)
     if experiment.plant_note:
