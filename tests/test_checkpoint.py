@@ -2,6 +2,10 @@
 
 import dataclasses
 import json
+import os
+import re
+import subprocess
+import sys
 from pathlib import Path
 
 import jax
@@ -182,6 +186,51 @@ def test_a_mistake_of_ours_is_not_blamed_on_the_disk(
     monkeypatch.setattr(checkpoints._manager, "save", mistaken)
     with pytest.raises(KeyError, match="born"):
         checkpoints.save(states[0], "toy", DIGEST)
+
+
+FILLS = """
+import resource, sys
+from pathlib import Path
+import jax
+from test_evolution import toy
+from mjxgait.errors import UserError
+from mjxgait.runs import checkpoint
+
+evolution = toy()
+step = jax.jit(evolution.step)
+state, _ = step(evolution.init(jax.random.key(0), 1, 1))
+later, _ = step(state)
+checkpoints = checkpoint.Checkpoints(Path(sys.argv[1]))
+checkpoints.save(state, "toy", "0" * 16)
+checkpoints._manager.wait_until_finished()
+if sys.argv[2] == "after the trial":
+    checkpoint.try_room = lambda *_: None
+resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))
+said = []
+for write in (lambda: checkpoints.save(later, "toy", "0" * 16), checkpoints.close):
+    try:
+        write()
+    except UserError as error:
+        said.append(error)
+print(said[0])
+"""
+
+
+@pytest.mark.parametrize("moment", ["before", "after the trial"])
+def test_a_disk_that_fills_is_one_sentence_and_nothing_else_on_the_screen(
+    tmp_path: Path, moment: str
+):
+    """Files may not grow over 100 bytes, which stands for a full disk."""
+    done = subprocess.run(
+        [sys.executable, "-c", FILLS, str(tmp_path), moment],
+        capture_output=True,
+        text=True,
+        timeout=100,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path), "JAX_PLATFORMS": "cpu"},
+    )
+    assert done.stderr == ""
+    assert re.fullmatch(r".*File too large; .*make room and go on with --resume", done.stdout[:-1])
+    assert Checkpoints(tmp_path).generations() == [0]
 
 
 def test_a_state_is_a_pytree_that_holds_everything(states: list[EvolutionState]):

@@ -5,7 +5,10 @@ error that Orbax hands on; what its threads would say on the screen besides is k
 """
 
 import dataclasses
-from collections.abc import Mapping
+import logging
+import sys
+import threading
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +17,7 @@ import numpy as np
 import orbax.checkpoint as ocp
 
 from mjxgait.errors import UserError
-from mjxgait.runs.disk import disk_errors
+from mjxgait.runs.disk import disk_errors, try_room
 from mjxgait.runs.stored import (
     FOLDER,
     MANIFEST,
@@ -27,12 +30,16 @@ from mjxgait.runs.stored import (
 )
 from mjxgait.search.evolution import EvolutionState
 
+OVERHEAD = 2**18
+"""Bytes that a checkpoint takes at most beside twice its arrays."""
+
 
 class Checkpoints:
     """The checkpoints of one run, written in the background, each complete or absent."""
 
     def __init__(self, run: Path, keep_every: int = 1) -> None:
         """Besides the latest three, each generation that is a multiple of `keep_every` stays."""
+        _keep_threads_quiet()
         self._run, self._folder = run, (run / FOLDER).resolve()
         options = ocp.CheckpointManagerOptions(
             max_to_keep=3, keep_period=keep_every, cleanup_tmp_directories=True
@@ -77,7 +84,10 @@ class Checkpoints:
             state=ocp.args.StandardSave(arrays),
             manifest=ocp.args.JsonSave(dataclasses.asdict(manifest)),
         )
+        size = sum(leaf.nbytes for leaf in arrays.values())
         with disk_errors(self._folder):
+            # Where Orbax cannot make its folder, its threads wait five minutes for one another.
+            try_room(self._folder, 2 * size + OVERHEAD)
             self._manager.save(manifest.generation, args=args, force=True)
 
     def close(self) -> None:
@@ -138,3 +148,33 @@ def _check_shapes(found: Mapping[str, Any], wanted: Mapping[str, Any], where: Pa
                 f"{there.get(name, 'missing')}, the settings ask for {here.get(name, 'nothing')}; "
                 "resume with the settings it was written with"
             )
+
+
+def _keep_threads_quiet() -> None:
+    """Keeps off the screen what Orbax hands on to the caller anyway."""
+    log = logging.getLogger("absl")
+    if _told_to_the_caller not in log.filters:
+        log.addFilter(_told_to_the_caller)
+    if not isinstance(sys.unraisablehook, _WithoutClosedLoops):
+        sys.unraisablehook = _WithoutClosedLoops(sys.unraisablehook)
+
+
+def _told_to_the_caller(record: logging.LogRecord) -> bool:
+    """Lets a record pass that is not about an error in one of Orbax's files."""
+    return not (record.exc_info and "orbax" in Path(record.pathname).parts)
+
+
+class _WithoutClosedLoops:
+    """A hook for errors that nobody can catch, without those of writes after a failed one.
+
+    Orbax closes its event loop at the first error; the threads of TensorStore, which are not
+    Python's, still report to it.
+    """
+
+    def __init__(self, before: Callable[["sys.UnraisableHookArgs"], Any]) -> None:
+        self._before = before
+
+    def __call__(self, error: "sys.UnraisableHookArgs", /) -> None:
+        foreign = threading.current_thread().name.startswith("Dummy-")
+        if not (foreign and str(error.exc_value) == "Event loop is closed"):
+            self._before(error)
