@@ -17,15 +17,12 @@ import jax
 import numpy as np
 
 from mjxgait.champion import write_champion
+from mjxgait.creature import Creature
 from mjxgait.runs.checkpoint import Checkpoints
 from mjxgait.runs.disk import disk_errors
-from mjxgait.settings.config import Config
-from mjxgait.creature import Creature
-from mjxgait.search.evolution import EvolutionState, GenerationMetrics, stop_reason
 from mjxgait.runs.examination import Examined, Examiner, why_ended
 from mjxgait.runs.exams import Exams
 from mjxgait.runs.experiment import Step, build_experiment
-from mjxgait.tasks.walk.fitness import TERMS
 from mjxgait.runs.folder import (
     CERTIFICATE,
     CHAMPION,
@@ -35,6 +32,9 @@ from mjxgait.runs.folder import (
     truncate_metrics,
 )
 from mjxgait.runs.screen import Screen
+from mjxgait.search.evolution import EvolutionState, GenerationMetrics, stop_reason
+from mjxgait.settings.config import Config
+from mjxgait.tasks.walk.fitness import TERMS
 
 
 def train(
