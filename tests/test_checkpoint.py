@@ -2,6 +2,10 @@
 
 import dataclasses
 import json
+import os
+import re
+import subprocess
+import sys
 from pathlib import Path
 
 import jax
@@ -73,15 +77,12 @@ def test_the_restored_key_goes_on_where_the_saved_one_was(
 
 
 def corrupt(run: Path, generation: int) -> None:
-    """Flips bytes in the middle of the largest file of a checkpoint."""
-    largest = max(
-        (run / FOLDER / str(generation) / "state").rglob("*"),
-        key=lambda path: path.stat().st_size if path.is_file() else 0,
-    )
-    data = bytearray(largest.read_bytes())
-    middle = len(data) // 2
-    data[middle : middle + 16] = bytes(16 * [255])
-    largest.write_bytes(data)
+    """Flips bytes in the middle of the files that hold the arrays of a checkpoint."""
+    for path in (run / FOLDER / str(generation) / "state").rglob("d/*"):
+        data = bytearray(path.read_bytes())
+        middle = len(data) // 2
+        data[middle : middle + 16] = bytes(16 * [255])
+        path.write_bytes(data)
 
 
 def test_a_damaged_checkpoint_is_refused_and_the_newest_intact_one_offered(run: Path, evolution):
@@ -135,7 +136,7 @@ def test_a_generation_that_is_not_there_lists_those_that_are(run: Path, evolutio
 
 
 def test_a_run_without_checkpoints_says_so(tmp_path: Path, evolution):
-    with pytest.raises(UserError, match="no checkpoint to resume from"):
+    with pytest.raises(UserError, match="no checkpoint yet; the run ended before"):
         restore(tmp_path, evolution)
 
 
@@ -146,19 +147,90 @@ def test_a_half_written_checkpoint_does_not_count(run: Path, evolution):
     assert int(restore(run, evolution).generation) == 6
 
 
-def test_a_disk_that_refuses_is_one_sentence(
+def test_going_on_from_an_earlier_checkpoint_drops_the_later_ones(
+    run: Path, states: list[EvolutionState], evolution
+):
+    (run / FOLDER / "notes.txt").write_text("the user's own")
+    checkpoints = Checkpoints(run)
+    assert checkpoints.drop_after(3) == [4, 5, 6]
+    checkpoints.save(states[4], "toy", DIGEST)
+    checkpoints.close()
+    assert Checkpoints(run).generations() == [0, 3, 4]
+    assert int(restore(run, evolution).generation) == 4
+    assert (run / FOLDER / "notes.txt").exists()
+
+
+def test_nothing_is_dropped_where_nothing_is_later(run: Path):
+    assert Checkpoints(run).drop_after(6) == []
+    assert Checkpoints(run).generations() == [0, 3, 4, 5, 6]
+
+
+def test_a_damaged_checkpoint_is_dropped_too(run: Path, states: list[EvolutionState]):
+    """The way out that a damaged checkpoint is answered with is a way."""
+    corrupt(run, 6)
+    checkpoints = Checkpoints(run)
+    assert checkpoints.drop_after(5) == [6]
+    checkpoints.save(states[6], "toy", DIGEST)
+    checkpoints.close()
+    assert Checkpoints(run).generations()[-1] == 6
+
+
+def test_a_mistake_of_ours_is_not_blamed_on_the_disk(
     tmp_path: Path, states: list[EvolutionState], monkeypatch: pytest.MonkeyPatch
 ):
     checkpoints = Checkpoints(tmp_path)
 
-    def full(*_: object, **__: object) -> None:
-        raise OSError(28, "No space left on device")
+    def mistaken(*_: object, **__: object) -> None:
+        raise KeyError("born")
 
-    monkeypatch.setattr(checkpoints._manager, "save", full)
-    with pytest.raises(
-        UserError, match=r"No space left on device.*make room and go on with --resume"
-    ):
+    monkeypatch.setattr(checkpoints._manager, "save", mistaken)
+    with pytest.raises(KeyError, match="born"):
         checkpoints.save(states[0], "toy", DIGEST)
+
+
+FILLS = """
+import resource, sys
+from pathlib import Path
+import jax
+from test_evolution import toy
+from mjxgait.errors import UserError
+from mjxgait.runs import checkpoint
+
+evolution = toy()
+step = jax.jit(evolution.step)
+state, _ = step(evolution.init(jax.random.key(0), 1, 1))
+later, _ = step(state)
+checkpoints = checkpoint.Checkpoints(Path(sys.argv[1]))
+checkpoints.save(state, "toy", "0" * 16)
+checkpoints._manager.wait_until_finished()
+if sys.argv[2] == "after the trial":
+    checkpoint.try_room = lambda *_: None
+resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))
+said = []
+for write in (lambda: checkpoints.save(later, "toy", "0" * 16), checkpoints.close):
+    try:
+        write()
+    except UserError as error:
+        said.append(error)
+print(said[0])
+"""
+
+
+@pytest.mark.parametrize("moment", ["before", "after the trial"])
+def test_a_disk_that_fills_is_one_sentence_and_nothing_else_on_the_screen(
+    tmp_path: Path, moment: str
+):
+    """Files may not grow over 100 bytes, which stands for a full disk."""
+    done = subprocess.run(
+        [sys.executable, "-c", FILLS, str(tmp_path), moment],
+        capture_output=True,
+        text=True,
+        timeout=100,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path), "JAX_PLATFORMS": "cpu"},
+    )
+    assert done.stderr == ""
+    assert re.fullmatch(r".*File too large; .*make room and go on with --resume", done.stdout[:-1])
+    assert Checkpoints(tmp_path).generations() == [0]
 
 
 def test_a_state_is_a_pytree_that_holds_everything(states: list[EvolutionState]):

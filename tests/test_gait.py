@@ -7,6 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from mjxgait.certify.controller import Controller as Examiner
+from mjxgait.champion import Champion
 from mjxgait.control.poses import (
     PERIOD,
     PITCH,
@@ -136,9 +138,37 @@ def test_the_clock_moves_on_whatever_the_creature_does(stool: Creature):
     cycle = control.prepare(
         Genome(jnp.asarray(random_poses(stool)), tuning(period=0.8)), settings(advance="clock")
     )
-    state = GaitState(jnp.int32(0), jnp.float32(0.395))
+    state = GaitState(jnp.int32(0), jnp.int32(79))
     _, state = control.act(cycle, state, sensed(stool, stool.stand + 1))
     assert int(state.position) == 12
+
+
+@pytest.mark.parametrize("period", [0.8, 0.4, 0.64, 1.0, 0.35, 0.7123, 1.9, 0.2, 0.006])
+@pytest.mark.parametrize(("interpolation", "mirror"), [(4, True), (7, False), (10, True)])
+def test_the_clock_is_the_examiners_on_every_step(
+    stool: Creature, period: float, interpolation: int, mirror: bool
+):
+    """Eight seconds; where the step is a fraction of the period, as exact arithmetic has it."""
+    rules = settings(interpolation=interpolation, advance="clock", mirror=mirror)
+    poses, genes = random_poses(stool), tuning(period=period)
+    control = tracker(stool)
+    cycle = control.prepare(Genome(jnp.asarray(poses), genes), rules)
+    blocked = sensed(stool, stool.stand + 1)
+
+    def moved(state: GaitState, _: None) -> tuple[GaitState, jax.Array]:
+        _, state = control.act(cycle, state, blocked)
+        return state, state.position
+
+    _, found = jax.lax.scan(moved, control.init(), length=1600)
+    named = dict(zip(TUNING, map(float, genes), strict=True))
+    champion = Champion(stool.name, stool.digest, poses, named, rules, 0.0, {}, {})
+    examiner, far = Examiner(stool, champion), np.ones((1, 4))
+    expected = [examiner.advance(np.zeros(1, int), far, 0 * far, k, 0.005)[0] for k in range(1601)]
+    assert np.array_equal(found, expected[1:])
+    if period in (0.8, 0.4, 0.64, 1.0, 0.35, 0.2):
+        length = examiner.length
+        exact = [k * length * 5 // round(1000 * period) % length for k in range(1, 1601)]
+        assert np.array_equal(found, exact)
 
 
 @pytest.mark.parametrize(

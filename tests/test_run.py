@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -166,6 +167,18 @@ def test_killed_between_two_checkpoints_it_repeats_what_came_after_the_first(
     mjxgait("train", "--resume", folder)
     assert result(folder) == result(finished[0])
     assert without_times(folder) == without_times(finished[0])
+
+
+def test_going_on_from_an_earlier_checkpoint_drops_the_later_and_comes_to_the_same_end(
+    finished: tuple[Path, str], tmp_path: Path
+):
+    folder = tmp_path / "again"
+    shutil.copytree(finished[0], folder)
+    said = mjxgait("train", "--resume", folder, "--generation", "5", "--no-plots")
+    assert "Dropped the checkpoints after generation 5: 6, 7; they come anew." in said
+    assert result(folder) == result(finished[0])
+    assert without_times(folder) == without_times(finished[0])
+    assert {path.name for path in folder.iterdir()} == {p.name for p in finished[0].iterdir()}
 
 
 def test_twice_interrupted_is_the_same_too(finished: tuple[Path, str], tmp_path: Path):

@@ -1,9 +1,12 @@
 """One number per run and measure: from its log, and from C MuJoCo, where all variants are judged alike whatever they evolved for."""
 
+import contextlib
 import dataclasses
+import functools
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures.process import BrokenProcessPool
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -17,13 +20,18 @@ from mjxgait.certify.simulate import simulate
 from mjxgait.certify.starts import join, nominal_starts, perturbed_starts
 from mjxgait.champion import Champion, read_champion
 from mjxgait.cores import process_per_core
-from mjxgait.creature import Creature
-from mjxgait.runs.checkpoint import disk_errors
-from mjxgait.runs.folder import METRICS, read_metrics
+from mjxgait.creature import Creature, load_creature
+from mjxgait.errors import UserError
+from mjxgait.runs.disk import disk_errors
+from mjxgait.runs.folder import CREATURE, METRICS, read_metrics
 
 MEASURED = "measured.jsonl"
 SECONDS, STARTS, SEED = 22.0, 16, 1000
 """Of the walk that judges every champion: perturbed as in the certificate, from starts that no evolution has seen."""
+
+
+Judged = tuple[float, float, bool | None]
+"""Of a champion: `walk`, `up` and `certified` of its `Result`."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -58,10 +66,14 @@ def read_logs(folder: Path) -> list[dict[str, Any]]:
     return [line for file in files for line in read_metrics(file)]
 
 
-def measure(
-    folder: Path, creature: Creature, plan: Plan, tell: Callable[[int, int], None]
-) -> list[Result]:
-    """The result of every run, in the order of the plan. One process per core; what has been measured before is not measured again."""
+def measure(folder: Path, plan: Plan, tell: Callable[[int, int], None]) -> list[Result]:
+    """The result of every run, in the order of the plan, by one process per core.
+
+    What has been measured before is not measured again.
+
+    Raises:
+      UserError: a process was killed from outside, or the folder cannot be written.
+    """
     known = {(line["variant"], line["seed"]): Result(**line) for line in _measured(folder)}
     lines: dict[tuple[str, int], list[dict[str, Any]]] = {}
     for line in read_logs(folder):
@@ -69,15 +81,14 @@ def measure(
     missing = [run for run in plan.runs if (run.variant, run.seed) not in known]
     if missing:
         tell(0, len(missing))
-    with process_per_core(len(missing)) as pool:
-        paths = [champion_path(folder, plan, run) for run in missing]
+    with _survivable(folder), process_per_core(len(missing)) as pool:
         found = pool.map(
-            partial(_result, creature, plan.study),
-            missing,
-            [lines[run.variant, run.seed] for run in missing],
-            paths,
+            partial(_judge, folder / CREATURE, plan.study.certify),
+            [champion_path(folder, plan, run) for run in missing],
+            [_found_somebody(lines[run.variant, run.seed]) for run in missing],
         )
-        for number, result in enumerate(found, 1):
+        for number, (run, judged) in enumerate(zip(missing, found, strict=True), 1):
+            result = _result(plan.study, run, lines[run.variant, run.seed], judged)
             known[result.variant, result.seed] = result
             with disk_errors(folder), (folder / MEASURED).open("a", encoding="utf-8") as log:
                 log.write(json.dumps(dataclasses.asdict(result)) + "\n")
@@ -85,35 +96,69 @@ def measure(
     return [known[run.variant, run.seed] for run in plan.runs]
 
 
+@contextlib.contextmanager
+def _survivable(folder: Path) -> Iterator[None]:
+    """Says what to do where somebody, such as a system out of memory, killed a process of ours."""
+    try:
+        yield
+    except BrokenProcessPool:
+        raise UserError(
+            f"{folder}: a process that examined champions was killed from outside, perhaps for "
+            "want of memory; what was examined before is kept: go on with "
+            f"mjxgait ablate --resume {folder}"
+        ) from None
+
+
 def _measured(folder: Path) -> list[dict[str, Any]]:
     return read_metrics(folder / MEASURED)
 
 
-def _result(
-    creature: Creature, study: Study, run: Run, lines: Sequence[Mapping[str, Any]], path: Path
-) -> Result:
-    champion = read_champion(path, creature)
+def _result(study: Study, run: Run, lines: Sequence[Mapping[str, Any]], judged: Judged) -> Result:
+    walk, up, certified = judged
     best = [-math.inf if line["best"] is None else line["best"] for line in lines]
-    finite = math.isfinite(best[-1])
-    walk, up, nominal = _walk(creature, champion) if finite else (0.0, 0.0, 0.0)
-    threshold = study.threshold
+    finite, threshold = _found_somebody(lines), study.threshold
     reached = [i for i, value in enumerate(best) if threshold is not None and value >= threshold]
-    # One that falls or lags this far behind the speed that the certificate asks for cannot pass, so the long examination is spared.
-    worth = nominal > 0.4
     return Result(
         variant=run.variant,
         seed=run.seed,
         walk=walk,
         up=up,
-        certified=(worth and certify(creature, champion, threads=1).passed)
-        if study.certify
-        else None,
+        certified=certified,
         fitness=best[-1] if finite else -1e9,
         area=float(np.mean([value for value in best if math.isfinite(value)])) if finite else -1e9,
         generations=reached[0] if reached else run.generations + 1,
         steps=sum(line["sim_steps"] for line in lines),
         finite=finite,
     )
+
+
+def _found_somebody(lines: Sequence[Mapping[str, Any]]) -> bool:
+    """Whether the best at the end could be judged."""
+    return lines[-1]["best"] is not None
+
+
+def _judge(creature_folder: Path, examine: bool, path: Path, finite: bool) -> Judged:
+    """In a process of its own: the walk of the champion at `path`, and if `examine` the verdict.
+
+    What is sent there is small. The pool of Python 3.11 hangs where a process is killed while it
+    is sent more than a pipe holds.
+    """
+    creature = _creature(creature_folder)
+    champion = read_champion(path, creature)
+    walk, up, nominal = _walk(creature, champion) if finite else (0.0, 0.0, 0.0)
+    # One that falls or lags this far behind the speed that the certificate asks for cannot pass, so the long examination is spared.
+    worth = nominal > 0.4
+    return (
+        walk,
+        up,
+        (worth and certify(creature, champion, threads=1).passed) if examine else None,
+    )
+
+
+@functools.cache
+def _creature(folder: Path) -> Creature:
+    """Loaded once in each process."""
+    return load_creature(folder)
 
 
 def _walk(creature: Creature, champion: Champion) -> tuple[float, float, float]:

@@ -19,7 +19,7 @@ from mjxgait.ablation.findings import Finding, find, trim_of
 from mjxgait.ablation.measures import Result
 from mjxgait.ablation.plan import Plan
 from mjxgait.ablation.statistics import Estimate, share
-from mjxgait.runs.checkpoint import disk_errors
+from mjxgait.runs.disk import disk_errors
 
 NAMES = {
     "walk": "body lengths per second covered before a fall or the end of 22 s, mean over 16 unseen perturbed starts in C MuJoCo",

@@ -14,7 +14,8 @@ import numpy as np
 from mjxgait.ablation.plan import Plan, Run
 from mjxgait.champion import write_champion
 from mjxgait.creature import Creature
-from mjxgait.runs.checkpoint import Checkpoints, disk_errors
+from mjxgait.runs.checkpoint import Checkpoints
+from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.experiment import Batch, build_batch
 from mjxgait.runs.folder import METRICS, truncate_metrics
 from mjxgait.runs.loop import interruptible, metrics_line, versions

@@ -146,16 +146,26 @@ class Controller:
         return np.linalg.solve(damped, force[..., None])[:, dof, 0]
 
     def advance(
-        self, position: np.ndarray, target: np.ndarray, joint_pos: np.ndarray, next_time: float
+        self,
+        position: np.ndarray,
+        target: np.ndarray,
+        joint_pos: np.ndarray,
+        next_step: int,
+        time_step: float,
     ) -> np.ndarray:
-        """Positions [S] at the next control step, which starts at `next_time` in s; target, joint_pos [S, J]: of this step."""
+        """Positions [S] at the next control step.
+
+        target, joint_pos: [S, J] of this step. next_step: its number, counted from 0. time_step: s.
+        """
         if self.settings.advance == "clock":
-            # The nudge keeps a position that is whole in exact arithmetic from being rounded down.
-            return np.full_like(
-                position, int(self.length * next_time / self.tuning["period"] + 1e-6) % self.length
-            )
+            return np.full_like(position, self._by_clock(next_step, time_step))
         error = np.sqrt(((target - joint_pos) ** 2).mean(1))
         return np.where(error < self.tuning["threshold"], (position + 1) % self.length, position)
+
+    def _by_clock(self, step: int, time_step: float) -> int:
+        turn = int(float(np.float32(time_step) / np.float32(self.tuning["period"])) * 2**32)
+        place = step * turn % 2**32 // 2**16
+        return (place + 1) * self.length // 2**16 % self.length
 
 
 def pose_cycle(key_poses: np.ndarray, creature: Creature) -> np.ndarray:

@@ -236,7 +236,7 @@ class _Run:
         for _ in range(self.refine - 1):
             self.batch.step(running, stage=VELOCITY_STAGE)
         self.position[running] = self.controller.advance(
-            self.position[running], target, reached, (k + 1) * film.time_step
+            self.position[running], target, reached, k + 1, film.time_step
         )
 
     def _physics_step(

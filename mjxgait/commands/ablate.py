@@ -100,7 +100,7 @@ def ablate_command(arguments: Sequence[str]) -> int:
     if not run_study(folder, creature, plan, screen.generation):
         print(f"interrupted; go on with: mjxgait ablate --resume {folder}")
         return INTERRUPTED
-    results = measure(folder, creature, plan, screen.measuring)
+    results = measure(folder, plan, screen.measuring)
     command = shlex.join(["mjxgait", "ablate", *_repeatable(options)])
     report = write_report(folder, plan, results, read_logs(folder), command)
     print(report.read_text(encoding="utf-8"))

@@ -12,6 +12,7 @@ import tyro
 
 from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import INTERRUPTED, UserError
+from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.folder import METRICS, PLOT, create_run, open_run, read_metrics
 from mjxgait.settings.config import Config, ExaminationConfig
 from mjxgait.settings.layers import resolve_config
@@ -100,7 +101,10 @@ def _plot_fitness(folder: Path) -> None:
     if lines := read_metrics(folder / METRICS):
         from mjxgait.viewing.curves import plot_fitness
 
-        plot_fitness(lines, folder / PLOT)
+        with disk_errors(
+            folder / PLOT, "the run itself is safe", f"draw it with mjxgait plot {folder}"
+        ):
+            plot_fitness(lines, folder / PLOT)
 
 
 def _layers(arguments: Sequence[str]) -> tuple[Creature, Config]:

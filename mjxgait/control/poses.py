@@ -50,10 +50,10 @@ class PoseCycle:
 
 @pytree
 class GaitState:
-    """Where the controller is in its cycle: position [] in steps of interpolation, time [] s."""
+    """Where the controller is: position [] in steps of interpolation, steps [] since the start."""
 
     position: jax.Array
-    time: jax.Array
+    steps: jax.Array
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -103,7 +103,7 @@ class PoseTracker:
 
     def init(self) -> GaitState:
         """The state at the start of an episode."""
-        return GaitState(position=jnp.zeros((), jnp.int32), time=jnp.zeros((), jnp.float32))
+        return GaitState(position=jnp.zeros((), jnp.int32), steps=jnp.zeros((), jnp.int32))
 
     def act(
         self, cycle: PoseCycle, state: GaitState, senses: Senses
@@ -115,12 +115,12 @@ class PoseTracker:
         target = jnp.clip(
             target, creature.joint_low.astype(np.float32), creature.joint_high.astype(np.float32)
         )
-        time = state.time + self.step
+        steps = state.steps + 1
         positions = cycle.count * cycle.interpolation
         reached = jnp.mean((target - senses["joint_pos"]) ** 2) < cycle.tuning[THRESHOLD] ** 2
-        by_clock = jnp.floor(positions * time / cycle.tuning[PERIOD]).astype(jnp.int32)
+        by_clock = clock_position(steps, self.step, cycle.tuning[PERIOD], positions)
         position = jnp.where(cycle.clocked, by_clock, state.position + reached) % positions
-        return target, GaitState(position, time)
+        return target, GaitState(position, steps)
 
 
 def pose_cycle(creature: Creature, key_poses: jax.Array) -> jax.Array:
@@ -130,6 +130,20 @@ def pose_cycle(creature: Creature, key_poses: jax.Array) -> jax.Array:
     return jnp.concatenate(
         [key_poses, creature.sign.astype(np.float32) * key_poses[:, creature.partner]]
     )
+
+
+def clock_position(
+    steps: jax.Array, step: float, period: jax.Array, positions: jax.Array
+) -> jax.Array:
+    """Position [] in a cycle of `positions` [] and `period` [] s after `steps` [] of `step` s.
+
+    In integers that overflow at the end of a cycle: float32 time would drift away from the examiner's.
+    """
+    turns = step / period
+    turn = ((turns - jnp.floor(turns)) * 2.0**32).astype(jnp.uint32)
+    phase = steps.astype(jnp.uint32) * turn
+    place = ((phase >> 16) + 1) * positions.astype(jnp.uint32) >> 16
+    return place.astype(jnp.int32) % positions
 
 
 def interpolate(

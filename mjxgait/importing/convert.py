@@ -19,7 +19,7 @@ from mjxgait.importing.hold import Held, hold
 from mjxgait.importing.mjcf import clean_mjcf
 from mjxgait.importing.notes import Notes, listed
 from mjxgait.importing.orient import find_forward, find_mirror, is_planar, yaw_to
-from mjxgait.importing.parts import Body, plain_names, rotation
+from mjxgait.importing.parts import Body, one_line, plain_names, rotation
 from mjxgait.importing.same import check_same
 from mjxgait.importing.skeleton import build_bodies
 from mjxgait.importing.soles import guard_parts, lay_soles
@@ -118,7 +118,7 @@ def _import(path: Path, choices: ImportChoices, notes: Notes) -> Imported:
     steady_balance(best.drive, best.puppet.names, best.model, best.qpos, feet, best.notes)
     name = plain_names([choices.name or path.stem], ["creature"])[0]
     check_same(model, anatomy, best.puppet, best.model)
-    return _folder(name, path.name, best, mirror, planar)
+    return _folder(name, one_line(path.name), best, mirror, planar)
 
 
 def read_source(path: Path, search: Sequence[Path], notes: Notes) -> Source:

@@ -165,6 +165,15 @@ def hull_points(points: np.ndarray) -> np.ndarray:
     return points[chosen]
 
 
+def one_line(text: str) -> str:
+    """Text that can stand in a comment and in any file.
+
+    Control characters become spaces, and what a file's name holds that is no Unicode a question mark.
+    """
+    told = text.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
+    return re.sub(r"[\x00-\x1f\x7f-\x9f]", " ", told)
+
+
 def plain_names(names: list[str], fallback: list[str]) -> list[str]:
     """Names that can stand in a shell pattern, each once."""
     used: set[str] = set()

@@ -1,11 +1,11 @@
 """Writes creature.toml: the guesses, each with its confidence beside it."""
 
-import json
-
 import numpy as np
+import tomli_w
 
 from mjxgait.importing.drive import Drive
 from mjxgait.importing.notes import Notes
+from mjxgait.importing.parts import one_line
 
 KEYS = {"forward": "forward", "feet": "feet", "trunk": "trunk"}
 
@@ -25,12 +25,14 @@ def creature_toml(
     """The text of creature.toml.
 
     Args:
-      origin: the model file's name. forward: [3] in the trunk's frame. feet: names of geoms.
+      origin: the model file's name, in one line. forward: [3] in the trunk's frame. feet: names of geoms.
       mirror: whether it is symmetric, and stated pairs: joint to partner and sign.
       body_length: m, None where the loader shall measure it.
     """
     symmetric, pairs = mirror
-    remark = {guess.what: f"  # {guess.confidence}: {guess.reason}" for guess in notes.guesses}
+    remark = {
+        guess.what: f"  # {guess.confidence}: {one_line(guess.reason)}" for guess in notes.guesses
+    }
     kp, kd, torque, ranges = (
         np.round(v, 4) for v in (drive.kp, drive.kd, drive.torque, drive.ranges)
     )
@@ -69,7 +71,7 @@ def creature_toml(
         if kp[j] != _usual(kp) or kd[j] != _usual(kd):
             lines += [f"kp = {float(kp[j])}", f"kd = {float(kd[j])}"]
         lines.append("")
-    lines += ["[mirror]", f"symmetric = {json.dumps(symmetric)}{remark.get('mirror', '')}"]
+    lines += ["[mirror]", f"symmetric = {str(symmetric).lower()}{remark.get('mirror', '')}"]
     rows = [
         f"    {{ joint = {_quoted(a)}, partner = {_quoted(b)}, sign = {sign} }},"
         for a, (b, sign) in pairs.items()
@@ -106,7 +108,8 @@ def _usual(values: np.ndarray) -> float:
 
 
 def _quoted(text: str) -> str:
-    return json.dumps(text)
+    """As TOML writes it, which is not as JSON does: it knows no halves of an emoji, no raw 0x7f."""
+    return tomli_w.dumps({"_": text}).removeprefix("_ = ").removesuffix("\n")
 
 
 def _table(weights: dict[str, float]) -> str:

@@ -3,26 +3,22 @@
 Letters: `P` individuals, `R` starts, `F` fitness terms, `K` key poses, `J` joints, `E` tuning genes.
 """
 
-import contextlib
 import dataclasses
 import json
-import logging
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
-import jax
 import numpy as np
-import orbax.checkpoint as ocp
 
 from mjxgait.certify import outdated, read_certificate
 from mjxgait.champion import read_champion
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
-from mjxgait.runs.checkpoint import FOLDER, SCHEMA, Manifest, array_hash
 from mjxgait.runs.examination import due, why_ended
 from mjxgait.runs.folder import CERTIFICATE, CHAMPION, CONFIG, METRICS, open_run, read_metrics
+from mjxgait.runs.stored import FOLDER, Manifest, read_stored, stored_generations
 from mjxgait.search.evolution import EvolutionState, stop_reason
 from mjxgait.settings.config import Config
 
@@ -98,46 +94,21 @@ def read_snapshot(path: Path, generation: int | None = None) -> Snapshot:
     """
     run, generation = _locate(path, generation)
     creature, config = open_run(run)
-    known = checkpoint_generations(run)
-    if not known:
-        raise UserError(
-            f"{run}: no checkpoint yet; the run ended before its first generation was done"
-        )
-    wanted = known[-1] if generation is None else generation
-    if wanted not in known:
-        raise UserError(
-            f"{run}: no checkpoint of generation {wanted}; there are {', '.join(map(str, known))}"
-        )
-    folder = run / FOLDER / str(wanted)
-    try:
-        manifest, arrays = _read(folder)
-    except _Damaged as damage:
-        raise UserError(
-            f"{folder}: the checkpoint is damaged ({damage}); {_way_out(run, known, wanted)}"
-        ) from None
-    _check_owner(folder, manifest, arrays, creature, config)
+    stored = read_stored(run, creature.digest, generation)
+    folder = run / FOLDER / str(stored.manifest.generation)
+    _check_shape(folder, stored.arrays, creature, config)
     files = [file for file in folder.rglob("*") if file.is_file()]
     return Snapshot(
         run=run,
-        manifest=manifest,
+        manifest=stored.manifest,
         creature=creature.spanned(config.evolution.pose_span),
         config=config,
-        arrays=arrays,
-        lines=_lines(run / METRICS, wanted),
-        generations=known,
+        arrays=stored.arrays,
+        lines=_lines(run / METRICS, stored.manifest.generation),
+        generations=stored_generations(run),
         versions=_versions(run),
         written=folder.stat().st_mtime,
         size=sum(file.stat().st_size for file in files),
-    )
-
-
-def checkpoint_generations(run: Path) -> list[int]:
-    """The generations a run has complete checkpoints of, oldest first; one that was being written when the run was killed is left out."""
-    folder = run / FOLDER
-    return (
-        sorted(int(entry.name) for entry in folder.iterdir() if entry.name.isdigit())
-        if folder.is_dir()
-        else []
     )
 
 
@@ -174,70 +145,9 @@ def _locate(path: Path, generation: int | None) -> tuple[Path, int | None]:
     )
 
 
-class _Damaged(Exception):
-    """A checkpoint that cannot be read, or whose values are not those that were written."""
-
-
-def _read(folder: Path) -> tuple[Manifest, dict[str, np.ndarray]]:
-    try:
-        manifest = Manifest(
-            **json.loads((folder / "manifest" / "metadata").read_text(encoding="utf-8"))
-        )
-        if manifest.schema != SCHEMA:
-            raise UserError(
-                f"{folder}: written with schema {manifest.schema}, this version reads {SCHEMA}; use the version that wrote it"
-            )
-        with _quiet(), ocp.Checkpointer(ocp.PyTreeCheckpointHandler()) as reader:
-            where = (folder / "state").resolve()
-            names = reader.metadata(where).item_metadata.tree
-            # As NumPy arrays: nothing of the devices that wrote it has to be here.
-            kinds = jax.tree.map(lambda _: ocp.RestoreArgs(restore_type=np.ndarray), names)
-            arrays = reader.restore(where, args=ocp.args.PyTreeRestore(restore_args=kinds))
-    except UserError:
-        raise
-    except Exception as error:  # Orbax raises many kinds on a broken folder
-        reason = (str(error).strip().splitlines() or [type(error).__name__])[0]
-        raise _Damaged(reason if len(reason) < 120 else reason[:117] + "...") from None
-    if array_hash(arrays) != manifest.arrays:
-        raise _Damaged("its values are not those that were written")
-    return manifest, arrays
-
-
-@contextlib.contextmanager
-def _quiet() -> Iterator[None]:
-    """Without Orbax's warning of a file that a part of a checkpoint never has."""
-    log = logging.getLogger("absl")
-    before = log.level
-    log.setLevel(logging.ERROR)
-    try:
-        yield
-    finally:
-        log.setLevel(before)
-
-
-def _way_out(run: Path, known: Sequence[int], damaged: int) -> str:
-    for generation in reversed(known):
-        if generation == damaged:
-            continue
-        try:
-            _read(run / FOLDER / str(generation))
-        except (_Damaged, UserError):
-            continue
-        return f"the newest intact one is of generation {generation}: add --generation {generation}"
-    return "no other one is intact"
-
-
-def _check_owner(
-    folder: Path,
-    manifest: Manifest,
-    arrays: Mapping[str, np.ndarray],
-    creature: Creature,
-    config: Config,
+def _check_shape(
+    folder: Path, arrays: Mapping[str, np.ndarray], creature: Creature, config: Config
 ) -> None:
-    if manifest.creature_digest != creature.digest:
-        raise UserError(
-            f"{folder}: was written for another body ({manifest.creature}) than the creature folder of this run holds"
-        )
     shape = (config.evolution.population, config.controller.key_poses, len(creature.joint_names))
     if arrays["genomes.key_poses"].shape != shape:
         raise UserError(

@@ -8,10 +8,10 @@ import numpy as np
 from mjxgait.certify import Certificate, CertificateConfig, Glance, certify, glance, rehearse
 from mjxgait.champion import Champion
 from mjxgait.runs.checkpoint import disk_errors
-from mjxgait.settings.config import Config, ExaminationConfig
-from mjxgait.search.evolution import EvolutionState
 from mjxgait.runs.exams import Exams
 from mjxgait.runs.experiment import Experiment
+from mjxgait.search.evolution import EvolutionState
+from mjxgait.settings.config import Config, ExaminationConfig
 
 SPARE = 1.2
 """How much faster than the certificate's least speed a gait should be in evolution before it is worth an examination."""

@@ -12,20 +12,20 @@ import numpy as np
 from jax.sharding import Mesh, NamedSharding, PartitionSpec
 
 from mjxgait.champion import Champion
-from mjxgait.settings.config import Config, RolloutConfig
+from mjxgait.control.drive import Drive
+from mjxgait.control.poses import TUNING, Genome, PoseTracker
 from mjxgait.creature import Creature
 from mjxgait.creature.settings import Termination
 from mjxgait.errors import UserError
-from mjxgait.search.evolution import Evolution, EvolutionState, GenerationMetrics, Proposal
-from mjxgait.control.drive import Drive
-from mjxgait.control.poses import TUNING, Genome, PoseTracker
-from mjxgait.settings.traced import traced
 from mjxgait.physics import make_plant
+from mjxgait.search.evolution import Evolution, EvolutionState, GenerationMetrics, Proposal
 from mjxgait.senses import check_senses
+from mjxgait.settings.config import Config, RolloutConfig
+from mjxgait.settings.traced import traced
 from mjxgait.simulation.evaluator import Local
 from mjxgait.simulation.rollout import AXIS, Episodes, Simulator
-from mjxgait.tasks.trials import Starts
 from mjxgait.tasks.score import in_order, score
+from mjxgait.tasks.trials import Starts
 from mjxgait.tasks.walk.task import Walk
 from mjxgait.types import Judged, pytree
 

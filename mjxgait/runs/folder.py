@@ -4,9 +4,9 @@ import json
 from pathlib import Path
 from typing import Any
 
-from mjxgait.settings.config import Config
 from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import UserError
+from mjxgait.settings.config import Config
 from mjxgait.settings.tables import build, dump_toml, read_toml
 
 CONFIG, CREATURE, METRICS, CHAMPION = "config.toml", "creature", "metrics.jsonl", "champion.json"

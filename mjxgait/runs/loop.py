@@ -17,14 +17,12 @@ import jax
 import numpy as np
 
 from mjxgait.champion import write_champion
-from mjxgait.runs.checkpoint import Checkpoints, disk_errors
-from mjxgait.settings.config import Config
 from mjxgait.creature import Creature
-from mjxgait.search.evolution import EvolutionState, GenerationMetrics, stop_reason
+from mjxgait.runs.checkpoint import Checkpoints
+from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.examination import Examined, Examiner, why_ended
 from mjxgait.runs.exams import Exams
 from mjxgait.runs.experiment import Step, build_experiment
-from mjxgait.tasks.protocol import Task
 from mjxgait.runs.folder import (
     CERTIFICATE,
     CHAMPION,
@@ -34,6 +32,9 @@ from mjxgait.runs.folder import (
     truncate_metrics,
 )
 from mjxgait.runs.screen import Screen
+from mjxgait.search.evolution import EvolutionState, GenerationMetrics, stop_reason
+from mjxgait.settings.config import Config
+from mjxgait.tasks.protocol import Task
 
 
 def train(
@@ -54,10 +55,15 @@ def train(
     # A run that was killed before its first checkpoint begins anew: it will do what it would have done.
     if resume and (checkpoints.generations() or generation is not None):
         state = checkpoints.restore(jax.eval_shape(experiment.init), creature.digest, generation)
-        truncate_metrics(folder / METRICS, int(state.generation))
+        begun = int(state.generation)
     else:
-        truncate_metrics(folder / METRICS, -1)
-        state = experiment.init()
+        state, begun = experiment.init(), -1
+    # First the checkpoints: a kill in between leaves lines too many, never a log with a gap.
+    if later := checkpoints.drop_after(begun):
+        names = ", ".join(map(str, later))
+        screen.say(f"Dropped the checkpoints after generation {begun}: {names}; they come anew.")
+    with disk_errors(folder):
+        truncate_metrics(folder / METRICS, begun)
     if experiment.plant_note:
         screen.say(experiment.plant_note)
     with screen.compiling(creature.name, experiment):

@@ -8,6 +8,7 @@ import numpy as np
 
 from mjxgait.champion import read_champion
 from mjxgait.errors import UserError
+from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.folder import CHAMPION, METRICS, open_run, read_metrics
 from mjxgait.settings.config import Config
 from mjxgait.tasks.walk.fitness import TERMS, signed_weights
@@ -35,10 +36,6 @@ def plot_run(run: Path, out: Path | None = None, formats: Sequence[str] = FORMAT
             f"{run}: nothing to plot; the run ended before its first generation was done"
         )
     out = out or run / PLOTS
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UserError(f"{out}: cannot be written ({error.strerror})") from None
     figures = dict(progress_figures(lines, _weights(config, lines)))
     if (run / CHAMPION).exists():
         walk = record_walk(creature, read_champion(run / CHAMPION, creature), SECONDS)
@@ -46,10 +43,12 @@ def plot_run(run: Path, out: Path | None = None, formats: Sequence[str] = FORMAT
             "filmstrip": ((12, 4.8), lambda drawing: draw_filmstrip(drawing, walk))
         }
     files = []
-    for name, (size, compose) in figures.items():
-        with figure(size) as drawing:
-            compose(drawing)
-            files += save(drawing, out / name, formats)
+    with disk_errors(out, "the run itself is safe", f"draw it with mjxgait plot {run}"):
+        out.mkdir(parents=True, exist_ok=True)
+        for name, (size, compose) in figures.items():
+            with figure(size) as drawing:
+                compose(drawing)
+                files += save(drawing, out / name, formats)
     return files
 
 

@@ -1,6 +1,7 @@
 """The command as a user runs it: a report with everything, rows that equal runs alone, kills that lose nothing."""
 
 import json
+import re
 import shutil
 import signal
 import subprocess
@@ -8,6 +9,7 @@ import sys
 import time
 from pathlib import Path
 
+import psutil
 import pyarrow.parquet
 import pytest
 from helpers import STOOL
@@ -181,6 +183,39 @@ def test_a_killed_study_goes_on_and_ends_the_same(
     assert (folder / "generations.parquet").read_bytes() == (
         whole / "generations.parquet"
     ).read_bytes()
+
+
+def worker_of(process: subprocess.Popen) -> psutil.Process:
+    """The first process that measures; it begins by importing what it needs, for a second."""
+    while process.poll() is None:
+        for child in psutil.Process(process.pid).children():
+            if any("spawn_main" in part for part in child.cmdline()):
+                return child
+        time.sleep(0.02)
+    raise AssertionError(process.communicate())
+
+
+def test_a_study_whose_measuring_is_killed_says_so_and_goes_on(
+    finished: tuple[Path, str], tmp_path: Path
+):
+    """As a system does that is out of memory."""
+    folder = tmp_path / "killed"
+    shutil.copytree(finished[0], folder)
+    log = folder / "measured.jsonl"
+    log.write_text("".join(log.read_text().splitlines(keepends=True)[:2]))
+    process = subprocess.Popen(
+        command("ablate", "--resume", folder), stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+    worker_of(process).kill()
+    said = process.communicate(timeout=100)[1].decode()
+    assert process.returncode == 2
+    assert re.fullmatch(
+        f"mjxgait: {folder}: .* was killed from outside, .* go on with "
+        f"mjxgait ablate --resume {folder}\n",
+        said,
+    )
+    mjxgait("ablate", "--resume", folder)
+    assert (folder / "results.csv").read_bytes() == (finished[0] / "results.csv").read_bytes()
 
 
 def test_a_study_that_would_take_days_is_refused_with_the_estimate(study: Path, tmp_path: Path):

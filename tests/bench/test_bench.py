@@ -79,7 +79,7 @@ def test_the_law_is_the_examiners(creature, workload):
     law, examiner = Law(creature, workload), Controller(creature, champion)
     target = law.target(genome, position, pos, rot, v)
     np.testing.assert_allclose(target, examiner.target(position, senses), atol=1e-12)
-    expected = examiner.advance(position, target, senses.joint_pos, 0.0)
+    expected = examiner.advance(position, target, senses.joint_pos, 1, 0.005)
     np.testing.assert_array_equal(
         law.advance(genome, position, target, senses.joint_pos, position), expected
     )

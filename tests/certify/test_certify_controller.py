@@ -190,7 +190,7 @@ def test_the_position_moves_on_when_the_pose_error_is_below_the_threshold(tiny):
     off = np.zeros((3, 8))
     off[0], off[1], off[2, 0] = 0.119, 0.121, 0.12 * np.sqrt(8) * 0.99
     np.testing.assert_array_equal(
-        control.advance(np.array([39, 39, 5]), off, np.zeros((3, 8)), 0.005), [0, 39, 6]
+        control.advance(np.array([39, 39, 5]), off, np.zeros((3, 8)), 1, 0.005), [0, 39, 6]
     )
 
 
@@ -198,7 +198,7 @@ def test_the_clock_moves_on_whatever_the_error(tiny):
     control = Controller(tiny, make_champion(tiny, tuning={"period": 0.8}, advance="clock"))
     far = np.ones((1, 8))
     at = [
-        int(control.advance(np.array([0]), far, 0 * far, k * 0.005)[0])
+        int(control.advance(np.array([0]), far, 0 * far, k, 0.005)[0])
         for k in (0, 3, 4, 80, 159, 160, 164)
     ]
     assert at == [0, 0, 1, 20, 39, 0, 1]

@@ -96,7 +96,7 @@ def plain_loop(creature, champion, starts, row, seconds):
         torques.append(control.torque(target, senses, model.opt.timestep)[0])
         data.qfrc_applied[creature.dof_adr] = torques[max(k - starts.delay[row], 0)]
         position = control.advance(
-            position, target, senses.joint_pos.copy(), (k + 1) * model.opt.timestep
+            position, target, senses.joint_pos.copy(), k + 1, model.opt.timestep
         )
         mujoco.mj_step2(model, data)
     return np.array(states)

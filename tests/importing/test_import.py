@@ -1,6 +1,8 @@
 """Importing small animals with the faults of real files: repaired, found or refused."""
 
 import dataclasses
+import os
+import tomllib
 from pathlib import Path
 
 import mujoco
@@ -18,6 +20,7 @@ from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import UserError
 from mjxgait.importing import ImportChoices, Imported, import_model
 from mjxgait.importing.portrait import facts, portrait, standing
+from mjxgait.importing.write_toml import _quoted
 from mjxgait.settings.config import ControllerConfig
 from mjxgait.settings.layers import resolve_config
 
@@ -54,6 +57,32 @@ def test_a_quadruped_stands_on_four_feet_and_knows_its_left_and_right(tmp_path):
         assert told(imported, words), words
     assert creature.steer_stride[names.index("fl_hip")] == 0.5
     assert creature.steer_stride[names.index("fr_hip")] == -0.5
+
+
+@pytest.mark.parametrize(
+    ("file", "told"),
+    [
+        ('dog 🦿 "a" \\ #b', 'dog 🦿 "a" \\ #b'),
+        ("two\nlines\x7f\x01\t\x85.", "two lines    ."),
+        (b"not Unicode \xff", "not Unicode \ufffd"),
+    ],
+    ids=["emoji, quotes and backslash", "control characters", "bytes"],
+)
+def test_a_file_may_have_any_name(tmp_path: Path, file: str | bytes, told: str):
+    """The name is told in creature.toml, in a text and in a comment."""
+    model = tmp_path / f"{os.fsdecode(file)}.xml"
+    model.write_text(QUADRUPED, encoding="utf-8")
+    write_folder(tmp_path / "mine", import_model(model, ImportChoices(apart=False)))
+    creature = load_creature(tmp_path / "mine")
+    assert creature.settings.creature.description == f"imported from {told}.xml: 8 joints"
+    text = (tmp_path / "mine" / "creature.toml").read_text(encoding="utf-8")
+    assert f"# Made by `mjxgait import` from {told}.xml." in text
+    assert "# high: the body that all limbs hang on" in text
+
+
+@pytest.mark.parametrize("text", ["🦿", 'a "b" \\ c', "a\nb\x00\x1f\x7f\x85", "'''", "ü\u200b", ""])
+def test_texts_come_back_from_creature_toml_as_they_were(text: str):
+    assert tomllib.loads(f"name = {_quoted(text)}") == {"name": text}
 
 
 def test_a_body_shorter_than_its_legs_is_as_long_as_they_are(tmp_path):

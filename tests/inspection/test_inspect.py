@@ -173,6 +173,10 @@ def test_a_run_killed_half_way_is_read_up_to_its_latest_checkpoint(run, capsys):
     assert "not finished" in said
 
 
+def add_text(path, text):
+    path.write_text(path.read_text() + text)
+
+
 @pytest.mark.parametrize(
     ("damage", "words"),
     [
@@ -184,7 +188,7 @@ def test_a_run_killed_half_way_is_read_up_to_its_latest_checkpoint(run, capsys):
             "damaged",
         ),
         (
-            lambda run: (run / "creature" / "creature.toml").open("a").write("\n# another body\n"),
+            lambda run: add_text(run / "creature" / "creature.toml", "\n# another body\n"),
             "another body",
         ),
     ],

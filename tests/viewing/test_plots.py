@@ -1,5 +1,6 @@
 """`mjxgait plot`: every plot as PNG and SVG, for good and bad runs."""
 
+import os
 import xml.etree.ElementTree as ElementTree
 
 import numpy as np
@@ -51,6 +52,17 @@ def test_a_champion_that_falls_can_be_plotted(tmp_path):
     assert len(
         plot_run(write_run(tmp_path / "run", creature, falling(creature)), formats=("png",))
     ) == len(PROGRESS | GAIT)
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs /dev/full, a full disk")
+@pytest.mark.parametrize("kind", ["png", "svg"])
+def test_a_disk_that_fills_between_two_plots_is_one_sentence(stool, tmp_path, kind):
+    run = write_run(tmp_path / "run", stool)
+    (tmp_path / "plots").mkdir()
+    (tmp_path / "plots" / f"terms.{kind}").symlink_to("/dev/full")
+    words = "plots: cannot be written: No space left on device; the run itself is safe: make room"
+    with pytest.raises(UserError, match=words):
+        plot_run(run, tmp_path / "plots")
 
 
 def test_one_generation_can_be_plotted(stool, tmp_path):

@@ -1,0 +1,62 @@
+"""What a disk refuses, said in one sentence; every other error goes through as it is."""
+
+import contextlib
+import errno
+import os
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+from mjxgait.errors import UserError
+
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+CLOSED = (errno.EROFS, errno.EACCES, errno.EPERM)
+GONE = (errno.ENOENT, errno.EIO, errno.ESTALE, errno.ENODEV, errno.ENXIO)
+"""A folder that somebody took away, or a disk that was pulled out or is broken."""
+CURES = (
+    dict.fromkeys(FULL, "make room")
+    | dict.fromkeys(CLOSED, "make it writable")
+    | dict.fromkeys(GONE, "bring it back")
+)
+SAFE, AGAIN = "the run is safe up to its latest checkpoint", "go on with --resume"
+
+
+@contextlib.contextmanager
+def disk_errors(path: Path, safe: str = SAFE, again: str = AGAIN) -> Iterator[None]:
+    """Turns what a full, closed or lost disk raises into one sentence.
+
+    path: what is being written. safe: what is not lost. again: what to do with room on the disk.
+
+    Raises:
+      UserError: instead of such an error; no other error is touched.
+    """
+    try:
+        yield
+    except Exception as error:
+        code = refusal(error)
+        if code is None:
+            raise
+        reason = f"{os.strerror(code)}; {safe}: {CURES[code]} and {again}"
+        raise UserError(f"{path}: cannot be written: {reason}") from error
+
+
+def refusal(error: BaseException) -> int | None:
+    """The error number with which a disk refused to be written; None for any other error.
+
+    TensorStore, which Orbax writes with, wraps it into the text of a ValueError.
+    """
+    if isinstance(error, OSError):
+        return error.errno if error.errno in CURES else None
+    if isinstance(error, ValueError):
+        return next((code for code in CURES if os.strerror(code) in str(error)), None)
+    return None
+
+
+def try_room(folder: Path, size: int) -> None:
+    """Writes a file of this size in bytes that vanishes again.
+
+    Raises:
+      OSError: the disk refuses.
+    """
+    with tempfile.TemporaryFile(dir=folder) as scratch:
+        scratch.write(bytes(size))
