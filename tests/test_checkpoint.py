@@ -198,7 +198,7 @@ from mjxgait.runs import checkpoint
 
 evolution = toy()
 step = jax.jit(evolution.step)
-state, _ = step(evolution.init(jax.random.key(0), 1, 1))
+state, _ = step(evolution.init(jax.random.key(0), 1, 1, 1))
 later, _ = step(state)
 checkpoints = checkpoint.Checkpoints(Path(sys.argv[1]))
 checkpoints.save(state, "toy", "0" * 16)
