@@ -1,6 +1,7 @@
 """How genomes are made from nothing and from other genomes: arrays in, arrays out.
 
-Functions for one genome, mapped over the offspring where they are called. A genome is key poses [K, J] and tuning [E] within a box.
+Functions for one genome, mapped over the offspring where they are called. A genome is key poses [K,
+J] and tuning [E] within a box.
 """
 
 import dataclasses
@@ -29,7 +30,8 @@ class Box:
 class Variation:
     """The operators that evolution calls; it knows a genome only as a pytree.
 
-    create: key, count -> genomes [count, ...]. cross: key, genome, genome -> genome. mutate: key, genome -> genome.
+    create: key, count -> genomes [count, ...]. cross: key, genome, genome -> genome. mutate: key,
+    genome -> genome.
     """
 
     create: Callable[[jax.Array, int], Any]
@@ -38,9 +40,11 @@ class Variation:
 
 
 def pose_variation(box: Box, config: EvolutionConfig) -> Variation:
-    """The operators of a genome of key poses and tuning, as chosen in the config, which may be plain or traced.
+    """The operators of a genome of key poses and tuning, as chosen in the config, which may be
+    plain or traced.
 
-    All options of a choice are computed and one is taken: they cost next to nothing beside the simulations.
+    All options of a choice are computed and one is taken: they cost next to nothing beside the
+    simulations.
     """
     poses = narrowed(box, config.pose_range)
     box = Box(
@@ -111,7 +115,9 @@ def uniform(key: jax.Array, box: Box, count: int) -> Any:
 
 
 def latin_hypercube(key: jax.Array, box: Box, count: int) -> Any:
-    """Genomes [count, ...] with one value of every gene in each of `count` slices of its range (McKay, Beckman & Conover 1979)."""
+    """Genomes [count, ...] with one value of every gene in each of `count` slices of its range
+    (McKay, Beckman & Conover 1979).
+    """
 
     def draw(key: jax.Array, shape: tuple[int, ...]) -> jax.Array:
         key_slice, key_within = jax.random.split(key)
@@ -144,7 +150,10 @@ def mutated_poses(
     kind: Any,
     sigma: jax.Array | float,
 ) -> jax.Array:
-    """Key poses [K, J] with a change in one of them; see `EvolutionConfig.mutation` for the kinds. Never leaves the box."""
+    """Key poses [K, J] with a change in one of them; see `EvolutionConfig.mutation` for the kinds.
+
+    Never leaves the box.
+    """
     key_pose, key_joint, key_value, key_kind = jax.random.split(key, 4)
     count, joints = poses.shape
     here = jnp.arange(count) == jax.random.randint(key_pose, (), 0, count)
@@ -179,7 +188,9 @@ def jittered(
     rate: jax.Array | float,
     sigma: jax.Array | float,
 ) -> jax.Array:
-    """Values [E], each moved with probability `rate` by a Gaussian of `sigma` ranges; never leaves the box."""
+    """Values [E], each moved with probability `rate` by a Gaussian of `sigma` ranges; never
+    leaves the box.
+    """
     key_which, key_by = jax.random.split(key)
     moved = values + sigma * (high - low) * jax.random.normal(key_by, values.shape)
     return jnp.clip(
@@ -188,14 +199,17 @@ def jittered(
 
 
 def first_occurrence(genomes: Any) -> jax.Array:
-    """Whether each genome [N] (leaves [N, ...]) is the first of its kind: a later equal one is a duplicate.
+    """Whether each genome [N] (leaves [N, ...]) is the first of its kind: a later equal one is a
+    duplicate.
 
-    Sorts by a random projection, so the cost grows as N log N; equal genomes have equal projections, and neighbours are compared in full.
+    Sorts by a random projection, so the cost grows as N log N; equal genomes have equal
+    projections, and neighbours are compared in full.
     """
     rows = jnp.concatenate(
         [leaf.reshape(leaf.shape[0], -1) for leaf in jax.tree.leaves(genomes)], axis=1
     )
-    # Elementwise product and sum, row by row alike: a matrix product may round equal rows differently at different places.
+    # Elementwise product and sum, row by row alike: a matrix product may round equal rows
+    # differently at different places.
     projection = jnp.sum(rows * jax.random.normal(jax.random.key(0), (rows.shape[1],)), axis=1)
     order = jnp.argsort(projection, stable=True)
     in_order = rows[order]

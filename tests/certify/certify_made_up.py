@@ -98,7 +98,9 @@ DOG = Dimensions(
 def walk(
     period=0.8, speed=0.8, duty=0.6, lift=0.05, phases=(0.0, 0.5, 0.5, 0.0), seconds=22.0
 ) -> Recording:
-    """A made-up steady walk of a dog without physics: every number is a plain function of the phase."""
+    """A made-up steady walk of a dog without physics: every number is a plain function of the
+    phase.
+    """
     time_step, positions = 0.005, 40
     time = np.arange(round(seconds / time_step)) * time_step
     phase = time / period
