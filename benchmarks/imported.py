@@ -1,10 +1,12 @@
-"""From model files that nobody here wrote to certified walks: imports and trains each in processes of its own, and prints a table.
+"""From model files that nobody here wrote to certified walks: imports and trains each in processes
+of its own, and prints a table.
 
     python benchmarks/imported.py --models "laikago" "gym ant" --out runs/imported
 
-Names are those of `tests/importing/packages.py`, whose files come from the package index. Options after `--` go to `train`. Columns: wall
-time of both commands together and of the import alone; whether the champion is certified, and the margin of its worst criterion; speed over
-the certificate's 20 s; generations; what fails, each measure with its value.
+Names are those of `tests/importing/packages.py`, whose files come from the package index. Options
+after `--` go to `train`. Columns: wall time of both commands together and of the import alone;
+whether the champion is certified, and the margin of its worst criterion; speed over the
+certificate's 20 s; generations; what fails, each measure with its value.
 """
 
 import argparse

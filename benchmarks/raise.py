@@ -1,20 +1,26 @@
-"""How much more than the certificate asks a champion can bear, as a table for docs/results.md; all in C MuJoCo by the examiner.
+"""How much more than the certificate asks a champion can bear, as a table for docs/results.md; all
+in C MuJoCo by the examiner.
 
     python benchmarks/raise.py runs/zoo/tall_quadruped-0 runs/zoo/duck-0 --json raise.json
 
-The starts are those of the certificate's criterion 4 with another seed; the same ones for every column. `A%, B%`: share that stays up for
-22 s, and the mean way forward over that of the same starts on the plain floor, what falls counting up to its fall. Columns:
+The starts are those of the certificate's criterion 4 with another seed; the same ones for every
+column. `A%, B%`: share that stays up for 22 s, and the mean way forward over that of the same
+starts on the plain floor, what falls counting up to its fall. Columns:
 
-- push: sudden change of the trunk's horizontal velocity, in sqrt(g h), that fells half; from any side, between 2 and 4 s, 5 s to fall.
+- push: sudden change of the trunk's horizontal velocity, in sqrt(g h), that fells half; from any
+  side, between 2 and 4 s, 5 s to fall.
 - plain: the floor of evolution; the share that stays up and the speed in body lengths/s.
-- bumps: floor with heights uniform in plus and minus this share of the hip height (mjxgait/certify/worlds.py); four floors, a quarter of
-  the starts on each. Other parts than feet may touch it.
-- uphill, downhill: steepest slope in degrees on which 90 % stay up and get more than a body length forward, all gentler ones included.
-- friction, trunk: coefficient of sliding friction 0.4 instead of 0.9; mass and inertia of the trunk body 1.3 times as large.
+- bumps: floor with heights uniform in plus and minus this share of the hip height
+  (mjxgait/certify/worlds.py); four floors, a quarter of the starts on each. Other parts than feet
+  may touch it.
+- uphill, downhill: steepest slope in degrees on which 90 % stay up and get more than a body length
+  forward, all gentler ones included.
+- friction, trunk: coefficient of sliding friction 0.4 instead of 0.9; mass and inertia of the trunk
+  body 1.3 times as large.
 - 10 min: how many of one undisturbed and three perturbed walks of ten minutes stay up.
-- turn at once, turn gently: one undisturbed walk, left / right; s from the command to turn by 90 degrees, at once or growing by 15 a
-      second,
-  until the heading, mean over a second, comes within 15 degrees and stays there for the rest of the 40 s; else what it was at the end.
+- turn at once, turn gently: one undisturbed walk, left / right; s from the command to turn by 90
+  degrees, at once or growing by 15 a second, until the heading, mean over a second, comes within 15
+  degrees and stays there for the rest of the 40 s; else what it was at the end.
 """
 
 import argparse
@@ -186,7 +192,9 @@ def heavier_trunk(creature: Creature, starts: Starts, factor: float) -> Starts:
 
 
 def turn(creature: Creature, champion: Champion, degrees: float, rate: float) -> dict[str, Any]:
-    """Straight on for a while, then with another heading commanded, which is approached by `rate` degrees/s."""
+    """Straight on for a while, then with another heading commanded, which is approached by
+    `rate` degrees/s.
+    """
     time_step = creature.model.opt.timestep
     before, steps = round(BEFORE_TURN / time_step), round((BEFORE_TURN + TURN_SECONDS) / time_step)
     since = np.maximum(np.arange(steps) - before + 1, 0) * time_step

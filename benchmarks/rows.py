@@ -1,9 +1,11 @@
-"""Useful creature-steps per second of a study's rows against those of a single run, generation by generation in turns.
+"""Useful creature-steps per second of a study's rows against those of a single run, generation by
+generation in turns.
 
     python benchmarks/rows.py --variants 4 --seeds 16 --generations 4
 
-Both are the shipped tall_quadruped with the default settings and the same lanes; the study's variants differ in their mutation rate.
-Prints both rates for each generation, the median ratio, and the largest memory of the process before and after.
+Both are the shipped tall_quadruped with the default settings and the same lanes; the study's
+variants differ in their mutation rate. Prints both rates for each generation, the median ratio, and
+the largest memory of the process before and after.
 """
 
 import argparse
@@ -45,11 +47,13 @@ def main() -> None:
         states, many = timed(rows, states)
         ratios.append(many / one)
         print(
-            f"generation {generation}: alone {one / 1e6:.2f}, rows {many / 1e6:.2f} M steps/s, ratio {many / one:.2f}",
+            f"generation {generation}: alone {one / 1e6:.2f}, rows {many / 1e6:.2f} M steps/s, "
+            f"ratio {many / one:.2f}",
             flush=True,
         )
     print(
-        f"{len(batch.experiments)} rows: median ratio {median(ratios):.2f} ({min(ratios):.2f} to {max(ratios):.2f})"
+        f"{len(batch.experiments)} rows: median ratio {median(ratios):.2f} ({min(ratios):.2f} to "
+        f"{max(ratios):.2f})"
     )
     print(f"peak memory {before:.0f} MiB when compiled, {memory():.0f} MiB at the end")
 

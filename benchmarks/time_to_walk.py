@@ -1,8 +1,10 @@
-"""Seconds from the command to a certified walk: `mjxgait train` in new processes, first with an empty cache, then with a warm one.
+"""Seconds from the command to a certified walk: `mjxgait train` in new processes, first with an
+empty cache, then with a warm one.
 
     python benchmarks/time_to_walk.py --json walk.json
 
-Each seed is run twice in a cache folder of its own: the first run finds nothing compiled, the second finds everything.
+Each seed is run twice in a cache folder of its own: the first run finds nothing compiled, the
+second finds everything.
 """
 
 import argparse
@@ -71,7 +73,8 @@ def main() -> None:
                     | run(options.env, seed, Path(scratch) / "cache", Path(scratch) / kind)
                 )
                 print(
-                    f"seed {seed} {kind}: {entries[-1]['seconds']:.1f} s, certified: {entries[-1]['passed']}",
+                    f"seed {seed} {kind}: {entries[-1]['seconds']:.1f} s, certified: "
+                    f"{entries[-1]['passed']}",
                     flush=True,
                 )
                 options.json.write_text(json.dumps(report(runs), indent=2) + "\n", encoding="utf-8")

@@ -1,12 +1,16 @@
-"""Trains creatures over seeds, each in a process of its own, and prints a table of what C MuJoCo says of the champions.
+"""Trains creatures over seeds, each in a process of its own, and prints a table of what C MuJoCo
+says of the champions.
 
-    python benchmarks/zoo.py --env tall_quadruped short_quadruped --seeds 0 1 2 3 4 --config default --out runs/zoo
+    python benchmarks/zoo.py --env tall_quadruped short_quadruped --seeds 0 1 2 3 4 \\
+        --config default --out runs/zoo
 
-A run that is there already is not repeated. Columns: whether the champion is certified ("outdated" when the certificate is another
-champion's, or does not say whose) and the margin of its worst criterion; which criteria fail; speed over the certificate's 20 s; body
-lengths per second from the nominal start over evolution's own episode, in the simulation that evolved it and in C MuJoCo; share of 64
-perturbed starts, which evolution never saw, that are up and forward after an episode and after 22 s; generations; wall time of the whole
-command, start-up, compilation and examination included.
+A run that is there already is not repeated. Columns: whether the champion is certified ("outdated"
+when the certificate is another champion's, or does not say whose) and the margin of its worst
+criterion; which criteria fail; speed over the certificate's 20 s; body lengths per second from the
+nominal start over evolution's own episode, in the simulation that evolved it and in C MuJoCo; share
+of 64 perturbed starts, which evolution never saw, that are up and forward after an episode and
+after 22 s; generations; wall time of the whole command, start-up, compilation and examination
+included.
 """
 
 import argparse

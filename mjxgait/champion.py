@@ -1,4 +1,6 @@
-"""`champion.json`: one gait, complete and readable without JAX: poses by joint name, cycle settings, gains, fitness."""
+"""`champion.json`: one gait, complete and readable without JAX: poses by joint name, cycle
+settings, gains, fitness.
+"""
 
 import dataclasses
 import hashlib
@@ -21,7 +23,8 @@ SCHEMA = 1
 class Champion:
     """A gait.
 
-    key_poses: [K, J] rad. tuning: value of each tuning gene. fitness and terms: as evolution scored it.
+    key_poses: [K, J] rad. tuning: value of each tuning gene. fitness and terms: as evolution scored
+    it.
     origin: where it comes from (generation, seed, versions).
     """
 
@@ -36,10 +39,13 @@ class Champion:
 
     @property
     def fingerprint(self) -> str:
-        """Hash of all that decides how it moves: body, poses, tuning, controller; not of its fitness or where it comes from."""
+        """Hash of all that decides how it moves: body, poses, tuning, controller; not of its
+        fitness or where it comes from.
+        """
         moves = {
             "creature": self.digest,
-            # As float64, which is what a file gives back: a champion has one fingerprint before it is written and after.
+            # As float64, which is what a file gives back: a champion has one fingerprint before it
+            # is written and after.
             "key_poses": np.asarray(self.key_poses, float).tolist(),
             "tuning": {name: float(value) for name, value in self.tuning.items()},
             "controller": dataclasses.asdict(self.controller),
@@ -107,7 +113,8 @@ def read_champion(path: Path, creature: Creature) -> Champion:
             )
         if document["creature_digest"] != creature.digest:
             raise UserError(
-                f"{path}: evolved on another body than {creature.name} as it is now; use the run's own creature folder"
+                f"{path}: evolved on another body than {creature.name} as it is now; use the run's "
+                "own creature folder"
             )
         settings = {
             key: value for key, value in document["controller"].items() if key != "mirrored"

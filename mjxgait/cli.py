@@ -20,10 +20,13 @@ COMMANDS = {
     "import": "make a creature folder from a model file: mjxgait import robot.urdf --out envs/mine",
     "check": "validate a creature folder and draw it: mjxgait check envs/mine",
     "bench": "measure the speed against C MuJoCo and DART: mjxgait bench --json FILE",
-    "ablate": "compare settings over seeds, with error bars: mjxgait ablate forced_evolution --out DIR",
+    "ablate": "compare settings over seeds, with error bars: mjxgait ablate forced_evolution --out "
+    "DIR",
     "envs": "list the shipped creatures and configs",
 }
-"""Each lives in mjxgait/commands/<name>.py (`import` in import_.py) as `<name>_command` and is imported only when it is called."""
+"""Each lives in mjxgait/commands/<name>.py (`import` in import_.py) as `<name>_command` and is
+imported only when it is called.
+"""
 
 USAGE = """usage: mjxgait SUBCOMMAND [options]
 
@@ -55,7 +58,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         print(f"mjxgait: {error}", file=sys.stderr)
         sys.exit(2)
     except BrokenPipeError:
-        # Whoever read the output has closed it, as `head` does; Python must not complain about the rest when it ends.
+        # Whoever read the output has closed it, as `head` does; Python must not complain about the
+        # rest when it ends.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
     except KeyboardInterrupt:

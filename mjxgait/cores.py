@@ -33,7 +33,9 @@ def single_threaded() -> Iterator[None]:
 
 @contextmanager
 def process_per_core(most: int | None = None) -> Iterator[concurrent.futures.Executor]:
-    """A pool of fresh processes, not more than `most`; Ctrl-C is left to the process that waits for them."""
+    """A pool of fresh processes, not more than `most`; Ctrl-C is left to the process that waits
+    for them.
+    """
     count = min(cores(), most or cores())
     context = multiprocessing.get_context(
         "spawn"

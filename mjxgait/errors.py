@@ -8,7 +8,10 @@ INTERRUPTED = 130
 
 
 class UserError(Exception):
-    """A mistake in what the user gave: one sentence that names the thing and the way out. The command line exits with code 2."""
+    """A mistake in what the user gave: one sentence that names the thing and the way out.
+
+    The command line exits with code 2.
+    """
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:

@@ -1,7 +1,8 @@
 """Shapes and the pytrees that rooms hand to each other.
 
-Letters used in every shape: `P` population, `N` individuals being evaluated, `R` starts per individual, `L` lanes (simulations in
-flight), `K` key poses, `J` actuated joints, `G` watched geoms (the `F` feet first), `E` tuning genes, `nq nv` as in MuJoCo.
+Letters used in every shape: `P` population, `N` individuals being evaluated, `R` starts per
+individual, `L` lanes (simulations in flight), `K` key poses, `J` actuated joints, `G` watched geoms
+(the `F` feet first), `E` tuning genes, `nq nv` as in MuJoCo.
 """
 
 import dataclasses
@@ -50,7 +51,8 @@ class Sensed:
     bias: [nv] Coriolis and gravity less passive forces (`C` of stable PD).
     trunk_pos: [3] m, body origin. trunk_rot: [3, 3], columns are the trunk's axes in the world.
     trunk_vel: [3] m/s of the body origin, trunk_angvel: [3] rad/s; both in the world frame.
-    geom_pos: [G, 3] m, centres of the watched geoms. geom_low: [G] m, height of their lowest points above the floor.
+    geom_pos: [G, 3] m, centres of the watched geoms. geom_low: [G] m, height of their lowest points
+    above the floor.
     """
 
     joint_pos: jax.Array
@@ -82,7 +84,8 @@ class Judged:
 class Plant(Protocol):
     """Batched physics of one creature, one step split around the controller.
 
-    Every array has one more axis than documented on the state: the lanes, at position `lane_axis` (0 in front, -1 innermost).
+    Every array has one more axis than documented on the state: the lanes, at position `lane_axis`
+    (0 in front, -1 innermost).
     """
 
     @property
@@ -124,7 +127,9 @@ class Plant(Protocol):
         ...
 
     def forward(self, state: BodyState) -> tuple[Sensed, Any]:
-        """Position and velocity dependent terms of the current state, and the plant's own workings for the two calls below."""
+        """Position and velocity dependent terms of the current state, and the plant's own
+        workings for the two calls below.
+        """
         ...
 
     def solve_damped(self, workings: Any, damping: jax.Array, force: jax.Array) -> jax.Array:
@@ -132,7 +137,9 @@ class Plant(Protocol):
         ...
 
     def advance(self, state: BodyState, workings: Any, torque: jax.Array) -> BodyState:
-        """The state one `sim_dt` later under applied generalised forces `torque` `[nv]`; friction passes through."""
+        """The state one `sim_dt` later under applied generalised forces `torque` `[nv]`;
+        friction passes through.
+        """
         ...
 
     def overlap(self, state: BodyState) -> jax.Array:

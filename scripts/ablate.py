@@ -1,4 +1,7 @@
-"""Compares variants of the settings: `python scripts/ablate.py forced_evolution --out runs/forced`. The same as `mjxgait ablate`."""
+"""Compares variants of the settings: `python scripts/ablate.py forced_evolution --out runs/forced`.
+
+The same as `mjxgait ablate`.
+"""
 
 import sys
 

@@ -1,4 +1,6 @@
-"""Makes docs/filmstrips.md, one stride of each champion: `python scripts/filmstrips.py runs/zoo/*-[0-4]`."""
+"""Makes docs/filmstrips.md, one stride of each champion: `python scripts/filmstrips.py
+runs/zoo/*-[0-4]`.
+"""
 
 import sys
 import tempfile

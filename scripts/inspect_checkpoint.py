@@ -1,4 +1,7 @@
-"""Tells what a checkpoint holds: `python scripts/inspect_checkpoint.py RUN`. The same as `mjxgait inspect`."""
+"""Tells what a checkpoint holds: `python scripts/inspect_checkpoint.py RUN`.
+
+The same as `mjxgait inspect`.
+"""
 
 import sys
 

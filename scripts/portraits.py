@@ -1,4 +1,6 @@
-"""Makes the small moving pictures of the README from finished runs: `python scripts/portraits.py runs/zoo/*-0`."""
+"""Makes the small moving pictures of the README from finished runs: `python scripts/portraits.py
+runs/zoo/*-0`.
+"""
 
 import sys
 from pathlib import Path

@@ -2,7 +2,8 @@
 
     python scripts/store_walk.py runs/zoo/tall_quadruped-0 docs/data/tall_quadruped-0
 
-Writes into the second folder the champion, its certificate, made anew, and `walk.npz`: integers, millionths of m, rad, N and m/s.
+Writes into the second folder the champion, its certificate, made anew, and `walk.npz`: integers,
+millionths of m, rad, N and m/s.
 """
 
 import argparse

@@ -1,4 +1,6 @@
-"""Children born one after another, as in the thesis: elder ones become parents, and none is like another."""
+"""Children born one after another, as in the thesis: elder ones become parents, and none is like
+another.
+"""
 
 import dataclasses
 

@@ -65,7 +65,9 @@ def test_mirror_map_agrees_with_the_names(shipped: Creature):
 
 
 def test_mirror_signs_of_single_joints():
-    """Pitch keeps its sign under reflection, roll and yaw change it, because an axis of rotation is a pseudo-vector."""
+    """Pitch keeps its sign under reflection, roll and yaw change it, because an axis of rotation
+    is a pseudo-vector.
+    """
     axes = np.array([[0, 1, 0], [1, 0, 0], [0, 0, 1]], float)
     partner, sign = mirror_map(
         np.zeros((3, 3)), axes, np.zeros(3, bool), ["pitch", "roll", "yaw"], 0.01

@@ -1,4 +1,6 @@
-"""The command as a user runs it: a folder with everything, kills that lose nothing, mistakes in one sentence."""
+"""The command as a user runs it: a folder with everything, kills that lose nothing, mistakes in
+one sentence.
+"""
 
 import json
 import os
@@ -239,7 +241,8 @@ def test_a_changed_creature_is_refused(finished: tuple[Path, str], tmp_path: Pat
         (["trian"], 'unknown subcommand "trian"; did you mean "train"?'),
         (
             ["train", "--env", "dragon"],
-            'unknown creature "dragon"; shipped: alien, crab, duck, short_quadruped, tall_quadruped',
+            'unknown creature "dragon"; shipped: alien, crab, duck, short_quadruped, '
+            "tall_quadruped",
         ),
         (["train", "--config", "nothing.toml"], "nothing.toml: no such file"),
         (["train", "--population", "1"], "population must be at least 2"),

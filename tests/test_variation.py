@@ -1,4 +1,6 @@
-"""The operators: offspring stay inside the box, and their genes come from where the operator says."""
+"""The operators: offspring stay inside the box, and their genes come from where the operator
+says.
+"""
 
 import jax
 import jax.numpy as jnp

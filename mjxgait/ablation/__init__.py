@@ -1,4 +1,6 @@
-"""Ablation studies: variants of the settings times seeds, evolved side by side, compared with error bars.
+"""Ablation studies: variants of the settings times seeds, evolved side by side, compared with error
+bars.
 
-Data flow: plan (what to run) -> rows (runs it) -> measures (one number per run) -> statistics -> report.
+Data flow: plan (what to run) -> rows (runs it) -> measures (one number per run) -> statistics ->
+report.
 """

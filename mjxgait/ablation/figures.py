@@ -38,7 +38,10 @@ def draw_intervals(findings: Sequence[Finding], measure: str, path: Path) -> Non
 
 
 def draw_curves(plan: Plan, logs: Sequence[Mapping[str, Any]], path: Path) -> None:
-    """Interquartile mean of the best fitness and the middle half of the runs, for every variant. A run without any counts as the worst."""
+    """Interquartile mean of the best fitness and the middle half of the runs, for every variant.
+
+    A run without any counts as the worst.
+    """
     with figure((8, 4.5)) as drawing:
         axes = drawing.subplots()
         shades = np.linspace(0.0, 0.65, len(plan.variants))

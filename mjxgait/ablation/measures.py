@@ -1,4 +1,6 @@
-"""One number per run and measure: from its log, and from C MuJoCo, where all variants are judged alike whatever they evolved for."""
+"""One number per run and measure: from its log, and from C MuJoCo, where all variants are judged
+alike whatever they evolved for.
+"""
 
 import contextlib
 import dataclasses
@@ -27,7 +29,9 @@ from mjxgait.runs.folder import CREATURE, METRICS, read_metrics
 
 MEASURED = "measured.jsonl"
 SECONDS, STARTS, SEED = 22.0, 16, 1000
-"""Of the walk that judges every champion: perturbed as in the certificate, from starts that no evolution has seen."""
+"""Of the walk that judges every champion: perturbed as in the certificate, from starts that no
+evolution has seen.
+"""
 
 
 Judged = tuple[float, float, bool | None]
@@ -38,9 +42,11 @@ Judged = tuple[float, float, bool | None]
 class Result:
     """What became of a run.
 
-    walk: body lengths per second covered before the fall or the end, mean over unseen perturbed starts. up: share of them that stay up.
-    certified: whether the champion passes the whole certificate; None when nobody asked. fitness: best at the end. area: mean of the
-    best over the generations. generations: until the best reached the study's threshold, one more than there were if it never did.
+    walk: body lengths per second covered before the fall or the end, mean over unseen perturbed
+    starts. up: share of them that stay up.
+    certified: whether the champion passes the whole certificate; None when nobody asked. fitness:
+    best at the end. area: mean of the best over the generations. generations: until the best
+    reached the study's threshold, one more than there were if it never did.
     steps: creature-steps that the run lived. finite: whether it found anybody who could be judged.
     """
 
@@ -146,7 +152,8 @@ def _judge(creature_folder: Path, examine: bool, path: Path, finite: bool) -> Ju
     creature = _creature(creature_folder)
     champion = read_champion(path, creature)
     walk, up, nominal = _walk(creature, champion) if finite else (0.0, 0.0, 0.0)
-    # One that falls or lags this far behind the speed that the certificate asks for cannot pass, so the long examination is spared.
+    # One that falls or lags this far behind the speed that the certificate asks for cannot pass, so
+    # the long examination is spared.
     worth = nominal > 0.4
     return (
         walk,
@@ -162,7 +169,9 @@ def _creature(folder: Path) -> Creature:
 
 
 def _walk(creature: Creature, champion: Champion) -> tuple[float, float, float]:
-    """Mean speed and share up over the unseen starts, and the speed from the undisturbed start (0 if it falls)."""
+    """Mean speed and share up over the unseen starts, and the speed from the undisturbed start
+    (0 if it falls).
+    """
     starts = join(
         nominal_starts(creature, 1), perturbed_starts(creature, STARTS, np.random.default_rng(SEED))
     )

@@ -20,7 +20,8 @@ Measure = Literal["walk", "up", "certified", "fitness", "area", "generations"]
 
 @dataclasses.dataclass(frozen=True)
 class VariantTable:
-    """One variant: what it is called, the config keys that it changes, and its own number of generations where it needs one.
+    """One variant: what it is called, the config keys that it changes, and its own number of
+    generations where it needs one.
 
     config: file or name of a shipped config that it runs instead of the study's config and base.
     """
@@ -40,12 +41,15 @@ class Study:
       question: what it asks; the report's title.
       env: creature. config: file or name of a shipped config, laid under the variants.
       seeds: so many, from first_seed on. generations: of every run.
-      measure: what the variants are compared by (docs/ablations.md). threshold: of fitness, for the measure `generations`.
-      certify: whether every run's champion is examined for its certificate, about 10 s for each that may pass.
+      measure: what the variants are compared by (docs/ablations.md). threshold: of fitness, for the
+        measure `generations`.
+      certify: whether every run's champion is examined for its certificate, about 10 s for each
+        that may pass.
       paired: whether all variants use the same seeds; else each has its own.
       allow_equal: whether two variants may be equal, as in a test of the method itself.
       base: config keys of all variants.
-      variant: the first is the base that the others are compared with. grid: dotted config keys and their values, instead of variants.
+      variant: the first is the base that the others are compared with. grid: dotted config keys and
+        their values, instead of variants.
     """
 
     __pydantic_config__ = STRICT
@@ -103,7 +107,8 @@ class Plan:
 def read_study(file: Path, over: Mapping[str, Any]) -> Study:
     """The study in a file or shipped under this name, with options laid over it.
 
-    With other generations than the file's, variants that have their own keep their share of evaluations, the initial population's included.
+    With other generations than the file's, variants that have their own keep their share of
+    evaluations, the initial population's included.
 
     Raises:
       UserError: names the file and the key.
@@ -152,7 +157,8 @@ def make_plan(study: Study, creature: Creature, where: str) -> Plan:
         equal = next((name for name, other in configs.items() if other == new), None)
         if equal is not None and not study.allow_equal:
             raise UserError(
-                f'{where}: the variants "{equal}" and "{table.name}" are equal; change one, or set allow_equal = true'
+                f'{where}: the variants "{equal}" and "{table.name}" are equal; change one, or set '
+                "allow_equal = true"
             )
         configs[table.name] = new
     if len(configs) < 2:
@@ -180,7 +186,9 @@ def _config(file: str | None, creature: Creature, where: str) -> Config:
 
 
 def _settled(config: Config) -> Config:
-    """All runs go on for all their generations: one that stopped early would be compared with others that had more."""
+    """All runs go on for all their generations: one that stopped early would be compared with
+    others that had more.
+    """
     forced = dataclasses.replace(config.evolution.forced, patience=0)
     return dataclasses.replace(
         config, evolution=dataclasses.replace(config.evolution, target=None, forced=forced)

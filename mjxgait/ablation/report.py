@@ -22,7 +22,8 @@ from mjxgait.ablation.statistics import Estimate, share
 from mjxgait.runs.disk import disk_errors
 
 NAMES = {
-    "walk": "body lengths per second covered before a fall or the end of 22 s, mean over 16 unseen perturbed starts in C MuJoCo",
+    "walk": "body lengths per second covered before a fall or the end of 22 s, mean over 16 unseen "
+    "perturbed starts in C MuJoCo",
     "up": "share of 16 unseen perturbed starts that stay up for 22 s in C MuJoCo",
     "certified": "share of champions that pass the stable-walk certificate",
     "fitness": "best fitness at the end",
@@ -45,7 +46,9 @@ def write_report(
     logs: Sequence[Mapping[str, Any]],
     command: str,
 ) -> Path:
-    """Writes report.md, report.html, results.csv, generations.parquet and the pictures; returns the path of report.md."""
+    """Writes report.md, report.html, results.csv, generations.parquet and the pictures; returns
+    the path of report.md.
+    """
     findings = find(plan, results)
     with disk_errors(folder):
         (folder / "results.csv").write_text(_csv(results), encoding="utf-8")
@@ -72,14 +75,15 @@ def markdown(
         f"# {study.question}",
         "",
         f"{study.env}: {len(plan.variants)} variants × {study.seeds} seeds "
-        f"({'the same for all' if study.paired else 'each variant its own'}, from {study.first_seed}), {study.generations} generations. "
-        f"Measure: {NAMES[study.measure]}.",
+        f"({'the same for all' if study.paired else 'each variant its own'}, from "
+        f"{study.first_seed}), {study.generations} generations. Measure: {NAMES[study.measure]}.",
         "",
         f"    {command}",
         "",
-        f"{means} over the seeds with 95 % bootstrap intervals (BCa). Difference, chance of being better and p are against "
-        f"“{base}”; p is of a permutation test{' within seeds' if study.paired else ''}, corrected (Holm) for {len(plan.variants) - 1} "
-        f"comparison{'s' if len(plan.variants) > 2 else ''}.",
+        f"{means} over the seeds with 95 % bootstrap intervals (BCa). Difference, chance of being "
+        f"better and p are against “{base}”; p is of a permutation "
+        f"test{' within seeds' if study.paired else ''}, corrected (Holm) for "
+        f"{len(plan.variants) - 1} comparison{'s' if len(plan.variants) > 2 else ''}.",
         "",
         *_table(plan, results, findings),
         "",
@@ -147,8 +151,9 @@ def _sentence(finding: Finding, base: str) -> str:
         return f"“{finding.name}” is {word} than “{base}” by {_number(abs(gap.value))} {interval}."
     half = 0.5 * (gap.high - gap.low)
     return (
-        f"Between “{finding.name}” and “{base}” no difference is shown: {_number(gap.value, '+')} {interval}. "
-        f"That is not proof of none; with these seeds a difference of less than about {_number(half)} would be missed."
+        f"Between “{finding.name}” and “{base}” no difference is shown: {_number(gap.value, '+')} "
+        f"{interval}. That is not proof of none; with these seeds a difference of less than about "
+        f"{_number(half)} would be missed."
     )
 
 
@@ -161,22 +166,26 @@ def _cautions(plan: Plan, results: Sequence[Result]) -> list[str]:
             for r in plan.runs
         ):
             found.append(
-                "The variants do not share fitness and starts, so their fitness values are not on one scale; compare by `walk`."
+                "The variants do not share fitness and starts, so their fitness values are not on "
+                "one scale; compare by `walk`."
             )
     broken = [f"{r.variant}, seed {r.seed}" for r in results if not r.finite]
     if broken:
         found.append(
-            f"Runs in which nobody could be judged (not finite), counted as the worst: {'; '.join(broken)}."
+            "Runs in which nobody could be judged (not finite), counted as the worst: "
+            f"{'; '.join(broken)}."
         )
     steps = {
         name: np.mean([r.steps for r in results if r.variant == name]) for name in plan.variants
     }
     if max(steps.values()) > 1.5 * min(steps.values()):
         found.append(
-            "The variants did not use the same number of simulated steps (last column): equal generations are not equal cost."
+            "The variants did not use the same number of simulated steps (last column): equal "
+            "generations are not equal cost."
         )
     found.append(
-        f"It holds for {plan.study.env} under these settings and this budget; another creature or a longer run may differ."
+        f"It holds for {plan.study.env} under these settings and this budget; another creature or "
+        "a longer run may differ."
     )
     return found
 

@@ -1,4 +1,6 @@
-"""Runs a study: its runs are rows of a few compiled programs, one per shape, and share the lanes."""
+"""Runs a study: its runs are rows of a few compiled programs, one per shape, and share the
+lanes.
+"""
 
 import dataclasses
 import json
@@ -114,7 +116,10 @@ class _Group:
         return states
 
     def _log(self, lines: list[dict[str, Any]]) -> None:
-        """One line per run that has not come to its own end. Wall time is left out: it is not a run's own, and never the same twice."""
+        """One line per run that has not come to its own end.
+
+        Wall time is left out: it is not a run's own, and never the same twice.
+        """
         with disk_errors(self.folder), (self.folder / METRICS).open("a", encoding="utf-8") as log:
             for run, line in zip(self.runs, lines, strict=True):
                 if line["generation"] <= run.generations:

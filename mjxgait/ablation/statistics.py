@@ -1,7 +1,8 @@
 """Comparisons of samples of runs, with error bars. Values: [S], one per seed; higher is better.
 
-Follows Agarwal et al. 2021, "Deep reinforcement learning at the edge of the statistical precipice": interquartile means, intervals
-instead of points, probability of improvement. All random draws are from a fixed seed: the same values give the same numbers.
+Follows Agarwal et al. 2021, "Deep reinforcement learning at the edge of the statistical precipice":
+interquartile means, intervals instead of points, probability of improvement. All random draws are
+from a fixed seed: the same values give the same numbers.
 """
 
 import dataclasses
@@ -15,7 +16,10 @@ from scipy.stats import DegenerateDataWarning
 
 RESAMPLES = 9999
 TRIM = 0.25
-"""Share cut off at either end: what is left is the interquartile mean. 0 is the mean, which is what a share of successes needs."""
+"""Share cut off at either end: what is left is the interquartile mean.
+
+0 is the mean, which is what a share of successes needs.
+"""
 CONFIDENCE = 0.95
 
 
@@ -32,8 +36,10 @@ class Estimate:
 class Comparison:
     """A variant against the base.
 
-    difference: of trimmed means. improvement: probability that a run of the variant beats one of the base.
-    p: of a permutation test of the difference. corrected: p after Holm's correction for all comparisons of the study.
+    difference: of trimmed means. improvement: probability that a run of the variant beats one of
+    the base.
+    p: of a permutation test of the difference. corrected: p after Holm's correction for all
+    comparisons of the study.
     """
 
     difference: Estimate
@@ -55,7 +61,10 @@ def estimate(values: np.ndarray, trim: float = TRIM) -> Estimate:
 def compare(
     base: np.ndarray, variants: Sequence[np.ndarray], paired: bool, trim: float = TRIM
 ) -> list[Comparison]:
-    """Each variant against the base; paired: whether the i-th values of both come from the same seed."""
+    """Each variant against the base.
+
+    paired: whether the i-th values of both come from the same seed.
+    """
     gap = partial(_gap, trim=trim)
     rows = [
         (
@@ -70,7 +79,9 @@ def compare(
 
 
 def improvement(base: np.ndarray, values: np.ndarray, paired: bool = False) -> Estimate:
-    """Probability that a run of the variant is better than one of the base; ties count half (Mann & Whitney's U over all pairs)."""
+    """Probability that a run of the variant is better than one of the base; ties count half
+    (Mann & Whitney's U over all pairs).
+    """
 
     def better(a: np.ndarray, b: np.ndarray, axis: int = -1) -> np.ndarray:
         a, b = np.moveaxis(a, axis, -1), np.moveaxis(b, axis, -1)
@@ -81,7 +92,9 @@ def improvement(base: np.ndarray, values: np.ndarray, paired: bool = False) -> E
 
 
 def permutation_p(base: np.ndarray, values: np.ndarray, paired: bool, trim: float = TRIM) -> float:
-    """Chance of a difference as large, either way, if the variant did nothing: labels swapped within seeds, or anyhow when unpaired."""
+    """Chance of a difference as large, either way, if the variant did nothing: labels swapped
+    within seeds, or anyhow when unpaired.
+    """
     kind = "samples" if paired else "independent"
     rng = np.random.default_rng(0)
     gap = partial(_gap, trim=trim)

@@ -26,7 +26,8 @@ class Buffer:
         bounds: bool = False,
         normalized: bool = False,
     ) -> int:
-        """Stores an array [n] or [n, width] and returns the number of its accessor. bounds: state least and greatest values.
+        """Stores an array [n] or [n, width] and returns the number of its accessor. bounds: state
+        least and greatest values.
 
         normalized: whole numbers stand for 0 to 1.
         """

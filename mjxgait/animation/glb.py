@@ -1,7 +1,8 @@
-"""A walk as a GLB file: one skin whose joints are the creature's bodies, rigidly weighted, animated by key frames.
+"""A walk as a GLB file: one skin whose joints are the creature's bodies, rigidly weighted, animated
+by key frames.
 
-glTF is Y-up with +Z forward and +X left, quaternions are (x, y, z, w), colours linear. Letters: `F` key frames, `B` joints of the skin
-(the root on the floor, then the bodies), `V` vertices.
+glTF is Y-up with +Z forward and +X left, quaternions are (x, y, z, w), colours linear. Letters: `F`
+key frames, `B` joints of the skin (the root on the floor, then the bodies), `V` vertices.
 """
 
 import dataclasses
@@ -27,7 +28,8 @@ ROUGHNESS = 0.75
 class Skeleton:
     """The joints of the skin in glTF's axes.
 
-    names: [B]. parent: [B] place of the parent, -1 for the root. bodies: [B] MuJoCo's body, 0 (the world) for the root.
+    names: [B]. parent: [B] place of the parent, -1 for the root. bodies: [B] MuJoCo's body, 0 (the
+    world) for the root.
     """
 
     names: tuple[str, ...]
@@ -48,7 +50,10 @@ def export_glb(loop: WalkLoop, path: Path, travelling: bool = False) -> None:
 
 
 def build_glb(loop: WalkLoop, travelling: bool = False) -> bytes:
-    """The bytes of the file. travelling: the root moves forward at an even speed; otherwise the creature walks in place."""
+    """The bytes of the file.
+
+    travelling: the root moves forward at an even speed; otherwise the creature walks in place.
+    """
     creature = loop.walk.creature
     skeleton = skeleton_of(creature.model, creature.trunk)
     axes = gltf_axes(loop.walk.forward)
@@ -94,7 +99,9 @@ def gltf_axes(forward: np.ndarray) -> np.ndarray:
 def local_poses(
     model: mujoco.MjModel, skeleton: Skeleton, qpos: np.ndarray, axes: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Each joint against its parent: positions [F, B, 3] m and quaternions [F, B, 4] (x, y, z, w), in glTF's axes."""
+    """Each joint against its parent: positions [F, B, 3] m and quaternions [F, B, 4] (x, y, z,
+    w), in glTF's axes.
+    """
     pos, rot = _world_poses(model, skeleton, qpos, axes)
     local_pos, quat = pos.copy(), np.zeros((*pos.shape[:2], 4))
     for b, parent in enumerate(skeleton.parent):
@@ -121,7 +128,9 @@ def _world_poses(
 
 
 def _quaternions(rotations: np.ndarray) -> np.ndarray:
-    """[F, 4] (x, y, z, w) of rotations [F, 3, 3], neighbours on the same side of the sphere so that they can be interpolated."""
+    """[F, 4] (x, y, z, w) of rotations [F, 3, 3], neighbours on the same side of the sphere so
+    that they can be interpolated.
+    """
     quats = np.zeros((len(rotations), 4))
     for i, rotation in enumerate(rotations):
         quat = np.zeros(4)

@@ -1,4 +1,7 @@
-"""Whole strides of a walk, closed so that the end meets the beginning. Letters: `F` key frames, `nq nv` as in MuJoCo."""
+"""Whole strides of a walk, closed so that the end meets the beginning.
+
+Letters: `F` key frames, `nq nv` as in MuJoCo.
+"""
 
 import dataclasses
 
@@ -11,15 +14,19 @@ from mjxgait.viewing.walk import Walk
 RATES = (24, 30, 60)
 MOST_STRIDES = 4
 TOLERANCE = 0.01
-"""Change of speed that fitting the strides to whole frames may cost before another stride is taken in."""
+"""Change of speed that fitting the strides to whole frames may cost before another stride is
+taken in.
+"""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class WalkLoop:
     """Key frames in place: the creature stays above the origin of the world.
 
-    walk: they were taken from. qpos: [F, nq], in a loop the last equal to the first. rate: frames/s. strides: in the loop; 0 if it is none.
-    advance: m that the creature moves forward in one loop; the travelling walk adds it evenly. stretched: duration over the recorded one.
+    walk: they were taken from. qpos: [F, nq], in a loop the last equal to the first. rate:
+    frames/s. strides: in the loop; 0 if it is none.
+    advance: m that the creature moves forward in one loop; the travelling walk adds it evenly.
+    stretched: duration over the recorded one.
     """
 
     walk: Walk
@@ -54,7 +61,8 @@ def walk_loop(walk: Walk, rate: int = 30) -> WalkLoop:
             else f"none was completed in {walk.seconds:g} s"
         )
         raise UserError(
-            f"{walk.creature.name}: the champion has no steady stride to make a loop of ({why}); train it for longer"
+            f"{walk.creature.name}: the champion has no steady stride to make a loop of ({why}); "
+            "train it for longer"
         )
     first, last, strides, count = chosen
     share = np.linspace(0.0, 1.0, count + 1)
@@ -88,7 +96,9 @@ def walk_take(walk: Walk, rate: int = 30) -> WalkLoop:
 
 
 def _fitting_strides(walk: Walk, rate: int) -> tuple[int, int, int, int] | None:
-    """First and last recorded frame, number of strides, and of key frames; the fewest strides that fit the frames well."""
+    """First and last recorded frame, number of strides, and of key frames; the fewest strides
+    that fit the frames well.
+    """
     found = []
     for strides in range(1, MOST_STRIDES + 1):
         if (ends := walk.steady_strides(strides)) is None:

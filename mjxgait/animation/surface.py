@@ -43,7 +43,9 @@ def _globe() -> tuple[np.ndarray, np.ndarray]:
 
 
 def _rings(count: int) -> np.ndarray:
-    """Triangles between rings of `AROUND` vertices; those without area at the poles are left out by the caller."""
+    """Triangles between rings of `AROUND` vertices; those without area at the poles are left out
+    by the caller.
+    """
     ring, step = np.meshgrid(np.arange(count - 1), np.arange(AROUND), indexing="ij")
     a, b = ring * AROUND + step, ring * AROUND + (step + 1) % AROUND
     c, d = a + AROUND, b + AROUND

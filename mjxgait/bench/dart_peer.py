@@ -1,8 +1,9 @@
 """DART through dartpy, stable PD as in its tutorial.
 
-The body is rebuilt from the MuJoCo model: same masses, joints and feet, contacts of the feet only. DART knows no armature, and solves
-its contacts as a linear complementarity problem to the end. It steps one world at a time; what the controller computes is vectorised
-over `LANES` worlds, as far as dartpy's accessors allow.
+The body is rebuilt from the MuJoCo model: same masses, joints and feet, contacts of the feet only.
+DART knows no armature, and solves its contacts as a linear complementarity problem to the end. It
+steps one world at a time; what the controller computes is vectorised over `LANES` worlds, as far as
+dartpy's accessors allow.
 """
 
 from typing import Any
@@ -42,7 +43,8 @@ class DartPeer:
         self.jobs = np.arange(first, workload.episodes, stride)
         self.law = Law(self.creature, workload)
         self.lanes = [_Lane(self.creature) for _ in range(min(LANES, len(self.jobs)))]
-        # DART's degrees of freedom: the root's six, then the joints in the order of the bodies, which is the model's.
+        # DART's degrees of freedom: the root's six, then the joints in the order of the bodies,
+        # which is the model's.
         self.kd = np.concatenate([np.zeros(FREE_DOFS), self.law.kd])
         self.damping = np.diag(self.kd * self.law.step)
         self.limit = np.concatenate([np.zeros(FREE_DOFS), self.creature.torque_limit])
@@ -83,7 +85,8 @@ class DartPeer:
                 lane.push(turned.T @ self.work.push[lane.job % starts][:3])
         q = np.array([lane.skeleton.getPositions() for lane in running])
         v = np.array([lane.skeleton.getVelocities() for lane in running])
-        # MuJoCo's order, in which the law reads the root's angular velocity; both have it in the body's frame.
+        # MuJoCo's order, in which the law reads the root's angular velocity; both have it in the
+        # body's frame.
         target = self.law.target(
             genome, position, pos, rot, np.concatenate([v[:, 3:6], v[:, :3], v[:, FREE_DOFS:]], 1)
         )
@@ -99,7 +102,9 @@ class DartPeer:
     def _stable_pd(
         self, running: list["_Lane"], q: np.ndarray, v: np.ndarray, target: np.ndarray
     ) -> np.ndarray:
-        """The tutorial's formula, constraint forces of the previous step included; clamped like ours."""
+        """The tutorial's formula, constraint forces of the previous step included; clamped like
+        ours.
+        """
         p, d = np.zeros_like(q), -self.kd * v
         p[:, FREE_DOFS:] = -self.law.kp * (
             q[:, FREE_DOFS:] + v[:, FREE_DOFS:] * self.law.step - target
@@ -250,7 +255,9 @@ def _floor() -> Any:
 def _forbidden_spheres(
     creature: Creature, model: mujoco.MjModel
 ) -> list[tuple[int, np.ndarray, float]]:
-    """Body, centres and radius of spheres that reach as low as the parts that must not touch: of a capsule its two ends."""
+    """Body, centres and radius of spheres that reach as low as the parts that must not touch: of
+    a capsule its two ends.
+    """
     balls = []
     for geom in creature.watched[len(creature.foot_of) :]:
         body, centre, size = (

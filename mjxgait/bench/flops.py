@@ -1,4 +1,6 @@
-"""Counts the floating-point operations of a program as it is written, before a compiler repeats or saves any."""
+"""Counts the floating-point operations of a program as it is written, before a compiler repeats
+or saves any.
+"""
 
 import math
 from collections.abc import Callable
@@ -20,7 +22,9 @@ REDUCTIONS = frozenset(
 
 
 def count_flops(function: Callable[..., Any], *args: Any) -> float:
-    """Operations on floating-point numbers, comparisons and choices included; a loop counts as often as it runs if that is known."""
+    """Operations on floating-point numbers, comparisons and choices included; a loop counts as
+    often as it runs if that is known.
+    """
     return _count(jax.make_jaxpr(function)(*args).jaxpr)
 
 

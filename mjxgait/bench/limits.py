@@ -1,4 +1,6 @@
-"""How far the step is from what the cores can do: operations and bytes counted in the compiled step, against a measured peak."""
+"""How far the step is from what the cores can do: operations and bytes counted in the compiled
+step, against a measured peak.
+"""
 
 from functools import partial
 from typing import Any
@@ -14,13 +16,15 @@ from mjxgait.simulation.rollout import Lane
 def step_cost(experiment: Experiment) -> dict[str, float]:
     """Per creature and step, controller and tally included.
 
-    flops_asked: floating-point operations of the program as written. flops: of the compiled one as XLA counts them, which computes
-    some values twice rather than storing them. bytes: read and written by the compiled kernels, mostly in the cache. state_bytes: what
-    a simulation carries from step to step.
+    flops_asked: floating-point operations of the program as written. flops: of the compiled one as
+    XLA counts them, which computes some values twice rather than storing them. bytes: read and
+    written by the compiled kernels, mostly in the cache. state_bytes: what a simulation carries
+    from step to step.
     """
     simulator, lanes = experiment.simulator, experiment.simulator.lanes
     lane = jax.eval_shape(partial(_lanes, experiment, lanes))
-    # The one look under the rollout's bonnet: its loop around the step would hide the step's own cost.
+    # The one look under the rollout's bonnet: its loop around the step would hide the step's own
+    # cost.
     compiled = jax.jit(simulator._step).lower(lane).compile().cost_analysis() or {}
     state = sum(leaf.size * leaf.dtype.itemsize for leaf in jax.tree.leaves(lane))
     costs = {
@@ -36,7 +40,9 @@ def step_cost(experiment: Experiment) -> dict[str, float]:
 def distance_to_limit(
     cost: dict[str, float], peak: dict[str, float], computed_rate: float
 ) -> dict[str, Any]:
-    """Shares of the measured peaks that `computed_rate` creature-steps per second use; 1 would be the machine's limit."""
+    """Shares of the measured peaks that `computed_rate` creature-steps per second use; 1 would
+    be the machine's limit.
+    """
     bound = {
         "flops": peak["flops"] / cost["flops_asked"],
         "cache_bytes": peak["cache_bytes"] / cost["bytes"],

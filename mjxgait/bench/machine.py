@@ -27,7 +27,8 @@ def machine_facts() -> dict[str, Any]:
 
 
 def measured_peak() -> dict[str, float]:
-    """flops: per s, single precision, in a matrix product. memory_bytes, cache_bytes: per s in an addition beyond and within the cache.
+    """flops: per s, single precision, in a matrix product. memory_bytes, cache_bytes: per s in an
+    addition beyond and within the cache.
 
     One process per core, all at once; the best of a few tries of each, summed.
     """
@@ -47,7 +48,9 @@ def _matrix_product(size: int) -> float:
 
 
 def _addition(size: int, repeats: int) -> float:
-    """Bytes per second of `c = a + b` on single-precision arrays of a size; two read, one written."""
+    """Bytes per second of `c = a + b` on single-precision arrays of a size; two read, one
+    written.
+    """
     a, b, c = (np.ones(size, np.float32) for _ in range(3))
 
     def add() -> None:

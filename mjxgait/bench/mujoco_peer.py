@@ -127,7 +127,10 @@ class MujocoPeer:
             self.batch.forward(lanes, stage=VELOCITY_STAGE)
 
     def _down(self, rows: Any) -> np.ndarray:
-        """The rules of `mjxgait.tasks.walk.tally`. Negated comparisons: what is not a number is down."""
+        """The rules of `mjxgait.tasks.walk.tally`.
+
+        Negated comparisons: what is not a number is down.
+        """
         creature, limits = self.creature, self.creature.settings.termination
         up = self.xmat[rows, creature.trunk, 6:] @ creature.up
         height = self.xpos[rows, creature.trunk, 2] / creature.stand_height

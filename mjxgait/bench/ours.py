@@ -1,4 +1,6 @@
-"""This project as a contestant: the compiled generation that a run calls, genetic algorithm, fitness and all."""
+"""This project as a contestant: the compiled generation that a run calls, genetic algorithm,
+fitness and all.
+"""
 
 import dataclasses
 import time
@@ -17,7 +19,10 @@ from mjxgait.settings.config import Config
 
 
 class Ours:
-    """One creature's run. startup, trace and compile: s. laps judge the genomes that `take` was given."""
+    """One creature's run.
+
+    startup, trace and compile: s. laps judge the genomes that `take` was given.
+    """
 
     def __init__(self, folder: Path, config: Config) -> None:
         began = time.perf_counter()
@@ -44,7 +49,8 @@ class Ours:
             != self.experiment.config.evolution.population
         ):
             raise ValueError(
-                "laps need growth = 2: as many are judged in a generation as there are in the population"
+                "laps need growth = 2: as many are judged in a generation as there are in the "
+                "population"
             )
         self.first = self.experiment.place(dataclasses.replace(self.first, genomes=genomes))
 
@@ -67,7 +73,9 @@ class Ours:
 
 
 def half_and_half(ours: Ours, generations: int) -> Genome:
-    """The better half of an evolved population and half of the initial one: good walkers and early deaths alike."""
+    """The better half of an evolved population and half of the initial one: good walkers and
+    early deaths alike.
+    """
     half = ours.experiment.config.evolution.population // 2
     evolved, initial = ours.evolved(generations).genomes, ours.first.genomes
     return jax.tree.map(

@@ -1,4 +1,6 @@
-"""What a generation costs besides the simulations: the genetic algorithm's operators, and the host's bookkeeping."""
+"""What a generation costs besides the simulations: the genetic algorithm's operators, and the
+host's bookkeeping.
+"""
 
 import dataclasses
 import io
@@ -27,8 +29,8 @@ REPEATS = 30
 
 
 def overhead(ours: Ours, generations: int = 8) -> dict[str, float]:
-    """Seconds per generation and shares of it: the operators, which are part of the compiled program, then what the host does: the
-    checkpoint, and all else (metrics, champion, screen).
+    """Seconds per generation and shares of it: the operators, which are part of the compiled
+    program, then what the host does: the checkpoint, and all else (metrics, champion, screen).
     """
     operators = _operators(ours.experiment)
     whole, compiled, checkpoint = _host_loop(ours, generations)
@@ -71,7 +73,9 @@ def _operators(experiment: Experiment) -> float:
 
 
 class _TimedCheckpoints(Checkpoints):
-    """Knows how long its saves have held up the run; what it writes in the background does not count."""
+    """Knows how long its saves have held up the run; what it writes in the background does not
+    count.
+    """
 
     seconds = 0.0
 
@@ -82,7 +86,9 @@ class _TimedCheckpoints(Checkpoints):
 
 
 def _host_loop(ours: Ours, generations: int) -> tuple[float, float, float]:
-    """Seconds altogether, within the compiled generation, and in saving checkpoints, per generation of a run's own loop."""
+    """Seconds altogether, within the compiled generation, and in saving checkpoints, per
+    generation of a run's own loop.
+    """
     inside: list[float] = []
 
     def step(state: EvolutionState) -> Any:

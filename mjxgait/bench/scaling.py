@@ -1,4 +1,6 @@
-"""How time and memory grow with the population and with the lanes: each point in a process of its own, so that its memory is its own."""
+"""How time and memory grow with the population and with the lanes: each point in a process of
+its own, so that its memory is its own.
+"""
 
 import dataclasses
 import json
@@ -20,7 +22,11 @@ DEFAULTS = (32, 128, 512)
 
 @dataclasses.dataclass(frozen=True)
 class Point:
-    """One setting. lanes: per device, 0 for the default. starts, seconds: of each individual's episodes. laps: generations timed."""
+    """One setting.
+
+    lanes: per device, 0 for the default. starts, seconds: of each individual's episodes. laps:
+    generations timed.
+    """
 
     population: int = 64
     lanes: int = 0
@@ -49,8 +55,9 @@ def scaling_points(creature: str, say: Callable[[str], None]) -> dict[str, list[
 
 def _line(point: dict[str, Any]) -> str:
     return (
-        f"population {point['population']:>5}, {point['lanes']:>3} lanes: {point['useful_steps_per_second']:>9,.0f} useful steps/s, "
-        f"{point['useful_share']:.0%} useful, {point['generation_s']:.2f} s a generation, {point['memory_mib']:.0f} MiB"
+        f"population {point['population']:>5}, {point['lanes']:>3} lanes: "
+        f"{point['useful_steps_per_second']:>9,.0f} useful steps/s, {point['useful_share']:.0%} "
+        f"useful, {point['generation_s']:.2f} s a generation, {point['memory_mib']:.0f} MiB"
     )
 
 
@@ -67,7 +74,10 @@ def measure(creature: str, point: Point) -> dict[str, Any]:
 
 
 def measure_here(creature: str, point: Point) -> dict[str, Any]:
-    """One point, in this process: an initial population is judged again and again. Memory in MiB, at most."""
+    """One point, in this process: an initial population is judged again and again.
+
+    Memory in MiB, at most.
+    """
     from mjxgait.bench.ours import Ours
     from mjxgait.creature import load_creature
     from mjxgait.settings.layers import resolve_config

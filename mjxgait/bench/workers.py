@@ -1,4 +1,6 @@
-"""A contestant on all cores: one process per core, each with its share of the episodes, started together and waited for together."""
+"""A contestant on all cores: one process per core, each with its share of the episodes, started
+together and waited for together.
+"""
 
 import multiprocessing
 import time
@@ -19,7 +21,10 @@ class Peer(Protocol):
 
 
 class Workers:
-    """Processes that wait between laps, so that they take nothing from the other contestants. startup: s until all were ready."""
+    """Processes that wait between laps, so that they take nothing from the other contestants.
+
+    startup: s until all were ready.
+    """
 
     def __init__(
         self,

@@ -1,6 +1,7 @@
 """The work that every contestant is given: the same genomes on the same starts, in plain NumPy.
 
-Letters: `N` genomes, `R` starts, `K` key poses, `C` poses in a cycle, `J` actuated joints, `nq nv` as in MuJoCo.
+Letters: `N` genomes, `R` starts, `K` key poses, `C` poses in a cycle, `J` actuated joints, `nq nv`
+as in MuJoCo.
 """
 
 import dataclasses
@@ -55,8 +56,8 @@ class Workload:
 class Lap:
     """One pass over a workload.
 
-    seconds: of wall time. processor: s of all cores, which other work on the machine changes little. steps: useful ones, of creatures
-    still up. forward: m, mean over episodes.
+    seconds: of wall time. processor: s of all cores, which other work on the machine changes
+    little. steps: useful ones, of creatures still up. forward: m, mean over episodes.
     """
 
     seconds: float

@@ -273,7 +273,9 @@ def push_ladder(
 
 
 def half_point(shares: dict[float, float]) -> float | None:
-    """Where the share of survivors first comes down to a half, between the pushes tried; None when it never does."""
+    """Where the share of survivors first comes down to a half, between the pushes tried; None
+    when it never does.
+    """
     steps = sorted(shares.items())
     for (s0, share0), (s1, share1) in itertools.pairwise(steps):
         if share0 > 0.5 >= share1:

@@ -11,7 +11,10 @@ from mjxgait.settings.tables import STRICT, Count, Fraction, NonNegative, Positi
 
 @dataclasses.dataclass(frozen=True)
 class ProgressConfig:
-    """2. strides: least number. speed: body lengths/s. drift: over distance. second_half: its speed over the first half's."""
+    """2. strides: least number.
+
+    speed: body lengths/s. drift: over distance. second_half: its speed over the first half's.
+    """
 
     __pydantic_config__ = STRICT
     strides: Count = 8
@@ -22,7 +25,10 @@ class ProgressConfig:
 
 @dataclasses.dataclass(frozen=True)
 class PeriodConfig:
-    """3. autocorrelation: least, at the stride period. variation: largest coefficient of variation of the stride period."""
+    """3. autocorrelation: least, at the stride period.
+
+    variation: largest coefficient of variation of the stride period.
+    """
 
     __pydantic_config__ = STRICT
     autocorrelation: Fraction = 0.8
@@ -59,8 +65,10 @@ class PushesConfig:
     """5. Speeds in units of sqrt(g * hip height).
 
     Attributes:
-      count, speed: pushes and their size. window: s, when a push may come. upright: share that must stay up to the end.
-      ladder: larger pushes, tried to find the one that fells half. ladder_count: at each. ladder_seconds: s to fall after a push.
+      count, speed: pushes and their size. window: s, when a push may come. upright: share that must
+        stay up to the end.
+      ladder: larger pushes, tried to find the one that fells half. ladder_count: at each.
+        ladder_seconds: s to fall after a push.
     """
 
     __pydantic_config__ = STRICT
@@ -86,7 +94,8 @@ class GaitConfig:
     """7. What makes a gait.
 
     Attributes:
-      frequency: largest stride frequency, in units of 4.48 m^-0.14 Hz. stride_length: least, in hip heights.
+      frequency: largest stride frequency, in units of 4.48 m^-0.14 Hz. stride_length: least, in hip
+        heights.
       clearance: least, in hip heights. slip: largest, over the distance. duty_factor: range.
     """
 
@@ -100,7 +109,8 @@ class GaitConfig:
 
 @dataclasses.dataclass(frozen=True)
 class PhysicsConfig:
-    """8. joint_speed: rad/s. joint_overrun: rad past the end of a joint's range. body_speed: sqrt(g * hip height).
+    """8. joint_speed: rad/s. joint_overrun: rad past the end of a joint's range. body_speed:
+    sqrt(g * hip height).
 
     penetration: hip heights. torque: torque limits.
     """

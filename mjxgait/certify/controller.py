@@ -1,4 +1,5 @@
-"""The controller of docs/controller.md in NumPy and float64, written from that page alone and for many simulations at once.
+"""The controller of docs/controller.md in NumPy and float64, written from that page alone and for
+many simulations at once.
 
 Letters: `S` simulations, `J` actuated joints, `C` poses in the cycle, `nv` degrees of freedom.
 """
@@ -17,7 +18,8 @@ class Senses:
     """What the controller reads of the current state.
 
     joint_pos: [S, J] rad. velocity: [S, nv] m/s, rad/s.
-    trunk_pos: [S, 3] m. trunk_rot: [S, 3, 3], columns are the trunk's axes in the world. trunk_angvel: [S, 3] rad/s, world frame.
+    trunk_pos: [S, 3] m. trunk_rot: [S, 3, 3], columns are the trunk's axes in the world.
+    trunk_angvel: [S, 3] rad/s, world frame.
     mass_matrix: [S, nv, nv]. bias: [S, nv], Coriolis and gravity less passive forces.
     constraint_force: [S, nv], of the previous step's solve.
     """
@@ -67,7 +69,9 @@ class Controller:
     def target(
         self, position: np.ndarray, senses: Senses, heading: float | None = None
     ) -> np.ndarray:
-        """Target [S, J] in rad with steering and balance, within the joints' ranges; `heading` is the commanded one in rad."""
+        """Target [S, J] in rad with steering and balance, within the joints' ranges; `heading`
+        is the commanded one in rad.
+        """
         creature = self.creature
         steer, pitch, roll = (part[:, None] for part in self.corrections(senses, heading))
         stretched = creature.stand + (self.planned(position) - creature.stand) * (
@@ -169,7 +173,9 @@ class Controller:
 
 
 def pose_cycle(key_poses: np.ndarray, creature: Creature) -> np.ndarray:
-    """[C, J] rad: the key poses [K, J], followed by their mirror images where the creature is symmetric."""
+    """[C, J] rad: the key poses [K, J], followed by their mirror images where the creature is
+    symmetric.
+    """
     if not creature.symmetric:
         return key_poses
     return np.concatenate([key_poses, creature.sign * key_poses[:, creature.partner]])

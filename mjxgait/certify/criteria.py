@@ -1,4 +1,5 @@
-"""The criteria of the certificate: pure functions from what was measured to values, thresholds and verdicts.
+"""The criteria of the certificate: pure functions from what was measured to values, thresholds and
+verdicts.
 
 Letters: `T` frames, `N` feet.
 """
@@ -75,7 +76,9 @@ class Criterion:
 
 
 def at_least(name: str, value: float, threshold: float, best: float | None = None) -> Measure:
-    """A measure that should be large; `best` is the value beyond which more is no better (twice the threshold if not given)."""
+    """A measure that should be large; `best` is the value beyond which more is no better (twice
+    the threshold if not given).
+    """
     return Measure(
         name, float(value), ">=", threshold, (2 * threshold if best is None else best) - threshold
     )
@@ -155,7 +158,9 @@ def periodic(window: Recording, config: PeriodConfig) -> Criterion:
 
 
 def autocorrelation_peak(signal: np.ndarray, period: float) -> float:
-    """Largest correlation of the signal [T, D] with itself, shifted by 0.8 to 1.2 periods (frames)."""
+    """Largest correlation of the signal [T, D] with itself, shifted by 0.8 to 1.2 periods
+    (frames).
+    """
     # Without what changes slower than a stride: a wandering signal resembles itself at any shift.
     width = round(period)
     sums = np.cumsum(np.pad(signal, ((1, 0), (0, 0))), axis=0)
@@ -213,7 +218,9 @@ def basic(whole: Recording, config: CertificateConfig) -> tuple[Criterion, Crite
 
 
 def gait(window: Recording, config: GaitConfig) -> Criterion:
-    """7. A gait, not a buzz: slow, long strides; feet that leave the floor and do not slide on it."""
+    """7. A gait, not a buzz: slow, long strides; feet that leave the floor and do not slide on
+    it.
+    """
     size = window.dimensions
     frequency = stride_frequency(window, config.clearance)
     duty = window.contact.mean(0)
@@ -254,7 +261,9 @@ def slip_distance(window: Recording) -> np.ndarray:
 
 
 def physics(window: Recording, config: PhysicsConfig) -> Criterion:
-    """8. No physics exploit: speeds, joint angles, penetration and torques of a machine that could exist."""
+    """8. No physics exploit: speeds, joint angles, penetration and torques of a machine that
+    could exist.
+    """
     size = window.dimensions
     return Criterion(
         8,
@@ -292,7 +301,10 @@ def parts(window: Recording, config: PartsConfig) -> Criterion:
 
 
 def joint_overrun(window: Recording) -> np.ndarray:
-    """[T, J] rad past the end of each joint's range; 0 within it. The shipped bodies have no stop there, only targets end there."""
+    """[T, J] rad past the end of each joint's range; 0 within it.
+
+    The shipped bodies have no stop there, only targets end there.
+    """
     low, high = np.array(window.dimensions.joint_range).T
     return np.maximum(np.maximum(low - window.joint_pos, window.joint_pos - high), 0.0)
 
@@ -307,5 +319,7 @@ def _distance(window: Recording) -> float:
 
 
 def _ratio(part: float, distance: float) -> float:
-    """Of a nuisance to the distance; not a number where there is no way forward to compare it with."""
+    """Of a nuisance to the distance; not a number where there is no way forward to compare it
+    with.
+    """
     return part / distance if distance > 0 else np.nan

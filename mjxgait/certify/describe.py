@@ -1,4 +1,7 @@
-"""What a gait is like, without a threshold: speed, effort, rhythm, footfalls, and its name. `N` feet."""
+"""What a gait is like, without a threshold: speed, effort, rhythm, footfalls, and its name.
+
+`N` feet.
+"""
 
 import itertools
 from typing import Any
@@ -55,7 +58,9 @@ def cost_of_transport(window: Recording) -> float:
 
 
 def mean_stance(window: Recording, parts: int) -> np.ndarray:
-    """[parts, N] how often each foot carries weight in each part of the stride, over all strides."""
+    """[parts, N] how often each foot carries weight in each part of the stride, over all
+    strides.
+    """
     starts = stride_starts(window)
     share, seen = np.zeros((parts, window.contact.shape[1])), np.zeros((parts, 1))
     for a, b in itertools.pairwise(starts):
@@ -66,15 +71,17 @@ def mean_stance(window: Recording, parts: int) -> np.ndarray:
 
 
 def footfall_diagram(window: Recording, parts: int = 20) -> list[str]:
-    """Per foot one character for each twentieth of the stride: `#` where it mostly stands, `.` where it mostly swings."""
+    """Per foot one character for each twentieth of the stride: `#` where it mostly stands, `.`
+    where it mostly swings.
+    """
     return ["".join("#" if s > 0.5 else "." for s in foot) for foot in mean_stance(window, parts).T]
 
 
 def footfall_phases(window: Recording) -> np.ndarray:
     """[N] middle of each foot's stance in cycles, [0, 1), against the first foot.
 
-    The middle of the stance, as a circular mean, does not hang on a single early or late touch as a touchdown does.
-    Where the duty factors are alike both agree.
+    The middle of the stance, as a circular mean, does not hang on a single early or late touch as a
+    touchdown does. Where the duty factors are alike both agree.
     """
     stance = mean_stance(window, 100)
     angle = np.exp(2j * np.pi * (np.arange(len(stance)) + 0.5) / len(stance))
@@ -83,7 +90,9 @@ def footfall_phases(window: Recording) -> np.ndarray:
 
 
 def gait_name(size: Dimensions, duty: np.ndarray, phases: np.ndarray) -> str:
-    """The nearest of the named gaits (Hildebrand 1965 for four feet) from duty factors and phases [N]."""
+    """The nearest of the named gaits (Hildebrand 1965 for four feet) from duty factors and
+    phases [N].
+    """
     if not np.isfinite(phases).all() or duty.min() > 0.98 or duty.max() < 0.02:
         return "none"
     if size.crawler:

@@ -10,7 +10,9 @@ from mjxgait.creature.geometry import support_extents
 
 
 class Layout:
-    """Indices: the free root, and row and column of each stored entry of the mass matrix (its lower triangle)."""
+    """Indices: the free root, and row and column of each stored entry of the mass matrix (its
+    lower triangle).
+    """
 
     def __init__(self, model: mujoco.MjModel) -> None:
         free = model.jnt_type == mujoco.mjtJoint.mjJNT_FREE

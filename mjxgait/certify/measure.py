@@ -45,7 +45,8 @@ class Recording:
     time_step: s.
     trunk_pos: [T, 3] m along the start's forward, left and up. trunk_up: [T] trunk's up axis . world up. pitch, roll: [T] rad.
     joint_pos, joint_vel, torque: [T, J] rad, rad/s, N·m.
-    foot_force: [T, N] N, normal. foot_slip: [T, N] m/s, tangential, of the foot's material at the contact; 0 without contact.
+    foot_force: [T, N] N, normal. foot_slip: [T, N] m/s, tangential, of the foot's material at the
+    contact; 0 without contact.
     foot_height: [T, N] m, lowest point above the floor.
     touch: [T] whether a part that is neither foot nor ground contact touches the floor.
     penetration: [T] m, of the deepest contact with the floor.
@@ -122,12 +123,14 @@ def measure(
     row: int = 0,
     inside: bool = True,
 ) -> Recording:
-    """Looks at one undisturbed simulation again: every stored frame is given to C MuJoCo, whose contacts are then read.
+    """Looks at one undisturbed simulation again: every stored frame is given to C MuJoCo, whose
+    contacts are then read.
 
     Frames after a simulation blew up are NaN, which no criterion accepts.
 
     Args:
-      inside: whether to look for parts in each other, which takes a quarter of the time with meshes.
+      inside: whether to look for parts in each other, which takes a quarter of the time with
+        meshes.
     """
     start = start_frame(creature)
     qpos, qvel, torque = trajectory.qpos[row], trajectory.qvel[row], trajectory.torque[row]
@@ -231,7 +234,9 @@ class _Sight:
 
 
 def _velocity(data: mujoco.MjData, points: np.ndarray, body: np.ndarray) -> np.ndarray:
-    """World velocities [P, 3] of the material points [P, 3] of bodies [P]; `cvel` is that at the tree's centre of mass."""
+    """World velocities [P, 3] of the material points [P, 3] of bodies [P]; `cvel` is that at the
+    tree's centre of mass.
+    """
     spin, slide = data.cvel[body, :3], data.cvel[body, 3:]
     arm = points - data.subtree_com[data.model.body_rootid[body]]
     # np.cross takes five times as long for so few points.

@@ -1,6 +1,7 @@
 """Runs many simulations of one champion on C MuJoCo under the NumPy controller.
 
-Letters: `S` simulations, `R` recorded ones (the first of the `S`), `T` control steps, `J` actuated joints, `nq nv` as in MuJoCo.
+Letters: `S` simulations, `R` recorded ones (the first of the `S`), `T` control steps, `J` actuated
+joints, `nq nv` as in MuJoCo.
 """
 
 import concurrent.futures
@@ -24,14 +25,17 @@ from mjxgait.settings.tables import STRICT, NonNegative, Positive
 VELOCITY_STAGE = int(mujoco.mjtStage.mjSTAGE_VEL)
 
 BLOWN_UP = 1e4
-"""m/s or rad/s, from which a simulation is stopped: beyond any walk, and before MuJoCo itself complains in a log file."""
+"""m/s or rad/s, from which a simulation is stopped: beyond any walk, and before MuJoCo itself
+complains in a log file.
+"""
 
 
 @dataclasses.dataclass(frozen=True)
 class Fall:
     """When a creature is down; criterion 1.
 
-    min_up: least product of the trunk's up axis with the world's. height: range of the trunk's height in standing heights.
+    min_up: least product of the trunk's up axis with the world's. height: range of the trunk's
+    height in standing heights.
     touch: whether a part that is neither foot nor ground contact is down when it touches the floor.
     """
 
@@ -49,10 +53,11 @@ class Fall:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Trajectory:
-    """Everything needed to look at the recorded simulations again; frames are control steps, before their torque acts.
+    """Everything needed to look at the recorded simulations again; frames are control steps, before
+    their torque acts.
 
-    time_step: s between frames. qpos: [R, T, nq]. qvel: [R, T, nv]. torque: [R, T, J] N·m. position: [R, T] in the pose cycle.
-    A simulation that blew up is NaN from there on.
+    time_step: s between frames. qpos: [R, T, nq]. qvel: [R, T, nv]. torque: [R, T, J] N·m.
+    position: [R, T] in the pose cycle. A simulation that blew up is NaN from there on.
     """
 
     time_step: float
@@ -66,7 +71,8 @@ class Trajectory:
 class Outcome:
     """What became of the simulations.
 
-    fell: [S] s, infinite for those that stayed up. travel: [S, 2] m along the start's forward and left until the end or the fall.
+    fell: [S] s, infinite for those that stayed up. travel: [S, 2] m along the start's forward and
+    left until the end or the fall.
     """
 
     fell: np.ndarray
@@ -80,7 +86,9 @@ class Outcome:
 
 
 def examined_model(creature: Creature, refine: int = 1) -> mujoco.MjModel:
-    """The creature's own body with a converged contact solver, and its time step divided by `refine`."""
+    """The creature's own body with a converged contact solver, and its time step divided by
+    `refine`.
+    """
     model = copy.copy(creature.model)
     model.opt.iterations, model.opt.ls_iterations = 100, 50
     model.opt.tolerance = 1e-8
@@ -105,8 +113,10 @@ def simulate(
     """Simulates the champion from every start.
 
     Args:
-      record: R, how many of the first simulations to record; these run to the end even after a fall, the others stop there.
-      refine: physics steps per control step: the controller stays what it was, its torque is held in between.
+      record: R, how many of the first simulations to record; these run to the end even after a
+        fall, the others stop there.
+      refine: physics steps per control step: the controller stays what it was, its torque is held
+        in between.
       heading: [T] rad, commanded heading at each control step; None walks straight ahead.
       threads: 0 takes the machine's cores. The result does not depend on it.
     """
@@ -262,7 +272,9 @@ class _Run:
         return target, senses.joint_pos, torque
 
     def _senses(self, running: np.ndarray) -> Senses:
-        """M and bias belong to the current state: each step ends with the velocity stage of the new one."""
+        """M and bias belong to the current state: each step ends with the velocity stage of the
+        new one.
+        """
         creature = self.creature
         velocity = self.qvel[running]
         rot = self.xmat[running, creature.trunk].reshape(-1, 3, 3)
@@ -281,7 +293,9 @@ class _Run:
         )
 
     def _lift(self) -> None:
-        """Raises each start until no part is deeper in the floor than when standing; else joint noise would begin with a kick."""
+        """Raises each start until no part is deeper in the floor than when standing; else joint
+        noise would begin with a kick.
+        """
         self.batch.forward(stage=VELOCITY_STAGE)
         standing = mujoco.MjData(self.model)
         standing.qpos[:] = self.creature.stand_qpos

@@ -32,9 +32,11 @@ def read_certificate(path: Path) -> dict[str, Any] | None:
 
 
 def outdated(document: dict[str, Any], champion: Champion) -> str | None:
-    """A sentence that says why a certificate does not count for this champion; None when it is of this one.
+    """A sentence that says why a certificate does not count for this champion; None when it is of
+    this one.
 
-    Times of files tell nothing: copying a run, or writing the same champion once more, changes them.
+    Times of files tell nothing: copying a run, or writing the same champion once more, changes
+    them.
     """
     if "champion" not in document:
         return "The certificate is outdated: it does not say which champion was examined, as those of earlier versions."

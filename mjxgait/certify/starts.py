@@ -15,7 +15,8 @@ class Starts:
     """One row per simulation.
 
     joint_offset, joint_velocity: [S, J] rad, rad/s; added to the standing pose.
-    friction: [S] factor on the sliding friction. mass: [S, nbody] factor on each body's mass and inertia.
+    friction: [S] factor on the sliding friction. mass: [S, nbody] factor on each body's mass and
+    inertia.
     stiffness, damping: [S, J] factors on kp and kd.
     delay: [S] control steps by which a torque comes too late.
     slope: [S, 2] rad, how steeply the floor rises along the world's x and y.

@@ -1,7 +1,8 @@
 """Other ground to walk on than that of evolution: uneven, sloping or slippery.
 
-Each function gives back the creature with another model. Its parts, their masses and all indices stay the same, so `simulate` takes it with
-every champion of the creature. What the examiner reads of heights takes the floor for level: on uneven ground it cannot tell a touch.
+Each function gives back the creature with another model. Its parts, their masses and all indices
+stay the same, so `simulate` takes it with every champion of the creature. What the examiner reads
+of heights takes the floor for level: on uneven ground it cannot tell a touch.
 """
 
 import copy
@@ -22,8 +23,9 @@ def uneven(
 ) -> Creature:
     """The floor as a height field around the start, `reach` m to each side.
 
-    At the corners of a grid of half a hip height the heights are uniform in ±`amplitude` m; triangles join them. The start is level: the
-    bumps begin a body length away and have their full height from two body lengths on.
+    At the corners of a grid of half a hip height the heights are uniform in ±`amplitude` m;
+    triangles join them. The start is level: the bumps begin a body length away and have their full
+    height from two body lengths on.
     """
     spec = mujoco.MjSpec.from_string(creature.files["creature.xml"])
     side = 2 * round(2 * reach / creature.hip_height) + 1
@@ -49,7 +51,8 @@ def uneven(
 def sloping(creature: Creature, angle: float) -> Creature:
     """Ground that rises forward by `angle` rad; negative falls.
 
-    Gravity is tilted and not the floor: heights are square to the slope, and the balance correction takes the slope for level.
+    Gravity is tilted and not the floor: heights are square to the slope, and the balance correction
+    takes the slope for level.
     """
     model = copy.copy(creature.model)
     forward = (creature.stand_rot @ creature.forward) * [1.0, 1.0, 0.0]

@@ -33,7 +33,8 @@ class AblateOptions:
       env: Another creature than the study names.
       seeds: Another number of seeds.
       first_seed: Another first seed.
-      generations: Another number of generations; variants that have a number of their own keep their share of evaluations.
+      generations: Another number of generations; variants that have a number of their own keep
+        their share of evaluations.
       config: Another base config: a TOML file, or the name of a shipped one.
       resume: Folder of a study to go on with, as it was.
       hours: Refuse a study that would take longer than this.
@@ -69,7 +70,8 @@ def ablate_command(arguments: Sequence[str]) -> int:
     else:
         if options.study is None:
             raise UserError(
-                "name the file of a study, such as: mjxgait ablate forced_evolution --out runs/forced"
+                "name the file of a study, such as: mjxgait ablate forced_evolution --out "
+                "runs/forced"
             )
         over = {name: getattr(options, name) for name in OVER}
         study = read_study(options.study, over)
@@ -84,13 +86,15 @@ def ablate_command(arguments: Sequence[str]) -> int:
     prepare_devices()
     hours = _hours(plan.upper_bound(creature), len(parts := groups(plan)))
     print(
-        f"{len(plan.variants)} variants × {study.seeds} seeds = {len(plan.runs)} runs in {len(parts)} "
-        f"program{'s' if len(parts) > 1 else ''}; at most {plan.upper_bound(creature) / 1e6:.0f} M creature-steps, "
-        f"about {_duration(3600 * hours)} at most on two cores"
+        f"{len(plan.variants)} variants × {study.seeds} seeds = {len(plan.runs)} runs in "
+        f"{len(parts)} program{'s' if len(parts) > 1 else ''}; at most "
+        f"{plan.upper_bound(creature) / 1e6:.0f} M creature-steps, about {_duration(3600 * hours)} "
+        "at most on two cores"
     )
     if hours > options.hours:
         raise UserError(
-            f"this study may take {hours:.0f} hours; take fewer --seeds or --generations, or allow it with --hours {hours:.0f}"
+            f"this study may take {hours:.0f} hours; take fewer --seeds or --generations, or allow "
+            f"it with --hours {hours:.0f}"
         )
     if options.dry_run:
         return 0
@@ -121,7 +125,8 @@ class _Progress:
         left = (news["of"] - news["generation"]) * news["seconds"]
         speed = news["steps"] / news["seconds"] / 1e6
         print(
-            f"{where}: generation {news['generation']} of {news['of']}, {speed:.2f} M steps/s, {_duration(left)} left",
+            f"{where}: generation {news['generation']} of {news['of']}, {speed:.2f} M steps/s, "
+            f"{_duration(left)} left",
             flush=True,
         )
 
@@ -134,7 +139,8 @@ def _create(folder: Path, study: Any, creature: Creature) -> None:
     try:
         if folder.exists() and any(folder.iterdir()):
             raise UserError(
-                f"{folder}: holds something already; name another folder with --out, or go on with --resume {folder}"
+                f"{folder}: holds something already; name another folder with --out, or go on with "
+                f"--resume {folder}"
             )
         (folder / CREATURE).mkdir(parents=True, exist_ok=True)
         for name, text in creature.files.items():
@@ -155,7 +161,9 @@ def _open(folder: Path) -> tuple[Any, Creature]:
 
 
 def _repeatable(options: AblateOptions) -> list[str]:
-    """The options that decide the results, without folders: the report is the same wherever it is made."""
+    """The options that decide the results, without folders: the report is the same wherever it
+    is made.
+    """
     if options.resume:
         return ["study.toml"]
     parts = [str(options.study)]

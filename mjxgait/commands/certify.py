@@ -15,9 +15,11 @@ from mjxgait.settings.tables import build, read_toml
 
 @dataclasses.dataclass(frozen=True)
 class CertifyOptions:
-    """Examine the champion of a run: whether it truly walks, criterion by criterion (docs/certificate.md).
+    """Examine the champion of a run: whether it truly walks, criterion by criterion
+    (docs/certificate.md).
 
-    Writes RUN/certificate.json. The exit code is 0 whether or not the champion passes, as long as it could be examined.
+    Writes RUN/certificate.json. The exit code is 0 whether or not the champion passes, as long as
+    it could be examined.
 
     Attributes:
       run: Run folder.

@@ -14,7 +14,8 @@ from mjxgait.settings.shipped import find_creature
 
 @dataclasses.dataclass(frozen=True)
 class CheckOptions:
-    """Validate a creature folder, let it stand for two seconds, and draw it with its feet, axes and mirror pairs marked.
+    """Validate a creature folder, let it stand for two seconds, and draw it with its feet, axes and
+    mirror pairs marked.
 
     Attributes:
       env: Creature folder, or the name of a shipped creature.

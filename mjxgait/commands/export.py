@@ -12,7 +12,8 @@ from mjxgait.errors import UserError
 
 @dataclasses.dataclass(frozen=True)
 class ExportOptions:
-    """Write the champion's walk as a GLB: one skin with animated joints, a loop without a seam. Units m, Y up, forward +Z.
+    """Write the champion's walk as a GLB: one skin with animated joints, a loop without a seam.
+    Units m, Y up, forward +Z.
 
     Attributes:
       run: Run folder.
@@ -42,6 +43,7 @@ def export_command(arguments: Sequence[str]) -> int:
     size = options.out.stat().st_size / 1024
     strides = "1 stride" if loop.strides == 1 else f"{loop.strides} strides"
     print(
-        f"{options.out} ({size:,.0f} KiB): {strides}, {loop.times[-1]:.2f} s at {loop.rate} frames/s, {loop.speed:.2f} m/s"
+        f"{options.out} ({size:,.0f} KiB): {strides}, {loop.times[-1]:.2f} s at {loop.rate} "
+        f"frames/s, {loop.speed:.2f} m/s"
     )
     return 0

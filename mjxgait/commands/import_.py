@@ -22,8 +22,10 @@ class ImportOptions:
       model: The file.
       out: Folder to make.
       name: Name of the creature; the file's name by default.
-      search: Further folders that may be read for meshes, package:// paths and includes; may be given several times.
-      keep: Pattern of joints that stay movable though no leg hangs on them; may be given several times.
+      search: Further folders that may be read for meshes, package:// paths and includes; may be
+        given several times.
+      keep: Pattern of joints that stay movable though no leg hangs on them; may be given several
+        times.
       freeze: Pattern of joints to freeze; may be given several times.
       up: Axis of the file that points up, where the guess is wrong.
       forward: Axis along which it should walk, where the guess is wrong.
@@ -56,7 +58,8 @@ def import_command(arguments: Sequence[str]) -> int:
     print(f"wrote {options.out}; look at it with: mjxgait check {options.out}")
     if not imported.stands:
         print(
-            "It does not stand by itself; it may still learn to walk, or edit the keyframe in creature.xml."
+            "It does not stand by itself; it may still learn to walk, or edit the keyframe in "
+            "creature.xml."
         )
     return 0
 

@@ -38,7 +38,8 @@ class InspectOptions:
 def inspect_command(arguments: Sequence[str]) -> int:
     """Returns the exit code."""
     options = tyro.cli(InspectOptions, args=list(arguments), prog="mjxgait inspect")
-    # Reading needs no accelerator, and a broken one must not be in the way. Before anything imports JAX.
+    # Reading needs no accelerator, and a broken one must not be in the way. Before anything imports
+    # JAX.
     os.environ.setdefault("JAX_PLATFORMS", "cpu")
     from mjxgait import inspect
 
@@ -58,7 +59,8 @@ def inspect_command(arguments: Sequence[str]) -> int:
             or options.individual is not None
         ):
             raise UserError(
-                "--diff takes two runs or checkpoints (such as RUN/checkpoints/5) and nothing else but --json"
+                "--diff takes two runs or checkpoints (such as RUN/checkpoints/5) and nothing else "
+                "but --json"
             )
         return tell(
             inspect.differences(*map(inspect.read_snapshot, options.diff)),
@@ -66,7 +68,8 @@ def inspect_command(arguments: Sequence[str]) -> int:
         )
     if options.path is None:
         raise UserError(
-            "name a run folder, a checkpoint, or a folder full of runs: mjxgait inspect runs/tall_quadruped-seed0"
+            "name a run folder, a checkpoint, or a folder full of runs: mjxgait inspect "
+            "runs/tall_quadruped-seed0"
         )
     if runs := inspect.runs_in(options.path):
         return tell(inspect.list_runs(runs), inspect.print_runs)

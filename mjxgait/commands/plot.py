@@ -11,7 +11,8 @@ import tyro
 
 @dataclasses.dataclass(frozen=True)
 class PlotOptions:
-    """Draw a run: fitness, terms and diversity over generations; footfalls, joints, trunk and a filmstrip of its champion.
+    """Draw a run: fitness, terms and diversity over generations; footfalls, joints, trunk and a
+    filmstrip of its champion.
 
     Attributes:
       run: Run folder.

@@ -26,7 +26,8 @@ class RenderOptions:
       fps: Pictures per second.
       size: Width and height in pixels.
       slow: How many times slower than life.
-      renderer: painter needs no GPU and no GL library; gl is MuJoCo's own; auto takes gl where it works.
+      renderer: painter needs no GPU and no GL library; gl is MuJoCo's own; auto takes gl where it
+        works.
     """
 
     run: tyro.conf.Positional[Path]
@@ -44,7 +45,8 @@ def render_command(arguments: Sequence[str]) -> int:
     """Returns the exit code."""
     options = tyro.cli(RenderOptions, args=list(arguments), prog="mjxgait render")
     os.environ.setdefault("JAX_PLATFORMS", "cpu")
-    # With a GL library that is missing, importing MuJoCo itself fails: only the process that draws may see the variable.
+    # With a GL library that is missing, importing MuJoCo itself fails: only the process that draws
+    # may see the variable.
     wanted = os.environ.pop("MUJOCO_GL", None)
     from mjxgait.viewing import cast, video
     from mjxgait.viewing.stage import Stage
@@ -95,7 +97,8 @@ def _check(options: RenderOptions) -> list[int]:
         )
     except ValueError:
         raise UserError(
-            f"--generations {options.generations}: must be numbers with commas between them, such as 0,5,20"
+            f"--generations {options.generations}: must be numbers with commas between them, such "
+            "as 0,5,20"
         ) from None
     if len(generations) > MOST_RUNNERS:
         raise UserError(f"--generations: at most {MOST_RUNNERS} can race")

@@ -11,7 +11,8 @@ from mjxgait.errors import UserError
 
 @dataclasses.dataclass(frozen=True)
 class ShareOptions:
-    """Write one HTML file with the 3D walk, the curves and the certificate; it plays by double click, without a network.
+    """Write one HTML file with the 3D walk, the curves and the certificate; it plays by double
+    click, without a network.
 
     Attributes:
       run: Run folder.

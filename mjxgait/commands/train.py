@@ -24,15 +24,17 @@ from mjxgait.settings.tables import build, merge
 class TrainOptions:
     """Evolve a walk for a creature.
 
-    Settings come in layers, each over the one before: configs/default.toml, the creature's own [train] table, the file of --config, and
-    the options given here. Every key of the config is an option.
+    Settings come in layers, each over the one before: configs/default.toml, the creature's own
+    [train] table, the file of --config, and the options given here. Every key of the config is an
+    option.
 
     Attributes:
-      env: Name of a shipped creature, path of a creature folder, or a model file (MJCF or URDF) to import on the fly.
+      env: Name of a shipped creature, path of a creature folder, or a model file (MJCF or URDF) to
+        import on the fly.
       config: TOML file with settings, or the name of a shipped config such as wilson.
       out: Folder for the run; by default a new one under runs/.
-      resume: Run folder to go on with; its own creature and settings are used, only what ends a run may differ: --generations,
-        --evolution.target, --examination.
+      resume: Run folder to go on with; its own creature and settings are used, only what ends a run
+        may differ: --generations, --evolution.target, --examination.
       generation: With --resume: the checkpoint to go on from instead of the latest.
       population: Short for --evolution.population.
       generations: Short for --evolution.generations.
@@ -73,7 +75,8 @@ def train_command(arguments: Sequence[str]) -> int:
     if options.resume:
         if _without_ends(config) != _without_ends(default):
             raise UserError(
-                f"{options.resume}: a resumed run keeps its settings; only --generations, --evolution.target and --examination may differ"
+                f"{options.resume}: a resumed run keeps its settings; only --generations, "
+                "--evolution.target and --examination may differ"
             )
         folder = options.resume
     else:
@@ -108,7 +111,9 @@ def _plot_fitness(folder: Path) -> None:
 
 
 def _layers(arguments: Sequence[str]) -> tuple[Creature, Config]:
-    """The creature and the settings below the options: they decide what the options' defaults are."""
+    """The creature and the settings below the options: they decide what the options' defaults
+    are.
+    """
     early = argparse.ArgumentParser(add_help=False, allow_abbrev=False, exit_on_error=False)
     for name in ("--env", "--config", "--resume"):
         early.add_argument(name, nargs="?")
@@ -140,7 +145,9 @@ def _creature(env: str) -> Creature:
 
 
 def _settings(options: TrainOptions) -> Config:
-    """The config with the short options laid over it, checked again: the options are typed but their ranges are not."""
+    """The config with the short options laid over it, checked again: the options are typed but
+    their ranges are not.
+    """
     short = {"population": options.population, "generations": options.generations}
     table = {"evolution": {key: value for key, value in short.items() if value is not None}}
     return build(Config, merge(dataclasses.asdict(options.settings), table), "the options")

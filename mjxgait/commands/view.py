@@ -29,7 +29,8 @@ def view_command(arguments: Sequence[str]) -> int:
     options = tyro.cli(ViewOptions, args=list(arguments), prog="mjxgait view")
     from mjxgait.web.live import serve
 
-    # What a script starts in the background ignores interrupts, and Python leaves it so: without this nothing but a kill would end it.
+    # What a script starts in the background ignores interrupts, and Python leaves it so: without
+    # this nothing but a kill would end it.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     serve(
         options.run,
@@ -43,7 +44,9 @@ def view_command(arguments: Sequence[str]) -> int:
 
 @contextlib.contextmanager
 def following(run: Path) -> Iterator[None]:
-    """Shows a run as long as the block lasts, in a process of its own that prints its address; if it fails, the block goes on."""
+    """Shows a run as long as the block lasts, in a process of its own that prints its address;
+    if it fails, the block goes on.
+    """
     viewer = subprocess.Popen(
         [sys.executable, "-m", "mjxgait", "view", str(run)], stdin=subprocess.DEVNULL
     )

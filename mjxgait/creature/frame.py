@@ -19,7 +19,9 @@ def start_position(creature: Creature) -> np.ndarray:
 
 
 def horizontal_freedoms(creature: Creature) -> np.ndarray:
-    """[2, nv] generalised velocity of the trunk moving at 1 m/s along the world's x and y; zero where the root cannot move so."""
+    """[2, nv] generalised velocity of the trunk moving at 1 m/s along the world's x and y; zero
+    where the root cannot move so.
+    """
     model = creature.model
     moves = np.zeros((2, model.nv))
     for joint in range(model.njnt):

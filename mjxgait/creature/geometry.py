@@ -12,7 +12,8 @@ def support_extents(geom_type: int, size: np.ndarray) -> tuple[float, np.ndarray
     """Parameters `(r, b, e)` of a geom's support function.
 
     How far the geom reaches from its centre in the direction `u` of its own frame is
-    `r + sum(abs(u) * b) + sqrt(sum((u * e)**2))`: a sphere, a box and an ellipsoid summed (Minkowski).
+    `r + sum(abs(u) * b) + sqrt(sum((u * e)**2))`: a sphere, a box and an ellipsoid summed
+    (Minkowski).
 
     Args:
       size: [3] MuJoCo's sizes. A mesh is measured by the box in `size`.
@@ -68,7 +69,9 @@ def ancestors(model: mujoco.MjModel, body: int) -> list[int]:
 def leg_lengths(
     model: mujoco.MjModel, data: mujoco.MjData, feet: list[int], joints: list[int]
 ) -> np.ndarray:
-    """[feet] height in m of each leg's first joint above the floor; a leg is the part of the tree that leads to one foot body only."""
+    """[feet] height in m of each leg's first joint above the floor; a leg is the part of the
+    tree that leads to one foot body only.
+    """
     chains = {foot: ancestors(model, foot) for foot in feet}
     lengths = []
     for foot, chain in chains.items():
@@ -87,9 +90,11 @@ def leg_lengths(
 def mirror_map(
     anchors: np.ndarray, axes: np.ndarray, slides: np.ndarray, names: list[str], tolerance: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Partner joint and sign of every joint under reflection in the vertical plane through the trunk.
+    """Partner joint and sign of every joint under reflection in the vertical plane through the
+    trunk.
 
-    A rotation axis is a pseudo-vector: reflected in y it becomes `(-x, y, -z)`; a slide's direction becomes `(x, -y, z)`.
+    A rotation axis is a pseudo-vector: reflected in y it becomes `(-x, y, -z)`; a slide's direction
+    becomes `(x, -y, z)`.
 
     Args:
       anchors, axes: [J, 3] in the creature's frame (forward, left, up) in the standing pose, m.
@@ -117,6 +122,7 @@ def mirror_map(
             )
         if partner[partner[j]] != j:
             raise UserError(
-                f'joints "{name}" and "{names[partner[j]]}" are not each other\'s mirror image; say which are in [mirror] pairs'
+                f'joints "{name}" and "{names[partner[j]]}" are not each other\'s mirror image; '
+                "say which are in [mirror] pairs"
             )
     return partner, np.sign(parallel[np.arange(len(names)), partner]).astype(int)

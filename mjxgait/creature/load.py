@@ -32,10 +32,12 @@ class Creature:
     files: name and text of each file, as read. model: the body as its file describes it.
     forward, left, up: [3] unit vectors in the trunk's frame.
     stand_qpos: [nq], stand_pos: [3] m and stand_rot: [3, 3] of the trunk; the standing pose.
-    joint_names: [J]; qpos_adr, dof_adr: [J]; stand, pose_low, pose_high, joint_low, joint_high: [J] rad.
+    joint_names: [J]; qpos_adr, dof_adr: [J]; stand, pose_low, pose_high, joint_low, joint_high: [J]
+    rad.
     kp, kd, torque_limit: [J] N·m/rad, N·m·s/rad, N·m. partner, sign: [J] mirror map.
     steer_bend, steer_stride, balance_pitch, balance_roll: [J] weights (docs/controller.md).
-    watched: [G] geom ids, the foot geoms first; foot_of: [F] which foot each foot geom belongs to; foot_names: one per foot.
+    watched: [G] geom ids, the foot geoms first; foot_of: [F] which foot each foot geom belongs to;
+    foot_names: one per foot.
     ground: ids of the other geoms that may touch the floor.
     hip_height: m, mean leg length. body_length: m. mass: kg.
     """
@@ -158,13 +160,16 @@ def load_creature(folder: Path) -> Creature:
 
 
 def _check_alone(path: Path, text: str) -> None:
-    """A body may come from a stranger: it refers to no other file, runs no plugin, and does not multiply itself."""
+    """A body may come from a stranger: it refers to no other file, runs no plugin, and does not
+    multiply itself.
+    """
     if len(text) > MOST_TEXT:
         raise UserError(f"{path}: larger than {MOST_TEXT // 1_000_000} MB; a creature is smaller")
     if found := NOT_ALONE.search(text):
         what = found.group(1) or found.group(2)
         raise UserError(
-            f'{path}: "{what}" is not allowed here: the file must hold the whole body; `mjxgait import` makes such a file'
+            f'{path}: "{what}" is not allowed here: the file must hold the whole body; `mjxgait '
+            "import` makes such a file"
         )
 
 
@@ -263,12 +268,15 @@ def _standing(model: mujoco.MjModel, keyframe: str) -> mujoco.MjData:
 
 
 def _trunk_axes(rotation: np.ndarray, forward: np.ndarray) -> np.ndarray:
-    """Rows forward, left, up in the trunk's frame: forward as given, up as near to the world's as it can be in the standing pose."""
+    """Rows forward, left, up in the trunk's frame: forward as given, up as near to the world's
+    as it can be in the standing pose.
+    """
     world_up = rotation.T @ [0.0, 0.0, 1.0]
     up = world_up - forward * (world_up @ forward) / max(forward @ forward, 1e-9)
     if np.linalg.norm(up) < 0.3 or np.linalg.norm(forward) < 1e-6:
         raise UserError(
-            f"creature.forward = {forward.tolist()} points up or down in the standing pose; name the axis the creature walks along"
+            f"creature.forward = {forward.tolist()} points up or down in the standing pose; name "
+            "the axis the creature walks along"
         )
     up, forward = up / np.linalg.norm(up), forward / np.linalg.norm(forward)
     return np.stack([forward, np.cross(up, forward), up])
@@ -334,7 +342,9 @@ def _mirror(
     names: list[str],
     axes: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Partner [J] and sign [J]: those that the file states, the others from the geometry; without symmetry everyone is their own."""
+    """Partner [J] and sign [J]: those that the file states, the others from the geometry;
+    without symmetry everyone is their own.
+    """
     partner, sign = np.arange(len(joints)), np.ones(len(joints), dtype=int)
     if not settings.mirror.symmetric:
         return partner, sign
@@ -372,12 +382,15 @@ def _check_names(names: list[str], partner: np.ndarray) -> None:
         swapped = name.replace("left", "\0").replace("right", "left").replace("\0", "right")
         if swapped != name and swapped in names and swapped != other:
             raise UserError(
-                f'joint "{name}" mirrors to "{other}" by its geometry but to "{swapped}" by its name; settle it in [mirror] pairs'
+                f'joint "{name}" mirrors to "{other}" by its geometry but to "{swapped}" by its '
+                "name; settle it in [mirror] pairs"
             )
 
 
 def _check(creature: Creature, data: mujoco.MjData) -> None:
-    """Refuses an empty pose range and gains outside SPD's stable region `h² kp < (4 I + 2 h kd) / 3` (docs/controller.md)."""
+    """Refuses an empty pose range and gains outside SPD's stable region `h² kp < (4 I + 2 h kd)
+    / 3` (docs/controller.md).
+    """
     model, h = creature.model, creature.model.opt.timestep
     mass = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, mass)
@@ -385,10 +398,12 @@ def _check(creature: Creature, data: mujoco.MjData) -> None:
     for j, name in enumerate(creature.joint_names):
         if creature.pose_low[j] > creature.pose_high[j]:
             raise UserError(
-                f'joint "{name}": its pose range lies outside its range in creature.xml; widen one of them'
+                f'joint "{name}": its pose range lies outside its range in creature.xml; widen one '
+                "of them"
             )
         if h * h * creature.kp[j] >= (4 * inertia[j] + 2 * h * creature.kd[j]) / 3:
             need = (1.5 * h * h * creature.kp[j] - 2 * inertia[j]) / h
             raise UserError(
-                f'joint "{name}": kp = {creature.kp[j]:g} is unstable at a time step of {h:g} s; raise kd to {need:.3g} or lower kp'
+                f'joint "{name}": kp = {creature.kp[j]:g} is unstable at a time step of {h:g} s; '
+                f"raise kd to {need:.3g} or lower kp"
             )

@@ -28,7 +28,9 @@ class Identity:
 
 @dataclasses.dataclass(frozen=True)
 class JointSettings:
-    """Gains in N·m/rad and N·m·s/rad, torque limit in N·m, pose range in degrees about the standing angle."""
+    """Gains in N·m/rad and N·m·s/rad, torque limit in N·m, pose range in degrees about the
+    standing angle.
+    """
 
     __pydantic_config__ = STRICT
     kp: Positive
@@ -39,7 +41,9 @@ class JointSettings:
 
 @dataclasses.dataclass(frozen=True)
 class JointException:
-    """Settings of the joints whose name matches a shell pattern; what is None stays as it is for all joints."""
+    """Settings of the joints whose name matches a shell pattern; what is None stays as it is for
+    all joints.
+    """
 
     __pydantic_config__ = STRICT
     match: Pattern
@@ -88,7 +92,9 @@ class Balance:
 
 @dataclasses.dataclass(frozen=True)
 class Termination:
-    """When an episode has failed: trunk's up axis against the world's, trunk height in standing heights, a touch."""
+    """When an episode has failed: trunk's up axis against the world's, trunk height in standing
+    heights, a touch.
+    """
 
     __pydantic_config__ = STRICT
     min_up: Annotated[float, pydantic.Field(ge=-1, le=1)] = 0.5

@@ -1,4 +1,5 @@
-"""Finds what a compiled model consists of: which tree is the creature, which way is up, which limbs are legs, which joints matter.
+"""Finds what a compiled model consists of: which tree is the creature, which way is up, which limbs
+are legs, which joints matter.
 
 Letters: `B` bodies, `J` joints, as in MuJoCo's arrays.
 """
@@ -23,10 +24,12 @@ MOST_BODIES, MOST_JOINTS = 400, 60
 
 @dataclasses.dataclass(eq=False)
 class Anatomy:
-    """qpos: [nq] the pose that everything was measured in. xpos [B, 3], xrot [B, 3, 3]: bodies in that pose, up is z, m.
+    """qpos: [nq] the pose that everything was measured in. xpos [B, 3], xrot [B, 3, 3]: bodies in
+    that pose, up is z, m.
 
-    root: body id. bodies: ids of the creature's bodies, parents first. active: ids of joints that move. feet: ids of the last moving body
-    of each leg. scale: m per unit of length. shapes: of each body, scaled.
+    root: body id. bodies: ids of the creature's bodies, parents first. active: ids of joints that
+    move. feet: ids of the last moving body of each leg. scale: m per unit of length. shapes: of
+    each body, scaled.
     """
 
     qpos: np.ndarray
@@ -40,7 +43,9 @@ class Anatomy:
     shapes: dict[int, list[Shape]]
 
     def low(self, model: mujoco.MjModel, bodies: Sequence[int]) -> float:
-        """Lowest point in m of some bodies; their frames and centres of mass where they have no shapes."""
+        """Lowest point in m of some bodies; their frames and centres of mass where they have no
+        shapes.
+        """
         heights = []
         for b in bodies:
             solid = [s for s in self.shapes[b] if s.solid] or self.shapes[b]
@@ -68,7 +73,8 @@ def find_anatomy(
     """The anatomy of a compiled model.
 
     Args:
-      coupled: names of joints that follow others. keep, freeze: patterns of joints that the user wants active or frozen.
+      coupled: names of joints that follow others. keep, freeze: patterns of joints that the user
+        wants active or frozen.
 
     Raises:
       UserError: no creature that can walk, and why.
@@ -95,7 +101,9 @@ def find_anatomy(
 
 
 def reference_pose(model: mujoco.MjModel) -> np.ndarray:
-    """[nq]: the file's zero pose, with each joint that may not be there in the middle of its range."""
+    """[nq]: the file's zero pose, with each joint that may not be there in the middle of its
+    range.
+    """
     qpos = model.qpos0.copy()
     for j in range(model.njnt):
         a, (low, high) = int(model.jnt_qposadr[j]), model.jnt_range[j]
@@ -122,12 +130,15 @@ def _check_size(model: mujoco.MjModel) -> None:
         np.isfinite(a).all() and np.abs(a, dtype=float).max(initial=0) < 1e9 for a in arrays
     ):
         raise UserError(
-            "the model has numbers that are infinite, not a number or absurdly large; correct them in the file"
+            "the model has numbers that are infinite, not a number or absurdly large; correct them "
+            "in the file"
         )
 
 
 def _root(model: mujoco.MjModel) -> int:
-    """The body whose subtree has the most joints, then the most mass; a chain of bodies that only carry root slides is passed over."""
+    """The body whose subtree has the most joints, then the most mass; a chain of bodies that
+    only carry root slides is passed over.
+    """
     tops = [b for b in range(1, model.nbody) if model.body_parentid[b] == 0]
 
     def weight(top: int) -> tuple[int, float]:
@@ -178,7 +189,8 @@ def _root_joints(model: mujoco.MjModel, root: int, notes: Notes) -> None:
     else:
         notes.change(
             f'free joint in place of the {len(types)} root joints of "{model.body(root).name}"',
-            "the trunk must be free to fall; a body that lives in a plane gets feet that are wide across instead",
+            "the trunk must be free to fall; a body that lives in a plane gets feet that are wide "
+            "across instead",
         )
 
 
@@ -319,7 +331,9 @@ def _followers(model: mujoco.MjModel) -> set[int]:
 
 
 def _segment(model: mujoco.MjModel, body: int, movers: set[int]) -> int:
-    """The nearest body up the tree, itself included, that has an active joint; the root where there is none."""
+    """The nearest body up the tree, itself included, that has an active joint; the root where
+    there is none.
+    """
     for b in ancestors(model, body):
         if b in movers:
             return b
@@ -331,7 +345,8 @@ def _legs(model: mujoco.MjModel, anatomy: Anatomy, movable: list[int]) -> list[i
     movers = {int(model.jnt_bodyid[j]) for j in movable}
     if not movers:
         raise UserError(
-            f'"{model.body(anatomy.root).name}" has no hinge joint below it, so it has no legs; a creature needs legs with hinges'
+            f'"{model.body(anatomy.root).name}" has no hinge joint below it, so it has no legs; a '
+            "creature needs legs with hinges"
         )
     segments: dict[int, list[int]] = {}
     for b in anatomy.bodies:
@@ -350,13 +365,15 @@ def _legs(model: mujoco.MjModel, anatomy: Anatomy, movable: list[int]) -> list[i
     if not feet:
         lowest = min(ends, key=lambda b: anatomy.low(model, _below(model, anatomy, b)))
         raise NoLegs(
-            f'no limb reaches the floor: "{model.body(anatomy.root).name}" itself lies lowest, the lowest limb "{model.body(lowest).name}" '
+            f'no limb reaches the floor: "{model.body(anatomy.root).name}" itself lies lowest, the '
+            f'lowest limb "{model.body(lowest).name}" '
             "ends above it, so this has no legs to walk on; if the file lies on its side, say --up"
         )
     wheels = [b for b in feet if _is_wheel(model, anatomy, b)]
     if len(wheels) == len(feet):
         raise UserError(
-            f'"{model.body(wheels[0]).name}" is a wheel, as are all parts on the floor; a creature needs legs that step'
+            f'"{model.body(wheels[0]).name}" is a wheel, as are all parts on the floor; a creature '
+            "needs legs that step"
         )
     return [b for b in feet if b not in wheels]
 
@@ -366,7 +383,9 @@ def _below(model: mujoco.MjModel, anatomy: Anatomy, body: int) -> list[int]:
 
 
 def lowered_limbs(model: mujoco.MjModel, anatomy: Anatomy, movable: list[int]) -> np.ndarray:
-    """[nq]: each limb as low as it gets, of some hundred poses; for files whose zero pose has the legs folded or stretched out."""
+    """[nq]: each limb as low as it gets, of some hundred poses; for files whose zero pose has
+    the legs folded or stretched out.
+    """
     data, rng = mujoco.MjData(model), np.random.default_rng(0)
     data.qpos[:] = anatomy.qpos
     up = anatomy.xrot[anatomy.root] @ _world_rotation(model, anatomy.qpos, anatomy.root).T
@@ -414,7 +433,9 @@ def _world_rotation(model: mujoco.MjModel, qpos: np.ndarray, body: int) -> np.nd
 def _without_toes(
     model: mujoco.MjModel, anatomy: Anatomy, ends: list[int], movers: set[int]
 ) -> list[int]:
-    """Several ends that branch off one moving body near each other are toes or fingers: that body is the end."""
+    """Several ends that branch off one moving body near each other are toes or fingers: that
+    body is the end.
+    """
     span = max(float(np.ptp(anatomy.xpos[anatomy.bodies], axis=0).max()), 1e-6)
     result: list[int] = []
     for end in ends:
@@ -461,7 +482,8 @@ def _choose_joints(
         )
     if len(anatomy.active) > MOST_JOINTS:
         raise UserError(
-            f"{len(anatomy.active)} joints would move; freeze those that do not matter with --freeze (at most {MOST_JOINTS})"
+            f"{len(anatomy.active)} joints would move; freeze those that do not matter with "
+            f"--freeze (at most {MOST_JOINTS})"
         )
 
 
@@ -485,6 +507,7 @@ def _check_loops(model: mujoco.MjModel, anatomy: Anatomy) -> None:
             a, b = (model.body(max(o, 0)).name for o in objects)
             name = model.equality(e).name or f"equality constraint {e}"
             raise UserError(
-                f'"{name}" closes a loop between "{a}" and "{b}", and only trees can be simulated here; '
+                f'"{name}" closes a loop between "{a}" and "{b}", and only trees can be simulated '
+                "here; "
                 "take one of the two rods out, or the constraint, and import again"
             )

@@ -1,4 +1,6 @@
-"""Makes the balance feedback so weak that the creature stands with it: a loop that is too strong for the body shakes it off its feet."""
+"""Makes the balance feedback so weak that the creature stands with it: a loop that is too strong
+for the body shakes it off its feet.
+"""
 
 from collections.abc import Callable
 
@@ -16,7 +18,9 @@ MOST = 0.5
 SHARES = (1.0, 0.5, 0.25, 0.12, 0.06, 0.0)
 """Of the full weight, tried in this order."""
 NUDGE = 0.05
-"""rad by which the joints start beside the stance, as perturbed starts do: in perfect rest a loop would tremble late or never."""
+"""rad by which the joints start beside the stance, as perturbed starts do: in perfect rest a
+loop would tremble late or never.
+"""
 CALM = 0.3
 """rad/s, root mean square of the joints at the end; more is a tremor."""
 
@@ -32,7 +36,8 @@ def steady_balance(
     """Scales the pitch and the roll weights of the drive.
 
     Args:
-      names: [J] of the joints. model, qpos: [nq] the creature facing +x in its standing pose. feet: names of geoms that may touch.
+      names: [J] of the joints. model, qpos: [nq] the creature facing +x in its standing pose. feet:
+        names of geoms that may touch.
     """
     tuning = resolve_config({}, "the imported creature").controller.tuning
     strongest = ((tuning.roll[1], tuning.roll_rate[1]), (tuning.pitch[1], tuning.pitch_rate[1]))
@@ -78,7 +83,8 @@ def feedback(
     """The controller's correction [J] of the target.
 
     Args:
-      weights: [J]. axis: 0 for roll, 1 for pitch. stand: [nq] the standing pose, in which the creature faces +x.
+      weights: [J]. axis: 0 for roll, 1 for pitch. stand: [nq] the standing pose, in which the
+        creature faces +x.
       gain, rate_gain: of the trunk's angle, 1, and of its rate, s.
     """
     level = rotation(stand[3:7])

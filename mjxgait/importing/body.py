@@ -1,4 +1,5 @@
-"""The creature as it will be written, with MuJoCo's kinematics: what poses and mirror images are computed with.
+"""The creature as it will be written, with MuJoCo's kinematics: what poses and mirror images are
+computed with.
 
 Letters: `J` active joints, `B` bodies in the list's order (MuJoCo's ids less one).
 """
@@ -16,7 +17,11 @@ FREE_POS, FREE_DOF = 7, 6
 
 
 class Puppet:
-    """Poses the bodies. low, high: [J] limits in rad, infinite where there is none. feet: groups of places of the bodies of each foot."""
+    """Poses the bodies.
+
+    low, high: [J] limits in rad, infinite where there is none. feet: groups of places of the bodies
+    of each foot.
+    """
 
     def __init__(self, bodies: list[Body], feet: list[int], in_plane: bool = False) -> None:
         """in_plane: whether the file lets the trunk move in a plane only."""
@@ -54,7 +59,9 @@ class Puppet:
         return [self.names.index(name) for name in order]
 
     def pose(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Positions [B, 3] m and rotations [B, 3, 3] at joint angles [J]; the trunk where it was placed."""
+        """Positions [B, 3] m and rotations [B, 3, 3] at joint angles [J]; the trunk where it was
+        placed.
+        """
         self.data.qpos[:] = self.qpos(q)
         mujoco.mj_kinematics(self.model, self.data)
         return self.data.xpos[1:].copy(), self.data.xmat[1:].reshape(-1, 3, 3).copy()
@@ -79,7 +86,9 @@ class Puppet:
         ]
 
     def shank_height(self, xpos: np.ndarray, xrot: np.ndarray) -> float:
-        """m, the lowest point of all that belongs to the last parts of legs but not to their ends."""
+        """m, the lowest point of all that belongs to the last parts of legs but not to their
+        ends.
+        """
         return min(
             float(tip_points(tips, xpos, xrot, far=False)[:, 2].min(initial=np.inf))
             for tips in self.tips
@@ -93,7 +102,9 @@ class Puppet:
         return moves
 
     def mirror(self, forward: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-        """Partner and sign [J] under reflection in the vertical plane along forward [3], or None for an unsymmetric body."""
+        """Partner and sign [J] under reflection in the vertical plane along forward [3], or None
+        for an unsymmetric body.
+        """
         self.pose(q)
         left = np.cross([0.0, 0.0, 1.0], forward)
         frame = np.stack([forward, left, [0.0, 0.0, 1.0]])

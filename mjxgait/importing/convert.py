@@ -38,7 +38,10 @@ STRAIGHT = 0.97
 
 @dataclasses.dataclass(frozen=True)
 class ImportChoices:
-    """What the user says about a model. keep, freeze: patterns of joint names. apart: whether to compile in a process of its own."""
+    """What the user says about a model.
+
+    keep, freeze: patterns of joint names. apart: whether to compile in a process of its own.
+    """
 
     name: str | None = None
     search: tuple[Path, ...] = ()
@@ -51,7 +54,10 @@ class ImportChoices:
 
 @dataclasses.dataclass(frozen=True)
 class Imported:
-    """files: name and text of each file of the creature folder. stands: whether it stood for two seconds."""
+    """files: name and text of each file of the creature folder.
+
+    stands: whether it stood for two seconds.
+    """
 
     name: str
     files: dict[str, str]
@@ -61,7 +67,9 @@ class Imported:
 
 @dataclasses.dataclass(eq=False)
 class Candidate:
-    """A standing pose that was tried: the bodies with their soles, the keyframe, and how it held."""
+    """A standing pose that was tried: the bodies with their soles, the keyframe, and how it
+    held.
+    """
 
     puppet: Puppet
     q: np.ndarray
@@ -77,7 +85,8 @@ def import_model(path: Path, choices: ImportChoices | None = None) -> Imported:
     """A creature from somebody's MJCF or URDF file.
 
     Raises:
-      UserError: it cannot be read, or is nothing that could walk; names the element and the way out.
+      UserError: it cannot be read, or is nothing that could walk; names the element and the way
+        out.
     """
     choices, notes = choices or ImportChoices(), Notes()
     try:
@@ -165,7 +174,8 @@ def _tell_dropped(model: mujoco.MjModel, notes: Notes) -> None:
             notes.change(f"{count} {what} dropped", why)
     notes.change(
         "the floor and all options replaced",
-        "a flat floor; time step 5 ms, Newton solver, pyramidal friction: what every physics here can do",
+        "a flat floor; time step 5 ms, Newton solver, pyramidal friction: what every physics here "
+        "can do",
     )
 
 
@@ -231,12 +241,15 @@ def _stand(
     planar: bool,
     notes: Notes,
 ) -> Candidate:
-    """The first pose that stands, of the file's own and those that a search finds; the best one where none does."""
+    """The first pose that stands, of the file's own and those that a search finds; the best one
+    where none does.
+    """
     tried: list[tuple[str, Candidate]] = []
     search = Search(puppet, offered[0][1], mirror, planar)
     for what, q in offered:
         tried.append((what, _try(puppet, q, mirror, planar, notes)))
-        # Legs that are straight out have no length left to step with: such a pose is only the second choice.
+        # Legs that are straight out have no length left to step with: such a pose is only the
+        # second choice.
         if tried[-1][1].held.stands and search.stretch(q) < STRAIGHT:
             break
     else:
@@ -357,7 +370,8 @@ def _folder(
 def _stated_length(best: Candidate) -> float | None:
     """m, of a body that is shorter than its legs, such as a biped's; None for all others.
 
-    Speeds are wanted and judged in body lengths. A biped, measured from its back to its toes, would be praised for shuffling.
+    Speeds are wanted and judged in body lengths. A biped, measured from its back to its toes, would
+    be praised for shuffling.
     """
     model, data = best.model, mujoco.MjData(best.model)
     data.qpos[:] = best.qpos

@@ -1,4 +1,7 @@
-"""How strong the joints are and how far they swing, and which of them steer and balance. `J` active joints."""
+"""How strong the joints are and how far they swing, and which of them steer and balance.
+
+`J` active joints.
+"""
 
 import dataclasses
 
@@ -17,13 +20,20 @@ STRENGTH, LEAST_STRENGTH, MOST_STRENGTH = 2.0, 0.5, 1.0
 DAMPING = 0.015
 """kd in units of kp, s. Stable PD needs 0.0075 at a step of 5 ms."""
 QUICKNESS = 5.0
-"""Least natural frequency of a joint, in units of a pendulum's of the hips' height: a slower joint cannot follow a stride."""
+"""Least natural frequency of a joint, in units of a pendulum's of the hips' height: a slower
+joint cannot follow a stride.
+"""
 SWING = 0.35
-"""rad, amplitude at which a joint's own inertia must be swung at that frequency within the torque limit."""
+"""rad, amplitude at which a joint's own inertia must be swung at that frequency within the
+torque limit.
+"""
 LEAST_DAMPING = 0.5
 """Damping ratio of a joint on its own."""
 LEAST_INERTIA = 2.0
-"""Of a joint, in units of time step times kd. Stable PD does not know what the floor holds, and so gives way by I / (I + h kd)."""
+"""Of a joint, in units of time step times kd.
+
+Stable PD does not know what the floor holds, and so gives way by I / (I + h kd).
+"""
 RANGES = {
     "stride": 40.0,
     "lift": 40.0,
@@ -39,7 +49,11 @@ ROLES = ("stride", "side", "lift")
 
 @dataclasses.dataclass(eq=False)
 class Drive:
-    """role: of each joint. kp, kd, torque: [J]. ranges: [J, 2] deg. The dicts map joint names to weights (docs/controller.md)."""
+    """role: of each joint.
+
+    kp, kd, torque: [J]. ranges: [J, 2] deg. The dicts map joint names to weights
+    (docs/controller.md).
+    """
 
     role: list[str]
     kp: np.ndarray
@@ -66,7 +80,8 @@ def plan_drive(puppet: Puppet, q: np.ndarray, stance: Stance, planar: bool, note
         weight * float(np.clip(STRENGTH / feet, LEAST_STRENGTH, MOST_STRENGTH)), SWING * quick
     )
     stated = np.array([joint.effort for joint in puppet.joints])
-    # The file's number is taken where it is one that a walk could need; 0 and 1000 N·m often only mean "not known".
+    # The file's number is taken where it is one that a walk could need; 0 and 1000 N·m often only
+    # mean "not known".
     torque = np.where(np.isfinite(stated) & (stated > 0.15 * own), np.minimum(stated, 3 * own), own)
     drive = Drive(roles, kp, kd, torque, _ranges(puppet, q, roles))
     _add_armature(puppet, drive, inertia, notes)
@@ -86,7 +101,9 @@ def plan_drive(puppet: Puppet, q: np.ndarray, stance: Stance, planar: bool, note
 
 
 def _own_inertia(puppet: Puppet) -> np.ndarray:
-    """[J] kg m², what each joint moves when the body floats free in the latest pose; with the armature."""
+    """[J] kg m², what each joint moves when the body floats free in the latest pose; with the
+    armature.
+    """
     mujoco.mj_forward(puppet.model, puppet.data)
     mass = np.zeros((puppet.model.nv, puppet.model.nv))
     mujoco.mj_fullM(puppet.model, puppet.data, mass)
@@ -94,7 +111,9 @@ def _own_inertia(puppet: Puppet) -> np.ndarray:
 
 
 def _add_armature(puppet: Puppet, drive: Drive, own: np.ndarray, notes: Notes) -> None:
-    """Gives light joints, of inertia `own` [J], the rotor of a motor of such strength, so that stable PD can hold the weight with them."""
+    """Gives light joints, of inertia `own` [J], the rotor of a motor of such strength, so that
+    stable PD can hold the weight with them.
+    """
     least = LEAST_INERTIA * puppet.model.opt.timestep * drive.kd
     raised = []
     for joint, has, wants in zip(puppet.joints, own, least, strict=True):
@@ -155,14 +174,17 @@ def _steering(puppet: Puppet, stance: Stance, drive: Drive, moves: np.ndarray) -
     ]
     behind = [j for j in spine if puppet.data.xanchor[j + 1][0] < puppet.data.xpos[1][0]]
     if behind:
-        # The hind part swings to the left with positive yaw about -z, which curves the body to the right.
+        # The hind part swings to the left with positive yaw about -z, which curves the body to the
+        # right.
         drive.bend[puppet.names[behind[0]]] = 0.5 * float(
             np.sign(puppet.data.xaxis[behind[0] + 1][2])
         )
 
 
 def _balance(puppet: Puppet, stance: Stance, drive: Drive, moves: np.ndarray, planar: bool) -> None:
-    """Nose down: front feet push down, hind feet give way, toes press; right side down: the feet go right, under the fall."""
+    """Nose down: front feet push down, hind feet give way, toes press; right side down: the feet
+    go right, under the fall.
+    """
     middle = np.mean([puppet.data.xpos[g[0] + 1][0] for g in puppet.feet])
     for f, group in enumerate(puppet.feet):
         leg, ahead = puppet.leg(f), float(puppet.data.xpos[group[0] + 1][0] - middle)

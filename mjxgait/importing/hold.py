@@ -11,9 +11,11 @@ SECONDS = 2.0
 
 @dataclasses.dataclass(frozen=True)
 class Held:
-    """up: least product of the trunk's upright axis with the world's. height: least, in standing heights. moved: m. sag: rad.
+    """up: least product of the trunk's upright axis with the world's. height: least, in standing
+    heights. moved: m. sag: rad.
 
-    speed: rad/s, root mean square of the joints at the end. touched: a part that touched the floor and may not, or "".
+    speed: rad/s, root mean square of the joints at the end. touched: a part that touched the floor
+    and may not, or "".
     """
 
     up: float
@@ -53,10 +55,12 @@ def hold(
     stand: np.ndarray | None = None,
     correct: Callable[[mujoco.MjData], np.ndarray] | None = None,
 ) -> Held:
-    """Stands for some seconds from qpos [nq]. kp, kd, limit: [J]. feet: names of geoms that may touch.
+    """Stands for some seconds from qpos [nq]. kp, kd, limit: [J]. feet: names of geoms that may
+    touch.
 
     Args:
-      stand: [J] target angles, those of qpos where it is None. correct: the change [J] of the target at a moment.
+      stand: [J] target angles, those of qpos where it is None. correct: the change [J] of the
+        target at a moment.
     """
     data = mujoco.MjData(model)
     data.qpos[:] = qpos

@@ -1,4 +1,6 @@
-"""Cleans an MJCF tree: includes put in place, everything that is no body, joint, geom or mesh taken out."""
+"""Cleans an MJCF tree: includes put in place, everything that is no body, joint, geom or mesh
+taken out.
+"""
 
 import xml.etree.ElementTree as ET
 from pathlib import Path
@@ -81,7 +83,10 @@ def clean_mjcf(source: Source, path: Path, places: Places, notes: Notes) -> None
 
 
 def _include(tree: ET.Element, path: Path, places: Places, count: list[int]) -> None:
-    """Puts the content of included files in place, as MuJoCo does. count: files and elements so far."""
+    """Puts the content of included files in place, as MuJoCo does.
+
+    count: files and elements so far.
+    """
     for parent in list(tree.iter()):
         for i, child in reversed(list(enumerate(parent))):
             if child.tag != "include":
@@ -125,7 +130,8 @@ def _empty(tree: ET.Element, name: str) -> None:
 
 
 def _drop_inner(tree: ET.Element, notes: Notes) -> None:
-    # Sites carry tendons, actuators and equality constraints: those stay readable for now and sites with them.
+    # Sites carry tendons, actuators and equality constraints: those stay readable for now and sites
+    # with them.
     dropped = {k: v for k, v in INNER.items() if k != "site"}
     total = 1.0
     parents = [(parent, child) for parent in tree.iter() for child in list(parent)]

@@ -1,4 +1,6 @@
-"""Finds where the front is, whether the body lives in a plane, and which joints mirror each other."""
+"""Finds where the front is, whether the body lives in a plane, and which joints mirror each
+other.
+"""
 
 import numpy as np
 
@@ -95,7 +97,9 @@ def _front(puppet: Puppet, xpos: np.ndarray, axis: np.ndarray) -> tuple[int, str
 
 
 def is_planar(puppet: Puppet, q: np.ndarray) -> np.ndarray | None:
-    """The lateral axis [3] of a body whose hinges are all parallel and whose feet are, or are kept, in one plane; else None."""
+    """The lateral axis [3] of a body whose hinges are all parallel and whose feet are, or are
+    kept, in one plane; else None.
+    """
     poses = puppet.pose(q)
     axes = puppet.data.xaxis[1:]
     if np.abs(axes @ axes[0]).min() < 0.99 or abs(axes[0][2]) > 0.1:
@@ -108,7 +112,9 @@ def is_planar(puppet: Puppet, q: np.ndarray) -> np.ndarray | None:
 
 
 def planar_pairs(puppet: Puppet, q: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-    """Partner and sign [J] of a planar body with two alike legs from one hip; None when it has none."""
+    """Partner and sign [J] of a planar body with two alike legs from one hip; None when it has
+    none.
+    """
     if len(puppet.feet) != 2:
         return None
     puppet.pose(q)

@@ -1,4 +1,6 @@
-"""A creature on its way from the compiled model to its folder: bodies in a tree, with their joints and shapes. All in SI units."""
+"""A creature on its way from the compiled model to its folder: bodies in a tree, with their
+joints and shapes. All in SI units.
+"""
 
 import contextlib
 import dataclasses
@@ -19,9 +21,11 @@ RINGS = 16
 
 @dataclasses.dataclass(eq=False)
 class Joint:
-    """A hinge. pos, axis: [3] in the body's frame. low, high: rad, infinite where unlimited. ref: rad, the angle of the body as placed.
+    """A hinge. pos, axis: [3] in the body's frame. low, high: rad, infinite where unlimited. ref:
+    rad, the angle of the body as placed.
 
-    effort: N·m, nan where the file states none. id: in the compiled model; a hinge made of a ball joint has the ball's.
+    effort: N·m, nan where the file states none. id: in the compiled model; a hinge made of a ball
+    joint has the ball's.
     """
 
     name: str
@@ -37,10 +41,13 @@ class Joint:
 
 @dataclasses.dataclass(eq=False)
 class Shape:
-    """A geom. kind: MuJoCo's geom type. size: [3] m. pos [3], quat [4]: in the body's frame. rgba: [4].
+    """A geom. kind: MuJoCo's geom type. size: [3] m. pos [3], quat [4]: in the body's frame. rgba:
+    [4].
 
-    points: [n, 3] m in the body's frame, and radius m: the shape is the hull of balls of this radius about the points.
-    solid: whether it touches things in the file. seen: whether it is drawn. name: for the written file.
+    points: [n, 3] m in the body's frame, and radius m: the shape is the hull of balls of this
+    radius about the points.
+    solid: whether it touches things in the file. seen: whether it is drawn. name: for the written
+    file.
     """
 
     kind: int
@@ -57,7 +64,8 @@ class Shape:
 
 @dataclasses.dataclass(eq=False)
 class Body:
-    """pos [3], quat [4]: in the parent's frame, with all joints at `ref`. mass: kg. ipos, iquat, inertia: of the principal frame, kg·m².
+    """pos [3], quat [4]: in the parent's frame, with all joints at `ref`. mass: kg. ipos, iquat,
+    inertia: of the principal frame, kg·m².
 
     id: in the compiled model. parent: place in the list, -1 for the root.
     """
@@ -168,7 +176,8 @@ def hull_points(points: np.ndarray) -> np.ndarray:
 def one_line(text: str) -> str:
     """Text that can stand in a comment and in any file.
 
-    Control characters become spaces, and what a file's name holds that is no Unicode a question mark.
+    Control characters become spaces, and what a file's name holds that is no Unicode a question
+    mark.
     """
     told = text.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
     return re.sub(r"[\x00-\x1f\x7f-\x9f]", " ", told)

@@ -1,4 +1,6 @@
-"""Draws a creature in its standing pose with what creature.toml says about it, and tells its facts in words."""
+"""Draws a creature in its standing pose with what creature.toml says about it, and tells its
+facts in words.
+"""
 
 import mujoco
 import numpy as np
@@ -58,16 +60,20 @@ def facts(creature: Creature) -> list[str]:
         else []
     )
     return [
-        f"{creature.name}: {creature.mass:.3g} kg, hip height {creature.hip_height:.3g} m, body length {creature.body_length:.3g} m",
+        f"{creature.name}: {creature.mass:.3g} kg, hip height {creature.hip_height:.3g} m, body "
+        f"length {creature.body_length:.3g} m",
         f"joints: {len(names)}, feet: {', '.join(creature.foot_names)}",
-        f"it {state} for 2 s: upright {held.up:.2f}, height {held.height:.2f} of the start, joints sag {held.sag:.3f} rad{touched}",
+        f"it {state} for 2 s: upright {held.up:.2f}, height {held.height:.2f} of the start, joints "
+        f"sag {held.sag:.3f} rad{touched}",
         *(["mirror pairs:", *mirror] if mirror else ["no mirror image"]),
         *([f"their own mirror image: {', '.join(own)}"] if creature.symmetric and own else []),
     ]
 
 
 def portrait(creature: Creature) -> Image.Image:
-    """The creature from its right side; feet ringed, axes drawn, joints with the same number mirror each other."""
+    """The creature from its right side; feet ringed, axes drawn, joints with the same number
+    mirror each other.
+    """
     data = mujoco.MjData(creature.model)
     data.qpos[:] = creature.stand_qpos
     mujoco.mj_forward(creature.model, data)

@@ -1,4 +1,6 @@
-"""Asserts that the written creature is the animal of the file: masses, inertias, joint positions and axes."""
+"""Asserts that the written creature is the animal of the file: masses, inertias, joint positions
+and axes.
+"""
 
 import mujoco
 import numpy as np
@@ -14,7 +16,8 @@ TOLERANCE = 1e-6
 def check_same(
     model: mujoco.MjModel, anatomy: Anatomy, puppet: Puppet, made: mujoco.MjModel
 ) -> None:
-    """Compares the compiled file with the written creature, body by body and joint by joint, relative to their size.
+    """Compares the compiled file with the written creature, body by body and joint by joint,
+    relative to their size.
 
     Raises:
       UserError: something differs, which is a mistake of the import.
@@ -73,5 +76,6 @@ def _equal(what: str, before: np.ndarray, after: np.ndarray, size: float) -> Non
     worst = float(np.abs(before - after).max(initial=0.0))
     if not worst <= TOLERANCE * max(size, 1e-9):
         raise UserError(
-            f"the import changed a {what} by {worst:.2g} of {size:.2g}; this is a mistake of the import, please report the model"
+            f"the import changed a {what} by {worst:.2g} of {size:.2g}; this is a mistake of the "
+            "import, please report the model"
         )

@@ -62,7 +62,9 @@ def build_bodies(
 
 
 def _placed(model: mujoco.MjModel, anatomy: Anatomy) -> tuple[np.ndarray, np.ndarray]:
-    """Places of all bodies with the active joints at their zero and the frozen ones where they are kept."""
+    """Places of all bodies with the active joints at their zero and the frozen ones where they
+    are kept.
+    """
     data = mujoco.MjData(model)
     data.qpos[:] = anatomy.qpos
     shared = {int(model.jnt_bodyid[j]) for j in anatomy.active}
@@ -148,7 +150,9 @@ def _stated_torque(model: mujoco.MjModel, joint: int) -> float:
 
 
 def height_of(bodies: list[Body], xpos: np.ndarray, xrot: np.ndarray, chosen: list[int]) -> float:
-    """Lowest point in m of the chosen bodies, at places [B, 3] and rotations [B, 3, 3] in the list's order."""
+    """Lowest point in m of the chosen bodies, at places [B, 3] and rotations [B, 3, 3] in the
+    list's order.
+    """
     lows = [np.inf]
     for i in chosen:
         shapes = [s for s in bodies[i].shapes if s.solid] or [s for s in bodies[i].shapes if s.seen]
@@ -158,7 +162,11 @@ def height_of(bodies: list[Body], xpos: np.ndarray, xrot: np.ndarray, chosen: li
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Tip:
-    """A shape of a foot. far: [n] which of its points belong to the foot's end, the others belong to the shank. body: its place."""
+    """A shape of a foot.
+
+    far: [n] which of its points belong to the foot's end, the others belong to the shank. body: its
+    place.
+    """
 
     body: int
     shape: Shape
@@ -166,7 +174,9 @@ class Tip:
 
 
 def foot_tips(bodies: list[Body], group: list[int]) -> list[Tip]:
-    """The shapes with which a limb can step: those at the far end of its last moving body and what is welded to it."""
+    """The shapes with which a limb can step: those at the far end of its last moving body and
+    what is welded to it.
+    """
     chain, i = [], group[0]
     while i > 0:
         chain.append(float(np.linalg.norm(bodies[i].pos)))

@@ -1,4 +1,6 @@
-"""Gives feet and trunk shapes that the fast physics can hold against the floor: spheres and capsules in place of what the file has."""
+"""Gives feet and trunk shapes that the fast physics can hold against the floor: spheres and
+capsules in place of what the file has.
+"""
 
 import dataclasses
 
@@ -22,7 +24,10 @@ MOST_TRUNK_SHAPES = 3
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Stance:
-    """Bodies in the standing pose, the creature facing +x. xpos: [B, 3] m. xrot: [B, 3, 3]. floor: m. hip: hip height in m."""
+    """Bodies in the standing pose, the creature facing +x.
+
+    xpos: [B, 3] m. xrot: [B, 3, 3]. floor: m. hip: hip height in m.
+    """
 
     xpos: np.ndarray
     xrot: np.ndarray
@@ -142,7 +147,9 @@ def _colour(body: Body) -> np.ndarray:
 
 
 def _round_foot(bodies: list[Body], tip: Tip, stance: Stance, notes: Notes) -> tuple[int, Shape]:
-    """A sphere or a lying capsule as it is; of a steep capsule the lower end, with a ball at the upper one that may not touch."""
+    """A sphere or a lying capsule as it is; of a steep capsule the lower end, with a ball at the
+    upper one that may not touch.
+    """
     i, shape = tip.body, tip.shape
     world = stance.xpos[i] + shape.points @ stance.xrot[i].T
     slope = abs(world[0, 2] - world[-1, 2]) / max(float(np.linalg.norm(world[0] - world[-1])), 1e-9)
@@ -220,7 +227,9 @@ def _fitted(
 def _across(
     bodies: list[Body], made: list[tuple[int, Shape]], stance: Stance
 ) -> list[tuple[int, Shape]]:
-    """Each ball and each end of a capsule as a long capsule across: in the creature's plane nothing changes."""
+    """Each ball and each end of a capsule as a long capsule across: in the creature's plane
+    nothing changes.
+    """
     wide = []
     for i, shape in made:
         shape.solid = False
@@ -242,7 +251,9 @@ def guard_parts(
     stance: Stance,
     notes: Notes,
 ) -> None:
-    """Shapes of everything but the feet: a few spheres and capsules that end an episode when they touch the floor."""
+    """Shapes of everything but the feet: a few spheres and capsules that end an episode when
+    they touch the floor.
+    """
     on_feet = {i for group in feet for i in group}
     lowered = []
     for segment in segments:
@@ -272,7 +283,8 @@ def guard_parts(
             if guard is not s:
                 bodies[i].shapes.append(guard)
                 notes.change(
-                    f'"{bodies[i].name}": a {_kind_name(guard.kind)} in place of its {_kind_name(s.kind)}',
+                    f'"{bodies[i].name}": a {_kind_name(guard.kind)} in place of its '
+                    f"{_kind_name(s.kind)}",
                     "for touching the floor",
                 )
     for body in bodies:

@@ -1,4 +1,7 @@
-"""Reads a model file and what it refers to. It is untrusted: only its folder and the search paths are read, and all is bounded."""
+"""Reads a model file and what it refers to.
+
+It is untrusted: only its folder and the search paths are read, and all is bounded.
+"""
 
 import dataclasses
 import io
@@ -21,9 +24,11 @@ READABLE_MESHES = (".stl", ".obj", ".msh")
 
 @dataclasses.dataclass
 class Source:
-    """A model file on its way to MuJoCo: its cleaned tree refers to meshes by their keys in `assets` and to no file.
+    """A model file on its way to MuJoCo: its cleaned tree refers to meshes by their keys in
+    `assets` and to no file.
 
-    efforts: N·m, largest torque by joint name, where the file says so outside of MuJoCo's elements. coupled: joints that follow others.
+    efforts: N·m, largest torque by joint name, where the file says so outside of MuJoCo's elements.
+    coupled: joints that follow others.
     poses: standing poses that the file offers outside of keyframes.
     """
 
@@ -47,7 +52,9 @@ class Places:
         self.roots = [self.home, *(folder.resolve() for folder in search)]
 
     def find(self, reference: str, folders: Sequence[str] = ("",)) -> Path | None:
-        """The file that a reference means, or None when it is missing or outside of the folders that may be read."""
+        """The file that a reference means, or None when it is missing or outside of the folders
+        that may be read.
+        """
         if "\0" in reference or len(reference) > 1000:
             return None
         uri = re.match(r"(?:package|model|file)://(.*)", reference)
@@ -75,7 +82,8 @@ def parse_xml(path: Path) -> ET.Element:
     """The root element of a file.
 
     Raises:
-      UserError: missing, too large, not XML, with a document type (entities can refer to files and grow without bound) or too deep.
+      UserError: missing, too large, not XML, with a document type (entities can refer to files and
+        grow without bound) or too deep.
     """
     try:
         if not path.is_file():
@@ -89,7 +97,8 @@ def parse_xml(path: Path) -> ET.Element:
         raise UserError(f"{path}: cannot be read ({error})") from None
     if b"<!DOCTYPE" in data or b"<!ENTITY" in data or b"\0" in data:
         raise UserError(
-            f"{path}: has a document type, entities or zero bytes, which are not read; save it as plain UTF-8 XML without them"
+            f"{path}: has a document type, entities or zero bytes, which are not read; save it as "
+            "plain UTF-8 XML without them"
         )
     data = data[max(data.find(b"<?xml"), 0) :]  # some files have a comment before it
     try:
@@ -107,7 +116,8 @@ def _bounded(path: Path, events: Iterator[tuple[str, ET.Element]]) -> ET.Element
         count += event == "start"
         if count > MOST_ELEMENTS or depth > MOST_DEPTH:
             raise UserError(
-                f"{path}: more than {MOST_ELEMENTS} elements, or nested deeper than {MOST_DEPTH}; this is not a creature"
+                f"{path}: more than {MOST_ELEMENTS} elements, or nested deeper than {MOST_DEPTH}; "
+                "this is not a creature"
             )
     if root is None:
         raise UserError(f"{path}: empty")
@@ -149,7 +159,9 @@ def load_mesh(
 
 
 def numbers(text: str | None) -> list[float] | None:
-    """The numbers in an attribute; None when there is none, or something that is not a finite number."""
+    """The numbers in an attribute; None when there is none, or something that is not a finite
+    number.
+    """
     try:
         values = [float(part) for part in (text or "").split()]
     except ValueError:

@@ -1,4 +1,5 @@
-"""Finds a standing pose: the file's own where it stands, else leg bends that put the feet level under the weight.
+"""Finds a standing pose: the file's own where it stands, else leg bends that put the feet level
+under the weight.
 
 Letters: `J` active joints, `F` feet.
 """
@@ -78,7 +79,9 @@ def _leg_length(puppet: Puppet, foot: int) -> float:
 
 
 def straightness(path: np.ndarray) -> float:
-    """Of thigh and shank, the two longest parts in a row of a path [n, 3] from joint to joint to the sole: 1 is a straight leg."""
+    """Of thigh and shank, the two longest parts in a row of a path [n, 3] from joint to joint to
+    the sole: 1 is a straight leg.
+    """
     parts = np.linalg.norm(np.diff(path, axis=0), axis=1)
     if len(parts) < 2:
         return NEUTRAL
@@ -153,7 +156,8 @@ class Search:
     def cost(self, q: np.ndarray) -> float:
         """How bad a stance is.
 
-        Uneven feet, weight beside them, other parts low, stretched legs, feet within the hips, limits near, far from the file's pose.
+        Uneven feet, weight beside them, other parts low, stretched legs, feet within the hips,
+        limits near, far from the file's pose.
         """
         puppet, hip = self.puppet, self.hip
         xpos, xrot = puppet.pose(q)
@@ -190,7 +194,8 @@ class Search:
             + 40 * stretched
             + 0.3 * (near**2).mean()
             + 3 * beneath
-            # A leg steps as far forward as back from beneath its hip; but two feet must be beneath the weight.
+            # A leg steps as far forward as back from beneath its hip; but two feet must be beneath
+            # the weight.
             + (10 * ahead if len(self.legs) > 2 else 0)
             + (0 if self.planar else 20 * narrow)  # feet within the hips: what steps so tips over
             + 200 * tilted

@@ -1,4 +1,6 @@
-"""Cleans a URDF tree for MuJoCo's own reader: meshes loaded or dropped, broken inertias mended, degrees and efforts read."""
+"""Cleans a URDF tree for MuJoCo's own reader: meshes loaded or dropped, broken inertias mended,
+degrees and efforts read.
+"""
 
 import xml.etree.ElementTree as ET
 from pathlib import Path
@@ -33,7 +35,8 @@ def clean_urdf(source: Source, path: Path, places: Places, notes: Notes) -> None
         for element in robot.iter()
     ):
         raise UserError(
-            f"{path}: is a xacro template; run `xacro {path.name} > robot.urdf` first and import robot.urdf"
+            f"{path}: is a xacro template; run `xacro {path.name} > robot.urdf` first and import "
+            "robot.urdf"
         )
     for element in list(robot):
         if element.tag not in KEPT:
@@ -128,7 +131,8 @@ def _inertial(link: ET.Element, notes: Notes) -> None:
     for key, (i, j) in zip(TENSOR, ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)), strict=True):
         inertia.set(key, repr(float(tensor[i, j])))
     notes.change(
-        f'inertia of link "{name}" mended: principal moments {np.array2string(mended, precision=3)}',
+        f'inertia of link "{name}" mended: principal moments '
+        f"{np.array2string(mended, precision=3)}",
         f"no body has the stated ones, {np.array2string(moments, precision=3)} kg m²",
     )
 

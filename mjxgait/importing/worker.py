@@ -1,4 +1,6 @@
-"""Compiles a cleaned model: in this process, or in one of its own that may use only so much time and memory."""
+"""Compiles a cleaned model: in this process, or in one of its own that may use only so much time
+and memory.
+"""
 
 import json
 import pickle
@@ -42,12 +44,14 @@ def compile_apart(
         )
     except subprocess.TimeoutExpired:
         raise UserError(
-            f"MuJoCo did not compile the model within {SECONDS} s; simplify its meshes or take out what is not its body"
+            f"MuJoCo did not compile the model within {SECONDS} s; simplify its meshes or take out "
+            "what is not its body"
         ) from None
     head, _, body = done.stdout.partition(b"\n")
     if done.returncode or not head:
         raise UserError(
-            "MuJoCo ended abnormally or ran out of memory while it compiled the model; simplify its meshes"
+            "MuJoCo ended abnormally or ran out of memory while it compiled the model; simplify "
+            "its meshes"
         )
     answer = json.loads(head)
     if "error" in answer:
@@ -85,7 +89,9 @@ def compile_here(
 def _repair(
     tree: ET.Element, message: str, changes: list[tuple[str, str]], left_out: list[str]
 ) -> bool:
-    """Changes the tree so that this message may not come again; False when nothing is left to try."""
+    """Changes the tree so that this message may not come again; False when nothing is left to
+    try.
+    """
     if found := UNKNOWN_ATTRIBUTE.search(message):
         name, tag = found.groups()
         hit = [e for e in tree.iter(tag) if name in e.attrib]
@@ -109,7 +115,8 @@ def _repair(
         compiler.attrib.update(balanceinertia="true", boundmass="1e-4", boundinertia="1e-6")
         changes.append(
             (
-                "masses and inertias raised to 1e-4 kg and 1e-6 kg m² and balanced where they were less",
+                "masses and inertias raised to 1e-4 kg and 1e-6 kg m² and balanced where they were "
+                "less",
                 message[:160],
             )
         )

@@ -25,7 +25,8 @@ def creature_toml(
     """The text of creature.toml.
 
     Args:
-      origin: the model file's name, in one line. forward: [3] in the trunk's frame. feet: names of geoms.
+      origin: the model file's name, in one line. forward: [3] in the trunk's frame. feet: names of
+        geoms.
       mirror: whether it is symmetric, and stated pairs: joint to partner and sign.
       body_length: m, None where the loader shall measure it.
     """
@@ -37,8 +38,10 @@ def creature_toml(
         np.round(v, 4) for v in (drive.kp, drive.kd, drive.torque, drive.ranges)
     )
     lines = [
-        f"# Made by `mjxgait import` from {origin}. The words after each guess say how sure it is; change what is wrong.",
-        f"# `mjxgait check` draws it. Mass, inertias, joint axes and positions in creature.xml are those of {origin}.",
+        f"# Made by `mjxgait import` from {origin}. The words after each guess say how sure it is; "
+        "change what is wrong.",
+        "# `mjxgait check` draws it. Mass, inertias, joint axes and positions in creature.xml are "
+        f"those of {origin}.",
         "[creature]",
         f"name = {_quoted(name)}",
         f"description = {_quoted(f'imported from {origin}: {len(joints)} joints')}",

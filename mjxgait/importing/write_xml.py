@@ -1,4 +1,6 @@
-"""Writes creature.xml: bodies, inertias, joints and shapes as they are, on a floor, with options that every physics here can simulate."""
+"""Writes creature.xml: bodies, inertias, joints and shapes as they are, on a floor, with options
+that every physics here can simulate.
+"""
 
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
@@ -67,7 +69,8 @@ def compile_own(text: str) -> mujoco.MjModel:
         return mujoco.MjModel.from_xml_string(text)
     except (ValueError, mujoco.FatalError) as error:
         raise UserError(
-            f"the repaired model does not compile; correct this in the file: {' '.join(str(error).split())[:300]}"
+            "the repaired model does not compile; correct this in the file: "
+            f"{' '.join(str(error).split())[:300]}"
         ) from None
 
 

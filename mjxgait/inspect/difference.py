@@ -13,7 +13,9 @@ from mjxgait.inspect.text import print_pairs, show, titled_table
 
 
 def differences(a: Snapshot, b: Snapshot) -> dict[str, Any]:
-    """Settings, fitness, population and champion of two checkpoints against each other; poses only where the joints are the same."""
+    """Settings, fitness, population and champion of two checkpoints against each other; poses
+    only where the joints are the same.
+    """
     mine, other = (flat(dataclasses.asdict(s.config)) for s in (a, b))
     same_joints = a.creature.joint_names == b.creature.joint_names
     same_shape = same_joints and a.key_poses.shape[1:] == b.key_poses.shape[1:]

@@ -1,4 +1,7 @@
-"""From a snapshot to plain values: what `--json` prints and what the tables are made of. Angles in degrees."""
+"""From a snapshot to plain values: what `--json` prints and what the tables are made of.
+
+Angles in degrees.
+"""
 
 import dataclasses
 import datetime
@@ -63,7 +66,9 @@ def facts(snapshot: Snapshot) -> dict[str, Any]:
 
 
 def certificate(snapshot: Snapshot) -> str:
-    """One sentence about the certificate of the run's champion, whatever checkpoint the snapshot is of."""
+    """One sentence about the certificate of the run's champion, whatever checkpoint the snapshot
+    is of.
+    """
     try:
         document = read_certificate(snapshot.run / CERTIFICATE)
         if document is None:
@@ -81,7 +86,9 @@ def certificate(snapshot: Snapshot) -> str:
 
 
 def settings_changed(snapshot: Snapshot) -> dict[str, dict[str, Any]]:
-    """The settings that differ from configs/default.toml, by dotted key: the default and this run's."""
+    """The settings that differ from configs/default.toml, by dotted key: the default and this
+    run's.
+    """
     default = flat(dataclasses.asdict(resolve_config({}, snapshot.creature.name)))
     mine = flat(dataclasses.asdict(snapshot.config))
     return {
@@ -103,7 +110,9 @@ def flat(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
 
 
 def fitness_summary(fitness: np.ndarray) -> dict[str, Any]:
-    """Best, quartiles, mean and worst of those that have a finite fitness [P], and how many have none."""
+    """Best, quartiles, mean and worst of those that have a finite fitness [P], and how many have
+    none.
+    """
     finite = fitness[np.isfinite(fitness)]
     if not len(finite):
         return {
@@ -130,7 +139,9 @@ def fitness_summary(fitness: np.ndarray) -> dict[str, Any]:
 
 
 def forced_spells(lines: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Each unbroken row of forced generations: first and last, and best fitness before and after."""
+    """Each unbroken row of forced generations: first and last, and best fitness before and
+    after.
+    """
     spells = []
     for forced, group in itertools.groupby(
         range(len(lines)), key=lambda i: bool(lines[i]["forced"])
@@ -152,7 +163,9 @@ def forced_spells(lines: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
 
 
 def contributions(snapshot: Snapshot) -> np.ndarray:
-    """[P, F] what each term gives to or takes from the fitness of each individual; a row's sum is its fitness."""
+    """[P, F] what each term gives to or takes from the fitness of each individual; a row's sum
+    is its fitness.
+    """
     terms = np.asarray(snapshot.arrays["terms"], float)
     counted = signed_weights(snapshot.config.fitness, jnp.int32(snapshot.generation))
     weights = np.array([float(counted[name]) for name in TERMS])
@@ -182,7 +195,9 @@ def population(snapshot: Snapshot) -> list[dict[str, Any]]:
 
 
 def diversity(snapshot: Snapshot) -> dict[str, Any]:
-    """How many genomes differ, and per joint the standard deviation over the population, mean of the key poses."""
+    """How many genomes differ, and per joint the standard deviation over the population, mean of
+    the key poses.
+    """
     genomes = np.concatenate(
         [snapshot.key_poses.reshape(len(snapshot.fitness), -1), snapshot.tuning], axis=1
     )
@@ -205,7 +220,8 @@ def individual_facts(snapshot: Snapshot, rank: int) -> dict[str, Any]:
     """
     if not 1 <= rank <= len(snapshot.fitness):
         raise UserError(
-            f"{snapshot.run}: no individual {rank}; the population has ranks 1 to {len(snapshot.fitness)}"
+            f"{snapshot.run}: no individual {rank}; the population has ranks 1 to "
+            f"{len(snapshot.fitness)}"
         )
     i = rank - 1
     terms = np.asarray(snapshot.arrays["terms"][i], float)

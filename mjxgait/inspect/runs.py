@@ -15,7 +15,9 @@ from mjxgait.runs.folder import CONFIG
 
 
 def runs_in(folder: Path) -> list[Path]:
-    """The run folders directly inside a folder, by name; empty when it is itself a run, or holds none."""
+    """The run folders directly inside a folder, by name; empty when it is itself a run, or holds
+    none.
+    """
     if not folder.is_dir() or (folder / CONFIG).is_file():
         return []
     return sorted(entry for entry in folder.iterdir() if (entry / CONFIG).is_file())

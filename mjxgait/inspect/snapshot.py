@@ -1,6 +1,8 @@
-"""One checkpoint read back as NumPy arrays, whatever devices wrote it, together with the run it belongs to.
+"""One checkpoint read back as NumPy arrays, whatever devices wrote it, together with the run it
+belongs to.
 
-Letters: `P` individuals, `R` starts, `F` fitness terms, `K` key poses, `J` joints, `E` tuning genes.
+Letters: `P` individuals, `R` starts, `F` fitness terms, `K` key poses, `J` joints, `E` tuning
+genes.
 """
 
 import dataclasses
@@ -27,8 +29,10 @@ from mjxgait.settings.config import Config
 class Snapshot:
     """A checkpoint that is whole, and its run.
 
-    arrays: of the state, by dotted name. lines: of the metrics, up to this generation. generations: there are checkpoints of.
-    versions: of the packages that wrote the run's champion. written: s since the epoch. size: bytes on disk.
+    arrays: of the state, by dotted name. lines: of the metrics, up to this generation. generations:
+    there are checkpoints of.
+    versions: of the packages that wrote the run's champion. written: s since the epoch. size: bytes
+    on disk.
     """
 
     run: Path
@@ -90,7 +94,8 @@ def read_snapshot(path: Path, generation: int | None = None) -> Snapshot:
     """The checkpoint of a run folder (the latest, or that of `generation`), or the one at a path.
 
     Raises:
-      UserError: not a run or checkpoint, or a damaged or foreign one; says which and names the newest that is intact.
+      UserError: not a run or checkpoint, or a damaged or foreign one; says which and names the
+        newest that is intact.
     """
     run, generation = _locate(path, generation)
     creature, config = open_run(run)
@@ -113,7 +118,9 @@ def read_snapshot(path: Path, generation: int | None = None) -> Snapshot:
 
 
 def _lines(path: Path, last: int) -> list[dict[str, Any]]:
-    """The metrics up to a generation; none where the file is not one of ours: the checkpoint is still worth telling of."""
+    """The metrics up to a generation; none where the file is not one of ours: the checkpoint is
+    still worth telling of.
+    """
     try:
         return [line for line in read_metrics(path) if line["generation"] <= last]
     except (OSError, UnicodeDecodeError, TypeError, KeyError):
@@ -133,15 +140,18 @@ def _locate(path: Path, generation: int | None) -> tuple[Path, int | None]:
         run = path.parent.parent
         if not (run / CONFIG).is_file():
             raise UserError(
-                f"{path}: a checkpoint without its run; keep {CONFIG} and the creature folder beside {FOLDER}/"
+                f"{path}: a checkpoint without its run; keep {CONFIG} and the creature folder "
+                f"beside {FOLDER}/"
             )
         if generation is not None and generation != int(path.name):
             raise UserError(
-                f"{path}: is generation {path.name}; for generation {generation} name the run folder {run}"
+                f"{path}: is generation {path.name}; for generation {generation} name the run "
+                f"folder {run}"
             )
         return run, int(path.name)
     raise UserError(
-        f"{path}: neither a run folder (it has no {CONFIG}) nor one of its checkpoints; `mjxgait train` makes one"
+        f"{path}: neither a run folder (it has no {CONFIG}) nor one of its checkpoints; `mjxgait "
+        "train` makes one"
     )
 
 
@@ -151,8 +161,8 @@ def _check_shape(
     shape = (config.evolution.population, config.controller.key_poses, len(creature.joint_names))
     if arrays["genomes.key_poses"].shape != shape:
         raise UserError(
-            f"{folder}: holds key poses of shape {arrays['genomes.key_poses'].shape}, this run's {CONFIG} asks for {shape}; "
-            "one of the two is from another run"
+            f"{folder}: holds key poses of shape {arrays['genomes.key_poses'].shape}, this run's "
+            f"{CONFIG} asks for {shape}; one of the two is from another run"
         )
 
 

@@ -103,7 +103,8 @@ def _print_identity(facts: Mapping[str, Any], console: Console) -> None:
     rows = {
         "run": facts["run"],
         "state": state,
-        "checkpoint": f"intact, schema {facts['schema']}, {size}, written {ago(facts['written'])} ({facts['written']})",
+        "checkpoint": f"intact, schema {facts['schema']}, {size}, written {ago(facts['written'])} "
+        f"({facts['written']})",
         "generations kept": ", ".join(map(str, facts["checkpoints"])),
         "seed": f"{facts['seed']} ({facts['random_key']['kind']} key now {key})",
         "body": facts["creature_digest"],
@@ -115,7 +116,8 @@ def _print_identity(facts: Mapping[str, Any], console: Console) -> None:
             if name != "broken"
         )
         + (f"; {fitness['broken']} without a finite one" if fitness["broken"] else ""),
-        "genomes": f"{facts['diversity']['unique']} different of {facts['diversity']['individuals']}",
+        "genomes": f"{facts['diversity']['unique']} different of "
+        f"{facts['diversity']['individuals']}",
     }
     print_pairs(rows, console)
 
@@ -146,7 +148,8 @@ def _print_history(facts: Mapping[str, Any], console: Console) -> None:
         for i in range(len(history))
     ][::-1][::stride][::-1]
     console.print(
-        f"\n[bold]history[/] of generations {history[0]['generation']} to {history[-1]['generation']}, fitness {low:.2f} to {high:.2f}"
+        f"\n[bold]history[/] of generations {history[0]['generation']} to "
+        f"{history[-1]['generation']}, fitness {low:.2f} to {high:.2f}"
     )
     for key in ("best", "mean"):
         console.print(f"{key:7} {sparkline([line[key] for line in thinned], low, high)}")
@@ -154,8 +157,9 @@ def _print_history(facts: Mapping[str, Any], console: Console) -> None:
         console.print(f"forced  {''.join('^' if f else ' ' for f in forced)}".rstrip())
     for spell in facts["forced_spells"]:
         console.print(
-            f"forced evolution in generations {spell['first']} to {spell['last']}: best {show(spell['best_before'])} to "
-            f"{show(spell['best_after'])}, mean {show(spell['mean_before'])} to {show(spell['mean_after'])}"
+            f"forced evolution in generations {spell['first']} to {spell['last']}: best "
+            f"{show(spell['best_before'])} to {show(spell['best_after'])}, mean "
+            f"{show(spell['mean_before'])} to {show(spell['mean_after'])}"
         )
 
 

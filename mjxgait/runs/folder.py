@@ -23,7 +23,8 @@ def create_run(folder: Path, creature: Creature, config: Config) -> None:
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             holds = "another run" if (folder / CONFIG).exists() else "something else"
             raise UserError(
-                f"{folder}: holds {holds}; name another folder with --out, or go on with --resume {folder}"
+                f"{folder}: holds {holds}; name another folder with --out, or go on with --resume "
+                f"{folder}"
             )
         (folder / CREATURE).mkdir(parents=True, exist_ok=True)
         for name, text in creature.files.items():

@@ -52,7 +52,8 @@ def train(
     """
     experiment = build_experiment(creature, config)
     checkpoints = Checkpoints(folder, config.keep_every)
-    # A run that was killed before its first checkpoint begins anew: it will do what it would have done.
+    # A run that was killed before its first checkpoint begins anew: it will do what it would have
+    # done.
     if resume and (checkpoints.generations() or generation is not None):
         state = checkpoints.restore(jax.eval_shape(experiment.init), creature.digest, generation)
         begun = int(state.generation)
@@ -104,7 +105,9 @@ def _evolve(
     screen: Screen,
     interrupted: threading.Event,
 ) -> tuple[EvolutionState, str | None, Examined | None]:
-    """Generation after generation; returns the last state, why it ended (None when the user interrupted it), and who ended it."""
+    """Generation after generation; returns the last state, why it ended (None when the user
+    interrupted it), and who ended it.
+    """
     experiment, examined, saved = examiner.experiment, None, int(state.generation)
     config, creature = experiment.config, experiment.creature
     while (reason := stop_reason(state, config.evolution)) is None and not interrupted.is_set():

@@ -1,4 +1,6 @@
-"""What a run says while it works: a live line in a terminal, one plain line per generation elsewhere."""
+"""What a run says while it works: a live line in a terminal, one plain line per generation
+elsewhere.
+"""
 
 import time
 from collections.abc import Iterator, Mapping
@@ -28,8 +30,8 @@ class Screen:
         """Says that the program is being compiled, with the time it takes."""
         config = experiment.config
         self.console.print(
-            f"{what}: population {config.evolution.population}, {config.rollout.starts} starts of {config.rollout.seconds:g} s, "
-            f"seed {config.seed}"
+            f"{what}: population {config.evolution.population}, {config.rollout.starts} starts of "
+            f"{config.rollout.seconds:g} s, seed {config.seed}"
         )
         began = time.perf_counter()
         if self.console.is_terminal:
@@ -47,7 +49,10 @@ class Screen:
         self.console.print(text)
 
     def generation(self, line: Mapping[str, Any], last: int) -> None:
-        """Shows a generation; see `metrics_line`. last: the generation at which the run ends at the latest."""
+        """Shows a generation; see `metrics_line`.
+
+        last: the generation at which the run ends at the latest.
+        """
         self._walls = [*self._walls[-4:], line["wall_s"]]
         left = (last - line["generation"]) * sum(self._walls) / len(self._walls)
         best, mean = (
@@ -56,8 +61,8 @@ class Screen:
         episodes = max(line["episodes"], 1)
         text = (
             f"generation {line['generation']:>3}/{last}  best {best}  mean {mean}  "
-            f"alive {1 - line['failures'] / episodes:>4.0%}  {line['steps_per_second']:>7,} steps/s  {left:>3.0f} s left"
-            + ("  forced evolution" if line["forced"] else "")
+            f"alive {1 - line['failures'] / episodes:>4.0%}  {line['steps_per_second']:>7,} "
+            f"steps/s  {left:>3.0f} s left" + ("  forced evolution" if line["forced"] else "")
         )
         if self.console.is_terminal:
             if self._status is None:
@@ -90,13 +95,17 @@ class Screen:
                 f"and in it in {worst['share']:.0%} of the frames."
             )
         self.console.print(
-            f"{verdict} (margin {certificate.margin:.2f}). {report['gait']}, {report['speed']:.2f} m/s; {certificate.seconds:.0f} s."
+            f"{verdict} (margin {certificate.margin:.2f}). {report['gait']}, {report['speed']:.2f} "
+            f"m/s; {certificate.seconds:.0f} s."
         )
 
     def report(
         self, folder: Path, why: str, last: Mapping[str, Any], seconds: float, interrupted: bool
     ) -> None:
-        """The table at the end: how it went and where everything is. last: the last line of the metrics."""
+        """The table at the end: how it went and where everything is.
+
+        last: the last line of the metrics.
+        """
         self.close()
         self.console.print(f"{why[0].upper()}{why[1:]}; {seconds:.0f} s.")
         table = Table(box=None, show_header=False, pad_edge=False)

@@ -1,9 +1,9 @@
 """Who has children with whom, and children born one after another.
 
-One after another, as in the thesis: "Two parent genomes were chosen randomly from the population and
-their pose combinations were permuted to produce unique children. The parents and children were all
-returned into the population" (Wilson, 3.5): a child may have an elder one as its parent, and none is
-like anybody before it.
+One after another, as in the thesis: "Two parent genomes were chosen randomly from the population
+and their pose combinations were permuted to produce unique children. The parents and children were
+all returned into the population" (Wilson, 3.5): a child may have an elder one as its parent, and
+none is like anybody before it.
 """
 
 import dataclasses
@@ -17,15 +17,19 @@ from mjxgait.settings.config import EvolutionConfig
 from mjxgait.settings.traced import chosen
 
 TRIES = 16
-"""Drawings of a child that must be new; if all bring somebody who is there, the first is mutated."""
+"""Drawings of a child that must be new; if all bring somebody who is there, the first is
+mutated.
+"""
 
 
 def parents(
     key: jax.Array, count: int, population: jax.Array | int, selection: Any
 ) -> tuple[jax.Array, jax.Array]:
-    """Places [count] of mothers and fathers in a population sorted best first; never the same individual twice.
+    """Places [count] of mothers and fathers in a population sorted best first; never the same
+    individual twice.
 
-    `uniform` draws all alike; `rank` falls linearly to zero with rank (Baker 1985, pressure 2); `tournament` takes the better of two.
+    `uniform` draws all alike; `rank` falls linearly to zero with rank (Baker 1985, pressure 2);
+    `tournament` takes the better of two.
     """
     key_mother, key_father = jax.random.split(key)
 

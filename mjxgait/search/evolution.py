@@ -1,7 +1,8 @@
 """The genetic algorithm: one generation as a pure function of its state, whatever a genome drives.
 
-A run begins with a population that nobody has judged (`seeding`): the first call judges it, so that the physics is traced and compiled
-once. Forced evolution (Wilson) is another way to fill the same offspring slots, chosen by a flag in the state.
+A run begins with a population that nobody has judged (`seeding`): the first call judges it, so that
+the physics is traced and compiled once. Forced evolution (Wilson) is another way to fill the same
+offspring slots, chosen by a flag in the state.
 """
 
 import dataclasses
@@ -29,13 +30,15 @@ class Origin(IntEnum):
 
 @pytree
 class EvolutionState:
-    """Everything that the next generation reads. The population is sorted, best first, once it has been judged.
+    """Everything that the next generation reads. The population is sorted, best first, once it has
+    been judged.
 
     genomes: leaves [P, ...]. terms: [P, R, F]. outcome: [P, R, O]. fitness: [P]. born: [P] generation of birth. origin: [P] an `Origin`.
     key: of all coming randomness. generation: [] -1 while seeding. seeded: [] how many of the initial population have been judged.
     best_history, mean_history: [W] of the latest generations, newest last. quiet: [] generations since the last spell.
     forced: [] whether the next generation is forced. spell_age, refreshed: [] of the current spell.
-    spell_best: [] best fitness when the last spell began. barren: [] spells in a row that began without a better best than the one before.
+    spell_best: [] best fitness when the last spell began. barren: [] spells in a row that began
+    without a better best than the one before.
     """
 
     genomes: Any
@@ -62,7 +65,8 @@ class GenerationMetrics:
     """What there is to tell of a generation; scalars but for best_terms [F] and best_outcome [O],
     the mean over the trials of the best individual's terms and outcome.
 
-    unique: different genomes. spread: mean standard deviation of a gene. failures: how many of the offspring's episodes ended early.
+    unique: different genomes. spread: mean standard deviation of a gene. failures: how many of the
+    offspring's episodes ended early.
     """
 
     generation: jax.Array
@@ -86,7 +90,10 @@ class GenerationMetrics:
 
 @pytree
 class Proposal:
-    """What a generation wants judged. key: of the next generation. offspring: leaves [M, ...]; origin: [M]."""
+    """What a generation wants judged.
+
+    key: of the next generation. offspring: leaves [M, ...]; origin: [M].
+    """
 
     key: jax.Array
     offspring: Any
@@ -97,7 +104,8 @@ class Proposal:
 class Evolution:
     """The algorithm with its parts, around whoever judges: `propose`, then `absorb` the verdict.
 
-    config: plain or traced. rank: terms [..., R, F], generation [] -> fitness [...], higher is better.
+    config: plain or traced. rank: terms [..., R, F], generation [] -> fitness [...], higher is
+    better.
     """
 
     config: EvolutionConfig
@@ -159,7 +167,9 @@ class Evolution:
     def _offspring(
         self, key: jax.Array, state: EvolutionState, seeding: jax.Array
     ) -> tuple[Any, jax.Array]:
-        """Genomes [M, ...] and their origins [M]: the unjudged initial population, forced ones, or children."""
+        """Genomes [M, ...] and their origins [M]: the unjudged initial population, forced ones,
+        or children.
+        """
         key_children, key_forced = jax.random.split(key)
         places = state.seeded + jnp.arange(self.config.offspring)
         initial = jax.tree.map(lambda leaf: leaf[places % self.config.population], state.genomes)
@@ -187,7 +197,8 @@ class Evolution:
         crosses = jax.random.bernoulli(key_whether, config.crossover, (count,))
         child = _pick(crosses, crossed, mother)
         mutated = jax.vmap(self.variation.mutate)(jax.random.split(key_mutate, count), child)
-        # A child of one parent that is not mutated would be a duplicate, unless the algorithm knows no mutation at all.
+        # A child of one parent that is not mutated would be a duplicate, unless the algorithm knows
+        # no mutation at all.
         mutates = jax.random.bernoulli(key_mutated, config.mutation_rate, (count,)) | (
             ~crosses & (config.mutation_rate > 0)
         )
@@ -233,7 +244,9 @@ class Evolution:
     def _survive(
         self, state: EvolutionState, proposal: Proposal, judged: Judged, generation: jax.Array
     ) -> EvolutionState:
-        """The P best of the grown population, without duplicates; in a forced generation what was fit enough goes before the old."""
+        """The P best of the grown population, without duplicates; in a forced generation what
+        was fit enough goes before the old.
+        """
         count, born = self.config.population, jnp.full(self.config.offspring, generation)
         pool = jax.tree.map(
             lambda a, b: jnp.concatenate([a, b]),
@@ -265,7 +278,9 @@ class Evolution:
     def _admitted(
         self, state: EvolutionState, fitness: jax.Array, candidates: jax.Array
     ) -> jax.Array:
-        """Which of the candidates [P + M] a forced generation takes in: fit enough, best first, as many as the spell has room for."""
+        """Which of the candidates [P + M] a forced generation takes in: fit enough, best first,
+        as many as the spell has room for.
+        """
         old = jnp.sort(fitness[: self.config.population])
         enough = old[
             jnp.floor(self.config.forced.accept * jnp.float32(self.config.population - 1)).astype(
@@ -284,7 +299,9 @@ class Evolution:
         )
 
     def _decide(self, state: EvolutionState) -> EvolutionState:
-        """Begins a spell of forced evolution when best and mean have stalled over the window; ends it when it has done its work."""
+        """Begins a spell of forced evolution when best and mean have stalled over the window;
+        ends it when it has done its work.
+        """
         config = self.config.forced
         best, mean = state.fitness[0], _finite_mean(state.fitness)
         bests, means = (
@@ -346,7 +363,10 @@ class Evolution:
 
 
 def stop_reason(state: EvolutionState, config: EvolutionConfig) -> str | None:
-    """Why a run is over after this generation, in words; None while it goes on. Reads the state on the host."""
+    """Why a run is over after this generation, in words; None while it goes on.
+
+    Reads the state on the host.
+    """
     if config.target is not None and float(state.fitness[0]) >= config.target:
         return f"the target fitness of {config.target:g} is reached"
     if (

@@ -31,7 +31,8 @@ class Box:
 class Variation:
     """The operators that evolution calls; it knows a genome only as a pytree.
 
-    create: key, count -> genomes [count, ...]. cross: key, genome, genome -> genome. mutate: key, genome -> genome.
+    create: key, count -> genomes [count, ...]. cross: key, genome, genome -> genome. mutate: key,
+    genome -> genome.
     """
 
     create: Callable[[jax.Array, int], Any]
@@ -110,7 +111,9 @@ def uniform(key: jax.Array, box: Box, count: int) -> Any:
 
 
 def latin_hypercube(key: jax.Array, box: Box, count: int) -> Any:
-    """Genomes [count, ...] with one value of every gene in each of `count` slices of its range (McKay, Beckman & Conover 1979)."""
+    """Genomes [count, ...] with one value of every gene in each of `count` slices of its range
+    (McKay, Beckman & Conover 1979).
+    """
 
     def draw(key: jax.Array, shape: tuple[int, ...]) -> jax.Array:
         key_slice, key_within = jax.random.split(key)
@@ -132,7 +135,9 @@ def jittered(
     rate: jax.Array | float,
     sigma: jax.Array | float,
 ) -> jax.Array:
-    """Values [E], each moved with probability `rate` by a Gaussian of `sigma` ranges; never leaves the box."""
+    """Values [E], each moved with probability `rate` by a Gaussian of `sigma` ranges; never
+    leaves the box.
+    """
     key_which, key_by = jax.random.split(key)
     moved = values + sigma * (high - low) * jax.random.normal(key_by, values.shape)
     return jnp.clip(
@@ -141,14 +146,17 @@ def jittered(
 
 
 def first_occurrence(genomes: Any) -> jax.Array:
-    """Whether each genome [N] (leaves [N, ...]) is the first of its kind: a later equal one is a duplicate.
+    """Whether each genome [N] (leaves [N, ...]) is the first of its kind: a later equal one is a
+    duplicate.
 
-    Sorts by a random projection, so the cost grows as N log N; equal genomes have equal projections, and neighbours are compared in full.
+    Sorts by a random projection, so the cost grows as N log N; equal genomes have equal
+    projections, and neighbours are compared in full.
     """
     rows = jnp.concatenate(
         [leaf.reshape(leaf.shape[0], -1) for leaf in jax.tree.leaves(genomes)], axis=1
     )
-    # Elementwise product and sum, row by row alike: a matrix product may round equal rows differently at different places.
+    # Elementwise product and sum, row by row alike: a matrix product may round equal rows
+    # differently at different places.
     projection = jnp.sum(rows * jax.random.normal(jax.random.key(0), (rows.shape[1],)), axis=1)
     order = jnp.argsort(projection, stable=True)
     in_order = rows[order]

@@ -1,4 +1,6 @@
-"""A camera with parallel rays: lengths along the floor stay true, so the scale in the picture can be measured with."""
+"""A camera with parallel rays: lengths along the floor stay true, so the scale in the picture
+can be measured with.
+"""
 
 import dataclasses
 
@@ -9,9 +11,11 @@ UP = np.array([0.0, 0.0, 1.0])
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Camera:
-    """Looks at a creature from its right side, a little from the front and from above, so that it walks to the right.
+    """Looks at a creature from its right side, a little from the front and from above, so that it
+    walks to the right.
 
-    centre: [3] m, in the middle of the picture. forward: [2] unit, the creature's way. scale: pixels/m. width, height: pixels.
+    centre: [3] m, in the middle of the picture. forward: [2] unit, the creature's way. scale:
+    pixels/m. width, height: pixels.
     azimuth: rad, from the side towards the front. elevation: rad.
     """
 
@@ -43,7 +47,9 @@ class Camera:
         return (points - self.centre) @ self.axes[2]
 
     def rays(self, columns: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        """[rows, columns, 3] world points in the plane of the picture, through the middles of pixels."""
+        """[rows, columns, 3] world points in the plane of the picture, through the middles of
+        pixels.
+        """
         right, up, _ = self.axes
         a = (columns + 0.5 - self.width / 2) / self.scale
         b = -(rows + 0.5 - self.height / 2) / self.scale

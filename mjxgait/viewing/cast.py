@@ -1,4 +1,6 @@
-"""Who is shown: the champion of a run, the best of its population, or the best of several generations."""
+"""Who is shown: the champion of a run, the best of its population, or the best of several
+generations.
+"""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -53,7 +55,8 @@ def _walks(run: Path, generation: int | None, ranks: range, seconds: float):
     snapshot = read_snapshot(run, generation)
     if ranks[-1] > len(snapshot.fitness):
         raise UserError(
-            f"{run}: no individual {ranks[-1]}; the population has ranks 1 to {len(snapshot.fitness)}"
+            f"{run}: no individual {ranks[-1]}; the population has ranks 1 to "
+            f"{len(snapshot.fitness)}"
         )
     for rank in ranks:
         i = rank - 1

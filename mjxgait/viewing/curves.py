@@ -1,4 +1,7 @@
-"""Plots of a run over its generations: fitness, what the terms give, diversity. lines: of `metrics.jsonl`."""
+"""Plots of a run over its generations: fitness, what the terms give, diversity.
+
+lines: of `metrics.jsonl`.
+"""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path

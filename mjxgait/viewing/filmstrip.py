@@ -15,7 +15,9 @@ SIZE = (420, 300)
 
 
 def filmstrip(walk: Walk, pictures: int = PICTURES, size: tuple[int, int] = SIZE) -> Image.Image:
-    """One stride in two rows of pictures, each with its part of the stride, its time and the feet that carry weight."""
+    """One stride in two rows of pictures, each with its part of the stride, its time and the
+    feet that carry weight.
+    """
     window, _ = gait_window(walk, 1)
     frames = np.round(np.linspace(window.start, window.stop, pictures, endpoint=False)).astype(int)
     stage = Stage([walk], *size)
@@ -45,5 +47,6 @@ def draw_filmstrip(drawing: Figure, walk: Walk) -> None:
     axes.imshow(filmstrip(walk), interpolation="lanczos")
     axes.set_axis_off()
     axes.set_title(
-        f"{walk.creature.name.replace('_', ' ')}: {what.replace('1 strides', 'one stride')}, in parts of the stride"
+        f"{walk.creature.name.replace('_', ' ')}: {what.replace('1 strides', 'one stride')}, in "
+        "parts of the stride"
     )

@@ -16,7 +16,9 @@ FAR = 100.0
 
 
 def draw_floor(camera: Camera, origin: np.ndarray) -> Image.Image:
-    """Bands of a round width in m, counted from the origin [2] m along the creature's way, and their numbers at the lower edge."""
+    """Bands of a round width in m, counted from the origin [2] m along the creature's way, and
+    their numbers at the lower edge.
+    """
     picture = Image.new("RGB", (camera.width, camera.height), BANDS[0])
     draw = ImageDraw.Draw(picture)
     numbers, step = band_lines(camera, origin)
@@ -29,7 +31,9 @@ def draw_floor(camera: Camera, origin: np.ndarray) -> Image.Image:
 
 
 def band_lines(camera: Camera, origin: np.ndarray) -> tuple[np.ndarray, float]:
-    """Numbers of the lines between bands that may be in the picture, and the width of a band in m."""
+    """Numbers of the lines between bands that may be in the picture, and the width of a band in
+    m.
+    """
     step = band_width(camera.scale)
     middle = int((camera.centre[:2] - origin) @ camera.forward // step)
     reach = (

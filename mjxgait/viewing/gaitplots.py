@@ -17,7 +17,9 @@ ROW = 0.28
 
 
 def gait_window(walk: Walk, strides: int = STRIDES) -> tuple[slice, str]:
-    """The frames to show and what to call them: steady strides, or the beginning of a walk that has none."""
+    """The frames to show and what to call them: steady strides, or the beginning of a walk that
+    has none.
+    """
     found = walk.steady_strides(strides)
     if found:
         return slice(*found), f"{strides} strides from {found[0] * walk.time_step:.2f} s on"

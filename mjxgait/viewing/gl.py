@@ -88,7 +88,9 @@ def gl_pictures(stage: Stage, frames: Sequence[int], backend: str) -> Iterator[I
 
 
 def scene_file(stage: Stage, frames: Sequence[int], path: Path) -> None:
-    """Writes all that the worker needs: poses [F, N, nq] with each creature in its lane, and the camera of every frame."""
+    """Writes all that the worker needs: poses [F, N, nq] with each creature in its lane, and the
+    camera of every frame.
+    """
     cameras = [stage.camera(frame) for frame in frames]
     first = cameras[0]
     into, creature = first.axes[2], stage.walks[0].creature

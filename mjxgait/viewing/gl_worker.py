@@ -1,6 +1,8 @@
-"""Draws with MuJoCo's own renderer in a process of its own: a GL library that is missing or crashes takes nothing else with it.
+"""Draws with MuJoCo's own renderer in a process of its own: a GL library that is missing or crashes
+takes nothing else with it.
 
-`python -m mjxgait.viewing.gl_worker SCENE.npz` writes raw RGB frames to its standard output. Letters: `F` frames, `N` creatures.
+`python -m mjxgait.viewing.gl_worker SCENE.npz` writes raw RGB frames to its standard output.
+Letters: `F` frames, `N` creatures.
 """
 
 import sys
@@ -14,7 +16,9 @@ BAND_GREY = 0.81
 BAND_HEIGHT = 1e-3
 """m above the floor, so that the two do not flicker."""
 SMOOTH = 2
-"""Rendered pixels per pixel and direction: smoother than GL's own samples, and faster where a CPU does the work."""
+"""Rendered pixels per pixel and direction: smoother than GL's own samples, and faster where a
+CPU does the work.
+"""
 SHADOW = 2048
 
 
@@ -46,7 +50,9 @@ def main(path: str) -> None:
 
 
 def _prepared(model: mujoco.MjModel, parts: dict[str, np.ndarray]) -> mujoco.MjModel:
-    """Parallel rays, a plain floor for the bands to lie on, and none of the model's own lamps: all creatures are lit alike."""
+    """Parallel rays, a plain floor for the bands to lie on, and none of the model's own lamps:
+    all creatures are lit alike.
+    """
     width, height = (SMOOTH * int(n) for n in parts["size"])
     model.vis.global_.offwidth, model.vis.global_.offheight = width, height
     model.vis.global_.orthographic, model.vis.global_.fovy = 1, float(parts["extent"])

@@ -1,6 +1,7 @@
 """Draws creatures on a floor with NumPy and Pillow alone: no GPU, no GL library, on any machine.
 
-Every primitive is hit by its own rays and kept by depth; meshes are filled triangle by triangle. Letters: `G` geoms.
+Every primitive is hit by its own rays and kept by depth; meshes are filled triangle by triangle.
+Letters: `G` geoms.
 """
 
 import dataclasses
@@ -39,7 +40,9 @@ class Painter:
     """Draws one kind of creature, any number of them at a time."""
 
     def __init__(self, model: mujoco.MjModel) -> None:
-        """`far` [G] may be set: 1 for parts on the creature's far side, which are drawn paler; 0 for those on its near side."""
+        """`far` [G] may be set: 1 for parts on the creature's far side, which are drawn paler; 0
+        for those on its near side.
+        """
         self.model = model
         self.geoms = seen_geoms(model)
         self.colours = geom_colours(model)[self.geoms, :3]
@@ -52,7 +55,8 @@ class Painter:
         """One frame.
 
         Args:
-          creatures: world positions [ngeom, 3] m and rotations [ngeom, 3, 3] of each creature's geoms.
+          creatures: world positions [ngeom, 3] m and rotations [ngeom, 3, 3] of each creature's
+            geoms.
           origin: [2] m, where the scale on the floor is zero.
         """
         fine = camera.enlarged(SMOOTH)
@@ -145,7 +149,10 @@ class _Canvas:
     def cover(
         self, place: tuple[slice, slice], distance: np.ndarray, normal: np.ndarray, paint: _Paint
     ) -> None:
-        """Paints a rectangle where it is nearer than what is there. distance: [h, w] m; normal: [h, w, 3] in the world."""
+        """Paints a rectangle where it is nearer than what is there.
+
+        distance: [h, w] m; normal: [h, w, 3] in the world.
+        """
         nearer = distance < self.depth[place]
         self.depth[place][nearer] = distance[nearer]
         self.body[place][nearer] = paint.body

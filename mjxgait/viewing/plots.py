@@ -1,4 +1,6 @@
-"""All plots of a run, as PNG and SVG: the one function that the end of training and `mjxgait plot` call."""
+"""All plots of a run, as PNG and SVG: the one function that the end of training and `mjxgait
+plot` call.
+"""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -24,7 +26,8 @@ SECONDS = 10.0
 
 
 def plot_run(run: Path, out: Path | None = None, formats: Sequence[str] = FORMATS) -> list[Path]:
-    """Writes every plot there is something to draw for into RUN/plots (or `out`); returns the files.
+    """Writes every plot there is something to draw for into RUN/plots (or `out`); returns the
+    files.
 
     Raises:
       UserError: not a run folder, nothing to plot yet, or the folder cannot be written.

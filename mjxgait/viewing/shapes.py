@@ -13,7 +13,9 @@ MISS = np.inf
 
 
 class Silhouettes:
-    """Outlines of geoms, from their support functions: of a sphere, a box and an ellipsoid summed."""
+    """Outlines of geoms, from their support functions: of a sphere, a box and an ellipsoid
+    summed.
+    """
 
     def __init__(self, model: mujoco.MjModel, geoms: np.ndarray) -> None:
         parts = [support_extents(model.geom_type[g], model.geom_size[g]) for g in geoms]
@@ -22,7 +24,9 @@ class Silhouettes:
         self.ellipsoid = np.array([p[2] for p in parts])[:, None]
 
     def outermost(self, pos: np.ndarray, rot: np.ndarray, directions: np.ndarray) -> np.ndarray:
-        """Outermost points [G, K, 3] of geoms at pos [G, 3] and rot [G, 3, 3] along unit directions [K, 3]; m."""
+        """Outermost points [G, K, 3] of geoms at pos [G, 3] and rot [G, 3, 3] along unit
+        directions [K, 3]; m.
+        """
         local = directions @ rot
         stretched = local * self.ellipsoid
         length = np.maximum(np.linalg.norm(stretched, axis=2, keepdims=True), 1e-12)

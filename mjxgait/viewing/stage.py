@@ -22,7 +22,10 @@ SMOOTH_SECONDS = 0.6
 
 
 class Stage:
-    """Walks of one creature in lanes side by side, the first one nearest, seen from the side. Frames are control steps."""
+    """Walks of one creature in lanes side by side, the first one nearest, seen from the side.
+
+    Frames are control steps.
+    """
 
     def __init__(self, walks: Sequence[Walk], width: int, height: int) -> None:
         self.walks, self.width, self.height = walks, width, height

@@ -1,4 +1,6 @@
-"""How all plots look: line styles and hatches carry the meaning, so that they can be read in grey."""
+"""How all plots look: line styles and hatches carry the meaning, so that they can be read in
+grey.
+"""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager

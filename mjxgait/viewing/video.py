@@ -34,7 +34,10 @@ class Runner:
 def moving_pictures(
     runners: Sequence[Runner], stage: Stage, fps: int, slow: float = 1.0, backend: str | None = None
 ) -> Iterator[Image.Image]:
-    """The frames of a video. slow: how many times slower than life. backend: of GL; None draws without."""
+    """The frames of a video.
+
+    slow: how many times slower than life. backend: of GL; None draws without.
+    """
     step = runners[0].walk.time_step
     count = max(int(stage.frames * step * slow * fps), 1)
     frames = [min(round(i / fps / slow / step), stage.frames - 1) for i in range(count)]

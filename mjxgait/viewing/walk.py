@@ -1,4 +1,5 @@
-"""A champion's undisturbed walk, simulated once in C MuJoCo: what every picture, video and animation is made of.
+"""A champion's undisturbed walk, simulated once in C MuJoCo: what every picture, video and
+animation is made of.
 
 Letters: `T` frames (control steps), `J` joints, `G` geoms, `nq` as in MuJoCo.
 """
@@ -25,7 +26,11 @@ AFTERMATH = 0.7
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Walk:
-    """One walk. qpos: [T, nq]. fell: s, infinite when it stayed up. It ends with the time asked for, or soon after the fall."""
+    """One walk.
+
+    qpos: [T, nq]. fell: s, infinite when it stayed up. It ends with the time asked for, or soon
+    after the fall.
+    """
 
     creature: Creature
     champion: Champion
@@ -69,7 +74,9 @@ class Walk:
         return starts[starts * self.time_step < self.fell]
 
     def steady_strides(self, count: int) -> tuple[int, int] | None:
-        """First and last frame of `count` strides in a row whose durations are nearest to the usual; None when there are not so many."""
+        """First and last frame of `count` strides in a row whose durations are nearest to the
+        usual; None when there are not so many.
+        """
         starts = self.stride_frames()
         settled = starts[starts * self.time_step >= WARMUP]
         starts = settled if len(settled) > count else starts

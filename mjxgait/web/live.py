@@ -1,7 +1,9 @@
-"""A page on this machine that shows a run as it learns: the best so far walking, and the curve growing.
+"""A page on this machine that shows a run as it learns: the best so far walking, and the curve
+growing.
 
-It only reads the run folder, in a process of its own, so it cannot disturb a training and works on a finished run as well. The browser
-plays the animation; all that costs time here is one short simulation when the champion has changed.
+It only reads the run folder, in a process of its own, so it cannot disturb a training and works on
+a finished run as well. The browser plays the animation; all that costs time here is one short
+simulation when the champion has changed.
 """
 
 import contextlib
@@ -63,7 +65,8 @@ class Watcher:
             return PATIENCE
         if changed != self._seen:
             self._seen = changed
-            # Half a file cannot be met with: it is replaced in one go. A foreign one is left to the other commands to report.
+            # Half a file cannot be met with: it is replaced in one go. A foreign one is left to the
+            # other commands to report.
             with contextlib.suppress(UserError):
                 self.shown = self._shown()
         return max(PATIENCE, (time.process_time() - began) * (1 / SHARE - 1))
@@ -144,7 +147,8 @@ def open_server(watcher: Watcher, port: int | None = None) -> ThreadingHTTPServe
         except OSError:
             continue
     raise UserError(
-        f"port {port or f'{PORTS.start} to {PORTS.stop - 1}'}: taken by another program; name a free one with --port"
+        f"port {port or f'{PORTS.start} to {PORTS.stop - 1}'}: taken by another program; name a "
+        "free one with --port"
     )
 
 

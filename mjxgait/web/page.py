@@ -1,4 +1,6 @@
-"""One HTML file that plays a walk in 3D by double click: nothing in it asks the network for anything."""
+"""One HTML file that plays a walk in 3D by double click: nothing in it asks the network for
+anything.
+"""
 
 import base64
 import html
@@ -53,8 +55,9 @@ def build_page(walk: Walk, loop: WalkLoop, sections: str) -> str:
     )
     stride = loop.times[-1] / loop.strides
     lead = (
-        f"{loop.speed:.2f} m/s, {loop.speed / walk.creature.body_length:.2f} body lengths per second; "
-        f"a stride takes {stride:.2f} s and leads {loop.advance / loop.strides:.2f} m forward."
+        f"{loop.speed:.2f} m/s, {loop.speed / walk.creature.body_length:.2f} body lengths per "
+        f"second; a stride takes {stride:.2f} s and leads {loop.advance / loop.strides:.2f} m "
+        "forward."
     )
     return string.Template((web / "page.html").read_text(encoding="utf-8")).substitute(
         title=html.escape(walk.creature.name.replace("_", " ")),
@@ -124,7 +127,8 @@ def _origin(creature: Creature, champion: Champion) -> str:
     rows = [
         [
             "creature",
-            f"{creature.name} (body {creature.digest}), {creature.mass:.1f} kg, {len(creature.joint_names)} joints",
+            f"{creature.name} (body {creature.digest}), {creature.mass:.1f} kg, "
+            f"{len(creature.joint_names)} joints",
         ],
         ["fitness", f"{champion.fitness:.3f}"],
         ["found in generation", str(origin.get("born", "unknown"))],

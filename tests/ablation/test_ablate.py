@@ -1,4 +1,6 @@
-"""The command as a user runs it: a report with everything, rows that equal runs alone, kills that lose nothing."""
+"""The command as a user runs it: a report with everything, rows that equal runs alone, kills
+that lose nothing.
+"""
 
 import json
 import re

@@ -29,7 +29,9 @@ RESULT = Result(
 def report(
     creature: Creature, folder: Path, measure: str = "walk", settings: dict | None = None, **other
 ) -> str:
-    """Of two variants: the base's runs lie around RESULT, the other's are changed by these amounts or to these values."""
+    """Of two variants: the base's runs lie around RESULT, the other's are changed by these
+    amounts or to these values.
+    """
     variants = (
         VariantTable("base"),
         VariantTable("other", settings or {"evolution": {"mutation_rate": 0.4}}),

@@ -90,7 +90,9 @@ def test_wilsons_interval_as_published():
 
 
 def test_no_difference_is_found_in_19_of_20_null_studies():
-    """Three variants that are the base, in 200 studies of seeds 0 to 199: false alarms in at most about one of twenty."""
+    """Three variants that are the base, in 200 studies of seeds 0 to 199: false alarms in at
+    most about one of twenty.
+    """
     alarms = 0
     for seed in range(200):
         samples = RNG(seed).gamma(2.0, 1.0, (4, 16))

@@ -1,4 +1,6 @@
-"""The exported animation: the same motion as MuJoCo's, without a seam, and valid for every program that reads glTF."""
+"""The exported animation: the same motion as MuJoCo's, without a seam, and valid for every
+program that reads glTF.
+"""
 
 import json
 import shutil
@@ -52,7 +54,9 @@ def matrix(translation, quat):
 
 
 def node_poses(document, frame=None):
-    """World matrix of each joint of the skin by name, at a key frame or, without one, at rest; from the file alone."""
+    """World matrix of each joint of the skin by name, at a key frame or, without one, at rest;
+    from the file alone.
+    """
     local = [
         (np.array(n.translation or [0, 0, 0]), np.array(n.rotation or [0, 0, 0, 1]))
         for n in document.nodes

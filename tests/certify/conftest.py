@@ -17,7 +17,9 @@ def tiny(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def trotter(tiny):
-    """One diagonal pair swings while the other pushes: hip and knee angles per leg, found by hand."""
+    """One diagonal pair swings while the other pushes: hip and knee angles per leg, found by
+    hand.
+    """
     column = {name: i for i, name in enumerate(tiny.joint_names)}
     poses = np.zeros((2, 8))
     for leg in LEGS:

@@ -185,7 +185,8 @@ def test_footfall_phases_are_those_put_in():
     np.testing.assert_allclose(phases, [0.0, 0.5, 0.75, 0.25], atol=0.01)
 
 
-# Order of the phases: front left, front right, hind left, hind right; when each foot stands, in cycles.
+# Order of the phases: front left, front right, hind left, hind right; when each foot stands, in
+# cycles.
 @pytest.mark.parametrize(
     ("phases", "duty", "name"),
     [

@@ -1,4 +1,6 @@
-"""The simulator: right rows, no leaks, the same as a plain loop over MuJoCo, and what is measured from it."""
+"""The simulator: right rows, no leaks, the same as a plain loop over MuJoCo, and what is
+measured from it.
+"""
 
 import dataclasses
 import subprocess
@@ -48,7 +50,9 @@ def outcome(tiny, trotter, mixed):
 
 
 def plain_loop(creature, champion, starts, row, seconds):
-    """One simulation on an MjData with a model of its own, nothing shared with the batch; returns the states before each step."""
+    """One simulation on an MjData with a model of its own, nothing shared with the batch;
+    returns the states before each step.
+    """
     model = examined_model(creature)
     model.geom_friction[:, 0] *= starts.friction[row]
     model.body_mass[:] *= starts.mass[row]

@@ -1,4 +1,6 @@
-"""docs/worked-example.md: its code, run as it stands, comes to the certificate's numbers, and its table shows them."""
+"""docs/worked-example.md: its code, run as it stands, comes to the certificate's numbers, and
+its table shows them.
+"""
 
 import ast
 import json

@@ -1,4 +1,7 @@
-"""Runs a share of the hostile inputs: python -m importing.fuzz_batch SCRATCH SHARE SHARES. Prints a line before and after each."""
+"""Runs a share of the hostile inputs: python -m importing.fuzz_batch SCRATCH SHARE SHARES.
+
+Prints a line before and after each.
+"""
 
 import sys
 import time

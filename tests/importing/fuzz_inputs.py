@@ -1,4 +1,7 @@
-"""Broken, hostile and absurd inputs, the same every time. Each is a name, a kind of file and its text."""
+"""Broken, hostile and absurd inputs, the same every time.
+
+Each is a name, a kind of file and its text.
+"""
 
 import random
 import re

@@ -1,4 +1,6 @@
-"""Two small animals that tests import: an MJCF quadruped with what real files hold, and a URDF biped."""
+"""Two small animals that tests import: an MJCF quadruped with what real files hold, and a URDF
+biped.
+"""
 
 from functools import reduce
 

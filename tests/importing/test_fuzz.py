@@ -1,4 +1,6 @@
-"""Hundreds of broken and hostile inputs: each gives a creature or one sentence, no traceback, hang, crash or read outside."""
+"""Hundreds of broken and hostile inputs: each gives a creature or one sentence, no traceback,
+hang, crash or read outside.
+"""
 
 import os
 import subprocess

@@ -86,7 +86,9 @@ def test_texts_come_back_from_creature_toml_as_they_were(text: str):
 
 
 def test_a_body_shorter_than_its_legs_is_as_long_as_they_are(tmp_path):
-    """Speeds are wanted and judged in body lengths; a biped measured from back to toes would be praised for shuffling."""
+    """Speeds are wanted and judged in body lengths; a biped measured from back to toes would be
+    praised for shuffling.
+    """
     for kind, text in (("urdf", BIPED), ("xml", QUADRUPED)):
         creature, imported = bring(tmp_path, text, kind)
         assert told(imported, "body_length") == (text is BIPED)
@@ -94,7 +96,9 @@ def test_a_body_shorter_than_its_legs_is_as_long_as_they_are(tmp_path):
 
 
 def test_joints_with_heavy_rotors_are_stiff_and_strong_enough_to_stride(tmp_path):
-    """The rotor inertia of gym's ant is a hundred times what its weight needs: with gains from the weight alone it moves in slow motion."""
+    """The rotor inertia of gym's ant is a hundred times what its weight needs: with gains from
+    the weight alone it moves in slow motion.
+    """
     slow, _ = bring(tmp_path, QUADRUPED)
     quick, imported = bring(
         tmp_path, QUADRUPED.replace("<default>", '<default><joint armature="1"/>')
@@ -126,7 +130,9 @@ def motionless(creature: Creature, gains: dict[str, float]) -> Champion:
 
 @pytest.mark.parametrize("axis", ["pitch", "roll"])
 def test_it_stands_with_the_strongest_balance_feedback(tmp_path, axis):
-    """A loop that is too strong for the body shakes a standing creature off its feet; then hardly any genome survives to be improved."""
+    """A loop that is too strong for the body shakes a standing creature off its feet; then
+    hardly any genome survives to be improved.
+    """
     creature, _ = bring(tmp_path, ROLLING)
     ranges = resolve_config(creature.settings.train, creature.name).controller.tuning
     gains = {name: getattr(ranges, name)[1] for name in (axis, f"{axis}_rate")}
@@ -244,7 +250,9 @@ def test_refusals_name_the_element_in_one_sentence(tmp_path, case):
 
 
 def test_no_mesh_outside_the_model_s_folder_is_read(tmp_path):
-    """The same file is used from inside and ignored outside, through a path, an absolute path and a link."""
+    """The same file is used from inside and ignored outside, through a path, an absolute path
+    and a link.
+    """
     home = tmp_path / "home"
     home.mkdir()
     corners = [(0, 0, 0), (0.1, 0, 0), (0, 0.1, 0), (0, 0, 0.1)]

@@ -1,4 +1,6 @@
-"""Real models: file, creature folder, `load_creature`, standing for two seconds, the same animal."""
+"""Real models: file, creature folder, `load_creature`, standing for two seconds, the same
+animal.
+"""
 
 from pathlib import Path
 

@@ -1,4 +1,6 @@
-"""Real models: from the file to a certified walk with nothing in between, as a user's commands do it."""
+"""Real models: from the file to a certified walk with nothing in between, as a user's commands
+do it.
+"""
 
 import os
 import subprocess
@@ -12,7 +14,10 @@ from mjxgait.certify import read_certificate
 from mjxgait.runs.folder import CERTIFICATE
 
 WALKERS = os.environ.get("MJXGAIT_TEST_WALKERS", "unitree a1").split(",")
-"""A minute each. `benchmarks/imported.py` walks the whole list; docs/your-own-creature.md has what came of it."""
+"""A minute each.
+
+`benchmarks/imported.py` walks the whole list; docs/your-own-creature.md has what came of it.
+"""
 pytestmark = pytest.mark.slow
 
 

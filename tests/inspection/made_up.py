@@ -18,7 +18,9 @@ FORCED = 2
 
 
 def make_state(creature, config, generation):
-    """Everybody's poses are the first key pose of rank 1 moved by the rank and the generation, in degrees."""
+    """Everybody's poses are the first key pose of rank 1 moved by the rank and the generation,
+    in degrees.
+    """
     ranks = np.arange(POPULATION)
     poses = (
         np.broadcast_to(creature.stand, (POPULATION, 2, len(creature.joint_names)))

@@ -1,4 +1,6 @@
-"""`mjxgait inspect` tells what a checkpoint holds, quickly, and says clearly what is wrong with one that is not whole."""
+"""`mjxgait inspect` tells what a checkpoint holds, quickly, and says clearly what is wrong with
+one that is not whole.
+"""
 
 import json
 import os

@@ -1,4 +1,7 @@
-"""`mjxgait view`: a page on this machine that follows a run. The browser test needs Chromium (apt: chromium) and playwright."""
+"""`mjxgait view`: a page on this machine that follows a run.
+
+The browser test needs Chromium (apt: chromium) and playwright.
+"""
 
 import json
 import os
@@ -156,7 +159,8 @@ def test_the_page_shows_the_best_and_the_curve_grows(browser, site, run, stool):
     watcher.look()
     wait_until(
         tab,
-        "document.getElementById('walk').src.includes('version=2') && document.getElementById('walk').loaded",
+        "document.getElementById('walk').src.includes('version=2') && "
+        "document.getElementById('walk').loaded",
     )
     assert tab.inner_html("#curve") != before
     assert not is_blank(canvas(tab))

@@ -1,4 +1,6 @@
-"""The painter that needs no GPU and no GL: shapes where MuJoCo has them, lengths that can be measured."""
+"""The painter that needs no GPU and no GL: shapes where MuJoCo has them, lengths that can be
+measured.
+"""
 
 import mujoco
 import numpy as np
