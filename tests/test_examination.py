@@ -25,7 +25,6 @@ from mjxgait.runs.folder import CERTIFICATE, EXAMS, create_run, read_metrics
 from mjxgait.runs.screen import Screen
 from mjxgait.search.evolution import EvolutionState
 from mjxgait.settings.config import ExaminationConfig
-from mjxgait.tasks.walk.fitness import TERMS
 
 SECONDS = 0.4
 
@@ -58,12 +57,12 @@ def state_with(
     experiment: Experiment, generation: int, speed: float = 0.7, alive: float = 1.0
 ) -> EvolutionState:
     """A population whose best walks at a speed in body lengths/s on both starts."""
-    state = experiment.init()
-    best = np.zeros(state.terms.shape[1:], np.float32)
-    best[:, TERMS.index("distance")] = speed * SECONDS
-    best[:, TERMS.index("alive")] = [1.0, alive]
+    state, names = experiment.init(), experiment.simulator.task.outcomes
+    best = np.zeros(state.outcome.shape[1:], np.float32)
+    best[:, names.index("forward")] = speed * SECONDS * experiment.creature.body_length
+    best[:, names.index("seconds")] = [SECONDS, alive * SECONDS]
     return dataclasses.replace(
-        state, generation=jnp.int32(generation), terms=state.terms.at[0].set(best)
+        state, generation=jnp.int32(generation), outcome=state.outcome.at[0].set(best)
     )
 
 

@@ -173,7 +173,7 @@ def test_stands_where_plain_pd_blows_up(stiff: Creature):
 
     def step(state: BodyState) -> tuple[BodyState, jax.Array]:
         sensed, workings = simulator.plant.forward(state)
-        torque = simulator.torque(law, state, sensed, workings, target)
+        torque = simulator.drive.torque(simulator.plant, law, state, sensed, workings, target)
         force = jnp.zeros((stiff.model.nv, 2)).at[stiff.dof_adr].set(torque)
         return simulator.plant.advance(state, workings, force), sensed.joint_vel
 

@@ -14,7 +14,6 @@ from mjxgait.certify.controller import Controller, Senses
 from mjxgait.certify.measure import Recording, measure
 from mjxgait.certify.simulate import Trajectory, simulate
 from mjxgait.certify.starts import nominal_starts
-from mjxgait.certify.strides import stride_starts
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 
@@ -69,8 +68,9 @@ class Walk:
         return self.body_poses()[0][:, self.creature.trunk]
 
     def stride_frames(self) -> np.ndarray:
-        """Frames at which a stride begins, while the creature is up."""
-        starts = stride_starts(self.recording)
+        """Frames at which the controller's cycle begins anew, while the creature is up: a loop of
+        whole cycles has no seam, which one of footfalls would have."""
+        starts = np.flatnonzero(np.diff(self.trajectory.position[0]) < 0) + 1
         return starts[starts * self.time_step < self.fell]
 
     def steady_strides(self, count: int) -> tuple[int, int] | None:

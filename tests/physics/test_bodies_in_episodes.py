@@ -43,7 +43,7 @@ def tallies(request: pytest.FixtureRequest, stool: Creature) -> tuple[Tally, lis
     experiment = build_experiment(stool, small_config(rollout=settings))
     simulator, plant = experiment.simulator, experiment.simulator.plant
     numbers = jax.device_get([plant.heavier(plant.parameters, factor) for factor in BODIES])
-    box = Box(*simulator.tracker.bounds(experiment.config.controller))
+    box = Box(*simulator.controller.bounds(experiment.config.controller))
     arguments = jax.tree.map(
         lambda leaf: leaf[None],
         (

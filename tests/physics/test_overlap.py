@@ -27,7 +27,7 @@ from mjxgait.physics.layout import sense_layout
 from mjxgait.physics.plain import mjx_plant
 from mjxgait.settings.config import FitnessConfig
 from mjxgait.simulation.rollout import CHECK_EVERY, Lane, Simulator
-from mjxgait.tasks.walk.fitness import DEEP, TERMS, TOUCHING, fitness_terms
+from mjxgait.tasks.walk.fitness import DEEP, TOUCHING, fitness_terms
 from mjxgait.tasks.walk.tally import Judge, Reason, Tally
 from mjxgait.types import BodyState
 
@@ -255,7 +255,8 @@ def test_the_tally_keeps_the_deepest_of_the_time_that_counts(stool: Creature):
     simulator = cast(
         Any, SimpleNamespace(plant=SimpleNamespace(overlap=lambda _: depth), steps=100)
     )
-    lane = cast(Any, Lane)(*[None] * 4, tally, *[None] * 3)
+    fields = dict.fromkeys(field.name for field in dataclasses.fields(Lane))
+    lane = cast(Any, Lane)(**(fields | {"tally": tally}))
     found = Simulator._look_for_overlap(simulator, lane).tally
     np.testing.assert_allclose(found.overlap, [0.03, 0.04, 0.0, 0.0, 0.01])
 
@@ -265,7 +266,7 @@ def term(creature: Creature, tally: Tally, forward: float) -> float:
     tally = dataclasses.replace(
         tally, forward=jnp.float32(forward * creature.body_length), steps=jnp.int32(200)
     )
-    return float(fitness_terms(creature, config, 0.005, 200, tally)[TERMS.index("overlap")])
+    return float(fitness_terms(creature, config, 0.005, 200, tally)["overlap"])
 
 
 def test_the_term_grows_with_depth_and_counts_as_far_as_there_is_a_walk(stool: Creature):

@@ -18,7 +18,7 @@ def test_targets_are_those_of_the_examiner(stool_walk):
     from mjxgait.certify.controller import Controller
 
     planned = Controller(stool_walk.creature, stool_walk.champion).planned(
-        stool_walk.recording.position
+        stool_walk.trajectory.position[0]
     )
     np.testing.assert_allclose(stool_walk.targets(), planned)
 
