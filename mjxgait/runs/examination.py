@@ -7,7 +7,7 @@ import numpy as np
 
 from mjxgait.certify import Certificate, CertificateConfig, Glance, certify, glance, rehearse
 from mjxgait.champion import Champion
-from mjxgait.runs.checkpoint import disk_errors
+from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.exams import Exams
 from mjxgait.runs.experiment import Experiment
 from mjxgait.search.evolution import EvolutionState

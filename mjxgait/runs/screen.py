@@ -110,8 +110,8 @@ class Screen:
         self.console.print(f"{why[0].upper()}{why[1:]}; {seconds:.0f} s.")
         table = Table(box=None, show_header=False, pad_edge=False)
         rows = {
-            "best fitness": f"{last['best']:.3f} in generation {last['generation']}",
-            "forward": f"{last['outcome_forward']:.2f} m per episode, mean of the starts",
+            "best fitness": _best(last),
+            "forward": _forward(last),
             "champion": str(folder / CHAMPION),
             "metrics": f"{folder / METRICS}, {folder / PLOT}",
             "settings": f"{folder / CONFIG}, {folder / CREATURE}/",
@@ -121,3 +121,15 @@ class Screen:
         self.console.print(table)
         if interrupted:
             self.console.print(f"To go on: mjxgait train --resume {folder}")
+
+
+def _best(last: Mapping[str, Any]) -> str:
+    """The best fitness in words; a generation that nobody could be judged in has none."""
+    if last["best"] is None:
+        return f"none: nobody could be judged in generation {last['generation']}"
+    return f"{last['best']:.3f} in generation {last['generation']}"
+
+
+def _forward(last: Mapping[str, Any]) -> str:
+    metres = last["outcome_forward"]
+    return "-" if metres is None else f"{metres:.2f} m per episode, mean of the starts"
