@@ -36,6 +36,11 @@ def _attitude(creature: Creature, sensed: Sensed, axis: np.ndarray) -> jax.Array
     return jnp.clip((sensed.trunk_rot @ axis.astype(np.float32))[2], -1.0, 1.0)
 
 
+def _rate(creature: Creature, sensed: Sensed, axis: np.ndarray) -> jax.Array:
+    """Angular velocity of the trunk about one of its own axes."""
+    return sensed.trunk_angvel @ (sensed.trunk_rot @ axis.astype(np.float32))
+
+
 SENSES: Mapping[str, Sense] = {
     "time": lambda creature, sensed, time: time,
     "joint_pos": lambda creature, sensed, time: sensed.joint_pos,
@@ -53,6 +58,8 @@ SENSES: Mapping[str, Sense] = {
         -jnp.arcsin(_attitude(creature, sensed, creature.forward))
     ),
     "roll": lambda creature, sensed, time: jnp.arcsin(_attitude(creature, sensed, creature.left)),
+    "pitch_rate": lambda creature, sensed, time: _rate(creature, sensed, creature.left),
+    "roll_rate": lambda creature, sensed, time: _rate(creature, sensed, creature.forward),
 }
 """Names, with shapes and units in docs/controller.md."""
 

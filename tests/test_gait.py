@@ -40,7 +40,11 @@ def random_poses(creature: Creature, count: int = 3) -> np.ndarray:
 
 
 def sensed(
-    creature: Creature, joints: np.ndarray, rotation: np.ndarray | None = None, offset: float = 0.0
+    creature: Creature,
+    joints: np.ndarray,
+    rotation: np.ndarray | None = None,
+    offset: float = 0.0,
+    spin: np.ndarray | None = None,
 ) -> dict[str, jax.Array]:
     """What the controller reads."""
     nothing = jnp.zeros(3)
@@ -51,7 +55,7 @@ def sensed(
         trunk_pos=jnp.asarray(np.add(creature.stand_pos, [0, offset, 0]), jnp.float32),
         trunk_rot=jnp.asarray(np.eye(3) if rotation is None else rotation, jnp.float32),
         trunk_vel=nothing,
-        trunk_angvel=nothing,
+        trunk_angvel=nothing if spin is None else jnp.asarray(spin, jnp.float32),
         geom_pos=jnp.zeros((len(creature.watched), 3)),
         geom_low=jnp.zeros(len(creature.watched)),
     )
@@ -216,9 +220,7 @@ def test_rates_of_the_trunk_are_its_own(stool: Creature, gene: int, weight: str,
     """About the trunk's axes, wherever it heads: it looks left, and turns in the world's frame."""
     creature = dataclasses.replace(stool, **{weight: np.array([1.0, 0, 0, 0])})
     left_turned = turned(2, np.pi / 2)
-    still = sensed(stool, stool.stand, left_turned)
-    spinning = jnp.asarray(left_turned @ [0.2, 0.3, 5.0], jnp.float32)
-    moving = still | {"trunk_angvel": spinning}
+    moving = sensed(stool, stool.stand, left_turned, spin=left_turned @ [0.2, 0.3, 5.0])
     genes, stand = jnp.zeros(len(TUNING)).at[gene].set(1.0), jnp.asarray(stool.stand, jnp.float32)
     change = corrections(creature, genes, stand, moving)
     assert np.allclose(change, [expected, 0, 0, 0], atol=1e-5)

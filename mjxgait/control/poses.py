@@ -13,7 +13,6 @@ import numpy as np
 from mjxgait.control.pose_variation import pose_variation
 from mjxgait.control.protocol import Command, Senses
 from mjxgait.creature import Creature
-from mjxgait.creature.frame import start_axes, start_position
 from mjxgait.search.variation import Box, Variation, in_ranges
 from mjxgait.settings.config import ControllerConfig, EvolutionConfig, TuningRanges
 from mjxgait.settings.traced import chosen
@@ -65,7 +64,7 @@ class PoseTracker:
 
     creature: Creature
     step: float
-    reads = ("joint_pos", "trunk_pos", "trunk_rot", "trunk_angvel")
+    reads = ("joint_pos", "heading", "aside", "pitch", "roll", "pitch_rate", "roll_rate")
     command: ClassVar[Command] = "pose"
 
     def bounds(self, config: ControllerConfig) -> tuple[Genome, Genome]:
@@ -160,25 +159,16 @@ def interpolate(
     return jnp.sum(weight[:, None] * poses, axis=0)
 
 
-def heading_error(creature: Creature, senses: Senses) -> tuple[jax.Array, jax.Array, jax.Array]:
-    """Forward [3] and left [3] of the trunk in the world, and its heading [] in rad, left of the start's forward."""
-    forward, left = (
-        senses["trunk_rot"] @ axis.astype(np.float32) for axis in (creature.forward, creature.left)
-    )
-    start_forward, start_left = start_axes(creature)
-    return forward, left, jnp.arctan2(forward @ start_left, forward @ start_forward)
-
-
 def corrections(
     creature: Creature, tuning: jax.Array, target: jax.Array, senses: Senses
 ) -> jax.Array:
     """Change [J] of the target pose by steering and balance; zero where the genes are zero."""
-    forward, left, heading = heading_error(creature, senses)
-    offset = (senses["trunk_pos"] - start_position(creature)) @ start_axes(creature)[1]
-    steer = _clip(tuning[STEER] * (heading + offset / (2 * creature.body_length)))
-    pitch, roll = -jnp.arcsin(jnp.clip(forward[2], -1, 1)), jnp.arcsin(jnp.clip(left[2], -1, 1))
-    pitch = _clip(tuning[PITCH] * pitch + tuning[PITCH_RATE] * (senses["trunk_angvel"] @ left))
-    roll = _clip(tuning[ROLL] * roll + tuning[ROLL_RATE] * (senses["trunk_angvel"] @ forward))
+    aside = senses["aside"] / (2 * creature.body_length)
+    steer = _clip(tuning[STEER] * (senses["heading"] + aside))
+    pitch, roll = (
+        _clip(tuning[angle] * senses[name] + tuning[rate] * senses[f"{name}_rate"])
+        for name, angle, rate in (("pitch", PITCH, PITCH_RATE), ("roll", ROLL, ROLL_RATE))
+    )
     bend, stride, on_pitch, on_roll, stand = (
         value.astype(np.float32)
         for value in (

@@ -2,7 +2,7 @@
 
 "Stable proportional-derivative controllers" in two elementwise parts, which serve one creature or a
 batch. What lies between them, the solve with `M + h diag(kd)`, belongs to whoever holds the mass
-matrix: `rollout.Simulator.torque` joins all three.
+matrix: `drive.Drive.torque` joins all three.
 """
 
 import jax

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
-from mjxgait.inspect.facts import TUNING, fitness_summary, flat
+from mjxgait.control.poses import TUNING
+from mjxgait.inspect.facts import fitness_summary, flat
 from mjxgait.inspect.snapshot import Snapshot
 from mjxgait.inspect.text import print_pairs, show, titled_table
 

@@ -15,15 +15,14 @@ import numpy as np
 
 from mjxgait.certify import outdated, read_certificate
 from mjxgait.champion import read_champion
+from mjxgait.control.poses import TUNING
 from mjxgait.errors import UserError
 from mjxgait.inspect.snapshot import Snapshot
 from mjxgait.runs.folder import CERTIFICATE, CHAMPION
 from mjxgait.search.evolution import Origin
-from mjxgait.settings.config import TuningRanges
 from mjxgait.settings.layers import resolve_config
 from mjxgait.tasks.walk.fitness import TERMS, signed_weights
 
-TUNING = tuple(field.name for field in dataclasses.fields(TuningRanges))
 KINDS = {
     Origin.INITIAL: "initial",
     Origin.CROSSOVER: "crossover",

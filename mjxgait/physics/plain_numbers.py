@@ -15,7 +15,7 @@ from mjxgait.creature import geometry
 from mjxgait.creature.overlap import Crossings
 from mjxgait.physics.layout import SenseLayout
 from mjxgait.physics.overlap import Bars, read_bars
-from mjxgait.physics.weights import inverse_weights
+from mjxgait.physics.weights import inverse_weights, weight_groups
 from mjxgait.types import Number, pytree
 
 with contextlib.redirect_stdout(
@@ -126,7 +126,7 @@ def reweighed(model: mjx.Model, data: mjx.Data, numbers: ModelNumbers) -> ModelN
     moves = below.T[:, model.dof_bodyid] > 0
     jacobian = jnp.concatenate([moved, jnp.broadcast_to(turn, moved.shape)], axis=2)
     jacobian = jnp.where(moves[:, :, None], jacobian, 0.0).swapaxes(1, 2)
-    bodies, dofs = inverse_weights(mass, jacobian, _groups(model))
+    bodies, dofs = inverse_weights(mass, jacobian, weight_groups(model.jnt_type))
     return _with(numbers, body_invweight0=bodies, dof_invweight0=dofs)
 
 
@@ -151,14 +151,3 @@ def _below(model: mjx.Model) -> np.ndarray:
     for b in range(model.nbody - 1, 0, -1):
         below[model.body_parentid[b]] += below[b]
     return below
-
-
-def _groups(model: mjx.Model) -> list[range]:
-    """Degrees of freedom that share a weight: the shifts of a free joint, the turns of a joint."""
-    sizes = {mujoco.mjtJoint.mjJNT_FREE: (3, 3), mujoco.mjtJoint.mjJNT_BALL: (3,)}
-    groups: list[range] = []
-    for kind, start in zip(model.jnt_type, model.jnt_dofadr, strict=True):
-        for size in sizes.get(int(kind), (1,)):
-            groups.append(range(int(start), int(start) + size))
-            start += size
-    return groups

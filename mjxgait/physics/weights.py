@@ -12,7 +12,24 @@ from collections.abc import Sequence
 
 import jax
 import jax.numpy as jnp
+import mujoco
 import numpy as np
+
+SHARED = {int(mujoco.mjtJoint.mjJNT_FREE): (3, 3), int(mujoco.mjtJoint.mjJNT_BALL): (3,)}
+"""Sizes of the groups of a joint's degrees of freedom that share a weight."""
+
+
+def weight_groups(kinds: Sequence[int]) -> list[range]:
+    """Degrees of freedom that share a weight, of joints of MuJoCo's kinds in the model's order.
+
+    The three shifts of a free joint do, the three turns of a free or ball joint, and else each alone.
+    """
+    groups: list[range] = []
+    for kind in kinds:
+        for size in SHARED.get(int(kind), (1,)):
+            start = groups[-1].stop if groups else 0
+            groups.append(range(start, start + size))
+    return groups
 
 
 def inverse_weights(

@@ -40,29 +40,6 @@ class Variation:
     mutate: Callable[[jax.Array, Any], Any]
 
 
-def box_variation(box: Box, config: EvolutionConfig) -> Variation:
-    """Operators for a genome of real numbers within a box, plain or traced config.
-
-    Each gene of a child comes from the one or the other parent; a mutation moves each, with
-    probability `tuning_rate`, by a Gaussian of `sigma` ranges.
-    """
-    middle = narrowed(box, config.initial_spread)
-
-    def cross(key: jax.Array, mother: Any, father: Any) -> Any:
-        def pick(key: jax.Array, a: jax.Array, b: jax.Array) -> jax.Array:
-            return jnp.where(jax.random.bernoulli(key, 0.5, a.shape), a, b)
-
-        return _leafwise(key, pick, mother, father)
-
-    def mutate(key: jax.Array, genome: Any) -> Any:
-        def move(key: jax.Array, value: jax.Array, low: jax.Array, high: jax.Array) -> jax.Array:
-            return jittered(key, value, low, high, config.tuning_rate, config.sigma)
-
-        return _leafwise(key, move, genome, box.low, box.high)
-
-    return Variation(create=creation(middle, config), cross=cross, mutate=mutate)
-
-
 def creation(box: Box, config: EvolutionConfig) -> Callable[[jax.Array, int], Any]:
     """How the first genomes are drawn from a box: uniformly or as a Latin hypercube."""
 
@@ -74,15 +51,6 @@ def creation(box: Box, config: EvolutionConfig) -> Callable[[jax.Array, int], An
         )
 
     return create
-
-
-def _leafwise(key: jax.Array, function: Callable[..., jax.Array], *trees: Any) -> Any:
-    """A function of a key and one leaf of each tree, applied to all leaves."""
-    leaves, shape = zip(*(jax.tree.flatten(tree) for tree in trees), strict=True)
-    keys = jax.random.split(key, len(leaves[0]))
-    return jax.tree.unflatten(
-        shape[0], [function(*parts) for parts in zip(keys, *leaves, strict=True)]
-    )
 
 
 def narrowed(box: Box, share: jax.Array | float) -> Box:

@@ -49,7 +49,7 @@ def through_generations(run: Path, generations: Sequence[int], seconds: float) -
 
 
 def _walks(run: Path, generation: int | None, ranks: range, seconds: float):
-    from mjxgait.inspect.facts import TUNING
+    from mjxgait.control.poses import TUNING
     from mjxgait.inspect.snapshot import read_snapshot
 
     snapshot = read_snapshot(run, generation)

@@ -13,18 +13,14 @@ from mjxgait.physics.fast.parameters import Parameters
 from mjxgait.physics.fast.slots import BALL, FREE, FREEDOMS
 from mjxgait.physics.fast.structure import Structure, join, scalars
 from mjxgait.physics.fast.topology import Topology
-from mjxgait.physics.weights import inverse_weights
+from mjxgait.physics.weights import inverse_weights, weight_groups
 
 
 def reweighed(topology: Topology, parameters: Parameters) -> Parameters:
     """One body's numbers with the weights of its contacts and limits computed anew."""
     numbers = jax.tree.map(lambda x: jnp.asarray(x, jnp.float32), parameters)
     structure = join(topology, numbers, np.dtype(np.float32))
-    groups, start = [], 0
-    for joint in topology.joints:
-        for size in (3,) * (FREEDOMS[joint.kind] // 3) or (1,):
-            groups.append(range(start, start + size))
-            start += size
+    groups = weight_groups([joint.kind for joint in topology.joints])
     body, dof = inverse_weights(*_at_rest(structure), groups)
     carried = np.array([contact.body for contact in topology.contacts], int)
     limited = np.array([limit.dof for limit in topology.limits], int)
