@@ -37,6 +37,23 @@ Evolve a stable walk for any creature.
 `mjxgait SUBCOMMAND --help` tells the options of each."""
 
 
+def _with_own_parts(given: Sequence[str]) -> list[str]:
+    """The options of a subcommand, after the code that `--controller` and `--task` name is loaded.
+
+    Only here: no run folder, model or settings file can have code loaded.
+    """
+    command, *rest = given
+    flags = ("--controller", "--task")
+    if not any(argument.partition("=")[0] in flags for argument in rest):
+        return rest
+    from mjxgait.parts.own import take_own
+
+    rest, named = take_own(rest)
+    if command == "train":
+        rest += [word for kind, name in named.items() for word in (f"--use.{kind}", name)]
+    return rest
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """The console command. Exit codes: 0 done, 2 a mistake in what was given, 130 interrupted."""
     given = list(sys.argv[1:] if arguments is None else arguments)
@@ -53,7 +70,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         module = importlib.import_module(
             f"mjxgait.commands.{given[0] + '_' * keyword.iskeyword(given[0])}"
         )
-        sys.exit(getattr(module, f"{given[0]}_command")(given[1:]))
+        sys.exit(getattr(module, f"{given[0]}_command")(_with_own_parts(given)))
     except UserError as error:
         print(f"mjxgait: {error}", file=sys.stderr)
         sys.exit(2)

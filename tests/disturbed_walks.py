@@ -38,10 +38,14 @@ GENES_OF_THE_GAIT = {
 }
 SETTINGS: dict[str, dict] = {
     "stable PD": {"controller": {"advance": "clock"}},
-    "with constraint forces": {"controller": {"advance": "clock", "constraint_forces": True}},
-    "by the pose error, soft": {"controller": {"stiffness": 0.7, "damping": 1.5}},
+    "with constraint forces": {
+        "controller": {"advance": "clock"},
+        "drive": {"constraint_forces": True},
+    },
+    "by the pose error, soft": {"drive": {"stiffness": 0.7, "damping": 1.5}},
     "plain PD, without the mirror": {
-        "controller": {"advance": "clock", "law": "pd", "mirror": False},
+        "controller": {"advance": "clock", "mirror": False},
+        "drive": {"law": "pd"},
     },
 }
 PUSH_AT = 60
@@ -114,9 +118,9 @@ def disturbed(creature: Creature) -> examined.Starts:
 
 
 def champion_of(creature: Creature, config: Config) -> Champion:
-    """The gait under the controller's settings."""
+    """The gait under the settings of controller and drive."""
     champion = make_champion(creature, poses(creature), GENES_OF_THE_GAIT)
-    return dataclasses.replace(champion, controller=config.controller)
+    return dataclasses.replace(champion, settings=config.controller, drive=config.drive)
 
 
 def watched(creature: Creature) -> list[Outcome]:

@@ -1,11 +1,18 @@
 """What several tests need."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import jax
+import numpy as np
 
-from mjxgait.settings.config import Config, FitnessConfig
+from mjxgait.champion import Champion
+from mjxgait.creature import Creature
+from mjxgait.settings.config import Config
+from mjxgait.settings.control import TUNING, DriveConfig, PoseConfig
 from mjxgait.settings.tables import build
+from mjxgait.settings.walk import WalkConfig
 from mjxgait.tasks.score import in_order
 from mjxgait.tasks.walk.fitness import TERMS, signed_weights
 
@@ -23,6 +30,33 @@ def small_config(**tables: dict) -> Config:
     return build(Config, table, "test")
 
 
-def weight_vector(config: FitnessConfig, generation: jax.Array) -> jax.Array:
+def weight_vector(config: WalkConfig, generation: jax.Array) -> jax.Array:
     """The weights [F] of walking in the order of its terms."""
     return in_order(signed_weights(config, generation), TERMS)
+
+
+STILL = dict.fromkeys(TUNING, 0.0) | {"threshold": 0.12, "period": 0.8}
+"""A blind cycle: no steering, no balance."""
+
+
+def pose_champion(
+    creature: Creature,
+    key_poses: np.ndarray,
+    tuning: Mapping[str, float],
+    settings: PoseConfig | None = None,
+    drive: DriveConfig | None = None,
+    **others: Any,
+) -> Champion:
+    """A champion of key poses [K, J] that nobody evolved; tuning over `STILL`."""
+    genes = STILL | dict(tuning)
+    given: dict[str, Any] = {"fitness": 0.0, "terms": {}, "origin": {}} | others
+    return Champion(
+        creature=creature.name,
+        digest=creature.digest,
+        controller="poses",
+        genome={"key_poses": key_poses, "tuning": np.array([genes[name] for name in TUNING])},
+        settings=settings or PoseConfig(key_poses=len(key_poses)),
+        drive=drive or DriveConfig(),
+        task="walk",
+        **given,
+    )

@@ -6,7 +6,8 @@ import numpy as np
 from mjxgait.certify.simulate import Fall, Trajectory
 from mjxgait.creature import Creature
 from mjxgait.creature.settings import Termination
-from mjxgait.tasks.walk.tally import CONTACT_GAP, SWING, Reason
+from mjxgait.tasks.falls import Reason
+from mjxgait.tasks.walk.tally import CONTACT_GAP, SWING
 
 
 class Frames:

@@ -8,9 +8,10 @@ import pytest
 from helpers import small_config, weight_vector
 
 from mjxgait.creature import Creature
+from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.score import score
 from mjxgait.tasks.walk.fitness import REWARDS, TERMS, fitness_terms
-from mjxgait.tasks.walk.tally import Judge, Reason
+from mjxgait.tasks.walk.tally import Judge
 
 STEP, HORIZON = 0.005, 1000
 LIVED = {"steps": 1000, "forward": 2.0}

@@ -6,9 +6,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from helpers import pose_champion
 
-from mjxgait.certify.controller import Controller as Examiner
-from mjxgait.champion import Champion
+from mjxgait.certify.twins.poses import PoseTwin
 from mjxgait.control.poses import (
     PERIOD,
     PITCH,
@@ -27,7 +27,7 @@ from mjxgait.control.poses import (
 )
 from mjxgait.creature import Creature
 from mjxgait.senses import sense
-from mjxgait.settings.config import ControllerConfig
+from mjxgait.settings.control import PoseConfig
 from mjxgait.types import Sensed
 
 
@@ -75,8 +75,8 @@ def tracker(creature: Creature) -> PoseTracker:
     return PoseTracker(creature, 0.005)
 
 
-def settings(**keys) -> ControllerConfig:
-    return dataclasses.replace(ControllerConfig(key_poses=3, interpolation=4), **keys)
+def settings(**keys) -> PoseConfig:
+    return dataclasses.replace(PoseConfig(key_poses=3, interpolation=4), **keys)
 
 
 def tuning(**genes: float) -> jax.Array:
@@ -165,9 +165,9 @@ def test_the_clock_is_the_examiners_on_every_step(
 
     _, found = jax.lax.scan(moved, control.init(), length=1600)
     named = dict(zip(TUNING, map(float, genes), strict=True))
-    champion = Champion(stool.name, stool.digest, poses, named, rules, 0.0, {}, {})
-    examiner, far = Examiner(stool, champion), np.ones((1, 4))
-    expected = [examiner.advance(np.zeros(1, int), far, 0 * far, k, 0.005)[0] for k in range(1601)]
+    examiner = PoseTwin(stool, pose_champion(stool, poses, named, rules), 0.005)
+    place, far = np.zeros(1601, int), np.ones((1601, 4))
+    expected = examiner.advance(place, far, 0 * far, np.arange(1601))
     assert np.array_equal(found, expected[1:])
     if period in (0.8, 0.4, 0.64, 1.0, 0.35, 0.2):
         length = examiner.length

@@ -32,7 +32,10 @@ def shape(**tables: dict) -> object:
             }
         },
         {"evolution": {"forced": {"enabled": False, "patience": 9}}},
-        {"controller": {"law": "pd", "advance": "clock", "mirror": False, "stiffness": 2.0}},
+        {
+            "controller": {"advance": "clock", "mirror": False},
+            "drive": {"law": "pd", "stiffness": 2.0},
+        },
         {"rollout": {"push": 0.0, "worst": 0.0}},
         {"fitness": {"speed": 0.0, "weights": {"slip": 3.0, "fall": 9.0}}},
     ],
@@ -81,7 +84,7 @@ def test_a_choice_is_known_plain_and_traced():
 VARIANTS = {
     "as it is": {},
     "another seed": {"seed": 5},
-    "plain PD": {"controller": {"law": "pd"}},
+    "plain PD": {"drive": {"law": "pd"}},
     "bit flips by the clock": {
         "controller": {"advance": "clock"},
         "evolution": {"mutation": "bit", "selection": "tournament"},

@@ -20,6 +20,7 @@ FLOORS = (
     ("viewing",),
     ("inspect",),
     ("runs",),
+    ("parts",),
     ("certify",),
     ("simulation",),
     ("tasks", "control"),

@@ -17,6 +17,7 @@ from mjxgait.search.variation import Box, uniform
 from mjxgait.settings.config import Config
 from mjxgait.settings.layers import resolve_config
 from mjxgait.simulation.rollout import Episodes
+from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.score import in_order, score
 from mjxgait.tasks.trials import NEVER, Starts, draw_starts
 from mjxgait.tasks.walk.fitness import (
@@ -26,7 +27,6 @@ from mjxgait.tasks.walk.fitness import (
     fitness_terms,
     stride_limit,
 )
-from mjxgait.tasks.walk.tally import Reason
 from mjxgait.types import BodyState, Sensed
 
 ENDS = (Reason.TIPPED, Reason.TOO_LOW, Reason.TOO_HIGH, Reason.TOUCHED)

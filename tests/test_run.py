@@ -57,7 +57,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
 
 def result(folder: Path) -> dict:
     champion = json.loads((folder / "champion.json").read_text())
-    return {key: champion[key] for key in ("key_poses", "tuning", "fitness", "terms", "origin")}
+    return {key: champion[key] for key in ("genome", "fitness", "terms", "origin")}
 
 
 def without_times(folder: Path) -> list[dict]:

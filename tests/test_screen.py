@@ -11,7 +11,10 @@ from mjxgait.runs.screen import Screen
 
 @pytest.mark.parametrize(
     ("best", "forward", "said"),
-    [(1.5, 3.25, ("1.500 in generation 4", "3.25 m")), (None, None, ("nobody could be judged",))],
+    [
+        (1.5, 3.25, ("1.500 in generation 4", "forward 3.25 per episode")),
+        (None, None, ("nobody could be judged",)),
+    ],
     ids=["judged", "nobody judged"],
 )
 def test_the_report_tells_the_best_or_that_there_is_none(

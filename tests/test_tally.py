@@ -18,7 +18,8 @@ from disturbed_walks import (
 from recorded_tally import Frames, end, tally_of
 
 from mjxgait.creature import Creature
-from mjxgait.tasks.walk.tally import Judge, Reason, Tally
+from mjxgait.tasks.falls import Reason, why_fallen
+from mjxgait.tasks.walk.tally import Judge, Tally
 from mjxgait.types import Sensed
 
 
@@ -59,11 +60,12 @@ def sensed_of(frames: Frames) -> Sensed:
 @pytest.fixture(scope="module")
 def judged(body: Creature, recordings: list[Frames]) -> tuple[Tally, jax.Array]:
     """The tallies [E, ...] of whole episodes, and what would have ended them, [E, T]."""
+    ends = body.settings.termination
     judge, clearance = Judge(body, STEP, STEPS // 2), jnp.float32(clearance_of(body))
 
     def episode(sensed: Sensed, torque: jax.Array) -> tuple[Tally, jax.Array]:
         def step(tally: Tally, now: tuple) -> tuple[Tally, jax.Array]:
-            return judge.update(tally, *now, clearance), judge.examine(now[0])
+            return judge.update(tally, *now, clearance), why_fallen(body, ends, now[0])
 
         return jax.lax.scan(step, judge.init(), (sensed, torque))
 

@@ -10,8 +10,8 @@ import pydantic
 
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError, did_you_mean
+from mjxgait.parts import resolve_config
 from mjxgait.settings.config import Config
-from mjxgait.settings.layers import resolve_config
 from mjxgait.settings.shipped import data_folder
 from mjxgait.settings.tables import STRICT, Count, Finite, Whole, build, merge, read_toml
 
@@ -200,7 +200,7 @@ def _lay(config: Config, table: Mapping[str, Any], where: str) -> Config:
         raise UserError(
             f"{where}: seeds and generations are the study's own keys, not settings of a variant"
         )
-    return build(Config, merge(dataclasses.asdict(config), table), where)
+    return build(type(config), merge(dataclasses.asdict(config), table), where)
 
 
 def _grid(study: Study, where: str) -> list[VariantTable]:

@@ -54,7 +54,7 @@ class CPeer:
     """One core's share of a workload: the episodes `first`, `first + stride`, ..."""
 
     def __init__(self, workload: Workload, first: int, stride: int, library: Path) -> None:
-        check_controller(workload.config.controller)
+        check_controller(workload.config)
         creature = workload.creature()
         model, watched = bare_model(creature)
         self.model = quiet(model)
@@ -90,7 +90,7 @@ def _work(
         "starts": len(workload.qpos),
         "steps": workload.steps,
         "by_clock": law.by_clock,
-        "constraint_forces": workload.config.controller.constraint_forces,
+        "constraint_forces": workload.config.drive.constraint_forces,
         "forbidden": len(forbidden),
         "trunk": creature.trunk,
         "root_dof": law.root,

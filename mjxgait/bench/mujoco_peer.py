@@ -15,7 +15,7 @@ from mujoco.batch import Batch
 from mjxgait.bench.workload import Workload
 from mjxgait.certify.layout import Layout, LowestPoint
 from mjxgait.creature import Creature
-from mjxgait.settings.config import ControllerConfig
+from mjxgait.settings.config import Config
 
 VELOCITY_STAGE = int(mujoco.mjtStage.mjSTAGE_VEL)
 LANES = 128
@@ -26,7 +26,7 @@ class MujocoPeer:
     """One core's share of a workload: the episodes `first`, `first + stride`, ..."""
 
     def __init__(self, workload: Workload, first: int, stride: int, lanes: int = LANES) -> None:
-        check_controller(workload.config.controller)
+        check_controller(workload.config)
         self.work, self.creature = workload, workload.creature()
         self.jobs = np.arange(first, workload.episodes, stride)
         self.lanes = min(lanes, len(self.jobs))
@@ -245,12 +245,13 @@ class DampedSolve:
         return np.linalg.solve(dense, force[..., None])[..., 0]
 
 
-def check_controller(settings: ControllerConfig) -> None:
+def check_controller(config: Config) -> None:
     """Refuses what the peers do not know, lest they do less work without a word."""
+    drive = config.drive
     if (
-        settings.law != "spd"
-        or settings.constraint_forces
-        or (settings.mirror, settings.stiffness, settings.damping) != (True, 1, 1)
+        drive.law != "spd"
+        or drive.constraint_forces
+        or (config.controller.mirror, drive.stiffness, drive.damping) != (True, 1, 1)
     ):
         raise ValueError(
             "the peers know mirrored poses and stable PD with the gains of the creature only"

@@ -80,7 +80,7 @@ def measure_here(creature: str, point: Point) -> dict[str, Any]:
     """
     from mjxgait.bench.ours import Ours
     from mjxgait.creature import load_creature
-    from mjxgait.settings.layers import resolve_config
+    from mjxgait.parts import resolve_config
     from mjxgait.settings.shipped import find_creature
 
     folder = find_creature(creature)

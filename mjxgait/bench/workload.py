@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mjxgait.certify.controller import pose_cycle
+from mjxgait.certify.twins.poses import pose_cycle
 from mjxgait.creature import Creature, load_creature
 from mjxgait.settings.config import Config
 

@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from mjxgait.certify import criteria, describe, draws
+from mjxgait.certify import criteria, draws
 from mjxgait.certify.check_body import check_body
 from mjxgait.certify.config import CertificateConfig
 from mjxgait.certify.criteria import Criterion
 from mjxgait.certify.measure import Recording, measure
 from mjxgait.certify.simulate import simulate
 from mjxgait.certify.starts import join, nominal_starts, perturbed_starts
+from mjxgait.certify.tasks import demands_of
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 
@@ -32,6 +33,7 @@ class Certificate:
 
     creature: str
     digest: str
+    task: str
     champion: str
     criteria: tuple[Criterion, ...]
     report: dict[str, Any]
@@ -69,6 +71,7 @@ class Certificate:
             "schema": SCHEMA,
             "creature": self.creature,
             "creature_digest": self.digest,
+            "task": self.task,
             "champion": self.champion,
             "passed": self.passed,
             "margin": self.margin,
@@ -119,15 +122,7 @@ def glance(
     whole, halved = (
         record(creature, champion, config.seconds, refine, threads) for refine in (1, 2)
     )
-    window = whole.window(config.warmup)
-    judged = (
-        *criteria.basic(whole, config),
-        criteria.half_step(whole, halved, config),
-        criteria.gait(window, config.gait),
-        criteria.physics(window, config.physics),
-        criteria.parts(window, config.parts),
-    )
-    return Glance(whole, judged)
+    return Glance(whole, demands_of(champion.task).undisturbed(whole, halved, config))
 
 
 def rehearse(
@@ -201,13 +196,14 @@ def certify(
         0.0: plain,
         config.pushes.speed: pushed,
     }
-    report = describe.describe(seen.whole.window(config.warmup), config.gait.clearance) | {
+    report = demands_of(champion.task).report(seen.whole.window(config.warmup), config) | {
         "push_survival": {f"{speed:g}": share for speed, share in sorted(shares.items())},
         "push_that_fells_half": half_point(shares),
     }
     return Certificate(
         creature.name,
         creature.digest,
+        champion.task,
         champion.fingerprint,
         tuple(judged),
         report,

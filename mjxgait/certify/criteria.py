@@ -1,7 +1,7 @@
-"""The criteria of the certificate: pure functions from what was measured to values, thresholds and
-verdicts.
+"""The criteria that every task shares: pure functions from what was measured to values, thresholds
+and verdicts.
 
-Letters: `T` frames, `N` feet.
+Letters: `T` frames, `J` actuated joints.
 """
 
 import dataclasses
@@ -9,17 +9,9 @@ from typing import Literal
 
 import numpy as np
 
-from mjxgait.certify.config import (
-    CertificateConfig,
-    GaitConfig,
-    PartsConfig,
-    PeriodConfig,
-    PhysicsConfig,
-    ProgressConfig,
-)
+from mjxgait.certify.config import CertificateConfig, PartsConfig, PhysicsConfig
 from mjxgait.certify.measure import Recording
 from mjxgait.certify.simulate import Fall
-from mjxgait.certify.strides import clearances, stride_frequency, stride_starts
 
 
 @dataclasses.dataclass(frozen=True)
@@ -105,78 +97,6 @@ def upright(whole: Recording, window: Recording, config: Fall) -> Criterion:
     )
 
 
-def progress(window: Recording, config: ProgressConfig) -> Criterion:
-    """2. Strides that all lead forward, fast enough, straight, without fading."""
-    path, starts = window.trunk_pos, stride_starts(window)
-    distance, middle = path[-1, 0] - path[0, 0], len(path) // 2
-    first, second = path[middle, 0] - path[0, 0], path[-1, 0] - path[middle, 0]
-    advance = np.diff(path[starts, 0]) if len(starts) > 1 else np.array([np.nan])
-    sideways = np.abs(path[:, 1] - path[0, 1]).max()
-    return Criterion(
-        2,
-        "progress",
-        (
-            at_least("strides", len(starts) - 1, config.strides),
-            at_least(
-                "shortest stride / mean stride", advance.min() / abs(advance.mean()), 0.0, 0.5
-            ),
-            at_least(
-                "speed (body lengths/s)",
-                speed(window) / window.dimensions.body_length,
-                config.speed,
-            ),
-            at_most("drift / distance", _ratio(sideways, distance), config.drift),
-            at_least(
-                "second half / first half",
-                second / first if first > 0 else np.nan,
-                config.second_half,
-                1.0,
-            ),
-        ),
-    )
-
-
-def periodic(window: Recording, config: PeriodConfig) -> Criterion:
-    """3. Joints and trunk attitude repeat with the stride period, and that period is steady."""
-    periods = np.diff(stride_starts(window)).astype(float)
-    if len(periods) < 2:
-        peak = variation = np.nan
-    else:
-        signal = np.column_stack([window.joint_pos, window.pitch, window.roll])
-        peak, variation = (
-            autocorrelation_peak(signal, periods.mean()),
-            periods.std() / periods.mean(),
-        )
-    return Criterion(
-        3,
-        "periodic",
-        (
-            at_least("autocorrelation at stride period", peak, config.autocorrelation, 1.0),
-            at_most("variation of stride period", variation, config.variation),
-        ),
-    )
-
-
-def autocorrelation_peak(signal: np.ndarray, period: float) -> float:
-    """Largest correlation of the signal [T, D] with itself, shifted by 0.8 to 1.2 periods
-    (frames).
-    """
-    # Without what changes slower than a stride: a wandering signal resembles itself at any shift.
-    width = round(period)
-    sums = np.cumsum(np.pad(signal, ((1, 0), (0, 0))), axis=0)
-    signal = (
-        signal[width // 2 :][: len(signal) - width + 1] - (sums[width:] - sums[:-width]) / width
-    )
-
-    def correlation(lag: int) -> float:
-        early, late = signal[:-lag], signal[lag:]
-        norm = np.sqrt((early**2).sum() * (late**2).sum())
-        return float((early * late).sum() / norm) if norm > 0 else np.nan
-
-    lags = range(max(1, int(0.8 * period)), min(int(np.ceil(1.2 * period)) + 1, len(signal) // 2))
-    return max((correlation(lag) for lag in lags), default=np.nan)
-
-
 def starts(share: float, config: CertificateConfig) -> Criterion:
     """4. Share of the perturbed starts that stayed up."""
     return Criterion(
@@ -189,75 +109,6 @@ def pushes(share: float, config: CertificateConfig) -> Criterion:
     return Criterion(
         5, "pushes", (at_least("share that stays up", share, config.pushes.upright, 1.0),)
     )
-
-
-def half_step(whole: Recording, halved: Recording, config: CertificateConfig) -> Criterion:
-    """6. With half the time step it still passes 1 to 3 and goes as far."""
-    window = whole.window(config.warmup)
-    repeated = basic(halved, config)
-    change = _distance(halved.window(config.warmup)) / _distance(window) - 1
-    failed = sum(not m.passed for c in repeated for m in c.measures)
-    return Criterion(
-        6,
-        "half the time step",
-        (
-            at_most("failures in criteria 1 to 3", failed, 0.0),
-            at_most("change of distance", abs(change), config.half_step.distance),
-        ),
-    )
-
-
-def basic(whole: Recording, config: CertificateConfig) -> tuple[Criterion, Criterion, Criterion]:
-    """Criteria 1 to 3 of one recording."""
-    window = whole.window(config.warmup)
-    return (
-        upright(whole, window, config.upright),
-        progress(window, config.progress),
-        periodic(window, config.period),
-    )
-
-
-def gait(window: Recording, config: GaitConfig) -> Criterion:
-    """7. A gait, not a buzz: slow, long strides; feet that leave the floor and do not slide on
-    it.
-    """
-    size = window.dimensions
-    frequency = stride_frequency(window, config.clearance)
-    duty = window.contact.mean(0)
-    low, high = config.duty_factor
-    return Criterion(
-        7,
-        "gait",
-        (
-            at_most(
-                "stride frequency / animal's",
-                frequency / (4.48 * size.mass**-0.14),
-                config.frequency,
-            ),
-            at_least(
-                "stride length / hip height",
-                speed(window) / frequency / size.hip_height,
-                config.stride_length,
-            ),
-            at_least(
-                "least clearance / hip height",
-                clearances(window).min(initial=np.inf) / size.hip_height,
-                config.clearance,
-            ),
-            at_most(
-                "worst foot's slip / distance",
-                _ratio(slip_distance(window).max(), _distance(window)),
-                config.slip,
-            ),
-            at_least("least duty factor", duty.min(), low),
-            Measure("greatest duty factor", float(duty.max()), "<=", high, 1 - high),
-        ),
-    )
-
-
-def slip_distance(window: Recording) -> np.ndarray:
-    """[N] m, path that each foot slides on the floor while it carries weight."""
-    return (window.foot_slip * window.contact).sum(0) * window.time_step
 
 
 def physics(window: Recording, config: PhysicsConfig) -> Criterion:
@@ -311,14 +162,15 @@ def joint_overrun(window: Recording) -> np.ndarray:
 
 def speed(window: Recording) -> float:
     """Mean forward speed in m/s."""
-    return _distance(window) / ((len(window.trunk_pos) - 1) * window.time_step)
+    return distance(window) / ((len(window.trunk_pos) - 1) * window.time_step)
 
 
-def _distance(window: Recording) -> float:
+def distance(window: Recording) -> float:
+    """m forward."""
     return float(window.trunk_pos[-1, 0] - window.trunk_pos[0, 0])
 
 
-def _ratio(part: float, distance: float) -> float:
+def ratio(part: float, distance: float) -> float:
     """Of a nuisance to the distance; not a number where there is no way forward to compare it
     with.
     """

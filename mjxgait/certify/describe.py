@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mjxgait.certify.criteria import slip_distance, speed
+from mjxgait.certify.criteria import speed
 from mjxgait.certify.measure import Dimensions, Recording
 from mjxgait.certify.strides import stride_frequency, stride_starts
 
@@ -32,6 +32,11 @@ def describe(window: Recording, clearance: float) -> dict[str, Any]:
         "gait": gait_name(size, duty, phases),
         "overlap": worst_overlap(window),
     }
+
+
+def slip_distance(window: Recording) -> np.ndarray:
+    """[N] m, path that each foot slides on the floor while it carries weight."""
+    return (window.foot_slip * window.contact).sum(0) * window.time_step
 
 
 def worst_overlap(window: Recording) -> dict[str, Any] | None:

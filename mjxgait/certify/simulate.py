@@ -14,9 +14,11 @@ import numpy as np
 import pydantic
 from mujoco.batch import Batch
 
-from mjxgait.certify.controller import Controller, Senses
-from mjxgait.certify.layout import Layout, LowestPoint, colliding_geoms
+from mjxgait.certify.drive import Drive
+from mjxgait.certify.layout import Layout, LowestPoint, colliding_geoms, start_frame
 from mjxgait.certify.starts import Starts
+from mjxgait.certify.state import FOOT_SENSES, State, sense
+from mjxgait.certify.twins import twin_of
 from mjxgait.champion import Champion
 from mjxgait.cores import cores
 from mjxgait.creature import Creature
@@ -57,14 +59,16 @@ class Trajectory:
     their torque acts.
 
     time_step: s between frames. qpos: [R, T, nq]. qvel: [R, T, nv]. torque: [R, T, J] N·m.
-    position: [R, T] in the pose cycle. A simulation that blew up is NaN from there on.
+    target: [R, T, J] rad that the joints were pulled to; NaN under a controller that sends torques.
+    phase: [R, T] where the controller was in its own cycle, in [0, 1); NaN for one without. A simulation that blew up is NaN from there on.
     """
 
     time_step: float
     qpos: np.ndarray
     qvel: np.ndarray
     torque: np.ndarray
-    position: np.ndarray
+    target: np.ndarray
+    phase: np.ndarray
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -135,7 +139,7 @@ def simulate(
         parts = list(pool.map(run, shares))
     order = np.argsort(np.concatenate(shares))
     kept = np.argsort(np.concatenate([share[share < record] for share in shares]))
-    fields = ("qpos", "qvel", "torque", "position")
+    fields = ("qpos", "qvel", "torque", "target", "phase")
     return Outcome(
         fell=np.concatenate([p.fell for p in parts])[order],
         travel=np.concatenate([p.travel for p in parts])[order],
@@ -165,7 +169,10 @@ class _Run:
             refine,
             fall,
         )
-        self.controller = Controller(creature, champion)
+        step = float(creature.model.opt.timestep)
+        self.twin = twin_of(creature, champion, step)
+        self.drive = Drive(creature, champion.drive, self.twin.command, step)
+        self.start = start_frame(creature)
         self.model = examined_model(creature, refine)
         self.batch = _batch(creature, self.model, starts)
         self.layout = Layout(self.model)
@@ -182,7 +189,9 @@ class _Run:
         )
         self.geom_xpos, self.geom_xmat = bind("geom_xpos"), bind("geom_xmat")
         self._lift()
-        self.position = np.zeros(len(starts), dtype=int)
+        self.memory = dict(self.twin.init(len(starts)))
+        self.feet = LowestPoint(self.model, creature.watched[: len(creature.foot_of)])
+        self.sees_feet = any(name in FOOT_SENSES for name in self.twin.reads)
         self.last_force = np.zeros_like(self.qvel)
         # What the controller has sent last, for those whose torques come late.
         self.sent = np.zeros((int(starts.delay.max()) + 1, *starts.stiffness.shape))
@@ -231,7 +240,8 @@ class _Run:
 
     def _follow(self, rows: np.ndarray, leader: int) -> None:
         """Puts simulations where another one is."""
-        for state in (self.qpos, self.qvel, self.warm_start, self.last_force, self.position):
+        own = (self.qpos, self.qvel, self.warm_start, self.last_force)
+        for state in (*own, *self.memory.values()):
             state[rows] = state[leader]
         self.sent[:, rows] = self.sent[:, [leader]]
 
@@ -240,28 +250,22 @@ class _Run:
     ) -> None:
         kept = running[running < self.record]
         film.qpos[kept, k], film.qvel[kept, k] = self.qpos[kept], self.qvel[kept]
-        film.position[kept, k] = self.position[kept]
-        target, reached, torque = self._physics_step(running, k, heading)
+        film.phase[kept, k] = self.twin.phase({n: m[kept] for n, m in self.memory.items()})
+        command, torque = self._physics_step(running, k, heading)
         film.torque[kept, k] = torque[: len(kept)]
+        if self.twin.command == "pose":
+            film.target[kept, k] = command[: len(kept)]
         for _ in range(self.refine - 1):
             self.batch.step(running, stage=VELOCITY_STAGE)
-        self.position[running] = self.controller.advance(
-            self.position[running], target, reached, k + 1, film.time_step
-        )
 
     def _physics_step(
         self, running: np.ndarray, k: int, heading: float | None
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Target, joint positions before the step, and torque that acts, [running, J] each."""
-        senses = self._senses(running)
-        target = self.controller.target(self.position[running], senses, heading)
-        starts = self.starts
-        self.sent[k % len(self.sent), running] = self.controller.torque(
-            target,
-            senses,
-            self.creature.model.opt.timestep,
-            starts.stiffness[running],
-            starts.damping[running],
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The command, and the torque that acts, [running, J] each."""
+        state, starts = self._state(running, k), self.starts
+        command = self._act(running, state, heading)
+        self.sent[k % len(self.sent), running] = self.drive.torque(
+            command, state, starts.stiffness[running], starts.damping[running]
         )
         # Before the first torque has arrived it acts already, as if the body had been held so.
         arrived = np.maximum(k - starts.delay[running], 0) % len(self.sent)
@@ -269,28 +273,49 @@ class _Run:
         self.applied[running[:, None], self.creature.dof_adr] = torque
         self.batch.step(running, stage=VELOCITY_STAGE)
         self.last_force[running] = self.constraint[running]
-        return target, senses.joint_pos, torque
+        return command, torque
 
-    def _senses(self, running: np.ndarray) -> Senses:
+    def _act(self, running: np.ndarray, state: State, heading: float | None) -> np.ndarray:
+        """The command [running, J]; the twin's memory moves on."""
+        senses = sense(self.creature, state, self.twin.reads)
+        if heading is not None:
+            # Told where to go, it does not come back to the line that it left.
+            senses["heading"] = senses["heading"] - heading
+            senses["aside"] = np.zeros_like(senses["aside"])
+        before = {name: values[running] for name, values in self.memory.items()}
+        command, after = self.twin.act(before, senses)
+        for name, values in after.items():
+            self.memory[name][running] = values
+        return command
+
+    def _state(self, running: np.ndarray, k: int) -> State:
         """M and bias belong to the current state: each step ends with the velocity stage of the
         new one.
         """
-        creature = self.creature
-        velocity = self.qvel[running]
-        rot = self.xmat[running, creature.trunk].reshape(-1, 3, 3)
-        return Senses(
+        creature, velocity = self.creature, self.qvel[running]
+        rot, root = self.xmat[running, creature.trunk].reshape(-1, 3, 3), self.layout.root_dof
+        return State(
+            start=self.start,
+            time=np.full(len(running), k * creature.model.opt.timestep),
             joint_pos=self.qpos[running[:, None], creature.qpos_adr],
             velocity=velocity,
             trunk_pos=self.xpos[running, creature.trunk],
             trunk_rot=rot,
+            trunk_vel=velocity[:, root : root + 3],
             # A free joint's angular velocity is in the body's own frame.
-            trunk_angvel=(
-                rot * velocity[:, None, self.layout.root_dof + 3 : self.layout.root_dof + 6]
-            ).sum(2),
+            trunk_angvel=(rot * velocity[:, None, root + 3 : root + 6]).sum(2),
+            foot_height=self._foot_height(running),
             mass_matrix=self.layout.dense(self.mass[running]),
             bias=self.bias[running] - self.passive[running],
             constraint_force=self.last_force[running],
         )
+
+    def _foot_height(self, running: np.ndarray) -> np.ndarray:
+        if not self.sees_feet:
+            return np.zeros((len(running), 0))
+        low = self.feet.heights(self.geom_xpos[running], self.geom_xmat[running])
+        feet = range(len(self.creature.foot_names))
+        return np.stack([low[:, self.creature.foot_of == foot].min(1) for foot in feet], 1)
 
     def _lift(self) -> None:
         """Raises each start until no part is deeper in the floor than when standing; else joint
@@ -320,7 +345,7 @@ class _Run:
         return np.floor(self.starts.push_time[rows] / time_step) == k
 
     def _travel(self, running: np.ndarray) -> np.ndarray:
-        start = self.controller.start
+        start = self.start
         moved = self.xpos[running, self.creature.trunk] - start.place
         return np.stack([moved @ start.forward, moved @ start.left], 1)
 
@@ -346,14 +371,14 @@ class _Run:
         def blank(width: int) -> np.ndarray:
             return np.full((self.record, steps, width), np.nan)
 
-        position = np.zeros((self.record, steps), dtype=int)
-        time_step = self.creature.model.opt.timestep
+        joints = len(self.creature.dof_adr)
         return Trajectory(
-            time_step,
-            blank(self.model.nq),
-            blank(self.model.nv),
-            blank(len(self.creature.dof_adr)),
-            position,
+            self.creature.model.opt.timestep,
+            qpos=blank(self.model.nq),
+            qvel=blank(self.model.nv),
+            torque=blank(joints),
+            target=blank(joints),
+            phase=np.full((self.record, steps), np.nan),
         )
 
 

@@ -10,7 +10,7 @@ import tyro
 
 from mjxgait.creature import load_creature
 from mjxgait.errors import UserError
-from mjxgait.settings.layers import resolve_config
+from mjxgait.parts import resolve_config
 from mjxgait.settings.shipped import data_folder, find_creature
 
 

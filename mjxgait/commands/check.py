@@ -8,7 +8,7 @@ import tyro
 
 from mjxgait.creature import load_creature
 from mjxgait.errors import UserError
-from mjxgait.settings.layers import resolve_config
+from mjxgait.parts import resolve_config
 from mjxgait.settings.shipped import find_creature
 
 

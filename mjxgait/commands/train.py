@@ -12,10 +12,10 @@ import tyro
 
 from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import INTERRUPTED, UserError
+from mjxgait.parts import resolve_config
 from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.folder import METRICS, PLOT, create_run, open_run, read_metrics
 from mjxgait.settings.config import Config, ExaminationConfig
-from mjxgait.settings.layers import resolve_config
 from mjxgait.settings.shipped import find_creature
 from mjxgait.settings.tables import build, merge
 
@@ -26,7 +26,8 @@ class TrainOptions:
 
     Settings come in layers, each over the one before: configs/default.toml, the creature's own
     [train] table, the file of --config, and the options given here. Every key of the config is an
-    option.
+    option. --controller and --task name who moves the creature and what it is to do: poses and
+    walk, or FILE.py:CLASS of your own (docs/extending.md).
 
     Attributes:
       env: Name of a shipped creature, path of a creature folder, or a model file (MJCF or URDF) to
@@ -58,11 +59,9 @@ class TrainOptions:
 def train_command(arguments: Sequence[str]) -> int:
     """Returns the exit code."""
     creature, default = _layers(arguments)
+    shape = _options_of(type(default))
     options = tyro.cli(
-        TrainOptions,
-        args=list(arguments),
-        prog="mjxgait train",
-        default=TrainOptions(settings=default),
+        shape, args=list(arguments), prog="mjxgait train", default=shape(settings=default)
     )
     config = _settings(options)
     # JAX takes a second to import: only once the options are known to be good.
@@ -99,6 +98,19 @@ def train_command(arguments: Sequence[str]) -> int:
     return 0 if ended else INTERRUPTED
 
 
+def _options_of(config: type[Config]) -> type[TrainOptions]:
+    """The options with every key of this config."""
+    settings = Annotated[config, tyro.conf.arg(name="")]  # type: ignore[valid-type]
+    field = ("settings", settings, dataclasses.field(default_factory=config))
+    return dataclasses.make_dataclass(
+        "TrainOptions",
+        [field],
+        bases=(TrainOptions,),
+        frozen=True,
+        namespace={"__doc__": TrainOptions.__doc__},
+    )
+
+
 def _plot_fitness(folder: Path) -> None:
     """After the result is on the screen: matplotlib is slow to import."""
     if lines := read_metrics(folder / METRICS):
@@ -115,7 +127,7 @@ def _layers(arguments: Sequence[str]) -> tuple[Creature, Config]:
     are.
     """
     early = argparse.ArgumentParser(add_help=False, allow_abbrev=False, exit_on_error=False)
-    for name in ("--env", "--config", "--resume"):
+    for name in ("--env", "--config", "--resume", "--use.controller", "--use.task"):
         early.add_argument(name, nargs="?")
     try:
         given, _ = early.parse_known_args(list(arguments))
@@ -124,9 +136,10 @@ def _layers(arguments: Sequence[str]) -> tuple[Creature, Config]:
     if given.resume:
         return open_run(Path(given.resume))
     creature = _creature(given.env or TrainOptions.env)
-    return creature, resolve_config(
-        creature.settings.train, creature.name, Path(given.config) if given.config else None
-    )
+    file = Path(given.config) if given.config else None
+    named = {kind: getattr(given, f"use.{kind}") for kind in ("controller", "task")}
+    use = {kind: name for kind, name in named.items() if name}
+    return creature, resolve_config(creature.settings.train, creature.name, file, use)
 
 
 def _creature(env: str) -> Creature:
@@ -150,7 +163,9 @@ def _settings(options: TrainOptions) -> Config:
     """
     short = {"population": options.population, "generations": options.generations}
     table = {"evolution": {key: value for key, value in short.items() if value is not None}}
-    return build(Config, merge(dataclasses.asdict(options.settings), table), "the options")
+    return build(
+        type(options.settings), merge(dataclasses.asdict(options.settings), table), "the options"
+    )
 
 
 def _without_ends(config: Config) -> Config:

@@ -15,7 +15,7 @@ from jax.typing import ArrayLike
 from mjxgait.control import spd
 from mjxgait.control.protocol import Command
 from mjxgait.creature import Creature
-from mjxgait.settings.config import ControllerConfig
+from mjxgait.settings.control import DriveConfig
 from mjxgait.settings.traced import chosen
 from mjxgait.types import BodyState, Plant, Sensed, pytree
 
@@ -42,7 +42,7 @@ class Drive:
     step: float
     command: Command
 
-    def rules(self, settings: ControllerConfig, stiffness: jax.Array, damping: jax.Array) -> Rules:
+    def rules(self, settings: DriveConfig, stiffness: jax.Array, damping: jax.Array) -> Rules:
         """What an episode keeps of the settings, plain or traced, and of its factors [J] on the gains."""
         return Rules(
             stable=chosen(settings.law, "spd"),

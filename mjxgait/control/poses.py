@@ -14,11 +14,11 @@ from mjxgait.control.pose_variation import pose_variation
 from mjxgait.control.protocol import Command, Senses
 from mjxgait.creature import Creature
 from mjxgait.search.variation import Box, Variation, in_ranges
-from mjxgait.settings.config import ControllerConfig, EvolutionConfig, TuningRanges
+from mjxgait.settings.config import EvolutionConfig
+from mjxgait.settings.control import TUNING, PoseConfig
 from mjxgait.settings.traced import chosen
 from mjxgait.types import pytree
 
-TUNING = tuple(field.name for field in dataclasses.fields(TuningRanges))
 THRESHOLD, PERIOD, STEER, PITCH, PITCH_RATE, ROLL, ROLL_RATE = range(len(TUNING))
 MAX_CORRECTION = 0.5
 """rad, or relative stride length: the most that one correction may change the target."""
@@ -67,7 +67,7 @@ class PoseTracker:
     reads = ("joint_pos", "heading", "aside", "pitch", "roll", "pitch_rate", "roll_rate")
     command: ClassVar[Command] = "pose"
 
-    def bounds(self, config: ControllerConfig) -> tuple[Genome, Genome]:
+    def bounds(self, config: PoseConfig) -> tuple[Genome, Genome]:
         """Lowest and highest genome: key_poses [K, J], tuning [E]."""
         low, high = (
             jnp.stack([jnp.float32(getattr(config.tuning, name)[end]) for name in TUNING])
@@ -80,15 +80,15 @@ class PoseTracker:
 
         return genome(self.creature.pose_low, low), genome(self.creature.pose_high, high)
 
-    def variation(self, settings: ControllerConfig, evolution: EvolutionConfig) -> Variation:
+    def variation(self, settings: PoseConfig, evolution: EvolutionConfig) -> Variation:
         """See `Controller`."""
         return pose_variation(Box(*self.bounds(settings)), evolution)
 
-    def genes(self, genomes: Genome, settings: ControllerConfig) -> np.ndarray:
+    def genes(self, genomes: Genome, settings: PoseConfig) -> np.ndarray:
         """See `Controller`."""
         return in_ranges(genomes, Box(*self.bounds(settings)))
 
-    def prepare(self, genome: Genome, config: ControllerConfig) -> PoseCycle:
+    def prepare(self, genome: Genome, config: PoseConfig) -> PoseCycle:
         """The whole cycle of a genome [K, J] under the settings, plain or traced."""
         poses = pose_cycle(self.creature, genome.key_poses)
         count = jnp.where(config.mirror, poses.shape[0], config.key_poses)

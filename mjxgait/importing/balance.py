@@ -11,7 +11,7 @@ from mjxgait.importing.drive import Drive
 from mjxgait.importing.hold import Held, hold
 from mjxgait.importing.notes import Notes
 from mjxgait.importing.parts import rotation
-from mjxgait.settings.layers import resolve_config
+from mjxgait.parts import resolve_config
 
 MOST = 0.5
 """rad, where the controller clips the feedback (docs/controller.md)."""

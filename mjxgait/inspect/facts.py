@@ -6,8 +6,7 @@ Angles in degrees.
 import dataclasses
 import datetime
 import itertools
-import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import jax.numpy as jnp
@@ -15,13 +14,13 @@ import numpy as np
 
 from mjxgait.certify import outdated, read_certificate
 from mjxgait.champion import read_champion
-from mjxgait.control.poses import TUNING
 from mjxgait.errors import UserError
+from mjxgait.inspect.genomes import view_of
 from mjxgait.inspect.snapshot import Snapshot
+from mjxgait.parts import make_task, resolve_config
 from mjxgait.runs.folder import CERTIFICATE, CHAMPION
 from mjxgait.search.evolution import Origin
-from mjxgait.settings.layers import resolve_config
-from mjxgait.tasks.walk.fitness import TERMS, signed_weights
+from mjxgait.tasks.protocol import Task
 
 KINDS = {
     Origin.INITIAL: "initial",
@@ -36,6 +35,8 @@ def facts(snapshot: Snapshot) -> dict[str, Any]:
     return {
         "run": str(snapshot.run),
         "creature": snapshot.creature.name,
+        "controller": snapshot.config.use.controller,
+        "task": snapshot.config.use.task,
         "creature_digest": snapshot.creature.digest,
         "generation": snapshot.generation,
         "generations": snapshot.config.evolution.generations,
@@ -88,7 +89,8 @@ def settings_changed(snapshot: Snapshot) -> dict[str, dict[str, Any]]:
     """The settings that differ from configs/default.toml, by dotted key: the default and this
     run's.
     """
-    default = flat(dataclasses.asdict(resolve_config({}, snapshot.creature.name)))
+    use = dataclasses.asdict(snapshot.config.use)
+    default = flat(dataclasses.asdict(resolve_config({}, snapshot.creature.name, use=use)))
     mine = flat(dataclasses.asdict(snapshot.config))
     return {
         key: {"default": default[key], "here": mine[key]}
@@ -161,13 +163,19 @@ def forced_spells(lines: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     return spells
 
 
+def task_of(snapshot: Snapshot) -> Task:
+    """What the run's creature is to do."""
+    return make_task(snapshot.creature, snapshot.config)
+
+
 def contributions(snapshot: Snapshot) -> np.ndarray:
     """[P, F] what each term gives to or takes from the fitness of each individual; a row's sum
     is its fitness.
     """
     terms = np.asarray(snapshot.arrays["terms"], float)
-    counted = signed_weights(snapshot.config.fitness, jnp.int32(snapshot.generation))
-    weights = np.array([float(counted[name]) for name in TERMS])
+    task = task_of(snapshot)
+    counted = task.weights(snapshot.config.fitness, jnp.int32(snapshot.generation))
+    weights = np.array([float(counted[name]) for name in task.terms])
     worst = snapshot.config.rollout.worst
     scores = terms @ weights
     lowest = np.argmin(np.where(np.isnan(scores), -np.inf, scores), axis=1)
@@ -176,8 +184,7 @@ def contributions(snapshot: Snapshot) -> np.ndarray:
 
 def population(snapshot: Snapshot) -> list[dict[str, Any]]:
     """One row per individual, best first."""
-    parts = contributions(snapshot)
-    arrays = snapshot.arrays
+    parts, arrays, names = contributions(snapshot), snapshot.arrays, task_of(snapshot).terms
     return [
         {
             "rank": i + 1,
@@ -186,7 +193,7 @@ def population(snapshot: Snapshot) -> list[dict[str, Any]]:
             "age": snapshot.generation - int(arrays["born"][i]),
             "kind": KINDS[Origin(int(arrays["origin"][i]))],
             "contributions": {
-                name: number(value) for name, value in zip(TERMS, parts[i], strict=True)
+                name: number(value) for name, value in zip(names, parts[i], strict=True)
             },
         }
         for i in range(len(parts))
@@ -194,21 +201,10 @@ def population(snapshot: Snapshot) -> list[dict[str, Any]]:
 
 
 def diversity(snapshot: Snapshot) -> dict[str, Any]:
-    """How many genomes differ, and per joint the standard deviation over the population, mean of
-    the key poses.
-    """
-    genomes = np.concatenate(
-        [snapshot.key_poses.reshape(len(snapshot.fitness), -1), snapshot.tuning], axis=1
-    )
-    spread = np.degrees(snapshot.key_poses.std(axis=0).mean(axis=0))
-    room = np.degrees(snapshot.creature.pose_high - snapshot.creature.pose_low)
-    return {
-        "individuals": len(genomes),
-        "unique": len(np.unique(genomes, axis=0)),
-        "spread_deg": _by_joint(snapshot, spread),
-        "spread_of_range": _by_joint(snapshot, spread / np.maximum(room, 1e-9)),
-        "tuning_spread": dict(zip(TUNING, map(float, snapshot.tuning.std(axis=0)), strict=True)),
-    }
+    """How many genomes differ, and by how much."""
+    rows = snapshot.rows
+    found = {"individuals": len(rows), "unique": len(np.unique(rows, axis=0))}
+    return found | view_of(snapshot.config.use.controller).spread(snapshot)
 
 
 def individual_facts(snapshot: Snapshot, rank: int) -> dict[str, Any]:
@@ -217,36 +213,22 @@ def individual_facts(snapshot: Snapshot, rank: int) -> dict[str, Any]:
     Raises:
       UserError: the population is smaller.
     """
-    if not 1 <= rank <= len(snapshot.fitness):
-        raise UserError(
-            f"{snapshot.run}: no individual {rank}; the population has ranks 1 to "
-            f"{len(snapshot.fitness)}"
-        )
-    i = rank - 1
+    champion, i = snapshot.champion(rank), rank - 1
     terms = np.asarray(snapshot.arrays["terms"][i], float)
-    return population(snapshot)[i] | {
-        "terms": {
-            name: [number(value) for value in column]
-            for name, column in zip(TERMS, terms.T, strict=True)
-        },
-        "tuning": dict(zip(TUNING, map(float, snapshot.tuning[i]), strict=True)),
-        "key_poses_deg": [_by_joint(snapshot, np.degrees(pose)) for pose in snapshot.key_poses[i]],
-        "range_deg": {
-            name: [math.degrees(low), math.degrees(high)]
-            for name, low, high in zip(
-                snapshot.creature.joint_names,
-                snapshot.creature.pose_low,
-                snapshot.creature.pose_high,
-                strict=True,
-            )
-        },
-    }
+    names = task_of(snapshot).terms
+    return (
+        population(snapshot)[i]
+        | {
+            "controller": champion.controller,
+            "terms": {
+                name: [number(value) for value in column]
+                for name, column in zip(names, terms.T, strict=True)
+            },
+        }
+        | view_of(champion.controller).facts(snapshot, i)
+    )
 
 
 def number(value: Any) -> float | None:
     """A number that JSON can hold; None for what is not finite."""
     return float(value) if np.isfinite(value) else None
-
-
-def _by_joint(snapshot: Snapshot, values: Iterable[float]) -> dict[str, float]:
-    return dict(zip(snapshot.creature.joint_names, map(float, values), strict=True))

@@ -1,8 +1,7 @@
 """One checkpoint read back as NumPy arrays, whatever devices wrote it, together with the run it
 belongs to.
 
-Letters: `P` individuals, `R` starts, `F` fitness terms, `K` key poses, `J` joints, `E` tuning
-genes.
+Letters: `P` individuals, `R` starts, `F` fitness terms.
 """
 
 import dataclasses
@@ -15,7 +14,7 @@ from typing import Any, cast
 import numpy as np
 
 from mjxgait.certify import outdated, read_certificate
-from mjxgait.champion import read_champion
+from mjxgait.champion import Champion, codec_of, read_champion
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.runs.examination import due, why_ended
@@ -52,14 +51,43 @@ class Snapshot:
         return self.manifest.generation
 
     @property
-    def key_poses(self) -> np.ndarray:
-        """[P, K, J] rad, best individual first."""
-        return self.arrays["genomes.key_poses"]
+    def genomes(self) -> dict[str, np.ndarray]:
+        """The arrays [P, ...] of the genomes by name, best individual first."""
+        prefix = "genomes."
+        named = (
+            (n.removeprefix(prefix), a) for n, a in self.arrays.items() if n.startswith(prefix)
+        )
+        return dict(named)
 
     @property
-    def tuning(self) -> np.ndarray:
-        """[P, E] in the order of the config's tuning ranges."""
-        return self.arrays["genomes.tuning"]
+    def rows(self) -> np.ndarray:
+        """[P, genes] every gene of every genome, in its own unit."""
+        flat = [array.reshape(len(array), -1) for array in self.genomes.values()]
+        return np.concatenate(flat, axis=1)
+
+    def champion(self, rank: int) -> Champion:
+        """An individual; rank 1 is the best.
+
+        Raises:
+          UserError: the population is smaller.
+        """
+        if not 1 <= rank <= len(self.fitness):
+            raise UserError(
+                f"{self.run}: no individual {rank}; the population has ranks 1 to "
+                f"{len(self.fitness)}"
+            )
+        return Champion(
+            creature=self.creature.name,
+            digest=self.creature.digest,
+            controller=self.config.use.controller,
+            genome={name: np.asarray(a[rank - 1], float) for name, a in self.genomes.items()},
+            settings=self.config.controller,
+            drive=self.config.drive,
+            task=self.config.use.task,
+            fitness=float(self.fitness[rank - 1]),
+            terms={},
+            origin={"generation": self.generation},
+        )
 
     @property
     def fitness(self) -> np.ndarray:
@@ -158,12 +186,15 @@ def _locate(path: Path, generation: int | None) -> tuple[Path, int | None]:
 def _check_shape(
     folder: Path, arrays: Mapping[str, np.ndarray], creature: Creature, config: Config
 ) -> None:
-    shape = (config.evolution.population, config.controller.key_poses, len(creature.joint_names))
-    if arrays["genomes.key_poses"].shape != shape:
-        raise UserError(
-            f"{folder}: holds key poses of shape {arrays['genomes.key_poses'].shape}, this run's "
-            f"{CONFIG} asks for {shape}; one of the two is from another run"
-        )
+    shapes = codec_of(config.use.controller).shapes(config.controller, creature)
+    for name, shape in shapes.items():
+        wanted = (config.evolution.population, *shape)
+        found = arrays[f"genomes.{name}"].shape if f"genomes.{name}" in arrays else None
+        if found != wanted:
+            raise UserError(
+                f"{folder}: holds {name.replace('_', ' ')} of shape {found}, this run's "
+                f"{CONFIG} asks for {wanted}; one of the two is from another run"
+            )
 
 
 def _versions(run: Path) -> dict[str, str]:

@@ -5,7 +5,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rich.console import Console
-from rich.table import Table
+
+from mjxgait.inspect.genomes import view_of
+from mjxgait.inspect.tables import print_pairs, show, titled_table
 
 BLOCKS = "▁▂▃▄▅▆▇█"
 WIDEST = 60
@@ -18,7 +20,7 @@ def print_facts(facts: Mapping[str, Any], console: Console) -> None:
     _print_settings(facts["settings_changed"], console)
     _print_history(facts, console)
     _print_population(facts["population"], console)
-    _print_joints(facts["champion"], facts["diversity"], console)
+    view_of(facts["controller"]).show(facts["champion"], facts["diversity"], console)
 
 
 def print_individual(individual: Mapping[str, Any], console: Console) -> None:
@@ -34,7 +36,7 @@ def print_individual(individual: Mapping[str, Any], console: Console) -> None:
     for name, values in individual["terms"].items():
         table.add_row(name, *map(show, values), show(individual["contributions"][name], sign=True))
     console.print(table)
-    _print_joints(individual, None, console)
+    view_of(individual["controller"]).show(individual, None, console)
 
 
 def sparkline(values: Sequence[float | None], low: float, high: float) -> str:
@@ -49,30 +51,6 @@ def sparkline(values: Sequence[float | None], low: float, high: float) -> str:
         )
 
     return "".join(map(block, values))
-
-
-def show(value: float | None, sign: bool = False) -> str:
-    """A number in a table."""
-    if value is None:
-        return "none"
-    text = f"{value:+.2f}" if sign else f"{value:.3f}"
-    return "0" if float(text) == 0 else text
-
-
-def titled_table(title: str, console: Console) -> Table:
-    """Prints a heading and returns the empty table to print below it."""
-    console.print(f"\n[bold]{title}[/]")
-    return Table(box=None, pad_edge=False)
-
-
-def print_pairs(rows: Mapping[str, str], console: Console) -> None:
-    """Names and values in two columns."""
-    table = Table(box=None, show_header=False, pad_edge=False)
-    table.add_column(no_wrap=True)
-    table.add_column(overflow="fold")
-    for name, value in rows.items():
-        table.add_row(name, value)
-    console.print(table)
 
 
 def ago(written: str) -> str:
@@ -107,6 +85,7 @@ def _print_identity(facts: Mapping[str, Any], console: Console) -> None:
         f"({facts['written']})",
         "generations kept": ", ".join(map(str, facts["checkpoints"])),
         "seed": f"{facts['seed']} ({facts['random_key']['kind']} key now {key})",
+        "controller, task": f"{facts['controller']}, {facts['task']}",
         "body": facts["creature_digest"],
         "versions": versions or "unknown: the run has no champion.json",
         "certificate": facts["certificate"],
@@ -191,33 +170,3 @@ def _print_population(rows: Sequence[Mapping[str, Any]], console: Console) -> No
             show(others, sign=True),
         )
     console.print(table)
-
-
-def _print_joints(
-    individual: Mapping[str, Any], diversity: Mapping[str, Any] | None, console: Console
-) -> None:
-    """Key poses by joint; with the diversity also how far the population is spread."""
-    poses = individual["key_poses_deg"]
-    who = "champion" if individual["rank"] == 1 else f"individual {individual['rank']}"
-    table = titled_table(f"{who}: key poses in degrees", console)
-    for heading in (
-        "joint",
-        "may lie in",
-        *(f"pose {k + 1}" for k in range(len(poses))),
-        *(["spread", "of range"] if diversity else []),
-    ):
-        table.add_column(heading, justify="left" if heading == "joint" else "right")
-    for joint, (low, high) in individual["range_deg"].items():
-        spread = (
-            [f"{diversity['spread_deg'][joint]:.1f}", f"{diversity['spread_of_range'][joint]:.0%}"]
-            if diversity
-            else []
-        )
-        table.add_row(
-            joint, f"{low:.0f} .. {high:.0f}", *(f"{pose[joint]:.1f}" for pose in poses), *spread
-        )
-    console.print(table)
-    console.print(
-        "tuning: "
-        + ", ".join(f"{name} {value:.3g}" for name, value in individual["tuning"].items())
-    )

@@ -5,16 +5,14 @@ from collections.abc import Callable
 
 import numpy as np
 
-from mjxgait.certify import Certificate, CertificateConfig, Glance, certify, glance, rehearse
+from mjxgait.certify import Certificate, Glance, certify, glance, rehearse
+from mjxgait.certify.tasks import demands_of
 from mjxgait.champion import Champion
 from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.exams import Exams
 from mjxgait.runs.experiment import Experiment
 from mjxgait.search.evolution import EvolutionState
 from mjxgait.settings.config import Config, ExaminationConfig
-
-SPARE = 1.2
-"""How much faster than the certificate's least speed a gait should be in evolution before it is worth an examination."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -140,10 +138,8 @@ def due(settings: ExaminationConfig, generation: int) -> bool:
 
 
 def _promising(experiment: Experiment, state: EvolutionState) -> bool:
-    """Whether the best individual was up to the end in all its trials, and clearly faster than it must be."""
-    names, seconds = experiment.simulator.task.outcomes, experiment.config.rollout.seconds
+    """Whether the best individual is worth an examination."""
+    config, names = experiment.config, experiment.simulator.task.outcomes
     outcome = dict(zip(names, np.asarray(state.outcome[0]).T, strict=True))
-    wanted = SPARE * CertificateConfig().progress.speed * seconds * experiment.creature.body_length
-    # Half a step, for an episode lasts a whole number of them.
-    whole = seconds - 0.5 * experiment.creature.model.opt.timestep
-    return bool((outcome["seconds"] > whole).all() and (outcome["forward"] >= wanted).all())
+    demands = demands_of(config.use.task)
+    return demands.promising(outcome, config.rollout.seconds, experiment.creature)

@@ -13,20 +13,19 @@ from jax.sharding import Mesh, NamedSharding, PartitionSpec
 
 from mjxgait.champion import Champion
 from mjxgait.control.drive import Drive
-from mjxgait.control.poses import TUNING, Genome, PoseTracker
 from mjxgait.creature import Creature
-from mjxgait.creature.settings import Termination
 from mjxgait.errors import UserError
+from mjxgait.parts import make_controller, make_task
+from mjxgait.parts.registry import what_ends
 from mjxgait.physics import make_plant
 from mjxgait.search.evolution import Evolution, EvolutionState, GenerationMetrics, Proposal
 from mjxgait.senses import check_senses
-from mjxgait.settings.config import Config, RolloutConfig
+from mjxgait.settings.config import Config
 from mjxgait.settings.traced import traced
 from mjxgait.simulation.evaluator import Local
 from mjxgait.simulation.rollout import AXIS, Episodes, Simulator
 from mjxgait.tasks.score import in_order, score
 from mjxgait.tasks.trials import Starts
-from mjxgait.tasks.walk.task import Walk
 from mjxgait.types import Judged, pytree
 
 Step = Callable[[EvolutionState], tuple[EvolutionState, GenerationMetrics]]
@@ -83,13 +82,13 @@ class Experiment:
             jax.random.fold_in(jax.random.key(self.config.seed), 0),
         )
 
-    def simulate(self, genomes: Genome, starts: Starts | None = None) -> Episodes:
+    def simulate(self, genomes: Any, starts: Starts | None = None) -> Episodes:
         """Genomes [N, ...] on the starts [R] of this run or on others: episodes with leaves [N, R, ...]."""
         rows = _lone((genomes, starts or self.starts, self.row.settings))
         episodes = self.simulator.simulate(*rows)
         return Episodes(_only(episodes.tally), episodes.computed_steps)
 
-    def judge(self, genomes: Genome) -> Judged:
+    def judge(self, genomes: Any) -> Judged:
         """The verdict on genomes [N, ...]."""
         return Local(self.simulator).verdict(self.row.settings, self.simulate(genomes))
 
@@ -138,13 +137,24 @@ class Experiment:
         return Champion(
             creature=self.creature.name,
             digest=self.creature.digest,
-            key_poses=best.key_poses,
-            tuning=dict(zip(TUNING, map(float, best.tuning), strict=True)),
-            controller=self.config.controller,
+            controller=self.config.use.controller,
+            genome=arrays_of(best),
+            settings=self.config.controller,
+            drive=self.config.drive,
+            task=self.config.use.task,
             fitness=float(fitness[rank]),
             terms=dict(zip(task.terms, map(float, terms), strict=True)),
             origin=origin,
         )
+
+
+def arrays_of(genome: Any) -> dict[str, np.ndarray]:
+    """The arrays of a genome by dotted name, as checkpoints have them."""
+    leaves = jax.tree_util.tree_leaves_with_path(genome)
+    return {
+        jax.tree_util.keystr(path, simple=True, separator="."): np.asarray(leaf)
+        for path, leaf in leaves
+    }
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -281,23 +291,14 @@ def _compiler_options() -> dict[str, str | bool]:
     return {"xla_cpu_prefer_vector_width": "512"} if jax.default_backend() == "cpu" else {}
 
 
-def _ends(creature: Creature, config: RolloutConfig) -> Termination:
-    """What ends an episode: what the creature says, where the config says nothing else."""
-    if not config.terminate:
-        return Termination(min_up=-1.0, height=(-np.inf, np.inf), touch=False)
-    given = dataclasses.asdict(config.termination)
-    return dataclasses.replace(
-        creature.settings.termination, **{k: v for k, v in given.items() if v is not None}
-    )
-
-
 def _simulator(creature: Creature, config: Config) -> Simulator:
-    creature, ends = creature.spanned(config.evolution.pose_span), _ends(creature, config.rollout)
+    creature = creature.spanned(config.evolution.pose_span)
     step = float(creature.model.opt.timestep)
     steps = max(round(config.rollout.seconds / step), 1)
-    plant, lanes = make_plant(creature, config.rollout.physics, ends.touch)
-    controller = PoseTracker(creature, step)
-    task = Walk(creature, step, steps, ends)
+    plant, lanes = make_plant(
+        creature, config.rollout.physics, what_ends(creature, config.rollout).touch
+    )
+    controller, task = make_controller(creature, config), make_task(creature, config)
     check_senses(controller.reads, task.adds)
     return Simulator(
         creature=creature,

@@ -6,8 +6,9 @@ from typing import Any
 
 from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import UserError
+from mjxgait.parts import build_config
 from mjxgait.settings.config import Config
-from mjxgait.settings.tables import build, dump_toml, read_toml
+from mjxgait.settings.tables import dump_toml, read_toml
 
 CONFIG, CREATURE, METRICS, CHAMPION = "config.toml", "creature", "metrics.jsonl", "champion.json"
 CERTIFICATE, EXAMS, PLOT = "certificate.json", "exams.jsonl", "fitness.png"
@@ -42,9 +43,8 @@ def open_run(folder: Path) -> tuple[Creature, Config]:
     """
     if not (folder / CONFIG).is_file():
         raise UserError(f"{folder}: not a run folder (it has no {CONFIG})")
-    return load_creature(folder / CREATURE), build(
-        Config, read_toml(folder / CONFIG), str(folder / CONFIG)
-    )
+    config = build_config(read_toml(folder / CONFIG), str(folder / CONFIG))
+    return load_creature(folder / CREATURE), config
 
 
 def read_metrics(path: Path) -> list[dict[str, Any]]:

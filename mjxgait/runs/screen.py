@@ -14,6 +14,7 @@ from rich.status import Status
 from rich.table import Table
 
 from mjxgait.certify import Certificate
+from mjxgait.certify.tasks import demands_of
 from mjxgait.runs.folder import CHAMPION, CONFIG, CREATURE, METRICS, PLOT
 
 
@@ -84,19 +85,20 @@ class Screen:
         for row in certificate.rows():
             table.add_row(*row, style="bold" if row[-1] == "FAIL" else None)
         self.console.print(table)
-        verdict = "Certified: it walks" if certificate.passed else "Not certified"
-        report = certificate.report
+        report, does = certificate.report, demands_of(certificate.task).verdict
+        verdict = f"Certified: {does}" if certificate.passed else "Not certified"
         if certificate.attempts > 1:
             self.console.print(f"This was examination {certificate.attempts} of its run.")
-        if (worst := report["overlap"]) and not certificate.criteria[-1].passed:
+        crossed = any(c.name == "parts" and not c.passed for c in certificate.criteria)
+        if crossed and (worst := report["overlap"]):
             one, other = worst["parts"]
             self.console.print(
                 f"{other} stands up to {1000 * worst['depth']:.0f} mm deep in {one}, "
                 f"and in it in {worst['share']:.0%} of the frames."
             )
         self.console.print(
-            f"{verdict} (margin {certificate.margin:.2f}). {report['gait']}, {report['speed']:.2f} "
-            f"m/s; {certificate.seconds:.0f} s."
+            f"{verdict} (margin {certificate.margin:.2f}). {report['summary']}; "
+            f"{certificate.seconds:.0f} s."
         )
 
     def report(
@@ -111,7 +113,7 @@ class Screen:
         table = Table(box=None, show_header=False, pad_edge=False)
         rows = {
             "best fitness": _best(last),
-            "forward": _forward(last),
+            "outcome": _outcome(last),
             "champion": str(folder / CHAMPION),
             "metrics": f"{folder / METRICS}, {folder / PLOT}",
             "settings": f"{folder / CONFIG}, {folder / CREATURE}/",
@@ -130,6 +132,9 @@ def _best(last: Mapping[str, Any]) -> str:
     return f"{last['best']:.3f} in generation {last['generation']}"
 
 
-def _forward(last: Mapping[str, Any]) -> str:
-    metres = last["outcome_forward"]
-    return "-" if metres is None else f"{metres:.2f} m per episode, mean of the starts"
+def _outcome(last: Mapping[str, Any]) -> str:
+    """What the best has done, in units of the world: m, s or how often."""
+    prefix = "outcome_"
+    named = {k.removeprefix(prefix): v for k, v in last.items() if k.startswith(prefix)}
+    told = (f"{name} {'-' if value is None else f'{value:.2f}'}" for name, value in named.items())
+    return ", ".join(told) + " per episode, mean of the starts"

@@ -53,6 +53,32 @@ def creation(box: Box, config: EvolutionConfig) -> Callable[[jax.Array, int], An
     return create
 
 
+def real_variation(box: Box, config: EvolutionConfig) -> Variation:
+    """Operators of genomes that are nothing but reals in a box: uniform crossover, Gaussian jumps."""
+
+    def cross(key: jax.Array, mother: Any, father: Any) -> Any:
+        def mixed(key: jax.Array, a: jax.Array, b: jax.Array) -> jax.Array:
+            return jnp.where(jax.random.bernoulli(key, 0.5, a.shape), a, b)
+
+        return _leafwise(key, mixed, mother, father)
+
+    def mutate(key: jax.Array, genome: Any) -> Any:
+        def moved(key: jax.Array, values: jax.Array, low: jax.Array, high: jax.Array) -> jax.Array:
+            return jittered(key, values, low, high, config.tuning_rate, config.sigma)
+
+        return _leafwise(key, moved, genome, box.low, box.high)
+
+    middle = narrowed(box, config.initial_spread)
+    return Variation(create=creation(middle, config), cross=cross, mutate=mutate)
+
+
+def _leafwise(key: jax.Array, function: Callable[..., jax.Array], *trees: Any) -> Any:
+    """The function of a key and one array of each tree, with a key of its own for each."""
+    leaves, shape_of = jax.tree.flatten(trees[0])
+    columns = zip(jax.random.split(key, len(leaves)), *map(jax.tree.leaves, trees), strict=True)
+    return jax.tree.unflatten(shape_of, [function(*column) for column in columns])
+
+
 def narrowed(box: Box, share: jax.Array | float) -> Box:
     """The middle of a box, `share` of its width in every gene."""
 

@@ -5,7 +5,10 @@ from typing import Annotated, Literal
 
 import pydantic
 
+from mjxgait.settings.control import DriveConfig, PoseConfig
 from mjxgait.settings.tables import (
+    HOST,
+    SHAPE,
     STRICT,
     Count,
     Finite,
@@ -14,61 +17,7 @@ from mjxgait.settings.tables import (
     Positive,
     Whole,
 )
-
-SHAPE = "shape"
-"""Marks what decides the shape of the compiled program; every other number or choice is a value that the program is handed."""
-
-HOST = "host"
-"""Marks what only the host reads, never the compiled program."""
-
-
-def _ordered(interval: tuple[float, float]) -> tuple[float, float]:
-    if interval[0] > interval[1]:
-        raise ValueError(f"[{interval[0]}, {interval[1]}]: the first must not be the larger")
-    return interval
-
-
-Interval = Annotated[tuple[Finite, Finite], pydantic.AfterValidator(_ordered)]
-
-
-@dataclasses.dataclass(frozen=True)
-class TuningRanges:
-    """Where the controller's own genes may lie (docs/controller.md); equal ends fix one."""
-
-    __pydantic_config__ = STRICT
-    threshold: Interval = (0.08, 0.16)
-    period: Interval = (0.8, 0.8)
-    steer: Interval = (0.0, 2.0)
-    pitch: Interval = (0.0, 0.0)
-    pitch_rate: Interval = (0.0, 0.0)
-    roll: Interval = (0.0, 0.0)
-    roll_rate: Interval = (0.0, 0.0)
-
-
-@dataclasses.dataclass(frozen=True)
-class ControllerConfig:
-    """The pose tracker.
-
-    Attributes:
-      key_poses: K, poses of half a cycle (of the whole one for an unsymmetric creature).
-      mirror: whether the other half of a symmetric creature's cycle is the mirror image; else the K poses are the whole cycle.
-      interpolation: n, steps between neighbouring poses.
-      advance: the target moves on when the pose error is below the threshold, or by the clock.
-      law: stable PD, or plain PD for comparison.
-      constraint_forces: whether stable PD counts the constraint forces of the previous step, as in DART's tutorial.
-      stiffness, damping: factors on the creature's kp and kd.
-    """
-
-    __pydantic_config__ = STRICT
-    key_poses: Annotated[int, pydantic.Field(ge=2), SHAPE] = 2
-    mirror: bool = True
-    interpolation: Count = 10
-    advance: Literal["error", "clock"] = "error"
-    law: Literal["spd", "pd"] = "spd"
-    constraint_forces: bool = False
-    stiffness: Positive = 1.0
-    damping: Positive = 1.0
-    tuning: TuningRanges = dataclasses.field(default_factory=TuningRanges)
+from mjxgait.settings.walk import WalkConfig
 
 
 @dataclasses.dataclass(frozen=True)
@@ -123,52 +72,6 @@ class RolloutConfig:
     worst: Fraction = 0.5
     physics: Annotated[Literal["auto", "mjx"], SHAPE] = "auto"
     lanes: Annotated[Whole, SHAPE] = 0
-
-
-@dataclasses.dataclass(frozen=True)
-class Weights:
-    """Weight of each fitness term (mjxgait/tasks/walk/fitness.py says what each measures); all but `distance` and `alive` are penalties."""
-
-    __pydantic_config__ = STRICT
-    distance: Finite = 1.0
-    alive: Finite = 0.0
-    drift: Finite = 1.0
-    fade: Finite = 0.5
-    slip: Finite = 10.0
-    clearance: Finite = 3.0
-    frequency: Finite = 4.0
-    duty: Finite = 2.0
-    airborne: Finite = 3.0
-    foot_height: Finite = 1.0
-    tilt: Finite = 1.0
-    wobble: Finite = 0.1
-    touch: Finite = 1.0
-    energy: Finite = 0.05
-    saturation: Finite = 0.5
-    limits: Finite = 0.5
-    overlap: Finite = 4.0
-    fall: Finite = 0.0
-
-
-@dataclasses.dataclass(frozen=True)
-class FitnessConfig:
-    """What is wanted of a gait.
-
-    Attributes:
-      speed: body lengths per second up to which faster is better; beyond it distance counts a fiftieth, so that a gait gets steadier and
-        not faster. 0 sets no limit.
-      clearance: height in hip heights that each foot should reach in each stride.
-      frequency: share of the highest stride frequency of an animal of this mass up to which a gait is not hasty.
-      style_ramp: generations over which the style terms (all but distance, alive, foot_height and
-        fall) grow to their full weight.
-    """
-
-    __pydantic_config__ = STRICT
-    speed: NonNegative = 0.9
-    clearance: NonNegative = 0.12
-    frequency: NonNegative = 0.7
-    style_ramp: Whole = 0
-    weights: Weights = dataclasses.field(default_factory=Weights)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -281,6 +184,20 @@ class ExaminationConfig:
 
 
 @dataclasses.dataclass(frozen=True)
+class UseConfig:
+    """Who takes part.
+
+    Attributes:
+      controller: what moves the creature: poses, or FILE.py:CLASS of your own (docs/extending.md).
+      task: what the creature is to do: walk, or FILE.py:CLASS of your own.
+    """
+
+    __pydantic_config__ = STRICT
+    controller: Annotated[str, SHAPE] = "poses"
+    task: Annotated[str, SHAPE] = "walk"
+
+
+@dataclasses.dataclass(frozen=True)
 class Config:
     """A run's settings.
 
@@ -294,8 +211,10 @@ class Config:
     seed: Annotated[Whole, HOST] = 0
     checkpoint_every: Annotated[Count, HOST] = 5
     keep_every: Annotated[Count, HOST] = 5
-    controller: ControllerConfig = dataclasses.field(default_factory=ControllerConfig)
+    use: UseConfig = dataclasses.field(default_factory=UseConfig)
+    controller: PoseConfig = dataclasses.field(default_factory=PoseConfig)
+    drive: DriveConfig = dataclasses.field(default_factory=DriveConfig)
     rollout: RolloutConfig = dataclasses.field(default_factory=RolloutConfig)
-    fitness: FitnessConfig = dataclasses.field(default_factory=FitnessConfig)
+    fitness: WalkConfig = dataclasses.field(default_factory=WalkConfig)
     evolution: EvolutionConfig = dataclasses.field(default_factory=EvolutionConfig)
     examination: ExaminationConfig = dataclasses.field(default_factory=ExaminationConfig)

@@ -1,22 +1,31 @@
 """How the layers of settings are laid over each other."""
 
-from collections.abc import Mapping
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from mjxgait.errors import UserError, did_you_mean
-from mjxgait.settings.config import Config
+from mjxgait.settings.config import Config, UseConfig
 from mjxgait.settings.shipped import data_folder, shipped_creatures
 from mjxgait.settings.tables import build, merge, read_toml
 
 
 def resolve_config(
-    creature_table: Mapping[str, Any], creature_name: str, file: Path | None = None
+    creature_table: Mapping[str, Any],
+    creature_name: str,
+    file: Path | None = None,
+    use: Mapping[str, str] | None = None,
+    config_class: Callable[[UseConfig], type[Config]] = lambda use: Config,
 ) -> Config:
     """The layers, each over the one before: `configs/default.toml`, the creature's `[train]`, the user's file.
 
     A file may begin with `standalone = true`: then nothing but the built-in defaults lies under it.
     Its tables `[creature.NAME]` hold keys for the creature of that name, laid over the rest of it.
+    What the first two say to a controller or a task that takes no part is left out.
+
+    Args:
+      use: who takes part, over what the layers say. config_class: the settings of those.
 
     Raises:
       UserError: names the layer and the key.
@@ -27,11 +36,41 @@ def resolve_config(
     if not standalone:
         layers.append((str(default), read_toml(default)))
         layers.append((f"{creature_name}/creature.toml: [train]", creature_table))
+    layers += mine
+    chosen = _chosen(layers, use or {})
+    cls = config_class(chosen)
     table: dict[str, Any] = {}
-    for where, layer in (*layers, *mine):
-        table = merge(table, layer)
-        build(Config, table, where)
-    return build(Config, table, "the settings taken together")
+    for where, layer in layers:
+        ours = layer if (where, layer) in mine else _without_absent(layer, chosen)
+        table = merge(table, ours)
+        build(cls, table, where)
+    table = merge(table, {"use": dataclasses.asdict(chosen)})
+    return build(cls, table, "the settings taken together")
+
+
+def _chosen(layers: Sequence[tuple[str, Mapping[str, Any]]], use: Mapping[str, str]) -> UseConfig:
+    table: dict[str, Any] = {}
+    for where, layer in layers:
+        given = layer.get("use", {})
+        if not isinstance(given, Mapping):
+            raise UserError(f"{where}: use = {given!r}: give a table such as [use]")
+        table = merge(table, given)
+        build(UseConfig, table, f"{where}: [use]")
+    return build(UseConfig, merge(table, use), "the options")
+
+
+def _without_absent(layer: Mapping[str, Any], use: UseConfig) -> dict[str, Any]:
+    """A layer that was written for the controller and the task of the default."""
+    usual = UseConfig()
+    absent = {
+        name
+        for name, same in (
+            ("controller", use.controller == usual.controller),
+            ("fitness", use.task == usual.task),
+        )
+        if not same
+    }
+    return {key: value for key, value in layer.items() if key not in absent}
 
 
 def _file_layers(
@@ -57,7 +96,8 @@ def _file_layers(
             )
         if not isinstance(own, Mapping):
             raise UserError(f"{path}: creature.{name} = {own!r}: give a table of config keys")
-        build(Config, own, f"{path}: [creature.{name}]")
+        if "use" not in general:
+            build(Config, own, f"{path}: [creature.{name}]")
     mine = creatures.get(creature_name, {})
     return standalone, [(str(path), general), (f"{path}: [creature.{creature_name}]", mine)]
 

@@ -21,9 +21,33 @@ Finite = Annotated[float, pydantic.Field(allow_inf_nan=False)]
 Count = Annotated[int, pydantic.Field(ge=1)]
 Whole = Annotated[int, pydantic.Field(ge=0)]
 
+
+def _ordered(interval: tuple[float, float]) -> tuple[float, float]:
+    if interval[0] > interval[1]:
+        raise ValueError(f"[{interval[0]}, {interval[1]}]: the first must not be the larger")
+    return interval
+
+
+Interval = Annotated[tuple[Finite, Finite], pydantic.AfterValidator(_ordered)]
+
+SHAPE = "shape"
+"""Marks what decides the shape of the compiled program; every other number or choice is a value
+that the program is handed.
+"""
+
+HOST = "host"
+"""Marks what only the host reads, never the compiled program."""
+
 UNKNOWN = "unexpected_keyword_argument"
 STRICT = pydantic.ConfigDict(extra="forbid")
 """What a dataclass read by `build` names as its `__pydantic_config__`."""
+
+
+@dataclasses.dataclass(frozen=True)
+class NoSettings:
+    """Of a part that has none."""
+
+    __pydantic_config__ = STRICT
 
 
 def read_toml(path: Path) -> dict[str, Any]:

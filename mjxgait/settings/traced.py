@@ -10,7 +10,8 @@ from typing import Any, Literal, get_args, get_origin, get_type_hints
 import jax
 import jax.numpy as jnp
 
-from mjxgait.settings.config import HOST, SHAPE, Config
+from mjxgait.settings.config import Config
+from mjxgait.settings.tables import HOST, SHAPE
 from mjxgait.types import pytree
 
 
@@ -84,17 +85,23 @@ def _fields(cls: type) -> list[tuple[Any, Any, str]]:
     return rows
 
 
-def _register(cls: type) -> None:
+_REGISTERED: set[type] = set()
+
+
+def register(cls: type) -> None:
     """Makes a config class, and those within it, pytrees."""
+    if cls in _REGISTERED:
+        return
+    _REGISTERED.add(cls)
     roles = {field.name: role for field, _, role in _fields(cls)}
     for field in dataclasses.fields(cls):
         inner: Any = get_type_hints(cls)[field.name]
         if isinstance(inner, type) and dataclasses.is_dataclass(inner):
-            _register(inner)
+            register(inner)
     data = [name for name, role in roles.items() if not role]
     jax.tree_util.register_dataclass(
         cls, data_fields=data, meta_fields=[name for name, role in roles.items() if role]
     )
 
 
-_register(Config)
+register(Config)

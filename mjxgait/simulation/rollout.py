@@ -179,7 +179,7 @@ class Simulator:
             tally=self.task.init(),
             aim=self.task.aim(start),
             standards=self.task.standards(mine.fitness),
-            rules=self.drive.rules(mine.controller, start.stiffness, start.damping),
+            rules=self.drive.rules(mine.drive, start.stiffness, start.damping),
             push=start.push,
             push_step=start.push_step,
         )

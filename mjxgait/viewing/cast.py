@@ -2,16 +2,13 @@
 generations.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-import numpy as np
-
-from mjxgait.champion import Champion, read_champion
-from mjxgait.errors import UserError
+from mjxgait.champion import read_champion
 from mjxgait.runs.folder import CHAMPION, open_run
 from mjxgait.viewing.video import Runner
-from mjxgait.viewing.walk import record_walk
+from mjxgait.viewing.walk import Walk, record_walk
 
 LOOP_SECONDS = 12.0
 """Simulated to find a steady stride."""
@@ -48,26 +45,11 @@ def through_generations(run: Path, generations: Sequence[int], seconds: float) -
     ]
 
 
-def _walks(run: Path, generation: int | None, ranks: range, seconds: float):
-    from mjxgait.control.poses import TUNING
+def _walks(
+    run: Path, generation: int | None, ranks: range, seconds: float
+) -> Iterator[tuple[int, Walk]]:
     from mjxgait.inspect.snapshot import read_snapshot
 
     snapshot = read_snapshot(run, generation)
-    if ranks[-1] > len(snapshot.fitness):
-        raise UserError(
-            f"{run}: no individual {ranks[-1]}; the population has ranks 1 to "
-            f"{len(snapshot.fitness)}"
-        )
-    for rank in ranks:
-        i = rank - 1
-        individual = Champion(
-            creature=snapshot.creature.name,
-            digest=snapshot.creature.digest,
-            key_poses=np.asarray(snapshot.key_poses[i], float),
-            tuning=dict(zip(TUNING, map(float, snapshot.tuning[i]), strict=True)),
-            controller=snapshot.config.controller,
-            fitness=float(snapshot.fitness[i]),
-            terms={},
-            origin={"generation": snapshot.generation},
-        )
-        yield rank, record_walk(snapshot.creature, individual, seconds)
+    for rank, champion in [(rank, snapshot.champion(rank)) for rank in ranks]:
+        yield rank, record_walk(snapshot.creature, champion, seconds)

@@ -73,7 +73,7 @@ def draw_joints(drawing: Figure, walk: Walk) -> None:
     axes = drawing.subplots(-(-len(order) // columns), columns, sharex=True, squeeze=False)
     angles, targets = (
         np.degrees(walk.recording.joint_pos[window]),
-        np.degrees(walk.targets()[window]),
+        np.degrees(walk.trajectory.target[0][window]),
     )
     time = np.arange(len(angles)) * walk.time_step
     for place, panel in enumerate(axes.flat):

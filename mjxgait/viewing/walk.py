@@ -10,10 +10,10 @@ from functools import cached_property
 import mujoco
 import numpy as np
 
-from mjxgait.certify.controller import Controller, Senses
 from mjxgait.certify.measure import Recording, measure
 from mjxgait.certify.simulate import Trajectory, simulate
 from mjxgait.certify.starts import nominal_starts
+from mjxgait.certify.strides import stride_starts
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 
@@ -69,8 +69,11 @@ class Walk:
 
     def stride_frames(self) -> np.ndarray:
         """Frames at which the controller's cycle begins anew, while the creature is up: a loop of
-        whole cycles has no seam, which one of footfalls would have."""
-        starts = np.flatnonzero(np.diff(self.trajectory.position[0]) < 0) + 1
+        whole cycles has no seam, which one of footfalls would have. Footfalls where it has none.
+        """
+        phase = self.trajectory.phase[0]
+        cyclic = np.isfinite(phase).all()
+        starts = np.flatnonzero(np.diff(phase) < 0) + 1 if cyclic else stride_starts(self.recording)
         return starts[starts * self.time_step < self.fell]
 
     def steady_strides(self, count: int) -> tuple[int, int] | None:
@@ -98,25 +101,6 @@ class Walk:
         """World positions [T, G, 3] m and rotations [T, G, 3, 3] of the geoms at some frames."""
         return _poses(self.creature.model, self.qpos[frames], ("geom_xpos", "geom_xmat"))
 
-    def targets(self) -> np.ndarray:
-        """[T, J] rad that the joints were pulled to, steering and balance included."""
-        pos, rot = self.body_poses()
-        trunk, unused = self.creature.trunk, np.zeros(0)
-        root = int(self.creature.model.jnt_dofadr[self.creature.model.body_jntadr[trunk]])
-        velocity = self.trajectory.qvel[0]
-        senses = Senses(
-            joint_pos=unused,
-            velocity=velocity,
-            trunk_pos=pos[:, trunk],
-            trunk_rot=rot[:, trunk],
-            # A free joint's angular velocity is in the body's own frame.
-            trunk_angvel=(rot[:, trunk] * velocity[:, None, root + 3 : root + 6]).sum(2),
-            mass_matrix=unused,
-            bias=unused,
-            constraint_force=unused,
-        )
-        return Controller(self.creature, self.champion).target(self.trajectory.position[0], senses)
-
 
 def record_walk(creature: Creature, champion: Champion, seconds: float) -> Walk:
     """Simulates the champion on an even floor, without noise or pushes."""
@@ -129,7 +113,10 @@ def record_walk(creature: Creature, champion: Champion, seconds: float) -> Walk:
     last = min(last, round((fell + AFTERMATH) / film.time_step)) if np.isfinite(fell) else last
     # One that blew up at once is shown standing.
     frames = np.minimum(np.arange(max(last, 2)), max(last, 1) - 1)
-    kept = {name: getattr(film, name)[:, frames] for name in ("qpos", "qvel", "torque", "position")}
+    kept = {
+        name: getattr(film, name)[:, frames]
+        for name in ("qpos", "qvel", "torque", "target", "phase")
+    }
     return Walk(creature, champion, dataclasses.replace(film, **kept), fell)
 
 

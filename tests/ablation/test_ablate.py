@@ -33,7 +33,7 @@ name = "stable PD"
 
 [[variant]]
 name = "plain PD"
-settings = {{ controller = {{ law = "pd" }} }}
+settings = {{ drive = {{ law = "pd" }} }}
 
 [[variant]]
 name = "three key poses"
@@ -103,7 +103,7 @@ def test_a_row_is_the_run_that_train_makes(finished: tuple[Path, str], tmp_path:
         "6",
         "--generations",
         "4",
-        "--controller.law",
+        "--drive.law",
         "pd",
     ]
     train += [

@@ -69,7 +69,7 @@ def test_a_variant_may_run_a_config_of_its_own_and_nothing_else(stool: Creature)
 
 
 def test_a_grid_is_the_base_and_every_combination(stool: Creature):
-    found = plan(stool, grid={"evolution.mutation_rate": [0.2, 0.6], "controller.law": ["pd"]})
+    found = plan(stool, grid={"evolution.mutation_rate": [0.2, 0.6], "drive.law": ["pd"]})
     assert found.variants == (
         "base",
         "mutation_rate = 0.2, law = pd",

@@ -11,18 +11,20 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
+from helpers import pose_champion
 
 from mjxgait.bench import contest
 from mjxgait.bench.flops import count_flops
 from mjxgait.bench.mujoco_peer import DampedSolve, Law, MujocoPeer
 from mjxgait.bench.scaling import draw
 from mjxgait.bench.workload import Lap, Workload
-from mjxgait.certify.controller import Controller, Senses
-from mjxgait.champion import Champion
+from mjxgait.certify.layout import start_frame
+from mjxgait.certify.state import State, sense
+from mjxgait.certify.twins.poses import PoseTwin
 from mjxgait.commands import bench
 from mjxgait.creature import load_creature
 from mjxgait.errors import UserError
-from mjxgait.settings.config import Config, ControllerConfig
+from mjxgait.settings.config import Config
 from mjxgait.settings.shipped import data_folder, find_creature
 
 NEEDS_DART = pytest.mark.skipif(
@@ -53,7 +55,7 @@ def workload(creature):
     qpos[1, creature.qpos_adr] += 0.02
     return Workload(
         folder=find_creature("tall_quadruped"),
-        config=Config(controller=ControllerConfig(constraint_forces=False)),
+        config=Config(),
         key_poses=poses,
         tuning={name: np.full(genomes, value) for name, value in TUNING.items()},
         qpos=qpos,
@@ -67,21 +69,30 @@ def workload(creature):
 
 def test_the_law_is_the_examiners(creature, workload):
     rng, count = np.random.default_rng(1), 5
-    champion = Champion(
-        "", "", workload.key_poses[1], TUNING, workload.config.controller, 0.0, {}, {}
-    )
+    champion = pose_champion(creature, workload.key_poses[1], TUNING)
     turn = np.linalg.qr(rng.normal(size=(count, 3, 3)))[0]
     rot = turn * np.sign(np.linalg.det(turn))[:, None, None]
     v, pos = rng.normal(size=(count, creature.model.nv)), rng.normal(size=(count, 3))
     spin = (rot @ v[:, 3:6, None])[..., 0]
-    senses = Senses(creature.stand + v[:, 6:] * 0.1, v, pos, rot, spin, *([np.zeros(0)] * 3))
+    state = State(
+        start_frame(creature),
+        np.zeros(count),
+        creature.stand + v[:, 6:] * 0.1,
+        v,
+        pos,
+        rot,
+        v[:, :3],
+        spin,
+        *([np.zeros(0)] * 4),
+    )
+    senses = sense(creature, state, PoseTwin.reads)
     position, genome = np.arange(count) * 7, np.full(count, 1)
-    law, examiner = Law(creature, workload), Controller(creature, champion)
+    law, examiner = Law(creature, workload), PoseTwin(creature, champion, 0.005)
     target = law.target(genome, position, pos, rot, v)
     np.testing.assert_allclose(target, examiner.target(position, senses), atol=1e-12)
-    expected = examiner.advance(position, target, senses.joint_pos, 1, 0.005)
+    expected = examiner.advance(position, target, state.joint_pos, np.ones(count, int))
     np.testing.assert_array_equal(
-        law.advance(genome, position, target, senses.joint_pos, position), expected
+        law.advance(genome, position, target, state.joint_pos, position), expected
     )
 
 

@@ -1,10 +1,12 @@
 """A small quadruped, champions for it, and a made-up good walk."""
 
+import dataclasses
+
 import numpy as np
+from helpers import pose_champion
 
 from mjxgait.certify.measure import Dimensions, Recording
-from mjxgait.champion import Champion
-from mjxgait.settings.config import ControllerConfig
+from mjxgait.settings.control import DriveConfig, PoseConfig
 
 LEG = """
       <body name="{name}_upper" pos="{x} {y} 0">
@@ -62,23 +64,19 @@ pitch = { "*_hip" = 1.0 }
 roll = { "*_left_knee" = 1.0 }
 """
 
-TUNING = {
-    "threshold": 0.12,
-    "period": 0.6,
-    "steer": 0.0,
-    "pitch": 0.0,
-    "pitch_rate": 0.0,
-    "roll": 0.0,
-    "roll_rate": 0.0,
-}
+DRIVE = {field.name for field in dataclasses.fields(DriveConfig)}
 
 
-def make_champion(creature, key_poses=None, tuning=None, **controller):
-    """A champion that stands, unless poses say otherwise."""
+def make_champion(creature, key_poses=None, tuning=None, **settings):
+    """A champion that stands, unless poses say otherwise; settings of the controller or the drive."""
     poses = np.stack([creature.stand] * 2) if key_poses is None else key_poses
-    settings = ControllerConfig(key_poses=len(poses), **controller)
-    return Champion(
-        creature.name, creature.digest, poses, TUNING | (tuning or {}), settings, 0.0, {}, {}
+    drive = {name: settings.pop(name) for name in DRIVE & settings.keys()}
+    return pose_champion(
+        creature,
+        poses,
+        {"period": 0.6} | (tuning or {}),
+        PoseConfig(key_poses=len(poses), **settings),
+        DriveConfig(**drive),
     )
 
 

@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 from certify_made_up import make_champion
 
-from mjxgait.certify.controller import Controller, Senses, pose_cycle
+from mjxgait.certify.drive import Drive
+from mjxgait.certify.layout import start_frame
+from mjxgait.certify.state import SENSES, State, sense
+from mjxgait.certify.twins.poses import PoseTwin, pose_cycle
+
+STEP = 0.005
 
 
 def rotation(axis, angle):
@@ -20,7 +25,7 @@ def rotation(axis, angle):
     )
 
 
-def senses(creature, rot=None, pos=(0.0, 0.0, 0.3035), angvel=(0.0, 0.0, 0.0), seed=None, count=1):
+def made_up(creature, rot=None, pos=(0.0, 0.0, 0.3035), angvel=(0.0, 0.0, 0.0), seed=None, count=1):
     """A state; standing still unless a seed draws joints, velocities and dynamics."""
     nv, joints = creature.model.nv, len(creature.stand)
     rng = np.random.default_rng(seed)
@@ -30,16 +35,33 @@ def senses(creature, rot=None, pos=(0.0, 0.0, 0.3035), angvel=(0.0, 0.0, 0.0), s
         else (lambda *shape: np.zeros(shape))
     )
     root = draw(count, nv, nv)
-    return Senses(
+    return State(
+        start=start_frame(creature),
+        time=np.full(count, 0.3),
         joint_pos=creature.stand + draw(count, joints),
         velocity=draw(count, nv),
         trunk_pos=np.tile(pos, (count, 1)),
         trunk_rot=np.tile(np.eye(3) if rot is None else rot, (count, 1, 1)),
+        trunk_vel=draw(count, 3),
         trunk_angvel=np.tile(angvel, (count, 1)),
+        foot_height=np.tile([0.0, 0.001, 0.003, 0.05], (count, 1)),
         mass_matrix=root @ root.swapaxes(1, 2) + np.eye(nv),
         bias=draw(count, nv),
         constraint_force=draw(count, nv),
     )
+
+
+def felt(creature, *arguments, **keys):
+    """What the controller senses of a made-up state."""
+    return sense(creature, made_up(creature, *arguments, **keys), PoseTwin.reads)
+
+
+def twin(creature, *arguments, **keys):
+    return PoseTwin(creature, make_champion(creature, *arguments, **keys), STEP)
+
+
+def drive(creature, **settings):
+    return Drive(creature, make_champion(creature, **settings).drive, "pose", STEP)
 
 
 def poses(creature, count=2):
@@ -49,7 +71,7 @@ def poses(creature, count=2):
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_the_cycle_passes_through_the_key_poses_and_their_mirror_images(tiny, count):
     key_poses = poses(tiny, count)
-    control = Controller(tiny, make_champion(tiny, key_poses, interpolation=7))
+    control = twin(tiny, key_poses, interpolation=7)
     assert control.length == 2 * count * 7
     at_poses = control.planned(np.arange(2 * count) * 7)
     mirrored = np.array(
@@ -75,7 +97,7 @@ def test_a_roll_joint_changes_sign_in_the_mirror(tiny):
 
 def test_between_poses_the_target_is_linear_and_the_cycle_closes(tiny):
     key_poses = poses(tiny)
-    control = Controller(tiny, make_champion(tiny, key_poses, interpolation=10))
+    control = twin(tiny, key_poses, interpolation=10)
     cycle = pose_cycle(key_poses, tiny)
     np.testing.assert_allclose(
         control.planned(np.array([3]))[0], 0.7 * cycle[0] + 0.3 * cycle[1], atol=1e-15
@@ -94,41 +116,36 @@ def test_an_unsymmetric_creature_is_not_mirrored(tiny):
 
 
 def test_heading_to_the_left_and_being_on_the_left_are_positive(tiny):
-    control = Controller(tiny, make_champion(tiny, tuning={"steer": 0.5}))
-    assert control.corrections(senses(tiny, rotation("z", 0.3)))[0] == pytest.approx(0.15)
-    on_the_left = senses(tiny, pos=(4.0, 0.2, 0.3))
+    control = twin(tiny, tuning={"steer": 0.5})
+    assert control.corrections(felt(tiny, rotation("z", 0.3)))[0] == pytest.approx(0.15)
+    on_the_left = felt(tiny, pos=(4.0, 0.2, 0.3))
     assert control.corrections(on_the_left)[0] == pytest.approx(0.5 * 0.2 / (2 * tiny.body_length))
-    assert control.corrections(on_the_left, heading=0.1)[0] == pytest.approx(-0.05)
-    assert control.corrections(senses(tiny, rotation("z", 3.0)))[0] == pytest.approx(0.5)
+    assert control.corrections(felt(tiny, rotation("z", 3.0)))[0] == pytest.approx(0.5)
 
 
 def test_nose_down_and_right_side_down_are_positive(tiny):
-    still = make_champion(tiny, tuning={"pitch": 1.0, "roll": 2.0})
-    _, pitch, roll = Controller(tiny, still).corrections(senses(tiny, rotation("y", 0.2)))
+    still = twin(tiny, tuning={"pitch": 1.0, "roll": 2.0})
+    _, pitch, roll = still.corrections(felt(tiny, rotation("y", 0.2)))
     assert (pitch, roll) == (pytest.approx(0.2), pytest.approx(0.0))
-    _, pitch, roll = Controller(tiny, still).corrections(senses(tiny, rotation("x", 0.2)))
+    _, pitch, roll = still.corrections(felt(tiny, rotation("x", 0.2)))
     assert (pitch, roll) == (pytest.approx(0.0), pytest.approx(0.4))
 
 
 def test_rates_are_positive_when_the_angles_grow(tiny):
-    swinging = make_champion(tiny, tuning={"pitch_rate": 0.1, "roll_rate": 0.2})
+    swinging = twin(tiny, tuning={"pitch_rate": 0.1, "roll_rate": 0.2})
     turned = rotation("z", 1.0)
-    _, pitch, roll = Controller(tiny, swinging).corrections(
-        senses(tiny, turned, angvel=turned @ [0.7, 0.5, 9.0])
-    )
+    _, pitch, roll = swinging.corrections(felt(tiny, turned, angvel=turned @ [0.7, 0.5, 9.0]))
     assert (pitch, roll) == (pytest.approx(0.05), pytest.approx(0.14))
 
 
 def test_the_corrected_target_is_the_sum_on_the_page(tiny):
     key_poses = poses(tiny)
-    champion = make_champion(tiny, key_poses, {"steer": 1.0, "pitch": 1.0, "roll": 1.0})
     stand = np.full(8, 0.05)
     creature = dataclasses.replace(tiny, stand=stand)
+    control = twin(creature, key_poses, {"steer": 1.0, "pitch": 1.0, "roll": 1.0})
     rot = rotation("z", 0.1) @ rotation("y", 0.2)
-    u, p, r = (
-        float(part[0]) for part in Controller(creature, champion).corrections(senses(creature, rot))
-    )
-    target = Controller(creature, champion).target(np.array([0]), senses(creature, rot))[0]
+    u, p, r = (float(part[0]) for part in control.corrections(felt(creature, rot)))
+    target = control.target(np.array([0]), felt(creature, rot))[0]
     for j in range(8):
         want = stand[j] + (key_poses[0, j] - stand[j]) * (1 + u * creature.steer_stride[j])
         want += (
@@ -140,17 +157,16 @@ def test_the_corrected_target_is_the_sum_on_the_page(tiny):
 
 
 def test_the_target_keeps_to_the_joint_ranges(tiny):
-    control = Controller(tiny, make_champion(tiny, np.full((2, 8), 3.0)))
-    np.testing.assert_array_equal(control.target(np.array([0]), senses(tiny))[0], tiny.joint_high)
+    control = twin(tiny, np.full((2, 8), 3.0))
+    np.testing.assert_array_equal(control.target(np.array([0]), felt(tiny))[0], tiny.joint_high)
 
 
 @pytest.mark.parametrize("constraint_forces", [False, True])
 def test_stable_pd_against_the_dense_formula(tiny, constraint_forces):
-    control = Controller(tiny, make_champion(tiny, constraint_forces=constraint_forces))
-    h, nv = 0.005, tiny.model.nv
-    state = senses(tiny, seed=1, count=3)
+    h, nv = STEP, tiny.model.nv
+    state = made_up(tiny, seed=1, count=3)
     target = np.random.default_rng(2).normal(0, 0.2, (3, 8))
-    got = control.torque(target, state, h)
+    got = drive(tiny, constraint_forces=constraint_forces).torque(target, state)
     for s in range(3):
         kp, kd, q, wish = (np.zeros(nv) for _ in range(4))
         kp[tiny.dof_adr], kd[tiny.dof_adr] = tiny.kp, tiny.kd
@@ -165,8 +181,8 @@ def test_stable_pd_against_the_dense_formula(tiny, constraint_forces):
 
 def test_stable_pd_predicts_the_acceleration_that_its_own_torque_makes(tiny):
     loose = dataclasses.replace(tiny, torque_limit=np.full(8, 1e9))
-    state, target, h = senses(tiny, seed=3), np.full((1, 8), 0.1), 0.005
-    torque = Controller(loose, make_champion(loose)).torque(target, state, h)[0]
+    state, target, h = made_up(tiny, seed=3), np.full((1, 8), 0.1), STEP
+    torque = drive(loose).torque(target, state)[0]
     force = -state.bias[0]
     force[tiny.dof_adr] += torque
     acc = np.linalg.solve(state.mass_matrix[0], force)[tiny.dof_adr]
@@ -179,26 +195,59 @@ def test_stable_pd_predicts_the_acceleration_that_its_own_torque_makes(tiny):
 
 
 def test_plain_pd(tiny):
-    state, target = senses(tiny, seed=4), np.full((1, 8), 0.1)
+    state, target = made_up(tiny, seed=4), np.full((1, 8), 0.1)
     want = -tiny.kp * (state.joint_pos - target) - tiny.kd * state.velocity[:, tiny.dof_adr]
-    got = Controller(tiny, make_champion(tiny, law="pd")).torque(target, state, 0.005)
+    got = drive(tiny, law="pd").torque(target, state)
     np.testing.assert_allclose(got, np.clip(want, -12, 12))
 
 
 def test_the_position_moves_on_when_the_pose_error_is_below_the_threshold(tiny):
-    control = Controller(tiny, make_champion(tiny, tuning={"threshold": 0.12}))
+    control = twin(tiny, tuning={"threshold": 0.12})
     off = np.zeros((3, 8))
     off[0], off[1], off[2, 0] = 0.119, 0.121, 0.12 * np.sqrt(8) * 0.99
     np.testing.assert_array_equal(
-        control.advance(np.array([39, 39, 5]), off, np.zeros((3, 8)), 1, 0.005), [0, 39, 6]
+        control.advance(np.array([39, 39, 5]), off, np.zeros((3, 8)), np.ones(3, int)), [0, 39, 6]
     )
 
 
 def test_the_clock_moves_on_whatever_the_error(tiny):
-    control = Controller(tiny, make_champion(tiny, tuning={"period": 0.8}, advance="clock"))
+    control = twin(tiny, tuning={"period": 0.8}, advance="clock")
     far = np.ones((1, 8))
     at = [
-        int(control.advance(np.array([0]), far, 0 * far, k, 0.005)[0])
+        int(control.advance(np.array([0]), far, 0 * far, np.array([k]))[0])
         for k in (0, 3, 4, 80, 159, 160, 164)
     ]
     assert at == [0, 0, 1, 20, 39, 0, 1]
+
+
+def test_a_torque_is_only_limited(tiny):
+    wanted = np.array([[1.0, -2.0, 50.0, -50.0, 0.0, 12.0, -12.0, 3.0]])
+    got = Drive(tiny, make_champion(tiny).drive, "torque", STEP).torque(wanted, made_up(tiny))
+    np.testing.assert_array_equal(got, np.clip(wanted, -12, 12))
+
+
+def test_the_senses_are_those_of_evolution(tiny):
+    """Every name, of a body that lies askew, in C's numbers and in evolution's."""
+    import jax.numpy as jnp
+
+    from mjxgait import senses as evolution
+    from mjxgait.types import Sensed
+
+    rot = rotation("z", 0.7) @ rotation("y", 0.2) @ rotation("x", -0.4)
+    state = made_up(tiny, rot, (0.3, -0.1, 0.25), (0.5, -0.7, 0.9), seed=6)
+    sensed = Sensed(
+        joint_pos=jnp.asarray(state.joint_pos[0]),
+        joint_vel=jnp.asarray(state.velocity[0, tiny.dof_adr]),
+        bias=jnp.asarray(state.bias[0]),
+        trunk_pos=jnp.asarray(state.trunk_pos[0]),
+        trunk_rot=jnp.asarray(rot),
+        trunk_vel=jnp.asarray(state.trunk_vel[0]),
+        trunk_angvel=jnp.asarray(state.trunk_angvel[0]),
+        geom_pos=jnp.zeros((len(tiny.watched), 3)),
+        geom_low=jnp.zeros(len(tiny.watched)).at[:4].set(jnp.asarray(state.foot_height[0])),
+    )
+    assert SENSES.keys() == evolution.SENSES.keys()
+    for name, value in evolution.sense(tiny, sensed, jnp.float32(0.3), SENSES).items():
+        ours = sense(tiny, state, [name])[name][0]
+        np.testing.assert_allclose(np.asarray(value), ours, atol=1e-6, err_msg=name)
+        assert name == "time" or np.any(ours != 0), name

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from certify_made_up import DOG, walk
 
-from mjxgait.certify import CertificateConfig, criteria, strides
+from mjxgait.certify import CertificateConfig, criteria, describe, strides
 from mjxgait.certify.certificate import half_point
 from mjxgait.certify.criteria import Measure
+from mjxgait.certify.tasks import walk as demands
 
 CONFIG = CertificateConfig()
 
@@ -17,11 +18,11 @@ def failures(recording, halved=None, started=1.0, pushed=1.0):
     """Numbers of the failed criteria."""
     window = recording.window(CONFIG.warmup)
     judged = (
-        *criteria.basic(recording, CONFIG),
+        *demands.basic(recording, CONFIG),
         criteria.starts(started, CONFIG),
         criteria.pushes(pushed, CONFIG),
-        criteria.half_step(recording, halved or recording, CONFIG),
-        criteria.gait(window, CONFIG.gait),
+        demands.half_step(recording, halved or recording, CONFIG),
+        demands.gait(window, CONFIG.gait),
         criteria.physics(window, CONFIG.physics),
         criteria.parts(window, CONFIG.parts),
     )
@@ -342,7 +343,7 @@ def test_a_foot_that_moves_once_tells_no_strides():
 
 def test_slip_is_summed_over_the_stance_only():
     window = walk().window(2.0)
-    assert criteria.slip_distance(window) == pytest.approx(np.full(4, 0.02 * 0.6 * 20), rel=0.02)
+    assert describe.slip_distance(window) == pytest.approx(np.full(4, 0.02 * 0.6 * 20), rel=0.02)
 
 
 def test_push_that_fells_half_lies_between_the_pushes_tried():

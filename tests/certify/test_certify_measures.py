@@ -27,6 +27,7 @@ from test_certify_criteria import (
 from mjxgait.certify import CertificateConfig, criteria
 from mjxgait.certify.criteria import Criterion
 from mjxgait.certify.measure import Recording
+from mjxgait.certify.tasks import walk as demands
 
 CONFIG = CertificateConfig()
 AT = 3000
@@ -94,8 +95,8 @@ def judged(recording: Recording) -> list[Criterion]:
     """All criteria that one recording decides by itself."""
     window = recording.window(CONFIG.warmup)
     return [
-        *criteria.basic(recording, CONFIG),
-        criteria.gait(window, CONFIG.gait),
+        *demands.basic(recording, CONFIG),
+        demands.gait(window, CONFIG.gait),
         criteria.physics(window, CONFIG.physics),
     ]
 
@@ -141,8 +142,8 @@ def test_shares_of_starts_and_pushes():
     ids=["another verdict", "shorter", "longer"],
 )
 def test_half_the_time_step(halved: Callable[[], Recording], name: str):
-    assert failed(criteria.half_step(walk(), halved(), CONFIG)) == {name}
-    assert failed(criteria.half_step(walk(), walk(), CONFIG)) == set()
+    assert failed(demands.half_step(walk(), halved(), CONFIG)) == {name}
+    assert failed(demands.half_step(walk(), walk(), CONFIG)) == set()
 
 
 def test_a_longer_body_is_slower_in_its_own_lengths():

@@ -12,7 +12,8 @@ import pytest
 from certify_made_up import make_champion
 
 from mjxgait.certify import distance, glance, record, survival
-from mjxgait.certify.controller import Controller, Senses
+from mjxgait.certify.drive import Drive
+from mjxgait.certify.layout import start_frame
 from mjxgait.certify.measure import measure
 from mjxgait.certify.simulate import Fall, examined_model, simulate
 from mjxgait.certify.starts import (
@@ -22,6 +23,8 @@ from mjxgait.certify.starts import (
     pushed_starts,
     unfamiliar,
 )
+from mjxgait.certify.state import State, sense
+from mjxgait.certify.twins.poses import PoseTwin
 from mjxgait.errors import UserError
 
 SECONDS = 1.5
@@ -65,9 +68,9 @@ def plain_loop(creature, champion, starts, row, seconds):
     data = mujoco.MjData(model)
     mujoco.mj_setConst(model, data)
     mujoco.mj_resetData(model, data)
-    control, position, states = Controller(creature, champion), np.zeros(1, int), []
-    control.kp = control.kp * starts.stiffness[row]
-    control.kd = control.kd * starts.damping[row]
+    step = model.opt.timestep
+    control, states = PoseTwin(creature, champion, step), []
+    drive, memory = Drive(creature, champion.drive, "pose", step), control.init(1)
     torques = []
     data.qpos[:] = creature.stand_qpos
     mujoco.mj_kinematics(model, data)
@@ -86,22 +89,24 @@ def plain_loop(creature, champion, starts, row, seconds):
         mujoco.mj_step1(model, data)
         mujoco.mj_fullM(model, data, mass)
         rot = data.xmat[creature.trunk].reshape(3, 3)
-        senses = Senses(
-            data.qpos[None, creature.qpos_adr],
-            data.qvel[None],
-            data.xpos[None, creature.trunk],
-            rot[None],
-            (rot @ data.qvel[3:6])[None],
-            mass[None],
-            (data.qfrc_bias - data.qfrc_passive)[None],
-            last[None],
+        state = State(
+            start=start_frame(creature),
+            time=np.array([k * step]),
+            joint_pos=data.qpos[None, creature.qpos_adr],
+            velocity=data.qvel[None],
+            trunk_pos=data.xpos[None, creature.trunk],
+            trunk_rot=rot[None],
+            trunk_vel=data.qvel[None, :3],
+            trunk_angvel=(rot @ data.qvel[3:6])[None],
+            foot_height=np.zeros((1, 0)),
+            mass_matrix=mass[None],
+            bias=(data.qfrc_bias - data.qfrc_passive)[None],
+            constraint_force=last[None],
         )
-        target = control.target(position, senses)
-        torques.append(control.torque(target, senses, model.opt.timestep)[0])
+        target, memory = control.act(memory, sense(creature, state, control.reads))
+        gains = starts.stiffness[[row]], starts.damping[[row]]
+        torques.append(drive.torque(target, state, *gains)[0])
         data.qfrc_applied[creature.dof_adr] = torques[max(k - starts.delay[row], 0)]
-        position = control.advance(
-            position, target, senses.joint_pos.copy(), k + 1, model.opt.timestep
-        )
         mujoco.mj_step2(model, data)
     return np.array(states)
 
@@ -111,7 +116,7 @@ def plain_loop(creature, champion, starts, row, seconds):
 def test_every_disturbance_reaches_the_right_simulation(tiny, trotter, mixed, row, advance):
     champion = make_champion(
         tiny,
-        trotter.key_poses,
+        trotter.genome["key_poses"],
         {"steer": 1.0, "roll": 0.3, "pitch_rate": 0.1},
         advance=advance,
         constraint_forces=True,

@@ -51,16 +51,17 @@ def test_times_of_files_do_not_matter(run, tiny):
 @pytest.mark.parametrize(
     "change",
     [
-        lambda c: {"key_poses": c.key_poses + np.eye(2, 8) * 1e-6},
-        lambda c: {"tuning": dict(c.tuning) | {"steer": 0.99}},
         lambda c: {
-            "controller": dataclasses.replace(
-                c.controller, interpolation=c.controller.interpolation + 1
-            )
+            "genome": {**c.genome, "key_poses": c.genome["key_poses"] + np.eye(2, 8) * 1e-6}
         },
+        lambda c: {"genome": {**c.genome, "tuning": c.genome["tuning"] + np.eye(1, 7)[0] * 0.01}},
+        lambda c: {
+            "settings": dataclasses.replace(c.settings, interpolation=c.settings.interpolation + 1)
+        },
+        lambda c: {"drive": dataclasses.replace(c.drive, stiffness=1.01)},
         lambda c: {"digest": "another body"},
     ],
-    ids=["pose", "tuning", "controller", "body"],
+    ids=["pose", "tuning", "controller", "drive", "body"],
 )
 def test_whatever_moves_otherwise_is_another_champion(run, trotter, change):
     other = dataclasses.replace(trotter, **change(trotter))
@@ -78,8 +79,7 @@ def test_poses_in_single_precision_have_the_fingerprint_of_what_is_written(tiny,
     """Evolution hands over float32."""
     single = dataclasses.replace(
         trotter,
-        key_poses=trotter.key_poses.astype(np.float32),
-        tuning={k: np.float32(v) for k, v in trotter.tuning.items()},
+        genome={name: array.astype(np.float32) for name, array in trotter.genome.items()},
     )
     write_champion(single, tiny, tmp_path / "champion.json")
     assert read_champion(tmp_path / "champion.json", tiny).fingerprint == single.fingerprint

@@ -8,6 +8,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from helpers import pose_champion
 from importing.models import BIPED, QUADRUPED, ROLLING
 
 from mjxgait.certify.simulate import simulate
@@ -21,7 +22,6 @@ from mjxgait.errors import UserError
 from mjxgait.importing import ImportChoices, Imported, import_model
 from mjxgait.importing.portrait import facts, portrait, standing
 from mjxgait.importing.write_toml import _quoted
-from mjxgait.settings.config import ControllerConfig
 from mjxgait.settings.layers import resolve_config
 
 
@@ -112,20 +112,7 @@ def test_joints_with_heavy_rotors_are_stiff_and_strong_enough_to_stride(tmp_path
 
 def motionless(creature: Creature, gains: dict[str, float]) -> Champion:
     """A gait whose only pose is the stance."""
-    tuning = dict.fromkeys(("steer", "pitch", "pitch_rate", "roll", "roll_rate"), 0.0) | {
-        "threshold": 0.12,
-        "period": 0.8,
-    }
-    return Champion(
-        creature.name,
-        creature.digest,
-        np.tile(creature.stand, (2, 1)),
-        tuning | gains,
-        ControllerConfig(),
-        0,
-        {},
-        {},
-    )
+    return pose_champion(creature, np.tile(creature.stand, (2, 1)), gains)
 
 
 @pytest.mark.parametrize("axis", ["pitch", "roll"])

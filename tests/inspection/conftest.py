@@ -5,9 +5,10 @@ import shutil
 
 import numpy as np
 import pytest
+from helpers import pose_champion
 from inspection.made_up import FORCED, LAST, POPULATION, make_state
 
-from mjxgait.champion import Champion, write_champion
+from mjxgait.champion import write_champion
 from mjxgait.control.poses import TUNING
 from mjxgait.creature import load_creature
 from mjxgait.runs.checkpoint import Checkpoints
@@ -36,15 +37,13 @@ def finished_run(tmp_path_factory):
             log.write(json.dumps(line) + "\n")
     checkpoints.close()
     write_champion(
-        Champion(
-            creature.name,
-            creature.digest,
+        pose_champion(
+            creature,
             np.asarray(state.genomes.key_poses[0]),
             dict.fromkeys(TUNING, 1.0),
             config.controller,
-            1.0,
-            {},
-            {"versions": {"jax": "9.9"}},
+            fitness=1.0,
+            origin={"versions": {"jax": "9.9"}},
         ),
         creature,
         folder / CHAMPION,

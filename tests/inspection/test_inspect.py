@@ -48,7 +48,7 @@ def test_tells_what_it_is(finished_run):
         True,
     )
     assert found["settings_changed"]["evolution.population"]["here"] == POPULATION
-    assert "controller.law" not in found["settings_changed"]
+    assert "drive.law" not in found["settings_changed"]
     assert found["versions"] == {"jax": "9.9"}
     assert found["ended"] == f"all {LAST} generations are done"
     assert found["checkpoints"][-1] == LAST

@@ -38,8 +38,9 @@ from mjxgait.control.poses import Genome
 from mjxgait.creature import Creature
 from mjxgait.runs.experiment import build_experiment
 from mjxgait.settings.traced import traced
+from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.trials import NEVER, Starts
-from mjxgait.tasks.walk.tally import Reason, Tally
+from mjxgait.tasks.walk.tally import Tally
 
 SLIM = {"xla_backend_optimization_level": 0}
 """Compiling is what takes the time here."""

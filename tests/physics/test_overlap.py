@@ -25,10 +25,11 @@ from mjxgait.creature.overlap import (
 from mjxgait.physics.fast import fast_plant
 from mjxgait.physics.layout import sense_layout
 from mjxgait.physics.plain import mjx_plant
-from mjxgait.settings.config import FitnessConfig
+from mjxgait.settings.walk import WalkConfig
 from mjxgait.simulation.rollout import CHECK_EVERY, Lane, Simulator
+from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.walk.fitness import DEEP, TOUCHING, fitness_terms
-from mjxgait.tasks.walk.tally import Judge, Reason, Tally
+from mjxgait.tasks.walk.tally import Judge, Tally
 from mjxgait.types import BodyState
 
 LANES = 6
@@ -262,7 +263,7 @@ def test_the_tally_keeps_the_deepest_of_the_time_that_counts(stool: Creature):
 
 
 def term(creature: Creature, tally: Tally, forward: float) -> float:
-    config = FitnessConfig(speed=1.0)
+    config = WalkConfig(speed=1.0)
     tally = dataclasses.replace(
         tally, forward=jnp.float32(forward * creature.body_length), steps=jnp.int32(200)
     )

@@ -4,11 +4,12 @@ import dataclasses
 import json
 
 import numpy as np
+from helpers import pose_champion
 
-from mjxgait.champion import Champion, write_champion
-from mjxgait.control.poses import TUNING
+from mjxgait.champion import write_champion
 from mjxgait.runs.folder import CHAMPION, METRICS, create_run
-from mjxgait.settings.config import Config, ControllerConfig
+from mjxgait.settings.config import Config
+from mjxgait.settings.control import PoseConfig
 
 
 def treading(creature, degrees=4.0, period=0.5):
@@ -17,26 +18,21 @@ def treading(creature, degrees=4.0, period=0.5):
     poses = creature.stand + np.radians(
         rng.uniform(-degrees, degrees, (2, len(creature.joint_names)))
     )
-    tuning = dict.fromkeys(TUNING, 0.0) | {"threshold": 0.1, "period": period}
-    controller = ControllerConfig(advance="clock")
-    return Champion(
-        creature.name,
-        creature.digest,
+    return pose_champion(
+        creature,
         poses,
-        tuning,
-        controller,
-        1.0,
-        {},
-        {"born": 3, "seed": 0, "versions": {"jax": "9.9"}},
+        {"threshold": 0.1, "period": period},
+        PoseConfig(advance="clock"),
+        fitness=1.0,
+        origin={"born": 3, "seed": 0, "versions": {"jax": "9.9"}},
     )
 
 
 def falling(creature):
     """Legs straight out to one side: it falls at once."""
     upright = treading(creature)
-    return dataclasses.replace(
-        upright, key_poses=np.stack([creature.pose_high, creature.pose_high])
-    )
+    poses = np.stack([creature.pose_high, creature.pose_high])
+    return dataclasses.replace(upright, genome={**upright.genome, "key_poses": poses})
 
 
 def metrics_line(generation):

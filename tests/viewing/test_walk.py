@@ -15,12 +15,11 @@ def test_steady_strides_are_as_long_as_the_clock_says(stool_walk):
 
 def test_targets_are_those_of_the_examiner(stool_walk):
     """Without steering and balance the target is the planned pose."""
-    from mjxgait.certify.controller import Controller
+    from mjxgait.certify.twins.poses import PoseTwin
 
-    planned = Controller(stool_walk.creature, stool_walk.champion).planned(
-        stool_walk.trajectory.position[0]
-    )
-    np.testing.assert_allclose(stool_walk.targets(), planned)
+    twin = PoseTwin(stool_walk.creature, stool_walk.champion, stool_walk.time_step)
+    positions = np.round(stool_walk.trajectory.phase[0] * twin.length).astype(int)
+    np.testing.assert_allclose(stool_walk.trajectory.target[0], twin.planned(positions))
 
 
 def test_a_walk_that_falls_ends_soon_after():

@@ -7,8 +7,9 @@ import jax.numpy as jnp
 import optax
 
 from mjxgait.creature import Creature
-from mjxgait.settings.config import FitnessConfig, Weights
-from mjxgait.tasks.walk.tally import Reason, Tally
+from mjxgait.settings.walk import WalkConfig, Weights
+from mjxgait.tasks.falls import Reason
+from mjxgait.tasks.walk.tally import Tally
 
 TERMS = tuple(field.name for field in dataclasses.fields(Weights))
 REWARDS = ("distance", "alive")
@@ -31,7 +32,7 @@ def stride_limit(mass: float) -> float:
 
 
 def fitness_terms(
-    creature: Creature, config: FitnessConfig, step: float, horizon: int, tally: Tally
+    creature: Creature, config: WalkConfig, step: float, horizon: int, tally: Tally
 ) -> dict[str, jax.Array]:
     """The terms [] of one episode, each without unit and before its weight. The config may be traced.
 
@@ -89,7 +90,7 @@ def _counted(distance: jax.Array, enough: jax.Array) -> jax.Array:
     return jnp.minimum(distance, enough) + BEYOND * jnp.maximum(distance - enough, 0.0)
 
 
-def signed_weights(config: FitnessConfig, generation: jax.Array) -> dict[str, jax.Array]:
+def signed_weights(config: WalkConfig, generation: jax.Array) -> dict[str, jax.Array]:
     """Signed weight [] of each term at a generation []: penalties negative, style terms ramped in."""
     grown = optax.linear_schedule(0.0, 1.0, 1)(generation / jnp.maximum(config.style_ramp, 1))
     ramp = jnp.where(jnp.asarray(config.style_ramp) > 0, grown, 1.0)

@@ -1,7 +1,6 @@
 """What an episode leaves behind: running sums, updated once per step for one creature, from which fitness is computed."""
 
 import dataclasses
-from enum import IntEnum
 
 import jax
 import jax.numpy as jnp
@@ -9,31 +8,20 @@ import numpy as np
 
 from mjxgait.creature import Creature
 from mjxgait.creature.frame import start_axes, start_position
-from mjxgait.creature.settings import Termination
 from mjxgait.senses import CONTACT_GAP, foot_geoms, foot_heights
 from mjxgait.tasks import protocol
+from mjxgait.tasks.falls import touches
 from mjxgait.types import Sensed, pytree
 
 SWING = 0.03
 """Hip heights; a foot that rises less has not left the floor, it has trembled. The certificate counts swings alike."""
 
 
-class Reason(IntEnum):
-    """Why an episode ended."""
-
-    FINISHED = protocol.FINISHED
-    TIPPED = 1
-    TOO_LOW = 2
-    TOO_HIGH = 3
-    TOUCHED = 4
-    NONFINITE = protocol.NONFINITE
-
-
 @pytree
 class Tally(protocol.Tally):
     """Sums over the steps that a creature was up. `F` here counts feet, not their geoms.
 
-    reason: a `Reason`. forward, left: [] m from the start to the latest position.
+    reason: a `falls.Reason`. forward, left: [] m from the start to the latest position.
     forward_half: [] m, `forward` at half time. heading: [] rad.
     swings: [F] completed swings, swinging: [F] whether in one: a swing rises above `SWING` and
       comes down to half of it; there it ends in a footfall.
@@ -71,13 +59,12 @@ class Tally(protocol.Tally):
 class Judge:
     """Keeps the tally of one creature's episodes.
 
-    half_time: step. ends: what ends an episode, if it is not what the creature says.
+    half_time: step.
     """
 
     creature: Creature
     step: float
     half_time: int
-    ends: Termination | None = None
 
     def init(self) -> Tally:
         """The empty tally."""
@@ -87,21 +74,6 @@ class Judge:
         names = ("swings", "swinging", "shortfall", "peak", "contact", "slip", "foot_down")
         per_foot = {name: jnp.zeros(feet) for name in names}
         return Tally(**(values | counts | per_foot | {"foot_pos": jnp.zeros((feet, 2))}))
-
-    def examine(self, sensed: Sensed) -> jax.Array:
-        """The reason [] to end the episode at this moment; `FINISHED` while all is well."""
-        limits = self.ends or self.creature.settings.termination
-        up = (sensed.trunk_rot @ self.creature.up.astype(np.float32))[2]
-        height = sensed.trunk_pos[2] / self.creature.stand_height
-        reason = jnp.zeros((), jnp.int32)
-        if limits.touch:
-            reason = jnp.where(self._touches(sensed), Reason.TOUCHED, reason)
-        reason = jnp.where(height > limits.height[1], Reason.TOO_HIGH, reason)
-        reason = jnp.where(height < limits.height[0], Reason.TOO_LOW, reason)
-        # Rounding may put a trunk that is wholly upside down below -1.
-        if limits.min_up > -1.0:
-            reason = jnp.where(up < limits.min_up, Reason.TIPPED, reason)
-        return reason
 
     def update(
         self,
@@ -152,17 +124,13 @@ class Judge:
             foot_down=down,
             tilt=tally.tilt + 1.0 - up,
             wobble=tally.wobble + sensed.trunk_angvel @ sensed.trunk_angvel,
-            touch=tally.touch + self._touches(sensed),
+            touch=tally.touch + touches(creature, sensed),
             work=tally.work + jnp.sum(jnp.maximum(torque * sensed.joint_vel, 0.0)) * self.step,
             saturation=tally.saturation
             + jnp.mean(jnp.abs(torque) >= creature.torque_limit.astype(np.float32)),
             limits=tally.limits + jnp.mean(outside),
             overlap=tally.overlap,
         )
-
-    def _touches(self, sensed: Sensed) -> jax.Array:
-        others = sensed.geom_low[len(self.creature.foot_of) :]
-        return jnp.min(others, initial=1.0) < 0.0
 
     def _feet(self, sensed: Sensed) -> tuple[jax.Array, jax.Array]:
         """Lowest point [F] of each foot and its horizontal position [F, 2], the mean of its geoms."""

@@ -1,0 +1,92 @@
+"""What the examiner knows of a moment, and the senses by name, written from docs/controller.md.
+
+Letters: `S` simulations, `J` actuated joints, `F` feet, `nv` degrees of freedom.
+"""
+
+import dataclasses
+from collections.abc import Callable, Collection, Mapping
+
+import numpy as np
+
+from mjxgait.certify.layout import StartFrame
+from mjxgait.creature import Creature
+
+CONTACT_GAP = 0.002
+"""m; a foot nearer to the floor is in contact for a controller."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class State:
+    """Many simulations at one moment.
+
+    start: where all of them stood first. time: [S] s since then. joint_pos: [S, J] rad. velocity: [S, nv] m/s, rad/s.
+    trunk_pos: [S, 3] m. trunk_rot: [S, 3, 3], columns are the trunk's axes in the world.
+    trunk_vel: [S, 3] m/s, trunk_angvel: [S, 3] rad/s, world frame.
+    foot_height: [S, F] m, lowest point above the floor; empty where nobody asks.
+    mass_matrix: [S, nv, nv]. bias: [S, nv], Coriolis and gravity less passive forces.
+    constraint_force: [S, nv], of the previous step's solve.
+    """
+
+    start: StartFrame
+    time: np.ndarray
+    joint_pos: np.ndarray
+    velocity: np.ndarray
+    trunk_pos: np.ndarray
+    trunk_rot: np.ndarray
+    trunk_vel: np.ndarray
+    trunk_angvel: np.ndarray
+    foot_height: np.ndarray
+    mass_matrix: np.ndarray
+    bias: np.ndarray
+    constraint_force: np.ndarray
+
+
+Sense = Callable[[Creature, State], np.ndarray]
+
+
+def _heading(creature: Creature, state: State) -> np.ndarray:
+    nose = state.trunk_rot @ creature.forward
+    return np.arctan2(nose @ state.start.left, nose @ state.start.forward)
+
+
+def _along(state: State, axis: np.ndarray) -> np.ndarray:
+    return (state.trunk_pos - state.start.place) @ axis
+
+
+def _nose_down(creature: Creature, state: State) -> np.ndarray:
+    return -np.arcsin(np.clip((state.trunk_rot @ creature.forward)[:, 2], -1, 1))
+
+
+def _right_down(creature: Creature, state: State) -> np.ndarray:
+    return np.arcsin(np.clip((state.trunk_rot @ creature.left)[:, 2], -1, 1))
+
+
+SENSES: Mapping[str, Sense] = {
+    "time": lambda creature, state: state.time,
+    "joint_pos": lambda creature, state: state.joint_pos,
+    "joint_vel": lambda creature, state: state.velocity[:, creature.dof_adr],
+    "foot_height": lambda creature, state: state.foot_height,
+    "contact": lambda creature, state: (state.foot_height < CONTACT_GAP).astype(float),
+    "trunk_pos": lambda creature, state: state.trunk_pos,
+    "trunk_rot": lambda creature, state: state.trunk_rot,
+    "trunk_vel": lambda creature, state: state.trunk_vel,
+    "trunk_angvel": lambda creature, state: state.trunk_angvel,
+    "heading": _heading,
+    "forward": lambda creature, state: _along(state, state.start.forward),
+    "aside": lambda creature, state: _along(state, state.start.left),
+    "pitch": _nose_down,
+    "roll": _right_down,
+    "pitch_rate": lambda creature, state: (
+        state.trunk_angvel * (state.trunk_rot @ creature.left)
+    ).sum(1),
+    "roll_rate": lambda creature, state: (
+        state.trunk_angvel * (state.trunk_rot @ creature.forward)
+    ).sum(1),
+}
+FOOT_SENSES = ("foot_height", "contact")
+"""Those for which `foot_height` must be told."""
+
+
+def sense(creature: Creature, state: State, names: Collection[str]) -> dict[str, np.ndarray]:
+    """The senses of these names, each [S, ...]."""
+    return {name: SENSES[name](creature, state) for name in names if name in SENSES}

@@ -1,0 +1,63 @@
+"""What is demanded of a task of the user's own: no fall, no exploit, and what its class says."""
+
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+import numpy as np
+
+from mjxgait.certify.config import CertificateConfig
+from mjxgait.certify.criteria import Criterion, at_most, parts, physics, speed, upright
+from mjxgait.certify.describe import worst_overlap
+from mjxgait.certify.measure import Recording
+from mjxgait.creature import Creature
+
+
+class HasCriteria(Protocol):
+    """A task's class, as `tasks.plain.PlainTask` has it."""
+
+    @classmethod
+    def criteria(cls, window: Recording) -> tuple[Criterion, ...]:
+        """Of its own, numbered from 10."""
+        ...
+
+
+class PlainDemands:
+    """See `Demands`."""
+
+    verdict = "it does what its task demands"
+
+    def __init__(self, task: HasCriteria) -> None:
+        self.task = task
+
+    def undisturbed(
+        self, whole: Recording, halved: Recording, config: CertificateConfig
+    ) -> tuple[Criterion, ...]:
+        """See `Demands`: stays up, at half the time step too; physics, parts, and its own."""
+        window = whole.window(config.warmup)
+        repeated = self._basic(halved, config)
+        failed = sum(not m.passed for c in repeated for m in c.measures)
+        return (
+            *self._basic(whole, config),
+            Criterion(
+                6,
+                "half the time step",
+                (at_most("failures in criterion 1 and its own", failed, 0.0),),
+            ),
+            physics(window, config.physics),
+            parts(window, config.parts),
+        )
+
+    def report(self, window: Recording, config: CertificateConfig) -> dict[str, Any]:
+        """See `Demands`."""
+        v = speed(window)
+        return {"speed": v, "overlap": worst_overlap(window), "summary": f"{v:.2f} m/s"}
+
+    def promising(
+        self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
+    ) -> bool:
+        """See `Demands`: to the end in all its trials."""
+        return bool((outcome["seconds"] > seconds - 0.5 * creature.model.opt.timestep).all())
+
+    def _basic(self, whole: Recording, config: CertificateConfig) -> tuple[Criterion, ...]:
+        window = whole.window(config.warmup)
+        return (upright(whole, window, config.upright), *self.task.criteria(window))

@@ -1,0 +1,27 @@
+"""Which task demands what."""
+
+from mjxgait.certify.tasks.plain import HasCriteria, PlainDemands
+from mjxgait.certify.tasks.protocol import Demands
+from mjxgait.certify.tasks.walk import WalkDemands
+from mjxgait.errors import UserError
+
+_DEMANDS: dict[str, Demands] = {"walk": WalkDemands()}
+
+
+def register_demands(task: str, own: HasCriteria) -> None:
+    """Makes the demands of a task of the user's known."""
+    _DEMANDS[task] = PlainDemands(own)
+
+
+def demands_of(task: str) -> Demands:
+    """Those of a task.
+
+    Raises:
+      UserError: it is code of the user's own that was not named.
+    """
+    if task not in _DEMANDS:
+        raise UserError(
+            f'its task is "{task}", which is no part of this program; code is never loaded from a '
+            "run folder: name it again with --task FILE.py:CLASS"
+        )
+    return _DEMANDS[task]

@@ -1,0 +1,201 @@
+"""What is demanded of a walk.
+
+Letters: `T` frames, `N` feet.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from mjxgait.certify.config import CertificateConfig, GaitConfig, PeriodConfig, ProgressConfig
+from mjxgait.certify.criteria import (
+    Criterion,
+    Measure,
+    at_least,
+    at_most,
+    distance,
+    parts,
+    physics,
+    ratio,
+    speed,
+    upright,
+)
+from mjxgait.certify.describe import describe, slip_distance
+from mjxgait.certify.measure import Recording
+from mjxgait.certify.strides import clearances, stride_frequency, stride_starts
+from mjxgait.creature import Creature
+
+SPARE = 1.2
+"""How much faster than the certificate's least speed a gait should be in evolution before it is
+worth an examination.
+"""
+
+
+class WalkDemands:
+    """See `Demands`: steady strides that lead forward, in the manner of an animal."""
+
+    verdict = "it walks"
+
+    def undisturbed(
+        self, whole: Recording, halved: Recording, config: CertificateConfig
+    ) -> tuple[Criterion, ...]:
+        """See `Demands`: all but 4 and 5."""
+        window = whole.window(config.warmup)
+        return (
+            *basic(whole, config),
+            half_step(whole, halved, config),
+            gait(window, config.gait),
+            physics(window, config.physics),
+            parts(window, config.parts),
+        )
+
+    def report(self, window: Recording, config: CertificateConfig) -> dict[str, Any]:
+        """See `Demands`."""
+        told = describe(window, config.gait.clearance)
+        return told | {"summary": f"{told['gait']}, {told['speed']:.2f} m/s"}
+
+    def promising(
+        self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
+    ) -> bool:
+        """See `Demands`: up to the end in all its trials, and clearly faster than it must be."""
+        wanted = SPARE * CertificateConfig().progress.speed * seconds * creature.body_length
+        # Half a step, for an episode lasts a whole number of them.
+        whole = seconds - 0.5 * creature.model.opt.timestep
+        return bool((outcome["seconds"] > whole).all() and (outcome["forward"] >= wanted).all())
+
+
+def basic(whole: Recording, config: CertificateConfig) -> tuple[Criterion, Criterion, Criterion]:
+    """Criteria 1 to 3 of one recording."""
+    window = whole.window(config.warmup)
+    return (
+        upright(whole, window, config.upright),
+        progress(window, config.progress),
+        periodic(window, config.period),
+    )
+
+
+def progress(window: Recording, config: ProgressConfig) -> Criterion:
+    """2. Strides that all lead forward, fast enough, straight, without fading."""
+    path, starts = window.trunk_pos, stride_starts(window)
+    distance, middle = path[-1, 0] - path[0, 0], len(path) // 2
+    first, second = path[middle, 0] - path[0, 0], path[-1, 0] - path[middle, 0]
+    advance = np.diff(path[starts, 0]) if len(starts) > 1 else np.array([np.nan])
+    sideways = np.abs(path[:, 1] - path[0, 1]).max()
+    return Criterion(
+        2,
+        "progress",
+        (
+            at_least("strides", len(starts) - 1, config.strides),
+            at_least(
+                "shortest stride / mean stride", advance.min() / abs(advance.mean()), 0.0, 0.5
+            ),
+            at_least(
+                "speed (body lengths/s)",
+                speed(window) / window.dimensions.body_length,
+                config.speed,
+            ),
+            at_most("drift / distance", ratio(sideways, distance), config.drift),
+            at_least(
+                "second half / first half",
+                second / first if first > 0 else np.nan,
+                config.second_half,
+                1.0,
+            ),
+        ),
+    )
+
+
+def periodic(window: Recording, config: PeriodConfig) -> Criterion:
+    """3. Joints and trunk attitude repeat with the stride period, and that period is steady."""
+    periods = np.diff(stride_starts(window)).astype(float)
+    if len(periods) < 2:
+        peak = variation = np.nan
+    else:
+        signal = np.column_stack([window.joint_pos, window.pitch, window.roll])
+        peak, variation = (
+            autocorrelation_peak(signal, periods.mean()),
+            periods.std() / periods.mean(),
+        )
+    return Criterion(
+        3,
+        "periodic",
+        (
+            at_least("autocorrelation at stride period", peak, config.autocorrelation, 1.0),
+            at_most("variation of stride period", variation, config.variation),
+        ),
+    )
+
+
+def autocorrelation_peak(signal: np.ndarray, period: float) -> float:
+    """Largest correlation of the signal [T, D] with itself, shifted by 0.8 to 1.2 periods
+    (frames).
+    """
+    # Without what changes slower than a stride: a wandering signal resembles itself at any shift.
+    width = round(period)
+    sums = np.cumsum(np.pad(signal, ((1, 0), (0, 0))), axis=0)
+    signal = (
+        signal[width // 2 :][: len(signal) - width + 1] - (sums[width:] - sums[:-width]) / width
+    )
+
+    def correlation(lag: int) -> float:
+        early, late = signal[:-lag], signal[lag:]
+        norm = np.sqrt((early**2).sum() * (late**2).sum())
+        return float((early * late).sum() / norm) if norm > 0 else np.nan
+
+    lags = range(max(1, int(0.8 * period)), min(int(np.ceil(1.2 * period)) + 1, len(signal) // 2))
+    return max((correlation(lag) for lag in lags), default=np.nan)
+
+
+def half_step(whole: Recording, halved: Recording, config: CertificateConfig) -> Criterion:
+    """6. With half the time step it still passes 1 to 3 and goes as far."""
+    window = whole.window(config.warmup)
+    repeated = basic(halved, config)
+    change = distance(halved.window(config.warmup)) / distance(window) - 1
+    failed = sum(not m.passed for c in repeated for m in c.measures)
+    return Criterion(
+        6,
+        "half the time step",
+        (
+            at_most("failures in criteria 1 to 3", failed, 0.0),
+            at_most("change of distance", abs(change), config.half_step.distance),
+        ),
+    )
+
+
+def gait(window: Recording, config: GaitConfig) -> Criterion:
+    """7. A gait, not a buzz: slow, long strides; feet that leave the floor and do not slide on
+    it.
+    """
+    size = window.dimensions
+    frequency = stride_frequency(window, config.clearance)
+    duty = window.contact.mean(0)
+    low, high = config.duty_factor
+    return Criterion(
+        7,
+        "gait",
+        (
+            at_most(
+                "stride frequency / animal's",
+                frequency / (4.48 * size.mass**-0.14),
+                config.frequency,
+            ),
+            at_least(
+                "stride length / hip height",
+                speed(window) / frequency / size.hip_height,
+                config.stride_length,
+            ),
+            at_least(
+                "least clearance / hip height",
+                clearances(window).min(initial=np.inf) / size.hip_height,
+                config.clearance,
+            ),
+            at_most(
+                "worst foot's slip / distance",
+                ratio(slip_distance(window).max(), distance(window)),
+                config.slip,
+            ),
+            at_least("least duty factor", duty.min(), low),
+            Measure("greatest duty factor", float(duty.max()), "<=", high, 1 - high),
+        ),
+    )

@@ -1,0 +1,34 @@
+"""Which twin moves which kind of champion."""
+
+from collections.abc import Callable
+
+from mjxgait.certify.twins.poses import PoseTwin
+from mjxgait.certify.twins.protocol import Twin
+from mjxgait.champion import Champion
+from mjxgait.creature import Creature
+from mjxgait.errors import UserError
+
+Maker = Callable[[Creature, Champion, float], Twin]
+"""From creature, champion and step in s."""
+
+_TWINS: dict[str, Maker] = {"poses": PoseTwin}
+
+
+def register_twin(controller: str, make: Maker) -> None:
+    """Makes the twins of a kind of controller known."""
+    _TWINS[controller] = make
+
+
+def twin_of(creature: Creature, champion: Champion, step: float) -> Twin:
+    """The champion's controller.
+
+    Raises:
+      UserError: the champion is not finite, or code of the user's own that was not named.
+    """
+    champion.check_finite(creature)
+    if champion.controller not in _TWINS:
+        raise UserError(
+            f'its controller is "{champion.controller}", which is no part of this program; code '
+            "is never loaded from a run folder: name it again with --controller FILE.py:CLASS"
+        )
+    return _TWINS[champion.controller](creature, champion, step)

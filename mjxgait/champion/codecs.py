@@ -1,0 +1,86 @@
+"""How each kind of genome is written for people and read again.
+
+A genome is a handful of named arrays; that is all that evolution, checkpoints and the champion's
+file ask of it. Shapes and names are the controller's own.
+"""
+
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+import numpy as np
+
+from mjxgait.champion.poses import PoseCodec
+from mjxgait.creature import Creature
+from mjxgait.errors import UserError
+
+Genome = Mapping[str, np.ndarray]
+
+
+class Codec(Protocol):
+    """Between the arrays of a kind of genome and what `champion.json` says of it."""
+
+    def document(self, genome: Genome, settings: Any, creature: Creature) -> dict[str, Any]:
+        """What people read."""
+        ...
+
+    def genome(self, document: Mapping[str, Any], creature: Creature) -> dict[str, np.ndarray]:
+        """The arrays of a document.
+
+        Raises:
+          KeyError, TypeError, ValueError: it is not of this kind.
+        """
+        ...
+
+    def settings(self, table: Mapping[str, Any], where: str) -> Any:
+        """The settings of its controller from a table of the file `where`."""
+        ...
+
+    def check(self, genome: Genome, creature: Creature) -> None:
+        """Refuses numbers that nobody can follow.
+
+        Raises:
+          UserError: names the first.
+        """
+        ...
+
+    def shapes(self, settings: Any, creature: Creature) -> dict[str, tuple[int, ...]]:
+        """Shapes that the settings demand of the arrays, as far as they do."""
+        ...
+
+
+class PlainCodec:
+    """Arrays as nested lists under their names: for every kind that has no codec of its own."""
+
+    def document(self, genome: Genome, settings: Any, creature: Creature) -> dict[str, Any]:
+        """See `Codec`."""
+        return {name: np.asarray(array, float).tolist() for name, array in genome.items()}
+
+    def genome(self, document: Mapping[str, Any], creature: Creature) -> dict[str, np.ndarray]:
+        """See `Codec`."""
+        return {name: np.array(values, float) for name, values in document.items()}
+
+    def settings(self, table: Mapping[str, Any], where: str) -> Any:
+        """See `Codec`: as it is; whoever knows the controller reads it."""
+        return dict(table)
+
+    def check(self, genome: Genome, creature: Creature) -> None:
+        """See `Codec`."""
+        for name, array in genome.items():
+            if not np.isfinite(array).all():
+                raise UserError(
+                    f"the genome's {name} has numbers that are not finite: this champion cannot "
+                    "move; take one of another generation"
+                )
+
+    def shapes(self, settings: Any, creature: Creature) -> dict[str, tuple[int, ...]]:
+        """See `Codec`."""
+        return {}
+
+
+CODECS: Mapping[str, Codec] = {"poses": PoseCodec()}
+"""By the name of the controller."""
+
+
+def codec_of(controller: str) -> Codec:
+    """That of a controller."""
+    return CODECS.get(controller, PlainCodec())

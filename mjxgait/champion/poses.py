@@ -1,0 +1,59 @@
+"""Key poses by joint name and tuning genes by name."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from mjxgait.creature import Creature
+from mjxgait.errors import UserError
+from mjxgait.settings.control import TUNING, PoseConfig
+from mjxgait.settings.tables import build
+
+
+class PoseCodec:
+    """Of genomes with `key_poses` [K, J] in rad and `tuning` [E] in the order of `TUNING`."""
+
+    def document(
+        self, genome: Mapping[str, np.ndarray], settings: PoseConfig, creature: Creature
+    ) -> dict[str, Any]:
+        """See `Codec`. mirrored: whether the mirror images of the poses follow them."""
+        return {
+            "key_poses": [
+                dict(zip(creature.joint_names, map(float, pose), strict=True))
+                for pose in genome["key_poses"]
+            ],
+            "mirrored": creature.symmetric and settings.mirror,
+            "tuning": dict(zip(TUNING, map(float, genome["tuning"]), strict=True)),
+        }
+
+    def genome(self, document: Mapping[str, Any], creature: Creature) -> dict[str, np.ndarray]:
+        """See `Codec`."""
+        poses = [[pose[name] for name in creature.joint_names] for pose in document["key_poses"]]
+        tuning = [document["tuning"][name] for name in TUNING]
+        return {"key_poses": np.array(poses, float), "tuning": np.array(tuning, float)}
+
+    def settings(self, table: Mapping[str, Any], where: str) -> PoseConfig:
+        """See `Codec`."""
+        return build(PoseConfig, table, where)
+
+    def check(self, genome: Mapping[str, np.ndarray], creature: Creature) -> None:
+        """See `Codec`."""
+        poses = genome["key_poses"]
+        for place in np.argwhere(~np.isfinite(poses)):
+            k, j = map(int, place)
+            raise UserError(
+                f'key pose {k + 1} has {poses[k, j]} rad for joint "{creature.joint_names[j]}": '
+                "this champion cannot move; take one of another generation"
+            )
+        for name, value in zip(TUNING, genome["tuning"], strict=True):
+            if not np.isfinite(value):
+                raise UserError(
+                    f'the tuning "{name}" is {value}: this champion cannot move; '
+                    "take one of another generation"
+                )
+
+    def shapes(self, settings: PoseConfig, creature: Creature) -> dict[str, tuple[int, ...]]:
+        """See `Codec`."""
+        poses = (settings.key_poses, len(creature.joint_names))
+        return {"key_poses": poses, "tuning": (len(TUNING),)}

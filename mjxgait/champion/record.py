@@ -1,0 +1,140 @@
+"""`champion.json`: one individual and all that decides how it moves."""
+
+import dataclasses
+import hashlib
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mjxgait.champion.codecs import codec_of
+from mjxgait.creature import Creature
+from mjxgait.errors import UserError
+from mjxgait.settings.control import DriveConfig
+from mjxgait.settings.tables import build
+
+SCHEMA = 2
+"""Champions of 1 had key poses without saying so, and the drive among the controller's settings."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Champion:
+    """An individual that was evolved.
+
+    controller: name of its kind, as in `[use]`. genome: its arrays by name. settings: the
+    controller's. task: that it was evolved for. fitness and terms: as evolution scored it.
+    origin: where it comes from (generation, seed, versions).
+    """
+
+    creature: str
+    digest: str
+    controller: str
+    genome: Mapping[str, np.ndarray]
+    settings: Any
+    drive: DriveConfig
+    task: str
+    fitness: float
+    terms: Mapping[str, float]
+    origin: Mapping[str, Any]
+
+    @property
+    def fingerprint(self) -> str:
+        """Hash of all that decides how it moves: body, controller, genome, settings; not of its
+        fitness or where it comes from.
+        """
+        moves = {
+            "creature": self.digest,
+            "controller": self.controller,
+            # As float64, which is what a file gives back: a champion has one fingerprint before it
+            # is written and after.
+            "genome": {n: np.asarray(array, float).tolist() for n, array in self.genome.items()},
+            "settings": as_table(self.settings),
+            "drive": as_table(self.drive),
+        }
+        return hashlib.sha256(json.dumps(moves, sort_keys=True).encode()).hexdigest()[:16]
+
+    def check_finite(self, creature: Creature) -> None:
+        """Refuses numbers that no joint can follow and that MuJoCo would complain of step by step.
+
+        Raises:
+          UserError: names the first.
+        """
+        codec_of(self.controller).check(self.genome, creature)
+
+
+def as_table(settings: Any) -> dict[str, Any]:
+    """Settings as a table, whether they are one already or a dataclass."""
+    return dict(settings) if isinstance(settings, Mapping) else dataclasses.asdict(settings)
+
+
+def write_champion(champion: Champion, creature: Creature, path: Path) -> None:
+    """Writes the file in one go: it is either the old one or the new one."""
+    gains = zip(creature.joint_names, creature.kp, creature.kd, creature.torque_limit, strict=True)
+    codec = codec_of(champion.controller)
+    document = {
+        "schema": SCHEMA,
+        "creature": champion.creature,
+        "creature_digest": champion.digest,
+        "task": champion.task,
+        "controller": champion.controller,
+        "genome": codec.document(champion.genome, champion.settings, creature),
+        "settings": as_table(champion.settings),
+        "drive": as_table(champion.drive),
+        "gains": {
+            name: {"kp": float(kp), "kd": float(kd), "torque_limit": float(limit)}
+            for name, kp, kd, limit in gains
+        },
+        "fitness": champion.fitness,
+        "terms": dict(champion.terms),
+        "origin": dict(champion.origin),
+    }
+    scratch = path.with_suffix(".tmp")
+    scratch.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
+    scratch.replace(path)
+
+
+def read_champion(path: Path, creature: Creature) -> Champion:
+    """The individual in a file, for the creature it was evolved on.
+
+    Raises:
+      UserError: the file is missing, not a champion, or of another creature.
+    """
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+        champion = _champion(document, creature, path)
+    except FileNotFoundError:
+        raise UserError(f"{path}: no such file; the run has no champion yet") from None
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise UserError(f"{path}: not a champion file ({error!r})") from None
+    try:
+        champion.check_finite(creature)
+    except UserError as error:
+        raise UserError(f"{path}: {error}") from None
+    return champion
+
+
+def _champion(document: Mapping[str, Any], creature: Creature, path: Path) -> Champion:
+    if document["schema"] != SCHEMA:
+        raise UserError(
+            f"{path}: written with schema {document['schema']}, this version reads {SCHEMA}"
+        )
+    if document["creature_digest"] != creature.digest:
+        raise UserError(
+            f"{path}: evolved on another body than {creature.name} as it is now; use the run's "
+            "own creature folder"
+        )
+    codec = codec_of(document["controller"])
+    return Champion(
+        creature=document["creature"],
+        digest=document["creature_digest"],
+        controller=document["controller"],
+        genome=codec.genome(document["genome"], creature),
+        settings=codec.settings(document["settings"], f"{path}: settings"),
+        drive=build(DriveConfig, document["drive"], f"{path}: drive"),
+        task=document["task"],
+        fitness=document["fitness"],
+        terms=document["terms"],
+        origin=document["origin"],
+    )

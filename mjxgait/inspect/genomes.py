@@ -1,0 +1,93 @@
+"""How each kind of genome is told of."""
+
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+import numpy as np
+from rich.console import Console
+
+from mjxgait.inspect.poses import PoseView, shared, title
+from mjxgait.inspect.snapshot import Snapshot
+from mjxgait.inspect.tables import titled_table
+
+
+class GenomeView(Protocol):
+    """One kind of genome, as values for `--json` and as tables for the screen."""
+
+    def facts(self, snapshot: Snapshot, i: int) -> dict[str, Any]:
+        """The genome of the individual in place `i`."""
+        ...
+
+    def spread(self, snapshot: Snapshot) -> dict[str, Any]:
+        """Standard deviation over the population of what the genomes hold."""
+        ...
+
+    def difference(self, a: Snapshot, b: Snapshot) -> dict[str, Any]:
+        """Of two populations and their champions; has `same_individuals`."""
+        ...
+
+    def show(
+        self, individual: Mapping[str, Any], spread: Mapping[str, Any] | None, console: Console
+    ) -> None:
+        """Prints the genome of an individual, and how far the population is spread."""
+        ...
+
+    def show_difference(self, found: Mapping[str, Any], console: Console) -> None:
+        """Prints a difference."""
+        ...
+
+
+class PlainView:
+    """Arrays of numbers under their names: for every kind that has no view of its own."""
+
+    def facts(self, snapshot: Snapshot, i: int) -> dict[str, Any]:
+        """See `GenomeView`."""
+        return {"genome": {name: array[i].tolist() for name, array in snapshot.genomes.items()}}
+
+    def spread(self, snapshot: Snapshot) -> dict[str, Any]:
+        """See `GenomeView`."""
+        spread = {name: array.std(axis=0).tolist() for name, array in snapshot.genomes.items()}
+        return {"genome_spread": spread}
+
+    def difference(self, a: Snapshot, b: Snapshot) -> dict[str, Any]:
+        """See `GenomeView`: of the arrays that have the same shape in both."""
+        mine, other = a.genomes, b.genomes
+        alike = [n for n in mine if n in other and mine[n].shape[1:] == other[n].shape[1:]]
+        return {
+            "same_individuals": shared(a, b) if len(alike) == len(mine) == len(other) else None,
+            "champion_moved": {name: (other[name][0] - mine[name][0]).tolist() for name in alike},
+        }
+
+    def show(
+        self, individual: Mapping[str, Any], spread: Mapping[str, Any] | None, console: Console
+    ) -> None:
+        """See `GenomeView`."""
+        _print_arrays(f"{title(individual)}: genome", individual["genome"], console)
+        if spread:
+            _print_arrays("spread over the population", spread["genome_spread"], console)
+
+    def show_difference(self, found: Mapping[str, Any], console: Console) -> None:
+        """See `GenomeView`."""
+        if found["same_individuals"] is None:
+            console.print("\nThe genomes differ in shape, so they cannot be compared in full.")
+        else:
+            console.print(f"\n{found['same_individuals']} genomes are in both populations.")
+        _print_arrays("champion: from A to B", found["champion_moved"], console)
+
+
+VIEWS: Mapping[str, GenomeView] = {"poses": PoseView()}
+"""By the name of the controller."""
+
+
+def view_of(controller: str) -> GenomeView:
+    """That of a controller's genomes."""
+    return VIEWS.get(controller, PlainView())
+
+
+def _print_arrays(heading: str, arrays: Mapping[str, Any], console: Console) -> None:
+    table = titled_table(heading, console)
+    table.add_column("array")
+    table.add_column("values", overflow="fold")
+    for name, values in arrays.items():
+        table.add_row(name, " ".join(f"{value:.4g}" for value in np.ravel(values)))
+    console.print(table)

@@ -1,0 +1,44 @@
+"""Tables on the screen, and the numbers in them."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+
+def show(value: float | None, sign: bool = False) -> str:
+    """A number in a table."""
+    if value is None:
+        return "none"
+    text = f"{value:+.2f}" if sign else f"{value:.3f}"
+    return "0" if float(text) == 0 else text
+
+
+def titled_table(title: str, console: Console) -> Table:
+    """Prints a heading and returns the empty table to print below it."""
+    console.print(f"\n[bold]{title}[/]")
+    return Table(box=None, pad_edge=False)
+
+
+def print_pairs(rows: Mapping[str, str], console: Console) -> None:
+    """Names and values in two columns."""
+    table = Table(box=None, show_header=False, pad_edge=False)
+    table.add_column(no_wrap=True)
+    table.add_column(overflow="fold")
+    for name, value in rows.items():
+        table.add_row(name, value)
+    console.print(table)
+
+
+def print_columns(title: str, rows: Mapping[str, list[Any]], console: Console) -> None:
+    """What A has and what B has."""
+    if not rows:
+        console.print(f"\n{title}: no difference")
+        return
+    table = titled_table(title, console)
+    for name in ("", "A", "B"):
+        table.add_column(name)
+    for key, (x, y) in rows.items():
+        table.add_row(key.replace("_", " ") if title == "fitness" else key, str(x), str(y))
+    console.print(table)

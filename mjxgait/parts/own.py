@@ -1,0 +1,97 @@
+"""Controllers and tasks from a file of the user's, named on the command line and nowhere else."""
+
+import importlib.util
+import inspect
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from types import ModuleType
+from typing import cast
+
+from mjxgait.certify.tasks import register_demands
+from mjxgait.certify.tasks.plain import HasCriteria
+from mjxgait.certify.twins import register_twin
+from mjxgait.errors import UserError, did_you_mean
+from mjxgait.parts.registry import SHIPPED, add_own
+
+KINDS = ("controller", "task")
+
+
+def take_own(arguments: Sequence[str]) -> tuple[list[str], dict[str, str]]:
+    """Loads what `--controller` and `--task` name.
+
+    Returns the other arguments, and the names under which the parts are known.
+
+    Raises:
+      UserError: says what is wrong with the file or the class.
+    """
+    rest, named = [], {}
+    waiting = list(arguments)
+    while waiting:
+        flag, equals, value = waiting.pop(0).partition("=")
+        kind = flag.removeprefix("--")
+        if not flag.startswith("--") or kind not in KINDS:
+            rest.append(flag + equals + value)
+            continue
+        if not equals and not waiting:
+            raise UserError(f"{flag}: name one of {', '.join(SHIPPED[kind])}, or FILE.py:CLASS")
+        named[kind] = load(kind, value if equals else waiting.pop(0))
+    return rest, named
+
+
+def load(kind: str, text: str) -> str:
+    """Makes a part known and returns its name: that of a shipped one as it is, or `file.py:CLASS`.
+
+    Raises:
+      UserError: says what is wrong with the file or the class.
+    """
+    if text in SHIPPED[kind]:
+        return text
+    place, colon, name = text.rpartition(":")
+    if not colon or not name or not place.endswith(".py"):
+        raise UserError(
+            f"--{kind} {text}: {did_you_mean(text, SHIPPED[kind])}; or give FILE.py:CLASS for one "
+            "of your own"
+        )
+    path = Path(place)
+    cls = getattr(_module(path, kind), name, None)
+    if not inspect.isclass(cls):
+        raise UserError(f'{path}: has no class "{name}"')
+    base = _base(kind)
+    if not issubclass(cls, base):
+        raise UserError(f"{path}: {name} must inherit from {base.__module__}.{base.__name__}")
+    if missing := sorted(getattr(cls, "__abstractmethods__", ())):
+        raise UserError(f"{path}: {name} lacks {', '.join(missing)}")
+    known = f"{path.name}:{name}"
+    add_own(kind, known, cls)
+    if kind == "controller":
+        from mjxgait.parts.same_code import SameCode
+
+        register_twin(known, SameCode)
+    else:
+        register_demands(known, cast(HasCriteria, cls))
+    return known
+
+
+def _base(kind: str) -> type:
+    from mjxgait.control.reals import RealController
+    from mjxgait.tasks.plain import PlainTask
+
+    return RealController if kind == "controller" else PlainTask
+
+
+def _module(path: Path, kind: str) -> ModuleType:
+    if not path.is_file():
+        raise UserError(f"--{kind} {path}: no such file")
+    name = f"mjxgait_own_{path.stem}"
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise UserError(f"--{kind} {path}: not a file of Python")
+    module = importlib.util.module_from_spec(spec)
+    # Its dataclasses look up their own module while they are made.
+    sys.modules[name] = module
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        raise UserError(f"{path}: cannot be loaded ({type(error).__name__}: {error})") from error
+    return module

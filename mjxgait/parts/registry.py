@@ -1,0 +1,94 @@
+"""Controllers and tasks by name."""
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mjxgait.creature import Creature
+from mjxgait.creature.settings import Termination
+from mjxgait.errors import UserError, did_you_mean
+from mjxgait.settings.config import Config, RolloutConfig
+
+if TYPE_CHECKING:  # JAX takes a second to import
+    from mjxgait.control.protocol import Controller
+    from mjxgait.tasks.protocol import Task
+
+Maker = Callable[[], type]
+
+
+def _poses() -> type:
+    from mjxgait.control.poses import PoseTracker
+
+    return PoseTracker
+
+
+def _walk() -> type:
+    from mjxgait.tasks.walk.task import Walk
+
+    return Walk
+
+
+SHIPPED: Mapping[str, Mapping[str, Maker]] = {
+    "controller": {"poses": _poses},
+    "task": {"walk": _walk},
+}
+"""By kind and name; the classes are imported when they are needed."""
+
+_OWN: dict[tuple[str, str], type] = {}
+
+
+def add_own(kind: str, name: str, cls: type) -> None:
+    """Makes a class of the user's known, for as long as the program runs."""
+    _OWN[kind, name] = cls
+
+
+def is_own(kind: str, name: str) -> bool:
+    """Whether it is the user's."""
+    return (kind, name) in _OWN
+
+
+def find(kind: str, name: str) -> type:
+    """The class of a controller or a task.
+
+    Raises:
+      UserError: there is none of that name, or it is code that was not named on the command line.
+    """
+    if (kind, name) in _OWN:
+        return _OWN[kind, name]
+    if name in SHIPPED[kind]:
+        return SHIPPED[kind][name]()
+    if ":" in name:
+        raise UserError(
+            f'the {kind} is "{name}": code is never loaded from a run folder or a settings file; '
+            f"name it with --{kind} FILE.py:CLASS"
+        )
+    raise UserError(f'there is no {kind} "{name}"; {did_you_mean(name, SHIPPED[kind])}')
+
+
+def make_controller(creature: Creature, config: Config) -> "Controller":
+    """What moves the creature."""
+    step = float(creature.model.opt.timestep)
+    made: Controller = find("controller", config.use.controller)(creature, step)
+    return made
+
+
+def make_task(creature: Creature, config: Config) -> "Task":
+    """What the creature is to do."""
+    step = float(creature.model.opt.timestep)
+    horizon = max(round(config.rollout.seconds / step), 1)
+    made: Task = find("task", config.use.task)(
+        creature, step, horizon, what_ends(creature, config.rollout)
+    )
+    return made
+
+
+def what_ends(creature: Creature, config: RolloutConfig) -> Termination:
+    """What ends an episode: what the creature says, where the config says nothing else."""
+    if not config.terminate:
+        return Termination(min_up=-1.0, height=(-np.inf, np.inf), touch=False)
+    given: dict[str, Any] = dataclasses.asdict(config.termination)
+    return dataclasses.replace(
+        creature.settings.termination, **{k: v for k, v in given.items() if v is not None}
+    )

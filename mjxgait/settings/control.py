@@ -1,0 +1,64 @@
+"""Settings of the controllers and of the drive."""
+
+import dataclasses
+from typing import Annotated, Literal
+
+import pydantic
+
+from mjxgait.settings.tables import SHAPE, STRICT, Count, Interval, Positive
+
+
+@dataclasses.dataclass(frozen=True)
+class TuningRanges:
+    """Where the controller's own genes may lie (docs/controller.md); equal ends fix one."""
+
+    __pydantic_config__ = STRICT
+    threshold: Interval = (0.08, 0.16)
+    period: Interval = (0.8, 0.8)
+    steer: Interval = (0.0, 2.0)
+    pitch: Interval = (0.0, 0.8)
+    pitch_rate: Interval = (0.0, 0.1)
+    roll: Interval = (0.0, 0.8)
+    roll_rate: Interval = (0.0, 0.1)
+
+
+TUNING = tuple(field.name for field in dataclasses.fields(TuningRanges))
+"""Names of the tuning genes, in the order in which genomes hold them."""
+
+
+@dataclasses.dataclass(frozen=True)
+class PoseConfig:
+    """The controller of key poses.
+
+    Attributes:
+      key_poses: K, poses of half a cycle (of the whole one for an unsymmetric creature).
+      mirror: whether the other half of a symmetric creature's cycle is the mirror image; else the
+        K poses are the whole cycle.
+      interpolation: n, steps between neighbouring poses.
+      advance: the target moves on when the pose error is below the threshold, or by the clock.
+    """
+
+    __pydantic_config__ = STRICT
+    key_poses: Annotated[int, pydantic.Field(ge=2), SHAPE] = 2
+    mirror: bool = True
+    interpolation: Count = 10
+    advance: Literal["error", "clock"] = "error"
+    tuning: TuningRanges = dataclasses.field(default_factory=TuningRanges)
+
+
+@dataclasses.dataclass(frozen=True)
+class DriveConfig:
+    """How the joints' motors follow what a controller sends.
+
+    Attributes:
+      law: stable PD, or plain PD for comparison.
+      constraint_forces: whether stable PD counts the constraint forces of the previous step, as in
+        DART's tutorial.
+      stiffness, damping: factors on the creature's kp and kd.
+    """
+
+    __pydantic_config__ = STRICT
+    law: Literal["spd", "pd"] = "spd"
+    constraint_forces: bool = False
+    stiffness: Positive = 1.0
+    damping: Positive = 1.0

@@ -1,0 +1,44 @@
+"""Falling: why an episode of a creature that should be on its feet ends early."""
+
+from enum import IntEnum
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from mjxgait.creature import Creature
+from mjxgait.creature.settings import Termination
+from mjxgait.tasks import protocol
+from mjxgait.types import Sensed
+
+
+class Reason(IntEnum):
+    """Why an episode ended."""
+
+    FINISHED = protocol.FINISHED
+    TIPPED = 1
+    TOO_LOW = 2
+    TOO_HIGH = 3
+    TOUCHED = 4
+    NONFINITE = protocol.NONFINITE
+
+
+def why_fallen(creature: Creature, limits: Termination, sensed: Sensed) -> jax.Array:
+    """The `Reason` [] to end the episode at this moment; `FINISHED` while all is well."""
+    up = (sensed.trunk_rot @ creature.up.astype(np.float32))[2]
+    height = sensed.trunk_pos[2] / creature.stand_height
+    reason = jnp.zeros((), jnp.int32)
+    if limits.touch:
+        reason = jnp.where(touches(creature, sensed), Reason.TOUCHED, reason)
+    reason = jnp.where(height > limits.height[1], Reason.TOO_HIGH, reason)
+    reason = jnp.where(height < limits.height[0], Reason.TOO_LOW, reason)
+    # Rounding may put a trunk that is wholly upside down below -1.
+    if limits.min_up > -1.0:
+        reason = jnp.where(up < limits.min_up, Reason.TIPPED, reason)
+    return reason
+
+
+def touches(creature: Creature, sensed: Sensed) -> jax.Array:
+    """Whether [] a part touches the floor that is neither foot nor ground contact."""
+    others = sensed.geom_low[len(creature.foot_of) :]
+    return jnp.min(others, initial=1.0) < 0.0

@@ -1,0 +1,91 @@
+"""What tasks share that ask nothing special: stand at the start, do something, do not fall."""
+
+import abc
+import dataclasses
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import jax
+import jax.numpy as jnp
+
+from mjxgait.creature import Creature
+from mjxgait.creature.settings import Termination
+from mjxgait.settings.config import RolloutConfig
+from mjxgait.settings.tables import NoSettings
+from mjxgait.tasks.falls import why_fallen
+from mjxgait.tasks.protocol import Tally
+from mjxgait.tasks.trials import Starts, draw_starts
+from mjxgait.types import Sensed
+
+
+class PlainTask(abc.ABC):
+    """A task to inherit from (docs/extending.md).
+
+    It needs `counts`, the weight of each fitness term by name, and `judge`; what it must keep of
+    an episode goes into a tally of its own. `Settings` is a frozen dataclass of numbers that become
+    keys of `[fitness]`. step: s. horizon: T, steps of a full episode. ends: what a fall is.
+    """
+
+    Settings: ClassVar[type] = NoSettings
+    counts: ClassVar[Mapping[str, float]] = {}
+    outcomes: ClassVar[tuple[str, ...]] = ("seconds",)
+    adds: ClassVar[tuple[str, ...]] = ()
+
+    def __init__(self, creature: Creature, step: float, horizon: int, ends: Termination) -> None:
+        self.creature, self.step, self.horizon, self.ends = creature, step, horizon, ends
+
+    @property
+    def terms(self) -> tuple[str, ...]:
+        """See `Task`."""
+        return tuple(self.counts)
+
+    def trials(self, key: jax.Array, settings: RolloutConfig) -> Starts:
+        """See `Task`: the first start is nominal, the others are perturbed and pushed."""
+        return draw_starts(key, self.creature, settings)
+
+    def aim(self, trial: Starts) -> Any:
+        """See `Task`."""
+        return ()
+
+    def standards(self, settings: Any) -> Any:
+        """See `Task`."""
+        return settings
+
+    def senses(self, aim: Any, sensed: Sensed) -> Mapping[str, jax.Array]:
+        """See `Task`."""
+        return {}
+
+    def init(self) -> Any:
+        """See `Task`."""
+        none = jnp.zeros((), jnp.int32)
+        return Tally(steps=none, reason=none, overlap=jnp.zeros(()))
+
+    def ended(self, sensed: Sensed, aim: Any) -> jax.Array:
+        """See `Task`: a fall ends it."""
+        return why_fallen(self.creature, self.ends, sensed)
+
+    def update(
+        self, tally: Any, sensed: Sensed, torque: jax.Array, standards: Any, aim: Any
+    ) -> Any:
+        """See `Task`: one step more."""
+        return dataclasses.replace(tally, steps=tally.steps + 1)
+
+    @abc.abstractmethod
+    def judge(self, tally: Any, settings: Any) -> Mapping[str, jax.Array]:
+        """See `Task`."""
+
+    @classmethod
+    def criteria(cls, window: Any) -> tuple[Any, ...]:
+        """What the examiner demands besides staying up: `certify.criteria.Criterion` of its own.
+
+        Numbered from 10, from a `certify.measure.Recording` after its warm-up.
+        """
+        return ()
+
+    def outcome(self, tally: Any) -> Mapping[str, jax.Array]:
+        """See `Task`: s until the end."""
+        return {"seconds": tally.steps * self.step}
+
+    def weights(self, settings: Any, generation: jax.Array) -> Mapping[str, jax.Array]:
+        """See `Task`."""
+        return {name: jnp.float32(weight) for name, weight in self.counts.items()}

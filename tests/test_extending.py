@@ -1,0 +1,131 @@
+"""docs/extending.md does what it says."""
+
+import json
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+from helpers import STOOL
+
+from mjxgait.cli import main
+
+PAGE = Path(__file__).parents[1] / "docs" / "extending.md"
+SMALL = (
+    "--population 6 --generations 1 --rollout.seconds 0.4 --rollout.physics mjx --rollout.lanes 4"
+    " --examination.candidates 0 --no-plots"
+)
+SHORT = """
+seconds = 3.0
+warmup = 0.5
+[starts]
+count = 2
+[pushes]
+count = 2
+window = [0.5, 1.0]
+ladder = [0.2]
+ladder_count = 2
+"""
+
+
+def blocks(language: str) -> list[str]:
+    """The page's code in a language."""
+    return re.findall(rf"```{language}\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+
+
+def call(command: str) -> int:
+    with pytest.raises(SystemExit) as ended:
+        main(shlex.split(command))
+    return int(ended.value.code or 0)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Path:
+    """Where the page's code lies as `my.py`."""
+    folder = tmp_path_factory.mktemp("own")
+    (folder / "my.py").write_text("\n\n".join(blocks("python")))
+    (folder / "short.toml").write_text(SHORT)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def trained(folder: Path) -> Path:
+    """The run that the page's commands make, on a small body and in little time."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        train, certify, inspect = "".join(blocks("sh")).strip().splitlines()
+        extra = {train: SMALL, certify: "--config short.toml", inspect: ""}
+        for line, options in extra.items():
+            command = line.removeprefix("mjxgait ").replace("tall_quadruped", str(STOOL))
+            assert call(f"{command} {options}") == 0, line
+    return folder / "runs" / "own"
+
+
+def test_the_examples_are_short():
+    """Twenty lines are enough for either; imports and blank lines apart."""
+    for code in blocks("python"):
+        _, _, classes = code.partition("\n\n\n")
+        assert len([line for line in classes.splitlines() if line.strip()]) <= 24
+
+
+def test_the_champion_is_the_users_own(trained: Path):
+    champion = json.loads((trained / "champion.json").read_text())
+    assert (champion["controller"], champion["task"]) == ("my.py:Spin", "my.py:Stand")
+    assert {name: len(values) for name, values in champion["genome"].items()} == {
+        "middle": 4,
+        "swing": 4,
+        "phase": 4,
+    }
+    assert set(champion["terms"]) == {"alive", "moved"}
+
+
+def test_it_is_examined_by_its_own_criteria(trained: Path):
+    document = json.loads((trained / "certificate.json").read_text())
+    assert [c["number"] for c in document["criteria"]] == [1, 4, 5, 6, 8, 9, 10]
+    stays = document["criteria"][-1]["measures"][0]
+    assert stays["threshold"] == 0.1
+    assert stays["value"] > 0
+
+
+def test_evolution_and_examiner_agree_on_it(trained: Path):
+    """How long it stands: undisturbed, in evolution and in C MuJoCo."""
+    champion = json.loads((trained / "champion.json").read_text())
+    assert champion["origin"]["nominal"]["seconds"] == pytest.approx(0.4)
+
+
+def test_no_code_is_loaded_from_a_run(trained: Path, capfd, monkeypatch):
+    from mjxgait.parts import registry
+
+    monkeypatch.setattr(registry, "_OWN", {})
+    assert call(f"inspect {trained}") == 2
+    assert "never loaded from a run folder" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ("--controller nothere.py:Spin", "no such file"),
+        ("--controller my.py:Nobody", 'has no class "Nobody"'),
+        ("--controller my.py:Stand", "must inherit from mjxgait.control.reals.RealController"),
+        ("--controller half.py:Half", "Half lacks act"),
+        ("--controller broken.py:X", "cannot be loaded (ZeroDivisionError"),
+        ("--controller posse", 'did you mean "poses"'),
+        ("--task my.py", "give FILE.py:CLASS"),
+        ("--task", "name one of walk"),
+        ("--use.controller my.py:Other", "name it with --controller FILE.py:CLASS"),
+        ("--controller wild.py:Wild", 'there is no sense "jont_pos"'),
+    ],
+)
+def test_a_mistake_is_one_sentence(folder: Path, arguments, words, capfd, monkeypatch):
+    monkeypatch.chdir(folder)
+    head = "from mjxgait.control.reals import RealController\n"
+    bounds = "    def bounds(self, settings):\n        return {'a': (0.0, 1.0)}\n"
+    act = "    def act(self, plan, memory, senses):\n        return 0, memory\n"
+    (folder / "half.py").write_text(f"{head}class Half(RealController):\n{bounds}")
+    (folder / "broken.py").write_text("1 / 0\n")
+    wild = f"class Wild(RealController):\n    reads = ('jont_pos',)\n{bounds}{act}"
+    (folder / "wild.py").write_text(head + wild)
+    assert call(f"train --env {STOOL} --out runs/none {arguments}") == 2
+    said = capfd.readouterr().err
+    assert words in said
+    assert "Traceback" not in said
