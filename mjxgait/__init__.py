@@ -1,3 +1,38 @@
-"""Evolve a stable walk for any creature."""
+"""Evolve a stable walk for any creature.
+
+You give it a body; it gives you a walk that physics agrees with, examined in a second simulator.
+
+    import mjxgait
+
+    run = mjxgait.train("tall_quadruped", seed=0, out="runs/x", generations=20)
+    run.certified, run.certificate["margin"], run.champion.genome["key_poses"]
+
+    mjxgait.walk(run)                     # columns for pandas: joints, feet, trunk over time
+    mjxgait.examine(run)                  # the certificate again, criterion by criterion
+    mjxgait.open("runs/x").metrics()      # fitness over generations
+    mjxgait.load_creature("my_dog.xml")   # a body: shipped, a folder, MJCF or URDF
+
+On the command line: `mjxgait --help`.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from mjxgait.library import Run, examine, load_creature, open, train, walk
 
 __version__ = "0.1.0"
+__all__ = ["Run", "examine", "load_creature", "open", "train", "walk"]
+
+
+def __getattr__(name: str) -> Any:
+    """What is asked for, imported then: the command line must not wait for it."""
+    if name in __all__:
+        from mjxgait import library
+
+        return getattr(library, name)
+    raise AttributeError(f"module 'mjxgait' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    """For `help(mjxgait)` and completion, which look at nothing that is not listed."""
+    return sorted({*globals(), *__all__})

@@ -9,9 +9,11 @@ import pytest
 PACKAGE = Path(__file__).parents[1] / "mjxgait"
 
 FLOORS = (
+    ("__init__",),
     ("__main__",),
     ("cli",),
     ("commands",),
+    ("library",),
     ("bench",),
     ("ablation",),
     ("web",),
@@ -30,7 +32,6 @@ FLOORS = (
     ("settings",),
     ("types", "cores"),
     ("errors",),
-    ("__init__",),
 )
 """The rooms, from the top down: each may import from the floors below it, and from itself."""
 

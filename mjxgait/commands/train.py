@@ -3,7 +3,6 @@
 import argparse
 import contextlib
 import dataclasses
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
@@ -12,9 +11,17 @@ import tyro
 
 from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import INTERRUPTED, UserError
+from mjxgait.library import load_imported
 from mjxgait.parts import resolve_config
 from mjxgait.runs.disk import disk_errors
-from mjxgait.runs.folder import METRICS, PLOT, create_run, open_run, read_metrics
+from mjxgait.runs.folder import (
+    METRICS,
+    PLOT,
+    create_run,
+    new_run_folder,
+    open_run,
+    read_metrics,
+)
 from mjxgait.settings.config import Config, ExaminationConfig
 from mjxgait.settings.shipped import find_creature
 from mjxgait.settings.tables import build, merge
@@ -79,7 +86,7 @@ def train_command(arguments: Sequence[str]) -> int:
             )
         folder = options.resume
     else:
-        folder = options.out or _new_folder(creature.name, config.seed)
+        folder = options.out or new_run_folder(creature.name, config.seed)
         create_run(folder, creature, config)
     prepare_devices()
     with following(folder) if options.view else contextlib.nullcontext():
@@ -151,10 +158,7 @@ def _creature(env: str) -> Creature:
 
     imported = import_model(path)
     print(imported.notes.text())
-    with tempfile.TemporaryDirectory() as folder:  # the run folder keeps the creature
-        for name, text in imported.files.items():
-            (Path(folder) / name).write_text(text, encoding="utf-8")
-        return load_creature(Path(folder))
+    return load_imported(imported.files)
 
 
 def _settings(options: TrainOptions) -> Config:
@@ -172,11 +176,3 @@ def _without_ends(config: Config) -> Config:
     """The settings that decide what a generation computes."""
     endless = dataclasses.replace(config.evolution, generations=0, target=None)
     return dataclasses.replace(config, evolution=endless, examination=ExaminationConfig())
-
-
-def _new_folder(creature: str, seed: int) -> Path:
-    """The first folder under runs/ that is not there yet."""
-    names = (
-        f"{creature}-seed{seed}{suffix}" for suffix in ("", *(f"-{i}" for i in range(2, 10_000)))
-    )
-    return next(folder for name in names if not (folder := Path("runs") / name).exists())

@@ -35,6 +35,14 @@ def create_run(folder: Path, creature: Creature, config: Config) -> None:
         raise UserError(f"{folder}: cannot be written ({error.strerror})") from None
 
 
+def new_run_folder(creature: str, seed: int) -> Path:
+    """The first folder under runs/ that is not there yet."""
+    names = (
+        f"{creature}-seed{seed}{suffix}" for suffix in ("", *(f"-{i}" for i in range(2, 10_000)))
+    )
+    return next(folder for name in names if not (folder := Path("runs") / name).exists())
+
+
 def open_run(folder: Path) -> tuple[Creature, Config]:
     """The creature and the settings of a run folder.
 

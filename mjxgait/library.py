@@ -1,0 +1,235 @@
+"""The program as a library: the same runs as the command line makes, from a script or a notebook.
+
+import mjxgait
+
+run = mjxgait.train("tall_quadruped", seed=0, out="runs/x", generations=20)
+run.champion, run.certificate, run.metrics()
+mjxgait.walk(run)["trunk_z"]
+"""
+
+import dataclasses
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mjxgait.certify import Certificate, CertificateConfig, certify, read_certificate
+from mjxgait.champion import Champion, read_champion
+from mjxgait.creature import Creature
+from mjxgait.creature import load_creature as load_folder
+from mjxgait.errors import UserError
+from mjxgait.runs.exams import Exams
+from mjxgait.runs.folder import (
+    CERTIFICATE,
+    CHAMPION,
+    EXAMS,
+    METRICS,
+    create_run,
+    new_run_folder,
+    open_run,
+    read_metrics,
+)
+from mjxgait.settings.config import Config
+from mjxgait.settings.shipped import find_creature
+from mjxgait.settings.tables import build, merge, read_toml
+
+Place = str | Path
+
+
+@dataclasses.dataclass(frozen=True)
+class Run:
+    """A run folder.
+
+    folder: where everything of it lies (the README says what).
+    """
+
+    folder: Path
+
+    @property
+    def creature(self) -> Creature:
+        """The body that was evolved on."""
+        return open_run(self.folder)[0]
+
+    @property
+    def config(self) -> Config:
+        """The settings, every key."""
+        return open_run(self.folder)[1]
+
+    @property
+    def champion(self) -> Champion:
+        """The best individual: its genome by name, its settings, its fitness.
+
+        Raises:
+          UserError: there is none yet.
+        """
+        return read_champion(self.folder / CHAMPION, self.creature)
+
+    @property
+    def certificate(self) -> dict[str, Any] | None:
+        """What the examiner said, as `certificate.json` has it; None before an examination."""
+        return read_certificate(self.folder / CERTIFICATE)
+
+    @property
+    def certified(self) -> bool:
+        """Whether its champion has passed every criterion."""
+        document = self.certificate
+        return bool(document and document["passed"])
+
+    def metrics(self) -> dict[str, np.ndarray]:
+        """Each number of `metrics.jsonl` over generations [G], NaN where there was none."""
+        lines = read_metrics(self.folder / METRICS)
+        names = dict.fromkeys(name for line in lines for name in line)
+        return {
+            name: np.array([np.nan if line.get(name) is None else line[name] for line in lines])
+            for name in names
+        }
+
+
+def load_creature(env: Place) -> Creature:
+    """A shipped creature by name, a creature folder, or a model file (MJCF, URDF) as it is.
+
+    Raises:
+      UserError: there is none, or it cannot be used; says why.
+    """
+    path = Path(env)
+    if not path.is_file():
+        return load_folder(find_creature(str(env)))
+    from mjxgait.importing import import_model
+
+    return load_imported(import_model(path).files)
+
+
+def load_imported(files: Mapping[str, str]) -> Creature:
+    """The creature of an imported model's files, by name."""
+    with tempfile.TemporaryDirectory() as folder:  # the run folder keeps the creature
+        for name, text in files.items():
+            (Path(folder) / name).write_text(text, encoding="utf-8")
+        return load_folder(Path(folder))
+
+
+def train(
+    env: Place = "tall_quadruped",
+    *,
+    out: Place | None = None,
+    config: Place | None = None,
+    controller: str | None = None,
+    task: str | None = None,
+    seed: int = 0,
+    population: int | None = None,
+    generations: int | None = None,
+    settings: Mapping[str, Any] | None = None,
+    quiet: bool = False,
+) -> Run:
+    """Evolves a creature, has its champion examined, and returns the run.
+
+    It is what `mjxgait train` does, without plots: the same settings give the same champion.
+
+    Args:
+      env: shipped creature, creature folder, or model file. out: the run folder, which must not
+        hold anything; by default a new one under runs/.
+      config: file with settings, or the name of a shipped config such as wilson.
+      controller, task: who moves the creature and what it is to do: a shipped name, or
+        FILE.py:CLASS of your own (docs/extending.md).
+      seed, population, generations: the settings that are changed most often.
+      settings: any others, in tables as in a config file: {"rollout": {"seconds": 5.0}}.
+      quiet: says nothing on the screen.
+
+    Raises:
+      UserError: one sentence that says what is wrong with what was given.
+    """
+    from rich.console import Console
+
+    from mjxgait.parts import resolve_config
+    from mjxgait.runs import loop
+    from mjxgait.runs.experiment import prepare_devices
+    from mjxgait.runs.screen import Screen
+
+    use = _use(controller=controller, task=task)
+    creature = load_creature(env)
+    resolved = resolve_config(
+        creature.settings.train, creature.name, Path(config) if config else None, use
+    )
+    short = {"population": population, "generations": generations}
+    evolution = {key: value for key, value in short.items() if value is not None}
+    table = merge(dataclasses.asdict(resolved), {"seed": seed, "evolution": evolution})
+    chosen = build(type(resolved), merge(table, settings or {}), "the settings given to train")
+    folder = Path(out) if out else new_run_folder(creature.name, chosen.seed)
+    create_run(folder, creature, chosen)
+    prepare_devices()
+    screen = Screen(Console(quiet=True)) if quiet else Screen()
+    loop.train(folder, creature, chosen, screen)
+    return Run(folder)
+
+
+def open(folder: Place) -> Run:
+    """A run that is there already.
+
+    Raises:
+      UserError: it is not a run folder.
+    """
+    run = Run(Path(folder))
+    open_run(run.folder)
+    return run
+
+
+def examine(run: Run | Place, config: Place | None = None) -> Certificate:
+    """Examines the champion of a run in C MuJoCo, criterion by criterion; writes nothing.
+
+    Args:
+      config: TOML file with other thresholds (configs/certificate/default.toml shows all).
+
+    Raises:
+      UserError: no run, no champion, or a bad file.
+    """
+    known = run if isinstance(run, Run) else open(run)
+    table = read_toml(Path(config)) if config else {}
+    champion = known.champion
+    attempt = Exams(known.folder / EXAMS).attempt(
+        champion.fingerprint, int(champion.origin.get("generation", 0))
+    )
+    return certify(
+        known.creature, champion, build(CertificateConfig, table, str(config)), attempts=attempt
+    )
+
+
+def walk(run: Run | Place, seconds: float = 12.0) -> dict[str, np.ndarray]:
+    """The champion's undisturbed motion in C MuJoCo, as columns [T] for pandas or a plot.
+
+    `time` s; `trunk_x`, `trunk_y`, `trunk_z` m, forward, left and up from the start; `pitch`,
+    `roll` rad; per joint `pos_NAME` rad, `vel_NAME` rad/s, `torque_NAME` N·m; per foot
+    `height_NAME` m, `force_NAME` N. It ends soon after a fall.
+
+    Raises:
+      UserError: no run or no champion.
+    """
+    from mjxgait.viewing.walk import record_walk
+
+    known = run if isinstance(run, Run) else open(run)
+    if not seconds > 0:
+        raise UserError(f"seconds = {seconds}: must be more than zero")
+    creature = known.creature
+    seen = record_walk(creature, known.champion, seconds).recording
+    columns = {"time": np.arange(len(seen.pitch)) * seen.time_step}
+    columns |= {f"trunk_{axis}": seen.trunk_pos[:, i] for i, axis in enumerate("xyz")}
+    columns |= {"pitch": seen.pitch, "roll": seen.roll}
+    joints = {"pos": seen.joint_pos, "vel": seen.joint_vel, "torque": seen.torque}
+    feet = {"height": seen.foot_height, "force": seen.foot_force}
+    for names, values in ((creature.joint_names, joints), (creature.foot_names, feet)):
+        columns |= {
+            f"{what}_{name}": array[:, i]
+            for what, array in values.items()
+            for i, name in enumerate(names)
+        }
+    return columns
+
+
+def _use(**named: str | None) -> dict[str, str]:
+    """Who takes part, the user's own code loaded."""
+    given = {kind: text for kind, text in named.items() if text is not None}
+    if not given:
+        return {}
+    from mjxgait.parts.own import load
+
+    return {kind: load(kind, text) for kind, text in given.items()}

@@ -1,0 +1,94 @@
+"""The program as a library: what the command line does, from Python."""
+
+import json
+import pydoc
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers import STOOL
+
+import mjxgait
+from mjxgait.errors import UserError
+
+SMALL = {
+    "rollout": {"seconds": 0.4, "lanes": 4, "physics": "mjx"},
+    "examination": {"candidates": 1, "draws": 2},
+}
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory) -> mjxgait.Run:
+    folder = tmp_path_factory.mktemp("runs") / "x"
+    return mjxgait.train(
+        STOOL, out=folder, seed=3, population=6, generations=2, settings=SMALL, quiet=True
+    )
+
+
+def test_a_run_is_its_folder(run: mjxgait.Run):
+    assert (run.creature.name, run.config.seed, run.config.rollout.lanes) == ("stool", 3, 4)
+    document = json.loads((run.folder / "champion.json").read_text())
+    assert run.champion.fitness == document["fitness"]
+    assert run.certificate == json.loads((run.folder / "certificate.json").read_text())
+    assert run.certified == run.certificate["passed"]
+    assert mjxgait.open(run.folder) == run
+
+
+def test_metrics_are_columns_over_generations(run: mjxgait.Run):
+    found = run.metrics()
+    assert np.array_equal(found["generation"], [0, 1, 2])
+    assert (np.diff(found["best"]) >= 0).all()
+    assert {len(column) for column in found.values()} == {3}
+
+
+def test_a_walk_is_columns_over_time(run: mjxgait.Run):
+    columns = mjxgait.walk(run, seconds=0.5)
+    rows = len(columns["time"])
+    assert {column.shape for column in columns.values()} == {(rows,)}
+    assert np.allclose(np.diff(columns["time"]), run.creature.model.opt.timestep)
+    feet, joints = run.creature.foot_names, run.creature.joint_names
+    assert {f"force_{foot}" for foot in feet} | {f"torque_{j}" for j in joints} <= set(columns)
+    # It stands on its feet: together they bear about its weight.
+    force = sum(columns[f"force_{foot}"] for foot in feet)
+    assert force.mean() == pytest.approx(9.81 * run.creature.mass, rel=0.3)
+
+
+def test_the_examination_again_comes_to_the_same(run: mjxgait.Run):
+    again = json.loads(mjxgait.examine(run).to_json())
+    assert {**again, "seconds": 0} == {**run.certificate, "seconds": 0}
+
+
+def test_nothing_is_overwritten(run: mjxgait.Run):
+    before = {p: p.read_bytes() for p in run.folder.rglob("*") if p.is_file()}
+    with pytest.raises(UserError, match="holds another run"):
+        mjxgait.train(STOOL, out=run.folder, settings=SMALL, quiet=True)
+    assert before == {p: p.read_bytes() for p in run.folder.rglob("*") if p.is_file()}
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: mjxgait.train("mule"), 'unknown creature "mule"'),
+        (lambda: mjxgait.train(STOOL, settings={"rolout": {}}), 'did you mean "rollout"'),
+        (lambda: mjxgait.train(STOOL, population=1), "population must be at least 2"),
+        (lambda: mjxgait.train(STOOL, controller="my.py:Spin"), "no such file"),
+        (lambda: mjxgait.open("nowhere"), "not a run folder"),
+        (lambda: mjxgait.walk("nowhere"), "not a run folder"),
+    ],
+    ids=["creature", "key", "range", "controller", "folder", "walk"],
+)
+def test_a_mistake_is_one_sentence(call, words: str, tmp_path: Path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(UserError, match=words):
+        call()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_help_is_a_good_read():
+    """What can be called stands in it, with what it takes, gives and refuses."""
+    text = pydoc.plain(pydoc.render_doc(mjxgait))
+    for name in mjxgait.__all__:
+        assert name in text
+        assert pydoc.getdoc(getattr(mjxgait, name))
+    for words in ("train(", "generations:", "Raises:", "mjxgait.walk(run)"):
+        assert words in text
