@@ -27,6 +27,7 @@ FLOORS = (
     ("champion", "physics", "senses"),
     ("creature",),
     ("settings",),
+    ("ground",),
     ("types", "cores"),
     ("errors",),
     ("__init__",),

@@ -38,6 +38,7 @@ class TrainOptions:
       generation: With --resume: the checkpoint to go on from instead of the latest.
       population: Short for --evolution.population.
       generations: Short for --evolution.generations.
+      ground: Short for --rollout.ground: flat, slope:0.1, steps:0.05, bumps:0.05, rough:0.05.
       view: Show the best of each generation walking on a page that only this machine can reach.
       plots: Draw all plots of the run when it has ended (`mjxgait plot`).
       settings: The config, key by key.
@@ -50,6 +51,7 @@ class TrainOptions:
     generation: int | None = None
     population: int | None = None
     generations: int | None = None
+    ground: str | None = None
     view: bool = False
     plots: bool = True
     settings: Annotated[Config, tyro.conf.arg(name="")] = dataclasses.field(default_factory=Config)
@@ -150,6 +152,8 @@ def _settings(options: TrainOptions) -> Config:
     """
     short = {"population": options.population, "generations": options.generations}
     table = {"evolution": {key: value for key, value in short.items() if value is not None}}
+    if options.ground is not None:
+        table |= {"rollout": {"ground": options.ground}}
     return build(Config, merge(dataclasses.asdict(options.settings), table), "the options")
 
 

@@ -293,6 +293,7 @@ def _ends(creature: Creature, config: RolloutConfig) -> Termination:
 
 def _simulator(creature: Creature, config: Config) -> Simulator:
     creature, ends = creature.spanned(config.evolution.pose_span), _ends(creature, config.rollout)
+    creature = creature.on(config.rollout.ground)
     step = float(creature.model.opt.timestep)
     steps = max(round(config.rollout.seconds / step), 1)
     plant, lanes = make_plant(creature, config.rollout.physics, ends.touch)

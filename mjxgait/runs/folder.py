@@ -35,16 +35,15 @@ def create_run(folder: Path, creature: Creature, config: Config) -> None:
 
 
 def open_run(folder: Path) -> tuple[Creature, Config]:
-    """The creature and the settings of a run folder.
+    """The creature, on the ground of the run, and the settings of a run folder.
 
     Raises:
       UserError: it is not a run folder.
     """
     if not (folder / CONFIG).is_file():
         raise UserError(f"{folder}: not a run folder (it has no {CONFIG})")
-    return load_creature(folder / CREATURE), build(
-        Config, read_toml(folder / CONFIG), str(folder / CONFIG)
-    )
+    config = build(Config, read_toml(folder / CONFIG), str(folder / CONFIG))
+    return load_creature(folder / CREATURE).on(config.rollout.ground), config
 
 
 def read_metrics(path: Path) -> list[dict[str, Any]]:

@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 
 import pydantic
 
+from mjxgait.ground.spec import FLAT, check_ground
 from mjxgait.settings.tables import (
     STRICT,
     Count,
@@ -18,6 +19,9 @@ from mjxgait.settings.tables import (
 SHAPE = "shape"
 """Marks what decides the shape of the compiled program; every other number or choice is a value that the program is handed."""
 
+KIND = "kind"
+"""Marks a text of which only what stands before the first colon shapes the compiled program."""
+
 HOST = "host"
 """Marks what only the host reads, never the compiled program."""
 
@@ -29,6 +33,9 @@ def _ordered(interval: tuple[float, float]) -> tuple[float, float]:
 
 
 Interval = Annotated[tuple[Finite, Finite], pydantic.AfterValidator(_ordered)]
+
+
+GroundText = Annotated[str, pydantic.AfterValidator(check_ground)]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -108,6 +115,7 @@ class RolloutConfig:
       worst: share of the worst start in the score; the mean of the starts has the rest.
       physics: the fast step where the model allows it, or plain MJX.
       lanes: simulations in flight per device; 0 lets the program choose.
+      ground: flat, slope:0.1, steps:0.05, bumps:0.05 or rough:0.05, in hip heights (docs/ground.md).
     """
 
     __pydantic_config__ = STRICT
@@ -123,6 +131,7 @@ class RolloutConfig:
     worst: Fraction = 0.5
     physics: Annotated[Literal["auto", "mjx"], SHAPE] = "auto"
     lanes: Annotated[Whole, SHAPE] = 0
+    ground: Annotated[GroundText, KIND] = FLAT
 
 
 @dataclasses.dataclass(frozen=True)

@@ -10,7 +10,7 @@ from typing import Any, Literal, get_args, get_origin, get_type_hints
 import jax
 import jax.numpy as jnp
 
-from mjxgait.settings.config import HOST, SHAPE, Config
+from mjxgait.settings.config import HOST, KIND, SHAPE, Config
 from mjxgait.types import pytree
 
 
@@ -54,6 +54,8 @@ def _traced(config: Any) -> Any:
             values[field.name] = HostOnly(field.name)
         elif role is SHAPE:
             values[field.name] = value
+        elif role is KIND:
+            values[field.name] = value.split(":")[0]
         else:
             values[field.name] = _leaf(value, hint)
     return type(config)(**values)
@@ -70,13 +72,13 @@ def _leaf(value: Any, hint: Any) -> Any:
 
 
 def _fields(cls: type) -> list[tuple[Any, Any, str]]:
-    """Each field of a config class with its type and its role: `SHAPE`, `HOST`, or empty for a value of the program."""
+    """Each field of a config class with its type and its role: `SHAPE`, `KIND`, `HOST`, or empty for a value of the program."""
     hints = get_type_hints(cls, include_extras=True)
     rows = []
     for field in dataclasses.fields(cls):
         hint = hints[field.name]
         marks = (
-            [mark for mark in getattr(hint, "__metadata__", ()) if mark in (SHAPE, HOST)]
+            [mark for mark in getattr(hint, "__metadata__", ()) if mark in (SHAPE, KIND, HOST)]
             if get_origin(hint) is not Literal
             else []
         )

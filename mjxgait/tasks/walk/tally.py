@@ -10,7 +10,7 @@ import numpy as np
 from mjxgait.creature import Creature
 from mjxgait.creature.frame import start_axes, start_position
 from mjxgait.creature.settings import Termination
-from mjxgait.senses import CONTACT_GAP, foot_geoms, foot_heights
+from mjxgait.senses import CONTACT_GAP, foot_geoms, foot_heights, trunk_height
 from mjxgait.tasks import protocol
 from mjxgait.types import Sensed, pytree
 
@@ -92,7 +92,7 @@ class Judge:
         """The reason [] to end the episode at this moment; `FINISHED` while all is well."""
         limits = self.ends or self.creature.settings.termination
         up = (sensed.trunk_rot @ self.creature.up.astype(np.float32))[2]
-        height = sensed.trunk_pos[2] / self.creature.stand_height
+        height = trunk_height(sensed) / self.creature.stand_height
         reason = jnp.zeros((), jnp.int32)
         if limits.touch:
             reason = jnp.where(self._touches(sensed), Reason.TOUCHED, reason)
