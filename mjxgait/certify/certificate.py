@@ -204,6 +204,7 @@ def certify(
     report = describe.describe(seen.whole.window(config.warmup), config.gait.clearance) | {
         "push_survival": {f"{speed:g}": share for speed, share in sorted(shares.items())},
         "push_that_fells_half": half_point(shares),
+        "ground": str(creature.terrain),
     }
     return Certificate(
         creature.name,

@@ -17,6 +17,7 @@ from mujoco.batch import Batch
 from mjxgait.certify.controller import Controller, Senses
 from mjxgait.certify.layout import Layout, LowestPoint, colliding_geoms
 from mjxgait.certify.starts import Starts
+from mjxgait.certify.terrain import grounded_model, terrain_of
 from mjxgait.champion import Champion
 from mjxgait.cores import cores
 from mjxgait.creature import Creature
@@ -86,10 +87,10 @@ class Outcome:
 
 
 def examined_model(creature: Creature, refine: int = 1) -> mujoco.MjModel:
-    """The creature's own body with a converged contact solver, and its time step divided by
-    `refine`.
+    """The creature's own body on its ground, with a converged contact solver, and its time step
+    divided by `refine`.
     """
-    model = copy.copy(creature.model)
+    model = copy.copy(grounded_model(creature))
     model.opt.iterations, model.opt.ls_iterations = 100, 50
     model.opt.tolerance = 1e-8
     model.opt.timestep = creature.model.opt.timestep / refine
@@ -169,8 +170,10 @@ class _Run:
         self.model = examined_model(creature, refine)
         self.batch = _batch(creature, self.model, starts)
         self.layout = Layout(self.model)
-        self.solid = LowestPoint(self.model, colliding_geoms(self.model))
-        self.forbidden = LowestPoint(self.model, creature.watched[len(creature.foot_of) :])
+        self.terrain = terrain_of(creature)
+        self.solid = LowestPoint(self.model, colliding_geoms(self.model), self.terrain)
+        others = creature.watched[len(creature.foot_of) :]
+        self.forbidden = LowestPoint(self.model, others, self.terrain)
         bind = self.batch.bind
         self.qpos, self.qvel, self.applied = bind("qpos"), bind("qvel"), bind("qfrc_applied")
         self.warm_start = bind("qacc_warmstart")
@@ -331,7 +334,9 @@ class _Run:
         """Negated comparisons, so that a simulation that is NaN counts as down."""
         trunk = self.creature.trunk
         up = self.xmat[running, trunk].reshape(-1, 3, 3)[:, 2] @ self.creature.up
-        height = self.xpos[running, trunk, 2] / self.creature.stand_height
+        x, y, z = self.xpos[running, trunk].T
+        above = z - self.terrain.height(x, y) if self.terrain else z
+        height = above / self.creature.stand_height
         fine = (
             self._sane(running)
             & (up > self.fall.min_up)

@@ -151,9 +151,10 @@ def _settings(options: TrainOptions) -> Config:
     their ranges are not.
     """
     short = {"population": options.population, "generations": options.generations}
-    table = {"evolution": {key: value for key, value in short.items() if value is not None}}
-    if options.ground is not None:
-        table |= {"rollout": {"ground": options.ground}}
+    table = {
+        "evolution": {key: value for key, value in short.items() if value is not None},
+        "rollout": {} if options.ground is None else {"ground": options.ground},
+    }
     return build(Config, merge(dataclasses.asdict(options.settings), table), "the options")
 
 

@@ -14,6 +14,7 @@ from rich.status import Status
 from rich.table import Table
 
 from mjxgait.certify import Certificate
+from mjxgait.ground.spec import FLAT
 from mjxgait.runs.folder import CHAMPION, CONFIG, CREATURE, METRICS, PLOT
 
 
@@ -86,6 +87,7 @@ class Screen:
         self.console.print(table)
         verdict = "Certified: it walks" if certificate.passed else "Not certified"
         report = certificate.report
+        ground = "" if report["ground"] == FLAT else f" on {report['ground']}"
         if certificate.attempts > 1:
             self.console.print(f"This was examination {certificate.attempts} of its run.")
         if (worst := report["overlap"]) and not certificate.criteria[-1].passed:
@@ -96,7 +98,7 @@ class Screen:
             )
         self.console.print(
             f"{verdict} (margin {certificate.margin:.2f}). {report['gait']}, {report['speed']:.2f} "
-            f"m/s; {certificate.seconds:.0f} s."
+            f"m/s{ground}; {certificate.seconds:.0f} s."
         )
 
     def report(
