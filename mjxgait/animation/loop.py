@@ -92,8 +92,7 @@ def walk_take(walk: Walk, rate: int = 30) -> WalkLoop:
     place = int(model.jnt_qposadr[model.body_jntadr[trunk]])
     advance = float((qpos[-1, place : place + 2] - qpos[0, place : place + 2]) @ walk.forward)
     share = np.linspace(0.0, 1.0, count)[:, None]
-    below = walk.ground_heights(qpos[[0, -1], place : place + 2])
-    qpos[:, place + 2] -= (1 - share[:, 0]) * below[0] + share[:, 0] * below[1]
+    qpos[:, place + 2] -= walk.ground_heights(qpos[:, place : place + 2])
     qpos[:, place : place + 2] -= (1 - share) * qpos[0, place : place + 2] + share * qpos[
         -1, place : place + 2
     ]
