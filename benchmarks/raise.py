@@ -10,9 +10,8 @@ starts on the plain floor, what falls counting up to its fall. Columns:
 - push: sudden change of the trunk's horizontal velocity, in sqrt(g h), that fells half; from any
   side, between 2 and 4 s, 5 s to fall.
 - plain: the floor of evolution; the share that stays up and the speed in body lengths/s.
-- bumps: floor with heights uniform in plus and minus this share of the hip height
-  (mjxgait/certify/worlds.py); four floors, a quarter of the starts on each. Other parts than feet
-  may touch it.
+- bumps: rough ground (docs/ground.md) that rises and falls by at most this share of the hip height;
+  four of them, a quarter of the starts on each. Other parts than feet may touch it.
 - uphill, downhill: steepest slope in degrees on which 90 % stay up and get more than a body length
   forward, all gentler ones included.
 - friction, trunk: coefficient of sliding friction 0.4 instead of 0.9; mass and inertia of the trunk
@@ -39,7 +38,7 @@ from mjxgait.certify.certificate import half_point
 from mjxgait.certify.config import PushesConfig
 from mjxgait.certify.simulate import Fall, Outcome, simulate
 from mjxgait.certify.starts import Starts, join, nominal_starts, perturbed_starts
-from mjxgait.certify.worlds import slippery, sloping, uneven
+from mjxgait.certify.worlds import slippery, sloping
 from mjxgait.champion import Champion, read_champion
 from mjxgait.creature import Creature
 from mjxgait.runs.folder import CHAMPION, open_run
@@ -157,10 +156,7 @@ def bumps(
     creature: Creature, champion: Champion, starts: Starts, amplitude: float
 ) -> list[Outcome]:
     """On each of the floors its share of the starts; amplitude: hip heights."""
-    floors = [
-        uneven(creature, amplitude * creature.hip_height, np.random.default_rng([SEED, i]))
-        for i in range(FLOORS)
-    ]
+    floors = [creature.on(f"rough:{amplitude:g}@{SEED + i}") for i in range(FLOORS)]
     shares = [starts.rows(np.arange(i, len(starts), FLOORS)) for i in range(FLOORS)]
     return [
         simulate(floor, champion, share, SECONDS, fall=Fall(touch=False))

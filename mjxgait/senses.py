@@ -48,6 +48,7 @@ SENSES: Mapping[str, Sense] = {
     "foot_height": lambda creature, sensed, time: foot_heights(creature, sensed),
     "contact": lambda creature, sensed, time: contacts(creature, sensed),
     "trunk_pos": lambda creature, sensed, time: sensed.trunk_pos,
+    "trunk_height": lambda creature, sensed, time: trunk_height(sensed),
     "trunk_rot": lambda creature, sensed, time: sensed.trunk_rot,
     "trunk_vel": lambda creature, sensed, time: sensed.trunk_vel,
     "trunk_angvel": lambda creature, sensed, time: sensed.trunk_angvel,
@@ -83,8 +84,14 @@ def check_senses(reads: Collection[str], added: Collection[str] = ()) -> None:
             raise UserError(f'there is no sense "{name}"; {did_you_mean(name, known)}')
 
 
+def trunk_height(sensed: Sensed) -> jax.Array:
+    """Height [] in m of the trunk above the ground under it."""
+    height = sensed.trunk_pos[2]
+    return height if sensed.floor is None else height - sensed.floor
+
+
 def foot_heights(creature: Creature, sensed: Sensed) -> jax.Array:
-    """Height [F] in m of each foot's lowest point above the floor."""
+    """Height [F] in m of each foot's lowest point above the ground under it."""
     return jnp.stack([jnp.min(sensed.geom_low[geoms]) for geoms in foot_geoms(creature)])
 
 

@@ -33,6 +33,8 @@ class BodyState:
     friction: [] factor on the floor's sliding friction.
     parameters: the numbers of this lane's own body, as `Plant.parameters_of` reads them; None
       where it has the plant's.
+    ground: a `Ground`, what this lane's creature walks on; None for the plane z = 0, which costs
+      nothing.
     """
 
     qpos: jax.Array
@@ -41,6 +43,7 @@ class BodyState:
     constraint_force: jax.Array
     friction: jax.Array
     parameters: Any = None
+    ground: Any = None
 
 
 @pytree
@@ -52,7 +55,8 @@ class Sensed:
     trunk_pos: [3] m, body origin. trunk_rot: [3, 3], columns are the trunk's axes in the world.
     trunk_vel: [3] m/s of the body origin, trunk_angvel: [3] rad/s; both in the world frame.
     geom_pos: [G, 3] m, centres of the watched geoms. geom_low: [G] m, height of their lowest points
-    above the floor.
+    above the ground under them.
+    floor: [] m, height of the ground under the trunk; None where it is the plane z = 0.
     """
 
     joint_pos: jax.Array
@@ -64,6 +68,7 @@ class Sensed:
     trunk_angvel: jax.Array
     geom_pos: jax.Array
     geom_low: jax.Array
+    floor: jax.Array | None = None
 
 
 @pytree

@@ -30,6 +30,7 @@ FLOORS = (
     ("champion", "physics", "senses"),
     ("creature",),
     ("settings",),
+    ("ground",),
     ("types", "cores"),
     ("errors",),
 )

@@ -75,6 +75,9 @@ def walk_loop(walk: Walk, rate: int = 30) -> WalkLoop:
     qpos = np.array([_integrate(model, q, s * gap) for q, s in zip(qpos, share, strict=True)])
     qpos[-1] = qpos[0]
     place = int(model.jnt_qposadr[model.body_jntadr[walk.creature.trunk]])
+    # Shown where a viewer's own floor is, or none: on ground that is no plane at its mean height.
+    below = walk.ground_heights(walk.qpos[first:last, place : place + 2])
+    qpos[:, place + 2] -= below.mean() - 0.5 * (below[-1] - below[0])
     qpos[:, place : place + 2] -= qpos[:-1, place : place + 2].mean(0)
     return WalkLoop(
         walk, qpos, rate, strides, advance, count / rate / ((last - first) * walk.time_step)
@@ -89,6 +92,7 @@ def walk_take(walk: Walk, rate: int = 30) -> WalkLoop:
     place = int(model.jnt_qposadr[model.body_jntadr[trunk]])
     advance = float((qpos[-1, place : place + 2] - qpos[0, place : place + 2]) @ walk.forward)
     share = np.linspace(0.0, 1.0, count)[:, None]
+    qpos[:, place + 2] -= walk.ground_heights(qpos[:, place : place + 2])
     qpos[:, place : place + 2] -= (1 - share) * qpos[0, place : place + 2] + share * qpos[
         -1, place : place + 2
     ]

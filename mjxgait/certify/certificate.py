@@ -199,6 +199,7 @@ def certify(
     report = demands_of(champion.task).report(seen.whole.window(config.warmup), config) | {
         "push_survival": {f"{speed:g}": share for speed, share in sorted(shares.items())},
         "push_that_fells_half": half_point(shares),
+        "ground": str(creature.terrain),
     }
     return Certificate(
         creature.name,

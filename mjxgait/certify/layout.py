@@ -1,12 +1,27 @@
 """Where things lie in a MuJoCo model, and how low they reach."""
 
 import dataclasses
+from typing import Protocol
 
 import mujoco
 import numpy as np
 
 from mjxgait.creature import Creature
 from mjxgait.creature.geometry import support_extents
+
+FLOOR = "floor"
+
+
+class Ground(Protocol):
+    """What is not the plane z = 0; places and heights in m, of any shape."""
+
+    def height(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """At these places of the world."""
+        ...
+
+    def steepness(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """[2, ...] its change per metre along x and y."""
+        ...
 
 
 class Layout:
@@ -55,11 +70,16 @@ def _horizontal(vector: np.ndarray) -> np.ndarray:
 
 
 class LowestPoint:
-    """The lowest points of some geoms above the floor, exact for MuJoCo's primitive shapes."""
+    """How far some geoms' lowest points are above the ground, exact for MuJoCo's primitive shapes.
 
-    def __init__(self, model: mujoco.MjModel, geoms: np.ndarray) -> None:
-        self.geoms = geoms
-        self.floor = float(model.geom("floor").pos[2])
+    On other ground than a plane it is the distance to the plane that touches it below that point.
+    """
+
+    def __init__(
+        self, model: mujoco.MjModel, geoms: np.ndarray, ground: Ground | None = None
+    ) -> None:
+        self.geoms, self.ground = geoms, ground
+        self.floor = 0.0 if ground else float(model.geom(FLOOR).pos[2])
         extents = [support_extents(int(model.geom_type[g]), model.geom_size[g]) for g in geoms]
         self.radius = np.array([r for r, _, _ in extents])
         self.box = np.array([b for _, b, _ in extents]).reshape(-1, 3)
@@ -67,11 +87,24 @@ class LowestPoint:
 
     def heights(self, xpos: np.ndarray, xmat: np.ndarray) -> np.ndarray:
         """[S, geoms] m, from all geoms' positions [S, ngeom, 3] and rotations [S, ngeom, 9]."""
+        if self.ground:
+            return self._above(self.ground, xpos[:, self.geoms], xmat[:, self.geoms])
         down = np.abs(xmat[:, self.geoms, 6:])
         reach = (
             self.radius + (down * self.box).sum(2) + np.sqrt(((down * self.ellipsoid) ** 2).sum(2))
         )
         return xpos[:, self.geoms, 2] - reach - self.floor
+
+    def _above(self, ground: Ground, pos: np.ndarray, rot: np.ndarray) -> np.ndarray:
+        """[S, geoms] m above ground that is no plane. pos: [S, geoms, 3]. rot: [S, geoms, 9]."""
+        down = rot[..., 6:]
+        round_part = down * self.ellipsoid
+        length = np.maximum(np.linalg.norm(round_part, axis=2, keepdims=True), 1e-9)
+        point = -(np.sign(down) * self.box + round_part * self.ellipsoid / length)
+        turned = (rot.reshape(*rot.shape[:2], 3, 3) @ point[..., None])[..., 0]
+        x, y, z = np.moveaxis(pos + turned, -1, 0)
+        upright = 1 / np.sqrt(1 + (ground.steepness(x, y) ** 2).sum(0))
+        return (z - ground.height(x, y)) * upright - self.radius
 
     def lowest(self, xpos: np.ndarray, xmat: np.ndarray) -> np.ndarray:
         """[S] m, the least of `heights`; infinite where there is no geom."""

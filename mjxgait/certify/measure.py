@@ -11,6 +11,7 @@ import numpy as np
 from mjxgait.certify.layout import LowestPoint, start_frame
 from mjxgait.certify.overlap import overlaps
 from mjxgait.certify.simulate import Trajectory, examined_model
+from mjxgait.certify.terrain import terrain_of
 from mjxgait.creature import Creature
 
 CARRIES = 1e-3
@@ -43,12 +44,13 @@ class Recording:
     """One simulation, frame by frame.
 
     time_step: s.
-    trunk_pos: [T, 3] m along the start's forward, left and up. trunk_up: [T] trunk's up axis . world up. pitch, roll: [T] rad.
+    trunk_pos: [T, 3] m along the start's forward and left, and above the ground.
+    trunk_up: [T] trunk's up axis . world up. pitch, roll: [T] rad.
     joint_pos, joint_vel, torque: [T, J] rad, rad/s, N·m.
     foot_force: [T, N] N, normal. foot_slip: [T, N] m/s, tangential, of the foot's material at the
     contact; 0 without contact.
-    foot_height: [T, N] m, lowest point above the floor.
-    touch: [T] whether a part that is neither foot nor ground contact touches the floor.
+    foot_height: [T, N] m, lowest point above the ground.
+    touch: [T] whether a part that is neither foot nor ground contact touches the ground.
     penetration: [T] m, of the deepest contact with the floor.
     body_speed: [T] m/s, of the fastest body's centre of mass.
     overlap_pairs: P names of parts that are ever in each other. overlap: [T, P] m, how deep.
@@ -143,11 +145,13 @@ def measure(
         sight.trunk_rot @ axis for axis in (creature.forward, creature.left, creature.up)
     )
     moved = sight.trunk_pos - start.place * [1, 1, 0]
+    ground = terrain_of(creature)
+    above = moved[:, 2] - (ground.height(*sight.trunk_pos[:, :2].T) if ground else 0.0)
     crossed = overlaps(creature, qpos if inside else qpos[:0])
     return Recording(
         dimensions=dimensions(creature),
         time_step=trajectory.time_step,
-        trunk_pos=np.stack([moved @ start.forward, moved @ start.left, moved[:, 2]], 1),
+        trunk_pos=np.stack([moved @ start.forward, moved @ start.left, above], 1),
         trunk_up=up[:, 2],
         pitch=-np.arcsin(np.clip(forward[:, 2], -1, 1)),
         roll=np.arcsin(np.clip(left[:, 2], -1, 1)),
@@ -173,7 +177,7 @@ class _Sight:
         self.data = mujoco.MjData(self.model)
         feet = len(creature.foot_names)
         foot_geoms = creature.watched[: len(creature.foot_of)]
-        self.reach = LowestPoint(self.model, foot_geoms)
+        self.reach = LowestPoint(self.model, foot_geoms, terrain_of(creature))
         self.foot_of_geom = np.full(self.model.ngeom, -1)
         self.foot_of_geom[foot_geoms] = creature.foot_of
         self.may_touch = np.isin(np.arange(self.model.ngeom), [*foot_geoms, *creature.ground])
@@ -219,8 +223,8 @@ class _Sight:
         self.penetration[k] = max(0.0, -contact.dist[on_floor].min())
         self.touch[k] = (~self.may_touch[geom]).any()
         velocity = _velocity(data, contact.pos[on_floor], self.model.geom_bodyid[geom])
-        # On a horizontal floor the tangential part is the horizontal one.
-        slip = np.hypot(velocity[:, 0], velocity[:, 1])
+        first, second = np.moveaxis(contact.frame[on_floor].reshape(-1, 3, 3)[:, 1:], 1, 0)
+        slip = np.hypot((velocity * first).sum(1), (velocity * second).sum(1))
         force = np.zeros(6)
         for i, foot, speed in zip(
             np.flatnonzero(on_floor), self.foot_of_geom[geom], slip, strict=True

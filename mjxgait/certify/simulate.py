@@ -18,6 +18,7 @@ from mjxgait.certify.drive import Drive
 from mjxgait.certify.layout import Layout, LowestPoint, colliding_geoms, start_frame
 from mjxgait.certify.starts import Starts
 from mjxgait.certify.state import FOOT_SENSES, State, sense
+from mjxgait.certify.terrain import grounded_model, terrain_of
 from mjxgait.certify.twins import twin_of
 from mjxgait.champion import Champion
 from mjxgait.cores import cores
@@ -90,10 +91,10 @@ class Outcome:
 
 
 def examined_model(creature: Creature, refine: int = 1) -> mujoco.MjModel:
-    """The creature's own body with a converged contact solver, and its time step divided by
-    `refine`.
+    """The creature's own body on its ground, with a converged contact solver, and its time step
+    divided by `refine`.
     """
-    model = copy.copy(creature.model)
+    model = copy.copy(grounded_model(creature))
     model.opt.iterations, model.opt.ls_iterations = 100, 50
     model.opt.tolerance = 1e-8
     model.opt.timestep = creature.model.opt.timestep / refine
@@ -176,8 +177,10 @@ class _Run:
         self.model = examined_model(creature, refine)
         self.batch = _batch(creature, self.model, starts)
         self.layout = Layout(self.model)
-        self.solid = LowestPoint(self.model, colliding_geoms(self.model))
-        self.forbidden = LowestPoint(self.model, creature.watched[len(creature.foot_of) :])
+        self.terrain = terrain_of(creature)
+        self.solid = LowestPoint(self.model, colliding_geoms(self.model), self.terrain)
+        others = creature.watched[len(creature.foot_of) :]
+        self.forbidden = LowestPoint(self.model, others, self.terrain)
         bind = self.batch.bind
         self.qpos, self.qvel, self.applied = bind("qpos"), bind("qvel"), bind("qfrc_applied")
         self.warm_start = bind("qacc_warmstart")
@@ -190,7 +193,8 @@ class _Run:
         self.geom_xpos, self.geom_xmat = bind("geom_xpos"), bind("geom_xmat")
         self._lift()
         self.memory = dict(self.twin.init(len(starts)))
-        self.feet = LowestPoint(self.model, creature.watched[: len(creature.foot_of)])
+        feet = creature.watched[: len(creature.foot_of)]
+        self.feet = LowestPoint(self.model, feet, self.terrain)
         self.sees_feet = any(name in FOOT_SENSES for name in self.twin.reads)
         self.last_force = np.zeros_like(self.qvel)
         # What the controller has sent last, for those whose torques come late.
@@ -296,6 +300,7 @@ class _Run:
         rot, root = self.xmat[running, creature.trunk].reshape(-1, 3, 3), self.layout.root_dof
         return State(
             start=self.start,
+            ground=self.terrain,
             time=np.full(len(running), k * creature.model.opt.timestep),
             joint_pos=self.qpos[running[:, None], creature.qpos_adr],
             velocity=velocity,
@@ -356,7 +361,9 @@ class _Run:
         """Negated comparisons, so that a simulation that is NaN counts as down."""
         trunk = self.creature.trunk
         up = self.xmat[running, trunk].reshape(-1, 3, 3)[:, 2] @ self.creature.up
-        height = self.xpos[running, trunk, 2] / self.creature.stand_height
+        x, y, z = self.xpos[running, trunk].T
+        above = z - self.terrain.height(x, y) if self.terrain else z
+        height = above / self.creature.stand_height
         fine = (
             self._sane(running)
             & (up > self.fall.min_up)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Collection, Mapping
 
 import numpy as np
 
-from mjxgait.certify.layout import StartFrame
+from mjxgait.certify.layout import Ground, StartFrame
 from mjxgait.creature import Creature
 
 CONTACT_GAP = 0.002
@@ -19,7 +19,7 @@ CONTACT_GAP = 0.002
 class State:
     """Many simulations at one moment.
 
-    start: where all of them stood first. time: [S] s since then. joint_pos: [S, J] rad. velocity: [S, nv] m/s, rad/s.
+    start: where all of them stood first. ground: under them; None for the plane z = 0. time: [S] s since then. joint_pos: [S, J] rad. velocity: [S, nv] m/s, rad/s.
     trunk_pos: [S, 3] m. trunk_rot: [S, 3, 3], columns are the trunk's axes in the world.
     trunk_vel: [S, 3] m/s, trunk_angvel: [S, 3] rad/s, world frame.
     foot_height: [S, F] m, lowest point above the floor; empty where nobody asks.
@@ -28,6 +28,7 @@ class State:
     """
 
     start: StartFrame
+    ground: Ground | None
     time: np.ndarray
     joint_pos: np.ndarray
     velocity: np.ndarray
@@ -53,6 +54,11 @@ def _along(state: State, axis: np.ndarray) -> np.ndarray:
     return (state.trunk_pos - state.start.place) @ axis
 
 
+def _height(state: State) -> np.ndarray:
+    x, y, z = state.trunk_pos.T
+    return z if state.ground is None else z - state.ground.height(x, y)
+
+
 def _nose_down(creature: Creature, state: State) -> np.ndarray:
     return -np.arcsin(np.clip((state.trunk_rot @ creature.forward)[:, 2], -1, 1))
 
@@ -68,6 +74,7 @@ SENSES: Mapping[str, Sense] = {
     "foot_height": lambda creature, state: state.foot_height,
     "contact": lambda creature, state: (state.foot_height < CONTACT_GAP).astype(float),
     "trunk_pos": lambda creature, state: state.trunk_pos,
+    "trunk_height": lambda creature, state: _height(state),
     "trunk_rot": lambda creature, state: state.trunk_rot,
     "trunk_vel": lambda creature, state: state.trunk_vel,
     "trunk_angvel": lambda creature, state: state.trunk_angvel,

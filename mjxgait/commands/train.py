@@ -46,6 +46,7 @@ class TrainOptions:
       generation: With --resume: the checkpoint to go on from instead of the latest.
       population: Short for --evolution.population.
       generations: Short for --evolution.generations.
+      ground: Short for --rollout.ground: flat, slope:0.1, steps:0.05, bumps:0.05, rough:0.05.
       view: Show the best of each generation walking on a page that only this machine can reach.
       plots: Draw all plots of the run when it has ended (`mjxgait plot`).
       settings: The config, key by key.
@@ -58,6 +59,7 @@ class TrainOptions:
     generation: int | None = None
     population: int | None = None
     generations: int | None = None
+    ground: str | None = None
     view: bool = False
     plots: bool = True
     settings: Annotated[Config, tyro.conf.arg(name="")] = dataclasses.field(default_factory=Config)
@@ -166,7 +168,10 @@ def _settings(options: TrainOptions) -> Config:
     their ranges are not.
     """
     short = {"population": options.population, "generations": options.generations}
-    table = {"evolution": {key: value for key, value in short.items() if value is not None}}
+    table = {
+        "evolution": {key: value for key, value in short.items() if value is not None},
+        "rollout": {} if options.ground is None else {"ground": options.ground},
+    }
     return build(
         type(options.settings), merge(dataclasses.asdict(options.settings), table), "the options"
     )

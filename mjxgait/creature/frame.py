@@ -4,6 +4,7 @@ import mujoco
 import numpy as np
 
 from mjxgait.creature.load import Creature
+from mjxgait.ground.spec import Place
 
 
 def start_axes(creature: Creature) -> tuple[np.ndarray, np.ndarray]:
@@ -16,6 +17,13 @@ def start_axes(creature: Creature) -> tuple[np.ndarray, np.ndarray]:
 def start_position(creature: Creature) -> np.ndarray:
     """[3] m, where the trunk stands at the start."""
     return creature.stand_pos.astype(np.float32)
+
+
+def start_place(creature: Creature) -> Place:
+    """Where the creature starts on its ground."""
+    return Place(
+        creature.stand_pos, start_axes(creature)[0], creature.hip_height, creature.body_length
+    )
 
 
 def horizontal_freedoms(creature: Creature) -> np.ndarray:

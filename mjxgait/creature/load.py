@@ -14,6 +14,7 @@ from mjxgait.creature import geometry
 from mjxgait.creature.settings import CreatureSettings, JointException
 from mjxgait.creature.world import check_world
 from mjxgait.errors import UserError, did_you_mean
+from mjxgait.ground.spec import LEVEL, GroundSpec, parse_ground
 from mjxgait.settings.tables import build, read_toml
 
 HINGE, SLIDE = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
@@ -40,6 +41,7 @@ class Creature:
     foot_names: one per foot.
     ground: ids of the other geoms that may touch the floor.
     hip_height: m, mean leg length. body_length: m. mass: kg.
+    terrain: the ground it walks on, which is not in `model`: there the floor is a plane.
     """
 
     settings: CreatureSettings
@@ -76,6 +78,7 @@ class Creature:
     hip_height: float
     body_length: float
     mass: float
+    terrain: GroundSpec = LEVEL
 
     @property
     def name(self) -> str:
@@ -102,6 +105,14 @@ class Creature:
     def evolution_model(self) -> mujoco.MjModel:
         """The model in which evolution simulates, unless its settings say what ends an episode."""
         return self.model_where(self.settings.termination.touch)
+
+    def on(self, ground: str) -> "Creature":
+        """The creature on other ground, by its text.
+
+        Raises:
+          ValueError: says what is allowed.
+        """
+        return dataclasses.replace(self, terrain=parse_ground(ground))
 
     def spanned(self, degrees: float) -> "Creature":
         """The creature with every hinge's pose range so wide, about its middle; 0 changes nothing.

@@ -12,6 +12,7 @@ import mujoco
 import numpy as np
 
 from mjxgait.creature.overlap import Crossings
+from mjxgait.ground.surface import Ground, clearance, contact, height
 from mjxgait.physics.layout import OtherTopology, SenseLayout
 from mjxgait.physics.overlap import deepest, single
 from mjxgait.physics.plain_numbers import (
@@ -23,6 +24,8 @@ from mjxgait.physics.plain_numbers import (
     reweighed,
 )
 from mjxgait.types import BodyState, Number, Sensed
+
+GEOM = mujoco.mjtGeom
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -110,24 +113,60 @@ class MjxPlant:
     def _forward(self, state: BodyState) -> tuple[Sensed, mjx.Data]:
         model = self._model(state)
         data = self.data.replace(qpos=state.qpos, qvel=state.qvel, qacc_warmstart=state.warmstart)
-        data = mjx.fwd_velocity(model, mjx.fwd_position(model, data))
+        data = mjx.fwd_position(model, data)
+        if state.ground is not None:
+            data = mjx.make_constraint(model, self._laid(model, data, state.ground))
+        data = mjx.fwd_velocity(model, data)
         layout = self.layout
-        offset = data.xpos[layout.trunk] - data.subtree_com[self.model.body_rootid[layout.trunk]]
+        trunk = data.xpos[layout.trunk]
+        offset = trunk - data.subtree_com[self.model.body_rootid[layout.trunk]]
         spin, shift = data.cvel[layout.trunk, :3], data.cvel[layout.trunk, 3:]
         sensed = Sensed(
             joint_pos=data.qpos[layout.qpos_adr],
             joint_vel=data.qvel[layout.dof_adr],
             bias=data.qfrc_bias - data.qfrc_passive,
-            trunk_pos=data.xpos[layout.trunk],
+            trunk_pos=trunk,
             trunk_rot=data.xmat[layout.trunk],
             trunk_vel=shift + jnp.cross(spin, offset),
             trunk_angvel=spin,
             geom_pos=data.geom_xpos[layout.watched],
-            geom_low=_lowest(
-                self._numbers(state), data.geom_xpos[layout.watched], data.geom_xmat[layout.watched]
-            ),
+            geom_low=self._lows(state, data),
+            floor=None if state.ground is None else height(state.ground, *trunk[:2]),
         )
         return sensed, data
+
+    def _lows(self, state: BodyState, data: mjx.Data) -> jax.Array:
+        """[G] m of the watched geoms above the ground."""
+        numbers, watched = self._numbers(state), self.layout.watched
+        pos, rot = data.geom_xpos[watched], data.geom_xmat[watched]
+        if state.ground is None:
+            return _lowest(numbers, pos, rot)
+        x, y, z = _cores(numbers, pos, rot).T
+        return clearance(state.ground, x, y, z, numbers.radius)
+
+    def _laid(self, model: mjx.Model, data: mjx.Data, ground: Ground) -> mjx.Data:
+        """The contacts with the floor moved onto the ground.
+
+        MJX has found each as with the plane z = 0: above its middle by the radius and half its
+        distance lies the centre of a sphere, or a corner of what has none.
+        """
+        touching = data._impl.contact
+        one, other = touching.geom.T
+        types, round_ones = np.asarray(model.geom_type), (GEOM.mjGEOM_SPHERE, GEOM.mjGEOM_CAPSULE)
+        on_floor = jnp.asarray(types == GEOM.mjGEOM_PLANE)[one]
+        radius = jnp.where(jnp.asarray(np.isin(types, round_ones)), model.geom_size[:, 0], 0)[other]
+        up = radius + 0.5 * touching.dist
+        x, y, z = (touching.pos + up[:, None] * jnp.array([0.0, 0.0, 1.0])).T
+        found = contact(ground, x, y, z, radius)
+        frame = jnp.stack([jnp.stack(axis, 1) for axis in found[1:]], 1)
+        deep = (radius + 0.5 * found.distance)[:, None]
+        middle = jnp.stack([x, y, z], 1) - deep * frame[:, 0]
+        moved = touching.replace(
+            dist=jnp.where(on_floor, found.distance, touching.dist),
+            pos=jnp.where(on_floor[:, None], middle, touching.pos),
+            frame=jnp.where(on_floor[:, None, None], frame, touching.frame),
+        )
+        return data.tree_replace({"_impl.contact": moved})
 
     def _advance(self, state: BodyState, data: mjx.Data, torque: jax.Array) -> BodyState:
         model = self._model(state)
@@ -142,6 +181,7 @@ class MjxPlant:
             data.qfrc_constraint,
             state.friction,
             state.parameters,
+            state.ground,
         )
 
 
@@ -154,6 +194,15 @@ def _lowest(numbers: ModelNumbers, pos: jax.Array, rot: jax.Array) -> jax.Array:
         - jnp.sum(jnp.abs(down) * numbers.box, axis=1)
         - jnp.linalg.norm(down * numbers.ellipsoid, axis=1)
     )
+
+
+def _cores(numbers: ModelNumbers, pos: jax.Array, rot: jax.Array) -> jax.Array:
+    """[G, 3] m, the lowest points of geoms at these places less their radii."""
+    down = rot[:, 2, :]
+    stretched = down * numbers.ellipsoid
+    reach = jnp.maximum(jnp.linalg.norm(stretched, axis=1, keepdims=True), 1e-6)
+    own = jnp.sign(down) * numbers.box + stretched * numbers.ellipsoid / reach
+    return pos - jnp.einsum("gij,gj->gi", rot, own)
 
 
 def _sense_difference(

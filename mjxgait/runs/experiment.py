@@ -292,7 +292,7 @@ def _compiler_options() -> dict[str, str | bool]:
 
 
 def _simulator(creature: Creature, config: Config) -> Simulator:
-    creature = creature.spanned(config.evolution.pose_span)
+    creature = creature.spanned(config.evolution.pose_span).on(config.rollout.ground)
     step = float(creature.model.opt.timestep)
     steps = max(round(config.rollout.seconds / step), 1)
     plant, lanes = make_plant(

@@ -44,7 +44,7 @@ def new_run_folder(creature: str, seed: int) -> Path:
 
 
 def open_run(folder: Path) -> tuple[Creature, Config]:
-    """The creature and the settings of a run folder.
+    """The creature, on the ground of the run, and the settings of a run folder.
 
     Raises:
       UserError: it is not a run folder.
@@ -52,7 +52,7 @@ def open_run(folder: Path) -> tuple[Creature, Config]:
     if not (folder / CONFIG).is_file():
         raise UserError(f"{folder}: not a run folder (it has no {CONFIG})")
     config = build_config(read_toml(folder / CONFIG), str(folder / CONFIG))
-    return load_creature(folder / CREATURE), config
+    return load_creature(folder / CREATURE).on(config.rollout.ground), config
 
 
 def read_metrics(path: Path) -> list[dict[str, Any]]:

@@ -15,6 +15,7 @@ from rich.table import Table
 
 from mjxgait.certify import Certificate
 from mjxgait.certify.tasks import demands_of
+from mjxgait.ground.spec import FLAT
 from mjxgait.runs.folder import CHAMPION, CONFIG, CREATURE, METRICS, PLOT
 
 
@@ -87,6 +88,7 @@ class Screen:
         self.console.print(table)
         report, does = certificate.report, demands_of(certificate.task).verdict
         verdict = f"Certified: {does}" if certificate.passed else "Not certified"
+        ground = "" if report["ground"] == FLAT else f" on {report['ground']}"
         if certificate.attempts > 1:
             self.console.print(f"This was examination {certificate.attempts} of its run.")
         crossed = any(c.name == "parts" and not c.passed for c in certificate.criteria)
@@ -97,7 +99,7 @@ class Screen:
                 f"and in it in {worst['share']:.0%} of the frames."
             )
         self.console.print(
-            f"{verdict} (margin {certificate.margin:.2f}). {report['summary']}; "
+            f"{verdict} (margin {certificate.margin:.2f}). {report['summary']}{ground}; "
             f"{certificate.seconds:.0f} s."
         )
 

@@ -5,9 +5,11 @@ from typing import Annotated, Literal
 
 import pydantic
 
+from mjxgait.ground.spec import FLAT, check_ground
 from mjxgait.settings.control import DriveConfig, PoseConfig
 from mjxgait.settings.tables import (
     HOST,
+    KIND,
     SHAPE,
     STRICT,
     Count,
@@ -18,6 +20,8 @@ from mjxgait.settings.tables import (
     Whole,
 )
 from mjxgait.settings.walk import WalkConfig
+
+GroundText = Annotated[str, pydantic.AfterValidator(check_ground)]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -57,6 +61,7 @@ class RolloutConfig:
       worst: share of the worst start in the score; the mean of the starts has the rest.
       physics: the fast step where the model allows it, or plain MJX.
       lanes: simulations in flight per device; 0 lets the program choose.
+      ground: flat, slope:0.1, steps:0.05, bumps:0.05 or rough:0.05, in hip heights (docs/ground.md).
     """
 
     __pydantic_config__ = STRICT
@@ -72,6 +77,7 @@ class RolloutConfig:
     worst: Fraction = 0.5
     physics: Annotated[Literal["auto", "mjx"], SHAPE] = "auto"
     lanes: Annotated[Whole, SHAPE] = 0
+    ground: Annotated[GroundText, KIND] = FLAT
 
 
 @dataclasses.dataclass(frozen=True)

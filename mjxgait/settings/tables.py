@@ -35,6 +35,9 @@ SHAPE = "shape"
 that the program is handed.
 """
 
+KIND = "kind"
+"""Marks a text of which only what stands before the first colon shapes the compiled program."""
+
 HOST = "host"
 """Marks what only the host reads, never the compiled program."""
 

@@ -11,7 +11,7 @@ import jax
 import jax.numpy as jnp
 
 from mjxgait.settings.config import Config
-from mjxgait.settings.tables import HOST, SHAPE
+from mjxgait.settings.tables import HOST, KIND, SHAPE
 from mjxgait.types import pytree
 
 
@@ -55,6 +55,8 @@ def _traced(config: Any) -> Any:
             values[field.name] = HostOnly(field.name)
         elif role is SHAPE:
             values[field.name] = value
+        elif role is KIND:
+            values[field.name] = value.split(":")[0]
         else:
             values[field.name] = _leaf(value, hint)
     return type(config)(**values)
@@ -71,13 +73,13 @@ def _leaf(value: Any, hint: Any) -> Any:
 
 
 def _fields(cls: type) -> list[tuple[Any, Any, str]]:
-    """Each field of a config class with its type and its role: `SHAPE`, `HOST`, or empty for a value of the program."""
+    """Each field of a config class with its type and its role: `SHAPE`, `KIND`, `HOST`, or empty for a value of the program."""
     hints = get_type_hints(cls, include_extras=True)
     rows = []
     for field in dataclasses.fields(cls):
         hint = hints[field.name]
         marks = (
-            [mark for mark in getattr(hint, "__metadata__", ()) if mark in (SHAPE, HOST)]
+            [mark for mark in getattr(hint, "__metadata__", ()) if mark in (SHAPE, KIND, HOST)]
             if get_origin(hint) is not Literal
             else []
         )

@@ -171,6 +171,7 @@ class Simulator:
                 warmstart=still,
                 constraint_force=still,
                 friction=start.friction,
+                ground=start.ground,
             ),
             plan=self.controller.prepare(
                 jax.tree.map(lambda leaf: leaf[row, individual], genomes), mine.controller

@@ -8,6 +8,7 @@ import numpy as np
 
 from mjxgait.creature import Creature
 from mjxgait.creature.settings import Termination
+from mjxgait.senses import trunk_height
 from mjxgait.tasks import protocol
 from mjxgait.types import Sensed
 
@@ -26,7 +27,7 @@ class Reason(IntEnum):
 def why_fallen(creature: Creature, limits: Termination, sensed: Sensed) -> jax.Array:
     """The `Reason` [] to end the episode at this moment; `FINISHED` while all is well."""
     up = (sensed.trunk_rot @ creature.up.astype(np.float32))[2]
-    height = sensed.trunk_pos[2] / creature.stand_height
+    height = trunk_height(sensed) / creature.stand_height
     reason = jnp.zeros((), jnp.int32)
     if limits.touch:
         reason = jnp.where(touches(creature, sensed), Reason.TOUCHED, reason)

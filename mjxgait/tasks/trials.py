@@ -5,7 +5,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from mjxgait.creature import Creature
-from mjxgait.creature.frame import horizontal_freedoms
+from mjxgait.creature.frame import horizontal_freedoms, start_place
+from mjxgait.ground.spec import parse_ground
+from mjxgait.ground.surface import DRAWS, Ground, lay_ground, named_draws
 from mjxgait.settings.config import RolloutConfig
 from mjxgait.types import pytree
 
@@ -19,6 +21,7 @@ class Starts:
     qpos: [R, nq]. qvel: [R, nv]. friction: [R] factor on the floor's friction.
     push: [R, nv] added to qvel at step push_step [R] (never when it is `NEVER`).
     stiffness, damping: [R, J] factors on the joints' kp and kd.
+    ground: leaves [R, ...], each trial's own; None where it is flat.
     """
 
     qpos: jax.Array
@@ -28,6 +31,7 @@ class Starts:
     push_step: jax.Array
     stiffness: jax.Array
     damping: jax.Array
+    ground: Ground | None = None
 
 
 def draw_starts(key: jax.Array, creature: Creature, config: RolloutConfig) -> Starts:
@@ -69,4 +73,17 @@ def draw_starts(key: jax.Array, creature: Creature, config: RolloutConfig) -> St
         push_step=jnp.where(perturbed[:, 0], moment, NEVER),
         stiffness=factors(key_stiffness),
         damping=factors(key_damping),
+        ground=draw_grounds(jax.random.fold_in(key, 2), creature, config),
     )
+
+
+def draw_grounds(key: jax.Array, creature: Creature, config: RolloutConfig) -> Ground | None:
+    """Leaves [R, ...]: the nominal start has the ground that the config names, the others others
+    of its kind; None where it is flat.
+    """
+    spec, place = parse_ground(config.ground), start_place(creature)
+    if spec.flat:
+        return None
+    draws = jax.random.uniform(key, (config.starts, DRAWS, 2)).at[0].set(named_draws(spec.seed))
+    grounds = [lay_ground(spec, place, each) for each in draws]
+    return jax.tree.map(lambda *leaves: jnp.stack(leaves), *grounds)

@@ -4,6 +4,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from mjxgait.viewing.camera import Camera
+from mjxgait.viewing.relief import Relief, draw_relief
 
 BANDS = ((236, 237, 238), (225, 227, 229))
 INK = (70, 74, 80)
@@ -15,10 +16,16 @@ FAR = 100.0
 """m; how far a band reaches to both sides."""
 
 
-def draw_floor(camera: Camera, origin: np.ndarray) -> Image.Image:
+def draw_floor(camera: Camera, origin: np.ndarray, relief: Relief | None = None) -> Image.Image:
     """Bands of a round width in m, counted from the origin [2] m along the creature's way, and
     their numbers at the lower edge.
+
+    relief: of ground that is no plane.
     """
+    if relief is not None:
+        picture = draw_relief(camera, origin, band_width(camera.scale), BANDS, relief)
+        number_bands(ImageDraw.Draw(picture), camera, origin, relief)
+        return picture
     picture = Image.new("RGB", (camera.width, camera.height), BANDS[0])
     draw = ImageDraw.Draw(picture)
     numbers, step = band_lines(camera, origin)
@@ -52,10 +59,16 @@ def font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
     return ImageFont.load_default(size)
 
 
-def number_bands(draw: ImageDraw.ImageDraw, camera: Camera, origin: np.ndarray) -> None:
-    """A tick and a number where each line meets the lower edge."""
+def number_bands(
+    draw: ImageDraw.ImageDraw, camera: Camera, origin: np.ndarray, relief: Relief | None = None
+) -> None:
+    """A tick and a number where each line meets the lower edge.
+
+    On ground that is no plane the lines are those at the height of the ground in mid-picture.
+    """
     numbers, step = band_lines(camera, origin)
-    ends = _line_ends(camera, origin, numbers, step)
+    level = 0.0 if relief is None else float(relief(*camera.centre[:2]))
+    ends = _line_ends(camera, origin, numbers, step, level)
     size = max(camera.height // 26, 11)
     letters = font(size)
     base = camera.height - size - 8
@@ -71,9 +84,11 @@ def number_bands(draw: ImageDraw.ImageDraw, camera: Camera, origin: np.ndarray) 
             )
 
 
-def _line_ends(camera: Camera, origin: np.ndarray, numbers: np.ndarray, step: float) -> np.ndarray:
-    """[n, 2, 2] pixels of both ends of the lines between bands."""
-    forward, start = np.append(camera.forward, 0.0), np.append(origin, 0.0)
+def _line_ends(
+    camera: Camera, origin: np.ndarray, numbers: np.ndarray, step: float, level: float = 0.0
+) -> np.ndarray:
+    """[n, 2, 2] pixels of both ends of the lines between bands, at a height in m."""
+    forward, start = np.append(camera.forward, 0.0), np.append(origin, level)
     left = np.cross([0.0, 0.0, 1.0], forward)
     along = start + numbers[:, None] * step * forward
     return camera.pixels(np.stack([along - FAR * left, along + FAR * left], 1))

@@ -6,6 +6,7 @@ import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from PIL import Image, ImageDraw
@@ -18,6 +19,8 @@ from mjxgait.viewing.stage import Stage
 WORKER = "mjxgait.viewing.gl_worker"
 OFF = ("disable", "disabled", "off", "false", "0")
 """Values of MUJOCO_GL that ask for no GL."""
+GROUND_CELL = 0.08
+"""Hip heights; of the field that stands for ground that is no plane."""
 PATIENCE = 60.0
 """s that a first picture may take."""
 
@@ -79,7 +82,8 @@ def gl_pictures(stage: Stage, frames: Sequence[int], backend: str) -> Iterator[I
                         f"the GL renderer ({backend}) stopped in the middle; add --renderer painter"
                     )
                 picture = Image.frombytes("RGB", (stage.width, stage.height), raw)
-                number_bands(ImageDraw.Draw(picture), stage.camera(frame), stage.origin)
+                draw = ImageDraw.Draw(picture)
+                number_bands(draw, stage.camera(frame), stage.origin, stage.relief)
                 yield picture
         finally:
             worker.kill()
@@ -103,7 +107,7 @@ def scene_file(stage: Stage, frames: Sequence[int], path: Path) -> None:
         int(n) for camera in (first, cameras[-1]) for n in band_lines(camera, stage.origin)[0]
     }
     step = band_lines(first, stage.origin)[1]
-    dark = [n for n in range(min(numbers), max(numbers)) if n % 2]
+    dark = [n for n in range(min(numbers), max(numbers)) if n % 2 and stage.relief is None]
     np.savez(
         path,
         xml=np.array(creature.files["creature.xml"]),
@@ -122,7 +126,32 @@ def scene_file(stage: Stage, frames: Sequence[int], path: Path) -> None:
         band_width=np.array(step),
         forward=stage.forward,
         lamp=lamp_direction(stage.forward),
+        **_ground(stage),
     )
+
+
+def _ground(stage: Stage) -> dict[str, Any]:
+    """Ground that is no plane as a height field around all that is seen; nothing for a plane.
+
+    heights: [rows, columns] m, rows to the left. ground_at: [2] m, its middle; ground_half: [2] m.
+    """
+    if stage.relief is None:
+        return {}
+    creature, room = stage.walks[0].creature, 2.5 * stage.width / stage.camera(0).scale
+    cell, lanes = GROUND_CELL * creature.hip_height, stage.lanes @ stage.left
+    ahead = np.arange(stage.way[:, 0].min() - room, stage.way[:, 0].max() + room, cell)
+    aside = stage.way[:, 1]
+    left = np.arange(aside.min() + lanes.min() - room, aside.max() + lanes.max() + 2 * room, cell)
+    x, y = (
+        stage.origin[i] + ahead[None, :] * stage.forward[i] + left[:, None] * stage.left[i]
+        for i in range(2)
+    )
+    middle = (ahead[0] + ahead[-1]) / 2 * stage.forward + (left[0] + left[-1]) / 2 * stage.left[:2]
+    return {
+        "heights": stage.relief(x, y),
+        "ground_at": stage.origin + middle,
+        "ground_half": np.array([np.ptp(ahead), np.ptp(left)]) / 2,
+    }
 
 
 def _command(stage: Stage, frames: Sequence[int], folder: Path) -> list[str]:

@@ -26,7 +26,7 @@ def main(path: str) -> None:
     """Draws every frame of a scene file; see `gl.scene_file`."""
     with np.load(path) as scene:
         parts = {name: scene[name] for name in scene.files}
-    model = _prepared(mujoco.MjModel.from_xml_string(str(parts["xml"])), parts)
+    model = _prepared(_compiled(parts), parts)
     width, height = (SMOOTH * int(n) for n in parts["size"])
     data = [mujoco.MjData(model) for _ in range(parts["qpos"].shape[1])]
     camera, option = mujoco.MjvCamera(), mujoco.MjvOption()
@@ -49,6 +49,28 @@ def main(path: str) -> None:
             sys.stdout.buffer.write(Image.fromarray(renderer.render()).reduce(SMOOTH).tobytes())
 
 
+def _compiled(parts: dict[str, np.ndarray]) -> mujoco.MjModel:
+    """The model, its floor a height field where the ground is no plane."""
+    if "heights" not in parts:
+        return mujoco.MjModel.from_xml_string(str(parts["xml"]))
+    heights, spec = parts["heights"], mujoco.MjSpec.from_string(str(parts["xml"]))
+    low, span = heights.min(), max(np.ptp(heights), 1e-6)
+    rows, columns = heights.shape
+    spec.add_hfield(
+        name="ground",
+        nrow=rows,
+        ncol=columns,
+        size=[*parts["ground_half"], span, 1.0],
+        userdata=np.zeros(heights.size),
+    )
+    floor, turn = spec.geom("floor"), np.arctan2(*parts["forward"][::-1]) / 2
+    floor.type, floor.hfieldname = mujoco.mjtGeom.mjGEOM_HFIELD, "ground"
+    floor.pos, floor.quat = [*parts["ground_at"], low], [np.cos(turn), 0, 0, np.sin(turn)]
+    model = spec.compile()
+    model.hfield_data[:] = ((heights - low) / span).ravel()
+    return model
+
+
 def _prepared(model: mujoco.MjModel, parts: dict[str, np.ndarray]) -> mujoco.MjModel:
     """Parallel rays, a plain floor for the bands to lie on, and none of the model's own lamps:
     all creatures are lit alike.
@@ -63,7 +85,8 @@ def _prepared(model: mujoco.MjModel, parts: dict[str, np.ndarray]) -> mujoco.MjM
     floor = model.geom("floor").id
     model.geom_matid[floor] = -1
     model.geom_rgba[floor] = [FLOOR_GREY, FLOOR_GREY, FLOOR_GREY, 1]
-    model.geom_size[floor, :2] = 0
+    if model.geom_type[floor] == mujoco.mjtGeom.mjGEOM_PLANE:
+        model.geom_size[floor, :2] = 0
     return model
 
 

@@ -13,12 +13,14 @@ from PIL import Image, ImageDraw, ImageFilter
 
 from mjxgait.viewing.camera import Camera
 from mjxgait.viewing.floor import draw_floor
+from mjxgait.viewing.relief import LIGHT as TOWARDS_LAMP
+from mjxgait.viewing.relief import Relief
 from mjxgait.viewing.shapes import Silhouettes, hit
 from mjxgait.viewing.triangles import fill_mesh
 
 SMOOTH = 2
 """Rays per pixel and direction."""
-LIGHT = np.array([-0.25, -0.45, 0.85]) / np.linalg.norm([-0.25, -0.45, 0.85])
+LIGHT = TOWARDS_LAMP / np.linalg.norm(TOWARDS_LAMP)
 """Towards the lamp, as (forward, left, up) of the creature's way."""
 SHADOW_GREY = 0.30
 OUTLINE = 0.45
@@ -50,7 +52,11 @@ class Painter:
         self.far = np.zeros(len(self.geoms))
 
     def picture(
-        self, camera: Camera, creatures: Sequence[tuple[np.ndarray, np.ndarray]], origin: np.ndarray
+        self,
+        camera: Camera,
+        creatures: Sequence[tuple[np.ndarray, np.ndarray]],
+        origin: np.ndarray,
+        relief: Relief | None = None,
     ) -> Image.Image:
         """One frame.
 
@@ -58,13 +64,14 @@ class Painter:
           creatures: world positions [ngeom, 3] m and rotations [ngeom, 3, 3] of each creature's
             geoms.
           origin: [2] m, where the scale on the floor is zero.
+          relief: of ground that is no plane.
         """
         fine = camera.enlarged(SMOOTH)
-        picture = draw_floor(camera, origin).resize(
+        picture = draw_floor(camera, origin, relief).resize(
             (fine.width, fine.height), Image.Resampling.BICUBIC
         )
         mine = [(pos[self.geoms], rot[self.geoms]) for pos, rot in creatures]
-        self._shade_floor(picture, fine, mine)
+        self._shade_floor(picture, fine, mine, relief)
         canvas = _Canvas(np.asarray(picture, dtype=np.float32).copy(), fine)
         for pos, rot in mine:
             self._draw(canvas, pos, rot)
@@ -75,6 +82,7 @@ class Painter:
         picture: Image.Image,
         camera: Camera,
         creatures: Sequence[tuple[np.ndarray, np.ndarray]],
+        relief: Relief | None,
     ) -> None:
         """Darkens the floor where the light from above does not reach it."""
         mask = Image.new("L", picture.size)
@@ -82,7 +90,7 @@ class Painter:
         directions = np.column_stack([COMPASS, np.zeros(len(COMPASS))])
         for pos, rot in creatures:
             rims = self.outlines.outermost(pos, rot, directions)
-            rims[..., 2] = 0.0
+            rims[..., 2] = 0.0 if relief is None else relief(rims[..., 0], rims[..., 1])
             for polygon in camera.pixels(rims):
                 draw.polygon([tuple(p) for p in polygon], fill=round(255 * SHADOW_GREY))
         mask = mask.filter(ImageFilter.BoxBlur(max(camera.scale * 0.012, 1)))

@@ -7,6 +7,7 @@ from PIL import Image
 
 from mjxgait.viewing.camera import Camera
 from mjxgait.viewing.painter import COMPASS, Painter
+from mjxgait.viewing.relief import Relief
 from mjxgait.viewing.shapes import Silhouettes
 from mjxgait.viewing.walk import Walk
 
@@ -44,7 +45,7 @@ class Stage:
         for walk, lane in zip(self.walks, self.lanes, strict=True):
             pos, rot = walk.geom_poses(np.array([min(frame, len(walk.qpos) - 1)]))
             shown.append((pos[0] + lane, rot[0]))
-        return self.painter.picture(self.camera(frame), shown, self.origin)
+        return self.painter.picture(self.camera(frame), shown, self.origin, self.relief)
 
     def pictures(self, frames: Sequence[int]) -> Iterator[Image.Image]:
         """The moments of several frames."""
@@ -54,7 +55,7 @@ class Stage:
         """Goes along with the one in front."""
         way = self.way[min(frame, len(self.way) - 1)]
         centre = np.append(
-            self.origin + way[0] * self.forward + way[1] * self.left[:2], self.middle
+            self.origin + way[0] * self.forward + way[1] * self.left[:2], self.middle + way[2]
         )
         return Camera(
             centre + self.shift, self.forward, self.scale, self.width, self.height, **self.elevation
@@ -64,9 +65,24 @@ class Stage:
         """[2] pixels, right behind the creature in a lane and half as high as it stands."""
         walk = self.walks[place]
         trunk = walk.trunk_pos[min(frame, len(walk.qpos) - 1)] + self.lanes[place]
-        return self.camera(frame).pixels(
-            np.append(trunk[:2] + self.back * self.forward, 0.5 * self.top)
-        )
+        point = trunk[:2] + self.back * self.forward
+        level = float(self.relief(*point)) if self.relief else 0.0
+        return self.camera(frame).pixels(np.append(point, 0.5 * self.top + level))
+
+    @property
+    def relief(self) -> Relief | None:
+        """The ground, if it is no plane; each lane has that of its own walk."""
+        if self.walks[0].ground is None:
+            return None
+        return self._height
+
+    def _height(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """m at places of the world, seen from the nearest lane."""
+        ground = self.walks[0].ground
+        assert ground is not None
+        aside = (x - self.origin[0]) * self.left[0] + (y - self.origin[1]) * self.left[1]
+        lane = self.lanes[np.abs(np.asarray(aside)[..., None] - self.lanes @ self.left).argmin(-1)]
+        return ground.height(x - lane[..., 0], y - lane[..., 1])
 
     def _place_lanes(self) -> None:
         forward = np.append(self.forward, 0.0)
@@ -107,12 +123,15 @@ class Stage:
         ways = []
         for walk in self.walks:
             moved = walk.trunk_pos[:, :2] - self.origin
-            path = np.column_stack([moved @ self.forward, moved @ self.left[:2]])
+            level = walk.ground_heights(walk.trunk_pos[:, :2])
+            path = np.column_stack([moved @ self.forward, moved @ self.left[:2], level])
             ways.append(np.concatenate([path, np.repeat(path[-1:], self.frames - len(path), 0)]))
         everyone = np.array(ways)
         # In a race there is room behind the one in front.
         behind = 0.0 if len(ways) == 1 else LAG * self.width / self.scale
-        front = np.column_stack([everyone[..., 0].max(0) - behind, everyone[..., 1].mean(0)])
+        front = np.column_stack(
+            [everyone[..., 0].max(0) - behind, everyone[..., 1].mean(0), everyone[..., 2].mean(0)]
+        )
         self.way = smooth(front, round(SMOOTH_SECONDS / self.walks[0].time_step))
 
 

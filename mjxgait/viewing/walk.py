@@ -10,10 +10,12 @@ from functools import cached_property
 import mujoco
 import numpy as np
 
+from mjxgait.certify.layout import Ground
 from mjxgait.certify.measure import Recording, measure
 from mjxgait.certify.simulate import Trajectory, simulate
 from mjxgait.certify.starts import nominal_starts
 from mjxgait.certify.strides import stride_starts
+from mjxgait.certify.terrain import terrain_of
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 
@@ -67,6 +69,15 @@ class Walk:
         """[T, 3] m in the world."""
         return self.body_poses()[0][:, self.creature.trunk]
 
+    @cached_property
+    def ground(self) -> Ground | None:
+        """What it walks on; None for the plane z = 0."""
+        return terrain_of(self.creature)
+
+    def ground_heights(self, places: np.ndarray) -> np.ndarray:
+        """[T] m of the ground at places [T, 2] m in the world."""
+        return self.ground.height(*places.T) if self.ground else np.zeros(len(places))
+
     def stride_frames(self) -> np.ndarray:
         """Frames at which the controller's cycle begins anew, while the creature is up: a loop of
         whole cycles has no seam, which one of footfalls would have. Footfalls where it has none.
@@ -103,7 +114,7 @@ class Walk:
 
 
 def record_walk(creature: Creature, champion: Champion, seconds: float) -> Walk:
-    """Simulates the champion on an even floor, without noise or pushes."""
+    """Simulates the champion on the creature's ground, without noise or pushes."""
     outcome = simulate(
         creature, champion, nominal_starts(creature, 1), seconds, record=1, threads=1
     )

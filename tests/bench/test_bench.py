@@ -76,6 +76,7 @@ def test_the_law_is_the_examiners(creature, workload):
     spin = (rot @ v[:, 3:6, None])[..., 0]
     state = State(
         start_frame(creature),
+        None,
         np.zeros(count),
         creature.stand + v[:, 6:] * 0.1,
         v,

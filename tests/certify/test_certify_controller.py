@@ -37,6 +37,7 @@ def made_up(creature, rot=None, pos=(0.0, 0.0, 0.3035), angvel=(0.0, 0.0, 0.0), 
     root = draw(count, nv, nv)
     return State(
         start=start_frame(creature),
+        ground=None,
         time=np.full(count, 0.3),
         joint_pos=creature.stand + draw(count, joints),
         velocity=draw(count, nv),

@@ -91,6 +91,7 @@ def plain_loop(creature, champion, starts, row, seconds):
         rot = data.xmat[creature.trunk].reshape(3, 3)
         state = State(
             start=start_frame(creature),
+            ground=None,
             time=np.array([k * step]),
             joint_pos=data.qpos[None, creature.qpos_adr],
             velocity=data.qvel[None],

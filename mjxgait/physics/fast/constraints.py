@@ -1,4 +1,4 @@
-"""Contacts with the floor and joint limits as MuJoCo's soft constraints.
+"""Contacts with the ground and joint limits as MuJoCo's soft constraints.
 
 A contact of MuJoCo's pyramidal cone has four edges, normal plus or minus friction times each tangent. Here it is kept in its three
 directions (normal, first, second tangent), of which the edges are combinations, and the friction enters late.
@@ -16,9 +16,11 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 
+from mjxgait.ground.surface import Ground, contact
 from mjxgait.physics.fast.carriers import Carriers
 from mjxgait.physics.fast.dynamics import root_axes
-from mjxgait.physics.fast.footing import Directions, Footing, Moves, Touch
+from mjxgait.physics.fast.footing import Footing, Moves, Touch
+from mjxgait.physics.fast.frames import Directions, Frames, Level, Tilted, Turned
 from mjxgait.physics.fast.kinematics import Motion, Pose
 from mjxgait.physics.fast.lanes import Pin, add, turn
 from mjxgait.physics.fast.parameters import Softness
@@ -62,8 +64,12 @@ def touch(
     freedom: Motion,
     paths: dict[int, jax.Array],
     pin: Pin,
+    ground: Ground | None = None,
 ) -> Touch | None:
-    """Where all contacts are and what moves them; paths: see `dynamics.motion_paths`."""
+    """Where all contacts are and what moves them.
+
+    paths: see `dynamics.motion_paths`. ground: None for the plane z = 0.
+    """
     if not structure.contacts:
         return None
     numbered = enumerate(structure.contacts)
@@ -71,15 +77,20 @@ def touch(
         _placed(structure, [n for n, _ in contacts], poses[body])
         for body, contacts in groupby(numbered, key=lambda c: c[1].body)
     ]
-    x, y, z, origin, radius = (pin(jnp.concatenate(column)) for column in zip(*places, strict=True))
-    distance = pin(origin + z - radius)
-    return Touch(
-        distance=distance,
-        # MuJoCo puts the contact point half way between the two surfaces.
-        points=pin((x, y, z - radius - 0.5 * distance)),
-        tangent=_tangents(structure, poses, pin),
-        moves=_moves(structure.carriers, freedom, paths, pin),
+    x, y, z, *origin, radius = (
+        pin(jnp.concatenate(column)) for column in zip(*places, strict=True)
     )
+    moves = _moves(structure.carriers, freedom, paths, pin)
+    # MuJoCo puts the contact point half way between the two surfaces.
+    if ground is None:
+        distance = pin(origin[2] + z - radius)
+        points = pin((x, y, z - radius - 0.5 * distance))
+        return Touch(distance, points, _level(structure, poses, pin), moves)
+    found = contact(ground, origin[0] + x, origin[1] + y, origin[2] + z, radius)
+    distance, frames = pin((found.distance, Tilted(*found[1:])))
+    deep = radius + 0.5 * distance
+    (nx, ny, nz) = frames.normal
+    return Touch(distance, pin((x - nx * deep, y - ny * deep, z - nz * deep)), frames, moves)
 
 
 def _moves(tree: Carriers, freedom: Motion, paths: dict[int, jax.Array], pin: Pin) -> Moves:
@@ -94,7 +105,7 @@ def _moves(tree: Carriers, freedom: Motion, paths: dict[int, jax.Array], pin: Pi
 
 
 def _placed(structure: Structure, places: Sequence[int], pose: Pose) -> tuple[jax.Array, ...]:
-    """Centres from the origin, height of the origin and radii of the contacts of one body, [c, L] each."""
+    """Centres from the origin, the origin and radii of the contacts of one body, [c, L] each."""
     own = slice(places[0], places[-1] + 1)
     local, radius = structure.columns.contacts.center[own], structure.columns.contacts.radius[own]
     x, y, z = (
@@ -102,20 +113,21 @@ def _placed(structure: Structure, places: Sequence[int], pose: Pose) -> tuple[ja
         for i in range(3)
     )
     like = jnp.ones_like(x)
-    return x, y, z, like * _component(pose.origin, 2), like * radius
+    return x, y, z, *(like * _component(pose.origin, i) for i in range(3)), like * radius
 
 
 def _component(vector: Any, i: int) -> Any:
     return vector if isinstance(vector, float) else vector[i]
 
 
-def _tangents(
-    structure: Structure, poses: Sequence[Pose], pin: Pin
-) -> tuple[jax.Array, jax.Array] | None:
-    """Along the capsule's axis as seen from above; the world's y where it stands upright, and x for a sphere."""
+def _level(structure: Structure, poses: Sequence[Pose], pin: Pin) -> Frames:
+    """The first tangent along a capsule's axis as seen from above.
+
+    The world's y where it stands upright, and x for a sphere.
+    """
     contacts = structure.contacts
-    if not any(contact.capsule for contact in contacts):
-        return None
+    if not any(slot.capsule for slot in contacts):
+        return Level()
     like = poses[contacts[0].body].rot[0][0]
 
     def heading(n: int) -> tuple[jax.Array, jax.Array]:
@@ -129,7 +141,7 @@ def _tangents(
     length = jnp.sqrt(x * x + y * y)
     upright = length < 0.5
     safe = jnp.where(upright, 1.0, length)
-    return pin((jnp.where(upright, 0.0, x / safe), jnp.where(upright, 1.0, y / safe)))
+    return pin(Turned(jnp.where(upright, 0.0, x / safe), jnp.where(upright, 1.0, y / safe)))
 
 
 def make_constraints(

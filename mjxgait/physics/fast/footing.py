@@ -18,13 +18,11 @@ import jax.numpy as jnp
 
 from mjxgait.physics.fast.carriers import Carriers
 from mjxgait.physics.fast.dynamics import rooted
+from mjxgait.physics.fast.frames import Directions, Frames
 from mjxgait.physics.fast.kinematics import Motion
 from mjxgait.physics.fast.lanes import Pin, axes, cross, dot, parts, plus, total
 from mjxgait.physics.fast.structure import Structure
 from mjxgait.physics.fast.treematrix import Rows
-
-Directions = tuple[jax.Array, jax.Array, jax.Array]
-"""Normal, first and second tangent, [C, L] each."""
 
 
 @jax.tree_util.register_dataclass
@@ -59,13 +57,13 @@ class Touch:
     """Geometry of all contacts.
 
     distance: [C, L] m. points: x, y, z from the tree's origin, [C, L] m.
-    tangent: x and y of the first tangent, [C, L], or None where it is the world's x for all.
+    frames: the contacts' axes.
     moves: of the degrees of freedom that move contacts.
     """
 
     distance: jax.Array
     points: tuple[jax.Array, jax.Array, jax.Array]
-    tangent: tuple[jax.Array, jax.Array] | None
+    frames: Frames
     moves: Moves
 
 
@@ -94,19 +92,12 @@ class Footing:
             moving[body] = self.pin(total([*above, *(steps[place] for place in places)]))
         slabs = [jnp.broadcast_to(moving[b], (n, *moving[b].shape)) for b, n in tree.contacts]
         motion = self.pin(jnp.concatenate(slabs))
-        vx, vy, vz = plus(axes(motion[:, 3:]), cross(axes(motion), self.touch.points))
-        if self.touch.tangent is None:
-            return self.pin((vz, vx, vy))
-        tx, ty = self.touch.tangent
-        return self.pin((vz, vx * tx + vy * ty, vy * tx - vx * ty))
+        velocity = plus(axes(motion[:, 3:]), cross(axes(motion), self.touch.points))
+        return self.pin(self.touch.frames.into(velocity))
 
     def gathered(self, force: Directions) -> dict[int, jax.Array]:
         """J^T f: per degree of freedom that moves a contact, [L]."""
-        normal, first, second = force
-        pull = first, second, normal
-        if self.touch.tangent is not None:
-            tx, ty = self.touch.tangent
-            pull = first * tx - second * ty, first * ty + second * tx, normal
+        pull = self.touch.frames.out(force)
         tree, moves = self.structure.carriers, self.touch.moves
         wrench = self._summed((*cross(self.touch.points, pull), *pull))
         shares: dict[int, jax.Array] = {}
@@ -126,7 +117,7 @@ class Footing:
         stiffness: of each contact D along nn, n1, n2, 11 and 22 (D is zero along 12), [C, L].
         """
         tree, moves = self.structure.carriers, self.touch.moves
-        held = self._summed(_spatial(self._in_world(stiffness), self.touch.points))
+        held = self._summed(_spatial(self.touch.frames.stiffness(stiffness), self.touch.points))
         rows = dict(enumerate(mass))
         if moves.turns is not None:
             xx, yy, zz, xy, xz, yz = held[tree.root][15:]
@@ -158,15 +149,6 @@ class Footing:
             below = [sums[b] for b, parent, _ in tree.bodies if parent == body]
             sums[body] = self.pin(total([*own.get(body, []), *below]))
         return sums
-
-    def _in_world(self, stiffness: Sequence[jax.Array]) -> tuple[jax.Array, ...]:
-        """D along xx, yy, zz, xy, xz, yz."""
-        nn, n1, n2, t1, t2 = stiffness
-        if self.touch.tangent is None:
-            return t1, t2, nn, jnp.zeros_like(nn), n1, n2
-        tx, ty = self.touch.tangent
-        xx, yy, xy = t1 * tx * tx + t2 * ty * ty, t1 * ty * ty + t2 * tx * tx, (t1 - t2) * tx * ty
-        return xx, yy, nn, xy, n1 * tx - n2 * ty, n1 * ty + n2 * tx
 
 
 def _spatial(stiffness: Sequence[jax.Array], points: Sequence[jax.Array]) -> list[jax.Array]:

@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 
 from mjxgait.creature.overlap import Crossings
+from mjxgait.ground.surface import Ground, clearance, height
 from mjxgait.physics.fast.constraints import make_constraints, touch
 from mjxgait.physics.fast.difference import difference
 from mjxgait.physics.fast.dynamics import bias_force, inertias, mass_rows, motion_paths
@@ -19,6 +20,7 @@ from mjxgait.physics.fast.kernel import one_kernel
 from mjxgait.physics.fast.kinematics import WORLD, Pose, motions, posture, unit_quaternion
 from mjxgait.physics.fast.lanes import (
     add,
+    column,
     cross,
     mul,
     parts,
@@ -105,9 +107,9 @@ class FastPlant:
 
     def advance(self, state: BodyState, workings: Workings, torque: jax.Array) -> BodyState:
         """See `Plant.advance`."""
-        # Numbers do not go through the kernel, which would copy them.
+        # Numbers and ground do not go through the kernel, which would copy them.
         after = one_kernel(self._advance)(state, workings, torque)
-        return dataclasses.replace(after, parameters=state.parameters)
+        return dataclasses.replace(after, parameters=state.parameters, ground=state.ground)
 
     def overlap(self, state: BodyState) -> jax.Array:
         """See `Plant.overlap`."""
@@ -135,7 +137,7 @@ class FastPlant:
         paths = motion_paths(structure, freedom, pin)
         mass = mass_rows(structure, body, freedom, paths, pin)
         return _sense(structure, state, poses, moving, bias), Workings(
-            mass, bias, touch(structure, poses, freedom, paths, pin)
+            mass, bias, touch(structure, poses, freedom, paths, pin, state.ground)
         )
 
     def _solve_damped(self, mass: Rows, damping: jax.Array, force: jax.Array) -> list[jax.Array]:
@@ -200,18 +202,25 @@ def _sense(
     topology, like = structure.topology, state.friction
     pose, motion = poses[topology.trunk], moving[topology.trunk]
     seen = [_look(geom, poses) for geom in structure.geoms]
+    trunk = table([pose.far_point((0.0, 0.0, 0.0))], like)[0]
+    if state.ground is None:
+        floor, lows = None, jnp.stack([low for _, low in seen])
+    else:
+        floor = height(state.ground, trunk[0], trunk[1])
+        lows = _above(structure, poses, state.ground, like)
     lever = cross(tuple(motion[:3]), parts(pose.pos))
     shift = [m + c for m, c in zip(motion[3:], lever, strict=True)]
     return Sensed(
         joint_pos=take(state.qpos, topology.joint_qpos),
         joint_vel=take(state.qvel, topology.joint_dof),
         bias=bias,
-        trunk_pos=table([pose.far_point((0.0, 0.0, 0.0))], like)[0],
+        trunk_pos=trunk,
         trunk_rot=jnp.moveaxis(table(pose.rot, like), 0, 1),
         trunk_vel=jnp.stack(shift),
         trunk_angvel=motion[:3],
         geom_pos=table([pos for pos, _ in seen], like),
-        geom_low=jnp.stack([low for _, low in seen]),
+        geom_low=lows,
+        floor=floor,
     )
 
 
@@ -224,6 +233,32 @@ def _look(geom: Geom, poses: Sequence[Pose]) -> tuple[Any, jax.Array]:
     square = add(*(mul(mul(e, e), mul(d, d)) for e, d in zip(geom.ellipsoid, down, strict=True)))
     round_reach = 0.0 if isinstance(square, float) else jnp.sqrt(square)
     return pos, sub(sub(pos[2] - geom.radius, box), round_reach)
+
+
+def _above(
+    structure: Structure, poses: Sequence[Pose], ground: Ground, like: jax.Array
+) -> jax.Array:
+    """[G, L] m, how far the lowest point of each geom is above the ground."""
+    cores = table([_core(geom, poses) for geom in structure.geoms], like)
+    radius = column([geom.radius for geom in structure.geoms], like.dtype)
+    return clearance(ground, cores[:, 0], cores[:, 1], cores[:, 2], radius)
+
+
+def _core(geom: Geom, poses: Sequence[Pose]) -> Any:
+    """The lowest point [3, L] of a geom less its radius."""
+    pose = WORLD if geom.body < 0 else poses[geom.body]
+    axes = [turn(pose.rot, column) for column in geom.rot]
+    place = pose.far_point(geom.pos)
+    for axis, box in zip(axes, geom.box, strict=True):
+        place = sub(place, mul(box, jnp.sign(axis[2]) * axis))
+    squares = [mul(e, e) for e in geom.ellipsoid]
+    square = add(*(mul(e, axis[2] * axis[2]) for e, axis in zip(squares, axes, strict=True)))
+    if isinstance(square, float):
+        return place
+    reach = jnp.sqrt(jnp.maximum(square, 1e-12))
+    return sub(
+        place, add(*(mul(e, axis[2] / reach * axis) for e, axis in zip(squares, axes, strict=True)))
+    )
 
 
 def turned(quat: jax.Array, spin: jax.Array, step: float) -> list[jax.Array]:

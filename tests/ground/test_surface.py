@@ -1,0 +1,130 @@
+"""The ground that the program computes: smooth, level at the start, and the examiner's own."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from helpers import small_config
+
+from mjxgait.certify.terrain import terrain_of
+from mjxgait.creature import Creature
+from mjxgait.creature.frame import start_place
+from mjxgait.ground.surface import Ground, contact, height, lay_ground, named_draws, normal
+from mjxgait.tasks.trials import draw_starts
+
+TEXTS = (
+    "slope:0.2",
+    "slope:0.2:down",
+    "slope:0.2:across",
+    "steps:0.1",
+    "steps:0.1:down@2",
+    "bumps:0.1",
+    "rough:0.1",
+    "rough:0.1@5",
+)
+
+
+def laid(creature: Creature, text: str) -> Ground:
+    spec = creature.on(text).terrain
+    ground = lay_ground(spec, start_place(creature), named_draws(spec.seed))
+    assert ground is not None
+    return ground
+
+
+def places(creature: Creature, reach: float, count: int = 400) -> np.ndarray:
+    """[2, count] m, at random within so many body lengths of the start."""
+    rng = np.random.default_rng(0)
+    around = rng.uniform(-1, 1, (2, count)) * reach * creature.body_length
+    return around + creature.stand_pos[:2, None]
+
+
+@pytest.mark.parametrize("text", TEXTS)
+def test_the_examiner_has_the_same_ground_of_its_own(stool: Creature, text: str):
+    x, y = places(stool, 30.0)
+    theirs = terrain_of(stool.on(text))
+    assert theirs is not None
+    ours = np.asarray(height(laid(stool, text), x, y))
+    assert np.ptp(ours) > 0.01
+    np.testing.assert_allclose(ours, theirs.height(x, y), atol=2e-5)
+
+
+@pytest.mark.parametrize("text", TEXTS)
+def test_the_normal_is_that_of_the_heights(stool: Creature, text: str):
+    ground = laid(stool, text)
+    x, y = (jnp.asarray(p, jnp.float32) for p in places(stool, 6.0))
+    gradient = jax.vmap(jax.grad(lambda at: height(ground, at[0], at[1])))(jnp.stack([x, y], 1))
+    wanted = jnp.stack([-gradient[:, 0], -gradient[:, 1], jnp.ones_like(x)])
+    wanted = wanted / jnp.linalg.norm(wanted, axis=0)
+    np.testing.assert_allclose(jnp.stack(normal(ground, x, y)), wanted, atol=2e-5)
+    assert wanted[2].min() < 0.999
+
+
+@pytest.mark.parametrize("text", TEXTS)
+def test_it_is_level_where_a_creature_starts(stool: Creature, text: str):
+    ground = laid(stool, text)
+    x, y = places(stool, 0.7)
+    np.testing.assert_array_equal(height(ground, x, y), 0.0)
+    np.testing.assert_array_equal(normal(ground, x, y)[2], 1.0)
+
+
+def test_it_is_as_high_and_as_steep_as_asked(stool: Creature):
+    forward, left = start_place(stool).forward, np.array([0.0, 1.0])
+    far = stool.stand_pos[:2] + 10 * stool.body_length * forward[:2]
+
+    def rise(text: str, way: np.ndarray) -> float:
+        """Per metre."""
+        there, here = (height(laid(stool, text), *at) for at in (far + way, far))
+        return float(there - here)
+
+    assert rise("slope:0.2", forward[:2]) == pytest.approx(0.2, abs=1e-4)
+    assert rise("slope:0.2:down", forward[:2]) == pytest.approx(-0.2, abs=1e-4)
+    assert rise("slope:0.2:across", left) == pytest.approx(0.2, abs=1e-4)
+    assert rise("steps:0.1", stool.hip_height * forward[:2]) == pytest.approx(
+        0.1 * stool.hip_height, abs=1e-4
+    )
+    for text in ("bumps:0.1", "rough:0.1"):
+        highest = np.abs(height(laid(stool, text), *places(stool, 20.0, 20_000))).max()
+        assert 0.08 * stool.hip_height < highest <= 0.1 * stool.hip_height
+
+
+def test_every_trial_has_ground_of_its_own_and_the_first_the_named_one(stool: Creature):
+    config = small_config(rollout={"ground": "rough:0.1@5", "starts": 3}).rollout
+    ground = draw_starts(jax.random.key(0), stool, config).ground
+    x, y = places(stool, 20.0)
+    heights = jax.vmap(lambda each: height(each, x, y))(ground)
+    np.testing.assert_allclose(heights[0], height(laid(stool, "rough:0.1@5"), x, y), atol=1e-6)
+    assert np.abs(heights[1] - heights[2]).max() > 0.01
+    again = draw_starts(jax.random.key(0), stool, config).ground
+    for one, other in zip(jax.tree.leaves(ground), jax.tree.leaves(again), strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_other_draws_do_not_change_with_the_ground(stool: Creature):
+    flat, rough = (
+        draw_starts(jax.random.key(0), stool, small_config(rollout={"ground": text}).rollout)
+        for text in ("flat", "rough:0.1")
+    )
+    assert flat.ground is None
+    for name in ("qpos", "qvel", "friction", "push", "push_step", "stiffness", "damping"):
+        np.testing.assert_array_equal(getattr(flat, name), getattr(rough, name))
+
+
+@pytest.mark.parametrize("text", TEXTS)
+def test_a_sphere_is_as_far_away_as_the_nearest_point(stool: Creature, text: str):
+    """Against the nearest of many points of the examiner's ground."""
+    theirs = terrain_of(stool.on(text))
+    assert theirs is not None
+    radius, (x, y) = 0.03, places(stool, 6.0, 60)
+    z = theirs.height(x, y) + np.random.default_rng(1).uniform(0.8, 1.5, 60) * radius
+    near = np.stack(np.meshgrid(*[np.linspace(-0.05, 0.05, 201)] * 2), -1).reshape(-1, 2).T
+    px, py = x + near[0][:, None], y + near[1][:, None]
+    apart = np.sqrt((px - x) ** 2 + (py - y) ** 2 + (theirs.height(px, py) - z) ** 2).min(0)
+    found = contact(laid(stool, text), x, y, z, radius)
+    # A step's edge is as sharp as the sphere: two looks do not quite find the nearest point.
+    tolerance = 2e-3 if "steps" in text else 5e-4
+    np.testing.assert_allclose(found.distance, apart - radius, atol=tolerance)
+    axes = jnp.stack([jnp.stack(axis) for axis in found[1:]])
+    np.testing.assert_allclose(
+        jnp.einsum("ain,bin->nab", axes, axes), np.tile(np.eye(3), (60, 1, 1)), atol=1e-5
+    )
+    assert (jnp.linalg.det(jnp.moveaxis(axes, -1, 0)) > 0.99).all()

@@ -1,0 +1,184 @@
+"""Both plants on other ground against C MuJoCo (float64), where each foot has a plane of its own.
+
+The plane touches the ground where it is nearest to the foot, found by the examiner's heights. So
+contacts in C have the same place, axes and weight, and what is compared is the whole step.
+"""
+
+import dataclasses
+from types import SimpleNamespace
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+import pytest
+from physics.test_fast_parity import LANES, SLIM, XML, _states
+
+from mjxgait.certify.layout import StartFrame
+from mjxgait.certify.terrain import Terrain
+from mjxgait.ground.spec import Place, parse_ground
+from mjxgait.ground.surface import lay_ground, named_draws
+from mjxgait.physics.fast import fast_plant
+from mjxgait.physics.layout import SenseLayout
+from mjxgait.physics.plain import mjx_plant
+from mjxgait.types import BodyState
+
+HIP, LENGTH = 0.4, 0.5
+FORWARD = np.array([0.6, 0.8, 0.0])
+FEET = ("left_foot", "right_foot", "rear_foot")
+CAPSULE = 'type="capsule" size="0.02 0.05" euler="80 0 30" solref="0.03 0.8"'
+BALLS = XML.replace(CAPSULE, 'type="sphere" size="0.03" solref="0.03 0.8"')
+FLOOR = (
+    '<geom name="floor" type="plane" size="0 0 1" contype="1" conaffinity="0" friction="0.8" '
+    'margin="0.002"/>'
+)
+EXACT = {"slope:0.3:across": 1e-5, "rough:0.3@1": 1e-3}
+"""Accelerations of one step, over the largest. On rough ground the plants take two looks for the
+nearest point, which a plane needs no more than one of."""
+
+
+def own_planes() -> str:
+    """The same body; each foot meets a movable plane and nothing else."""
+
+    def plane(n: int) -> str:
+        geom = FLOOR.replace("floor", f"plane_{n}").replace('contype="1"', f'contype="{2**n}"')
+        return f'<body name="under_{n}" mocap="true">{geom}</body>'
+
+    xml = BALLS.replace(FLOOR, "".join(map(plane, range(len(FEET)))))
+    for n, foot in enumerate(FEET):
+        xml = xml.replace(f'name="{foot}"', f'name="{foot}" conaffinity="{2**n}"')
+    return xml
+
+
+@dataclasses.dataclass
+class Scene:
+    exact: float
+    terrain: Terrain
+    state: BodyState
+    torque: np.ndarray
+    fast: Any
+    plain: Any
+    in_c: list[mujoco.MjData]
+
+
+@pytest.fixture(scope="module")
+def plants() -> SimpleNamespace:
+    """Both plants of the body on a floor, and the body in C on planes; compiled once per kind."""
+    model = mujoco.MjModel.from_xml_string(BALLS)
+    hinges = np.nonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE)[0]
+    watched = np.array([model.geom(name).id for name in (*FEET, "trunk", "tail")])
+    layout = SenseLayout(
+        model.body("trunk").id, model.jnt_qposadr[hinges], model.jnt_dofadr[hinges], watched
+    )
+    return SimpleNamespace(
+        fast=fast_plant(model, layout),
+        plain=mjx_plant(model, layout),
+        planes=mujoco.MjModel.from_xml_string(own_planes()),
+        plane_model=model,
+        layout=layout,
+    )
+
+
+@pytest.fixture(scope="module", params=EXACT)
+def scene(request: pytest.FixtureRequest, plants: SimpleNamespace) -> Scene:
+    spec = parse_ground(request.param)
+    start = np.zeros(3)
+    ground = lay_ground(spec, Place(start, FORWARD, HIP, LENGTH), named_draws(spec.seed))
+    left = np.array([-FORWARD[1], FORWARD[0], 0.0])
+    terrain = Terrain(spec, StartFrame(start, FORWARD, left), HIP, LENGTH)
+    state = _states(plants.plane_model)
+    # Not so far that the height itself takes float32's digits.
+    qpos = np.array(state.qpos)
+    qpos[0] -= 70.0
+    qpos[2] += terrain.height(qpos[0], qpos[1])
+    every = jax.tree.map(lambda leaf: jnp.tile(leaf[..., None], LANES), ground)
+    state = dataclasses.replace(state, qpos=jnp.asarray(qpos), ground=every)
+    rng = np.random.default_rng(2)
+    torque = np.asarray(2 * rng.normal(size=(plants.planes.nv, LANES)), np.float32)
+    fast = jax.jit(stepped(plants.fast)).lower(state, torque).compile(compiler_options=SLIM)
+    in_front = jax.tree.map(lambda x: jnp.moveaxis(x, -1, 0), (state, torque))
+    plain = jax.jit(stepped(plants.plain)).lower(*in_front).compile(compiler_options=SLIM)
+    return Scene(
+        EXACT[request.param],
+        terrain,
+        state,
+        torque,
+        jax.tree.map(np.asarray, fast(state, torque)),
+        jax.tree.map(lambda x: np.moveaxis(np.asarray(x), 0, -1), plain(*in_front)),
+        [step_in_c(plants.planes, terrain, state, torque, lane) for lane in range(LANES)],
+    )
+
+
+def stepped(plant: Any) -> Any:
+    """From state and torque to what is sensed and the next state."""
+
+    def step(state: BodyState, torque: jax.Array) -> Any:
+        sensed, workings = plant.forward(state)
+        return sensed, plant.advance(state, workings, torque)
+
+    return step
+
+
+def step_in_c(
+    model: mujoco.MjModel, terrain: Terrain, state: BodyState, torque: np.ndarray, lane: int
+) -> mujoco.MjData:
+    data, nominal = mujoco.MjData(model), model.geom_friction.copy()
+    data.qpos[:], data.qvel[:] = np.asarray(state.qpos)[:, lane], np.asarray(state.qvel)[:, lane]
+    data.qacc_warmstart[:] = np.asarray(state.warmstart)[:, lane]
+    data.qfrc_applied[:] = torque[:, lane]
+    mujoco.mj_kinematics(model, data)
+    for n, foot in enumerate(FEET):
+        place, normal = nearest(terrain, data.geom(foot).xpos)
+        data.mocap_pos[n] = place
+        mujoco.mju_quatZ2Vec(data.mocap_quat[n], normal)
+    model.geom_friction[:, 0] *= float(state.friction[lane])
+    mujoco.mj_step(model, data)
+    model.geom_friction[:] = nominal
+    return data
+
+
+def nearest(terrain: Terrain, centre: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The point of the ground nearest to a centre, and the normal there."""
+    x, y = centre[:2]
+    for _ in range(50):
+        below, steep = terrain.height(x, y), terrain.steepness(x, y)
+        normal = np.append(-steep, 1.0) / np.sqrt(1 + (steep**2).sum())
+        apart = (centre - [x, y, below]) @ normal
+        x, y, _ = centre - apart * normal
+    return np.array([x, y, terrain.height(x, y)]), normal
+
+
+def apart(ours: np.ndarray, theirs: np.ndarray) -> float:
+    """Largest difference over the largest entry."""
+    return float(np.abs(ours - theirs).max() / max(np.abs(theirs).max(), 1e-2))
+
+
+def test_feet_are_on_the_ground_and_off_it(scene: Scene):
+    touching = [data.ncon for data in scene.in_c]
+    assert 0 in touching
+    assert max(touching) >= 2
+
+
+@pytest.mark.parametrize("plant", ["fast", "plain"])
+def test_a_step_is_that_of_c(scene: Scene, plant: str):
+    _, after = getattr(scene, plant)
+    for lane, data in enumerate(scene.in_c):
+        assert apart(after.warmstart[:, lane], data.qacc) < scene.exact
+        assert apart(after.qvel[:, lane], data.qvel) < scene.exact
+        assert apart(after.qpos[:, lane], data.qpos) < 1e-6
+
+
+@pytest.mark.parametrize("plant", ["fast", "plain"])
+def test_heights_are_told_above_the_ground(scene: Scene, plant: str):
+    """A ball's lowest point against the ground's nearest, the trunk's place straight down."""
+    sensed, _ = getattr(scene, plant)
+    for lane in range(LANES):
+        x, y, _ = sensed.trunk_pos[:, lane]
+        assert sensed.floor[lane] == pytest.approx(scene.terrain.height(x, y), abs=1e-4)
+        for foot in range(len(FEET)):
+            centre = sensed.geom_pos[foot, :, lane].astype(float)
+            point, normal = nearest(scene.terrain, centre)
+            height = (centre - point) @ normal - 0.03
+            if height < 0.1:
+                assert sensed.geom_low[foot, lane] == pytest.approx(height, abs=2e-3)
