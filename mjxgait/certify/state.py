@@ -19,7 +19,8 @@ CONTACT_GAP = 0.002
 class State:
     """Many simulations at one moment.
 
-    start: where all of them stood first. ground: under them; None for the plane z = 0. time: [S] s since then. joint_pos: [S, J] rad. velocity: [S, nv] m/s, rad/s.
+    start: where all of them stood first. ground: under them; None for the plane z = 0.
+    time: [S] s since the start. joint_pos: [S, J] rad. velocity: [S, nv] m/s, rad/s.
     trunk_pos: [S, 3] m. trunk_rot: [S, 3, 3], columns are the trunk's axes in the world.
     trunk_vel: [S, 3] m/s, trunk_angvel: [S, 3] rad/s, world frame.
     foot_height: [S, F] m, lowest point above the floor; empty where nobody asks.
