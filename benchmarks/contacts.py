@@ -96,7 +96,7 @@ def measure(env: str, placement: str, count: int, rounds: int) -> dict[str, Any]
     near: contacts that C MuJoCo finds, mean over the states.
     """
     creature = with_points(env, placement, count)
-    plant, _ = make_plant(creature, "auto")
+    plant, _ = make_plant(creature, "auto", True)
     if plant.lane_axis != -1:
         raise SystemExit(f"{env}: not a body for the fast plant")
     trace = tread(creature)

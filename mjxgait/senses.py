@@ -9,34 +9,33 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from mjxgait.creature import Creature
-from mjxgait.creature.frame import start_axes, start_position
+from mjxgait.body import Body
 from mjxgait.errors import UserError, did_you_mean
 from mjxgait.types import Sensed
 
 CONTACT_GAP = 0.002
 """m; a foot nearer to the floor is in contact. A resting foot sinks in by about a millimetre."""
 
-Sense = Callable[[Creature, Sensed, jax.Array], jax.Array]
+Sense = Callable[[Body, Sensed, jax.Array], jax.Array]
 """From creature, state of the body and time [] in s to an array."""
 
 
-def _heading(creature: Creature, sensed: Sensed, time: jax.Array) -> jax.Array:
+def _heading(creature: Body, sensed: Sensed, time: jax.Array) -> jax.Array:
     nose = sensed.trunk_rot @ creature.forward.astype(np.float32)
-    forward, left = start_axes(creature)
+    forward, left = creature.start_axes
     return jnp.arctan2(nose @ left, nose @ forward)
 
 
-def _along(creature: Creature, sensed: Sensed, axis: int) -> jax.Array:
-    return (sensed.trunk_pos - start_position(creature)) @ start_axes(creature)[axis]
+def _along(creature: Body, sensed: Sensed, axis: int) -> jax.Array:
+    return (sensed.trunk_pos - creature.stand_pos.astype(np.float32)) @ creature.start_axes[axis]
 
 
-def _attitude(creature: Creature, sensed: Sensed, axis: np.ndarray) -> jax.Array:
+def _attitude(creature: Body, sensed: Sensed, axis: np.ndarray) -> jax.Array:
     """Sine of the angle of one of the trunk's axes above the horizon."""
     return jnp.clip((sensed.trunk_rot @ axis.astype(np.float32))[2], -1.0, 1.0)
 
 
-def _rate(creature: Creature, sensed: Sensed, axis: np.ndarray) -> jax.Array:
+def _rate(creature: Body, sensed: Sensed, axis: np.ndarray) -> jax.Array:
     """Angular velocity of the trunk about one of its own axes."""
     return sensed.trunk_angvel @ (sensed.trunk_rot @ axis.astype(np.float32))
 
@@ -66,7 +65,7 @@ SENSES: Mapping[str, Sense] = {
 
 
 def sense(
-    creature: Creature, sensed: Sensed, time: jax.Array, names: Collection[str]
+    creature: Body, sensed: Sensed, time: jax.Array, names: Collection[str]
 ) -> dict[str, jax.Array]:
     """The senses of these names."""
     return {name: SENSES[name](creature, sensed, time) for name in names if name in SENSES}
@@ -90,17 +89,17 @@ def trunk_height(sensed: Sensed) -> jax.Array:
     return height if sensed.floor is None else height - sensed.floor
 
 
-def foot_heights(creature: Creature, sensed: Sensed) -> jax.Array:
+def foot_heights(creature: Body, sensed: Sensed) -> jax.Array:
     """Height [F] in m of each foot's lowest point above the ground under it."""
     return jnp.stack([jnp.min(sensed.geom_low[geoms]) for geoms in foot_geoms(creature)])
 
 
-def contacts(creature: Creature, sensed: Sensed) -> jax.Array:
+def contacts(creature: Body, sensed: Sensed) -> jax.Array:
     """Whether [F] each foot touches the floor, 0 or 1."""
     return (foot_heights(creature, sensed) < CONTACT_GAP).astype(jnp.float32)
 
 
-def foot_geoms(creature: Creature) -> list[slice]:
+def foot_geoms(creature: Body) -> list[slice]:
     """Of each foot, its places among the watched geoms."""
     groups = [np.flatnonzero(creature.foot_of == foot) for foot in range(len(creature.foot_names))]
     return [slice(int(group[0]), int(group[-1]) + 1) for group in groups]

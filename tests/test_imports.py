@@ -28,6 +28,7 @@ FLOORS = (
     ("tasks", "control"),
     ("search",),
     ("champion", "physics", "senses"),
+    ("body",),
     ("creature",),
     ("settings",),
     ("ground",),

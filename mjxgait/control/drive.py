@@ -12,9 +12,9 @@ import jax.numpy as jnp
 import numpy as np
 from jax.typing import ArrayLike
 
+from mjxgait.body import Body
 from mjxgait.control import spd
 from mjxgait.control.protocol import Command
-from mjxgait.creature import Creature
 from mjxgait.settings.control import DriveConfig
 from mjxgait.settings.traced import chosen
 from mjxgait.types import BodyState, Plant, Sensed, pytree
@@ -38,7 +38,7 @@ class Rules:
 class Drive:
     """The joints' motors of one creature. step: s between two commands."""
 
-    creature: Creature
+    creature: Body
     step: float
     command: Command
 
@@ -93,7 +93,7 @@ class Drive:
 
     def lift(self, joints: ArrayLike) -> jax.Array:
         """Joint values [J] at their places among the degrees of freedom [nv], zero elsewhere."""
-        adr, nv = self.creature.dof_adr, self.creature.model.nv
+        adr, nv = self.creature.dof_adr, self.creature.nv
         if np.array_equal(adr, np.arange(adr[0], adr[0] + len(adr))):
             return jnp.pad(jnp.asarray(joints), (adr[0], nv - adr[-1] - 1))
         return jnp.zeros(nv, jnp.float32).at[adr].set(joints)

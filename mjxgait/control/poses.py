@@ -10,14 +10,14 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from mjxgait.body import Body
 from mjxgait.control.pose_variation import pose_variation
 from mjxgait.control.protocol import Command, Senses
-from mjxgait.creature import Creature
 from mjxgait.search.variation import Box, Variation, in_ranges
 from mjxgait.settings.config import EvolutionConfig
 from mjxgait.settings.control import TUNING, PoseConfig
 from mjxgait.settings.traced import chosen
-from mjxgait.types import pytree
+from mjxgait.types import Number, pytree
 
 THRESHOLD, PERIOD, STEER, PITCH, PITCH_RATE, ROLL, ROLL_RATE = range(len(TUNING))
 MAX_CORRECTION = 0.5
@@ -62,7 +62,7 @@ class PoseTracker:
     step: s between two control steps.
     """
 
-    creature: Creature
+    creature: Body
     step: float
     reads = ("joint_pos", "heading", "aside", "pitch", "roll", "pitch_rate", "roll_rate")
     command: ClassVar[Command] = "pose"
@@ -75,8 +75,8 @@ class PoseTracker:
         )
         shape = (config.key_poses, len(self.creature.joint_names))
 
-        def genome(pose: np.ndarray, tuning: jax.Array) -> Genome:
-            return Genome(jnp.asarray(np.broadcast_to(pose, shape), jnp.float32), tuning)
+        def genome(pose: Number, tuning: jax.Array) -> Genome:
+            return Genome(jnp.broadcast_to(jnp.asarray(pose, jnp.float32), shape), tuning)
 
         return genome(self.creature.pose_low, low), genome(self.creature.pose_high, high)
 
@@ -122,7 +122,7 @@ class PoseTracker:
         return target, GaitState(position, steps)
 
 
-def pose_cycle(creature: Creature, key_poses: jax.Array) -> jax.Array:
+def pose_cycle(creature: Body, key_poses: jax.Array) -> jax.Array:
     """The closed cycle [C, J]: the key poses [K, J] and, for a symmetric creature, their mirror images."""
     if not creature.symmetric:
         return key_poses
@@ -159,9 +159,7 @@ def interpolate(
     return jnp.sum(weight[:, None] * poses, axis=0)
 
 
-def corrections(
-    creature: Creature, tuning: jax.Array, target: jax.Array, senses: Senses
-) -> jax.Array:
+def corrections(creature: Body, tuning: jax.Array, target: jax.Array, senses: Senses) -> jax.Array:
     """Change [J] of the target pose by steering and balance; zero where the genes are zero."""
     aside = senses["aside"] / (2 * creature.body_length)
     steer = _clip(tuning[STEER] * (senses["heading"] + aside))

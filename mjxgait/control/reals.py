@@ -8,8 +8,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from mjxgait.body import Body
 from mjxgait.control.protocol import Command, Senses
-from mjxgait.creature import Creature
 from mjxgait.search.variation import Box, Variation, in_ranges, real_variation
 from mjxgait.settings.config import EvolutionConfig
 from mjxgait.settings.tables import NoSettings
@@ -30,7 +30,7 @@ class RealController(abc.ABC):
     reads: ClassVar[tuple[str, ...]] = ()
     command: ClassVar[Command] = "pose"
 
-    def __init__(self, creature: Creature, step: float) -> None:
+    def __init__(self, creature: Body, step: float) -> None:
         self.creature, self.step = creature, step
 
     @abc.abstractmethod

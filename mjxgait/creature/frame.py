@@ -7,22 +7,10 @@ from mjxgait.creature.load import Creature
 from mjxgait.ground.spec import Place
 
 
-def start_axes(creature: Creature) -> tuple[np.ndarray, np.ndarray]:
-    """Horizontal unit vectors [3] forward and left of the nominal standing pose, in the world."""
-    forward = (creature.stand_rot @ creature.forward) * [1, 1, 0]
-    forward = forward / np.linalg.norm(forward)
-    return forward.astype(np.float32), np.cross([0, 0, 1], forward).astype(np.float32)
-
-
-def start_position(creature: Creature) -> np.ndarray:
-    """[3] m, where the trunk stands at the start."""
-    return creature.stand_pos.astype(np.float32)
-
-
 def start_place(creature: Creature) -> Place:
     """Where the creature starts on its ground."""
     return Place(
-        creature.stand_pos, start_axes(creature)[0], creature.hip_height, creature.body_length
+        creature.stand_pos, creature.start_axes[0], creature.hip_height, creature.body_length
     )
 
 

@@ -91,6 +91,18 @@ class Creature:
         return float(self.stand_pos[2])
 
     @property
+    def nv(self) -> int:
+        """Degrees of freedom."""
+        return int(self.model.nv)
+
+    @property
+    def start_axes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Horizontal unit vectors [3] forward and left of the nominal standing pose, in the world."""
+        forward = (self.stand_rot @ self.forward) * [1, 1, 0]
+        forward = forward / np.linalg.norm(forward)
+        return forward.astype(np.float32), np.cross([0, 0, 1], forward).astype(np.float32)
+
+    @property
     def symmetric(self) -> bool:
         """Whether poses are mirrored."""
         return self.settings.mirror.symmetric

@@ -18,6 +18,7 @@ from mjxgait.errors import UserError
 from mjxgait.inspect.genomes import view_of
 from mjxgait.inspect.snapshot import Snapshot
 from mjxgait.parts import make_task, resolve_config
+from mjxgait.parts.registry import what_ends
 from mjxgait.runs.folder import CERTIFICATE, CHAMPION
 from mjxgait.search.evolution import Origin
 from mjxgait.tasks.protocol import Task
@@ -165,7 +166,9 @@ def forced_spells(lines: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
 
 def task_of(snapshot: Snapshot) -> Task:
     """What the run's creature is to do."""
-    return make_task(snapshot.creature, snapshot.config)
+    creature, config = snapshot.creature, snapshot.config
+    step, ends = float(creature.model.opt.timestep), what_ends(creature, config.rollout)
+    return make_task(creature, step, ends, config)
 
 
 def contributions(snapshot: Snapshot) -> np.ndarray:

@@ -12,6 +12,7 @@ from mjxgait.errors import UserError, did_you_mean
 from mjxgait.settings.config import Config, RolloutConfig
 
 if TYPE_CHECKING:  # JAX takes a second to import
+    from mjxgait.body import Body, Ends
     from mjxgait.control.protocol import Controller
     from mjxgait.tasks.protocol import Task
 
@@ -67,20 +68,16 @@ def find(kind: str, name: str) -> type:
     raise UserError(f'there is no {kind} "{name}"; {did_you_mean(name, SHIPPED[kind])}')
 
 
-def make_controller(creature: Creature, config: Config) -> "Controller":
-    """What moves the creature."""
-    step = float(creature.model.opt.timestep)
-    made: Controller = find("controller", config.use.controller)(creature, step)
+def make_controller(body: "Body", step: float, config: Config) -> "Controller":
+    """What moves the creature. step: s between two control steps."""
+    made: Controller = find("controller", config.use.controller)(body, step)
     return made
 
 
-def make_task(creature: Creature, config: Config) -> "Task":
-    """What the creature is to do."""
-    step = float(creature.model.opt.timestep)
+def make_task(body: "Body", step: float, ends: "Termination | Ends", config: Config) -> "Task":
+    """What the creature is to do. ends: what a fall is."""
     horizon = max(round(config.rollout.seconds / step), 1)
-    made: Task = find("task", config.use.task)(
-        creature, step, horizon, what_ends(creature, config.rollout)
-    )
+    made: Task = find("task", config.use.task)(body, step, horizon, ends)
     return made
 
 

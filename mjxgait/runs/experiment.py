@@ -9,21 +9,17 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.sharding import Mesh, NamedSharding, PartitionSpec
+from jax.sharding import NamedSharding, PartitionSpec
 
 from mjxgait.champion import Champion
-from mjxgait.control.drive import Drive
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
-from mjxgait.parts import make_controller, make_task
-from mjxgait.parts.registry import what_ends
-from mjxgait.physics import make_plant
+from mjxgait.runs.blueprint import Blueprint, Numbers, draw_up
 from mjxgait.search.evolution import Evolution, EvolutionState, GenerationMetrics, Proposal
-from mjxgait.senses import check_senses
 from mjxgait.settings.config import Config
 from mjxgait.settings.traced import traced
 from mjxgait.simulation.evaluator import Local
-from mjxgait.simulation.rollout import AXIS, Episodes, Simulator
+from mjxgait.simulation.rollout import Episodes, Simulator
 from mjxgait.tasks.score import in_order, score
 from mjxgait.tasks.trials import Starts
 from mjxgait.types import Judged, pytree
@@ -61,8 +57,13 @@ class Experiment:
 
     creature: Creature
     config: Config
-    simulator: Simulator
+    blueprint: Blueprint
     row: Row
+
+    @cached_property
+    def simulator(self) -> Simulator:
+        """With the body's numbers as constants: what the host asks about the program."""
+        return self.blueprint.simulator()
 
     @property
     def starts(self) -> Starts:
@@ -77,7 +78,8 @@ class Experiment:
     def init(self) -> EvolutionState:
         """The state of generation -1: a population that nobody has judged."""
         return _initial(
-            self.simulator,
+            self.blueprint,
+            self.blueprint.numbers,
             self.row.settings,
             jax.random.fold_in(jax.random.key(self.config.seed), 0),
         )
@@ -181,17 +183,18 @@ class Batch:
 
     def lower(self) -> jax.stages.Lowered:
         """The program of a generation, the same for all settings of the same shape: what has been compiled once is found again."""
-        simulator = self.experiments[0].simulator
-        everywhere = _everywhere(simulator)
+        blueprint = self.experiments[0].blueprint
+        everywhere = _everywhere(self.experiments[0].simulator)
         program = jax.jit(
-            partial(_generation, simulator), in_shardings=everywhere, out_shardings=everywhere
+            partial(_generation, blueprint), in_shardings=everywhere, out_shardings=everywhere
         )
-        return program.lower(self.rows, self.abstract())
+        return program.lower(blueprint.numbers, self.rows, self.abstract())
 
     def compile(self) -> Step:
         """A generation of all rows as one compiled program: states and metrics have leaves [B, ...]."""
-        rows = jax.device_put(self.rows, _everywhere(self.experiments[0].simulator))
-        return partial(self.lower().compile(compiler_options=_compiler_options()), rows)
+        one = self.experiments[0]
+        known = jax.device_put((one.blueprint.numbers, self.rows), _everywhere(one.simulator))
+        return partial(self.lower().compile(compiler_options=_compiler_options()), *known)
 
     def place(self, states: EvolutionState) -> EvolutionState:
         """The states on all devices, where the compiled program wants them."""
@@ -204,8 +207,7 @@ def build_experiment(creature: Creature, config: Config) -> Experiment:
     Raises:
       UserError: the physics does not support the creature's model.
     """
-    simulator = _simulator(creature, config)
-    return _experiment(simulator, config)
+    return _experiment(draw_up(creature, config), config)
 
 
 def build_batch(creature: Creature, configs: Sequence[Config]) -> Batch:
@@ -218,8 +220,8 @@ def build_batch(creature: Creature, configs: Sequence[Config]) -> Batch:
         raise UserError(
             "these settings need programs of different shapes: run them in batches of their own"
         )
-    simulator = _simulator(creature, configs[0])
-    return Batch(tuple(_experiment(simulator, config) for config in configs))
+    blueprint = draw_up(creature, configs[0])
+    return Batch(tuple(_experiment(blueprint, config) for config in configs))
 
 
 def evolution_of(simulator: Simulator, settings: Config) -> Evolution:
@@ -235,16 +237,21 @@ def evolution_of(simulator: Simulator, settings: Config) -> Evolution:
 
 
 @partial(jax.jit, static_argnums=0)
-def _initial(simulator: Simulator, settings: Config, key: jax.Array) -> EvolutionState:
+def _initial(
+    blueprint: Blueprint, numbers: Numbers | None, settings: Config, key: jax.Array
+) -> EvolutionState:
     """The same compiled function for every run, alone or beside others, so that they begin with the same bits."""
+    simulator = blueprint.simulator(numbers)
     task, trials = simulator.task, settings.rollout.starts
     return evolution_of(simulator, settings).init(key, trials, len(task.terms), len(task.outcomes))
 
 
 def _generation(
-    simulator: Simulator, rows: Row, states: EvolutionState
+    blueprint: Blueprint, numbers: Numbers | None, rows: Row, states: EvolutionState
 ) -> tuple[EvolutionState, GenerationMetrics]:
     """One generation of all rows [B]. Row by row but for the simulations, so that a row's numbers do not depend on its neighbours."""
+
+    simulator = blueprint.simulator(numbers)
 
     def propose(pair: tuple[Row, EvolutionState]) -> Proposal:
         row, state = pair
@@ -261,11 +268,11 @@ def _generation(
     return jax.lax.map(absorb, (rows, states, proposals, judged))
 
 
-def _experiment(simulator: Simulator, config: Config) -> Experiment:
-    creature = simulator.creature
+def _experiment(blueprint: Blueprint, config: Config) -> Experiment:
+    creature = blueprint.creature
     key = jax.random.fold_in(jax.random.key(config.seed), 1)
-    starts = simulator.task.trials(key, config.rollout)
-    return Experiment(creature, config, simulator, Row(traced(config), starts))
+    starts = blueprint.simulator().task.trials(key, creature, config.rollout)
+    return Experiment(creature, config, blueprint, Row(traced(config), starts))
 
 
 def _everywhere(simulator: Simulator) -> NamedSharding:
@@ -289,24 +296,3 @@ def _stack(trees: Sequence[Any]) -> Any:
 def _compiler_options() -> dict[str, str | bool]:
     """The fast plant gains a third from the widest vectors, which XLA's CPU compiler does not use by itself."""
     return {"xla_cpu_prefer_vector_width": "512"} if jax.default_backend() == "cpu" else {}
-
-
-def _simulator(creature: Creature, config: Config) -> Simulator:
-    creature = creature.spanned(config.evolution.pose_span).on(config.rollout.ground)
-    step = float(creature.model.opt.timestep)
-    steps = max(round(config.rollout.seconds / step), 1)
-    plant, lanes = make_plant(
-        creature, config.rollout.physics, what_ends(creature, config.rollout).touch
-    )
-    controller, task = make_controller(creature, config), make_task(creature, config)
-    check_senses(controller.reads, task.adds)
-    return Simulator(
-        creature=creature,
-        plant=plant,
-        controller=controller,
-        drive=Drive(creature, step, controller.command),
-        task=task,
-        steps=steps,
-        lanes=config.rollout.lanes or lanes,
-        mesh=Mesh(np.array(jax.devices()), (AXIS,)),
-    )

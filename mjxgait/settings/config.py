@@ -61,6 +61,8 @@ class RolloutConfig:
       worst: share of the worst start in the score; the mean of the starts has the rest.
       physics: the fast step where the model allows it, or plain MJX.
       lanes: simulations in flight per device; 0 lets the program choose.
+      body: its numbers are constants of the compiled program, which is faster, or inputs: then
+        another body of the same make-up needs no compilation.
       ground: flat, slope:0.1, steps:0.05, bumps:0.05 or rough:0.05, in hip heights (docs/ground.md).
     """
 
@@ -78,6 +80,7 @@ class RolloutConfig:
     physics: Annotated[Literal["auto", "mjx"], SHAPE] = "auto"
     lanes: Annotated[Whole, SHAPE] = 0
     ground: Annotated[GroundText, KIND] = FLAT
+    body: Annotated[Literal["constants", "inputs"], SHAPE] = "constants"
 
 
 @dataclasses.dataclass(frozen=True)

@@ -14,9 +14,9 @@ import jax.numpy as jnp
 import numpy as np
 from jax.sharding import Mesh, PartitionSpec
 
+from mjxgait.body import Body
 from mjxgait.control.drive import Drive, Rules, per_lane
 from mjxgait.control.protocol import Controller
-from mjxgait.creature import Creature
 from mjxgait.senses import sense
 from mjxgait.settings.config import Config
 from mjxgait.tasks.protocol import FINISHED, NONFINITE, Task
@@ -64,7 +64,7 @@ class Simulator:
     steps: T per episode. lanes: L per device. mesh: the devices.
     """
 
-    creature: Creature
+    creature: Body
     plant: Plant
     controller: Controller
     drive: Drive

@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from mjxgait.creature import Creature
+from mjxgait.body import Body, Ends
 from mjxgait.creature.settings import Termination
 from mjxgait.senses import trunk_height
 from mjxgait.tasks import protocol
@@ -24,7 +24,7 @@ class Reason(IntEnum):
     NONFINITE = protocol.NONFINITE
 
 
-def why_fallen(creature: Creature, limits: Termination, sensed: Sensed) -> jax.Array:
+def why_fallen(creature: Body, limits: Termination | Ends, sensed: Sensed) -> jax.Array:
     """The `Reason` [] to end the episode at this moment; `FINISHED` while all is well."""
     up = (sensed.trunk_rot @ creature.up.astype(np.float32))[2]
     height = trunk_height(sensed) / creature.stand_height
@@ -34,12 +34,11 @@ def why_fallen(creature: Creature, limits: Termination, sensed: Sensed) -> jax.A
     reason = jnp.where(height > limits.height[1], Reason.TOO_HIGH, reason)
     reason = jnp.where(height < limits.height[0], Reason.TOO_LOW, reason)
     # Rounding may put a trunk that is wholly upside down below -1.
-    if limits.min_up > -1.0:
-        reason = jnp.where(up < limits.min_up, Reason.TIPPED, reason)
-    return reason
+    tipped = (up < limits.min_up) & (limits.min_up > -1.0)
+    return jnp.where(tipped, Reason.TIPPED, reason)
 
 
-def touches(creature: Creature, sensed: Sensed) -> jax.Array:
+def touches(creature: Body, sensed: Sensed) -> jax.Array:
     """Whether [] a part touches the floor that is neither foot nor ground contact."""
     others = sensed.geom_low[len(creature.foot_of) :]
     return jnp.min(others, initial=1.0) < 0.0

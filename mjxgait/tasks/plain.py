@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 import jax
 import jax.numpy as jnp
 
+from mjxgait.body import Body, Ends
 from mjxgait.creature import Creature
 from mjxgait.creature.settings import Termination
 from mjxgait.settings.config import RolloutConfig
@@ -31,7 +32,7 @@ class PlainTask(abc.ABC):
     outcomes: ClassVar[tuple[str, ...]] = ("seconds",)
     adds: ClassVar[tuple[str, ...]] = ()
 
-    def __init__(self, creature: Creature, step: float, horizon: int, ends: Termination) -> None:
+    def __init__(self, creature: Body, step: float, horizon: int, ends: Termination | Ends) -> None:
         self.creature, self.step, self.horizon, self.ends = creature, step, horizon, ends
 
     @property
@@ -39,9 +40,9 @@ class PlainTask(abc.ABC):
         """See `Task`."""
         return tuple(self.counts)
 
-    def trials(self, key: jax.Array, settings: RolloutConfig) -> Starts:
+    def trials(self, key: jax.Array, creature: Creature, settings: RolloutConfig) -> Starts:
         """See `Task`: the first start is nominal, the others are perturbed and pushed."""
-        return draw_starts(key, self.creature, settings)
+        return draw_starts(key, creature, settings)
 
     def aim(self, trial: Starts) -> Any:
         """See `Task`."""

@@ -5,6 +5,7 @@ from typing import Any, Protocol
 
 import jax
 
+from mjxgait.creature import Creature
 from mjxgait.settings.config import RolloutConfig
 from mjxgait.tasks.trials import Starts
 from mjxgait.types import Sensed, pytree
@@ -47,8 +48,8 @@ class Task(Protocol):
         """Names of the senses that the task adds."""
         ...
 
-    def trials(self, key: jax.Array, settings: RolloutConfig) -> Starts:
-        """The R trials [R, ...] that everybody is judged on."""
+    def trials(self, key: jax.Array, creature: Creature, settings: RolloutConfig) -> Starts:
+        """The R trials [R, ...] that everybody is judged on; drawn once, by the host."""
         ...
 
     def aim(self, trial: Starts) -> Any:

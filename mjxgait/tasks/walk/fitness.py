@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 import optax
 
-from mjxgait.creature import Creature
+from mjxgait.body import Body
 from mjxgait.settings.walk import WalkConfig, Weights
 from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.walk.tally import Tally
@@ -32,7 +32,7 @@ def stride_limit(mass: float) -> float:
 
 
 def fitness_terms(
-    creature: Creature, config: WalkConfig, step: float, horizon: int, tally: Tally
+    creature: Body, config: WalkConfig, step: float, horizon: int, tally: Tally
 ) -> dict[str, jax.Array]:
     """The terms [] of one episode, each without unit and before its weight. The config may be traced.
 

@@ -6,8 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from mjxgait.creature import Creature
-from mjxgait.creature.frame import start_axes, start_position
+from mjxgait.body import Body
 from mjxgait.senses import CONTACT_GAP, foot_geoms, foot_heights
 from mjxgait.tasks import protocol
 from mjxgait.tasks.falls import touches
@@ -62,7 +61,7 @@ class Judge:
     half_time: step.
     """
 
-    creature: Creature
+    creature: Body
     step: float
     half_time: int
 
@@ -88,8 +87,8 @@ class Judge:
           torque: [J] N·m. clearance: [] m wanted of each foot in each of its swings.
         """
         creature = self.creature
-        start_forward, start_left = start_axes(creature)
-        moved = sensed.trunk_pos - start_position(creature)
+        start_forward, start_left = creature.start_axes
+        moved = sensed.trunk_pos - creature.stand_pos.astype(np.float32)
         forward_axis = sensed.trunk_rot @ creature.forward.astype(np.float32)
         up = (sensed.trunk_rot @ creature.up.astype(np.float32))[2]
         low, pos = self._feet(sensed)
