@@ -19,6 +19,7 @@ from mjxgait.certify import Certificate, CertificateConfig, certify, read_certif
 from mjxgait.champion import Champion, read_champion
 from mjxgait.creature import Creature
 from mjxgait.creature import load_creature as load_folder
+from mjxgait.creature.scale import scaled_files
 from mjxgait.errors import UserError
 from mjxgait.runs.exams import Exams
 from mjxgait.runs.folder import (
@@ -87,22 +88,30 @@ class Run:
         }
 
 
-def load_creature(env: Place) -> Creature:
+def load_creature(env: Place, scale: Mapping[str, float] | None = None) -> Creature:
     """A shipped creature by name, a creature folder, or a model file (MJCF, URDF) as it is.
+
+    Args:
+      scale: factors of the parts' size by pattern of their names (docs/creature.md).
 
     Raises:
       UserError: there is none, or it cannot be used; says why.
     """
     path = Path(env)
     if not path.is_file():
-        return load_folder(find_creature(str(env)))
+        return scaled(load_folder(find_creature(str(env))), scale or {})
     from mjxgait.importing import import_model
 
-    return load_imported(import_model(path).files)
+    return scaled(load_files(import_model(path).files), scale or {})
 
 
-def load_imported(files: Mapping[str, str]) -> Creature:
-    """The creature of an imported model's files, by name."""
+def scaled(creature: Creature, scale: Mapping[str, float]) -> Creature:
+    """The creature with parts of another size, by pattern of their names."""
+    return load_files(scaled_files(creature.files, scale)) if scale else creature
+
+
+def load_files(files: Mapping[str, str]) -> Creature:
+    """The creature whose files these are, by name."""
     with tempfile.TemporaryDirectory() as folder:  # the run folder keeps the creature
         for name, text in files.items():
             (Path(folder) / name).write_text(text, encoding="utf-8")
@@ -116,6 +125,7 @@ def train(
     config: Place | None = None,
     controller: str | None = None,
     task: str | None = None,
+    scale: Mapping[str, float] | None = None,
     seed: int = 0,
     population: int | None = None,
     generations: int | None = None,
@@ -132,6 +142,7 @@ def train(
       config: file with settings, or the name of a shipped config such as wilson.
       controller, task: who moves the creature and what it is to do: a shipped name, or
         FILE.py:CLASS of your own (docs/extending.md).
+      scale: factors of the parts' size, such as {"*_shin": 1.2} (docs/creature.md).
       seed, population, generations: the settings that are changed most often.
       settings: any others, in tables as in a config file: {"rollout": {"seconds": 5.0}}.
       quiet: says nothing on the screen.
@@ -147,7 +158,7 @@ def train(
     from mjxgait.runs.screen import Screen
 
     use = _use(controller=controller, task=task)
-    creature = load_creature(env)
+    creature = load_creature(env, scale)
     resolved = resolve_config(
         creature.settings.train, creature.name, Path(config) if config else None, use
     )

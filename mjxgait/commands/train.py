@@ -10,8 +10,9 @@ from typing import Annotated
 import tyro
 
 from mjxgait.creature import Creature, load_creature
+from mjxgait.creature.scale import parse_scales
 from mjxgait.errors import INTERRUPTED, UserError
-from mjxgait.library import load_imported
+from mjxgait.library import load_files, scaled
 from mjxgait.parts import resolve_config
 from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.folder import (
@@ -40,6 +41,8 @@ class TrainOptions:
       env: Name of a shipped creature, path of a creature folder, or a model file (MJCF or URDF) to
         import on the fly.
       config: TOML file with settings, or the name of a shipped config such as wilson.
+      scale: Parts of another size, as PATTERN=FACTOR: '*_shin=1.2' for longer shins, 'trunk=0.9'
+        (docs/creature.md). Lengths, masses and inertias follow, gains do not.
       out: Folder for the run; by default a new one under runs/.
       resume: Run folder to go on with; its own creature and settings are used, only what ends a run
         may differ: --generations, --evolution.target, --examination.
@@ -54,6 +57,7 @@ class TrainOptions:
 
     env: str = "tall_quadruped"
     config: str | None = None
+    scale: tuple[str, ...] = ()
     out: Path | None = None
     resume: Path | None = None
     generation: int | None = None
@@ -81,6 +85,10 @@ def train_command(arguments: Sequence[str]) -> int:
     from mjxgait.viewing.plots import PLOTS, plot_run
 
     if options.resume:
+        if options.scale:
+            raise UserError(
+                f"{options.resume}: a resumed run keeps its body; --scale needs a new run"
+            )
         if _without_ends(config) != _without_ends(default):
             raise UserError(
                 f"{options.resume}: a resumed run keeps its settings; only --generations, "
@@ -138,13 +146,14 @@ def _layers(arguments: Sequence[str]) -> tuple[Creature, Config]:
     early = argparse.ArgumentParser(add_help=False, allow_abbrev=False, exit_on_error=False)
     for name in ("--env", "--config", "--resume", "--use.controller", "--use.task"):
         early.add_argument(name, nargs="?")
+    early.add_argument("--scale", nargs="*")
     try:
         given, _ = early.parse_known_args(list(arguments))
     except argparse.ArgumentError as error:
         raise UserError(str(error)) from None
     if given.resume:
         return open_run(Path(given.resume))
-    creature = _creature(given.env or TrainOptions.env)
+    creature = scaled(_creature(given.env or TrainOptions.env), parse_scales(given.scale or ()))
     file = Path(given.config) if given.config else None
     named = {kind: getattr(given, f"use.{kind}") for kind in ("controller", "task")}
     use = {kind: name for kind, name in named.items() if name}
@@ -160,7 +169,7 @@ def _creature(env: str) -> Creature:
 
     imported = import_model(path)
     print(imported.notes.text())
-    return load_imported(imported.files)
+    return load_files(imported.files)
 
 
 def _settings(options: TrainOptions) -> Config:
