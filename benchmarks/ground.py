@@ -33,6 +33,8 @@ from mjxgait.runs.experiment import prepare_devices
 from mjxgait.settings.shipped import find_creature
 from mjxgait.types import BodyState, Plant
 
+WIDE = {"xla_cpu_prefer_vector_width": "512"}
+"""As in `mjxgait train`."""
 GROUNDS = ("flat", "slope:0.1", "steps:0.05", "bumps:0.05", "rough:0.05")
 
 
@@ -89,7 +91,7 @@ def build(creature: Creature, plant: Plant, text: str) -> tuple[Callable[[], jax
         return state.qpos, low
 
     began = time.perf_counter()
-    compiled = jax.jit(walk).lower(*arguments).compile()
+    compiled = jax.jit(walk).lower(*arguments).compile(compiler_options=WIDE)
     compile_s = time.perf_counter() - began
     return lambda: jax.block_until_ready(compiled(*arguments))[0], compile_s
 
