@@ -87,7 +87,8 @@ class Screen:
         self.console.print(table)
         verdict = "Certified: it walks" if certificate.passed else "Not certified"
         report = certificate.report
-        ground = "" if report["ground"] == FLAT else f" on {report['ground']}"
+        ground = report.get("ground", FLAT)
+        where = "" if ground == FLAT else f" on {ground}"
         if certificate.attempts > 1:
             self.console.print(f"This was examination {certificate.attempts} of its run.")
         if (worst := report["overlap"]) and not certificate.criteria[-1].passed:
@@ -98,7 +99,7 @@ class Screen:
             )
         self.console.print(
             f"{verdict} (margin {certificate.margin:.2f}). {report['gait']}, {report['speed']:.2f} "
-            f"m/s{ground}; {certificate.seconds:.0f} s."
+            f"m/s{where}; {certificate.seconds:.0f} s."
         )
 
     def report(
