@@ -252,7 +252,7 @@ def _generation(
 
 
 def _experiment(simulator: Simulator, config: Config) -> Experiment:
-    creature = simulator.creature
+    creature = simulator.creature.on(config.rollout.ground)
     key = jax.random.fold_in(jax.random.key(config.seed), 1)
     starts = simulator.task.trials(key, config.rollout)
     return Experiment(creature, config, simulator, Row(traced(config), starts))
@@ -293,7 +293,6 @@ def _ends(creature: Creature, config: RolloutConfig) -> Termination:
 
 def _simulator(creature: Creature, config: Config) -> Simulator:
     creature, ends = creature.spanned(config.evolution.pose_span), _ends(creature, config.rollout)
-    creature = creature.on(config.rollout.ground)
     step = float(creature.model.opt.timestep)
     steps = max(round(config.rollout.seconds / step), 1)
     plant, lanes = make_plant(creature, config.rollout.physics, ends.touch)
