@@ -42,12 +42,10 @@ class Terrain:
 
     def steepness(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """[2, ...] change of the height per metre along x and y."""
-        return np.stack(
-            [
-                self.height(x + NEAR, y) - self.height(x - NEAR, y),
-                self.height(x, y + NEAR) - self.height(x, y - NEAR),
-            ]
-        ) / (2 * NEAR)
+        x, y = np.asarray(x), np.asarray(y)
+        far = NEAR * np.array([1.0, -1.0, 0.0, 0.0]).reshape(4, *(1,) * x.ndim)
+        east, west, north, south = self.height(x + far, y + far[[2, 2, 0, 1]])
+        return np.stack([east - west, north - south]) / (2 * NEAR)
 
     def rise(self, ahead: np.ndarray, left: np.ndarray) -> np.ndarray:
         """m at places so far ahead and to the left of the start."""
@@ -64,8 +62,7 @@ class Terrain:
                     sign * spec.size * np.where(way < level, way**2 / (2 * level), way - level / 2)
                 )
             case "steps":
-                first = np.random.RandomState(spec.seed).random_sample((5, 2))[0, 1]
-                steps = np.maximum((ahead - level) / self.hip - first, 0)
+                steps = np.maximum((ahead - level) / self.hip - self.draws[0, 1], 0)
                 done, rest = np.divmod(steps, 1.0)
                 up = np.clip((rest - 0.8) / 0.2, 0, 1)
                 return sign * spec.size * self.hip * (done + up**2 * (3 - 2 * up))
@@ -73,15 +70,24 @@ class Terrain:
                 return self._waves(ahead, left) * full
 
     def _waves(self, ahead: np.ndarray, left: np.ndarray) -> np.ndarray:
+        along, across, phase, size = self.waves
+        ahead, left = np.asarray(ahead)[..., None], np.asarray(left)[..., None]
+        return parabolic_wave(ahead * along + left * across + phase) @ size
+
+    @functools.cached_property
+    def waves(self) -> np.ndarray:
+        """[4, W] cycles per metre ahead and to the left, cycles at the start, m."""
         rough = self.spec.kind == "rough"
         lengths = np.array([1.5, 2.0, 2.7, 3.6, 4.8] if rough else [2.0, 2.0]) * self.hip
-        drawn = np.random.RandomState(self.spec.seed).random_sample((5, 2))[: len(lengths)]
-        total = np.zeros(np.broadcast(ahead, left).shape)
-        for n, length in enumerate(lengths):
-            angle = np.pi * (n + (drawn[n, 0] if rough else 0.5)) / len(lengths)
-            way = ahead * np.cos(angle) + left * np.sin(angle)
-            total += length * parabolic_wave(way / length + drawn[n, 1])
-        return self.spec.size * self.hip * total / lengths.sum()
+        directions, phases = self.draws[: len(lengths)].T
+        angle = np.pi * (np.arange(len(lengths)) + (directions if rough else 0.5)) / len(lengths)
+        size = self.spec.size * self.hip * lengths / lengths.sum()
+        return np.stack([np.cos(angle) / lengths, np.sin(angle) / lengths, phases, size])
+
+    @functools.cached_property
+    def draws(self) -> np.ndarray:
+        """[5, 2] in [0, 1) of the seed."""
+        return np.random.RandomState(self.spec.seed).random_sample((5, 2))
 
 
 def parabolic_wave(cycles: np.ndarray) -> np.ndarray:

@@ -79,6 +79,6 @@ def draw_up(creature: Creature, config: Config) -> Blueprint:
     Raises:
       UserError: the physics does not support the creature's model.
     """
-    creature = creature.spanned(config.evolution.pose_span).on(config.rollout.ground)
+    creature = creature.spanned(config.evolution.pose_span)
     touch = what_ends(creature, config.rollout).touch
     return Blueprint(creature, config, *make_plant(creature, config.rollout.physics, touch))

@@ -269,7 +269,7 @@ def _generation(
 
 
 def _experiment(blueprint: Blueprint, config: Config) -> Experiment:
-    creature = blueprint.creature
+    creature = blueprint.creature.on(config.rollout.ground)
     key = jax.random.fold_in(jax.random.key(config.seed), 1)
     starts = blueprint.simulator().task.trials(key, creature, config.rollout)
     return Experiment(creature, config, blueprint, Row(traced(config), starts))

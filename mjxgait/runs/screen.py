@@ -88,7 +88,8 @@ class Screen:
         self.console.print(table)
         report, does = certificate.report, demands_of(certificate.task).verdict
         verdict = f"Certified: {does}" if certificate.passed else "Not certified"
-        ground = "" if report["ground"] == FLAT else f" on {report['ground']}"
+        ground = report.get("ground", FLAT)
+        where = "" if ground == FLAT else f" on {ground}"
         if certificate.attempts > 1:
             self.console.print(f"This was examination {certificate.attempts} of its run.")
         crossed = any(c.name == "parts" and not c.passed for c in certificate.criteria)
@@ -99,7 +100,7 @@ class Screen:
                 f"and in it in {worst['share']:.0%} of the frames."
             )
         self.console.print(
-            f"{verdict} (margin {certificate.margin:.2f}). {report['summary']}{ground}; "
+            f"{verdict} (margin {certificate.margin:.2f}). {report['summary']}{where}; "
             f"{certificate.seconds:.0f} s."
         )
 

@@ -34,8 +34,9 @@ TIGHT = {"fast": 1.0, "mjx": 50.0}
 
 BARS = {".bars.centre", ".bars.half", ".bars.reach"}
 RARE = {"dof_frictionloss", "dof_solref", "dof_solimp", "geom_gap", "geom_solmix"}
-ALIKE = {"fast": BARS, "mjx": BARS | {f".model['{name}']" for name in RARE}}
-"""What is the same in all the bodies: none is watched for overlap, none has dry friction."""
+DRY = {".density", ".viscosity"}
+ALIKE = {"fast": BARS | DRY, "mjx": BARS | {f".model['{name}']" for name in RARE}}
+"""What is the same in all the bodies: none is watched for overlap, none has dry friction or swims."""
 
 
 @pytest.fixture(scope="module")

@@ -54,7 +54,7 @@ def test_accepts_a_plain_creature() -> None:
         ({"integrator": mujoco.mjtIntegrator.mjINT_IMPLICITFAST}, "integrator is not Euler"),
         ({"solver": mujoco.mjtSolver.mjSOL_CG}, "solver is not Newton"),
         ({"cone": mujoco.mjtCone.mjCONE_ELLIPTIC}, "cone is not pyramidal"),
-        ({"viscosity": 0.1}, "fluid"),
+        ({"wind": (1.0, 0.0, 0.0)}, "wind"),
         ({"flag": "", "joint": '<joint name="knee" damping="1"/>'}, "eulerdamp"),
         ({"joint": '<joint name="knee" frictionloss="1"/>'}, "dry friction"),
         (

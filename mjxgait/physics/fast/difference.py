@@ -18,6 +18,7 @@ WORDS = {
     "step": "the timestep",
     "line_iterations": "ls_iterations",
     "warm_start": "the warm start",
+    "water": "whether it is in a fluid",
 }
 
 

@@ -81,7 +81,8 @@ class Parameters:
     joint_axis: [N, 3], joint_anchor: [N, 3] m, both in the body's frame. reference: [N] rad, m,
       position of a slide or hinge at rest.
     armature, spring, spring_reference, damping: [nv]; the spring is linear in the position.
-    gravity: [3] m/s². impratio: [] MuJoCo's.
+    gravity: [3] m/s². density: [] kg/m³, viscosity: [] kg/(m s), of the fluid. impratio: []
+      MuJoCo's.
     """
 
     pos: Number
@@ -98,6 +99,8 @@ class Parameters:
     spring_reference: Number
     damping: Number
     gravity: Number
+    density: Number
+    viscosity: Number
     impratio: Number
     contacts: Contacts
     limits: Limits
@@ -132,6 +135,8 @@ def read_parameters(
         spring_reference=_snapped(model.qpos_spring[address[of_dof]]),
         damping=_snapped(model.dof_damping),
         gravity=np.zeros(3) if off else _snapped(model.opt.gravity),
+        density=np.array(float(model.opt.density)),
+        viscosity=np.array(float(model.opt.viscosity)),
         impratio=np.array(float(model.opt.impratio)),
         contacts=_contacts(model),
         limits=_limits(model),

@@ -38,6 +38,7 @@ from mjxgait.physics.fast.structure import Geom, Structure, join
 from mjxgait.physics.fast.support import UnsupportedModel
 from mjxgait.physics.fast.topology import Topology, read_topology
 from mjxgait.physics.fast.treematrix import Rows, factor, on_pivot, solve
+from mjxgait.physics.fast.water import fluid_force
 from mjxgait.physics.fast.weights import reweighed
 from mjxgait.physics.layout import OtherTopology, SenseLayout
 from mjxgait.physics.overlap import deepest
@@ -133,7 +134,10 @@ class FastPlant:
         freedom = motions(freedoms, like, pin)
         body = inertias(structure, poses, like, pin)
         bias, moving = bias_force(structure, body, freedom, state.qvel, pin)
-        bias = pin(bias + _resistance(structure, state))
+        bias = bias + _resistance(structure, state)
+        if self.topology.water:
+            bias = bias - fluid_force(structure, poses, body, freedom, moving, pin)
+        bias = pin(bias)
         paths = motion_paths(structure, freedom, pin)
         mass = mass_rows(structure, body, freedom, paths, pin)
         return _sense(structure, state, poses, moving, bias), Workings(

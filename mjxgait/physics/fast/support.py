@@ -54,10 +54,7 @@ def _check_options(model: mujoco.MjModel) -> None:
     )
     _refuse(off & (flag.mjDSBL_SPRING | flag.mjDSBL_DAMPER), "springs or dampers are disabled")
     _refuse(option.noslip_iterations, "noslip iterations")
-    _refuse(
-        (option.density, option.viscosity, *option.wind),
-        "fluid forces (density, viscosity or wind)",
-    )
+    _refuse(option.wind, "wind")
     _refuse(
         option.enableflags & ~int(mujoco.mjtEnableBit.mjENBL_ENERGY),
         "an enable flag other than energy",
@@ -77,6 +74,7 @@ def _check_elements(model: mujoco.MjModel) -> None:
         _refuse(count, f"the model has {name}")
     _refuse(model.nv == 0, "nothing in the model can move")
     _refuse(model.body_gravcomp, "gravity compensation")
+    _refuse(model.geom_fluid, "a geom has a fluid shape (only MuJoCo's inertia boxes are known)")
     for name in ("geom_adhesion", "geom_surfacevel"):
         _refuse(getattr(model, name, 0), f"a geom uses {name}")
 

@@ -38,6 +38,7 @@ class Topology:
     bar_body: [S], first, second: [Q]; see `Crossings`.
     step: s. iterations, line_iterations: the most of Newton's method and its line search.
     warm_start: whether the solver starts where it was a step before.
+    water: whether a fluid resists.
     names: of the bodies, for messages only.
     """
 
@@ -58,6 +59,7 @@ class Topology:
     iterations: int
     line_iterations: int
     warm_start: bool
+    water: bool
     names: tuple[str, ...] = dataclasses.field(compare=False)
 
     @functools.cached_property
@@ -126,6 +128,7 @@ def read_topology(
         iterations=int(model.opt.iterations),
         line_iterations=int(model.opt.ls_iterations),
         warm_start=not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_WARMSTART,
+        water=bool(model.opt.density or model.opt.viscosity),
         names=tuple(model.body(b).name or f"body {b}" for b in range(1, model.nbody)),
     )
 

@@ -1,0 +1,95 @@
+"""The fast physics in water, without gravity and floor, against C MuJoCo (float64)."""
+
+from types import SimpleNamespace
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+import pytest
+from many_bodies import SLIM, XML
+
+from mjxgait.physics.fast import fast_plant
+from mjxgait.physics.layout import SenseLayout
+from mjxgait.types import BodyState
+
+FLOOR = '<geom name="floor" type="plane" size="0 0 1" contype="1" friction="0.8" margin="0.002"/>'
+LANES = 6
+STEPS = 100
+
+
+def swimmer(density: float, viscosity: float) -> mujoco.MjModel:
+    option = f'<option density="{density}" viscosity="{viscosity}" gravity="0 0 0" '
+    return mujoco.MjModel.from_xml_string(XML.replace(FLOOR, "").replace("<option ", option))
+
+
+def states(model: mujoco.MjModel) -> tuple[BodyState, np.ndarray]:
+    """Tumbling fast enough that density counts, and torques."""
+    rng = np.random.default_rng(1)
+    qpos = np.tile(model.qpos0[:, None], LANES)
+    qpos[3:7] = rng.normal(size=(4, LANES))
+    qpos[7:] += rng.uniform(-0.3, 0.3, (model.nq - 7, LANES))
+    for start in (3, model.jnt_qposadr[model.joint("tail").id]):
+        qpos[start : start + 4] /= np.linalg.norm(qpos[start : start + 4], axis=0)
+    qvel = 2.0 * rng.normal(size=(model.nv, LANES))
+    torque = np.asarray(rng.normal(size=qvel.shape), np.float32)
+    arrays = (qpos, qvel, 0 * qvel, 0 * qvel, np.ones(LANES))
+    return BodyState(*(jnp.asarray(a, jnp.float32) for a in arrays)), torque
+
+
+@pytest.fixture(scope="module", params=[(900.0, 0.3), (0.0, 3.0)], ids=str)
+def swim(request: pytest.FixtureRequest) -> SimpleNamespace:
+    """One step and many of the fast plant, and the same in C."""
+    model = swimmer(*request.param)
+    hinges = np.nonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE)[0]
+    trunk = model.body("trunk").id
+    layout = SenseLayout(
+        trunk, model.jnt_qposadr[hinges], model.jnt_dofadr[hinges], np.array([model.geom("leg").id])
+    )
+    plant, (state, torque) = fast_plant(model, layout), states(model)
+
+    def step(state: BodyState, torque: jax.Array) -> tuple[jax.Array, BodyState]:
+        sensed, workings = plant.forward(state)
+        return sensed.bias, plant.advance(state, workings, torque)
+
+    compiled = jax.jit(step).lower(state, torque).compile(compiler_options=SLIM)
+    bias, after = compiled(state, torque)
+    later = after
+    for _ in range(STEPS - 1):
+        _, later = compiled(later, torque)
+    return SimpleNamespace(
+        model=model, layout=layout, state=state, torque=torque, bias=bias, after=after, later=later
+    )
+
+
+def in_c(swim: SimpleNamespace, lane: int, steps: int) -> mujoco.MjData:
+    data = mujoco.MjData(swim.model)
+    data.qpos[:], data.qvel[:] = swim.state.qpos[:, lane], swim.state.qvel[:, lane]
+    data.qfrc_applied[:] = swim.torque[:, lane]
+    mujoco.mj_step(swim.model, data, steps)
+    return data
+
+
+def close(ours: np.ndarray, theirs: np.ndarray, tolerance: float) -> None:
+    """To a share of the largest entry."""
+    np.testing.assert_allclose(ours, theirs, rtol=0, atol=tolerance * np.abs(theirs).max())
+
+
+def test_a_step_is_that_of_c(swim: SimpleNamespace):
+    for lane in range(LANES):
+        data = in_c(swim, lane, 1)
+        close(swim.bias[:, lane], data.qfrc_bias - data.qfrc_passive, 1e-5)
+        close(swim.after.warmstart[:, lane], data.qacc, 2e-5)
+        close(swim.after.qvel[:, lane], data.qvel, 1e-5)
+
+
+def test_the_fluid_is_what_makes_the_difference(swim: SimpleNamespace):
+    dry = SimpleNamespace(**{**vars(swim), "model": swimmer(0.0, 0.0)})
+    apart = np.abs(in_c(swim, 0, 1).qacc - in_c(dry, 0, 1).qacc).max()
+    assert apart > 0.05 * np.abs(in_c(swim, 0, 1).qacc).max()
+
+
+def test_a_swim_is_that_of_c(swim: SimpleNamespace):
+    for lane in range(LANES):
+        data = in_c(swim, lane, STEPS)
+        close(swim.later.qpos[:, lane], data.qpos, 2e-3)
