@@ -8,6 +8,7 @@ import pytest
 from helpers import small_config
 
 from mjxgait.creature import Creature
+from mjxgait.runs.experiment import build_experiment
 from mjxgait.tasks.trials import NEVER, Starts, draw_starts
 
 NONE = {
@@ -86,3 +87,28 @@ def test_pushes_go_all_ways_along_the_ground_in_the_middle_of_the_episode(stool:
     assert all((np.sign(push[:, :2]) == way).all(1).any() for way in ((1, 1), (1, -1), (-1, 1)))
     assert starts.push_step[0] == NEVER
     assert ((starts.push_step[1:] >= 100) & (starts.push_step[1:] < 300)).all()
+
+
+def test_each_part_has_a_mass_of_its_own_but_in_the_first_start(stool: Creature):
+    starts = drawn(stool, masses=0.2)
+    assert differing(starts, drawn(stool)) == {"heaviness"}
+    assert starts.heaviness.shape == (COUNT, stool.model.nbody - 1)
+    assert np.all(starts.heaviness[0] == 1.0)
+    assert 1.18 < starts.heaviness[1:].max() <= 1.2
+    assert 0.8 <= starts.heaviness[1:].min() < 0.82
+
+
+def test_the_bodies_of_a_run_weigh_what_their_starts_say(stool: Creature):
+    """All that follows from the masses is reckoned too: `Plant.heavier`, whose own tests compare C."""
+    config = small_config(rollout={**NONE, "masses": 0.2, "starts": 3})
+    experiment = build_experiment(stool, config)
+    numbers, plain = experiment.starts.numbers, experiment.simulator.plant.parameters
+    masses = experiment.simulator.plant.heavier(plain, experiment.starts.heaviness[1])
+    for leaf, its in zip(jax.tree.leaves(numbers), jax.tree.leaves(masses), strict=True):
+        np.testing.assert_allclose(leaf[1], its, rtol=1e-6)
+    own = build_experiment(stool, small_config(rollout={**NONE, "starts": 3}))
+    genomes = own.init().genomes
+    # Heavier or lighter, it moves otherwise; the first start is the same body.
+    mixed, same = (e.simulate(genomes).tally.forward for e in (experiment, own))
+    assert np.allclose(mixed[:, 0], same[:, 0], atol=1e-5)
+    assert np.abs(mixed[:, 1:] - same[:, 1:]).max() > 1e-5

@@ -17,6 +17,7 @@ from mjxgait.physics import make_plant
 from mjxgait.senses import check_senses
 from mjxgait.settings.config import Config
 from mjxgait.simulation.rollout import AXIS, Simulator
+from mjxgait.tasks.trials import Starts
 from mjxgait.types import Plant, pytree
 
 
@@ -46,6 +47,14 @@ class Blueprint:
         ends = what_ends(self.creature, self.config.rollout)
         single = jax.tree.map(lambda x: np.asarray(x, np.float32), self.plant.parameters)
         return Numbers(given_body(self.creature), given_ends(ends), single)
+
+    def embodied(self, starts: Starts) -> Starts:
+        """The starts with the bodies that their heaviness makes."""
+        if starts.heaviness is None:
+            return starts
+        one, heavier = self.plant.parameters, self.plant.heavier
+        numbers = jax.vmap(lambda factors: heavier(one, factors))(starts.heaviness)
+        return dataclasses.replace(starts, numbers=numbers)
 
     def simulator(self, numbers: Numbers | None = None) -> Simulator:
         """Of the creature itself, or of whatever body has these numbers."""

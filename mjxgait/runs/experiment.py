@@ -272,7 +272,7 @@ def _experiment(blueprint: Blueprint, config: Config) -> Experiment:
     creature = blueprint.creature.on(config.rollout.ground)
     key = jax.random.fold_in(jax.random.key(config.seed), 1)
     starts = blueprint.simulator().task.trials(key, creature, config.rollout)
-    return Experiment(creature, config, blueprint, Row(traced(config), starts))
+    return Experiment(creature, config, blueprint, Row(traced(config), blueprint.embodied(starts)))
 
 
 def _everywhere(simulator: Simulator) -> NamedSharding:

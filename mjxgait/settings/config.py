@@ -56,6 +56,8 @@ class RolloutConfig:
       friction: range of the factor on the floor's friction.
       push: sudden change of the trunk's horizontal velocity at a random moment of a perturbed start, in units of sqrt(g * hip height).
       gains: half width of the uniform change of each joint's kp and kd in a perturbed start, as a share.
+      masses: the same for each part's mass and inertia, which then differ from lane to lane; a step
+        costs a third more (docs/performance.md).
       terminate: whether an episode ends when the creature falls; if not, its whole body meets the
         floor. termination: what counts as falling, where it differs from creature.toml.
       worst: share of the worst start in the score; the mean of the starts has the rest.
@@ -74,6 +76,7 @@ class RolloutConfig:
     friction: tuple[Positive, Positive] = (0.8, 1.2)
     push: NonNegative = 0.15
     gains: Fraction = 0.1
+    masses: Annotated[Fraction, SHAPE] = 0.0
     terminate: Annotated[bool, SHAPE] = True
     termination: TerminationConfig = dataclasses.field(default_factory=TerminationConfig)
     worst: Fraction = 0.5

@@ -171,6 +171,7 @@ class Simulator:
                 warmstart=still,
                 constraint_force=still,
                 friction=start.friction,
+                parameters=start.numbers,
                 ground=start.ground,
             ),
             plan=self.controller.prepare(

@@ -1,5 +1,7 @@
 """The starts on which every individual is judged: the first nominal, the others perturbed."""
 
+from typing import Any
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -21,6 +23,8 @@ class Starts:
     qpos: [R, nq]. qvel: [R, nv]. friction: [R] factor on the floor's friction.
     push: [R, nv] added to qvel at step push_step [R] (never when it is `NEVER`).
     stiffness, damping: [R, J] factors on the joints' kp and kd.
+    heaviness: [R, nbody - 1] factors on the parts' masses and inertias; None where all are 1.
+    numbers: leaves [R, ...], the bodies that follow from it, as the plant reads them.
     ground: leaves [R, ...], each trial's own; None where it is flat.
     """
 
@@ -32,6 +36,8 @@ class Starts:
     stiffness: jax.Array
     damping: jax.Array
     ground: Ground | None = None
+    heaviness: jax.Array | None = None
+    numbers: Any = None
 
 
 def draw_starts(key: jax.Array, creature: Creature, config: RolloutConfig) -> Starts:
@@ -73,8 +79,17 @@ def draw_starts(key: jax.Array, creature: Creature, config: RolloutConfig) -> St
         push_step=jnp.where(perturbed[:, 0], moment, NEVER),
         stiffness=factors(key_stiffness),
         damping=factors(key_damping),
+        heaviness=_heaviness(jax.random.fold_in(key, 3), creature, config),
         ground=draw_grounds(jax.random.fold_in(key, 2), creature, config),
     )
+
+
+def _heaviness(key: jax.Array, creature: Creature, config: RolloutConfig) -> jax.Array | None:
+    if not config.masses:
+        return None
+    parts = creature.model.nbody - 1
+    spread = jax.random.uniform(key, (config.starts, parts), minval=-1.0).at[0].set(0.0)
+    return 1.0 + config.masses * spread
 
 
 def draw_grounds(key: jax.Array, creature: Creature, config: RolloutConfig) -> Ground | None:
