@@ -13,10 +13,14 @@ STOOL = Path(__file__).parent / "data" / "stool"
 
 
 def small_config(**tables: dict) -> Config:
-    """A config for runs of a second: few individuals, short episodes."""
+    """A config for runs of a second: few individuals, short episodes.
+
+    Of the same shape as `test_run.SMALL`, and with MJX as the study of `test_ablate`: they share
+    its program.
+    """
     table = {
         "evolution": {"population": 6, "generations": 3},
-        "rollout": {"seconds": 0.4, "starts": 2, "lanes": 4, "physics": "mjx"},
+        "rollout": {"seconds": 0.4, "starts": 2, "lanes": 4},
     }
     for name, values in tables.items():
         table[name] = {**table.get(name, {}), **values}

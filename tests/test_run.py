@@ -24,13 +24,15 @@ SMALL = [
     "--env",
     str(STOOL),
     "--population",
-    "8",
+    "6",
     "--generations",
     "7",
     "--rollout.seconds",
     "0.4",
     "--rollout.starts",
     "2",
+    "--rollout.lanes",
+    "4",
 ]
 SMALL += ["--seed", "5", "--examination.candidates", "0", "--no-plots", "--checkpoint-every", "1"]
 
@@ -80,7 +82,7 @@ def test_the_folder_holds_the_whole_run(finished: tuple[Path, str]):
     }
     creature, config = open_run(folder)
     assert creature.digest == load_creature(STOOL).digest
-    assert (config.seed, config.evolution.population) == (5, 8)
+    assert (config.seed, config.evolution.population) == (5, 6)
     champion = read_champion(folder / "champion.json", creature)
     lines = read_metrics(folder / "metrics.jsonl")
     assert [line["generation"] for line in lines] == list(range(8))
@@ -118,10 +120,10 @@ def test_the_same_seed_gives_the_same_champion(finished: tuple[Path, str], tmp_p
     assert without_times(tmp_path / "again") == without_times(finished[0])
 
 
-def kill_when(folder: Path, ready: Callable[[], bool], *more: str) -> int:
-    """Starts the run and kills it as soon as `ready` holds; returns its exit code."""
+def kill_when(ready: Callable[[], bool], *arguments: object) -> int:
+    """Starts a command and kills it as soon as `ready` holds; returns its exit code."""
     process = subprocess.Popen(
-        command("train", *SMALL, *more, "--out", folder),
+        command(*arguments),
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
@@ -143,17 +145,22 @@ def saving(folder: Path, generation: int) -> Callable[[], bool]:
     return lambda: any((folder / "checkpoints").glob(f"{generation}.*tmp*"))
 
 
-@pytest.mark.parametrize("moment", ["generation 1", "generation 5", "save 1", "save 3", "save 6"])
-def test_a_killed_run_goes_on_to_the_same_champion_bit_for_bit(
-    finished: tuple[Path, str], tmp_path: Path, moment: str
+MOMENTS = ("generation 1", "save 1", "save 3", "generation 5", "save 6")
+
+
+def test_a_run_killed_again_and_again_goes_on_to_the_same_champion_bit_for_bit(
+    finished: tuple[Path, str], tmp_path: Path
 ):
-    folder = tmp_path / "killed"
-    kind, number = moment.split()
-    kill_when(
-        folder,
-        generations(folder, int(number)) if kind == "generation" else saving(folder, int(number)),
-    )
-    mjxgait("train", "--resume", folder)
+    """Killed in generations and amid checkpoints: each time it goes on from what was left."""
+    folder, codes = tmp_path / "killed", []
+    begin = ("train", *SMALL, "--out", folder)
+    for moment in MOMENTS:
+        kind, number = moment.split()
+        ready = (generations if kind == "generation" else saving)(folder, int(number))
+        codes.append(kill_when(ready, *begin))
+        begin = ("train", "--resume", folder)
+    assert codes.count(-signal.SIGKILL) >= 4, "at most one moment may have passed unseen"
+    mjxgait(*begin)
     assert result(folder) == result(finished[0])
     assert without_times(folder) == without_times(finished[0])
 
@@ -162,7 +169,8 @@ def test_killed_between_two_checkpoints_it_repeats_what_came_after_the_first(
     finished: tuple[Path, str], tmp_path: Path
 ):
     folder = tmp_path / "killed"
-    kill_when(folder, generations(folder, 4), "--checkpoint-every", "5")
+    arguments = ("train", *SMALL, "--checkpoint-every", "5", "--out", folder)
+    assert kill_when(generations(folder, 4), *arguments) == -signal.SIGKILL
     assert sorted(
         int(path.name) for path in (folder / "checkpoints").iterdir() if path.name.isdigit()
     ) == [0]
