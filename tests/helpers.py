@@ -3,7 +3,9 @@
 from pathlib import Path
 
 import jax
+import pytest
 
+from mjxgait.cli import main
 from mjxgait.settings.config import Config, FitnessConfig
 from mjxgait.settings.tables import build
 from mjxgait.tasks.score import in_order
@@ -30,3 +32,13 @@ def small_config(**tables: dict) -> Config:
 def weight_vector(config: FitnessConfig, generation: jax.Array) -> jax.Array:
     """The weights [F] of walking in the order of its terms."""
     return in_order(signed_weights(config, generation), TERMS)
+
+
+def said_by(capsys: pytest.CaptureFixture, *arguments: object, code: int) -> str:
+    """What a command says that ends with this code, in this process: none needs to be started."""
+    capsys.readouterr()
+    with pytest.raises(SystemExit) as ended:
+        main([*map(str, arguments)])
+    assert ended.value.code == code
+    said = capsys.readouterr()
+    return said.out + said.err

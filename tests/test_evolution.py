@@ -44,7 +44,7 @@ class Problem:
         return jnp.where(inside, self.slope * near_zero(genomes), jnp.nan)
 
 
-FLAT = Problem(slope=0.0)
+CENTRE, FLAT = Problem(), Problem(slope=0.0)
 
 
 def near_zero(genomes: Genome) -> jax.Array:
@@ -70,7 +70,7 @@ class Toy(Evolution):
         return self.absorb(state, proposal, judged)
 
 
-def toy(problem: Problem = Problem(), **settings) -> Toy:
+def toy(problem: Problem = CENTRE, **settings) -> Toy:
     """A spell of forced evolution looks two generations back, so that most toys share a program."""
     plain = EvolutionConfig(population=20, generations=30, forced=FORCED)
     return made(dataclasses.replace(plain, **settings), problem)

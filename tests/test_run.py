@@ -14,7 +14,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from helpers import STOOL
+from helpers import STOOL, said_by
 
 from mjxgait.champion import read_champion
 from mjxgait.creature import load_creature
@@ -41,10 +41,8 @@ def command(*arguments: object) -> list[str]:
     return [sys.executable, "-m", "mjxgait", *map(str, arguments)]
 
 
-def mjxgait(*arguments: object, code: int = 0, **options) -> str:
-    done = subprocess.run(
-        command(*arguments), capture_output=True, text=True, timeout=300, **options
-    )
+def mjxgait(*arguments: object, code: int = 0) -> str:
+    done = subprocess.run(command(*arguments), capture_output=True, text=True, timeout=300)
     assert done.returncode == code, done.stderr
     assert "Traceback" not in done.stderr
     return done.stdout + done.stderr
@@ -225,21 +223,25 @@ def test_ctrl_c_finishes_the_generation_saves_and_says_how_to_go_on(
     assert (folder / "checkpoints" / str(last)).is_dir()
 
 
-def test_a_folder_with_another_run_is_left_alone(finished: tuple[Path, str]):
+def test_a_folder_with_another_run_is_left_alone(
+    finished: tuple[Path, str], capsys: pytest.CaptureFixture
+):
     before = result(finished[0])
-    assert "holds another run; name another folder with --out, or go on with --resume" in mjxgait(
-        "train", *SMALL, "--out", finished[0], code=2
+    assert "holds another run; name another folder with --out, or go on with --resume" in said_by(
+        capsys, "train", *SMALL, "--out", finished[0], code=2
     )
     assert result(finished[0]) == before
 
 
-def test_a_changed_creature_is_refused(finished: tuple[Path, str], tmp_path: Path):
+def test_a_changed_creature_is_refused(
+    finished: tuple[Path, str], tmp_path: Path, capsys: pytest.CaptureFixture
+):
     folder = tmp_path / "changed"
     subprocess.run(["cp", "-r", str(finished[0]), str(folder)], check=True)
     xml = folder / "creature" / "creature.xml"
     xml.write_text(xml.read_text().replace("0.04", "0.05"))
-    assert "belongs to another body than stool as it is now" in mjxgait(
-        "train", "--resume", folder, "--generations", "9", code=2
+    assert "belongs to another body than stool as it is now" in said_by(
+        capsys, "train", "--resume", folder, "--generations", "9", code=2
     )
 
 
@@ -261,15 +263,20 @@ def test_a_changed_creature_is_refused(finished: tuple[Path, str], tmp_path: Pat
     ],
 )
 def test_a_mistake_is_one_sentence_and_exit_code_2(
-    arguments: list[str], words: str, tmp_path: Path
+    arguments: list[str],
+    words: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture,
+    monkeypatch: pytest.MonkeyPatch,
 ):
-    assert words in " ".join(mjxgait(*arguments, code=2, cwd=tmp_path).split())
+    monkeypatch.chdir(tmp_path)
+    assert words in " ".join(said_by(capsys, *arguments, code=2).split())
     assert not list(tmp_path.rglob("config.toml"))
 
 
-def test_help_reads_well():
-    assert "train" in mjxgait("--help")
-    text = mjxgait("train", "--help")
+def test_help_reads_well(capsys: pytest.CaptureFixture):
+    assert "train" in said_by(capsys, "--help", code=0)
+    text = said_by(capsys, "train", "--help", code=0)
     assert "--evolution.population" in text
     assert "--seed" in text
 
