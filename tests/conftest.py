@@ -1,9 +1,13 @@
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
+# One cache of compiled programs for all workers and for the commands that tests start; without the
+# second line it keeps nothing that takes less than a second, of which there are hundreds.
 os.environ.setdefault(
     "JAX_COMPILATION_CACHE_DIR", str(Path(__file__).parents[1] / ".pytest_cache" / "jax")
 )
+os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
 
 import jax
 import pytest
@@ -13,6 +17,8 @@ from mjxgait.creature import Creature, load_creature
 from mjxgait.settings.shipped import data_folder
 
 jax.config.update("jax_num_cpu_devices", 2)
+# Compiling is what takes the time in most tests; see `as_shipped`.
+jax.config.update("jax_disable_most_optimizations", True)
 
 SHIPPED = sorted(path.parent.name for path in data_folder("envs").glob("*/creature.toml"))
 
@@ -27,3 +33,14 @@ def stool() -> Creature:
 def shipped(request: pytest.FixtureRequest) -> Creature:
     """Each creature that the program ships."""
     return load_creature(data_folder("envs") / request.param)
+
+
+@pytest.fixture(scope="module")
+def as_shipped() -> Iterator[None]:
+    """Programs compiled with all optimizations, where these could make a difference.
+
+    The commands that tests start are compiled so in any case.
+    """
+    jax.config.update("jax_disable_most_optimizations", False)
+    yield
+    jax.config.update("jax_disable_most_optimizations", True)

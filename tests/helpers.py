@@ -6,8 +6,10 @@ from typing import Any
 
 import jax
 import numpy as np
+import pytest
 
 from mjxgait.champion import Champion
+from mjxgait.cli import main
 from mjxgait.creature import Creature
 from mjxgait.settings.config import Config
 from mjxgait.settings.control import TUNING, DriveConfig, PoseConfig
@@ -20,10 +22,14 @@ STOOL = Path(__file__).parent / "data" / "stool"
 
 
 def small_config(**tables: dict) -> Config:
-    """A config for runs of a second: few individuals, short episodes."""
+    """A config for runs of a second: few individuals, short episodes.
+
+    Of the same shape as `test_run.SMALL`, and with MJX as the study of `test_ablate`: they share
+    its program.
+    """
     table = {
         "evolution": {"population": 6, "generations": 3},
-        "rollout": {"seconds": 0.4, "starts": 2, "lanes": 4, "physics": "mjx"},
+        "rollout": {"seconds": 0.4, "starts": 2, "lanes": 4},
     }
     for name, values in tables.items():
         table[name] = {**table.get(name, {}), **values}
@@ -60,3 +66,13 @@ def pose_champion(
         task="walk",
         **given,
     )
+
+
+def said_by(capsys: pytest.CaptureFixture, *arguments: object, code: int) -> str:
+    """What a command says that ends with this code, in this process: none needs to be started."""
+    capsys.readouterr()
+    with pytest.raises(SystemExit) as ended:
+        main([*map(str, arguments)])
+    assert ended.value.code == code
+    said = capsys.readouterr()
+    return said.out + said.err

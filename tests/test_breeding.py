@@ -13,7 +13,8 @@ from mjxgait.control.pose_variation import pose_variation
 from mjxgait.control.poses import Genome
 from mjxgait.search.breeding import Nursery
 from mjxgait.search.variation import Box, first_occurrence
-from mjxgait.settings.config import EvolutionConfig
+from mjxgait.settings.config import Config, EvolutionConfig
+from mjxgait.settings.traced import traced
 
 THESIS = EvolutionConfig(
     population=12,
@@ -34,14 +35,23 @@ def marked(config: EvolutionConfig, poses: int) -> Genome:
     return Genome(jnp.tile(values, (1, 1, 2)), jnp.zeros((config.population, 1)))
 
 
+@jax.jit
+def bear(
+    settings: EvolutionConfig, key: jax.Array, adults: Genome, reach: jax.Array
+) -> tuple[Genome, jax.Array]:
+    """Settings as inputs, as in a run: what differs in numbers only is compiled once."""
+    low = jnp.zeros(adults.key_poses.shape[1:])
+    box = Box(Genome(low, jnp.zeros(1)), Genome(low + reach, jnp.zeros(1)))
+    return Nursery(settings, pose_variation(box, settings)).children(key, adults)
+
+
 def born(poses: int = 3, seed: int = 0, **settings) -> tuple[Genome, Genome, jax.Array]:
     """The adults, their children, and which of these are crossings."""
     config = dataclasses.replace(THESIS, **settings)
     adults = marked(config, poses)
     reach = float(config.population * poses)
-    low, high = jnp.zeros((poses, 2)), jnp.full((poses, 2), reach)
-    variation = pose_variation(Box(Genome(low, jnp.zeros(1)), Genome(high, jnp.zeros(1))), config)
-    children, crossed = jax.jit(Nursery(config, variation).children)(jax.random.key(seed), adults)
+    settings = traced(Config(evolution=config)).evolution
+    children, crossed = bear(settings, jax.random.key(seed), adults, jnp.float32(reach))
     return adults, children, crossed
 
 

@@ -12,7 +12,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from test_evolution import toy
+from test_evolution import advance, begin, inputs, toy
 
 from mjxgait.errors import UserError
 from mjxgait.runs.checkpoint import FOLDER, Checkpoints
@@ -29,10 +29,10 @@ def evolution():
 @pytest.fixture(scope="module")
 def states(evolution) -> list[EvolutionState]:
     """The states of generations 0 to 6."""
-    state, step = evolution.init(jax.random.key(0), 1, 1, 1), jax.jit(evolution.step)
-    found = []
+    given, found = inputs(evolution), []
+    state = begin(*given, jax.random.key(0))
     for _ in range(7):
-        state, _ = step(state)
+        state, *_ = advance(*given, state)
         found.append(state)
     return found
 
@@ -72,8 +72,11 @@ def test_what_comes_back_is_what_was_saved_to_the_bit(
 def test_the_restored_key_goes_on_where_the_saved_one_was(
     run: Path, states: list[EvolutionState], evolution
 ):
-    step = jax.jit(evolution.step)
-    assert np.array_equal(step(restore(run, evolution))[0].fitness, step(states[6])[0].fitness)
+    restored, whole = (
+        advance(*inputs(evolution), jax.device_get(state))[0]
+        for state in (restore(run, evolution), states[6])
+    )
+    assert np.array_equal(restored.fitness, whole.fitness)
 
 
 def corrupt(run: Path, generation: int) -> None:
@@ -190,17 +193,15 @@ def test_a_mistake_of_ours_is_not_blamed_on_the_disk(
 
 
 FILLS = """
-import resource, sys
+import dataclasses, resource, sys
 from pathlib import Path
 import jax
-from test_evolution import toy
+from test_evolution import begin, inputs, toy
 from mjxgait.errors import UserError
 from mjxgait.runs import checkpoint
 
-evolution = toy()
-step = jax.jit(evolution.step)
-state, _ = step(evolution.init(jax.random.key(0), 1, 1, 1))
-later, _ = step(state)
+begun = begin(*inputs(toy()), jax.random.key(0))
+state, later = (dataclasses.replace(begun, generation=jax.numpy.int32(g)) for g in (0, 1))
 checkpoints = checkpoint.Checkpoints(Path(sys.argv[1]))
 checkpoints.save(state, "toy", "0" * 16)
 checkpoints._manager.wait_until_finished()

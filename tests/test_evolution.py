@@ -3,6 +3,7 @@
 import dataclasses
 import itertools
 from collections.abc import Callable
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -20,11 +21,30 @@ from mjxgait.search.evolution import (
     stop_reason,
 )
 from mjxgait.search.variation import Box, first_occurrence
-from mjxgait.settings.config import EvolutionConfig, ForcedConfig
-from mjxgait.types import Judged
+from mjxgait.settings.config import Config, EvolutionConfig, ForcedConfig
+from mjxgait.settings.traced import traced
+from mjxgait.types import Judged, pytree
 
+FORCED = ForcedConfig(window=2)
 K, J = 2, 3
 BOX = Box(Genome(-jnp.ones((K, J)), jnp.zeros(1)), Genome(jnp.ones((K, J)), jnp.zeros(1)))
+
+
+@pytree
+class Problem:
+    """The centre is the best, the higher the slope the more; no value where the first gene is out of the limits."""
+
+    slope: float = 1.0
+    lowest: float = -2.0
+    highest: float = 2.0
+
+    def value(self, genomes: Genome) -> jax.Array:
+        first = genomes.key_poses[:, 0, 0]
+        inside = (first >= self.lowest) & (first <= self.highest)
+        return jnp.where(inside, self.slope * near_zero(genomes), jnp.nan)
+
+
+CENTRE, FLAT = Problem(), Problem(slope=0.0)
 
 
 def near_zero(genomes: Genome) -> jax.Array:
@@ -35,11 +55,11 @@ def near_zero(genomes: Genome) -> jax.Array:
 class Toy(Evolution):
     """An evolution with a judge of its own."""
 
-    value: Callable[[Genome], jax.Array] = near_zero
+    problem: Problem
 
     def step(self, state: EvolutionState) -> tuple[EvolutionState, GenerationMetrics]:
         proposal = self.propose(state)
-        terms = self.value(proposal.offspring)[:, None, None]
+        terms = self.problem.value(proposal.offspring)[:, None, None]
         judged = Judged(
             terms=terms,
             outcome=terms,
@@ -50,21 +70,47 @@ class Toy(Evolution):
         return self.absorb(state, proposal, judged)
 
 
-def toy(value: Callable[[Genome], jax.Array] = near_zero, **settings) -> Toy:
+def toy(problem: Problem = CENTRE, **settings) -> Toy:
+    """A spell of forced evolution looks two generations back, so that most toys share a program."""
+    plain = EvolutionConfig(population=20, generations=30, forced=FORCED)
+    return made(dataclasses.replace(plain, **settings), problem)
+
+
+def made(config: EvolutionConfig, problem: Problem) -> Toy:
+    """From settings, plain or traced."""
+
     def rank(terms: jax.Array, generation: jax.Array) -> jax.Array:
         return jnp.where(jnp.isfinite(terms[..., 0, 0]), terms[..., 0, 0], -jnp.inf)
 
-    config = dataclasses.replace(EvolutionConfig(population=20, generations=30), **settings)
-    return Toy(config, pose_variation(BOX, config), rank, value)
+    return Toy(config, pose_variation(BOX, config), rank, problem)
+
+
+def inputs(toy: Toy) -> tuple[EvolutionConfig, Problem]:
+    """What the programs below read, as in a run: toys that differ in numbers only share one."""
+    return traced(Config(evolution=toy.config)).evolution, toy.problem
+
+
+@jax.jit
+def begin(settings: EvolutionConfig, problem: Problem, key: jax.Array) -> EvolutionState:
+    return made(settings, problem).init(key, 1, 1, 1)
+
+
+@jax.jit
+def advance(
+    settings: EvolutionConfig, problem: Problem, state: EvolutionState
+) -> tuple[EvolutionState, GenerationMetrics, Genome]:
+    """The next state, what there is to tell, and who was born."""
+    evolution = made(settings, problem)
+    return *evolution.step(state), evolution.propose(state).offspring
 
 
 def run(
-    evolution: Toy, generations: int = 30, seed: int = 0
+    evolution: Toy, generations: int = 30, seed: int = 0, program: Callable[..., Any] = advance
 ) -> list[tuple[EvolutionState, GenerationMetrics]]:
-    state, step = evolution.init(jax.random.key(seed), 1, 1, 1), jax.jit(evolution.step)
-    history = []
+    given = inputs(evolution)
+    state, history = begin(*given, jax.random.key(seed)), []
     while len(history) < generations:
-        state, metrics = step(state)
+        state, metrics, _ = jax.device_get(program(*given, state))
         if state.generation >= 0:
             history.append((state, metrics))
     return history
@@ -78,16 +124,16 @@ def test_the_best_never_falls_and_the_algorithm_finds_the_optimum():
 
 @pytest.mark.parametrize("seed", range(5))
 def test_the_best_survives_forced_evolution_too(seed: int):
-    forced = ForcedConfig(window=1, gain=10.0, refresh=1.0, patience=0)
+    forced = ForcedConfig(window=2, gain=10.0, refresh=1.0, patience=0)
     best = [float(metrics.best) for _, metrics in run(toy(forced=forced), 30, seed)]
     assert all(later >= earlier for earlier, later in itertools.pairwise(best))
 
 
 def test_the_best_of_old_and_new_survive():
-    evolution, state = toy(), run(toy(), 3)[-1][0]
-    born = near_zero(evolution.propose(state).offspring)
-    best = np.unique(np.concatenate([state.fitness, born]))[::-1][:20]
-    assert np.allclose(evolution.step(state)[0].fitness, best)
+    state = run(toy(), 3)[-1][0]
+    after, _, born = advance(*inputs(toy()), state)
+    best = np.unique(np.concatenate([state.fitness, near_zero(born)]))[::-1][:20]
+    assert np.allclose(after.fitness, best)
     assert not np.allclose(state.fitness, best)
 
 
@@ -106,7 +152,7 @@ def test_duplicates_fill_the_population_when_they_may_stay():
 @pytest.mark.parametrize("growth", [1.2, 1.5, 2.0, 3.0])
 def test_everybody_of_the_initial_population_is_judged_before_generation_zero(growth: float):
     evolution = toy(growth=growth)
-    created = evolution.init(jax.random.key(0), 1, 1, 1)
+    created = begin(*inputs(evolution), jax.random.key(0))
     first = run(evolution, 1)[0][0]
     assert int(first.generation) == 0
     assert np.allclose(first.fitness, np.sort(near_zero(created.genomes))[::-1])
@@ -114,38 +160,28 @@ def test_everybody_of_the_initial_population_is_judged_before_generation_zero(gr
 
 
 def test_an_individual_that_cannot_be_judged_loses_and_poisons_nobody():
-    def sometimes(genomes: Genome) -> jax.Array:
-        return jnp.where(genomes.key_poses[:, 0, 0] > 0.3, jnp.nan, near_zero(genomes))
-
-    for state, metrics in run(toy(sometimes), 10)[1:]:
+    for state, metrics in run(toy(Problem(highest=0.3)), 10)[1:]:
         assert np.isfinite(state.fitness).all()
         assert np.isfinite(metrics.mean)
         assert (state.genomes.key_poses[:, 0, 0] <= 0.3).all()
 
 
 def test_a_population_without_one_good_individual_recovers():
-    def rarely(genomes: Genome) -> jax.Array:
-        return jnp.where(genomes.key_poses[:, 0, 0] < 0.99, jnp.nan, near_zero(genomes))
-
-    history = run(toy(rarely, population=8, mutation="pose"), 80)
+    history = run(toy(Problem(lowest=0.99), mutation="pose"), 80)
     assert not np.isfinite(history[0][1].best)
     assert np.isfinite(history[-1][1].best)
 
 
-def flat(genomes: Genome) -> jax.Array:
-    return jnp.zeros(genomes.key_poses.shape[0])
-
-
 def test_stagnation_starts_a_spell_that_refreshes_and_ends():
-    forced = ForcedConfig(window=3, newcomers=0.25, refresh=0.5, limit=2, patience=0)
-    history = run(toy(flat, forced=forced), 16)
+    forced = ForcedConfig(window=2, newcomers=0.25, refresh=0.5, limit=2, patience=0)
+    history = run(toy(FLAT, forced=forced), 16)
     flags = [bool(metrics.forced) for _, metrics in history]
-    assert flags[:4] == [False] * 4
-    assert flags[4]
-    assert not all(flags[4:7])
-    before, after = history[3][0], history[4][0]
+    assert flags[:3] == [False] * 3
+    assert flags[3]
+    assert not all(flags[3:6])
+    before, after = history[2][0], history[3][0]
     assert int(after.refreshed) == 10
-    newborn = after.born == 4
+    newborn = after.born == 3
     assert int(newborn.sum()) == 10
     assert set(np.asarray(after.origin)[newborn].tolist()) == {Origin.NEWCOMER, Origin.MUTATION}
     assert float(after.fitness[0]) >= float(before.fitness[0])
@@ -159,8 +195,8 @@ def lengths_of_spells(history: list[tuple[EvolutionState, GenerationMetrics]]) -
 @pytest.mark.parametrize(("limit", "length"), [(3, 3), (0, 5)])
 def test_without_a_limit_a_spell_lasts_until_the_population_is_refreshed(limit: int, length: int):
     """Four a generation are taken in, 19 of 20 are to be replaced."""
-    forced = ForcedConfig(window=3, refresh=1.0, limit=limit, patience=0)
-    assert lengths_of_spells(run(toy(flat, growth=1.2, forced=forced), 12))[0] == length
+    forced = ForcedConfig(window=2, refresh=1.0, limit=limit, patience=0)
+    assert lengths_of_spells(run(toy(FLAT, growth=1.2, forced=forced), 12))[0] == length
 
 
 def test_without_a_limit_a_spell_in_which_nobody_is_fit_does_not_end():
@@ -180,8 +216,8 @@ def test_a_growing_pool_evolves_and_simulates_nobody_twice():
     history = run(evolution, 10)
     assert float(history[-1][1].best) > float(history[0][1].best)
     state = history[-1][0]
-    offspring = evolution.propose(state).offspring
-    everybody = jax.tree.map(lambda a, b: jnp.concatenate([a, b]), state.genomes, offspring)
+    born = advance(*inputs(evolution), state)[2]
+    everybody = jax.tree.map(lambda a, b: jnp.concatenate([a, b]), state.genomes, born)
     assert first_occurrence(everybody).all()
 
 
@@ -191,7 +227,7 @@ def test_growth_keeps_forced_evolution_away():
 
 
 def test_unfit_newcomers_are_not_taken_in():
-    forced = ForcedConfig(window=1, gain=10.0, newcomers=1.0, accept=1.0, patience=0)
+    forced = ForcedConfig(window=2, gain=10.0, newcomers=1.0, accept=1.0, patience=0)
     for (before, _), (after, metrics) in zip(
         history := run(toy(forced=forced), 12), history[1:], strict=False
     ):
@@ -202,7 +238,7 @@ def test_unfit_newcomers_are_not_taken_in():
 
 def test_a_run_stops_when_forced_evolution_no_longer_pays():
     forced = ForcedConfig(window=2, limit=1, patience=2)
-    evolution = toy(flat, forced=forced)
+    evolution = toy(FLAT, forced=forced)
     reasons = [stop_reason(state, evolution.config) for state, _ in run(evolution, 25)]
     assert next(reason for reason in reasons if reason).startswith(
         "forced evolution no longer pays"
@@ -228,20 +264,21 @@ def test_parents_are_two_and_the_better_are_drawn_more_often(selection: str):
 def test_one_generation_is_traced_once():
     traces = []
 
-    def counted(genomes: Genome) -> jax.Array:
+    def counted(*given: Any) -> Any:
         traces.append(1)
-        return near_zero(genomes)
+        return advance.__wrapped__(*given)
 
-    run(toy(counted), 10)
+    counted.__name__ = "advance"  # to the cache of programs it is that one
+    run(toy(), 10, program=jax.jit(counted))
     assert len(traces) == 1
 
 
 def test_no_generation_draws_the_numbers_of_another():
-    evolution, states = toy(), [state for state, _ in run(toy(), 6)]
+    given, states = inputs(toy()), [state for state, _ in run(toy(), 6)]
     keys = {tuple(np.asarray(jax.random.key_data(state.key)).tolist()) for state in states}
     assert len(keys) == 6
     later = dataclasses.replace(states[0], key=states[1].key)
-    one, other = (evolution.propose(state).offspring.key_poses for state in (states[0], later))
+    one, other = (advance(*given, state)[2].key_poses for state in (states[0], later))
     assert not np.array_equal(one, other)
 
 

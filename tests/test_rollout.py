@@ -1,6 +1,8 @@
 """Episodes on lanes: the verdict on a genome depends on nothing but the genome and the start."""
 
 import dataclasses
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import jax
@@ -16,6 +18,7 @@ from mjxgait.runs.experiment import Experiment, build_experiment, evolution_of
 from mjxgait.search.variation import Box, uniform
 from mjxgait.settings.config import Config
 from mjxgait.settings.layers import resolve_config
+from mjxgait.simulation.evaluator import Local
 from mjxgait.simulation.rollout import Episodes
 from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.score import in_order, score
@@ -27,7 +30,7 @@ from mjxgait.tasks.walk.fitness import (
     fitness_terms,
     stride_limit,
 )
-from mjxgait.types import BodyState, Sensed
+from mjxgait.types import BodyState, Judged, Sensed
 
 ENDS = (Reason.TIPPED, Reason.TOO_LOW, Reason.TOO_HIGH, Reason.TOUCHED)
 
@@ -47,13 +50,24 @@ def with_lanes(experiment: Experiment, lanes: int, devices: int) -> Experiment:
     )
 
 
+@cache
+def program(experiment: Experiment) -> Callable[[Genome, Starts], Episodes]:
+    """Compiled once for all that is simulated in an experiment."""
+    return jax.jit(experiment.simulate)
+
+
 def simulate(experiment: Experiment, population: Genome, starts: Starts | None = None) -> Episodes:
-    return jax.device_get(jax.jit(experiment.simulate)(population, starts))
+    return jax.device_get(program(experiment)(population, starts or experiment.starts))
+
+
+def judged(experiment: Experiment, population: Genome, starts: Starts | None = None) -> Judged:
+    verdict = jax.jit(Local(experiment.simulator).verdict)
+    return verdict(experiment.row.settings, simulate(experiment, population, starts))
 
 
 @pytest.fixture(scope="module")
 def experiment(stool: Creature) -> Experiment:
-    return build_experiment(stool, small_config(rollout={"lanes": 3}))
+    return build_experiment(stool, small_config(rollout={"lanes": 3, "physics": "mjx"}))
 
 
 @pytest.fixture(scope="module")
@@ -98,8 +112,8 @@ def test_a_bad_individual_does_not_touch_its_neighbours(experiment: Experiment, 
 def test_not_finite_means_the_lowest_score(experiment: Experiment):
     population = genomes(experiment, 7)
     poisoned = dataclasses.replace(population, key_poses=population.key_poses.at[2].set(jnp.nan))
-    judged = jax.jit(experiment.judge)(poisoned)
-    fitness = evolution_of(experiment.simulator, experiment.config).rank(judged.terms, jnp.int32(0))
+    terms = judged(experiment, poisoned).terms
+    fitness = evolution_of(experiment.simulator, experiment.config).rank(terms, jnp.int32(0))
     assert np.isneginf(fitness[2])
     assert np.isfinite(np.delete(fitness, 2)).all()
 
@@ -108,10 +122,9 @@ def test_physics_that_breaks_at_once_means_the_lowest_score_too(experiment: Expe
     """Nothing has been counted then, and nothing must come of it."""
     starts = experiment.starts
     broken = dataclasses.replace(starts, qvel=starts.qvel.at[1, 0].set(jnp.nan))
-    row = dataclasses.replace(experiment.row, starts=broken)
-    judged = jax.jit(dataclasses.replace(experiment, row=row).judge)(genomes(experiment, 7))
-    assert np.isnan(judged.terms[:, 1]).all()
-    assert np.isfinite(judged.terms[:, 0]).all()
+    terms = judged(experiment, genomes(experiment, 7), broken).terms
+    assert np.isnan(terms[:, 1]).all()
+    assert np.isfinite(terms[:, 0]).all()
 
 
 def start_at(experiment: Experiment, height: float = 0.0, roll: float = 0.0) -> Starts:
@@ -198,7 +211,9 @@ def test_nothing_but_a_failed_computation_ends_an_episode_that_is_not_to_end(sto
 
 def test_death_freezes_the_tally(experiment: Experiment, stool: Creature):
     """A longer episode adds nothing to an individual that has died."""
-    long = build_experiment(stool, small_config(rollout={"lanes": 3, "seconds": 0.8}))
+    long = build_experiment(
+        stool, small_config(rollout={"lanes": 3, "seconds": 0.8, "physics": "mjx"})
+    )
     population = genomes(long, 7)
     leaning = start_at(experiment, height=0.1, roll=0.9)
     starts = dataclasses.replace(leaning, qvel=leaning.qvel.at[:, 3].set(6.0))

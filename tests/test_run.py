@@ -14,7 +14,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from helpers import STOOL
+from helpers import STOOL, said_by
 
 from mjxgait.champion import read_champion
 from mjxgait.creature import load_creature
@@ -24,13 +24,15 @@ SMALL = [
     "--env",
     str(STOOL),
     "--population",
-    "8",
+    "6",
     "--generations",
     "7",
     "--rollout.seconds",
     "0.4",
     "--rollout.starts",
     "2",
+    "--rollout.lanes",
+    "4",
 ]
 SMALL += ["--seed", "5", "--examination.candidates", "0", "--no-plots", "--checkpoint-every", "1"]
 
@@ -39,10 +41,8 @@ def command(*arguments: object) -> list[str]:
     return [sys.executable, "-m", "mjxgait", *map(str, arguments)]
 
 
-def mjxgait(*arguments: object, code: int = 0, **options) -> str:
-    done = subprocess.run(
-        command(*arguments), capture_output=True, text=True, timeout=300, **options
-    )
+def mjxgait(*arguments: object, code: int = 0) -> str:
+    done = subprocess.run(command(*arguments), capture_output=True, text=True, timeout=300)
     assert done.returncode == code, done.stderr
     assert "Traceback" not in done.stderr
     return done.stdout + done.stderr
@@ -80,7 +80,7 @@ def test_the_folder_holds_the_whole_run(finished: tuple[Path, str]):
     }
     creature, config = open_run(folder)
     assert creature.digest == load_creature(STOOL).digest
-    assert (config.seed, config.evolution.population) == (5, 8)
+    assert (config.seed, config.evolution.population) == (5, 6)
     champion = read_champion(folder / "champion.json", creature)
     lines = read_metrics(folder / "metrics.jsonl")
     assert [line["generation"] for line in lines] == list(range(8))
@@ -118,10 +118,10 @@ def test_the_same_seed_gives_the_same_champion(finished: tuple[Path, str], tmp_p
     assert without_times(tmp_path / "again") == without_times(finished[0])
 
 
-def kill_when(folder: Path, ready: Callable[[], bool], *more: str) -> int:
-    """Starts the run and kills it as soon as `ready` holds; returns its exit code."""
+def kill_when(ready: Callable[[], bool], *arguments: object) -> int:
+    """Starts a command and kills it as soon as `ready` holds; returns its exit code."""
     process = subprocess.Popen(
-        command("train", *SMALL, *more, "--out", folder),
+        command(*arguments),
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
@@ -143,17 +143,22 @@ def saving(folder: Path, generation: int) -> Callable[[], bool]:
     return lambda: any((folder / "checkpoints").glob(f"{generation}.*tmp*"))
 
 
-@pytest.mark.parametrize("moment", ["generation 1", "generation 5", "save 1", "save 3", "save 6"])
-def test_a_killed_run_goes_on_to_the_same_champion_bit_for_bit(
-    finished: tuple[Path, str], tmp_path: Path, moment: str
+MOMENTS = ("generation 1", "save 1", "save 3", "generation 5", "save 6")
+
+
+def test_a_run_killed_again_and_again_goes_on_to_the_same_champion_bit_for_bit(
+    finished: tuple[Path, str], tmp_path: Path
 ):
-    folder = tmp_path / "killed"
-    kind, number = moment.split()
-    kill_when(
-        folder,
-        generations(folder, int(number)) if kind == "generation" else saving(folder, int(number)),
-    )
-    mjxgait("train", "--resume", folder)
+    """Killed in generations and amid checkpoints: each time it goes on from what was left."""
+    folder, codes = tmp_path / "killed", []
+    begin = ("train", *SMALL, "--out", folder)
+    for moment in MOMENTS:
+        kind, number = moment.split()
+        ready = (generations if kind == "generation" else saving)(folder, int(number))
+        codes.append(kill_when(ready, *begin))
+        begin = ("train", "--resume", folder)
+    assert codes.count(-signal.SIGKILL) >= 4, "at most one moment may have passed unseen"
+    mjxgait(*begin)
     assert result(folder) == result(finished[0])
     assert without_times(folder) == without_times(finished[0])
 
@@ -162,7 +167,8 @@ def test_killed_between_two_checkpoints_it_repeats_what_came_after_the_first(
     finished: tuple[Path, str], tmp_path: Path
 ):
     folder = tmp_path / "killed"
-    kill_when(folder, generations(folder, 4), "--checkpoint-every", "5")
+    arguments = ("train", *SMALL, "--checkpoint-every", "5", "--out", folder)
+    assert kill_when(generations(folder, 4), *arguments) == -signal.SIGKILL
     assert sorted(
         int(path.name) for path in (folder / "checkpoints").iterdir() if path.name.isdigit()
     ) == [0]
@@ -217,21 +223,25 @@ def test_ctrl_c_finishes_the_generation_saves_and_says_how_to_go_on(
     assert (folder / "checkpoints" / str(last)).is_dir()
 
 
-def test_a_folder_with_another_run_is_left_alone(finished: tuple[Path, str]):
+def test_a_folder_with_another_run_is_left_alone(
+    finished: tuple[Path, str], capsys: pytest.CaptureFixture
+):
     before = result(finished[0])
-    assert "holds another run; name another folder with --out, or go on with --resume" in mjxgait(
-        "train", *SMALL, "--out", finished[0], code=2
+    assert "holds another run; name another folder with --out, or go on with --resume" in said_by(
+        capsys, "train", *SMALL, "--out", finished[0], code=2
     )
     assert result(finished[0]) == before
 
 
-def test_a_changed_creature_is_refused(finished: tuple[Path, str], tmp_path: Path):
+def test_a_changed_creature_is_refused(
+    finished: tuple[Path, str], tmp_path: Path, capsys: pytest.CaptureFixture
+):
     folder = tmp_path / "changed"
     subprocess.run(["cp", "-r", str(finished[0]), str(folder)], check=True)
     xml = folder / "creature" / "creature.xml"
     xml.write_text(xml.read_text().replace("0.04", "0.05"))
-    assert "belongs to another body than stool as it is now" in mjxgait(
-        "train", "--resume", folder, "--generations", "9", code=2
+    assert "belongs to another body than stool as it is now" in said_by(
+        capsys, "train", "--resume", folder, "--generations", "9", code=2
     )
 
 
@@ -253,15 +263,20 @@ def test_a_changed_creature_is_refused(finished: tuple[Path, str], tmp_path: Pat
     ],
 )
 def test_a_mistake_is_one_sentence_and_exit_code_2(
-    arguments: list[str], words: str, tmp_path: Path
+    arguments: list[str],
+    words: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture,
+    monkeypatch: pytest.MonkeyPatch,
 ):
-    assert words in " ".join(mjxgait(*arguments, code=2, cwd=tmp_path).split())
+    monkeypatch.chdir(tmp_path)
+    assert words in " ".join(said_by(capsys, *arguments, code=2).split())
     assert not list(tmp_path.rglob("config.toml"))
 
 
-def test_help_reads_well():
-    assert "train" in mjxgait("--help")
-    text = mjxgait("train", "--help")
+def test_help_reads_well(capsys: pytest.CaptureFixture):
+    assert "train" in said_by(capsys, "--help", code=0)
+    text = said_by(capsys, "train", "--help", code=0)
     assert "--evolution.population" in text
     assert "--seed" in text
 

@@ -109,6 +109,6 @@ def test_the_bodies_of_a_run_weigh_what_their_starts_say(stool: Creature):
     own = build_experiment(stool, small_config(rollout={**NONE, "starts": 3}))
     genomes = own.init().genomes
     # Heavier or lighter, it moves otherwise; the first start is the same body.
-    mixed, same = (e.simulate(genomes).tally.forward for e in (experiment, own))
+    mixed, same = (jax.jit(e.simulate)(genomes).tally.forward for e in (experiment, own))
     assert np.allclose(mixed[:, 0], same[:, 0], atol=1e-5)
     assert np.abs(mixed[:, 1:] - same[:, 1:]).max() > 1e-5

@@ -2,6 +2,8 @@
 says.
 """
 
+from functools import partial
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -11,7 +13,8 @@ from mjxgait.control.pose_variation import pose_variation
 from mjxgait.control.poses import Genome
 from mjxgait.search import variation
 from mjxgait.search.variation import Box, first_occurrence
-from mjxgait.settings.config import EvolutionConfig
+from mjxgait.settings.config import Config, EvolutionConfig
+from mjxgait.settings.traced import traced
 
 K, J, E = 3, 5, 7
 BOX = Box(
@@ -31,11 +34,39 @@ def inside(genomes: Genome) -> bool:
     return all(bool(jnp.all((low <= leaf) & (leaf <= high))) for low, leaf, high in pairs)
 
 
+def inputs(config: EvolutionConfig) -> EvolutionConfig:
+    """Settings as inputs of a program, as in a run: all kinds of an operator share one."""
+    return traced(Config(evolution=config)).evolution
+
+
+@partial(jax.jit, static_argnums=1)
+def creating(settings: EvolutionConfig, count: int) -> Genome:
+    return pose_variation(BOX, settings).create(jax.random.key(1), count)
+
+
+def created(config: EvolutionConfig, count: int) -> Genome:
+    return creating(inputs(config), count)
+
+
+@jax.jit
+def crossed(settings: EvolutionConfig, keys: jax.Array, mother: Genome, father: Genome) -> Genome:
+    cross = pose_variation(BOX, settings).cross
+    return jax.vmap(cross, in_axes=(0, None, None))(keys, mother, father)
+
+
+@jax.jit
+def mutating(settings: EvolutionConfig, keys: jax.Array, genome: Genome) -> Genome:
+    return jax.vmap(pose_variation(BOX, settings).mutate, in_axes=(0, None))(keys, genome)
+
+
+def mutated(config: EvolutionConfig, genome: Genome) -> Genome:
+    """200 mutants of one genome."""
+    return mutating(inputs(config), keys(200), genome)
+
+
 @pytest.mark.parametrize("initial", ["uniform", "latin"])
 def test_initial_genomes_fill_the_box(initial: str):
-    genomes = pose_variation(BOX, EvolutionConfig(initial=initial, initial_spread=1.0)).create(
-        jax.random.key(1), 200
-    )
+    genomes = created(EvolutionConfig(initial=initial, initial_spread=1.0), 200)
     assert genomes.key_poses.shape == (200, K, J)
     assert inside(genomes)
     share = (genomes.key_poses - BOX.low.key_poses) / (BOX.high.key_poses - BOX.low.key_poses)
@@ -44,7 +75,8 @@ def test_initial_genomes_fill_the_box(initial: str):
 
 
 def test_a_latin_hypercube_has_one_value_in_each_slice():
-    genomes = variation.latin_hypercube(jax.random.key(1), BOX, 50)
+    hypercube = jax.jit(variation.latin_hypercube, static_argnums=2)
+    genomes = hypercube(jax.random.key(1), BOX, 50)
     share = (genomes.key_poses - BOX.low.key_poses) / (BOX.high.key_poses - BOX.low.key_poses)
     slices = np.sort(np.floor(np.asarray(share).reshape(50, -1) * 50), axis=0)
     assert (slices == np.arange(50)[:, None]).all()
@@ -55,8 +87,7 @@ def test_every_pose_of_a_child_is_one_of_a_parent(crossing: str):
     mother, father = (
         jax.tree.map(lambda leaf: leaf[0], variation.uniform(key, BOX, 1)) for key in keys(2)
     )
-    cross = pose_variation(BOX, EvolutionConfig(crossing=crossing)).cross
-    children = jax.vmap(cross, in_axes=(0, None, None))(keys(100), mother, father)
+    children = crossed(inputs(EvolutionConfig(crossing=crossing)), keys(100), mother, father)
     both = np.concatenate([mother.key_poses, father.key_poses])
     places = np.array(
         [
@@ -77,8 +108,7 @@ def test_every_pose_of_a_child_is_one_of_a_parent(crossing: str):
 )
 def test_mutation_changes_one_pose_and_as_many_joints_as_its_kind_says(mutation: str, changed: int):
     genome = Genome(jnp.zeros((K, J)), jnp.full(E, 0.5).at[0].set(0.0))
-    mutate = pose_variation(BOX, EvolutionConfig(mutation=mutation, tuning_rate=0.0)).mutate
-    mutants = jax.vmap(mutate, in_axes=(0, None))(keys(100), genome)
+    mutants = mutated(EvolutionConfig(mutation=mutation, tuning_rate=0.0), genome)
     differs = np.asarray(mutants.key_poses != genome.key_poses)
     assert (differs.any(axis=2).sum(axis=1) == 1).all()
     assert (differs.sum(axis=(1, 2)) == changed).all()
@@ -88,28 +118,22 @@ def test_mutation_changes_one_pose_and_as_many_joints_as_its_kind_says(mutation:
 
 def test_mixed_mutation_is_the_one_kind_or_the_other():
     genome = Genome(jnp.zeros((K, J)), jnp.zeros(E))
-    mutate = pose_variation(BOX, EvolutionConfig(mutation="mixed", tuning_rate=0.0)).mutate
-    differs = np.asarray(jax.vmap(mutate, in_axes=(0, None))(keys(200), genome).key_poses != 0)
+    mutants = mutated(EvolutionConfig(mutation="mixed", tuning_rate=0.0), genome)
+    differs = np.asarray(mutants.key_poses != 0)
     counts = np.bincount(differs.sum(axis=(1, 2)), minlength=J + 1)
     assert counts[2] + counts[J] == 200
     assert 70 < counts[2] < 130
 
 
 def test_the_initial_spread_is_the_middle_of_each_range():
-    genomes = pose_variation(BOX, EvolutionConfig(initial_spread=0.5)).create(
-        jax.random.key(1), 500
-    )
+    genomes = created(EvolutionConfig(initial_spread=0.5), 500)
     reach = np.abs(genomes.key_poses).max(axis=0) / BOX.high.key_poses
     assert ((reach > 0.45) & (reach <= 0.5)).all()
     assert float(genomes.tuning[:, 1:].min()) >= 0.25
 
 
 def test_mutation_never_leaves_the_box():
-    edge = BOX.high
-    mutate = pose_variation(
-        BOX, EvolutionConfig(sigma=3.0, tuning_rate=1.0, tuning_sigma=3.0)
-    ).mutate
-    assert inside(jax.vmap(mutate, in_axes=(0, None))(keys(200), edge))
+    assert inside(mutated(EvolutionConfig(sigma=3.0, tuning_rate=1.0, tuning_sigma=3.0), BOX.high))
 
 
 def test_duplicates_are_all_but_the_first_of_equal_genomes():

@@ -14,7 +14,7 @@ from pathlib import Path
 import psutil
 import pyarrow.parquet
 import pytest
-from helpers import STOOL
+from helpers import STOOL, said_by
 
 from mjxgait.runs.folder import read_metrics
 
@@ -220,8 +220,11 @@ def test_a_study_whose_measuring_is_killed_says_so_and_goes_on(
     assert (folder / "results.csv").read_bytes() == (finished[0] / "results.csv").read_bytes()
 
 
-def test_a_study_that_would_take_days_is_refused_with_the_estimate(study: Path, tmp_path: Path):
-    said = mjxgait("ablate", study, "--generations", "10000000", "--out", tmp_path / "x", code=2)
+def test_a_study_that_would_take_days_is_refused_with_the_estimate(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture
+):
+    arguments = ("--generations", "10000000", "--out", tmp_path / "x")
+    said = said_by(capsys, "ablate", study, *arguments, code=2)
     assert "hours" in said
     assert not (tmp_path / "x").exists()
 
@@ -235,12 +238,14 @@ def test_a_study_that_would_take_days_is_refused_with_the_estimate(study: Path, 
         (["switches", "--env", "dragon"], 'unknown creature "dragon"'),
     ],
 )
-def test_mistakes_are_one_sentence(arguments: list[str], words: str):
-    assert words in mjxgait("ablate", *arguments, code=2)
+def test_mistakes_are_one_sentence(arguments: list[str], words: str, capsys: pytest.CaptureFixture):
+    assert words in said_by(capsys, "ablate", *arguments, code=2)
 
 
-def test_a_folder_in_use_is_left_alone(finished: tuple[Path, str], study: Path):
+def test_a_folder_in_use_is_left_alone(
+    finished: tuple[Path, str], study: Path, capsys: pytest.CaptureFixture
+):
     folder, _ = finished
     before = json.dumps(sorted(path.name for path in folder.iterdir()))
-    assert "--resume" in mjxgait("ablate", study, "--out", folder, code=2)
+    assert "--resume" in said_by(capsys, "ablate", study, "--out", folder, code=2)
     assert json.dumps(sorted(path.name for path in folder.iterdir())) == before

@@ -7,7 +7,7 @@ import numpy as np
 
 from mjxgait.creature import Creature
 from mjxgait.senses import sense
-from mjxgait.tasks.walk.tally import Judge, Reason
+from mjxgait.tasks.falls import Reason, why_fallen
 from mjxgait.types import Sensed
 
 
@@ -29,10 +29,10 @@ def standing(creature: Creature, above: float, floor: float | None) -> Sensed:
 
 
 def test_height_counts_above_the_ground(stool: Creature):
-    judge = Judge(stool, 0.005, 100)
-    assert judge.examine(standing(stool, 2.0, 2.0)) == Reason.FINISHED
-    assert judge.examine(standing(stool, 2.0, None)) == Reason.TOO_HIGH
-    assert judge.examine(standing(stool, 2.0, 2.2)) == Reason.TOO_LOW
+    ends = stool.settings.termination
+    assert why_fallen(stool, ends, standing(stool, 2.0, 2.0)) == Reason.FINISHED
+    assert why_fallen(stool, ends, standing(stool, 2.0, None)) == Reason.TOO_HIGH
+    assert why_fallen(stool, ends, standing(stool, 2.0, 2.2)) == Reason.TOO_LOW
 
 
 def test_a_controller_may_read_it(stool: Creature):

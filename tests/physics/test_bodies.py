@@ -145,9 +145,8 @@ def test_a_lane_keeps_its_body(plant: Plant, numbers: list[Any], together: Any):
 
 def test_none_is_the_plants_own(plant: Plant, moment: Moment, tight: float):
     """Constants and inputs of the same numbers give the same."""
-    one = moment.of(0)
-    own = jax.tree.map(lambda x: np.asarray(x)[None], plant.parameters)
-    given, none = one.for_plant(plant, own), one.for_plant(plant)
+    own = stacked([plant.parameters] * BODIES)
+    given, none = moment.for_plant(plant, own), moment.for_plant(plant)
     ours = compiled(everything(plant), *none)(*none)
     theirs = compiled(everything(plant), *given)(*given)
     assert ours[2].parameters is None

@@ -288,7 +288,9 @@ def test_a_walker_whose_legs_cross_is_seen_and_nobody_else(stool: Creature):
     """On fewer lanes than individuals, one whose legs meet among others that stand still."""
     from mjxgait.runs.experiment import build_experiment
 
-    experiment = build_experiment(stool, small_config(rollout={"lanes": 3, "starts": 1}))
+    experiment = build_experiment(
+        stool, small_config(rollout={"lanes": 3, "starts": 1, "physics": "mjx"})
+    )
     low, high = experiment.simulator.controller.bounds(experiment.config.controller)
     signs = np.array([1.0 if "front" in name else -1.0 for name in stool.joint_names])
     standing = np.broadcast_to(stool.stand, low.key_poses.shape)

@@ -38,7 +38,6 @@ def watched_tab(browser, address):
     tab.on("request", lambda request: asked.append(request.url))
     tab.goto(address)
     wait_until(tab, "document.getElementById('walk')?.loaded")
-    tab.wait_for_timeout(500)
     return tab, wrong, asked
 
 
@@ -56,6 +55,15 @@ def canvas(tab):
     return np.asarray(
         Image.open(io.BytesIO(base64.b64decode(picture.split(",")[1]))).convert("RGBA"), int
     )
+
+
+def drawn(tab, seconds=30):
+    """What the canvas shows as soon as it shows something: a model is drawn some time after it has been loaded."""
+    end = time.monotonic() + seconds
+    while is_blank(picture := canvas(tab)):
+        assert time.monotonic() < end, f"the canvas is still blank after {seconds} s"
+        tab.wait_for_timeout(100)
+    return picture
 
 
 def is_blank(picture):

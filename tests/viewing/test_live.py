@@ -13,7 +13,7 @@ import urllib.error
 import urllib.request
 
 import pytest
-from viewing.browser import canvas, is_blank, wait_until, watched_tab
+from viewing.browser import drawn, wait_until, watched_tab
 from viewing.made_up import falling, metrics_line, treading, write_run
 
 from mjxgait.champion import write_champion
@@ -152,7 +152,7 @@ def test_the_page_shows_the_best_and_the_curve_grows(browser, site, run, stool):
     improve(run, stool, treading(stool, degrees=12.0))
     watcher.look()
     tab, wrong, asked = watched_tab(browser, address)
-    assert not is_blank(canvas(tab))
+    drawn(tab)
     assert "generation" in tab.inner_text("#what")
     before = tab.inner_html("#curve")
     improve(run, stool, treading(stool, degrees=8.0))
@@ -163,6 +163,6 @@ def test_the_page_shows_the_best_and_the_curve_grows(browser, site, run, stool):
         "document.getElementById('walk').loaded",
     )
     assert tab.inner_html("#curve") != before
-    assert not is_blank(canvas(tab))
+    drawn(tab)
     assert wrong == []
     assert [url for url in asked if not url.startswith((address, "data:", "blob:"))] == []

@@ -7,7 +7,7 @@ import json
 
 import numpy as np
 import pytest
-from viewing.browser import canvas, is_blank, watched_tab
+from viewing.browser import canvas, drawn, is_blank, watched_tab
 from viewing.made_up import treading, write_run
 
 from mjxgait.certify.certificate import SCHEMA
@@ -60,8 +60,7 @@ def opened(browser, page):
 
 def test_the_canvas_shows_a_creature_that_moves(opened):
     tab, _, _ = opened
-    first = canvas(tab)
-    assert not is_blank(first)
+    first = drawn(tab)
     assert tab.evaluate("walk.availableAnimations") == ["walk"]
     for _ in range(20):
         tab.wait_for_timeout(130)
@@ -93,7 +92,8 @@ def test_a_blank_canvas_would_be_noticed(browser, page, tmp_path):
     (tmp_path / "broken.html").write_text(text[:start] + text[end:], encoding="utf-8")
     tab = browser.new_page()
     tab.goto((tmp_path / "broken.html").as_uri())
-    tab.wait_for_timeout(1500)
+    with pytest.raises(AssertionError, match="blank"):
+        drawn(tab, seconds=1.5)
     assert not tab.evaluate("document.getElementById('walk').loaded")
     assert is_blank(canvas(tab))
 
