@@ -1,4 +1,4 @@
-"""Ground that is no plane, drawn: facets from far to near, shaded, with the same bands as the floor."""
+"""Ground that is no plane, drawn in facets from far to near, with the same bands as the floor."""
 
 from collections.abc import Callable
 
