@@ -36,9 +36,10 @@ def certificate(margin: float, attempts: int = 1) -> Certificate:
     return Certificate(
         "stool",
         "",
+        "walk",
         "",
         (Criterion(2, "progress", (measure,)),),
-        {"gait": "walk", "speed": 1.0, "overlap": None},
+        {"summary": "walk, 1.00 m/s", "overlap": None},
         CertificateConfig(),
         1.0,
         attempts,

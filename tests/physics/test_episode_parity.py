@@ -9,7 +9,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from certify_made_up import TUNING
 from disturbed_walks import (
     CONFIGS,
     DISTURBANCES,
@@ -29,7 +28,7 @@ from disturbed_walks import (
     tolerance,
     watched,
 )
-from helpers import small_config
+from helpers import STILL, small_config
 from recorded_tally import Frames, end, tally_of
 
 from mjxgait.certify.simulate import Outcome
@@ -82,7 +81,7 @@ def tallies(request: pytest.FixtureRequest, body: Creature, outcomes: list[Outco
     """Evolution's, leaves [B, 1, R, ...]."""
     rollout = {"seconds": SECONDS, "lanes": 3, "physics": request.param, **LENIENT}
     simulator = build_experiment(body, small_config(rollout=rollout)).simulator
-    genes = TUNING | GENES_OF_THE_GAIT
+    genes = STILL | GENES_OF_THE_GAIT
     genome = Genome(jnp.float32(poses(body)), jnp.float32([genes[name] for name in GENES]))
     genomes = jax.tree.map(lambda leaf: jnp.stack([leaf[None]] * len(CONFIGS)), genome)
     settings = jax.tree.map(lambda *leaves: jnp.stack(leaves), *map(traced, CONFIGS))
