@@ -36,7 +36,8 @@ import numpy as np
 from mjxgait.certify import CertificateConfig, push_ladder
 from mjxgait.certify.certificate import half_point
 from mjxgait.certify.config import PushesConfig
-from mjxgait.certify.simulate import Fall, Outcome, simulate
+from mjxgait.certify.outcome import Fall, Outcome
+from mjxgait.certify.simulate import simulate
 from mjxgait.certify.starts import Starts, join, nominal_starts, perturbed_starts
 from mjxgait.certify.worlds import slippery, sloping
 from mjxgait.champion import Champion, read_champion

@@ -8,7 +8,8 @@ from certify_made_up import LEGS, TOML, XML, make_champion
 from helpers import small_config
 
 from mjxgait.certify import starts as examined
-from mjxgait.certify.simulate import Fall, Outcome, simulate
+from mjxgait.certify.outcome import Fall, Outcome
+from mjxgait.certify.simulate import simulate
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature, load_creature
 from mjxgait.settings.config import Config

@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 
-from mjxgait.certify.simulate import Fall, Trajectory
+from mjxgait.certify.outcome import Fall, Trajectory
 from mjxgait.creature import Creature
 from mjxgait.creature.settings import Termination
 from mjxgait.tasks.falls import Reason

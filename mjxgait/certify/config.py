@@ -5,7 +5,7 @@ The first table is `simulate.Fall`.
 
 import dataclasses
 
-from mjxgait.certify.simulate import Fall
+from mjxgait.certify.outcome import Fall
 from mjxgait.settings.tables import STRICT, Count, Fraction, NonNegative, Positive, Whole
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from mjxgait.certify.config import CertificateConfig, PartsConfig, PhysicsConfig
 from mjxgait.certify.measure import Recording
-from mjxgait.certify.simulate import Fall
+from mjxgait.certify.outcome import Fall
 
 
 @dataclasses.dataclass(frozen=True)

@@ -9,8 +9,9 @@ import mujoco
 import numpy as np
 
 from mjxgait.certify.layout import LowestPoint, start_frame
+from mjxgait.certify.outcome import Trajectory
 from mjxgait.certify.overlap import overlaps
-from mjxgait.certify.simulate import Trajectory, examined_model
+from mjxgait.certify.stepping import examined_model
 from mjxgait.certify.terrain import terrain_of
 from mjxgait.creature import Creature
 

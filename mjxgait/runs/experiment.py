@@ -90,10 +90,6 @@ class Experiment:
         episodes = self.simulator.simulate(*rows)
         return Episodes(_only(episodes.tally), episodes.computed_steps)
 
-    def judge(self, genomes: Any) -> Judged:
-        """The verdict on genomes [N, ...]."""
-        return Local(self.simulator).verdict(self.row.settings, self.simulate(genomes))
-
     def compile(self) -> Step:
         """The generation as one compiled program."""
         batch = Batch((self,))

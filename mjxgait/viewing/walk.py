@@ -12,7 +12,8 @@ import numpy as np
 
 from mjxgait.certify.layout import Ground
 from mjxgait.certify.measure import Recording, measure
-from mjxgait.certify.simulate import Trajectory, simulate
+from mjxgait.certify.outcome import Trajectory
+from mjxgait.certify.simulate import simulate
 from mjxgait.certify.starts import nominal_starts
 from mjxgait.certify.strides import stride_starts
 from mjxgait.certify.terrain import terrain_of

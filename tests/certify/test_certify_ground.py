@@ -9,8 +9,9 @@ from mjxgait.certify.certificate import record
 from mjxgait.certify.config import CertificateConfig
 from mjxgait.certify.layout import LowestPoint
 from mjxgait.certify.measure import measure
-from mjxgait.certify.simulate import examined_model, simulate
+from mjxgait.certify.simulate import simulate
 from mjxgait.certify.starts import nominal_starts
+from mjxgait.certify.stepping import examined_model
 from mjxgait.certify.terrain import grounded_model, terrain_of
 from mjxgait.certify.worlds import slippery
 

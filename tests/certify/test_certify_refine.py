@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mjxgait.certify import record
-from mjxgait.certify.simulate import examined_model
+from mjxgait.certify.stepping import examined_model
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 

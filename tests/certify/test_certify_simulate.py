@@ -15,7 +15,8 @@ from mjxgait.certify import distance, glance, record, survival
 from mjxgait.certify.drive import Drive
 from mjxgait.certify.layout import start_frame
 from mjxgait.certify.measure import measure
-from mjxgait.certify.simulate import Fall, examined_model, simulate
+from mjxgait.certify.outcome import Fall
+from mjxgait.certify.simulate import simulate
 from mjxgait.certify.starts import (
     join,
     nominal_starts,
@@ -24,6 +25,7 @@ from mjxgait.certify.starts import (
     unfamiliar,
 )
 from mjxgait.certify.state import State, sense
+from mjxgait.certify.stepping import examined_model
 from mjxgait.certify.twins.poses import PoseTwin
 from mjxgait.errors import UserError
 

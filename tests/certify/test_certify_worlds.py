@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from certify_made_up import make_champion
 
-from mjxgait.certify.simulate import Fall, simulate
+from mjxgait.certify.outcome import Fall
+from mjxgait.certify.simulate import simulate
 from mjxgait.certify.starts import perturbed_starts
 from mjxgait.certify.worlds import slippery, sloping
 

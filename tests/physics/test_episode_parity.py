@@ -31,7 +31,7 @@ from disturbed_walks import (
 from helpers import STILL, small_config
 from recorded_tally import Frames, end, tally_of
 
-from mjxgait.certify.simulate import Outcome
+from mjxgait.certify.outcome import Outcome
 from mjxgait.control.poses import TUNING as GENES
 from mjxgait.control.poses import Genome
 from mjxgait.creature import Creature

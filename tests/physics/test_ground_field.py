@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 from many_bodies import SLIM
 
-from mjxgait.certify.simulate import examined_model
+from mjxgait.certify.stepping import examined_model
 from mjxgait.certify.terrain import terrain_of
 from mjxgait.creature import Creature
 from mjxgait.creature.frame import start_place

@@ -1,0 +1,70 @@
+"""What a simulation ends with: when a creature is down, what became of it, and its motion.
+
+Letters: `S` simulations, `R` recorded ones (the first of the `S`), `T` control steps, `J` actuated
+joints, `nq nv` as in MuJoCo.
+"""
+
+import dataclasses
+from typing import Annotated
+
+import numpy as np
+import pydantic
+
+from mjxgait.settings.tables import STRICT, NonNegative, Positive
+
+
+@dataclasses.dataclass(frozen=True)
+class Fall:
+    """When a creature is down; criterion 1.
+
+    min_up: least product of the trunk's up axis with the world's. height: range of the trunk's
+    height in standing heights.
+    touch: whether a part that is neither foot nor ground contact is down when it touches the floor.
+    """
+
+    __pydantic_config__ = STRICT
+    min_up: Annotated[float, pydantic.Field(ge=-1, le=1)] = 0.5
+    height: tuple[NonNegative, Positive] = (0.5, 1.5)
+    touch: bool = True
+
+    def __post_init__(self) -> None:
+        if not self.height[0] < 1 < self.height[1]:
+            raise ValueError(
+                f"height = {list(self.height)}: must be a range around 1, the standing height"
+            )
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Trajectory:
+    """Everything needed to look at the recorded simulations again; frames are control steps, before
+    their torque acts.
+
+    time_step: s between frames. qpos: [R, T, nq]. qvel: [R, T, nv]. torque: [R, T, J] N·m.
+    target: [R, T, J] rad that the joints were pulled to; NaN under a controller that sends torques.
+    phase: [R, T] where the controller was in its own cycle, in [0, 1); NaN for one without. A simulation that blew up is NaN from there on.
+    """
+
+    time_step: float
+    qpos: np.ndarray
+    qvel: np.ndarray
+    torque: np.ndarray
+    target: np.ndarray
+    phase: np.ndarray
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Outcome:
+    """What became of the simulations.
+
+    fell: [S] s, infinite for those that stayed up. travel: [S, 2] m along the start's forward and
+    left until the end or the fall.
+    """
+
+    fell: np.ndarray
+    travel: np.ndarray
+    trajectory: Trajectory
+
+    @property
+    def stayed_up(self) -> np.ndarray:
+        """[S] whether never down."""
+        return np.isinf(self.fell)

@@ -1,0 +1,306 @@
+"""Steps the simulations of one thread on C MuJoCo, under the twin of the champion's controller.
+
+Letters: `S` simulations, `R` recorded ones (the first of the `S`), `T` control steps, `J` actuated
+joints, `nq nv` as in MuJoCo.
+"""
+
+import copy
+
+import mujoco
+import numpy as np
+from mujoco.batch import Batch
+
+from mjxgait.certify.drive import Drive
+from mjxgait.certify.layout import Layout, LowestPoint, colliding_geoms, start_frame
+from mjxgait.certify.outcome import Fall, Outcome, Trajectory
+from mjxgait.certify.starts import Starts
+from mjxgait.certify.state import FOOT_SENSES, State, sense
+from mjxgait.certify.terrain import grounded_model, terrain_of
+from mjxgait.certify.twins import twin_of
+from mjxgait.champion import Champion
+from mjxgait.creature import Creature
+
+VELOCITY_STAGE = int(mujoco.mjtStage.mjSTAGE_VEL)
+
+BLOWN_UP = 1e4
+"""m/s or rad/s, from which a simulation is stopped: beyond any walk, and before MuJoCo itself
+complains in a log file.
+"""
+
+
+def examined_model(creature: Creature, refine: int = 1) -> mujoco.MjModel:
+    """The creature's own body on its ground, with a converged contact solver, and its time step
+    divided by `refine`.
+    """
+    model = copy.copy(grounded_model(creature))
+    model.opt.iterations, model.opt.ls_iterations = 100, 50
+    model.opt.tolerance = 1e-8
+    model.opt.timestep = creature.model.opt.timestep / refine
+    # A simulation that blows up must not be put back on its feet in silence.
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    return model
+
+
+class Stepping:
+    """The simulations of one thread, of which the first `record` are recorded."""
+
+    def __init__(
+        self,
+        creature: Creature,
+        champion: Champion,
+        starts: Starts,
+        record: int,
+        refine: int,
+        fall: Fall,
+    ) -> None:
+        self.creature, self.starts, self.record, self.refine, self.fall = (
+            creature,
+            starts,
+            record,
+            refine,
+            fall,
+        )
+        step = float(creature.model.opt.timestep)
+        self.twin = twin_of(creature, champion, step)
+        self.drive = Drive(creature, champion.drive, self.twin.command, step)
+        self.start = start_frame(creature)
+        self.model = examined_model(creature, refine)
+        self.batch = _batch(creature, self.model, starts)
+        self.layout = Layout(self.model)
+        self.terrain = terrain_of(creature)
+        self.solid = LowestPoint(self.model, colliding_geoms(self.model), self.terrain)
+        others = creature.watched[len(creature.foot_of) :]
+        self.forbidden = LowestPoint(self.model, others, self.terrain)
+        bind = self.batch.bind
+        self.qpos, self.qvel, self.applied = bind("qpos"), bind("qvel"), bind("qfrc_applied")
+        self.warm_start = bind("qacc_warmstart")
+        self.xpos, self.xmat, self.mass = bind("xpos"), bind("xmat"), bind("M")
+        self.bias, self.passive, self.constraint = (
+            bind("qfrc_bias"),
+            bind("qfrc_passive"),
+            bind("qfrc_constraint"),
+        )
+        self.geom_xpos, self.geom_xmat = bind("geom_xpos"), bind("geom_xmat")
+        self._lift()
+        self.memory = dict(self.twin.init(len(starts)))
+        feet = creature.watched[: len(creature.foot_of)]
+        self.feet = LowestPoint(self.model, feet, self.terrain)
+        self.sees_feet = any(name in FOOT_SENSES for name in self.twin.reads)
+        self.last_force = np.zeros_like(self.qvel)
+        # What the controller has sent last, for those whose torques come late.
+        self.sent = np.zeros((int(starts.delay.max()) + 1, *starts.stiffness.shape))
+
+    def to_the_end(self, steps: int, heading: np.ndarray | None) -> Outcome:
+        """Steps until the end, leaving out what has fallen and is not recorded."""
+        count, time_step = len(self.starts), self.creature.model.opt.timestep
+        fell = np.full(count, np.inf)
+        travel = np.zeros((count, 2))
+        leader, waiting = self._alike()
+        running = np.setdiff1d(np.arange(count), waiting)
+        film = self._empty_film(steps)
+        for k in range(steps):
+            if not len(running):
+                break
+            if len(waiting) and np.isinf(fell[leader]):
+                released = waiting[self._pushed(waiting, k)]
+                self._follow(released, leader)
+                running, waiting = np.union1d(running, released), np.setdiff1d(waiting, released)
+            self._push(running, k)
+            commanded = None if heading is None else float(heading[k])
+            self._control_step(running, k, commanded, film)
+            travel[running] = self._travel(running)
+            down = running[self._down(running)]
+            fell[down] = np.minimum(fell[down], (k + 1) * time_step)
+            watched = (k + 1) * time_step < self.starts.end[running]
+            if len(down) or not watched.all():
+                running = running[
+                    watched
+                    & self._sane(running)
+                    & ((running < self.record) | np.isinf(fell[running]))
+                ]
+        fell[waiting], travel[waiting] = fell[leader], travel[leader]
+        return Outcome(fell, travel, film)
+
+    def _alike(self) -> tuple[int, np.ndarray]:
+        """One simulation that stands for others until they are pushed, and those others.
+
+        Nothing tells them apart before, so a quarter of all steps need not be taken.
+        """
+        alike = np.flatnonzero(self.starts.undisturbed)
+        if not len(alike):
+            return 0, alike
+        leader = int(alike[self.starts.push_time[alike].argmax()])
+        return leader, alike[(alike != leader) & (alike >= self.record)]
+
+    def _follow(self, rows: np.ndarray, leader: int) -> None:
+        """Puts simulations where another one is."""
+        own = (self.qpos, self.qvel, self.warm_start, self.last_force)
+        for state in (*own, *self.memory.values()):
+            state[rows] = state[leader]
+        self.sent[:, rows] = self.sent[:, [leader]]
+
+    def _control_step(
+        self, running: np.ndarray, k: int, heading: float | None, film: Trajectory
+    ) -> None:
+        kept = running[running < self.record]
+        film.qpos[kept, k], film.qvel[kept, k] = self.qpos[kept], self.qvel[kept]
+        film.phase[kept, k] = self.twin.phase({n: m[kept] for n, m in self.memory.items()})
+        command, torque = self._physics_step(running, k, heading)
+        film.torque[kept, k] = torque[: len(kept)]
+        if self.twin.command == "pose":
+            film.target[kept, k] = command[: len(kept)]
+        for _ in range(self.refine - 1):
+            self.batch.step(running, stage=VELOCITY_STAGE)
+
+    def _physics_step(
+        self, running: np.ndarray, k: int, heading: float | None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The command, and the torque that acts, [running, J] each."""
+        state, starts = self._state(running, k), self.starts
+        command = self._act(running, state, heading)
+        self.sent[k % len(self.sent), running] = self.drive.torque(
+            command, state, starts.stiffness[running], starts.damping[running]
+        )
+        # Before the first torque has arrived it acts already, as if the body had been held so.
+        arrived = np.maximum(k - starts.delay[running], 0) % len(self.sent)
+        torque = self.sent[arrived, running]
+        self.applied[running[:, None], self.creature.dof_adr] = torque
+        self.batch.step(running, stage=VELOCITY_STAGE)
+        self.last_force[running] = self.constraint[running]
+        return command, torque
+
+    def _act(self, running: np.ndarray, state: State, heading: float | None) -> np.ndarray:
+        """The command [running, J]; the twin's memory moves on."""
+        senses = sense(self.creature, state, self.twin.reads)
+        if heading is not None:
+            # Told where to go, it does not come back to the line that it left.
+            senses["heading"] = senses["heading"] - heading
+            senses["aside"] = np.zeros_like(senses["aside"])
+        before = {name: values[running] for name, values in self.memory.items()}
+        command, after = self.twin.act(before, senses)
+        for name, values in after.items():
+            self.memory[name][running] = values
+        return command
+
+    def _state(self, running: np.ndarray, k: int) -> State:
+        """M and bias belong to the current state: each step ends with the velocity stage of the
+        new one.
+        """
+        creature, velocity = self.creature, self.qvel[running]
+        rot, root = self.xmat[running, creature.trunk].reshape(-1, 3, 3), self.layout.root_dof
+        return State(
+            start=self.start,
+            ground=self.terrain,
+            time=np.full(len(running), k * creature.model.opt.timestep),
+            joint_pos=self.qpos[running[:, None], creature.qpos_adr],
+            velocity=velocity,
+            trunk_pos=self.xpos[running, creature.trunk],
+            trunk_rot=rot,
+            trunk_vel=velocity[:, root : root + 3],
+            # A free joint's angular velocity is in the body's own frame.
+            trunk_angvel=(rot * velocity[:, None, root + 3 : root + 6]).sum(2),
+            foot_height=self._foot_height(running),
+            mass_matrix=self.layout.dense(self.mass[running]),
+            bias=self.bias[running] - self.passive[running],
+            constraint_force=self.last_force[running],
+        )
+
+    def _foot_height(self, running: np.ndarray) -> np.ndarray:
+        if not self.sees_feet:
+            return np.zeros((len(running), 0))
+        low = self.feet.heights(self.geom_xpos[running], self.geom_xmat[running])
+        feet = range(len(self.creature.foot_names))
+        return np.stack([low[:, self.creature.foot_of == foot].min(1) for foot in feet], 1)
+
+    def _lift(self) -> None:
+        """Raises each start until no part is deeper in the floor than when standing; else joint
+        noise would begin with a kick.
+        """
+        self.batch.forward(stage=VELOCITY_STAGE)
+        standing = mujoco.MjData(self.model)
+        standing.qpos[:] = self.creature.stand_qpos
+        mujoco.mj_kinematics(self.model, standing)
+        usual = self.solid.lowest(standing.geom_xpos[None], standing.geom_xmat[None])
+        self.qpos[:, self.layout.root_qpos + 2] += np.maximum(
+            usual - self.solid.lowest(self.geom_xpos, self.geom_xmat), 0
+        )
+        self.batch.forward(stage=VELOCITY_STAGE)
+
+    def _push(self, running: np.ndarray, k: int) -> None:
+        pushed = running[self._pushed(running, k)]
+        if len(pushed):
+            self.qvel[pushed, self.layout.root_dof : self.layout.root_dof + 2] += self.starts.push[
+                pushed
+            ]
+            self.batch.forward(pushed, stage=VELOCITY_STAGE)
+
+    def _pushed(self, rows: np.ndarray, k: int) -> np.ndarray:
+        """Which of some simulations are pushed at a step."""
+        time_step = self.creature.model.opt.timestep
+        return np.floor(self.starts.push_time[rows] / time_step) == k
+
+    def _travel(self, running: np.ndarray) -> np.ndarray:
+        start = self.start
+        moved = self.xpos[running, self.creature.trunk] - start.place
+        return np.stack([moved @ start.forward, moved @ start.left], 1)
+
+    def _sane(self, running: np.ndarray) -> np.ndarray:
+        return (np.abs(self.qvel[running]) < BLOWN_UP).all(1)
+
+    def _down(self, running: np.ndarray) -> np.ndarray:
+        """Negated comparisons, so that a simulation that is NaN counts as down."""
+        trunk = self.creature.trunk
+        up = self.xmat[running, trunk].reshape(-1, 3, 3)[:, 2] @ self.creature.up
+        x, y, z = self.xpos[running, trunk].T
+        above = z - self.terrain.height(x, y) if self.terrain else z
+        height = above / self.creature.stand_height
+        fine = (
+            self._sane(running)
+            & (up > self.fall.min_up)
+            & (height > self.fall.height[0])
+            & (height < self.fall.height[1])
+        )
+        if self.fall.touch:
+            fine &= self.forbidden.lowest(self.geom_xpos[running], self.geom_xmat[running]) > 0
+        return ~fine
+
+    def _empty_film(self, steps: int) -> Trajectory:
+        def blank(width: int) -> np.ndarray:
+            return np.full((self.record, steps, width), np.nan)
+
+        joints = len(self.creature.dof_adr)
+        return Trajectory(
+            self.creature.model.opt.timestep,
+            qpos=blank(self.model.nq),
+            qvel=blank(self.model.nv),
+            torque=blank(joints),
+            target=blank(joints),
+            phase=np.full((self.record, steps), np.nan),
+        )
+
+
+def _batch(creature: Creature, model: mujoco.MjModel, starts: Starts) -> Batch:
+    """The simulations at their starts."""
+    batch = Batch(model, len(starts), 1, persistent=True)
+    batch.expand("geom_friction")[:, :, 0] *= starts.friction[:, None]
+    batch.expand("body_mass")[:] *= starts.mass
+    batch.expand("body_inertia")[:] *= starts.mass[:, :, None]
+    batch.expand("opt.gravity")[:] = _gravity(model, starts.slope)
+    # The impedance and not the time constant, which is as short as the time step allows already.
+    impedance = batch.expand("geom_solimp")[:, :, :2]
+    impedance /= impedance + starts.floor[:, None, None] * (1 - impedance)
+    batch.set_const()
+    batch.reset(stage=int(mujoco.mjtStage.mjSTAGE_NONE))
+    qpos = batch.bind("qpos")
+    qpos[:] = creature.stand_qpos
+    qpos[:, creature.qpos_adr] += starts.joint_offset
+    batch.bind("qvel")[:, creature.dof_adr] = starts.joint_velocity
+    return batch
+
+
+def _gravity(model: mujoco.MjModel, slope: np.ndarray) -> np.ndarray:
+    """[S, 3] on slopes [S, 2]: gravity is tilted instead of the floor, see `worlds.sloping`."""
+    angle = np.linalg.norm(slope, axis=1, keepdims=True)
+    uphill = slope / np.where(angle > 0, angle, 1.0)
+    change = np.concatenate([-np.sin(angle) * uphill, 1 - np.cos(angle)], 1)
+    return model.opt.gravity + np.linalg.norm(model.opt.gravity) * change
