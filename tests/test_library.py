@@ -11,14 +11,15 @@ from helpers import STOOL
 import mjxgait
 from mjxgait.errors import UserError
 
+pytestmark = pytest.mark.usefixtures("as_shipped")  # shares the program of test_examination
 SMALL = {
-    "rollout": {"seconds": 0.4, "lanes": 4, "physics": "mjx"},
+    "rollout": {"seconds": 0.4, "lanes": 4},
     "examination": {"candidates": 1, "draws": 2},
 }
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory) -> mjxgait.Run:
+def run(tmp_path_factory, as_shipped) -> mjxgait.Run:
     folder = tmp_path_factory.mktemp("runs") / "x"
     return mjxgait.train(
         STOOL, out=folder, seed=3, population=6, generations=2, settings=SMALL, quiet=True

@@ -45,9 +45,10 @@ def genomes(experiment: Experiment, count: int, seed: int = 0) -> Genome:
 
 def with_lanes(experiment: Experiment, lanes: int, devices: int) -> Experiment:
     mesh = jax.sharding.Mesh(np.array(jax.devices()[:devices]), ("lanes",))
-    return dataclasses.replace(
-        experiment, simulator=dataclasses.replace(experiment.simulator, lanes=lanes, mesh=mesh)
-    )
+    other = dataclasses.replace(experiment)
+    simulator = dataclasses.replace(experiment.simulator, lanes=lanes, mesh=mesh)
+    vars(other)["simulator"] = simulator  # where the property keeps it
+    return other
 
 
 @cache

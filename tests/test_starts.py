@@ -106,9 +106,6 @@ def test_the_bodies_of_a_run_weigh_what_their_starts_say(stool: Creature):
     masses = experiment.simulator.plant.heavier(plain, experiment.starts.heaviness[1])
     for leaf, its in zip(jax.tree.leaves(numbers), jax.tree.leaves(masses), strict=True):
         np.testing.assert_allclose(leaf[1], its, rtol=1e-6)
-    own = build_experiment(stool, small_config(rollout={**NONE, "starts": 3}))
-    genomes = own.init().genomes
-    # Heavier or lighter, it moves otherwise; the first start is the same body.
-    mixed, same = (jax.jit(e.simulate)(genomes).tally.forward for e in (experiment, own))
-    assert np.allclose(mixed[:, 0], same[:, 0], atol=1e-5)
-    assert np.abs(mixed[:, 1:] - same[:, 1:]).max() > 1e-5
+    # Nothing else tells the starts apart: where the masses count, everybody moves otherwise in each.
+    forward = jax.jit(experiment.simulate)(experiment.init().genomes).tally.forward
+    assert np.abs(np.diff(forward, axis=1)).max() > 1e-5
