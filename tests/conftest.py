@@ -8,6 +8,8 @@ os.environ.setdefault(
     "JAX_COMPILATION_CACHE_DIR", str(Path(__file__).parents[1] / ".pytest_cache" / "jax")
 )
 os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
+# Compiling is what takes the time in most tests, and in the commands that they start; see `as_shipped`.
+os.environ.setdefault("JAX_DISABLE_MOST_OPTIMIZATIONS", "1")
 
 import jax
 import pytest
@@ -17,8 +19,6 @@ from mjxgait.creature import Creature, load_creature
 from mjxgait.settings.shipped import data_folder
 
 jax.config.update("jax_num_cpu_devices", 2)
-# Compiling is what takes the time in most tests; see `as_shipped`.
-jax.config.update("jax_disable_most_optimizations", True)
 
 SHIPPED = sorted(path.parent.name for path in data_folder("envs").glob("*/creature.toml"))
 
@@ -37,10 +37,7 @@ def shipped(request: pytest.FixtureRequest) -> Creature:
 
 @pytest.fixture(scope="module")
 def as_shipped() -> Iterator[None]:
-    """Programs compiled with all optimizations, where these could make a difference.
-
-    The commands that tests start are compiled so in any case.
-    """
+    """Programs compiled with all optimizations, where these could make a difference."""
     jax.config.update("jax_disable_most_optimizations", False)
     yield
     jax.config.update("jax_disable_most_optimizations", True)

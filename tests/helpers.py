@@ -1,5 +1,6 @@
 """What several tests need."""
 
+import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -8,6 +9,7 @@ import jax
 import numpy as np
 import pytest
 
+from mjxgait.certify import CertificateConfig
 from mjxgait.champion import Champion
 from mjxgait.cli import main
 from mjxgait.creature import Creature
@@ -76,3 +78,22 @@ def said_by(capsys: pytest.CaptureFixture, *arguments: object, code: int) -> str
     assert ended.value.code == code
     said = capsys.readouterr()
     return said.out + said.err
+
+
+SHORT = """
+seconds = 3.0
+warmup = 0.5
+[starts]
+count = 2
+[pushes]
+count = 2
+window = [0.5, 1.0]
+ladder = [0.2]
+ladder_count = 2
+"""
+"""An examination of 3 s instead of 22, as a file of `certify --config`: not a verdict, but one."""
+
+
+def short_examination() -> CertificateConfig:
+    """The same as settings."""
+    return build(CertificateConfig, tomllib.loads(SHORT), "short")

@@ -27,7 +27,6 @@ from mjxgait.search.evolution import EvolutionState
 from mjxgait.settings.config import ExaminationConfig
 
 SECONDS = 0.4
-pytestmark = pytest.mark.usefixtures("as_shipped")  # shares the program of test_run
 
 
 def certificate(margin: float, attempts: int = 1) -> Certificate:

@@ -6,7 +6,7 @@ import shlex
 from pathlib import Path
 
 import pytest
-from helpers import STOOL
+from helpers import SHORT, STOOL
 
 from mjxgait.cli import main
 
@@ -15,17 +15,6 @@ SMALL = (
     "--population 6 --generations 1 --rollout.seconds 0.4 --rollout.physics mjx --rollout.lanes 4"
     " --examination.candidates 0 --no-plots"
 )
-SHORT = """
-seconds = 3.0
-warmup = 0.5
-[starts]
-count = 2
-[pushes]
-count = 2
-window = [0.5, 1.0]
-ladder = [0.2]
-ladder_count = 2
-"""
 
 
 def blocks(language: str) -> list[str]:

@@ -2,24 +2,32 @@
 
 import json
 import pydoc
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers import STOOL
+from helpers import SHORT, STOOL, short_examination
 
 import mjxgait
 from mjxgait.errors import UserError
 
-pytestmark = pytest.mark.usefixtures("as_shipped")  # shares the program of test_examination
 SMALL = {
     "rollout": {"seconds": 0.4, "lanes": 4},
     "examination": {"candidates": 1, "draws": 2},
 }
 
 
+@pytest.fixture(scope="module", autouse=True)
+def short() -> Iterator[None]:
+    """What is examined here is examined for 3 s: the whole takes ten times as long."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("mjxgait.certify.certificate.CertificateConfig", short_examination)
+        yield
+
+
 @pytest.fixture(scope="module")
-def run(tmp_path_factory, as_shipped) -> mjxgait.Run:
+def run(tmp_path_factory) -> mjxgait.Run:
     folder = tmp_path_factory.mktemp("runs") / "x"
     return mjxgait.train(
         STOOL, out=folder, seed=3, population=6, generations=2, settings=SMALL, quiet=True
@@ -54,8 +62,9 @@ def test_a_walk_is_columns_over_time(run: mjxgait.Run):
     assert force.mean() == pytest.approx(9.81 * run.creature.mass, rel=0.3)
 
 
-def test_the_examination_again_comes_to_the_same(run: mjxgait.Run):
-    again = json.loads(mjxgait.examine(run).to_json())
+def test_the_examination_again_comes_to_the_same(run: mjxgait.Run, tmp_path: Path):
+    (tmp_path / "short.toml").write_text(SHORT)
+    again = json.loads(mjxgait.examine(run, tmp_path / "short.toml").to_json())
     assert {**again, "seconds": 0} == {**run.certificate, "seconds": 0}
 
 
