@@ -17,9 +17,12 @@ def stool_run(stool, tmp_path_factory):
     return write_run(tmp_path_factory.mktemp("runs") / "stool", stool, treading(stool))
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def browser():
-    """Headless Chromium; needs the apt package chromium and the Python package playwright."""
+    """Headless Chromium; needs the apt package chromium and the Python package playwright.
+
+    Closed after a file's tests: a page that moves takes more than a core as long as it is open.
+    """
     playwright = pytest.importorskip(
         "playwright.sync_api", reason="needs the Python package playwright"
     )

@@ -166,3 +166,4 @@ def test_the_page_shows_the_best_and_the_curve_grows(browser, site, run, stool):
     drawn(tab)
     assert wrong == []
     assert [url for url in asked if not url.startswith((address, "data:", "blob:"))] == []
+    tab.close()

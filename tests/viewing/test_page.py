@@ -96,6 +96,7 @@ def test_a_blank_canvas_would_be_noticed(browser, page, tmp_path):
         drawn(tab, seconds=1.5)
     assert not tab.evaluate("document.getElementById('walk').loaded")
     assert is_blank(canvas(tab))
+    tab.close()
 
 
 def test_the_page_names_no_place_outside_itself(page):
