@@ -30,7 +30,7 @@ from mjxgait.creature import Creature, load_creature
 from mjxgait.physics import make_plant
 from mjxgait.runs.experiment import prepare_devices
 from mjxgait.settings.shipped import find_creature
-from mjxgait.types import BodyState, Plant
+from mjxgait.types import BodyState, Plant, Sensed
 
 LANES = 64
 STEPS = 400
@@ -99,7 +99,7 @@ def build(
     def walk(numbers: Any, state: BodyState) -> jax.Array:
         own = plant if numbers is None else plant.with_parameters(numbers)
         step = partial(follow, creature, own)
-        return jax.lax.fori_loop(0, STEPS, lambda _, now: step(now), state).qpos
+        return jax.lax.fori_loop(0, STEPS, lambda _, now: step(now)[0], state).qpos
 
     arguments = numbers, start(creature, every)
     began = time.perf_counter()
@@ -117,8 +117,8 @@ def start(creature: Creature, every: Any) -> BodyState:
     return BodyState(jnp.asarray(qpos, jnp.float32), still, still, still, jnp.ones(LANES), every)
 
 
-def follow(creature: Creature, plant: Plant, state: BodyState) -> BodyState:
-    """One step of stable PD towards the standing pose."""
+def follow(creature: Creature, plant: Plant, state: BodyState) -> tuple[BodyState, Sensed]:
+    """One step of stable PD towards the standing pose, and what was sensed before it."""
     step = float(creature.model.opt.timestep)
     kp, kd, limit, goal = (
         np.float32(x)[:, None]
@@ -131,7 +131,7 @@ def follow(creature: Creature, plant: Plant, state: BodyState) -> BodyState:
     braked = jnp.broadcast_to(step * kd, pull.shape)
     acceleration = plant.solve_damped(workings, lift(braked), force)
     torque = spd.limited_torque(pull, acceleration[creature.dof_adr], braked, limit)
-    return plant.advance(state, workings, lift(torque))
+    return plant.advance(state, workings, lift(torque)), sensed
 
 
 def lifted(creature: Creature, joints: jax.Array) -> jax.Array:

@@ -12,7 +12,6 @@ import argparse
 import json
 import time
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -20,10 +19,9 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from bodies import LANES, STEPS, lifted, start, timed
+from bodies import LANES, STEPS, follow, start, timed
 
 from mjxgait.bench.machine import machine_facts
-from mjxgait.control import spd
 from mjxgait.creature import Creature, load_creature
 from mjxgait.creature.frame import start_place
 from mjxgait.ground.spec import parse_ground
@@ -31,7 +29,7 @@ from mjxgait.ground.surface import lay_ground, named_draws
 from mjxgait.physics import make_plant
 from mjxgait.runs.experiment import prepare_devices
 from mjxgait.settings.shipped import find_creature
-from mjxgait.types import BodyState, Plant
+from mjxgait.types import BodyState, Plant, Sensed
 
 WIDE = {"xla_cpu_prefer_vector_width": "512"}
 """As in `mjxgait train`."""
@@ -86,8 +84,11 @@ def build(creature: Creature, plant: Plant, text: str) -> tuple[Callable[[], jax
     arguments = BodyState(**{**vars(start(creature, None)), "ground": every}), jnp.zeros(LANES)
 
     def walk(state: BodyState, low: jax.Array) -> tuple[jax.Array, jax.Array]:
-        step = partial(follow, creature, plant)
-        state, low = jax.lax.fori_loop(0, STEPS, lambda _, now: step(*now), (state, low))
+        def step(_: int, now: tuple[BodyState, jax.Array]) -> tuple[BodyState, jax.Array]:
+            after, sensed = follow(creature, plant, now[0])
+            return after, least(now[1], sensed)
+
+        state, low = jax.lax.fori_loop(0, STEPS, step, (state, low))
         return state.qpos, low
 
     began = time.perf_counter()
@@ -96,26 +97,10 @@ def build(creature: Creature, plant: Plant, text: str) -> tuple[Callable[[], jax
     return lambda: jax.block_until_ready(compiled(*arguments))[0], compile_s
 
 
-def follow(
-    creature: Creature, plant: Plant, state: BodyState, low: jax.Array
-) -> tuple[BodyState, jax.Array]:
-    """One step of stable PD towards the standing pose, and the least that was ever sensed."""
-    step = float(creature.model.opt.timestep)
-    kp, kd, limit, goal = (
-        np.float32(x)[:, None]
-        for x in (creature.kp, creature.kd, creature.torque_limit, creature.stand)
-    )
-    sensed, workings = plant.forward(state)
-    pull = spd.pd_force(sensed.joint_pos, sensed.joint_vel, goal, kp, kd, step)
-    lift = partial(lifted, creature)
-    force = lift(pull) + state.constraint_force - sensed.bias
-    braked = jnp.broadcast_to(step * kd, pull.shape)
-    acceleration = plant.solve_damped(workings, lift(braked), force)
-    torque = spd.limited_torque(pull, acceleration[creature.dof_adr], braked, limit)
+def least(low: jax.Array, sensed: Sensed) -> jax.Array:
+    """The lowest [L] m that anything was above the ground: so heights cannot be left out."""
     low = jnp.minimum(low, sensed.geom_low.min(0))
-    if sensed.floor is not None:
-        low = jnp.minimum(low, sensed.trunk_pos[2] - sensed.floor)
-    return plant.advance(state, workings, lift(torque)), low
+    return low if sensed.floor is None else jnp.minimum(low, sensed.trunk_pos[2] - sensed.floor)
 
 
 if __name__ == "__main__":

@@ -8,7 +8,6 @@ mjxgait.walk(run)["trunk_z"]
 """
 
 import dataclasses
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -19,7 +18,7 @@ from mjxgait.certify import Certificate, CertificateConfig, certify, read_certif
 from mjxgait.champion import Champion, read_champion
 from mjxgait.creature import Creature
 from mjxgait.creature import load_creature as load_folder
-from mjxgait.creature.scale import scaled_files
+from mjxgait.creature.scale import load_files, scaled
 from mjxgait.errors import UserError
 from mjxgait.runs.exams import Exams
 from mjxgait.runs.folder import (
@@ -103,19 +102,6 @@ def load_creature(env: Place, scale: Mapping[str, float] | None = None) -> Creat
     from mjxgait.importing import import_model
 
     return scaled(load_files(import_model(path).files), scale or {})
-
-
-def scaled(creature: Creature, scale: Mapping[str, float]) -> Creature:
-    """The creature with parts of another size, by pattern of their names."""
-    return load_files(scaled_files(creature.files, scale)) if scale else creature
-
-
-def load_files(files: Mapping[str, str]) -> Creature:
-    """The creature whose files these are, by name."""
-    with tempfile.TemporaryDirectory() as folder:  # the run folder keeps the creature
-        for name, text in files.items():
-            (Path(folder) / name).write_text(text, encoding="utf-8")
-        return load_folder(Path(folder))
 
 
 def train(

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from mjxgait.creature import Creature
-from mjxgait.creature.scale import parse_scales
+from mjxgait.creature.scale import parse_scales, scaled
 from mjxgait.errors import UserError
-from mjxgait.library import load_creature, scaled
+from mjxgait.library import load_creature
 
 
 def test_a_whole_creature_scales_as_geometry_says(shipped: Creature):

@@ -69,6 +69,12 @@ def _horizontal(vector: np.ndarray) -> np.ndarray:
     return flat / np.linalg.norm(flat)
 
 
+def per_foot(creature: Creature, heights: np.ndarray) -> np.ndarray:
+    """[S, F] the least of the heights [S, geoms] of each foot's geoms."""
+    feet = range(len(creature.foot_names))
+    return np.stack([heights[:, creature.foot_of == foot].min(1) for foot in feet], 1)
+
+
 class LowestPoint:
     """How far some geoms' lowest points are above the ground, exact for MuJoCo's primitive shapes.
 

@@ -8,7 +8,7 @@ import dataclasses
 import mujoco
 import numpy as np
 
-from mjxgait.certify.layout import LowestPoint, start_frame
+from mjxgait.certify.layout import LowestPoint, per_foot, start_frame
 from mjxgait.certify.outcome import Trajectory
 from mjxgait.certify.overlap import overlaps
 from mjxgait.certify.stepping import examined_model
@@ -205,10 +205,8 @@ class _Sight:
             data.xpos[creature.trunk],
             data.xmat[creature.trunk].reshape(3, 3),
         )
-        heights = self.reach.heights(data.geom_xpos[None], data.geom_xmat[None])[0]
-        self.foot_height[k] = [
-            heights[creature.foot_of == n].min() for n in range(len(creature.foot_names))
-        ]
+        heights = self.reach.heights(data.geom_xpos[None], data.geom_xmat[None])
+        self.foot_height[k] = per_foot(creature, heights)[0]
         self.body_speed[k] = np.linalg.norm(
             _velocity(data, data.xipos, np.arange(self.model.nbody))[1:], axis=1
         ).max()

@@ -11,7 +11,7 @@ import numpy as np
 from mujoco.batch import Batch
 
 from mjxgait.certify.drive import Drive
-from mjxgait.certify.layout import Layout, LowestPoint, colliding_geoms, start_frame
+from mjxgait.certify.layout import Layout, LowestPoint, colliding_geoms, per_foot, start_frame
 from mjxgait.certify.outcome import Fall, Outcome, Trajectory
 from mjxgait.certify.starts import Starts
 from mjxgait.certify.state import FOOT_SENSES, State, sense
@@ -209,8 +209,7 @@ class Stepping:
         if not self.sees_feet:
             return np.zeros((len(running), 0))
         low = self.feet.heights(self.geom_xpos[running], self.geom_xmat[running])
-        feet = range(len(self.creature.foot_names))
-        return np.stack([low[:, self.creature.foot_of == foot].min(1) for foot in feet], 1)
+        return per_foot(self.creature, low)
 
     def _lift(self) -> None:
         """Raises each start until no part is deeper in the floor than when standing; else joint

@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from mjxgait.champion.codecs import codec_of
+from mjxgait.champion.codecs import Genome, codec_of
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
+from mjxgait.settings.config import Config
 from mjxgait.settings.control import DriveConfig
 from mjxgait.settings.tables import build
 
@@ -38,6 +39,20 @@ class Champion:
     fitness: float
     terms: Mapping[str, float]
     origin: Mapping[str, Any]
+
+    @classmethod
+    def of(cls, creature: Creature, config: Config, genome: Genome, **scored: Any) -> "Champion":
+        """Who has this genome in a run; scored: fitness, terms and origin."""
+        return cls(
+            creature=creature.name,
+            digest=creature.digest,
+            controller=config.use.controller,
+            genome=genome,
+            settings=config.controller,
+            drive=config.drive,
+            task=config.use.task,
+            **scored,
+        )
 
     @property
     def fingerprint(self) -> str:

@@ -6,11 +6,8 @@ from pathlib import Path
 
 import tyro
 
-from mjxgait.certify import CertificateConfig, certify
-from mjxgait.champion import read_champion
-from mjxgait.runs.exams import Exams
-from mjxgait.runs.folder import CERTIFICATE, CHAMPION, EXAMS, open_run
-from mjxgait.settings.tables import build, read_toml
+from mjxgait.library import examine
+from mjxgait.runs.folder import CERTIFICATE
 
 
 @dataclasses.dataclass(frozen=True)
@@ -33,19 +30,9 @@ class CertifyOptions:
 def certify_command(arguments: Sequence[str]) -> int:
     """Returns the exit code."""
     options = tyro.cli(CertifyOptions, args=list(arguments), prog="mjxgait certify")
-    creature, _ = open_run(options.run)
-    champion = read_champion(options.run / CHAMPION, creature)
-    config = (
-        build(CertificateConfig, read_toml(options.config), str(options.config))
-        if options.config
-        else CertificateConfig()
-    )
+    certificate = examine(options.run, options.config)
     from mjxgait.runs.screen import Screen  # rich is slow to import
 
-    attempt = Exams(options.run / EXAMS).attempt(
-        champion.fingerprint, int(champion.origin.get("generation", 0))
-    )
-    certificate = certify(creature, champion, config, attempts=attempt)
     (options.run / CERTIFICATE).write_text(certificate.to_json(), encoding="utf-8")
     Screen().certificate(certificate)
     return 0

@@ -10,9 +10,8 @@ from typing import Annotated
 import tyro
 
 from mjxgait.creature import Creature, load_creature
-from mjxgait.creature.scale import parse_scales
+from mjxgait.creature.scale import load_files, parse_scales, scaled
 from mjxgait.errors import INTERRUPTED, UserError
-from mjxgait.library import load_files, scaled
 from mjxgait.parts import resolve_config
 from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.folder import (

@@ -2,13 +2,16 @@
 
 import fnmatch
 import re
+import tempfile
 import tomllib
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 import mujoco
 import numpy as np
 import tomli_w
 
+from mjxgait.creature import Creature, load_creature
 from mjxgait.creature.geometry import support_extents
 from mjxgait.errors import UserError, did_you_mean
 
@@ -38,6 +41,19 @@ def parse_scales(texts: Sequence[str]) -> dict[str, float]:
             )
         scales[pattern] = factor
     return scales
+
+
+def scaled(creature: Creature, scales: Mapping[str, float]) -> Creature:
+    """The creature with parts of another size, by pattern of their names; see `scaled_files`."""
+    return load_files(scaled_files(creature.files, scales)) if scales else creature
+
+
+def load_files(files: Mapping[str, str]) -> Creature:
+    """The creature whose files these are, by name."""
+    with tempfile.TemporaryDirectory() as folder:  # the run folder keeps the creature
+        for name, text in files.items():
+            (Path(folder) / name).write_text(text, encoding="utf-8")
+        return load_creature(Path(folder))
 
 
 def scaled_files(files: Mapping[str, str], scales: Mapping[str, float]) -> dict[str, str]:

@@ -76,14 +76,10 @@ class Snapshot:
                 f"{self.run}: no individual {rank}; the population has ranks 1 to "
                 f"{len(self.fitness)}"
             )
-        return Champion(
-            creature=self.creature.name,
-            digest=self.creature.digest,
-            controller=self.config.use.controller,
-            genome={name: np.asarray(a[rank - 1], float) for name, a in self.genomes.items()},
-            settings=self.config.controller,
-            drive=self.config.drive,
-            task=self.config.use.task,
+        return Champion.of(
+            self.creature,
+            self.config,
+            {name: np.asarray(a[rank - 1], float) for name, a in self.genomes.items()},
             fitness=float(self.fitness[rank - 1]),
             terms={},
             origin={"generation": self.generation},

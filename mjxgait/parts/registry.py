@@ -45,11 +45,6 @@ def add_own(kind: str, name: str, cls: type) -> None:
     _OWN[kind, name] = cls
 
 
-def is_own(kind: str, name: str) -> bool:
-    """Whether it is the user's."""
-    return (kind, name) in _OWN
-
-
 def find(kind: str, name: str) -> type:
     """The class of a controller or a task.
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from mjxgait.parts.registry import find, is_own
+from mjxgait.parts.registry import find
 from mjxgait.settings import layers
 from mjxgait.settings.config import Config, UseConfig
 from mjxgait.settings.tables import STRICT, build
@@ -20,7 +20,7 @@ def config_class(use: UseConfig) -> type[Config]:
             ("controller", "controller", use.controller),
             ("fitness", "task", use.task),
         )
-        if is_own(kind, name) or name != getattr(UseConfig(), kind)
+        if name != getattr(UseConfig(), kind)
     }
     return _config_class(tuple(sorted(own.items()))) if own else Config
 

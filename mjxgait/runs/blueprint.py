@@ -1,6 +1,7 @@
 """What the simulator of a run is made of, and the body's numbers where they are inputs of the program."""
 
 import dataclasses
+import functools
 from typing import Any
 
 import jax
@@ -47,6 +48,11 @@ class Blueprint:
         ends = what_ends(self.creature, self.config.rollout)
         single = jax.tree.map(lambda x: np.asarray(x, np.float32), self.plant.parameters)
         return Numbers(given_body(self.creature), given_ends(ends), single)
+
+    @functools.cached_property
+    def own(self) -> Simulator:
+        """With the creature's numbers as constants: what the host asks about the program."""
+        return self.simulator()
 
     def embodied(self, starts: Starts) -> Starts:
         """The starts with the bodies that their heaviness makes."""

@@ -62,8 +62,8 @@ class Experiment:
 
     @cached_property
     def simulator(self) -> Simulator:
-        """With the body's numbers as constants: what the host asks about the program."""
-        return self.blueprint.simulator()
+        """See `Blueprint.own`."""
+        return self.blueprint.own
 
     @property
     def starts(self) -> Starts:
@@ -132,14 +132,10 @@ class Experiment:
             "nominal": dict(zip(task.outcomes, map(float, outcome[rank, 0]), strict=True)),
             "versions": versions,
         }
-        return Champion(
-            creature=self.creature.name,
-            digest=self.creature.digest,
-            controller=self.config.use.controller,
-            genome=arrays_of(best),
-            settings=self.config.controller,
-            drive=self.config.drive,
-            task=self.config.use.task,
+        return Champion.of(
+            self.creature,
+            self.config,
+            arrays_of(best),
             fitness=float(fitness[rank]),
             terms=dict(zip(task.terms, map(float, terms), strict=True)),
             origin=origin,
@@ -267,7 +263,7 @@ def _generation(
 def _experiment(blueprint: Blueprint, config: Config) -> Experiment:
     creature = blueprint.creature.on(config.rollout.ground)
     key = jax.random.fold_in(jax.random.key(config.seed), 1)
-    starts = blueprint.simulator().task.trials(key, creature, config.rollout)
+    starts = blueprint.own.task.trials(key, creature, config.rollout)
     return Experiment(creature, config, blueprint, Row(traced(config), blueprint.embodied(starts)))
 
 

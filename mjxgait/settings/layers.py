@@ -32,17 +32,18 @@ def resolve_config(
     """
     default = data_folder("configs") / "default.toml"
     standalone, mine = _file_layers(file, creature_name) if file is not None else (False, [])
-    layers: list[tuple[str, Mapping[str, Any]]] = []
+    given: list[tuple[str, Mapping[str, Any]]] = []
     if not standalone:
-        layers.append((str(default), read_toml(default)))
-        layers.append((f"{creature_name}/creature.toml: [train]", creature_table))
-    layers += mine
-    chosen = _chosen(layers, use or {})
+        given.append((str(default), read_toml(default)))
+        given.append((f"{creature_name}/creature.toml: [train]", creature_table))
+    chosen = _chosen([*given, *mine], use or {})
     cls = config_class(chosen)
     table: dict[str, Any] = {}
-    for where, layer in layers:
-        ours = layer if (where, layer) in mine else _without_absent(layer, chosen)
-        table = merge(table, ours)
+    for where, layer in [
+        *((w, _without_absent(given_one, chosen)) for w, given_one in given),
+        *mine,
+    ]:
+        table = merge(table, layer)
         build(cls, table, where)
     table = merge(table, {"use": dataclasses.asdict(chosen)})
     return build(cls, table, "the settings taken together")
@@ -63,14 +64,10 @@ def _without_absent(layer: Mapping[str, Any], use: UseConfig) -> dict[str, Any]:
     """A layer that was written for the controller and the task of the default."""
     usual = UseConfig()
     absent = {
-        name
-        for name, same in (
-            ("controller", use.controller == usual.controller),
-            ("fitness", use.task == usual.task),
-        )
-        if not same
+        "controller": use.controller != usual.controller,
+        "fitness": use.task != usual.task,
     }
-    return {key: value for key, value in layer.items() if key not in absent}
+    return {key: value for key, value in layer.items() if not absent.get(key)}
 
 
 def _file_layers(
