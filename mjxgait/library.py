@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from mjxgait.certify import Certificate, CertificateConfig, certify, read_certificate
-from mjxgait.champion import Champion, read_champion
+from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 from mjxgait.creature import load_creature as load_folder
 from mjxgait.creature.scale import load_files, scaled
@@ -28,6 +28,7 @@ from mjxgait.runs.folder import (
     METRICS,
     create_run,
     new_run_folder,
+    open_champion,
     open_run,
     read_metrics,
 )
@@ -49,7 +50,9 @@ class Run:
 
     @property
     def creature(self) -> Creature:
-        """The body that was evolved on."""
+        """The champion's body: where bodies evolve its own, else that which the run was given."""
+        if (self.folder / CHAMPION).exists():
+            return open_champion(self.folder)[0]
         return open_run(self.folder)[0]
 
     @property
@@ -64,7 +67,7 @@ class Run:
         Raises:
           UserError: there is none yet.
         """
-        return read_champion(self.folder / CHAMPION, self.creature)
+        return open_champion(self.folder)[1]
 
     @property
     def certificate(self) -> dict[str, Any] | None:

@@ -131,6 +131,15 @@ class Plant(Protocol):
         """
         ...
 
+    def resized(self, parameters: Any, factor: Number) -> Any:
+        """One body's numbers with each part's lengths times factor [nbody - 1], its mass times the
+        third power and its inertia times the fifth (`creature.scale`).
+
+        Weights of constraints are computed anew. The depth at which two bars may stand is scaled
+        by the mean of their factors.
+        """
+        ...
+
     def forward(self, state: BodyState) -> tuple[Sensed, Any]:
         """Position and velocity dependent terms of the current state, and the plant's own
         workings for the two calls below.

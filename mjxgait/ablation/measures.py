@@ -151,6 +151,7 @@ def _judge(creature_folder: Path, examine: bool, path: Path, finite: bool) -> Ju
     """
     creature = _creature(creature_folder)
     champion = read_champion(path, creature)
+    creature = champion.embodied(creature)
     walk, up, nominal = _walk(creature, champion) if finite else (0.0, 0.0, 0.0)
     # One that falls or lags this far behind the speed that the certificate asks for cannot pass, so
     # the long examination is spared.

@@ -63,5 +63,6 @@ def _lanes(experiment: Experiment, lanes: int) -> Lane:
         lambda leaf: leaf[None], (experiment.row.starts, experiment.row.settings)
     )
     jobs = jnp.zeros(lanes, jnp.int32)
-    lane = jax.vmap(partial(simulator._fresh_lane, genomes, starts, settings))(jobs, jobs)
+    own = simulator._own_starts(genomes, starts)
+    lane = jax.vmap(partial(simulator._fresh_lane, genomes, starts, settings, own))(jobs, jobs)
     return jax.tree.map(lambda leaf: jnp.moveaxis(leaf, 0, simulator.plant.lane_axis), lane)

@@ -1,6 +1,14 @@
 """One individual, complete and readable without JAX: `champion.json`."""
 
 from mjxgait.champion.codecs import CODECS, Codec, codec_of
-from mjxgait.champion.record import Champion, read_champion, write_champion
+from mjxgait.champion.record import Champion, read_champion, split_genome, write_champion
 
-__all__ = ["CODECS", "Champion", "Codec", "codec_of", "read_champion", "write_champion"]
+__all__ = [
+    "CODECS",
+    "Champion",
+    "Codec",
+    "codec_of",
+    "read_champion",
+    "split_genome",
+    "write_champion",
+]

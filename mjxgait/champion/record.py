@@ -11,6 +11,7 @@ import numpy as np
 
 from mjxgait.champion.codecs import Genome, codec_of
 from mjxgait.creature import Creature
+from mjxgait.creature.proportions import grown, proportions
 from mjxgait.errors import UserError
 from mjxgait.settings.config import Config
 from mjxgait.settings.control import DriveConfig
@@ -26,7 +27,8 @@ class Champion:
 
     controller: name of its kind, as in `[use]`. genome: its arrays by name. settings: the
     controller's. task: that it was evolved for. fitness and terms: as evolution scored it.
-    origin: where it comes from (generation, seed, versions).
+    origin: where it comes from (generation, seed, versions). sizes: factors of the parts that are
+    not as the creature has them, where bodies evolve.
     """
 
     creature: str
@@ -39,10 +41,12 @@ class Champion:
     fitness: float
     terms: Mapping[str, float]
     origin: Mapping[str, Any]
+    sizes: Mapping[str, float] = dataclasses.field(default_factory=dict)
 
     @classmethod
     def of(cls, creature: Creature, config: Config, genome: Genome, **scored: Any) -> "Champion":
         """Who has this genome in a run; scored: fitness, terms and origin."""
+        genome, sizes = split_genome(genome)
         return cls(
             creature=creature.name,
             digest=creature.digest,
@@ -51,8 +55,17 @@ class Champion:
             settings=config.controller,
             drive=config.drive,
             task=config.use.task,
+            sizes={} if sizes is None else proportions(creature).by_part(sizes),
             **scored,
         )
+
+    def embodied(self, creature: Creature) -> Creature:
+        """Its own body, from the creature that was evolved on.
+
+        Raises:
+          UserError: its sizes are those of another creature.
+        """
+        return grown(creature, self.sizes)
 
     @property
     def fingerprint(self) -> str:
@@ -68,6 +81,8 @@ class Champion:
             "settings": as_table(self.settings),
             "drive": as_table(self.drive),
         }
+        if self.sizes:
+            moves["sizes"] = dict(self.sizes)
         return hashlib.sha256(json.dumps(moves, sort_keys=True).encode()).hexdigest()[:16]
 
     def check_finite(self, creature: Creature) -> None:
@@ -77,6 +92,14 @@ class Champion:
           UserError: names the first.
         """
         codec_of(self.controller).check(self.genome, creature)
+
+
+def split_genome(genome: Genome) -> tuple[dict[str, np.ndarray], np.ndarray | None]:
+    """The controller's own arrays by name; and the logarithms of the sizes [..., Z], if it has any
+    (`control.bodied.Bodied`).
+    """
+    own = {n.removeprefix("plan."): a for n, a in genome.items() if n.startswith("plan.")}
+    return (own, genome["sizes"]) if own else (dict(genome), None)
 
 
 def as_table(settings: Any) -> dict[str, Any]:
@@ -102,6 +125,7 @@ def write_champion(champion: Champion, creature: Creature, path: Path) -> None:
             for name, kp, kd, limit in gains
         },
         "fitness": champion.fitness,
+        **({"sizes": dict(champion.sizes)} if champion.sizes else {}),
         "terms": dict(champion.terms),
         "origin": dict(champion.origin),
     }
@@ -152,4 +176,5 @@ def _champion(document: Mapping[str, Any], creature: Creature, path: Path) -> Ch
         fitness=document["fitness"],
         terms=document["terms"],
         origin=document["origin"],
+        sizes={name: float(factor) for name, factor in document.get("sizes", {}).items()},
     )

@@ -48,6 +48,8 @@ class TrainOptions:
       generation: With --resume: the checkpoint to go on from instead of the latest.
       population: Short for --evolution.population.
       generations: Short for --evolution.generations.
+      evolve_body: Short for --evolution.body: 1.25 lets the parts below the trunk become up to a
+        quarter larger or a fifth smaller; the run keeps the body that won in body/.
       ground: Short for --rollout.ground: flat, slope:0.1, steps:0.05, bumps:0.05, rough:0.05.
       view: Show the best of each generation walking on a page that only this machine can reach.
       plots: Draw all plots of the run when it has ended (`mjxgait plot`).
@@ -62,6 +64,7 @@ class TrainOptions:
     generation: int | None = None
     population: int | None = None
     generations: int | None = None
+    evolve_body: float | None = None
     ground: str | None = None
     view: bool = False
     plots: bool = True
@@ -175,7 +178,11 @@ def _settings(options: TrainOptions) -> Config:
     """The config with the short options laid over it, checked again: the options are typed but
     their ranges are not.
     """
-    short = {"population": options.population, "generations": options.generations}
+    short = {
+        "population": options.population,
+        "generations": options.generations,
+        "body": options.evolve_body,
+    }
     table = {
         "evolution": {key: value for key, value in short.items() if value is not None},
         "rollout": {} if options.ground is None else {"ground": options.ground},

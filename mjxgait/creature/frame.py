@@ -29,3 +29,18 @@ def horizontal_freedoms(creature: Creature) -> np.ndarray:
         elif model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE:
             moves[:, dof] = model.jnt_axis[joint][:2]
     return moves.astype(np.float32)
+
+
+def vertical_freedom(model: mujoco.MjModel) -> np.ndarray:
+    """[nq] change of the positions that lifts by 1 m all whose root can rise; zero where it cannot."""
+    rises = np.zeros(model.nq)
+    for joint in range(model.njnt):
+        place = model.jnt_qposadr[joint]
+        if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE:
+            rises[place + 2] = 1.0
+        elif model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE:
+            at_root = model.body_parentid[model.jnt_bodyid[joint]] == 0
+            rises[place] = (
+                at_root * (abs(model.jnt_axis[joint][2]) > 0.99) * model.jnt_axis[joint][2]
+            )
+    return rises

@@ -12,6 +12,7 @@ import numpy as np
 import tomli_w
 
 from mjxgait.creature import Creature, load_creature
+from mjxgait.creature.frame import vertical_freedom
 from mjxgait.creature.geometry import support_extents
 from mjxgait.errors import UserError, did_you_mean
 
@@ -56,13 +57,18 @@ def load_files(files: Mapping[str, str]) -> Creature:
         return load_creature(Path(folder))
 
 
-def scaled_files(files: Mapping[str, str], scales: Mapping[str, float]) -> dict[str, str]:
+def scaled_files(
+    files: Mapping[str, str], scales: Mapping[str, float], body_length: float | None = None
+) -> dict[str, str]:
     """The files of a creature whose parts are other lengths.
 
     A part is a body of creature.xml; those that match several patterns are scaled by each. Of a
     part scaled by s the shapes and the places of joints and of the parts that hang on it are times
     s, its mass s³ and its inertia s⁵. The creature stands on its lowest point as before. Gains and
     torque limits stay.
+
+    Args:
+      body_length: m, for its settings to state; by default one that they state follows the trunk's.
 
     Raises:
       UserError: a pattern matches nothing, or a part has a mesh.
@@ -77,7 +83,7 @@ def scaled_files(files: Mapping[str, str], scales: Mapping[str, float]) -> dict[
     return {
         **files,
         MODEL: SIZE.sub("", spec.to_xml()),
-        SETTINGS: _measured(files[SETTINGS], factors),
+        SETTINGS: _measured(files[SETTINGS], factors, body_length),
     }
 
 
@@ -95,23 +101,24 @@ def _factors(names: Sequence[str], scales: Mapping[str, float]) -> dict[str, flo
     return factors
 
 
-def _measured(text: str, factors: Mapping[str, float]) -> str:
-    """The settings with a body length, where they state one, that follows the trunk's size."""
+def _measured(text: str, factors: Mapping[str, float], body_length: float | None) -> str:
+    """The settings with a body length: the one given, or where they state one, as the trunk's size
+    makes it.
+    """
     table = tomllib.loads(text)
     creature = table["creature"]
-    factor = factors.get(creature["trunk"], 1.0)
-    if factor == 1.0 or not creature.get("body_length"):
+    stated, factor = creature.get("body_length"), factors.get(creature["trunk"], 1.0)
+    length = body_length or (factor * stated if stated else None)
+    if length == stated:
         return text
-    return tomli_w.dumps(
-        {**table, "creature": {**creature, "body_length": factor * creature["body_length"]}}
-    )
+    return tomli_w.dumps({**table, "creature": {**creature, "body_length": length}})
 
 
 def _scale(body: mujoco.MjsBody, s: float) -> None:
     for geom in body.geoms:
         if geom.type == mujoco.mjtGeom.mjGEOM_MESH:
             raise UserError(
-                f'--scale: part "{body.name}" has the mesh "{geom.meshname}", which cannot be '
+                f'part "{body.name}" has the mesh "{geom.meshname}", which cannot be '
                 "scaled; scale other parts, or import the model with its collision shapes only"
             )
         geom.pos, geom.size, geom.fromto = s * geom.pos, s * geom.size, s * geom.fromto
@@ -127,14 +134,11 @@ def _scale(body: mujoco.MjsBody, s: float) -> None:
 def _stand(spec: mujoco.MjSpec, height: float) -> None:
     """Lifts the standing poses, and the pose of the file, until the lowest point is at `height`."""
     model = spec.compile()
-    free = [j for j in range(model.njnt) if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_FREE]
     lift = height - _lowest(model)
+    upwards = vertical_freedom(model)
     for key in spec.keys:
-        for joint in free:
-            qpos = np.array(key.qpos)
-            qpos[model.jnt_qposadr[joint] + 2] += lift
-            key.qpos = qpos
-    for joint in free:
+        key.qpos = np.array(key.qpos) + lift * upwards
+    for joint in np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE):
         body = spec.body(model.body(model.jnt_bodyid[joint]).name)
         body.pos = body.pos + np.array([0.0, 0.0, lift])
 

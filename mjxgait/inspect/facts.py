@@ -228,6 +228,7 @@ def individual_facts(snapshot: Snapshot, rank: int) -> dict[str, Any]:
                 for name, column in zip(names, terms.T, strict=True)
             },
         }
+        | ({"sizes": dict(champion.sizes)} if champion.sizes else {})
         | view_of(champion.controller).facts(snapshot, i)
     )
 

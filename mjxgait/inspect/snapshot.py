@@ -14,7 +14,7 @@ from typing import Any, cast
 import numpy as np
 
 from mjxgait.certify import outdated, read_certificate
-from mjxgait.champion import Champion, codec_of, read_champion
+from mjxgait.champion import Champion, codec_of, read_champion, split_genome
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.runs.examination import due, why_ended
@@ -52,17 +52,19 @@ class Snapshot:
 
     @property
     def genomes(self) -> dict[str, np.ndarray]:
-        """The arrays [P, ...] of the genomes by name, best individual first."""
-        prefix = "genomes."
-        named = (
-            (n.removeprefix(prefix), a) for n, a in self.arrays.items() if n.startswith(prefix)
-        )
-        return dict(named)
+        """The controller's arrays [P, ...] by name, best individual first."""
+        return split_genome(self._every_gene)[0]
+
+    @property
+    def _every_gene(self) -> dict[str, np.ndarray]:
+        """The arrays of `genomes` and, where bodies evolve, their sizes."""
+        named = ((name.partition("."), array) for name, array in self.arrays.items())
+        return {rest: array for (room, _, rest), array in named if room == "genomes"}
 
     @property
     def rows(self) -> np.ndarray:
         """[P, genes] every gene of every genome, in its own unit."""
-        flat = [array.reshape(len(array), -1) for array in self.genomes.values()]
+        flat = [array.reshape(len(array), -1) for array in self._every_gene.values()]
         return np.concatenate(flat, axis=1)
 
     def champion(self, rank: int) -> Champion:
@@ -79,7 +81,7 @@ class Snapshot:
         return Champion.of(
             self.creature,
             self.config,
-            {name: np.asarray(a[rank - 1], float) for name, a in self.genomes.items()},
+            {name: np.asarray(a[rank - 1], float) for name, a in self._every_gene.items()},
             fitness=float(self.fitness[rank - 1]),
             terms={},
             origin={"generation": self.generation},
@@ -183,9 +185,10 @@ def _check_shape(
     folder: Path, arrays: Mapping[str, np.ndarray], creature: Creature, config: Config
 ) -> None:
     shapes = codec_of(config.use.controller).shapes(config.controller, creature)
+    prefix = "genomes." if config.evolution.body == 1.0 else "genomes.plan."
     for name, shape in shapes.items():
         wanted = (config.evolution.population, *shape)
-        found = arrays[f"genomes.{name}"].shape if f"genomes.{name}" in arrays else None
+        found = arrays[prefix + name].shape if prefix + name in arrays else None
         if found != wanted:
             raise UserError(
                 f"{folder}: holds {name.replace('_', ' ')} of shape {found}, this run's "

@@ -20,6 +20,7 @@ def print_facts(facts: Mapping[str, Any], console: Console) -> None:
     _print_settings(facts["settings_changed"], console)
     _print_history(facts, console)
     _print_population(facts["population"], console)
+    _print_sizes(facts["champion"], console)
     view_of(facts["controller"]).show(facts["champion"], facts["diversity"], console)
 
 
@@ -36,7 +37,14 @@ def print_individual(individual: Mapping[str, Any], console: Console) -> None:
     for name, values in individual["terms"].items():
         table.add_row(name, *map(show, values), show(individual["contributions"][name], sign=True))
     console.print(table)
+    _print_sizes(individual, console)
     view_of(individual["controller"]).show(individual, None, console)
+
+
+def _print_sizes(individual: Mapping[str, Any], console: Console) -> None:
+    """Of an individual whose body has evolved."""
+    if sizes := individual.get("sizes"):
+        console.print("sizes: " + ", ".join(f"{name} {f:.2f}" for name, f in sizes.items()))
 
 
 def sparkline(values: Sequence[float | None], low: float, high: float) -> str:

@@ -13,20 +13,35 @@ from mjxgait.types import Number, pytree
 class Bars:
     """The numbers of `Crossings`; lanes, where they are, innermost.
 
-    centre, half: [S, 3] m in the body's frame, a bar's middle and from there to an end. reach: [Q]
-    m; a pair's depth is this minus the distance of the two axes.
+    centre, half: [S, 3] m in the body's frame, a bar's middle and from there to an end.
+    radius: [S] m. reach: [Q] m; a pair's depth is this minus the distance of the two axes.
     """
 
     centre: Number
     half: Number
+    radius: Number
     reach: Number
 
 
 def read_bars(crossings: Crossings | None) -> Bars:
     """Of these; none of None."""
     if crossings is None or not len(crossings.first):
-        return Bars(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0))
-    return Bars(crossings.centre, crossings.half, crossings.reach)
+        return Bars(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0))
+    return Bars(crossings.centre, crossings.half, crossings.radius, crossings.reach)
+
+
+def resized_bars(bars: Bars, first: ArrayLike, second: ArrayLike, factor: Number) -> Bars:
+    """One body's bars with their lengths times factor [S]."""
+    a, b = np.array(first, int), np.array(second, int)
+    radii = factor[a] * bars.radius[a] + factor[b] * bars.radius[b]
+    # How deep two shapes stand in each other follows their mean.
+    allowed = 0.5 * (factor[a] + factor[b]) * (bars.radius[a] + bars.radius[b] - bars.reach)
+    return Bars(
+        bars.centre * factor[:, None],
+        bars.half * factor[:, None],
+        bars.radius * factor,
+        radii - allowed,
+    )
 
 
 def deepest(

@@ -21,6 +21,7 @@ from mjxgait.physics.plain_numbers import (
     mjx,
     model_difference,
     read_numbers,
+    resized,
     reweighed,
 )
 from mjxgait.types import BodyState, Number, Sensed
@@ -67,6 +68,11 @@ class MjxPlant:
     def heavier(self, parameters: ModelNumbers, factor: Number) -> ModelNumbers:
         """See `Plant.heavier`."""
         return reweighed(self.model, self.data, heavier(parameters, factor))
+
+    def resized(self, parameters: ModelNumbers, factor: Number) -> ModelNumbers:
+        """See `Plant.resized`."""
+        large = resized(self.model, self.layout, self.crossings, parameters, factor)
+        return reweighed(self.model, self.data, large)
 
     def forward(self, state: BodyState) -> tuple[Sensed, Any]:
         """See `Plant.forward`."""

@@ -14,7 +14,7 @@ import numpy as np
 from mjxgait.creature import geometry
 from mjxgait.creature.overlap import Crossings
 from mjxgait.physics.layout import SenseLayout
-from mjxgait.physics.overlap import Bars, read_bars
+from mjxgait.physics.overlap import Bars, read_bars, resized_bars
 from mjxgait.physics.weights import inverse_weights, weight_groups
 from mjxgait.types import Number, pytree
 
@@ -142,6 +142,42 @@ def heavier(numbers: ModelNumbers, factor: Number) -> ModelNumbers:
         numbers,
         body_mass=numbers.model["body_mass"] * every,
         body_inertia=numbers.model["body_inertia"] * every[:, None],
+    )
+
+
+def resized(
+    model: mjx.Model,
+    layout: SenseLayout,
+    crossings: Crossings | None,
+    numbers: ModelNumbers,
+    factor: Number,
+) -> ModelNumbers:
+    """With lengths times factor [nbody - 1], and masses and inertias as they follow; not yet the
+    weights.
+    """
+    every = jnp.concatenate([jnp.ones(1), jnp.asarray(factor, jnp.float32)])
+    old, geom, joint = numbers.model, every[model.geom_bodyid], every[model.jnt_bodyid]
+    large = _with(
+        numbers,
+        body_pos=old["body_pos"] * every[model.body_parentid][:, None],
+        body_ipos=old["body_ipos"] * every[:, None],
+        body_mass=old["body_mass"] * every**3,
+        body_inertia=old["body_inertia"] * every[:, None] ** 5,
+        jnt_pos=old["jnt_pos"] * joint[:, None],
+        geom_pos=old["geom_pos"] * geom[:, None],
+        geom_size=old["geom_size"] * geom[:, None],
+        geom_rbound=old["geom_rbound"] * geom,
+    )
+    watched = geom[layout.watched]
+    bars = numbers.bars
+    if crossings is not None and len(crossings.first):
+        bars = resized_bars(bars, crossings.first, crossings.second, every[crossings.body])
+    return dataclasses.replace(
+        large,
+        radius=numbers.radius * watched,
+        box=numbers.box * watched[:, None],
+        ellipsoid=numbers.ellipsoid * watched[:, None],
+        bars=bars,
     )
 
 

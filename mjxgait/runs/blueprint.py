@@ -2,6 +2,7 @@
 
 import dataclasses
 import functools
+from functools import partial
 from typing import Any
 
 import jax
@@ -9,12 +10,14 @@ import numpy as np
 from jax.sharding import Mesh
 
 from mjxgait.body import Body, Ends, GivenBody, given_body, given_ends
+from mjxgait.control.bodied import BodiedController
 from mjxgait.control.drive import Drive
 from mjxgait.creature import Creature
 from mjxgait.creature.settings import Termination
 from mjxgait.parts import make_controller, make_task
 from mjxgait.parts.registry import what_ends
 from mjxgait.physics import make_plant
+from mjxgait.runs.growth import Growth, growth_of
 from mjxgait.senses import check_senses
 from mjxgait.settings.config import Config
 from mjxgait.simulation.rollout import AXIS, Simulator
@@ -33,12 +36,16 @@ class Numbers:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Blueprint:
-    """A creature under the settings that shape its program. plant, lanes: see `make_plant`."""
+    """A creature under the settings that shape its program. plant, lanes: see `make_plant`.
+
+    growth: of the body, where it evolves.
+    """
 
     creature: Creature
     config: Config
     plant: Plant
     lanes: int
+    growth: Growth | None = None
 
     @property
     def numbers(self) -> Numbers | None:
@@ -74,6 +81,9 @@ class Blueprint:
     def _simulator(self, body: Body, ends: Termination | Ends, plant: Plant) -> Simulator:
         step = float(self.creature.model.opt.timestep)
         controller = make_controller(body, step, self.config)
+        if self.growth is not None:
+            sizes = len(self.growth.proportions.names)
+            controller = BodiedController(controller, sizes, self.config.evolution.body)
         task = make_task(body, step, ends, self.config)
         check_senses(controller.reads, task.adds)
         return Simulator(
@@ -85,6 +95,7 @@ class Blueprint:
             steps=max(round(self.config.rollout.seconds / step), 1),
             lanes=self.config.rollout.lanes or self.lanes,
             mesh=Mesh(np.array(jax.devices()), (AXIS,)),
+            bodies=None if self.growth is None else partial(self.growth.body, plant),
         )
 
 
@@ -96,4 +107,5 @@ def draw_up(creature: Creature, config: Config) -> Blueprint:
     """
     creature = creature.spanned(config.evolution.pose_span)
     touch = what_ends(creature, config.rollout).touch
-    return Blueprint(creature, config, *make_plant(creature, config.rollout.physics, touch))
+    plant, lanes = make_plant(creature, config.rollout.physics, touch)
+    return Blueprint(creature, config, plant, lanes, growth_of(creature, config))

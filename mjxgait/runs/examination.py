@@ -98,7 +98,7 @@ class Examiner:
 
     def _look(self, champion: Champion, wanted: float) -> Seen:
         """At the undisturbed walk, and if its margin is what is wanted, at the disturbed ones."""
-        creature = self.experiment.creature
+        creature = champion.embodied(self.experiment.creature)
         seen = glance(creature, champion)
         margin = seen.margin
         if margin >= wanted:
@@ -112,9 +112,8 @@ class Examiner:
         self.tell(
             f"Generation {generation}: examining the champion in C MuJoCo, attempt {attempt}…"
         )
-        certificate = certify(
-            self.experiment.creature, seen.champion, seen=seen.glance, attempts=attempt
-        )
+        body = seen.champion.embodied(self.experiment.creature)
+        certificate = certify(body, seen.champion, seen=seen.glance, attempts=attempt)
         with disk_errors(self.exams.path.parent):
             self.exams.add(name, generation, certificate.passed)
         return Examined(certificate, seen.champion)

@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+from mjxgait.champion import Champion, read_champion
 from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import UserError
 from mjxgait.parts import build_config
@@ -11,7 +12,7 @@ from mjxgait.settings.config import Config
 from mjxgait.settings.tables import dump_toml, read_toml
 
 CONFIG, CREATURE, METRICS, CHAMPION = "config.toml", "creature", "metrics.jsonl", "champion.json"
-CERTIFICATE, EXAMS, PLOT = "certificate.json", "exams.jsonl", "fitness.png"
+CERTIFICATE, EXAMS, PLOT, BODY = "certificate.json", "exams.jsonl", "fitness.png", "body"
 
 
 def create_run(folder: Path, creature: Creature, config: Config) -> None:
@@ -27,12 +28,17 @@ def create_run(folder: Path, creature: Creature, config: Config) -> None:
                 f"{folder}: holds {holds}; name another folder with --out, or go on with --resume "
                 f"{folder}"
             )
-        (folder / CREATURE).mkdir(parents=True, exist_ok=True)
-        for name, text in creature.files.items():
-            (folder / CREATURE / name).write_text(text, encoding="utf-8")
+        keep_body(folder / CREATURE, creature)
         (folder / CONFIG).write_text(dump_toml(config), encoding="utf-8")
     except OSError as error:
         raise UserError(f"{folder}: cannot be written ({error.strerror})") from None
+
+
+def keep_body(folder: Path, creature: Creature) -> None:
+    """Writes a creature folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in creature.files.items():
+        (folder / name).write_text(text, encoding="utf-8")
 
 
 def new_run_folder(creature: str, seed: int) -> Path:
@@ -53,6 +59,17 @@ def open_run(folder: Path) -> tuple[Creature, Config]:
         raise UserError(f"{folder}: not a run folder (it has no {CONFIG})")
     config = build_config(read_toml(folder / CONFIG), str(folder / CONFIG))
     return load_creature(folder / CREATURE).on(config.rollout.ground), config
+
+
+def open_champion(folder: Path) -> tuple[Creature, Champion]:
+    """The best individual of a run folder, and the body that it has.
+
+    Raises:
+      UserError: it is not a run folder, or has no champion yet.
+    """
+    creature, _ = open_run(folder)
+    champion = read_champion(folder / CHAMPION, creature)
+    return champion.embodied(creature), champion
 
 
 def read_metrics(path: Path) -> list[dict[str, Any]]:

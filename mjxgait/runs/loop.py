@@ -24,10 +24,12 @@ from mjxgait.runs.examination import Examined, Examiner, why_ended
 from mjxgait.runs.exams import Exams
 from mjxgait.runs.experiment import Step, build_experiment
 from mjxgait.runs.folder import (
+    BODY,
     CERTIFICATE,
     CHAMPION,
     EXAMS,
     METRICS,
+    keep_body,
     read_metrics,
     truncate_metrics,
 )
@@ -82,6 +84,8 @@ def train(
     if reason is not None and (examined := examined or examiner.best(state)):
         with disk_errors(folder):
             write_champion(examined.champion, creature, folder / CHAMPION)
+            if examined.champion.sizes:
+                keep_body(folder / BODY, examined.champion.embodied(creature))
             (folder / CERTIFICATE).write_text(examined.certificate.to_json(), encoding="utf-8")
         screen.certificate(examined.certificate)
     lines = read_metrics(folder / METRICS)

@@ -131,7 +131,10 @@ class EvolutionConfig:
       mutation: `redraw` re-draws two joints of one pose, `single` one joint, `pose` a whole pose, `gaussian` moves every joint of one pose
         by sigma, in units of its range, `mixed` is one or the other of the first and the last. `bit` and `byte` read the value of one joint
         as 8 bits over its range and flip one of them, or re-draw all eight, as classic GAs do. mutation_rate: share of offspring mutated.
-      tuning_rate, tuning_sigma: chance that a tuning gene of a mutated offspring changes, and by how much, in units of its range.
+      body: how many times larger or smaller the parts below the trunk may become, each mirrored pair
+        by a gene of its own (docs/creature.md); 1 leaves the body as it is.
+      tuning_rate, tuning_sigma: chance that a tuning gene of a mutated offspring changes, and by how much, in units of its range;
+        likewise a body's.
     """
 
     __pydantic_config__ = STRICT
@@ -151,6 +154,7 @@ class EvolutionConfig:
     mutation: Literal["redraw", "single", "pose", "gaussian", "mixed", "bit", "byte"] = "mixed"
     mutation_rate: Fraction = 0.8
     sigma: Positive = 0.12
+    body: Annotated[float, pydantic.Field(ge=1, le=2), SHAPE] = 1.0
     tuning_rate: Fraction = 0.3
     tuning_sigma: Positive = 0.1
     remove_duplicates: bool = True

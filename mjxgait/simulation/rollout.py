@@ -61,7 +61,8 @@ class Lane:
 class Simulator:
     """Everything static about the episodes of one creature.
 
-    steps: T per episode. lanes: L per device. mesh: the devices.
+    steps: T per episode. lanes: L per device. mesh: the devices. bodies: makes of a genome and a
+    start that with its own body; None where all have the plant's.
     """
 
     creature: Body
@@ -72,6 +73,7 @@ class Simulator:
     steps: int
     lanes: int
     mesh: Mesh
+    bodies: Callable[[Any, Starts], Starts] | None = None
 
     def simulate(self, genomes: Any, starts: Starts, settings: Config) -> Episodes:
         """Every genome (leaves [B, N, ...]) on every start [B, R] of its row, under the row's traced settings, leaves [B, ...].
@@ -85,11 +87,11 @@ class Simulator:
         run = jax.shard_map(
             partial(self._run_queue, total=total),
             mesh=self.mesh,
-            in_specs=(PartitionSpec(AXIS), PartitionSpec(), PartitionSpec(), PartitionSpec()),
+            in_specs=(PartitionSpec(AXIS), *[PartitionSpec()] * 4),
             out_specs=PartitionSpec(AXIS),
             check_vma=False,
         )
-        tally, computed = run(jobs, genomes, starts, settings)
+        tally, computed = run(jobs, genomes, starts, settings, self._own_starts(genomes, starts))
 
         def in_order(leaf: jax.Array) -> jax.Array:
             by_device = leaf.reshape(devices, queue, *leaf.shape[1:])
@@ -101,8 +103,22 @@ class Simulator:
 
         return Episodes(jax.tree.map(in_order, tally), jnp.sum(computed))
 
+    def _own_starts(self, genomes: Any, starts: Starts) -> Starts | None:
+        """Leaves [B, N, R, ...]; None where they depend on nobody."""
+        if self.bodies is None:
+            return None
+        each = jax.vmap(jax.vmap(self.bodies, (None, 0)), (0, None))
+        return jax.vmap(each)(genomes, starts)
+
     def _run_queue(
-        self, jobs: jax.Array, genomes: Any, starts: Starts, settings: Config, *, total: int
+        self,
+        jobs: jax.Array,
+        genomes: Any,
+        starts: Starts,
+        settings: Config,
+        own: Starts | None,
+        *,
+        total: int,
     ) -> tuple[Any, jax.Array]:
         """Works off one device's queue of jobs [Q]: tally with leaves [Q, ...], and the computed steps [1]."""
         queue = jobs.shape[0]
@@ -111,7 +127,7 @@ class Simulator:
 
         def fresh(places: jax.Array) -> Lane:
             job = jnp.where(places < waiting, places, queue)
-            lane = jax.vmap(partial(self._fresh_lane, genomes, starts, settings))(
+            lane = jax.vmap(partial(self._fresh_lane, genomes, starts, settings, own))(
                 job, jobs[jnp.minimum(places, queue - 1)]
             )
             return jax.tree.map(lambda leaf: jnp.moveaxis(leaf, 0, self.plant.lane_axis), lane)
@@ -155,12 +171,19 @@ class Simulator:
         return carry[1], (carry[3] * (CHECK_EVERY * lanes))[None]
 
     def _fresh_lane(
-        self, genomes: Any, starts: Starts, settings: Config, job: jax.Array, episode: jax.Array
+        self,
+        genomes: Any,
+        starts: Starts,
+        settings: Config,
+        own: Starts | None,
+        job: jax.Array,
+        episode: jax.Array,
     ) -> Lane:
         """The lane at the start of an episode []: of row, genome and start, the start changes fastest."""
         count, individuals = starts.friction.shape[1], jax.tree.leaves(genomes)[0].shape[1]
         row, individual = episode // (individuals * count), episode // count % individuals
-        start = jax.tree.map(lambda leaf: leaf[row, episode % count], starts)
+        here = (row, episode % count) if own is None else (row, individual, episode % count)
+        start = jax.tree.map(lambda leaf: leaf[here], starts if own is None else own)
         mine = jax.tree.map(lambda leaf: leaf[row], settings)
         still = jnp.zeros_like(start.qvel)
         return Lane(

@@ -5,8 +5,7 @@ generations.
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from mjxgait.champion import read_champion
-from mjxgait.runs.folder import CHAMPION, open_run
+from mjxgait.runs.folder import open_champion
 from mjxgait.viewing.video import Runner
 from mjxgait.viewing.walk import Walk, record_walk
 
@@ -16,8 +15,7 @@ LOOP_SECONDS = 12.0
 
 def champion_of(run: Path, seconds: float) -> Runner:
     """The run's champion."""
-    creature, _ = open_run(run)
-    return Runner(record_walk(creature, read_champion(run / CHAMPION, creature), seconds))
+    return Runner(record_walk(*open_champion(run), seconds))
 
 
 def top_of(run: Path, count: int, seconds: float) -> list[Runner]:
@@ -52,4 +50,4 @@ def _walks(
 
     snapshot = read_snapshot(run, generation)
     for rank, champion in [(rank, snapshot.champion(rank)) for rank in ranks]:
-        yield rank, record_walk(snapshot.creature, champion, seconds)
+        yield rank, record_walk(champion.embodied(snapshot.creature), champion, seconds)

@@ -8,10 +8,9 @@ from pathlib import Path
 import jax.numpy as jnp
 import numpy as np
 
-from mjxgait.champion import read_champion
 from mjxgait.errors import UserError
 from mjxgait.runs.disk import disk_errors
-from mjxgait.runs.folder import CHAMPION, METRICS, open_run, read_metrics
+from mjxgait.runs.folder import CHAMPION, METRICS, open_champion, open_run, read_metrics
 from mjxgait.settings.config import Config
 from mjxgait.tasks.walk.fitness import TERMS, signed_weights
 from mjxgait.viewing.curves import Lines, progress_figures
@@ -32,7 +31,7 @@ def plot_run(run: Path, out: Path | None = None, formats: Sequence[str] = FORMAT
     Raises:
       UserError: not a run folder, nothing to plot yet, or the folder cannot be written.
     """
-    creature, config = open_run(run)
+    _, config = open_run(run)
     lines = read_metrics(run / METRICS)
     if not lines:
         raise UserError(
@@ -41,7 +40,7 @@ def plot_run(run: Path, out: Path | None = None, formats: Sequence[str] = FORMAT
     out = out or run / PLOTS
     figures = dict(progress_figures(lines, _weights(config, lines)))
     if (run / CHAMPION).exists():
-        walk = record_walk(creature, read_champion(run / CHAMPION, creature), SECONDS)
+        walk = record_walk(*open_champion(run), SECONDS)
         figures |= dict(gait_figures(walk)) | {
             "filmstrip": ((12, 4.8), lambda drawing: draw_filmstrip(drawing, walk))
         }

@@ -22,9 +22,8 @@ from typing import Any
 import numpy as np
 
 from mjxgait.animation import build_glb, walk_loop, walk_take
-from mjxgait.champion import read_champion
 from mjxgait.errors import UserError
-from mjxgait.runs.folder import CHAMPION, METRICS, open_run, read_metrics
+from mjxgait.runs.folder import CHAMPION, METRICS, open_champion, open_run, read_metrics
 from mjxgait.viewing.walk import record_walk
 
 HERE = "127.0.0.1"
@@ -91,8 +90,8 @@ class Watcher:
         }
 
     def _shown(self) -> Shown:
-        champion = read_champion(self.run / CHAMPION, self.creature)
-        walk = record_walk(self.creature, champion, SECONDS)
+        creature, champion = open_champion(self.run)
+        walk = record_walk(creature, champion, SECONDS)
         found = (
             f"generation {champion.origin.get('generation', '?')}, fitness {champion.fitness:.2f}"
         )

@@ -14,10 +14,10 @@ from typing import Any
 
 from mjxgait.animation import WalkLoop, build_glb, walk_loop
 from mjxgait.certify import outdated, read_certificate
-from mjxgait.champion import Champion, read_champion
+from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
-from mjxgait.runs.folder import CERTIFICATE, CHAMPION, METRICS, open_run, read_metrics
+from mjxgait.runs.folder import CERTIFICATE, METRICS, open_champion, read_metrics
 from mjxgait.viewing.curves import draw_fitness
 from mjxgait.viewing.gaitplots import gait_figures
 from mjxgait.viewing.style import Figures, figure
@@ -34,8 +34,7 @@ def write_page(run: Path, out: Path) -> None:
     Raises:
       UserError: no run, no champion, no steady stride, or the file cannot be written.
     """
-    creature, _ = open_run(run)
-    champion = read_champion(run / CHAMPION, creature)
+    creature, champion = open_champion(run)
     walk = record_walk(creature, champion, SECONDS)
     page = build_page(walk, walk_loop(walk, RATE), _sections(run, creature, champion, walk))
     try:

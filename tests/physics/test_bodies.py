@@ -32,7 +32,7 @@ PLANTS = {"fast": fast_plant, "mjx": mjx_plant}
 TIGHT = {"fast": 1.0, "mjx": 50.0}
 """Factor on the tolerances of the fast physics: MJX loses more in single precision."""
 
-BARS = {".bars.centre", ".bars.half", ".bars.reach"}
+BARS = {".bars.centre", ".bars.half", ".bars.radius", ".bars.reach"}
 RARE = {"dof_frictionloss", "dof_solref", "dof_solimp", "geom_gap", "geom_solmix"}
 DRY = {".density", ".viscosity"}
 ALIKE = {"fast": BARS | DRY, "mjx": BARS | {f".model['{name}']" for name in RARE}}

@@ -5,6 +5,8 @@ Letters: `B` bodies without the world, `N` joints, `C` contacts, `M` limits, `G`
 of a body per lane have one more axis, the lanes, innermost.
 """
 
+import dataclasses
+
 import mujoco
 import numpy as np
 
@@ -206,7 +208,7 @@ def _softness(each: list[Softened]) -> Softness:
 def _bars(crossings: Crossings | None) -> Bars:
     bars = read_bars(crossings)
     centre, half = (_snapped(np.asarray(x)) for x in (bars.centre, bars.half))
-    return Bars(centre, half, bars.reach)
+    return dataclasses.replace(bars, centre=centre, half=half)
 
 
 def _watched(model: mujoco.MjModel, layout: SenseLayout) -> Watched:

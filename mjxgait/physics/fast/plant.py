@@ -33,6 +33,7 @@ from mjxgait.physics.fast.lanes import (
 from mjxgait.physics.fast.newton import Problem, constrained_acceleration
 from mjxgait.physics.fast.overlap import bar_places
 from mjxgait.physics.fast.parameters import Parameters, read_parameters
+from mjxgait.physics.fast.resized import resized
 from mjxgait.physics.fast.slots import BALL, FREE
 from mjxgait.physics.fast.structure import Geom, Structure, join
 from mjxgait.physics.fast.support import UnsupportedModel
@@ -97,6 +98,10 @@ class FastPlant:
             inertia=parameters.inertia * factor[:, None],
         )
         return reweighed(self.topology, heavy)
+
+    def resized(self, parameters: Parameters, factor: Number) -> Parameters:
+        """See `Plant.resized`."""
+        return reweighed(self.topology, resized(self.topology, parameters, factor))
 
     def forward(self, state: BodyState) -> tuple[Sensed, Workings]:
         """See `Plant.forward`."""

@@ -1,0 +1,156 @@
+"""Which parts of a creature may be of other sizes, and how high it then stands.
+
+Letters: `B` bodies without the world, `Z` sizes: one for both parts of a mirrored pair.
+"""
+
+import dataclasses
+from collections.abc import Mapping
+
+import mujoco
+import numpy as np
+
+from mjxgait.creature.frame import vertical_freedom
+from mjxgait.creature.geometry import support_extents
+from mjxgait.creature.load import Creature
+from mjxgait.creature.scale import load_files, scaled_files
+from mjxgait.errors import UserError
+
+SLIDE = mujoco.mjtJoint.mjJNT_SLIDE
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Proportions:
+    """All that hangs on the trunk, in sizes of its own; the trunk stays as it is.
+
+    names: of the parts, per size. size_of: [B] whose size a body has, -1 for one that keeps its.
+    fixed: [S] m, reach: [S, B] m; when standing the lowest points of the S shapes are at
+    `fixed + reach @ factors`. upwards: [nq] what lifts the creature by 1 m.
+    """
+
+    names: tuple[tuple[str, ...], ...]
+    size_of: np.ndarray
+    fixed: np.ndarray
+    reach: np.ndarray
+    upwards: np.ndarray
+
+    def by_part(self, sizes: np.ndarray) -> dict[str, float]:
+        """Factors by part, of sizes [Z] as logarithms."""
+        factors = np.exp(np.asarray(sizes, float))
+        return {n: float(f) for f, names in zip(factors, self.names, strict=True) for n in names}
+
+
+def proportions(creature: Creature) -> Proportions:
+    """Those of a creature."""
+    model = creature.model
+    root = _jointed(model, creature.trunk)
+    groups: dict[int, int] = {}
+    size_of = np.full(model.nbody - 1, -1)
+    names: list[list[str]] = []
+    for body in range(1, model.nbody):
+        own = _jointed(model, body)
+        if own in (root, 0):
+            continue
+        first = min(own, _partner(creature, own))
+        size = groups.setdefault(first, len(groups))
+        if size == len(names):
+            names.append([])
+        names[size].append(model.body(body).name)
+        size_of[body - 1] = size
+    return Proportions(
+        tuple(map(tuple, names)), size_of, *_heights(creature), vertical_freedom(model)
+    )
+
+
+def grown(creature: Creature, sizes: Mapping[str, float]) -> Creature:
+    """The creature with parts of these factors; its controller and certificate keep their yardstick.
+
+    Raises:
+      UserError: such a body cannot be had.
+    """
+    if not sizes:
+        return creature
+    # Steering is in body lengths, as evolution had them.
+    files = scaled_files(creature.files, sizes, body_length=creature.body_length)
+    return dataclasses.replace(load_files(files), terrain=creature.terrain)
+
+
+def check_sizes(creature: Creature, most: float) -> None:
+    """Refuses sizes whose smallest or largest body cannot be had.
+
+    Raises:
+      UserError: says why.
+    """
+    parts = [name for names in proportions(creature).names for name in names]
+    if not all(parts):
+        raise UserError(
+            "--evolve-body: a part of creature.xml has no name, by which the run would keep its "
+            "size; give every body one"
+        )
+    for factor in (1 / most, most):
+        try:
+            grown(creature, dict.fromkeys(parts, factor))
+        except UserError as error:
+            raise UserError(f"--evolve-body {most:g}: {error}") from None
+
+
+def _jointed(model: mujoco.MjModel, body: int) -> int:
+    """The body that it is welded to: one with a joint, or the world."""
+    return int(model.body_weldid[body])
+
+
+def _partner(creature: Creature, body: int) -> int:
+    """The mirror image of a body with joints, by its first that is actuated."""
+    model = creature.model
+    on = np.flatnonzero(model.dof_bodyid[creature.dof_adr] == body)
+    if not len(on):
+        return body
+    return int(model.dof_bodyid[creature.dof_adr[creature.partner[on[0]]]])
+
+
+def _heights(creature: Creature) -> tuple[np.ndarray, np.ndarray]:
+    """Of the lowest point of each shape that collides: what stays, and how it follows the factors.
+
+    A body's own lengths (its shapes, joints and the places of its children) grow by its factor, and
+    attitudes stay as they are, so a height is a sum over the chain from the trunk.
+    """
+    model, data = creature.model, mujoco.MjData(creature.model)
+    data.qpos[:] = creature.stand_qpos
+    mujoco.mj_kinematics(model, data)
+    bodies = model.nbody
+    fixed, reach = np.zeros(bodies), np.zeros((bodies, bodies))
+    for body in range(1, bodies):
+        parent = int(model.body_parentid[body])
+        if parent == 0:
+            fixed[body] = data.xpos[body, 2]
+            continue
+        place = data.xmat[parent].reshape(3, 3)[2] @ model.body_pos[body]
+        slid = _slid(model, data, body)
+        fixed[body] = fixed[parent] + slid
+        reach[body] = reach[parent]
+        reach[body, parent] += place
+        reach[body, body] += data.xpos[body, 2] - data.xpos[parent, 2] - place - slid
+    shapes = [
+        g
+        for g in range(model.ngeom)
+        if model.geom_bodyid[g] and (model.geom_contype[g] or model.geom_conaffinity[g])
+    ]
+    rows = reach[model.geom_bodyid[shapes]].copy()
+    for row, g in zip(rows, shapes, strict=True):
+        body = int(model.geom_bodyid[g])
+        radius, box, ellipsoid = support_extents(int(model.geom_type[g]), model.geom_size[g])
+        down = np.abs(data.geom_xmat[g].reshape(3, 3)[2])
+        low = data.geom_xpos[g, 2] - radius - down @ box - np.linalg.norm(down * ellipsoid)
+        row[body] += low - data.xpos[body, 2]
+    return fixed[model.geom_bodyid[shapes]], rows[:, 1:]
+
+
+def _slid(model: mujoco.MjModel, data: mujoco.MjData, body: int) -> float:
+    """m, how far the slides of a body have lifted it."""
+    first = int(model.body_jntadr[body])
+    joints = range(first, first + int(model.body_jntnum[body]))
+    return sum(
+        float(data.qpos[q] - model.qpos0[q]) * float(data.xaxis[j, 2])
+        for j in joints
+        if model.jnt_type[j] == SLIDE
+        for q in [model.jnt_qposadr[j]]
+    )

@@ -1,0 +1,173 @@
+"""Proportions as genes: the numbers of a lane's body are those of the scaled files."""
+
+from pathlib import Path
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from helpers import said_by
+from jax.tree_util import keystr
+from scipy.spatial.transform import Rotation
+
+import mjxgait
+from mjxgait.certify.simulate import simulate
+from mjxgait.certify.starts import nominal_starts
+from mjxgait.champion import Champion, read_champion
+from mjxgait.control.bodied import Bodied
+from mjxgait.creature import Creature, load_creature
+from mjxgait.creature.overlap import find_crossings
+from mjxgait.creature.proportions import grown, proportions
+from mjxgait.inspect import facts, read_snapshot
+from mjxgait.physics.fast import fast_plant
+from mjxgait.physics.layout import sense_layout
+from mjxgait.physics.plain import mjx_plant
+from mjxgait.runs.folder import BODY, CHAMPION
+from mjxgait.runs.growth import Growth
+from mjxgait.tasks.trials import draw_starts
+
+MOST = 1.3
+
+
+def some_sizes(creature: Creature, seed: int) -> np.ndarray:
+    count = len(proportions(creature).names)
+    return np.random.default_rng(seed).uniform(-np.log(MOST), np.log(MOST), count)
+
+
+def test_mirrored_parts_share_a_size(shipped: Creature):
+    known = proportions(shipped)
+    model = shipped.model
+    trunk = model.body(shipped.trunk).name
+    named = [name for names in known.names for name in names]
+    assert len(set(named)) == len(named)
+    assert trunk not in named
+    assert set(named) | {trunk} == {model.body(b).name for b in range(1, model.nbody)}
+    if shipped.symmetric:
+        body_of = model.dof_bodyid[shipped.dof_adr]
+        for joint, partner in enumerate(shipped.partner):
+            pair = {model.body(body_of[j]).name for j in (joint, partner)}
+            assert any(pair <= set(names) for names in known.names), pair
+
+
+OF_MODEL = ("body_iquat", "body_inertia", "body_pos", "qpos0", "qpos_spring")
+APART = {".axes", ".inertia", ".pos", *(f".model['{name}']" for name in OF_MODEL)}
+"""Compared apart: of equal moments of inertia any axes will do, and where the root was in the file
+is of no matter.
+"""
+
+
+def rootless(numbers: Any) -> np.ndarray:
+    """Places of the bodies below the root, m."""
+    if hasattr(numbers, "pos"):
+        return np.asarray(numbers.pos)[1:]
+    return np.asarray(numbers.model["body_pos"])[2:]
+
+
+def tensors(numbers: Any) -> np.ndarray:
+    """[B, 3, 3] of the parts, in units of the largest moment."""
+    if hasattr(numbers, "inertia"):
+        first, second = np.moveaxis(np.asarray(numbers.axes, float), 1, 0)
+        axes = np.stack([first, second, np.cross(first, second)], axis=2)
+        moments = np.asarray(numbers.inertia, float)
+    else:
+        quats = np.asarray(numbers.model["body_iquat"], float)
+        axes = Rotation.from_quat(quats, scalar_first=True).as_matrix()
+        moments = np.asarray(numbers.model["body_inertia"], float)
+    whole = np.einsum("bij,bj,bkj->bik", axes, moments, axes)
+    return whole / moments.max()
+
+
+@pytest.mark.parametrize("make", [fast_plant, mjx_plant], ids=["fast", "mjx"])
+def test_a_lanes_body_is_the_one_in_the_scaled_files(shipped: Creature, make: Any):
+    """Every number that the plant reads, from places to the weights of constraints."""
+    known, sizes = proportions(shipped), some_sizes(shipped, 3)
+    layout, touch = sense_layout(shipped), shipped.settings.termination.touch
+    plant = make(shipped.model_where(touch), layout, None)
+    factors = np.exp(np.append(sizes, 0.0))[known.size_of]
+    ours = jax.jit(plant.resized)(plant.parameters, jnp.float32(factors))
+    other = grown(shipped, known.by_part(sizes))
+    theirs = plant.parameters_of(other.model_where(touch), sense_layout(other), None)
+    for (path, a), b in zip(
+        jax.tree_util.tree_leaves_with_path(ours), jax.tree.leaves(theirs), strict=True
+    ):
+        if keystr(path) in APART:
+            continue
+        most = 2e-5 * np.abs(b).max(initial=1e-6)
+        np.testing.assert_allclose(a, b, rtol=0, atol=most, err_msg=keystr(path))
+    assert abs(rootless(ours) - rootless(theirs)).max() < 1e-5
+    np.testing.assert_allclose(tensors(ours), tensors(theirs), rtol=0, atol=1e-5)
+
+
+def test_it_stands_as_high_above_the_floor(shipped: Creature):
+    known, sizes = proportions(shipped), some_sizes(shipped, 4)
+    plant = fast_plant(shipped.model, sense_layout(shipped), None)
+    config = mjxgait.settings.config.RolloutConfig(starts=1)
+    start = jax.tree.map(lambda x: x[0], draw_starts(jax.random.key(0), shipped, config))
+    grew = Growth(known).body(plant, Bodied({}, jnp.float32(sizes)), start)
+    other = grown(shipped, known.by_part(sizes))
+    np.testing.assert_allclose(grew.qpos, other.stand_qpos, atol=2e-5)
+    assert abs(other.stand_qpos - shipped.stand_qpos).max() > 1e-3
+
+
+def test_bars_that_are_watched_grow_with_their_parts(stool: Creature):
+    """Alike factors scale every depth alike."""
+    plant = fast_plant(stool.evolution_model, sense_layout(stool), find_crossings(stool))
+    assert plant.topology.first
+    grew = plant.resized(plant.parameters, jnp.full(stool.model.nbody - 1, 1.2))
+    for name in ("centre", "half", "radius", "reach"):
+        before, after = getattr(plant.parameters.bars, name), getattr(grew.bars, name)
+        np.testing.assert_allclose(after, 1.2 * before, rtol=1e-5, err_msg=name)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> mjxgait.Run:
+    out = tmp_path_factory.mktemp("body") / "run"
+    settings = {
+        "evolution": {"body": MOST},
+        "rollout": {"seconds": 0.5, "lanes": 8},
+        "examination": {"candidates": 1, "every": 0, "draws": 1},
+    }
+    stool = Path(__file__).parent / "data" / "stool"
+    return mjxgait.train(stool, out=out, population=8, generations=2, settings=settings, quiet=True)
+
+
+def test_the_run_keeps_the_body_that_won(run: mjxgait.Run):
+    champion, body = run.champion, load_creature(run.folder / BODY)
+    assert champion.sizes
+    assert all(1 / MOST <= f <= MOST for f in champion.sizes.values())
+    assert len(set(champion.sizes.values())) > 1
+    assert body.digest == run.creature.digest != load_creature(run.folder / "creature").digest
+    assert run.certificate
+    assert run.certificate["creature_digest"] == body.digest
+
+
+def test_the_champion_moves_in_c_mujoco_as_it_did_in_evolution(run: mjxgait.Run):
+    """Everybody of the population with a body of their own, and not with the one they came from."""
+    snapshot = read_snapshot(run.folder)
+    told = snapshot.arrays["outcome"][:, 0, 0]
+    everybody = [snapshot.champion(rank + 1) for rank in range(len(told))]
+
+    def forward(creature: Creature, champion: Champion) -> float:
+        return float(simulate(creature, champion, nominal_starts(creature, 1), 0.5).travel[0, 0])
+
+    known = snapshot.creature
+    own = np.array([forward(one.embodied(known), one) for one in everybody])
+    ancestors = np.array([forward(known, one) for one in everybody])
+    assert np.median(abs(own - told)) < 1e-3
+    assert abs(own - told).sum() < 0.3 * abs(ancestors - told).sum()
+
+
+def test_it_is_told_of_and_shown(run: mjxgait.Run):
+    snapshot = read_snapshot(run.folder)
+    best = snapshot.champion(1)
+    kept = read_champion(run.folder / CHAMPION, snapshot.creature)
+    assert best.sizes == pytest.approx(kept.sizes)
+    assert best.fingerprint == kept.fingerprint
+    assert facts(snapshot)["champion"]["sizes"] == pytest.approx(kept.sizes)
+    assert len(mjxgait.walk(run, 0.3)["time"]) > 10
+
+
+def test_sizes_out_of_reason_are_one_sentence(capsys: pytest.CaptureFixture):
+    told = said_by(capsys, "train", "--env", "tall_quadruped", "--evolve-body", 9, code=2)
+    assert "evolution.body" in told
