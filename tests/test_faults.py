@@ -39,7 +39,8 @@ def test_a_fault_can_be_planted(name: str):
     ast.parse(script.planted(fault))
     assert fault.tests
     for test in fault.tests:
-        assert (ROOT / test.partition("::")[0]).is_file(), test
+        file, _, function = test.partition("::")
+        assert f"def {function.partition('[')[0]}" in (ROOT / file).read_text(), test
 
 
 TOY = {

@@ -34,8 +34,10 @@ evolution has seen.
 """
 
 
-Judged = tuple[float, float, bool | None]
-"""Of a champion: `walk`, `up` and `certified` of its `Result`."""
+Ways = dict[str, tuple[float, float]]
+"""`walk` and `up` of a champion on each ground."""
+Judged = tuple[Ways, bool | None]
+"""Of a champion: its ways, and `certified` of its `Result`."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -48,6 +50,7 @@ class Result:
     best at the end. area: mean of the best over the generations. generations: until the best
     reached the study's threshold, one more than there were if it never did.
     steps: creature-steps that the run lived. finite: whether it found anybody who could be judged.
+    elsewhere: `walk` and `up` on the study's further grounds.
     """
 
     variant: str
@@ -60,10 +63,16 @@ class Result:
     generations: int
     steps: int
     finite: bool
+    elsewhere: Ways = dataclasses.field(default_factory=dict)
 
     def value(self, measure: str) -> float:
         """Of a measure, as a number."""
         return float(getattr(self, measure) or 0.0)
+
+    def on(self, ground: str) -> "Result":
+        """With `walk` and `up` of one of the further grounds."""
+        walk, up = self.elsewhere[ground]
+        return dataclasses.replace(self, walk=walk, up=up, certified=None)
 
 
 def read_logs(folder: Path) -> list[dict[str, Any]]:
@@ -89,7 +98,7 @@ def measure(folder: Path, plan: Plan, tell: Callable[[int, int], None]) -> list[
         tell(0, len(missing))
     with _survivable(folder), process_per_core(len(missing)) as pool:
         found = pool.map(
-            partial(_judge, folder / CREATURE, plan.study.certify),
+            partial(_judge, folder / CREATURE, plan.study.grounds, plan.study.certify),
             [champion_path(folder, plan, run) for run in missing],
             [_found_somebody(lines[run.variant, run.seed]) for run in missing],
         )
@@ -120,7 +129,8 @@ def _measured(folder: Path) -> list[dict[str, Any]]:
 
 
 def _result(study: Study, run: Run, lines: Sequence[Mapping[str, Any]], judged: Judged) -> Result:
-    walk, up, certified = judged
+    ways, certified = judged
+    walk, up = ways[study.grounds[0]]
     best = [-math.inf if line["best"] is None else line["best"] for line in lines]
     finite, threshold = _found_somebody(lines), study.threshold
     reached = [i for i, value in enumerate(best) if threshold is not None and value >= threshold]
@@ -135,6 +145,7 @@ def _result(study: Study, run: Run, lines: Sequence[Mapping[str, Any]], judged: 
         generations=reached[0] if reached else run.generations + 1,
         steps=sum(line["sim_steps"] for line in lines),
         finite=finite,
+        elsewhere={ground: ways[ground] for ground in study.grounds[1:]},
     )
 
 
@@ -143,24 +154,26 @@ def _found_somebody(lines: Sequence[Mapping[str, Any]]) -> bool:
     return lines[-1]["best"] is not None
 
 
-def _judge(creature_folder: Path, examine: bool, path: Path, finite: bool) -> Judged:
-    """In a process of its own: the walk of the champion at `path`, and if `examine` the verdict.
+def _judge(
+    creature_folder: Path, grounds: Sequence[str], examine: bool, path: Path, finite: bool
+) -> Judged:
+    """In a process of its own: the walk of the champion at `path` on each ground, and if `examine`
+    the verdict on the first.
 
     What is sent there is small. The pool of Python 3.11 hangs where a process is killed while it
     is sent more than a pipe holds.
     """
     creature = _creature(creature_folder)
     champion = read_champion(path, creature)
-    creature = champion.embodied(creature)
-    walk, up, nominal = _walk(creature, champion) if finite else (0.0, 0.0, 0.0)
+    body = champion.embodied(creature)
+    walks = {g: _walk(body.on(g), champion) if finite else (0.0, 0.0, 0.0) for g in grounds}
     # One that falls or lags this far behind the speed that the certificate asks for cannot pass, so
     # the long examination is spared.
-    worth = nominal > 0.4
-    return (
-        walk,
-        up,
-        (worth and certify(creature, champion, threads=1).passed) if examine else None,
-    )
+    worth = walks[grounds[0]][2] > 0.4
+    ways = {ground: (walk, up) for ground, (walk, up, _) in walks.items()}
+    if not examine:
+        return ways, None
+    return ways, worth and certify(body.on(grounds[0]), champion, threads=1).passed
 
 
 @functools.cache

@@ -10,8 +10,9 @@ import pydantic
 
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError, did_you_mean
+from mjxgait.ground.spec import FLAT
 from mjxgait.parts import resolve_config
-from mjxgait.settings.config import Config
+from mjxgait.settings.config import Config, GroundText
 from mjxgait.settings.shipped import data_folder
 from mjxgait.settings.tables import STRICT, Count, Finite, Whole, build, merge, read_toml
 
@@ -45,6 +46,8 @@ class Study:
         measure `generations`.
       certify: whether every run's champion is examined for its certificate, about 10 s for each
         that may pass.
+      grounds: that every champion is tried on, whatever it evolved on (docs/ground.md); `walk`, `up`
+        and `certified` are of the first, and each further one has a table of its own.
       paired: whether all variants use the same seeds; else each has its own.
       allow_equal: whether two variants may be equal, as in a test of the method itself.
       base: config keys of all variants.
@@ -62,6 +65,7 @@ class Study:
     measure: Measure = "walk"
     threshold: Finite | None = None
     certify: bool = False
+    grounds: tuple[GroundText, ...] = (FLAT,)
     paired: bool = True
     allow_equal: bool = False
     base: dict[str, Any] = dataclasses.field(default_factory=dict)
@@ -71,6 +75,8 @@ class Study:
     def __post_init__(self) -> None:
         if bool(self.variant) == bool(self.grid):
             raise ValueError("give either [[variant]] tables or a [grid], not both and not neither")
+        if not self.grounds or len(set(self.grounds)) < len(self.grounds):
+            raise ValueError("grounds must name at least one ground, and none twice")
         if self.measure == "certified" and not self.certify:
             raise ValueError('measure = "certified" needs certify = true')
         if self.measure == "generations" and self.threshold is None:

@@ -19,6 +19,7 @@ from mjxgait.ablation.findings import Finding, find, trim_of
 from mjxgait.ablation.measures import Result
 from mjxgait.ablation.plan import Plan
 from mjxgait.ablation.statistics import Estimate, share
+from mjxgait.ground.spec import FLAT
 from mjxgait.runs.disk import disk_errors
 
 NAMES = {
@@ -76,7 +77,8 @@ def markdown(
         "",
         f"{study.env}: {len(plan.variants)} variants × {study.seeds} seeds "
         f"({'the same for all' if study.paired else 'each variant its own'}, from "
-        f"{study.first_seed}), {study.generations} generations. Measure: {NAMES[study.measure]}.",
+        f"{study.first_seed}), {study.generations} generations. Measure: {NAMES[study.measure]}"
+        f"{_where(study.grounds[0])}.",
         "",
         f"    {command}",
         "",
@@ -87,6 +89,7 @@ def markdown(
         "",
         *_table(plan, results, findings),
         "",
+        *_elsewhere(plan, results),
         "![Estimates](intervals.png)",
         "",
         "## What can be concluded, and what cannot",
@@ -102,6 +105,10 @@ def markdown(
         "",
     ]
     return "\n".join(lines)
+
+
+def _where(ground: str) -> str:
+    return "" if ground == FLAT else f", on {ground}"
 
 
 def _table(plan: Plan, results: Sequence[Result], findings: Sequence[Finding]) -> list[str]:
@@ -139,6 +146,17 @@ def _table(plan: Plan, results: Sequence[Result], findings: Sequence[Finding]) -
         ]
         rows.append("| " + " | ".join(cells) + " |")
     return rows
+
+
+def _elsewhere(plan: Plan, results: Sequence[Result]) -> list[str]:
+    """The table and sentences of each further ground."""
+    lines = []
+    for ground in plan.study.grounds[1:]:
+        there = [result.on(ground) for result in results]
+        findings = find(plan, there)
+        lines += [f"## On {ground}", "", *_table(plan, there, findings), ""]
+        lines += [*[f"- {_sentence(finding, plan.variants[0])}" for finding in findings[1:]], ""]
+    return lines
 
 
 def _sentence(finding: Finding, base: str) -> str:
@@ -193,9 +211,13 @@ def _cautions(plan: Plan, results: Sequence[Result]) -> list[str]:
 def _csv(results: Sequence[Result]) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    names = [field.name for field in dataclasses.fields(Result)]
-    writer.writerow(names)
-    writer.writerows([getattr(result, name) for name in names] for result in results)
+    names = [field.name for field in dataclasses.fields(Result) if field.name != "elsewhere"]
+    grounds = list(results[0].elsewhere)
+    there = [f"{measure} on {ground}" for ground in grounds for measure in ("walk", "up")]
+    writer.writerow([*names, *there])
+    for result in results:
+        own = [value for ground in grounds for value in result.elsewhere[ground]]
+        writer.writerow([*(getattr(result, name) for name in names), *own])
     return text.getvalue()
 
 

@@ -115,6 +115,8 @@ def test_values_share_a_program_and_shapes_need_one_each(stool: Creature):
         ({"variant": [TWO[0], TWO[0]]}, ["two variants", '"base"']),
         ({"variant": [TWO[0], {"name": "x", "config": "wilsn"}]}, ["wilsn", "wilson"]),
         ({"variant": TWO[:1]}, ["two variants"]),
+        ({"grounds": ["flat", "lava"]}, ["grounds", "lava"]),
+        ({"grounds": ["flat", "flat"]}, ["grounds", "none twice"]),
         (
             {"variant": [TWO[0], {"name": "x", "settings": {"seed": 3}}]},
             ["seeds and generations are the study's own keys"],
