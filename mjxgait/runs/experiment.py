@@ -241,7 +241,7 @@ def _initial(
 def _generation(
     blueprint: Blueprint, numbers: Numbers | None, rows: Row, states: EvolutionState
 ) -> tuple[EvolutionState, GenerationMetrics]:
-    """One generation of all rows [B]. Row by row but for the simulations, so that a row's numbers do not depend on its neighbours."""
+    """One generation of all rows [B]. Row by row but for the simulations, so that a row reads nothing of its neighbours."""
 
     simulator = blueprint.simulator(numbers)
 

@@ -33,7 +33,7 @@ class Local:
     simulator: Simulator
 
     def judge(self, genomes: Any, trials: Starts, settings: Config) -> Judged:
-        """See `Evaluator`. Row by row but for the simulations: no row depends on its neighbours."""
+        """See `Evaluator`. Row by row but for the simulations: no row reads anything of its neighbours."""
         episodes = self.simulator.simulate(genomes, trials, settings)
         lived = jnp.sum(episodes.tally.steps, axis=(1, 2))
         # Idle lanes are nobody's: each row bears a part in proportion to the steps that it lived.

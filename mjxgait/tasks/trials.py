@@ -89,7 +89,9 @@ def _heaviness(key: jax.Array, creature: Creature, config: RolloutConfig) -> jax
         return None
     parts = creature.model.nbody - 1
     spread = jax.random.uniform(key, (config.starts, parts), minval=-1.0).at[0].set(0.0)
-    return 1.0 + config.masses * spread
+    # What is welded to a part is as much heavier as the part.
+    carrier = np.maximum(creature.model.body_weldid[1:] - 1, 0)
+    return 1.0 + config.masses * spread[:, carrier]
 
 
 def draw_grounds(key: jax.Array, creature: Creature, config: RolloutConfig) -> Ground | None:

@@ -12,6 +12,7 @@ import numpy as np
 
 from mjxgait.creature import geometry
 from mjxgait.creature.overlap import Crossings
+from mjxgait.physics.fast.fused import Model, geom_weights
 from mjxgait.physics.fast.lanes import columns, constants
 from mjxgait.physics.fast.slots import HINGE, SLIDE, Ends
 from mjxgait.physics.fast.softness import Softened, contact_softness, limit_softness, mixed
@@ -110,9 +111,7 @@ class Parameters:
     bars: Bars
 
 
-def read_parameters(
-    model: mujoco.MjModel, layout: SenseLayout, crossings: Crossings | None
-) -> Parameters:
+def read_parameters(model: Model, layout: SenseLayout, crossings: Crossings | None) -> Parameters:
     """Of a model, in NumPy.
 
     Raises:
@@ -157,36 +156,35 @@ def _turned(quats: np.ndarray) -> np.ndarray:
     return np.array([columns(quat) for quat in quats]).reshape(-1, 3, 3)
 
 
-def _reference(model: mujoco.MjModel, joint: int) -> float:
+def _reference(model: Model, joint: int) -> float:
     has_one = model.jnt_type[joint] in (SLIDE, HINGE)
     return float(model.qpos0[model.jnt_qposadr[joint]]) if has_one else 0.0
 
 
-def _contacts(model: mujoco.MjModel) -> Contacts:
+def _contacts(model: Model) -> Contacts:
     ends = contact_ends(model)
     geoms = [end.geom for end in ends]
     axis = np.array([_long_axis(model, geom) for geom in geoms]).reshape(-1, 3)
-    bodies = model.geom_bodyid[geoms]
     return Contacts(
         center=_snapped(np.array([_center(model, end) for end in ends]).reshape(-1, 3)),
         axis=_snapped(axis),
         radius=np.array(model.geom_size[geoms, 0]),
         friction=np.array([float(mixed(model, end.floor, end.geom)[0]) for end in ends]),
-        weight=np.array(model.body_invweight0[bodies, 0]),
+        weight=geom_weights(model, geoms),
         softness=_softness([contact_softness(model, end.floor, end.geom) for end in ends]),
     )
 
 
-def _center(model: mujoco.MjModel, end: Ends) -> np.ndarray:
+def _center(model: Model, end: Ends) -> np.ndarray:
     half = model.geom_size[end.geom][1] * _long_axis(model, end.geom)
     return model.geom_pos[end.geom] + end.side * half if end.side else model.geom_pos[end.geom]
 
 
-def _long_axis(model: mujoco.MjModel, geom: int) -> np.ndarray:
+def _long_axis(model: Model, geom: int) -> np.ndarray:
     return np.array(columns(model.geom_quat[geom]))[2]
 
 
-def _limits(model: mujoco.MjModel) -> Limits:
+def _limits(model: Model) -> Limits:
     joints = limited_joints(model)
     return Limits(
         low=np.array(model.jnt_range[joints, 0]),
@@ -211,7 +209,7 @@ def _bars(crossings: Crossings | None) -> Bars:
     return dataclasses.replace(bars, centre=centre, half=half)
 
 
-def _watched(model: mujoco.MjModel, layout: SenseLayout) -> Watched:
+def _watched(model: Model, layout: SenseLayout) -> Watched:
     geoms = [int(g) for g in layout.watched]
     extents = [geometry.support_extents(model.geom_type[g], model.geom_size[g]) for g in geoms]
     radius, box, ellipsoid = (np.array(column) for column in zip(*extents, strict=True))

@@ -16,6 +16,7 @@ from mjxgait.physics.fast.constraints import make_constraints, touch
 from mjxgait.physics.fast.difference import difference
 from mjxgait.physics.fast.dynamics import bias_force, inertias, mass_rows, motion_paths
 from mjxgait.physics.fast.footing import Touch
+from mjxgait.physics.fast.fused import fuse
 from mjxgait.physics.fast.kernel import one_kernel
 from mjxgait.physics.fast.kinematics import WORLD, Pose, motions, posture, unit_quaternion
 from mjxgait.physics.fast.lanes import (
@@ -78,12 +79,13 @@ class FastPlant:
     ) -> Parameters:
         """See `Plant.parameters_of`."""
         try:
-            told = difference(self.topology, read_topology(model, layout, crossings))
+            other = fast_plant(model, layout, crossings)
+            told = difference(self.topology, other.topology)
         except UnsupportedModel as reason:
             told = f"the fast physics does not know this: {reason}"
         if told:
             raise OtherTopology(told)
-        return read_parameters(model, layout, crossings)
+        return other.parameters
 
     def with_parameters(self, parameters: Parameters) -> Self:
         """See `Plant.with_parameters`."""
@@ -91,17 +93,35 @@ class FastPlant:
 
     def heavier(self, parameters: Parameters, factor: Number) -> Parameters:
         """See `Plant.heavier`."""
-        factor = jnp.broadcast_to(factor, np.shape(parameters.mass))
+        factor = self._of_moving(factor)
         heavy = dataclasses.replace(
             parameters,
             mass=parameters.mass * factor,
             inertia=parameters.inertia * factor[:, None],
         )
-        return reweighed(self.topology, heavy)
+        return self._reweighed(parameters, heavy)
 
     def resized(self, parameters: Parameters, factor: Number) -> Parameters:
         """See `Plant.resized`."""
-        return reweighed(self.topology, resized(self.topology, parameters, factor))
+        large = resized(self.topology, parameters, self._of_moving(factor))
+        return self._reweighed(parameters, large)
+
+    def _of_moving(self, factor: Number) -> Number:
+        """[B] of factors [] or [nbody - 1]: what is welded to a body is as the body."""
+        moving = np.array(self.topology.moving)
+        return (
+            jnp.broadcast_to(factor, np.shape(moving)) if np.ndim(factor) == 0 else factor[moving]
+        )
+
+    def _reweighed(self, before: Parameters, after: Parameters) -> Parameters:
+        """With the weights that follow from the change."""
+        weighed = reweighed(self.topology, after)
+        if not self.topology.welded:
+            return weighed
+        # MuJoCo weighs a contact at the welded body's own centre, which is not known here any more.
+        ratio = weighed.contacts.weight / reweighed(self.topology, before).contacts.weight
+        contacts = dataclasses.replace(weighed.contacts, weight=before.contacts.weight * ratio)
+        return dataclasses.replace(weighed, contacts=contacts)
 
     def forward(self, state: BodyState) -> tuple[Sensed, Workings]:
         """See `Plant.forward`."""
@@ -303,5 +323,5 @@ def fast_plant(
     Raises:
       UnsupportedModel: it does not; the message says why.
     """
-    topology = read_topology(model, layout, crossings)
-    return FastPlant(topology, read_parameters(model, layout, crossings))
+    seen = fuse(model, layout, crossings)
+    return FastPlant(read_topology(*seen), read_parameters(*seen))

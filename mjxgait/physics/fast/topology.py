@@ -12,6 +12,7 @@ import numpy as np
 
 from mjxgait.creature.overlap import Crossings
 from mjxgait.physics.fast.carriers import Carriers, find_carriers
+from mjxgait.physics.fast.fused import Fused, Model
 from mjxgait.physics.fast.slots import (
     FREEDOMS,
     BodySlot,
@@ -39,7 +40,8 @@ class Topology:
     step: s. iterations, line_iterations: the most of Newton's method and its line search.
     warm_start: whether the solver starts where it was a step before.
     water: whether a fluid resists.
-    names: of the bodies, for messages only.
+    names: of the bodies, for messages only. moving: [B] which of the model's bodies they are;
+    welded: whether they carry others.
     """
 
     bodies: tuple[BodySlot, ...]
@@ -61,6 +63,8 @@ class Topology:
     warm_start: bool
     water: bool
     names: tuple[str, ...] = dataclasses.field(compare=False)
+    moving: tuple[int, ...] = dataclasses.field(compare=False)
+    welded: bool = dataclasses.field(compare=False)
 
     @functools.cached_property
     def joints(self) -> tuple[JointSlot, ...]:
@@ -93,9 +97,7 @@ class Topology:
         return find_carriers(self.bodies, self.pattern, self.contacts)
 
 
-def read_topology(
-    model: mujoco.MjModel, layout: SenseLayout, crossings: Crossings | None
-) -> Topology:
+def read_topology(model: Model, layout: SenseLayout, crossings: Crossings | None) -> Topology:
     """Of a model, of which `layout` is sensed and `crossings` are looked at.
 
     Raises:
@@ -130,12 +132,16 @@ def read_topology(
         warm_start=not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_WARMSTART,
         water=bool(model.opt.density or model.opt.viscosity),
         names=tuple(model.body(b).name or f"body {b}" for b in range(1, model.nbody)),
+        moving=integers(model.kept - 1)
+        if isinstance(model, Fused)
+        else tuple(range(model.nbody - 1)),
+        welded=isinstance(model, Fused),
     )
 
 
-def contact_ends(model: mujoco.MjModel) -> list[Ends]:
+def contact_ends(model: Model) -> list[Ends]:
     """The spheres that may touch the floor, in the order of their bodies; a capsule is two."""
-    touching = check_supported(model)
+    touching = check_supported(model.model if isinstance(model, Fused) else model)
     flag = mujoco.mjtDisableBit
     if model.opt.disableflags & (flag.mjDSBL_CONSTRAINT | flag.mjDSBL_CONTACT):
         return []
@@ -147,7 +153,7 @@ def contact_ends(model: mujoco.MjModel) -> list[Ends]:
     return sorted(ends, key=lambda end: int(model.geom_bodyid[end.geom]))
 
 
-def limited_joints(model: mujoco.MjModel) -> list[int]:
+def limited_joints(model: Model) -> list[int]:
     """The hinges and slides that have a limit."""
     flag = mujoco.mjtDisableBit
     if model.opt.disableflags & (flag.mjDSBL_CONSTRAINT | flag.mjDSBL_LIMIT):
@@ -155,7 +161,7 @@ def limited_joints(model: mujoco.MjModel) -> list[int]:
     return [int(j) for j in np.nonzero(model.jnt_limited)[0]]
 
 
-def joints_of(model: mujoco.MjModel, body: int) -> range:
+def joints_of(model: Model, body: int) -> range:
     """The joints of a body, by MuJoCo's numbers."""
     first = int(model.body_jntadr[body])
     return range(first, first + int(model.body_jntnum[body]))
@@ -166,7 +172,7 @@ def integers(values: np.ndarray) -> tuple[int, ...]:
     return tuple(int(value) for value in values)
 
 
-def _body(model: mujoco.MjModel, b: int) -> BodySlot:
+def _body(model: Model, b: int) -> BodySlot:
     joints = (
         JointSlot(int(model.jnt_type[j]), int(model.jnt_qposadr[j]), int(model.jnt_dofadr[j]))
         for j in joints_of(model, b)
