@@ -10,8 +10,12 @@ import pytest
 from helpers import STOOL, small_config
 
 from mjxgait.creature import Creature, load_creature
+from mjxgait.creature.overlap import find_crossings
+from mjxgait.physics.fast import fast_plant
+from mjxgait.physics.layout import sense_layout
 from mjxgait.runs.blueprint import Numbers
 from mjxgait.runs.experiment import Batch, build_experiment
+from mjxgait.types import BodyState
 
 INPUTS = {"body": "inputs", "physics": "auto"}
 
@@ -23,6 +27,19 @@ def changed(folder: Path, pattern: str, factor: float) -> Creature:
         text = (folder / name).read_text()
         text = re.sub(pattern, lambda m: f"{m[1]}{float(m[2]) * factor:.6g}", text)
         (folder / name).write_text(text)
+    return load_creature(folder)
+
+
+SADDLE = """<geom name="saddle" type="box" size="0.05 0.04 0.01" pos="0 0 0.08" mass="0.1"/>"""
+
+
+def saddled(folder: Path) -> Creature:
+    """The stool with a shape more, which comes near other parts."""
+    shutil.copytree(STOOL, folder)
+    text = (folder / "creature.xml").read_text()
+    trunk = re.search(r'<body name="trunk"[^>]*>', text)
+    assert trunk
+    (folder / "creature.xml").write_text(text.replace(trunk[0], trunk[0] + SADDLE))
     return load_creature(folder)
 
 
@@ -45,6 +62,32 @@ def stools(stool) -> str:
 @pytest.mark.parametrize("change", OTHERS)
 def test_another_body_has_the_same_program(stools: str, change: str, tmp_path: Path):
     assert program(changed(tmp_path / "other", *OTHERS[change]), **INPUTS) == stools
+
+
+def test_a_shape_more_needs_no_program_of_its_own(stools: str, stool: Creature, tmp_path: Path):
+    """There is room for shapes that may touch the floor and for pairs that may overlap."""
+    other = saddled(tmp_path / "other")
+    assert len(other.watched) > len(stool.watched)
+    assert program(other, **INPUTS) == stools
+
+
+def test_room_that_nothing_is_in_changes_nothing(tmp_path: Path):
+    creature = saddled(tmp_path / "other")
+    known = (creature.evolution_model, sense_layout(creature), find_crossings(creature))
+    tight, roomy = fast_plant(*known), fast_plant(*known, roomy=True)
+    rng, lanes = np.random.default_rng(0), 8
+    qpos = np.tile(creature.stand_qpos[:, None], lanes)
+    qpos[creature.qpos_adr] += rng.normal(size=(len(creature.qpos_adr), lanes))
+    qpos[2] += np.linspace(-0.3, 0.1, lanes)
+    zero = np.zeros((creature.nv, lanes))
+    state = BodyState(*map(np.float32, (qpos, zero, zero, zero, np.ones(lanes))))
+    depths = [np.asarray(jax.jit(plant.overlap)(state)) for plant in (tight, roomy)]
+    np.testing.assert_allclose(depths[0], depths[1], atol=1e-6)
+    assert np.ptp(depths[0]) > 1e-3
+    seen = [np.asarray(jax.jit(plant.forward)(state)[0].geom_low) for plant in (tight, roomy)]
+    feet = len(creature.foot_of)
+    np.testing.assert_allclose(seen[0][:feet], seen[1][:feet], atol=1e-6)
+    np.testing.assert_allclose(seen[0][feet:].min(0), seen[1][feet:].min(0), atol=1e-6)
 
 
 def test_as_constants_it_has_one_of_its_own(stool, tmp_path: Path):

@@ -20,12 +20,13 @@ SLOWER = "15 to 30"
 
 
 def make_plant(
-    creature: Creature, physics: Literal["auto", "mjx"], touch_ends: bool
+    creature: Creature, physics: Literal["auto", "mjx"], touch_ends: bool, roomy: bool = False
 ) -> tuple[Plant, int]:
     """The plant of a creature, and how many lanes per device suit it.
 
     Args:
       touch_ends: whether an episode ends when a part touches the floor that must not.
+      roomy: whether its program is to serve bodies with other shapes too.
 
     Raises:
       UserError: MJX does not support something in the model; in its words.
@@ -35,7 +36,7 @@ def make_plant(
     note = ""
     if physics == "auto":
         try:
-            return fast_plant(model, layout, crossings), 64
+            return fast_plant(model, layout, crossings, roomy), 64
         except UnsupportedModel as reason:
             note = _cost(reason)
     try:

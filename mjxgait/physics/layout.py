@@ -11,13 +11,15 @@ from mjxgait.creature import Creature
 class SenseLayout:
     """What is sensed.
 
-    trunk: body id. qpos_adr, dof_adr: [J] addresses of the actuated joints. watched: [G] geom ids.
+    trunk: body id. qpos_adr, dof_adr: [J] addresses of the actuated joints. watched: [G] geom ids, of which the
+    first `feet` are feet.
     """
 
     trunk: int
     qpos_adr: np.ndarray
     dof_adr: np.ndarray
     watched: np.ndarray
+    feet: int = 0
 
 
 class OtherTopology(Exception):
@@ -26,4 +28,10 @@ class OtherTopology(Exception):
 
 def sense_layout(creature: Creature) -> SenseLayout:
     """The layout of a creature."""
-    return SenseLayout(creature.trunk, creature.qpos_adr, creature.dof_adr, creature.watched)
+    return SenseLayout(
+        creature.trunk,
+        creature.qpos_adr,
+        creature.dof_adr,
+        creature.watched,
+        len(creature.foot_of),
+    )

@@ -1,5 +1,7 @@
 """How deep parts of a creature are in each other: what both plants compute of `Crossings`."""
 
+import dataclasses
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -15,12 +17,16 @@ class Bars:
 
     centre, half: [S, 3] m in the body's frame, a bar's middle and from there to an end.
     radius: [S] m. reach: [Q] m; a pair's depth is this minus the distance of the two axes.
+    body: [S], first, second: [Q] as in `Crossings`, where they are no part of the topology.
     """
 
     centre: Number
     half: Number
     radius: Number
     reach: Number
+    body: Number | None = None
+    first: Number | None = None
+    second: Number | None = None
 
 
 def read_bars(crossings: Crossings | None) -> Bars:
@@ -32,15 +38,16 @@ def read_bars(crossings: Crossings | None) -> Bars:
 
 def resized_bars(bars: Bars, first: ArrayLike, second: ArrayLike, factor: Number) -> Bars:
     """One body's bars with their lengths times factor [S]."""
-    a, b = np.array(first, int), np.array(second, int)
+    a, b = whole(first), whole(second)
     radii = factor[a] * bars.radius[a] + factor[b] * bars.radius[b]
     # How deep two shapes stand in each other follows their mean.
     allowed = 0.5 * (factor[a] + factor[b]) * (bars.radius[a] + bars.radius[b] - bars.reach)
-    return Bars(
-        bars.centre * factor[:, None],
-        bars.half * factor[:, None],
-        bars.radius * factor,
-        radii - allowed,
+    return dataclasses.replace(
+        bars,
+        centre=bars.centre * factor[:, None],
+        half=bars.half * factor[:, None],
+        radius=bars.radius * factor,
+        reach=radii - allowed,
     )
 
 
@@ -58,7 +65,7 @@ def deepest(
       bars: with as many axes as the following, 1 long where the numbers are the same.
       centre, half: [S, 3, ...] m; each bar's middle and from there to one end, in any one frame.
     """
-    depth = _pair_depths(np.array(first), np.array(second), bars, centre, half)
+    depth = _pair_depths(whole(first), whole(second), bars, centre, half)
     # Halves laid on each other; a maximum over this axis takes three times as long on CPU.
     while depth.shape[0] > 1:
         rows = (depth.shape[0] + 1) // 2
@@ -67,7 +74,7 @@ def deepest(
 
 
 def _pair_depths(
-    first: np.ndarray, second: np.ndarray, bars: Bars, centre: jax.Array, half: jax.Array
+    first: Number, second: Number, bars: Bars, centre: jax.Array, half: jax.Array
 ) -> jax.Array:
     """[Q, ...] of each pair."""
 
@@ -83,6 +90,13 @@ def _pair_depths(
         (single(lengths[first]), single(lengths[second])),
     )
     return single(bars.reach) - distance
+
+
+def whole(indices: ArrayLike) -> Number:
+    """Indices, which are numbers like all others where they are inputs of the program."""
+    if isinstance(indices, jax.Array):
+        return indices.astype(jnp.int32)
+    return np.asarray(indices, int)
 
 
 def single(numbers: Number) -> Number:

@@ -107,5 +107,6 @@ def draw_up(creature: Creature, config: Config) -> Blueprint:
     """
     creature = creature.spanned(config.evolution.pose_span)
     touch = what_ends(creature, config.rollout).touch
-    plant, lanes = make_plant(creature, config.rollout.physics, touch)
+    inputs = config.rollout.body == "inputs"
+    plant, lanes = make_plant(creature, config.rollout.physics, touch, roomy=inputs)
     return Blueprint(creature, config, plant, lanes, growth_of(creature, config))

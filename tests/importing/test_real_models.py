@@ -12,11 +12,16 @@ from importing.packages import MODELS, model_file
 from mjxgait.commands.import_ import write_folder
 from mjxgait.creature import load_creature
 from mjxgait.creature.geometry import ancestors
+from mjxgait.creature.overlap import find_crossings
+from mjxgait.creature.scale import load_files
 from mjxgait.errors import UserError
 from mjxgait.importing import ImportChoices, import_model
 from mjxgait.importing.portrait import standing
-from mjxgait.physics.fast import UnsupportedModel
+from mjxgait.physics.fast import UnsupportedModel, fast_plant
+from mjxgait.physics.fast.difference import difference
 from mjxgait.physics.fast.support import check_supported
+from mjxgait.physics.fast.topology import Topology
+from mjxgait.physics.layout import sense_layout
 
 REFUSED = {
     "r2d2": "wheel",
@@ -100,3 +105,21 @@ def test_a_stance_that_was_searched_has_no_foot_within_the_hips(tmp_path: Path, 
         ]
         hip = max(hips, key=abs)
         assert data.geom_xpos[geom] @ left * np.sign(hip) > abs(hip) - 0.03 * creature.hip_height
+
+
+DOGS = ("unitree a1", "unitree go2", "laikago", "mini cheetah", "solo12", "anymal b")
+
+
+def test_robot_dogs_share_one_program():
+    """Twelve joints each, whatever rotors, sensors and shapes their files have."""
+
+    def topology(name: str) -> Topology:
+        path, search = model_file(name)
+        files = import_model(path, ImportChoices(search=search, apart=False)).files
+        creature = load_files(files)
+        known = (creature.evolution_model, sense_layout(creature), find_crossings(creature))
+        return fast_plant(*known, roomy=True).topology
+
+    first, *others = (topology(name) for name in DOGS)
+    for name, other in zip(DOGS[1:], others, strict=True):
+        assert difference(first, other) == "", name

@@ -35,6 +35,7 @@ from mjxgait.physics.fast.newton import Problem, constrained_acceleration
 from mjxgait.physics.fast.overlap import bar_places
 from mjxgait.physics.fast.parameters import Parameters, read_parameters
 from mjxgait.physics.fast.resized import resized
+from mjxgait.physics.fast.roomy import make_room
 from mjxgait.physics.fast.slots import BALL, FREE
 from mjxgait.physics.fast.structure import Geom, Structure, join
 from mjxgait.physics.fast.support import UnsupportedModel
@@ -79,7 +80,7 @@ class FastPlant:
     ) -> Parameters:
         """See `Plant.parameters_of`."""
         try:
-            other = fast_plant(model, layout, crossings)
+            other = fast_plant(model, layout, crossings, roomy=self.topology.open_pairs)
             told = difference(self.topology, other.topology)
         except UnsupportedModel as reason:
             told = f"the fast physics does not know this: {reason}"
@@ -140,11 +141,14 @@ class FastPlant:
     def overlap(self, state: BodyState) -> jax.Array:
         """See `Plant.overlap`."""
         topology = self.topology
-        if not topology.first:
+        if not (topology.first or topology.open_pairs):
             return jnp.full_like(state.friction, -jnp.inf)
         structure = self._body(state)
+        bars = structure.exact.bars
         places = one_kernel(partial(bar_places, structure))(state.qpos, state.friction)
-        return deepest(topology.first, topology.second, structure.exact.bars, *places)
+        if bars.first is None or bars.second is None:
+            return deepest(topology.first, topology.second, bars, *places)
+        return deepest(bars.first[..., 0], bars.second[..., 0], bars, *places)
 
     def _body(self, state: BodyState) -> Structure:
         """The body of these lanes: their own, or the plant's."""
@@ -316,12 +320,21 @@ def take(rows: jax.Array, addresses: Sequence[int]) -> jax.Array:
 
 
 def fast_plant(
-    model: mujoco.MjModel, layout: SenseLayout, crossings: Crossings | None = None
+    model: mujoco.MjModel,
+    layout: SenseLayout,
+    crossings: Crossings | None = None,
+    roomy: bool = False,
 ) -> FastPlant:
     """A plant for a model that the fast physics knows.
+
+    Args:
+      roomy: with places to spare, so that bodies with other shapes can share its program.
 
     Raises:
       UnsupportedModel: it does not; the message says why.
     """
     seen = fuse(model, layout, crossings)
-    return FastPlant(read_topology(*seen), read_parameters(*seen))
+    topology, parameters = read_topology(*seen), read_parameters(*seen)
+    if roomy:
+        topology, parameters = make_room(topology, parameters, layout.feet)
+    return FastPlant(topology, parameters)

@@ -2,12 +2,13 @@
 
 import dataclasses
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
 from mjxgait.physics.fast.parameters import Parameters
 from mjxgait.physics.fast.topology import Topology
-from mjxgait.physics.overlap import resized_bars
+from mjxgait.physics.overlap import Bars, resized_bars, whole
 from mjxgait.types import Number
 
 
@@ -40,5 +41,12 @@ def resized(topology: Topology, parameters: Parameters, factor: Number) -> Param
             box=watched.box * seen[:, None],
             ellipsoid=watched.ellipsoid * seen[:, None],
         ),
-        bars=resized_bars(old.bars, topology.first, topology.second, of(list(topology.bar_body))),
+        bars=_bars(topology, old.bars, of_world),
     )
+
+
+def _bars(topology: Topology, old: Bars, of_world: jax.Array) -> Bars:
+    if old.body is None or old.first is None or old.second is None:
+        factor = of_world[np.array(topology.bar_body, int)]
+        return resized_bars(old, topology.first, topology.second, factor)
+    return resized_bars(old, old.first, old.second, of_world[whole(old.body)])

@@ -7,6 +7,8 @@ import mujoco
 FREE, BALL, SLIDE, HINGE = (
     int(getattr(mujoco.mjtJoint, f"mjJNT_{name}")) for name in ("FREE", "BALL", "SLIDE", "HINGE")
 )
+ANY = -1
+"""A watched shape of whatever kind: none of its numbers is known to be zero."""
 FREEDOMS = {FREE: 6, BALL: 3, SLIDE: 1, HINGE: 1}
 
 
@@ -45,7 +47,7 @@ class LimitSlot:
 
 @dataclasses.dataclass(frozen=True)
 class WatchedSlot:
-    """A geom that is sensed. body: -1 for the world's. shape: MuJoCo's type."""
+    """A geom that is sensed. body: -1 for the world's. shape: MuJoCo's type, or `ANY`."""
 
     body: int
     shape: int

@@ -16,7 +16,7 @@ from mjxgait.creature import geometry
 from mjxgait.physics.fast.carriers import Carriers
 from mjxgait.physics.fast.lanes import Scalar, Vector
 from mjxgait.physics.fast.parameters import Parameters
-from mjxgait.physics.fast.slots import ContactSlot, LimitSlot
+from mjxgait.physics.fast.slots import ANY, ContactSlot, LimitSlot
 from mjxgait.physics.fast.topology import Topology
 from mjxgait.physics.fast.treematrix import Sparsity
 from mjxgait.types import Number
@@ -171,6 +171,8 @@ def _extents(
     shape: int, radius: Scalar, box: Vector, ellipsoid: Vector
 ) -> tuple[Scalar, Vector, Vector]:
     """Radius, box and ellipsoid with a plain zero where a shape has none, so that it folds."""
+    if shape == ANY:
+        return radius, box, ellipsoid
     has_radius, has_box, has_ellipsoid = geometry.support_extents(shape, np.ones(3))
 
     def kept(values: Vector, has: np.ndarray) -> Vector:

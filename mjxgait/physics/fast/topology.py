@@ -39,7 +39,7 @@ class Topology:
     bar_body: [S], first, second: [Q]; see `Crossings`.
     step: s. iterations, line_iterations: the most of Newton's method and its line search.
     warm_start: whether the solver starts where it was a step before.
-    water: whether a fluid resists.
+    water: whether a fluid resists. open_pairs: whether bars and pairs are numbers (`roomy`).
     names: of the bodies, for messages only. moving: [B] which of the model's bodies they are;
     welded: whether they carry others.
     """
@@ -62,6 +62,7 @@ class Topology:
     line_iterations: int
     warm_start: bool
     water: bool
+    open_pairs: bool
     names: tuple[str, ...] = dataclasses.field(compare=False)
     moving: tuple[int, ...] = dataclasses.field(compare=False)
     welded: bool = dataclasses.field(compare=False)
@@ -131,6 +132,7 @@ def read_topology(model: Model, layout: SenseLayout, crossings: Crossings | None
         line_iterations=int(model.opt.ls_iterations),
         warm_start=not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_WARMSTART,
         water=bool(model.opt.density or model.opt.viscosity),
+        open_pairs=False,
         names=tuple(model.body(b).name or f"body {b}" for b in range(1, model.nbody)),
         moving=integers(model.kept - 1)
         if isinstance(model, Fused)
