@@ -4,7 +4,7 @@ import concurrent.futures
 import multiprocessing
 import os
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 SINGLE_THREADED = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
@@ -32,9 +32,13 @@ def single_threaded() -> Iterator[None]:
 
 
 @contextmanager
-def process_per_core(most: int | None = None) -> Iterator[concurrent.futures.Executor]:
+def process_per_core(
+    most: int | None = None, prepare: Callable[[], object] | None = None
+) -> Iterator[concurrent.futures.Executor]:
     """A pool of fresh processes, not more than `most`; Ctrl-C is left to the process that waits
     for them.
+
+    prepare: called in each before its first work.
     """
     count = min(cores(), most or cores())
     context = multiprocessing.get_context(
@@ -42,8 +46,12 @@ def process_per_core(most: int | None = None) -> Iterator[concurrent.futures.Exe
     )  # a fork of a process in which JAX has threads may hang
     with (
         single_threaded(),
-        concurrent.futures.ProcessPoolExecutor(
-            count, context, signal.signal, (signal.SIGINT, signal.SIG_IGN)
-        ) as pool,
+        concurrent.futures.ProcessPoolExecutor(count, context, _begin, (prepare,)) as pool,
     ):
         yield pool
+
+
+def _begin(prepare: Callable[[], object] | None) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if prepare is not None:
+        prepare()

@@ -82,6 +82,36 @@ def test_evolution_and_examiner_agree_on_it(trained: Path):
     assert champion["origin"]["nominal"]["seconds"] == pytest.approx(0.4)
 
 
+STUDY = f"""
+question = "How much mutation does the user's own controller want?"
+env = "{STOOL.as_posix()}"
+seeds = 2
+generations = 1
+certify = false
+
+[base]
+use = {{ controller = "my.py:Spin" }}
+evolution = {{ population = 6 }}
+rollout = {{ seconds = 0.4, physics = "mjx", lanes = 4 }}
+
+[[variant]]
+name = "much"
+
+[[variant]]
+name = "less"
+settings = {{ evolution = {{ mutation_rate = 0.2 }} }}
+"""
+
+
+def test_it_takes_part_in_studies(folder: Path, monkeypatch: pytest.MonkeyPatch):
+    """The processes that measure champions load it as well."""
+    monkeypatch.chdir(folder)
+    (folder / "study.toml").write_text(STUDY)
+    assert call("ablate study.toml --controller my.py:Spin --out study") == 0
+    lines = (folder / "study" / "results.csv").read_text().splitlines()
+    assert len(lines) == 1 + 4
+
+
 def test_no_code_is_loaded_from_a_run(trained: Path, capfd, monkeypatch):
     from mjxgait.parts import registry
 

@@ -24,6 +24,7 @@ from mjxgait.champion import Champion, read_champion
 from mjxgait.cores import process_per_core
 from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import UserError
+from mjxgait.parts.own import load_all, loaded
 from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.folder import CREATURE, METRICS, read_metrics
 
@@ -96,7 +97,8 @@ def measure(folder: Path, plan: Plan, tell: Callable[[int, int], None]) -> list[
     missing = [run for run in plan.runs if (run.variant, run.seed) not in known]
     if missing:
         tell(0, len(missing))
-    with _survivable(folder), process_per_core(len(missing)) as pool:
+    prepare = partial(load_all, loaded())
+    with _survivable(folder), process_per_core(len(missing), prepare) as pool:
         found = pool.map(
             partial(_judge, folder / CREATURE, plan.study.grounds, plan.study.certify),
             [champion_path(folder, plan, run) for run in missing],
@@ -167,9 +169,9 @@ def _judge(
     champion = read_champion(path, creature)
     body = champion.embodied(creature)
     walks = {g: _walk(body.on(g), champion) if finite else (0.0, 0.0, 0.0) for g in grounds}
-    # One that falls or lags this far behind the speed that the certificate asks for cannot pass, so
-    # the long examination is spared.
-    worth = walks[grounds[0]][2] > 0.4
+    # One that falls or lags this far behind the speed that the certificate of a walk asks for cannot
+    # pass, so the long examination is spared.
+    worth = champion.task != "walk" or walks[grounds[0]][2] > 0.4
     ways = {ground: (walk, up) for ground, (walk, up, _) in walks.items()}
     if not examine:
         return ways, None

@@ -146,13 +146,15 @@ def make_plan(study: Study, creature: Creature, where: str) -> Plan:
       UserError: an unknown key, a bad value, two variants of one name, or two that are equal.
     """
     tables = list(study.variant) or _grid(study, where)
-    base = _lay(_config(study.config, creature, where), study.base, f"{where}: [base]")
     configs: dict[str, Config] = {}
     for table in tables:
         if table.name in configs:
             raise UserError(f'{where}: two variants are called "{table.name}"; name them apart')
         here = f'{where}: variant "{table.name}"'
-        own = _config(table.config, creature, here) if table.config else base
+        use = {**study.base.get("use", {}), **table.settings.get("use", {})}
+        own = _config(table.config or study.config, creature, here, use)
+        if not table.config:
+            own = _lay(own, study.base, f"{where}: [base]")
         new = _settled(_lay(own, table.settings, here))
         new = dataclasses.replace(
             new,
@@ -184,9 +186,12 @@ def make_plan(study: Study, creature: Creature, where: str) -> Plan:
     return Plan(study, tuple(configs), tuple(runs))
 
 
-def _config(file: str | None, creature: Creature, where: str) -> Config:
+def _config(
+    file: str | None, creature: Creature, where: str, use: Mapping[str, str] | None
+) -> Config:
+    path = Path(file) if file else None
     try:
-        return resolve_config(creature.settings.train, creature.name, Path(file) if file else None)
+        return resolve_config(creature.settings.train, creature.name, path, use)
     except UserError as error:
         raise UserError(f"{where}: {error}") from None
 

@@ -15,6 +15,7 @@ from mjxgait.errors import UserError, did_you_mean
 from mjxgait.parts.registry import SHIPPED, add_own
 
 KINDS = ("controller", "task")
+_LOADED: dict[tuple[str, str], str] = {}
 
 
 def take_own(arguments: Sequence[str]) -> tuple[list[str], dict[str, str]]:
@@ -64,6 +65,7 @@ def load(kind: str, text: str) -> str:
         raise UserError(f"{path}: {name} lacks {', '.join(missing)}")
     known = f"{path.name}:{name}"
     add_own(kind, known, cls)
+    _LOADED[kind, known] = text
     if kind == "controller":
         from mjxgait.parts.same_code import SameCode
 
@@ -71,6 +73,17 @@ def load(kind: str, text: str) -> str:
     else:
         register_demands(known, cast(HasCriteria, cls))
     return known
+
+
+def loaded() -> tuple[tuple[str, str], ...]:
+    """Kind and `FILE.py:CLASS` of all that has been loaded, for other processes to do the same."""
+    return tuple((kind, text) for (kind, _), text in _LOADED.items())
+
+
+def load_all(parts: Sequence[tuple[str, str]]) -> None:
+    """Loads what another process had `loaded`."""
+    for kind, text in parts:
+        load(kind, text)
 
 
 def _base(kind: str) -> type:
