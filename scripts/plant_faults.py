@@ -8,6 +8,7 @@ old text is not there exactly once. docs/testing.md says what it is for.
 
 import argparse
 import concurrent.futures
+import contextlib
 import dataclasses
 import os
 import re
@@ -17,12 +18,14 @@ import sys
 import tempfile
 import time
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 LIST = ROOT / "tests" / "faults.toml"
-LEFT_OUT = (".*", "__pycache__", "*.egg-info", "build", "dist", "runs")
-"""What a copy of the tree does without."""
+LEFT_OUT = (".*", "__pycache__", "*.egg-info")
+AT_THE_TOP = ("build", "dist", "runs")
+"""What a copy of the tree does without, everywhere and at its top."""
 LONGEST = 900
 """Seconds for one run of tests; a fault that makes them hang counts as not caught."""
 FAILURE = re.compile(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", re.MULTILINE)
@@ -93,12 +96,25 @@ def run_tests(
     return done.returncode, done.stdout + done.stderr
 
 
+@contextlib.contextmanager
+def copied(root: Path) -> Iterator[Path]:
+    """A copy of a tree, for as long as it is needed."""
+    everywhere = shutil.ignore_patterns(*LEFT_OUT)
+
+    def left_out(folder: str, names: list[str]) -> set[str]:
+        here = AT_THE_TOP if Path(folder) == root else ()
+        return everywhere(folder, names) | {name for name in names if name in here}
+
+    with tempfile.TemporaryDirectory(prefix="faults-") as folder:
+        tree = Path(folder) / "tree"
+        shutil.copytree(root, tree, ignore=left_out, symlinks=True)
+        yield tree
+
+
 def examine(fault: Fault, root: Path, cache: Path) -> Finding:
     """Plants one fault in a copy of a tree and runs tests until one fails."""
     begin, text = time.monotonic(), planted(fault, root)
-    with tempfile.TemporaryDirectory(prefix="faults-") as folder:
-        tree = Path(folder) / "tree"
-        shutil.copytree(root, tree, ignore=shutil.ignore_patterns(*LEFT_OUT), symlinks=True)
+    with copied(root) as tree:
         (tree / fault.file).write_text(text, encoding="utf-8")
         for arguments in (fault.tests, ("-m", "not slow")):
             status, output = run_tests(tree, arguments, cache)
@@ -114,7 +130,8 @@ def examine(fault: Fault, root: Path, cache: Path) -> Finding:
 def check_sound(faults: list[Fault], root: Path, cache: Path) -> None:
     """Ends the program where the tests fail without any fault: then they would catch everything."""
     named = dict.fromkeys(test for fault in faults for test in fault.tests)
-    status, output = run_tests(root, ("-p", "no:cacheprovider", *named), cache, longest=None)
+    with copied(root) as tree:  # which must hold all that the tests need
+        status, output = run_tests(tree, tuple(named), cache, longest=None)
     if status != 0:
         sys.exit(f"the tests fail without a fault, with status {status}:\n{output[-3000:]}")
 

@@ -55,6 +55,16 @@ MISSED = ("wrong divisor", "return x / 2", "return x / 3", "tests/test_toy.py")
 ROTTEN = ("gone", "return 4 * x", "return 5 * x", "tests/test_toy.py")
 
 
+def test_a_copy_lacks_what_is_made_and_nothing_else(tmp_path: Path):
+    """A room of the package may have the name of a folder of results."""
+    kept, left = ("toy/runs/loop.py", "tests/a.py"), ("runs/x/config.toml", ".git/HEAD")
+    for name in (*kept, *left):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text("")
+    with script.copied(tmp_path) as tree:
+        assert {n for n in (*kept, *left) if (tree / n).exists()} == set(kept)
+
+
 def planting(folder: Path, *faults: tuple[str, str, str, str]) -> list[str]:
     """The arguments with which the script plants these faults in a toy tree."""
     for name, text in TOY.items():
