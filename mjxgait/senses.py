@@ -54,6 +54,8 @@ SENSES: Mapping[str, Sense] = {
     "heading": _heading,
     "forward": lambda creature, sensed, time: _along(creature, sensed, 0),
     "aside": lambda creature, sensed, time: _along(creature, sensed, 1),
+    "forward_vel": lambda creature, sensed, time: sensed.trunk_vel @ creature.start_axes[0],
+    "up_vel": lambda creature, sensed, time: sensed.trunk_vel[2],
     "pitch": lambda creature, sensed, time: (
         -jnp.arcsin(_attitude(creature, sensed, creature.forward))
     ),

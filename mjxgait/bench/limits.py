@@ -63,6 +63,9 @@ def _lanes(experiment: Experiment, lanes: int) -> Lane:
         lambda leaf: leaf[None], (experiment.row.starts, experiment.row.settings)
     )
     jobs = jnp.zeros(lanes, jnp.int32)
+    plans = jax.vmap(jax.vmap(simulator.controller.prepare, (0, None)))(
+        genomes, settings.controller
+    )
     own = simulator._own_starts(genomes, starts)
-    lane = jax.vmap(partial(simulator._fresh_lane, genomes, starts, settings, own))(jobs, jobs)
+    lane = jax.vmap(partial(simulator._fresh_lane, plans, starts, settings, own))(jobs, jobs)
     return jax.tree.map(lambda leaf: jnp.moveaxis(leaf, 0, simulator.plant.lane_axis), lane)

@@ -82,6 +82,8 @@ SENSES: Mapping[str, Sense] = {
     "heading": _heading,
     "forward": lambda creature, state: _along(state, state.start.forward),
     "aside": lambda creature, state: _along(state, state.start.left),
+    "forward_vel": lambda creature, state: state.trunk_vel @ state.start.forward,
+    "up_vel": lambda creature, state: state.trunk_vel[:, 2],
     "pitch": _nose_down,
     "roll": _right_down,
     "pitch_rate": lambda creature, state: (

@@ -10,6 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from mjxgait.champion.poses import PoseCodec
+from mjxgait.champion.programs import ProgramCodec
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 
@@ -77,7 +78,7 @@ class PlainCodec:
         return {}
 
 
-CODECS: Mapping[str, Codec] = {"poses": PoseCodec()}
+CODECS: Mapping[str, Codec] = {"poses": PoseCodec(), "program": ProgramCodec()}
 """By the name of the controller."""
 
 

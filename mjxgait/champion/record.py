@@ -143,14 +143,14 @@ def read_champion(path: Path, creature: Creature) -> Champion:
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
         champion = _champion(document, creature, path)
+        champion.check_finite(creature)
+    except UserError as error:
+        told = str(error)
+        raise UserError(told if str(path) in told else f"{path}: {told}") from None
     except FileNotFoundError:
         raise UserError(f"{path}: no such file; the run has no champion yet") from None
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise UserError(f"{path}: not a champion file ({error!r})") from None
-    try:
-        champion.check_finite(creature)
-    except UserError as error:
-        raise UserError(f"{path}: {error}") from None
     return champion
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from rich.console import Console
 
 from mjxgait.inspect.poses import PoseView, shared, title
+from mjxgait.inspect.programs import ProgramView
 from mjxgait.inspect.snapshot import Snapshot
 from mjxgait.inspect.tables import titled_table
 
@@ -75,7 +76,7 @@ class PlainView:
         _print_arrays("champion: from A to B", found["champion_moved"], console)
 
 
-VIEWS: Mapping[str, GenomeView] = {"poses": PoseView()}
+VIEWS: Mapping[str, GenomeView] = {"poses": PoseView(), "program": ProgramView()}
 """By the name of the controller."""
 
 

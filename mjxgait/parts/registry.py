@@ -31,8 +31,14 @@ def _walk() -> type:
     return Walk
 
 
+def _programs() -> type:
+    from mjxgait.control.programs.controller import Programs
+
+    return Programs
+
+
 SHIPPED: Mapping[str, Mapping[str, Maker]] = {
-    "controller": {"poses": _poses},
+    "controller": {"poses": _poses, "program": _programs},
     "task": {"walk": _walk},
 }
 """By kind and name; the classes are imported when they are needed."""
@@ -65,7 +71,11 @@ def find(kind: str, name: str) -> type:
 
 def make_controller(body: "Body", step: float, config: Config) -> "Controller":
     """What moves the creature. step: s between two control steps."""
-    made: Controller = find("controller", config.use.controller)(body, step)
+    kind: Any = find("controller", config.use.controller)
+    added = getattr(find("task", config.use.task), "adds", ())
+    # One whose genome depends on what there is to sense is told.
+    told = getattr(kind, "told", None)
+    made: Controller = told(body, step, config.controller, added) if told else kind(body, step)
     return made
 
 

@@ -204,7 +204,8 @@ class UseConfig:
     """Who takes part.
 
     Attributes:
-      controller: what moves the creature: poses, or FILE.py:CLASS of your own (docs/extending.md).
+      controller: what moves the creature: poses, program (docs/programs.md), or FILE.py:CLASS of
+        your own (docs/extending.md).
       task: what the creature is to do: walk, or FILE.py:CLASS of your own.
     """
 

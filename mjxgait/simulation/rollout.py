@@ -91,7 +91,8 @@ class Simulator:
             out_specs=PartitionSpec(AXIS),
             check_vma=False,
         )
-        tally, computed = run(jobs, genomes, starts, settings, self._own_starts(genomes, starts))
+        plans = jax.vmap(jax.vmap(self.controller.prepare, (0, None)))(genomes, settings.controller)
+        tally, computed = run(jobs, plans, starts, settings, self._own_starts(genomes, starts))
 
         def in_order(leaf: jax.Array) -> jax.Array:
             by_device = leaf.reshape(devices, queue, *leaf.shape[1:])
@@ -113,7 +114,7 @@ class Simulator:
     def _run_queue(
         self,
         jobs: jax.Array,
-        genomes: Any,
+        plans: Any,
         starts: Starts,
         settings: Config,
         own: Starts | None,
@@ -127,7 +128,7 @@ class Simulator:
 
         def fresh(places: jax.Array) -> Lane:
             job = jnp.where(places < waiting, places, queue)
-            lane = jax.vmap(partial(self._fresh_lane, genomes, starts, settings, own))(
+            lane = jax.vmap(partial(self._fresh_lane, plans, starts, settings, own))(
                 job, jobs[jnp.minimum(places, queue - 1)]
             )
             return jax.tree.map(lambda leaf: jnp.moveaxis(leaf, 0, self.plant.lane_axis), lane)
@@ -172,15 +173,18 @@ class Simulator:
 
     def _fresh_lane(
         self,
-        genomes: Any,
+        plans: Any,
         starts: Starts,
         settings: Config,
         own: Starts | None,
         job: jax.Array,
         episode: jax.Array,
     ) -> Lane:
-        """The lane at the start of an episode []: of row, genome and start, the start changes fastest."""
-        count, individuals = starts.friction.shape[1], jax.tree.leaves(genomes)[0].shape[1]
+        """The lane at the start of an episode []: of row, individual and start, the start changes fastest.
+
+        plans: leaves [B, N, ...], the controller's. own: starts of each, where they have their own.
+        """
+        count, individuals = starts.friction.shape[1], jax.tree.leaves(plans)[0].shape[1]
         row, individual = episode // (individuals * count), episode // count % individuals
         here = (row, episode % count) if own is None else (row, individual, episode % count)
         start = jax.tree.map(lambda leaf: leaf[here], starts if own is None else own)
@@ -197,9 +201,7 @@ class Simulator:
                 parameters=start.numbers,
                 ground=start.ground,
             ),
-            plan=self.controller.prepare(
-                jax.tree.map(lambda leaf: leaf[row, individual], genomes), mine.controller
-            ),
+            plan=jax.tree.map(lambda leaf: leaf[row, individual], plans),
             memory=self.controller.init(),
             tally=self.task.init(),
             aim=self.task.aim(start),

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 from mjxgait.certify.twins.poses import PoseTwin
+from mjxgait.certify.twins.programs import ProgramTwin
 from mjxgait.certify.twins.protocol import Twin
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
@@ -11,7 +12,7 @@ from mjxgait.errors import UserError
 Maker = Callable[[Creature, Champion, float], Twin]
 """From creature, champion and step in s."""
 
-_TWINS: dict[str, Maker] = {"poses": PoseTwin}
+_TWINS: dict[str, Maker] = {"poses": PoseTwin, "program": ProgramTwin}
 
 
 def register_twin(controller: str, make: Maker) -> None:

@@ -1,0 +1,199 @@
+"""Expressions: as text for people, and as arrays for evolution.
+
+An expression is arrays `code` [C] and `value` [C] in prefix order, as far as `code` is not `EMPTY`.
+In text it is a number, a name, or `(function argument ...)`.
+"""
+
+import dataclasses
+import fnmatch
+from collections.abc import Mapping, Sequence
+from typing import Protocol
+
+import numpy as np
+
+from mjxgait.errors import UserError, did_you_mean
+from mjxgait.settings.programs import FUNCTIONS
+
+EMPTY, CONSTANT, FIRST_FUNCTION, FIRST_ADDED, FIRST_SENSE = 0, 1, 2, 32, 64
+FUNCTION_CODES = {name: FIRST_FUNCTION + i for i, name in enumerate(FUNCTIONS)}
+ARITY = np.zeros(FIRST_ADDED, np.int32)
+ARITY[FIRST_FUNCTION : FIRST_FUNCTION + len(FUNCTIONS)] = list(FUNCTIONS.values())
+"""[32] by code; senses take no arguments."""
+LEAST_DIVISOR, LARGEST = 1e-6, 1e9
+"""`/` gives 1 where the divisor is smaller. No function gives more than the second, so that none
+gives what is not finite.
+"""
+DEEPEST = 400
+"""Functions that an expression in text may have: it is read by recursion."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Terminal:
+    """A number that an expression may read: its name, and where it is among the senses.
+
+    index: in the sense's array; None where that is one number.
+    """
+
+    name: str
+    code: int
+    sense: str
+    index: int | None = None
+
+
+class HasParts(Protocol):
+    """What is told of a body."""
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Of the actuated joints."""
+        ...
+
+    @property
+    def foot_names(self) -> tuple[str, ...]:
+        """Of the feet."""
+        ...
+
+
+ADDED = {"s0": "goal_distance"}
+"""Names of senses that tasks add."""
+SCALARS = {
+    "t": "time",
+    "vx": "forward_vel",
+    "vz": "up_vel",
+    "px": "forward",
+    "py": "aside",
+    "pz": "trunk_height",
+    "heading": "heading",
+    "pitch": "pitch",
+    "roll": "roll",
+    "pitch_rate": "pitch_rate",
+    "roll_rate": "roll_rate",
+}
+
+
+def terminals(body: HasParts, added: Sequence[str] = ()) -> tuple[Terminal, ...]:
+    """All that a body senses, and those of the senses `added` by a task that have a name."""
+    rows: list[tuple[str, str, int | None]] = [(n, sense, None) for n, sense in SCALARS.items()]
+    for j in range(len(body.joint_names)):
+        rows += [(f"a{j}", "joint_pos", j), (f"w{j}", "joint_vel", j)]
+    rows += [(f"c{f}", "contact", f) for f in range(len(body.foot_names))]
+    own = [Terminal(n, FIRST_SENSE + i, sense, k) for i, (n, sense, k) in enumerate(rows)]
+    given = [
+        Terminal(name, FIRST_ADDED + i, sense)
+        for i, (name, sense) in enumerate(ADDED.items())
+        if sense in added
+    ]
+    return (*given, *own)
+
+
+def chosen_terminals(known: Sequence[Terminal], patterns: Sequence[str]) -> tuple[Terminal, ...]:
+    """Those whose names match a pattern.
+
+    Raises:
+      UserError: a pattern without a star or bracket matches none.
+    """
+    names = [terminal.name for terminal in known]
+    for pattern in patterns:
+        if not set(pattern) & set("*?[") and pattern not in names:
+            raise UserError(
+                f'controller.senses: there is no "{pattern}" here; {did_you_mean(pattern, names)}'
+            )
+    found = tuple(t for t in known if any(fnmatch.fnmatchcase(t.name, p) for p in patterns))
+    if not found:
+        raise UserError(f"controller.senses = {list(patterns)}: no sense has such a name")
+    return found
+
+
+def to_text(code: np.ndarray, value: np.ndarray, known: Sequence[Terminal]) -> str:
+    """The expression in arrays [C]."""
+    names = {terminal.code: terminal.name for terminal in known}
+    functions = {number: name for name, number in FUNCTION_CODES.items()}
+    nodes = iter(range(int((np.asarray(code) != EMPTY).sum())))
+
+    def read() -> str:
+        i = next(nodes)
+        if code[i] == CONSTANT:
+            return np.format_float_positional(np.float32(value[i]), unique=True, trim="-")
+        if int(code[i]) in names:
+            return names[int(code[i])]
+        name = functions[int(code[i])]
+        return f"({' '.join([name, *(read() for _ in range(FUNCTIONS[name]))])})"
+
+    return read()
+
+
+def to_arrays(
+    text: str, known: Sequence[Terminal], nodes: int, where: str
+) -> tuple[np.ndarray, np.ndarray]:
+    """code and value [nodes] of an expression in text.
+
+    Raises:
+      UserError: names what is wrong with it; `where` says whose it is.
+    """
+    words = text.replace("(", " ( ").replace(")", " ) ").split()
+    count = sum(word not in "()" for word in words)
+    if count > nodes:
+        raise UserError(f"{where}: {count:,} nodes; an expression may have {nodes}")
+    if words.count("(") > DEEPEST:
+        raise UserError(f"{where}: {words.count('(')} functions; the most is {DEEPEST}")
+    reader = _Reader(words, {terminal.name: terminal.code for terminal in known}, where)
+    found = reader.expression()
+    if reader.words:
+        raise UserError(f'{where}: more after its end: "{reader.words[-1]}"')
+    code, value = np.zeros(nodes, np.int32), np.zeros(nodes, np.float32)
+    code[: len(found)], value[: len(found)] = zip(*found, strict=True)
+    return code, value
+
+
+class _Reader:
+    """Takes the words of an expression, the last of `words` first."""
+
+    def __init__(self, words: Sequence[str], codes: Mapping[str, int], where: str) -> None:
+        self.words, self.codes, self.where = list(reversed(words)), codes, where
+
+    def expression(self) -> list[tuple[int, float]]:
+        """Its nodes: code and value of each."""
+        word = self._take()
+        if word == ")":
+            raise UserError(f"{self.where}: a closing parenthesis too many")
+        if word != "(":
+            return [self._leaf(word)]
+        name = self._take()
+        if name not in FUNCTIONS:
+            raise UserError(
+                f'{self.where}: there is no function "{name}"; {did_you_mean(name, FUNCTIONS)}'
+            )
+        nodes, given = [(FUNCTION_CODES[name], 0.0)], 0
+        while self._next() != ")":
+            nodes += self.expression()
+            given += 1
+        self._take()
+        if given != FUNCTIONS[name]:
+            raise UserError(
+                f'{self.where}: "{name}" takes {FUNCTIONS[name]} arguments, not {given}'
+            )
+        return nodes
+
+    def _leaf(self, word: str) -> tuple[int, float]:
+        if word in self.codes:
+            return self.codes[word], 0.0
+        try:
+            number = float(word)
+        except ValueError:
+            raise UserError(
+                f'{self.where}: "{word}" is neither a sense nor a number; '
+                f"{did_you_mean(word, self.codes)}"
+            ) from None
+        if not abs(number) <= LARGEST:
+            raise UserError(f"{self.where}: {word}: a constant must be within ±{LARGEST:g}")
+        return CONSTANT, number
+
+    def _next(self) -> str:
+        if not self.words:
+            raise UserError(f"{self.where}: ends too early; something is missing")
+        return self.words[-1]
+
+    def _take(self) -> str:
+        word = self._next()
+        self.words.pop()
+        return word

@@ -1,0 +1,58 @@
+"""Genomes of expressions, one per joint, as people read and write them."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from mjxgait.champion.expressions import ADDED, terminals, to_arrays, to_text
+from mjxgait.creature import Creature
+from mjxgait.errors import UserError
+from mjxgait.settings.programs import ProgramConfig
+from mjxgait.settings.tables import build
+
+
+class ProgramCodec:
+    """Of genomes with `code` and `value` [J, C]; see `Codec`."""
+
+    def document(
+        self, genome: Mapping[str, np.ndarray], settings: ProgramConfig, creature: Creature
+    ) -> dict[str, Any]:
+        """See `Codec`. expressions: by joint. nodes: the most that one may have."""
+        known = terminals(creature, tuple(ADDED.values()))
+        rows = zip(creature.joint_names, genome["code"], genome["value"], strict=True)
+        return {
+            "expressions": {name: to_text(code, value, known) for name, code, value in rows},
+            "nodes": int(genome["code"].shape[1]),
+        }
+
+    def genome(self, document: Mapping[str, Any], creature: Creature) -> dict[str, np.ndarray]:
+        """See `Codec`."""
+        known, nodes = terminals(creature, tuple(ADDED.values())), int(document["nodes"])
+        texts = document["expressions"]
+        if missing := [name for name in creature.joint_names if name not in texts]:
+            raise UserError(f'no expression for joint "{missing[0]}"')
+        pairs = [
+            to_arrays(str(texts[name]), known, nodes, f'expression of joint "{name}"')
+            for name in creature.joint_names
+        ]
+        code, value = (np.stack(rows) for rows in zip(*pairs, strict=True))
+        return {"code": code, "value": value}
+
+    def settings(self, table: Mapping[str, Any], where: str) -> ProgramConfig:
+        """See `Codec`."""
+        return build(ProgramConfig, table, where)
+
+    def check(self, genome: Mapping[str, np.ndarray], creature: Creature) -> None:
+        """See `Codec`."""
+        for j, place in np.argwhere(~np.isfinite(genome["value"])):
+            raise UserError(
+                f'the expression of joint "{creature.joint_names[j]}" has a constant that is '
+                f"{genome['value'][j, place]}: this champion cannot move; take one of another "
+                "generation"
+            )
+
+    def shapes(self, settings: ProgramConfig, creature: Creature) -> dict[str, tuple[int, ...]]:
+        """See `Codec`."""
+        shape = (len(creature.joint_names), settings.nodes)
+        return {"code": shape, "value": shape}

@@ -1,0 +1,76 @@
+"""A controller whose genome is one expression per joint (Gritz & Hahn 1995, 1997)."""
+
+from collections.abc import Sequence
+from typing import Any, ClassVar
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from mjxgait.body import Body
+from mjxgait.champion.expressions import FUNCTION_CODES, Terminal, chosen_terminals, terminals
+from mjxgait.control.programs.evaluate import Listing, evaluate, listed
+from mjxgait.control.programs.grow import Words
+from mjxgait.control.programs.operators import program_variation
+from mjxgait.control.programs.trees import Trees
+from mjxgait.control.protocol import Command, Senses
+from mjxgait.search.variation import Variation
+from mjxgait.settings.config import EvolutionConfig
+from mjxgait.settings.programs import ProgramConfig
+
+
+class Programs:
+    """See `Controller`: an expression's value is the angle in rad that its joint is pulled to.
+
+    settings: those that shape the program. added: names of the senses that the task adds.
+    """
+
+    Settings: ClassVar[type] = ProgramConfig
+    command: ClassVar[Command] = "pose"
+
+    @classmethod
+    def told(
+        cls, creature: Body, step: float, settings: ProgramConfig, added: Sequence[str]
+    ) -> "Programs":
+        """For a body, under these settings, with the senses that the task adds."""
+        return cls(creature, step, settings, added)
+
+    def __init__(
+        self, creature: Body, step: float, settings: ProgramConfig, added: Sequence[str] = ()
+    ) -> None:
+        self.creature, self.step = creature, step
+        self.known: tuple[Terminal, ...] = chosen_terminals(
+            terminals(creature, added), settings.senses
+        )
+        self.words = Words(
+            tuple(FUNCTION_CODES[name] for name in settings.functions),
+            tuple(terminal.code for terminal in self.known),
+            settings.nodes,
+        )
+        self.reads = tuple(dict.fromkeys(terminal.sense for terminal in self.known))
+
+    def variation(self, settings: ProgramConfig, evolution: EvolutionConfig) -> Variation:
+        """See `Controller`."""
+        return program_variation(self.words, len(self.creature.joint_names), settings)
+
+    def genes(self, genomes: Trees, settings: ProgramConfig) -> np.ndarray:
+        """See `Controller`: any other node is a difference."""
+        code, value = (np.asarray(leaf) for leaf in (genomes.code, genomes.value))
+        return np.concatenate([leaf.reshape(len(leaf), -1) for leaf in (code, value)], axis=1)
+
+    def prepare(self, genome: Trees, settings: ProgramConfig) -> Listing:
+        """See `Controller`."""
+        return listed(genome, self.words)
+
+    def init(self) -> Any:
+        """See `Controller`: a program has no memory."""
+        return ()
+
+    def act(self, plan: Listing, memory: Any, senses: Senses) -> tuple[jax.Array, Any]:
+        """See `Controller`: within the range of each joint's poses."""
+        seen = [
+            senses[t.sense] if t.index is None else senses[t.sense][t.index] for t in self.known
+        ]
+        angle = evaluate(plan, jnp.stack(seen))
+        low, high = self.creature.pose_low, self.creature.pose_high
+        return jnp.clip(angle, low.astype(np.float32), high.astype(np.float32)), memory

@@ -1,0 +1,121 @@
+"""A creature that is moved by expressions: evolved, written, edited by hand, examined again."""
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers import SHORT, STOOL, said_by
+
+import mjxgait
+from mjxgait.certify.simulate import simulate
+from mjxgait.certify.starts import nominal_starts
+from mjxgait.champion import read_champion
+from mjxgait.inspect import facts, read_snapshot
+from mjxgait.runs.folder import CHAMPION
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> mjxgait.Run:
+    settings = {
+        "controller": {"nodes": 32, "senses": ["a*", "t", "v?", "pitch"]},
+        "rollout": {"seconds": 0.5, "lanes": 8},
+        "examination": {"candidates": 0},
+    }
+    return mjxgait.train(
+        STOOL,
+        out=tmp_path_factory.mktemp("programs") / "run",
+        controller="program",
+        population=8,
+        generations=2,
+        settings=settings,
+        quiet=True,
+    )
+
+
+@pytest.fixture
+def edited(run: mjxgait.Run, tmp_path: Path) -> Path:
+    """A copy of the run."""
+    return shutil.copytree(run.folder, tmp_path / "run")
+
+
+def edit(folder: Path, joint: str, text: str) -> None:
+    document = json.loads((folder / CHAMPION).read_text())
+    document["genome"]["expressions"][joint] = text
+    (folder / CHAMPION).write_text(json.dumps(document))
+
+
+def test_evolution_and_examiner_move_everybody_alike(run: mjxgait.Run):
+    """The examiner reads the expressions as text, one node after the other."""
+    snapshot = read_snapshot(run.folder)
+    told = snapshot.arrays["outcome"][:, 0, 0]
+    everybody = [snapshot.champion(rank + 1) for rank in range(len(told))]
+    starts = nominal_starts(run.creature, 1)
+    seen = [simulate(run.creature, one, starts, 0.5).travel[0, 0] for one in everybody]
+    assert np.ptp(told) > 0.01
+    assert np.median(abs(np.array(seen) - told)) < 1e-3
+
+
+def test_the_champion_is_written_for_people_and_stays_who_it_is(run: mjxgait.Run):
+    document = json.loads((run.folder / CHAMPION).read_text())
+    assert set(document["genome"]["expressions"]) == set(run.creature.joint_names)
+    kept = read_champion(run.folder / CHAMPION, run.creature)
+    assert kept.fingerprint == read_snapshot(run.folder).champion(1).fingerprint
+
+
+def test_only_the_senses_that_were_asked_for_are_read(run: mjxgait.Run):
+    texts = json.loads((run.folder / CHAMPION).read_text())["genome"]["expressions"].values()
+    words = " ".join(texts).replace("(", " ").replace(")", " ").split()
+    names = {word for word in words if word[0].isalpha()} - {"ifltz"}
+    assert names <= {"a0", "a1", "a2", "a3", "aside", "t", "vx", "vz", "pitch"}
+
+
+def test_inspect_prints_the_expressions(run: mjxgait.Run, capsys: pytest.CaptureFixture):
+    said = said_by(capsys, "inspect", run.folder, code=0)
+    told = facts(read_snapshot(run.folder))["champion"]
+    assert "an expression per joint" in said
+    for joint, text in told["expressions"].items():
+        assert joint in said
+        assert text.count("(") + text.count(" ") >= 0
+    assert sum(told["nodes"]) > 0
+
+
+def test_an_edited_expression_is_what_moves(run: mjxgait.Run, edited: Path):
+    joint, changed = run.creature.joint_names[0], mjxgait.open(edited)
+    edit(edited, joint, "0.3")
+    assert np.allclose(mjxgait.walk(changed, 1.0)[f"pos_{joint}"][-20:], 0.3, atol=0.15)
+    edit(edited, joint, "(/ t (- a0 a0))")
+    assert np.isfinite(mjxgait.walk(changed, 0.3)[f"pos_{joint}"]).all()
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [("(+ a0 a99)", '"a99" is neither a sense nor a number'), ("(+ a0", "ends too early")],
+)
+def test_a_mistake_names_the_file_and_the_joint(
+    run: mjxgait.Run, edited: Path, text: str, words: str, capsys: pytest.CaptureFixture
+):
+    joint = run.creature.joint_names[1]
+    edit(edited, joint, text)
+    (edited / "short.toml").write_text(SHORT)
+    said = said_by(capsys, "certify", edited, "--config", edited / "short.toml", code=2)
+    assert words in said
+    assert joint in said
+    assert CHAMPION in said
+
+
+@pytest.mark.parametrize(
+    ("option", "words"),
+    [
+        (("--controller.functions", "+", "pow"), '"pow" is no function'),
+        (("--controller.senses", "a0", "nose"), 'there is no "nose" here'),
+        (("--controller.initial-depth", "2", "40"), "must be a range"),
+    ],
+)
+def test_settings_that_cannot_be_are_one_sentence(
+    option: tuple[str, ...], words: str, tmp_path: Path, capsys: pytest.CaptureFixture
+):
+    arguments = ("train", "--env", STOOL, "--controller", "program", "--out", tmp_path / "x")
+    said = said_by(capsys, *arguments, *option, code=2)
+    assert words in said

@@ -1,0 +1,279 @@
+"""Programs as arrays: text, first programs, crossing, mutation and values, against plain readings
+of the same and against DEAP.
+"""
+
+import operator
+from functools import partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from deap import gp
+
+from mjxgait.certify.twins.programs import read, value_of
+from mjxgait.champion.expressions import (
+    ARITY,
+    CONSTANT,
+    EMPTY,
+    FIRST_ADDED,
+    FUNCTION_CODES,
+    Terminal,
+    to_arrays,
+    to_text,
+)
+from mjxgait.control.programs.evaluate import evaluate, listed
+from mjxgait.control.programs.grow import Words, half_and_half
+from mjxgait.control.programs.operators import crossed, mutated, spliced
+from mjxgait.control.programs.trees import Trees, depths, subtree_sizes
+from mjxgait.errors import UserError
+from mjxgait.settings.programs import FUNCTIONS, ProgramConfig
+
+MANY = 10_000
+NODES = 64
+KNOWN = tuple(Terminal(f"a{i}", 64 + i, "joint_pos", i) for i in range(5))
+SETTINGS = ProgramConfig(functions=tuple(FUNCTIONS), nodes=NODES, depth=12)
+WORDS = Words(
+    tuple(FUNCTION_CODES[name] for name in SETTINGS.functions),
+    tuple(terminal.code for terminal in KNOWN),
+    NODES,
+)
+
+
+def first_programs(count: int, words: Words = WORDS, seed: int = 0) -> tuple[jax.Array, jax.Array]:
+    make = partial(half_and_half, words=words, depth=(2, 5), constants=(-1.0, 1.0))
+    return jax.jit(jax.vmap(lambda key: make(key)))(jax.random.split(jax.random.key(seed), count))
+
+
+@pytest.fixture(scope="module")
+def programs() -> tuple[np.ndarray, np.ndarray]:
+    """[MANY, NODES] that were crossed and mutated after they were made."""
+    tree = first_programs(MANY)
+    keys = jax.random.split(jax.random.key(1), (2, MANY))
+    other = jax.tree.map(lambda leaf: leaf[::-1], tree)
+    cross = jax.jit(jax.vmap(lambda k, a, b: crossed(k, a, b, SETTINGS)))
+    mutate = jax.jit(jax.vmap(lambda k, a: mutated(k, a, WORDS, SETTINGS)))
+    code, value = mutate(keys[1], cross(keys[0], tree, other))
+    return np.asarray(code), np.asarray(value)
+
+
+def taken(code: int) -> int:
+    return int(ARITY[code]) if code < FIRST_ADDED else 0
+
+
+def plain_end(code: np.ndarray, start: int) -> int:
+    """Where the subtree that begins at a place ends, read node by node."""
+    wanted, i = 1, start
+    while wanted:
+        wanted += taken(code[i]) - 1
+        i += 1
+    return i
+
+
+def plain_depth(code: np.ndarray) -> int:
+    """Of a whole tree, by recursion."""
+    nodes = iter(code)
+
+    def below() -> int:
+        node = next(nodes)
+        return 1 + max((below() for _ in range(taken(node))), default=-1)
+
+    return below()
+
+
+def test_every_program_is_one_tree_within_its_limits(programs: Any):
+    code, value = programs
+    for row, constants in zip(code, value, strict=True):
+        used = int((row != EMPTY).sum())
+        assert plain_end(row, 0) == used > 0
+        assert not row[used:].any()
+        assert not constants[row != CONSTANT].any()
+    assert max(map(plain_depth, code[::10])) <= SETTINGS.depth
+
+
+def test_subtrees_and_depths_are_those_of_a_plain_reading(programs: Any):
+    code = programs[0][:500]
+    sizes = np.asarray(jax.jit(jax.vmap(subtree_sizes))(code))
+    deepest = np.asarray(jax.jit(jax.vmap(depths))(code)).max(1)
+    for row, size, deep in zip(code, sizes, deepest, strict=True):
+        assert deep == plain_depth(row)
+        for i in range(int((row != EMPTY).sum())):
+            assert size[i] == plain_end(row, i) - i
+
+
+def test_splicing_is_cutting_and_pasting(programs: Any):
+    code, rng = programs[0], np.random.default_rng(0)
+    splice = jax.jit(lambda *a: spliced((a[0], a[1]), a[2], (a[3], a[4]), a[5], 99))
+    kept = 0
+    for _ in range(200):
+        host, donor = code[rng.integers(MANY, size=2)]
+        here, there = (rng.integers((row != EMPTY).sum()) for row in (host, donor))
+        graft = donor[there : plain_end(donor, there)]
+        wanted = np.concatenate([host[:here], graft, host[plain_end(host, here) :]])
+        none = np.zeros(NODES, np.float32)
+        found = np.asarray(splice(host, none, here, donor, none, there)[0])
+        if (wanted != EMPTY).sum() > NODES:
+            assert np.array_equal(found, host)
+            kept += 1
+        else:
+            assert np.array_equal(found, np.pad(wanted, (0, NODES))[:NODES])
+    assert 0 < kept < 200
+
+
+def test_text_and_back(programs: Any):
+    for code, value in zip(*(rows[:1000] for rows in programs), strict=True):
+        again = to_arrays(to_text(code, value, KNOWN), KNOWN, NODES, "x")
+        assert np.array_equal(again[0], code)
+        assert np.array_equal(again[1], value)
+
+
+def deaps() -> gp.PrimitiveSet:
+    """The same functions in DEAP, with nothing of ours."""
+    known = gp.PrimitiveSet("MAIN", len(KNOWN), prefix="a")
+
+    def over(a: float, b: float) -> float:
+        return a / b if abs(b) >= 1e-6 else 1.0
+
+    plain = {
+        "+": operator.add,
+        "-": operator.sub,
+        "*": operator.mul,
+        "/": over,
+        "ifltz": lambda a, b, c: b if a < 0 else c,
+        "min": min,
+        "max": max,
+        "abs": abs,
+        "sin": np.sin,
+        "cos": np.cos,
+    }
+    for name, function in plain.items():
+
+        def within(*values: float, function: Any = function) -> float:
+            return min(max(function(*values), -1e9), 1e9)
+
+        known.addPrimitive(within, FUNCTIONS[name], f"f{FUNCTION_CODES[name]}")
+    return known
+
+
+def in_deap(code: np.ndarray, value: np.ndarray, known: gp.PrimitiveSet) -> gp.PrimitiveTree:
+    names = {f"f{number}": number for number in FUNCTION_CODES.values()}
+    functions = {names[p.name]: p for p in known.primitives[object]}
+    arguments = [t for t in known.terminals[object] if t.name.startswith("a")]
+    nodes: list[Any] = []
+    for number, constant in zip(code, value, strict=True):
+        if number == EMPTY:
+            break
+        if number == CONSTANT:
+            # As the text says it: the shortest that is this number in single precision.
+            nodes.append(gp.Terminal(float(str(np.float32(constant))), False, object))
+        else:
+            nodes.append(functions[number] if number < FIRST_ADDED else arguments[number - 64])
+    return gp.PrimitiveTree(nodes)
+
+
+def test_ten_thousand_programs_give_what_a_plain_reading_and_deap_give(programs: Any):
+    """Within 1e-4 of the larger of 1 and the value, but for 1 in 1,000, which single precision
+    leads to the other side of a zero.
+    """
+    code, value = programs
+    seen = np.random.default_rng(0).normal(size=(MANY, len(KNOWN))).astype(np.float32)
+    trees = Trees(jnp.asarray(code)[:, None], jnp.asarray(value)[:, None])
+    listing = jax.jit(jax.vmap(lambda one: listed(one, WORDS)))(trees)
+    ours = np.asarray(jax.jit(jax.vmap(evaluate))(listing, seen))[:, 0]
+    known, plain, theirs = deaps(), np.empty(MANY), np.empty(MANY)
+    for i in range(MANY):
+        senses = {"joint_pos": seen[i : i + 1].astype(float)}
+        plain[i] = np.ravel(value_of(read(to_text(code[i], value[i], KNOWN)), senses))[0]
+        theirs[i] = gp.compile(in_deap(code[i], value[i], known), known)(*map(float, seen[i]))
+    assert np.isfinite(ours).all()
+    np.testing.assert_allclose(plain, theirs, rtol=1e-12, atol=1e-12)
+    assert len(np.unique(plain)) > MANY / 4
+    apart = abs(ours - plain) > 1e-4 * np.maximum(1.0, abs(plain))
+    assert apart.mean() < 1e-3
+
+
+def test_the_evaluator_does_not_care_for_its_neighbours(programs: Any):
+    """One alone, as the examiner has a user's code, and among others of other lengths."""
+    code, value = (jnp.asarray(rows[:16]) for rows in programs)
+    seen = jnp.asarray(np.random.default_rng(1).normal(size=(16, len(KNOWN))), jnp.float32)
+    plans = [listed(Trees(code[i : i + 1], value[i : i + 1]), WORDS) for i in range(16)]
+    together = jax.vmap(evaluate)(jax.tree.map(lambda *x: jnp.stack(x), *plans), seen)
+    alone = [evaluate(plan, senses) for plan, senses in zip(plans, seen, strict=True)]
+    np.testing.assert_allclose(np.stack(alone), together, rtol=1e-6, atol=1e-6)
+
+
+def test_the_first_programs_are_shaped_as_deaps():
+    """Ramped half-and-half of depths 2 to 5: mean size and depth within 4 %, and their spread."""
+    known = deaps()
+    known.addEphemeralConstant("ball", partial(np.random.default_rng(0).uniform, -1, 1))
+    theirs = [gp.PrimitiveTree(gp.genHalfAndHalf(known, 2, 5)) for _ in range(4000)]
+    words = Words(WORDS.functions, WORDS.senses, 512)
+    code = np.asarray(first_programs(4000, words)[0])
+    ours = {"size": (code != EMPTY).sum(1), "depth": np.array([plain_depth(row) for row in code])}
+    expected = {
+        "size": np.array([len(tree) for tree in theirs]),
+        "depth": np.array([tree.height for tree in theirs]),
+    }
+    for what, values in ours.items():
+        assert values.mean() == pytest.approx(expected[what].mean(), rel=0.06), what
+        assert values.std() == pytest.approx(expected[what].std(), rel=0.1), what
+    ends = code[(code == CONSTANT) | (code >= FIRST_ADDED)]
+    assert (ends == CONSTANT).mean() == pytest.approx(1 / (len(KNOWN) + 1), abs=0.01)
+
+
+def test_crossing_prefers_functions():
+    """Nine points of ten are at a function where there is one; DEAP and Koza do likewise."""
+    from mjxgait.control.programs.operators import chosen_node
+
+    code = to_arrays("(+ (* a0 a1) a2)", KNOWN, NODES, "x")[0]
+    keys = jax.random.split(jax.random.key(0), 4000)
+    chosen = np.asarray(jax.vmap(lambda key: chosen_node(key, jnp.asarray(code), 0.9))(keys))
+    shares = np.bincount(chosen, minlength=5) / len(chosen)
+    assert shares[[0, 1]].sum() == pytest.approx(0.9, abs=0.02)
+    assert shares[0] == pytest.approx(shares[1], abs=0.03)
+    assert shares[[2, 3, 4]] == pytest.approx([0.1 / 3] * 3, abs=0.015)
+
+
+def test_each_mutation_does_its_own():
+    tree = map(jnp.asarray, to_arrays("(+ (* a0 0.5) (ifltz a1 a2 a3))", KNOWN, NODES, "x"))
+    code, value = tree
+    alone = {"subtree": 0.0, "point": 0.0, "hoist": 0.0, "constant": 1e-30}
+
+    def all_of(kind: str) -> set[str]:
+        settings = ProgramConfig(**{**alone, kind: 1.0}, nodes=NODES, functions=tuple(FUNCTIONS))
+        keys = jax.random.split(jax.random.key(0), 64)
+        make = jax.jit(jax.vmap(lambda key: mutated(key, (code, value), WORDS, settings)))
+        rows = zip(*map(np.asarray, make(keys)), strict=True)
+        return {to_text(*row, KNOWN) for row in rows}
+
+    assert all(text.startswith("(+ (* a0 ") for text in all_of("constant"))
+    assert len(all_of("constant")) > 30
+    assert {"a0", "(* a0 0.5)", "(ifltz a1 a2 a3)"} <= all_of("hoist")
+    point = all_of("point")
+    assert "(- (* a0 0.5) (ifltz a1 a2 a3))" in point
+    assert all(text.count("(") == 3 for text in point)
+    assert max(text.count("(") for text in all_of("subtree")) > 3
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("(+ a0 b7)", '"b7" is neither a sense nor a number'),
+        ("(+ a0)", '"+" takes 2 arguments, not 1'),
+        ("(ifltz a0 a1)", '"ifltz" takes 3 arguments, not 2'),
+        ("(plus a0 a1)", 'there is no function "plus"'),
+        ("(+ a0 a1", "ends too early"),
+        ("", "ends too early"),
+        ("a0 a1", "more after its end"),
+        (")", "a closing parenthesis too many"),
+        ("(+ a0 nan)", "a constant must be within"),
+        ("(+ a0 1e300)", "a constant must be within"),
+        ("((+ a0 a1))", 'there is no function "("'),
+        ("(+ a0 " * 5000 + "a1" + ")" * 5000, "10,001 nodes; an expression may have 64"),
+    ],
+)
+def test_a_mistake_in_an_expression_is_one_sentence(text: str, words: str):
+    with pytest.raises(UserError, match="expression of joint") as told:
+        to_arrays(text, KNOWN, NODES, 'expression of joint "knee"')
+    assert words in str(told.value)
