@@ -20,6 +20,10 @@ Genome = Mapping[str, np.ndarray]
 class Codec(Protocol):
     """Between the arrays of a kind of genome and what `champion.json` says of it."""
 
+    def settled(self, genome: Genome, creature: Creature) -> dict[str, np.ndarray]:
+        """The arrays of a champion: those that its file will give back."""
+        ...
+
     def document(self, genome: Genome, settings: Any, creature: Creature) -> dict[str, Any]:
         """What people read."""
         ...
@@ -51,6 +55,10 @@ class Codec(Protocol):
 
 class PlainCodec:
     """Arrays as nested lists under their names: for every kind that has no codec of its own."""
+
+    def settled(self, genome: Genome, creature: Creature) -> dict[str, np.ndarray]:
+        """See `Codec`."""
+        return dict(genome)
 
     def document(self, genome: Genome, settings: Any, creature: Creature) -> dict[str, Any]:
         """See `Codec`."""

@@ -7,7 +7,7 @@ In text it is a number, a name, or `(function argument ...)`.
 import dataclasses
 import fnmatch
 from collections.abc import Mapping, Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -25,6 +25,10 @@ gives what is not finite.
 """
 DEEPEST = 400
 """Functions that an expression in text may have: it is read by recursion."""
+
+
+Expression = str | float | tuple[Any, ...]
+"""The name of a sense, a number, or a function with its arguments."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -106,18 +110,32 @@ def chosen_terminals(known: Sequence[Terminal], patterns: Sequence[str]) -> tupl
 
 def to_text(code: np.ndarray, value: np.ndarray, known: Sequence[Terminal]) -> str:
     """The expression in arrays [C]."""
+    return in_text(nested(code, value, known))
+
+
+def in_text(expression: Expression) -> str:
+    """As it is written."""
+    if isinstance(expression, tuple):
+        return f"({' '.join(map(in_text, expression))})"
+    if isinstance(expression, float):
+        return str(np.format_float_positional(np.float32(expression), unique=True, trim="-"))
+    return expression
+
+
+def nested(code: np.ndarray, value: np.ndarray, known: Sequence[Terminal]) -> Expression:
+    """The expression in arrays [C]."""
     names = {terminal.code: terminal.name for terminal in known}
     functions = {number: name for name, number in FUNCTION_CODES.items()}
     nodes = iter(range(int((np.asarray(code) != EMPTY).sum())))
 
-    def read() -> str:
+    def read() -> Expression:
         i = next(nodes)
         if code[i] == CONSTANT:
-            return np.format_float_positional(np.float32(value[i]), unique=True, trim="-")
+            return float(value[i])
         if int(code[i]) in names:
             return names[int(code[i])]
         name = functions[int(code[i])]
-        return f"({' '.join([name, *(read() for _ in range(FUNCTIONS[name]))])})"
+        return (name, *(read() for _ in range(FUNCTIONS[name])))
 
     return read()
 

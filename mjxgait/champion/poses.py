@@ -14,6 +14,12 @@ from mjxgait.settings.tables import build
 class PoseCodec:
     """Of genomes with `key_poses` [K, J] in rad and `tuning` [E] in the order of `TUNING`."""
 
+    def settled(
+        self, genome: Mapping[str, np.ndarray], creature: Creature
+    ) -> dict[str, np.ndarray]:
+        """See `Codec`."""
+        return dict(genome)
+
     def document(
         self, genome: Mapping[str, np.ndarray], settings: PoseConfig, creature: Creature
     ) -> dict[str, Any]:

@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from mjxgait.champion.expressions import ADDED, terminals, to_arrays, to_text
+from mjxgait.champion.expressions import ADDED, in_text, nested, terminals, to_arrays, to_text
+from mjxgait.champion.simplify import simplified
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.settings.programs import ProgramConfig
@@ -25,6 +26,19 @@ class ProgramCodec:
             "expressions": {name: to_text(code, value, known) for name, code, value in rows},
             "nodes": int(genome["code"].shape[1]),
         }
+
+    def settled(
+        self, genome: Mapping[str, np.ndarray], creature: Creature
+    ) -> dict[str, np.ndarray]:
+        """See `Codec`: simplified, as it is written and read."""
+        known, nodes = terminals(creature, tuple(ADDED.values())), genome["code"].shape[1]
+        pairs = zip(genome["code"], genome["value"], strict=True)
+        rows = []
+        for code, value in pairs:
+            text = in_text(simplified(nested(code, value, known)))
+            rows.append(to_arrays(text, known, nodes, "an expression"))
+        code, value = (np.stack(parts) for parts in zip(*rows, strict=True))
+        return {"code": code, "value": value}
 
     def genome(self, document: Mapping[str, Any], creature: Creature) -> dict[str, np.ndarray]:
         """See `Codec`."""

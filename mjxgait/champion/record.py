@@ -51,7 +51,7 @@ class Champion:
             creature=creature.name,
             digest=creature.digest,
             controller=config.use.controller,
-            genome=genome,
+            genome=codec_of(config.use.controller).settled(genome, creature),
             settings=config.controller,
             drive=config.drive,
             task=config.use.task,

@@ -20,9 +20,12 @@ from mjxgait.champion.expressions import (
     FIRST_ADDED,
     FUNCTION_CODES,
     Terminal,
+    in_text,
+    nested,
     to_arrays,
     to_text,
 )
+from mjxgait.champion.simplify import simplified
 from mjxgait.control.programs.evaluate import evaluate, listed
 from mjxgait.control.programs.grow import Words, half_and_half
 from mjxgait.control.programs.operators import crossed, mutated, spliced
@@ -126,6 +129,38 @@ def test_text_and_back(programs: Any):
         again = to_arrays(to_text(code, value, KNOWN), KNOWN, NODES, "x")
         assert np.array_equal(again[0], code)
         assert np.array_equal(again[1], value)
+
+
+def test_a_simplified_program_is_shorter_and_does_the_same(programs: Any):
+    """Within 1e-4 of the larger of 1 and the value, but for 1 in 500."""
+    seen, apart, before, after = np.random.default_rng(3).normal(size=(3, len(KNOWN))), [], 0, 0
+    for code, value in zip(*(rows[:2000] for rows in programs), strict=True):
+        long = nested(code, value, KNOWN)
+        short = simplified(long)
+        texts = (to_text(code, value, KNOWN), in_text(short))
+        was, now = (value_of(read(text), {"joint_pos": seen}) for text in texts)
+        apart.append((abs(was - now) > 1e-4 * np.maximum(1.0, abs(was))).any())
+        before, after = before + len(texts[0].split()), after + len(texts[1].split())
+        assert len(texts[1].split()) <= len(texts[0].split())
+    assert np.mean(apart) < 2e-3
+    assert after < 0.95 * before
+
+
+@pytest.mark.parametrize(
+    ("long", "short"),
+    [
+        (("+", "a0", ("*", 0.0, "a1")), "a0"),
+        (("-", "a0", "a0"), 0.0),
+        (("/", "a0", 0.0), 1.0),
+        (("/", 0.0, "a0"), ("/", 0.0, "a0")),
+        (("ifltz", ("*", "a0", "a0"), "a1", "a2"), "a2"),
+        (("ifltz", ("-", 1.0, 3.0), "a1", "a2"), "a1"),
+        (("*", ("+", 1.0, 1.0), "a0"), ("*", 2.0, "a0")),
+        (("min", "a1", "a1"), "a1"),
+    ],
+)
+def test_what_makes_no_difference_goes(long: Any, short: Any):
+    assert simplified(long) == short
 
 
 def deaps() -> gp.PrimitiveSet:
