@@ -2,11 +2,13 @@
 
 from typing import Any
 
+import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
 
 from mjxgait.physics.fast import UnsupportedModel, fast_plant
+from mjxgait.physics.fast.lanes import sin_cos
 from mjxgait.physics.layout import SenseLayout
 
 FLAG = '<flag eulerdamp="disable"/>'
@@ -83,3 +85,10 @@ def test_accepts_a_plain_creature() -> None:
 def test_refuses(changes: dict[str, Any], words: str) -> None:
     with pytest.raises(UnsupportedModel, match=words):
         _plant(_model(**changes))
+
+
+def test_sine_and_cosine_in_every_quadrant():
+    angle = np.linspace(-20.0, 20.0, 4001, dtype=np.float32)
+    sine, cosine = sin_cos(jnp.asarray(angle))
+    np.testing.assert_allclose(sine, np.sin(angle.astype(float)), atol=3e-7)
+    np.testing.assert_allclose(cosine, np.cos(angle.astype(float)), atol=3e-7)
