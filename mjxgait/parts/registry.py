@@ -31,9 +31,15 @@ def _walk() -> type:
     return Walk
 
 
+def _hop() -> type:
+    from mjxgait.tasks.hop.task import Hop
+
+    return Hop
+
+
 SHIPPED: Mapping[str, Mapping[str, Maker]] = {
     "controller": {"poses": _poses},
-    "task": {"walk": _walk},
+    "task": {"walk": _walk, "hop": _hop},
 }
 """By kind and name; the classes are imported when they are needed."""
 
