@@ -14,7 +14,9 @@ NEAR = 0.05
 
 @dataclasses.dataclass(frozen=True)
 class HopWeights:
-    """Weight of each fitness term (mjxgait/tasks/hop/fitness.py says what each measures); all are penalties.
+    """Weight of each fitness term (mjxgait/tasks/hop/fitness.py says what each measures).
+
+    All are penalties.
 
     As long as all but `distance` sum up to less than `distance`, getting nearer is worth its manner.
     """

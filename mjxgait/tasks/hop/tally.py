@@ -48,7 +48,7 @@ def empty(creature: Body, horizon: int) -> Tally:
 
 
 def goal_distance(creature: Body, goal: jax.Array, sensed: Sensed) -> jax.Array:
-    """From the trunk to the goal [] in m along the start's forward axis; positive when it is ahead."""
+    """From the trunk to the goal [] in m along the start's forward axis; positive when ahead."""
     return goal - forward_way(creature, sensed)
 
 
