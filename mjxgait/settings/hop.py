@@ -16,9 +16,8 @@ NEAR = 0.05
 class HopWeights:
     """Weight of each fitness term (mjxgait/tasks/hop/fitness.py says what each measures).
 
-    All are penalties.
-
-    As long as all but `distance` sum up to less than `distance`, getting nearer is worth its manner.
+    All are penalties. As long as all but `distance` sum up to less than `distance`, getting nearer
+    is worth its manner.
     """
 
     __pydantic_config__ = STRICT

@@ -37,7 +37,7 @@ class HopDemands:
     def undisturbed(
         self, whole: Recording, halved: Recording, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
-        """See `Demands`: 1 and 2, again at half the time step, 8 and 9, from the first moment on."""
+        """See `Demands`: 1 and 2, both at half the time step too, 8, 9; from the first moment on."""
         repeated = basic(halved, config.hop)
         failed = sum(not m.passed for c in repeated for m in c.measures)
         return (
