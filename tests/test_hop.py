@@ -11,8 +11,11 @@ import pytest
 from helpers import SHORT, pose_champion, said_by
 
 from mjxgait.certify import record
+from mjxgait.certify.simulate import simulate
+from mjxgait.certify.starts import nominal_starts
 from mjxgait.creature import Creature, load_creature
 from mjxgait.parts import resolve_config
+from mjxgait.parts.own import load
 from mjxgait.parts.settings import build_config
 from mjxgait.runs.experiment import Experiment, build_experiment
 from mjxgait.settings.config import RolloutConfig
@@ -217,7 +220,50 @@ def test_every_episode_is_judged_by_its_own_goal(experiment: Experiment):
     assert np.abs(way).max() > 1e-3
 
 
+REACH = """
+import jax.numpy as jnp
+from mjxgait.control.reals import RealController
+
+
+class Reach(RealController):
+    reads = ("goal_distance",)
+
+    def bounds(self, settings):
+        return {"reach": (0.0 * self.creature.stand, 0.0 * self.creature.stand + 1.0)}
+
+    def act(self, plan, memory, senses):
+        return self.creature.stand + 0.4 * plan["reach"] * senses["goal_distance"], memory
+"""
+ALIKE = {"joint_noise": 0.0, "velocity_noise": 0.0, "friction": (1.0, 1.0), "gains": 0.0, "push": 0}
+
+
+def test_evolution_and_examiner_tell_a_controller_the_same_goals(stool: Creature, tmp_path: Path):
+    """Trials that differ in nothing but their goals, by a controller that does as it reads."""
+    (tmp_path / "reach.py").write_text(REACH)
+    name = load("controller", f"{tmp_path / 'reach.py'}:Reach")
+    table = {
+        "use": {"task": "hop", "controller": name},
+        "evolution": {"population": 6},
+        "rollout": {"seconds": 0.4, "starts": 3, "lanes": 4, "physics": "mjx", **ALIKE},
+    }
+    experiment = build_experiment(stool, build_config(table, "test"))
+    state = experiment.init()
+    tally = jax.device_get(jax.jit(experiment.simulate)(state.genomes).tally)
+    starts = nominal_starts(stool, 3)
+    starts.goal[:] = experiment.starts.goal
+    way = (tally.goal - tally.left)[0]
+    # The tally has seen the state before the last step.
+    path = simulate(stool, experiment.champion(state, {}), starts, 0.4).path[:, -2]
+    np.testing.assert_allclose(way, path, atol=1e-4)
+    assert np.ptp(path) > 1e-2
+
+
 # The lamp
+
+
+def test_the_highest_joint_is_the_hip_of_what_has_no_legs(luxo: Creature):
+    """The neck, above the ankle and both arms."""
+    assert luxo.hip_height == pytest.approx(luxo.stand_height + 0.025 + 0.175 + 0.16)
 
 
 def test_the_lamp_stands(luxo: Creature):
