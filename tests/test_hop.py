@@ -294,6 +294,12 @@ def test_a_layer_keeps_what_it_says_to_the_task_that_it_names():
     assert resolve_config(train, "mine", use={"task": "walk"}).fitness == WalkConfig()
 
 
+def test_a_users_file_may_speak_of_the_lamp_alone(luxo: Creature, tmp_path: Path):
+    file = tmp_path / "mine.toml"
+    file.write_text("[creature.luxo.fitness.weights]\ntime = 0.3\n")
+    assert resolve_config(luxo.settings.train, "luxo", file).fitness.weights.time == 0.3
+
+
 def test_a_short_run_ends_with_a_champion_and_a_verdict(tmp_path: Path, capsys):
     folder, short = tmp_path / "run", tmp_path / "short.toml"
     short.write_text(SHORT + "[hop]\nstay = 1.0\n")

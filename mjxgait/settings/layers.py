@@ -96,7 +96,8 @@ def _file_layers(
             )
         if not isinstance(own, Mapping):
             raise UserError(f"{path}: creature.{name} = {own!r}: give a table of config keys")
-        if "use" not in general:
+        # That of the creature at hand is read below, for whoever takes part.
+        if name != creature_name and "use" not in {**general, **own}:
             build(Config, own, f"{path}: [creature.{name}]")
     mine = creatures.get(creature_name, {})
     return standalone, [(str(path), general), (f"{path}: [creature.{creature_name}]", mine)]
