@@ -85,6 +85,11 @@ def check_senses(reads: Collection[str], added: Collection[str] = ()) -> None:
             raise UserError(f'there is no sense "{name}"; {did_you_mean(name, known)}')
 
 
+def forward_way(creature: Body, sensed: Sensed) -> jax.Array:
+    """Way [] in m of the trunk from the start, along the start's forward axis."""
+    return _along(creature, sensed, 0)
+
+
 def trunk_height(sensed: Sensed) -> jax.Array:
     """Height [] in m of the trunk above the ground under it."""
     height = sensed.trunk_pos[2]

@@ -251,8 +251,8 @@ def test_a_changed_creature_is_refused(
         (["trian"], 'unknown subcommand "trian"; did you mean "train"?'),
         (
             ["train", "--env", "dragon"],
-            'unknown creature "dragon"; shipped: alien, crab, duck, short_quadruped, '
-            "tall_quadruped",
+            'unknown creature "dragon"; shipped: alien, crab, duck, luxo, '
+            "short_quadruped, tall_quadruped",
         ),
         (["train", "--config", "nothing.toml"], "nothing.toml: no such file"),
         (["train", "--population", "1"], "population must be at least 2"),

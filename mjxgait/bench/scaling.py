@@ -81,11 +81,13 @@ def measure_here(creature: str, point: Point) -> dict[str, Any]:
     from mjxgait.bench.ours import Ours
     from mjxgait.creature import load_creature
     from mjxgait.parts import resolve_config
+    from mjxgait.settings.config import UseConfig
     from mjxgait.settings.shipped import find_creature
 
     folder = find_creature(creature)
     settings = load_creature(folder).settings
-    config = resolve_config(settings.train, settings.creature.name)
+    walking = dataclasses.asdict(UseConfig())
+    config = resolve_config(settings.train, settings.creature.name, use=walking)
     rollout = dataclasses.replace(
         config.rollout, starts=point.starts, seconds=point.seconds, lanes=point.lanes
     )

@@ -12,6 +12,7 @@ from mjxgait.certify import criteria, draws
 from mjxgait.certify.check_body import check_body
 from mjxgait.certify.config import CertificateConfig
 from mjxgait.certify.criteria import Criterion
+from mjxgait.certify.draws import AIMS
 from mjxgait.certify.measure import Recording, measure
 from mjxgait.certify.simulate import simulate
 from mjxgait.certify.starts import join, nominal_starts, perturbed_starts
@@ -119,10 +120,12 @@ def glance(
     """
     config = config or CertificateConfig()
     check_body(creature)
+    demands = demands_of(champion.task)
+    goal = float(demands.aimed(nominal_starts(creature, 1), config).goal[0])
     whole, halved = (
-        record(creature, champion, config.seconds, refine, threads) for refine in (1, 2)
+        record(creature, champion, config.seconds, refine, threads, goal) for refine in (1, 2)
     )
-    return Glance(whole, demands_of(champion.task).undisturbed(whole, halved, config))
+    return Glance(whole, demands.undisturbed(whole, halved, config))
 
 
 def rehearse(
@@ -141,17 +144,18 @@ def rehearse(
       count: perturbed starts, and as many pushes.
     """
     config = config or CertificateConfig()
-    draw = draws.common(config)
-    groups = (
-        draws.starts(creature, config, draw, count),
-        draws.pushes(creature, config, draw, count),
+    draw, demands = draws.common(config), demands_of(champion.task)
+    disturbed = demands.aimed(
+        draws.starts(creature, config, draw, count), config, draw.generator(AIMS)
     )
+    starts = demands.aimed(join(disturbed, draws.pushes(creature, config, draw, count)), config)
     seconds = min(config.seconds, config.pushes.window[1] + config.pushes.ladder_seconds)
-    outcome = simulate(
-        creature, champion, join(*groups), seconds, fall=config.upright, threads=threads
-    )
-    started, pushed = (float(up.mean()) for up in np.split(outcome.stayed_up, 2))
-    return min(criteria.starts(started, config).margin, criteria.pushes(pushed, config).margin)
+    fall = demands.fall(config)
+    outcome = simulate(creature, champion, starts, seconds, fall=fall, threads=threads)
+    started = demands.succeeded(outcome, starts, config)[:count]
+    pushed = outcome.stayed_up[count:]
+    judged = demands.disturbed(float(started.mean()), float(pushed.mean()), config)
+    return min(criterion.margin for criterion in judged)
 
 
 def certify(
@@ -174,29 +178,29 @@ def certify(
     config = config or CertificateConfig()
     began = time.perf_counter()
     seen = seen or glance(creature, champion, config, threads)
-    draw = draws.own(champion, config)
+    draw, demands = draws.own(champion, config), demands_of(champion.task)
+    disturbed = draws.starts(creature, config, draw, config.starts.count)
     groups = (
         nominal_starts(creature, 1),
-        draws.starts(creature, config, draw, config.starts.count),
+        demands.aimed(disturbed, config, draw.generator(AIMS)),
         draws.pushes(creature, config, draw, config.pushes.count),
         *draws.ladder(creature, config, draw),
     )
+    starts = demands.aimed(join(*groups), config)
     outcome = simulate(
-        creature, champion, join(*groups), config.seconds, fall=config.upright, threads=threads
+        creature, champion, starts, config.seconds, fall=demands.fall(config), threads=threads
     )
-    plain, started, pushed, *harder = (
-        float(up.mean())
-        for up in np.split(outcome.stayed_up, np.cumsum([len(g) for g in groups])[:-1])
-    )
+    ends = np.cumsum([len(g) for g in groups])[:-1]
+    plain, _, pushed, *harder = (float(up.mean()) for up in np.split(outcome.stayed_up, ends))
+    started = float(np.split(demands.succeeded(outcome, starts, config), ends)[1].mean())
     judged = sorted(
-        (*seen.criteria, criteria.starts(started, config), criteria.pushes(pushed, config)),
-        key=lambda c: c.number,
+        (*seen.criteria, *demands.disturbed(started, pushed, config)), key=lambda c: c.number
     )
     shares = dict(zip(config.pushes.ladder, harder, strict=True)) | {
         0.0: plain,
         config.pushes.speed: pushed,
     }
-    report = demands_of(champion.task).report(seen.whole.window(config.warmup), config) | {
+    report = demands.report(seen.whole, config) | {
         "push_survival": {f"{speed:g}": share for speed, share in sorted(shares.items())},
         "push_that_fells_half": half_point(shares),
         "ground": str(creature.terrain),
@@ -215,19 +219,28 @@ def certify(
 
 
 def record(
-    creature: Creature, champion: Champion, seconds: float, refine: int = 1, threads: int = 0
+    creature: Creature,
+    champion: Champion,
+    seconds: float,
+    refine: int = 1,
+    threads: int = 0,
+    goal: float = 0.0,
 ) -> Recording:
-    """The undisturbed walk, measured; parts in each other only at the usual time step."""
+    """The undisturbed walk, measured; parts in each other only at the usual time step.
+
+    goal: m ahead, where the task has one.
+    """
+    start = nominal_starts(creature, 1)
     outcome = simulate(
         creature,
         champion,
-        nominal_starts(creature, 1),
+        dataclasses.replace(start, goal=np.array([goal])),
         seconds,
         record=1,
         refine=refine,
         threads=threads,
     )
-    return measure(creature, outcome.trajectory, inside=refine == 1)
+    return measure(creature, outcome.trajectory, inside=refine == 1, goal=goal)
 
 
 def survival(
@@ -257,9 +270,9 @@ def push_ladder(
     Their speeds are in units of sqrt(g * hip height).
     """
     groups = draws.ladder(creature, config, draws.common(config))
-    outcome = simulate(
-        creature, champion, join(*groups), config.seconds, fall=config.upright, threads=threads
-    )
+    starts = demands_of(champion.task).aimed(join(*groups), config)
+    fall = demands_of(champion.task).fall(config)
+    outcome = simulate(creature, champion, starts, config.seconds, fall=fall, threads=threads)
     return dict(
         zip(
             config.pushes.ladder,

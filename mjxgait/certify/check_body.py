@@ -127,13 +127,17 @@ class _Body:
     def hip_height(self) -> float:
         """Mean height in m of the legs' first joints, found from the trunk downwards.
 
-        A leg begins with the first body below the trunk that carries a single foot.
+        A leg begins with the first body below the trunk that carries a single foot. If no joint
+        lies between the trunk and any foot, it is the height of the highest joint.
         """
         self.pose(self.stand)
         carried = np.zeros(self.model.nbody, int)
         carried[self.feet] = 1
         for body in range(self.model.nbody - 1, 0, -1):
             carried[self.model.body_parentid[body]] += carried[body]
+        above_feet = [j for j in self.joints if carried[j.bodyid[0]]]
+        if not above_feet:
+            return float(max(self.data.xanchor[j.id][2] for j in self.joints))
         heights = []
         for foot in self.feet:
             body, hips = foot, []

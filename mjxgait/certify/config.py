@@ -1,9 +1,12 @@
-"""What the certificate demands: the nine criteria, one table each, with the defaults.
+"""What the certificate demands: the nine criteria and the tasks, one table each, with the defaults.
 
 The first table is `simulate.Fall`.
 """
 
 import dataclasses
+from typing import Annotated
+
+import pydantic
 
 from mjxgait.certify.outcome import Fall
 from mjxgait.settings.tables import STRICT, Count, Fraction, NonNegative, Positive, Whole
@@ -132,6 +135,27 @@ class PartsConfig:
 
 
 @dataclasses.dataclass(frozen=True)
+class HopConfig:
+    """What is demanded of who hops to a goal, instead of 1 to 3 and 7.
+
+    Attributes:
+      nominal: m, the goal of the undisturbed way. goals: m, range of the others.
+      near: share of the goal's distance within which one has arrived. stay: s, at the end, all of
+        which it must be there.
+      min_up: least product of the trunk's up axis with the world's; below it, one has fallen.
+      arrive: share of the perturbed starts that must arrive and stay.
+    """
+
+    __pydantic_config__ = STRICT
+    nominal: Positive = 1.2
+    goals: tuple[Positive, Positive] = (0.4, 2.0)
+    near: Positive = 0.05
+    stay: Positive = 5.0
+    min_up: Annotated[float, pydantic.Field(ge=-1, le=1)] = 0.2
+    arrive: Fraction = 0.9
+
+
+@dataclasses.dataclass(frozen=True)
 class CertificateConfig:
     """The examination.
 
@@ -153,6 +177,7 @@ class CertificateConfig:
     gait: GaitConfig = dataclasses.field(default_factory=GaitConfig)
     physics: PhysicsConfig = dataclasses.field(default_factory=PhysicsConfig)
     parts: PartsConfig = dataclasses.field(default_factory=PartsConfig)
+    hop: HopConfig = dataclasses.field(default_factory=HopConfig)
 
     def __post_init__(self) -> None:
         if self.warmup >= self.seconds:

@@ -13,6 +13,9 @@ from mjxgait.certify.starts import Starts, perturbed_starts, pushed_starts, unfa
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 
+AIMS = 3
+"""The purpose of what a task draws: goals."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Draw:
@@ -21,7 +24,7 @@ class Draw:
     words: tuple[int, ...]
 
     def generator(self, purpose: int) -> np.random.Generator:
-        """A source for each purpose: 0 starts, 1 pushes, 2 the ladder of larger pushes."""
+        """A source for each purpose: 0 starts, 1 pushes, 2 the ladder of larger pushes, `AIMS`."""
         return np.random.default_rng([*self.words, purpose])
 
 

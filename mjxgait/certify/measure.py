@@ -54,6 +54,7 @@ class Recording:
     touch: [T] whether a part that is neither foot nor ground contact touches the ground.
     penetration: [T] m, of the deepest contact with the floor.
     body_speed: [T] m/s, of the fastest body's centre of mass.
+    goal: m ahead of the start; 0 where the task has none.
     overlap_pairs: P names of parts that are ever in each other. overlap: [T, P] m, how deep.
     """
 
@@ -74,6 +75,7 @@ class Recording:
     body_speed: np.ndarray
     overlap_pairs: tuple[tuple[str, str], ...]
     overlap: np.ndarray
+    goal: float = 0.0
 
     @property
     def contact(self) -> np.ndarray:
@@ -125,6 +127,7 @@ def measure(
     trajectory: Trajectory,
     row: int = 0,
     inside: bool = True,
+    goal: float = 0.0,
 ) -> Recording:
     """Looks at one undisturbed simulation again: every stored frame is given to C MuJoCo, whose
     contacts are then read.
@@ -134,6 +137,7 @@ def measure(
     Args:
       inside: whether to look for parts in each other, which takes a quarter of the time with
         meshes.
+      goal: m ahead of the start, where the task has one.
     """
     start = start_frame(creature)
     qpos, qvel, torque = trajectory.qpos[row], trajectory.qvel[row], trajectory.torque[row]
@@ -167,6 +171,7 @@ def measure(
         body_speed=sight.body_speed,
         overlap_pairs=crossed.pairs,
         overlap=crossed.depth if inside else np.zeros((len(qpos), 0)),
+        goal=goal,
     )
 
 

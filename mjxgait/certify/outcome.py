@@ -58,10 +58,12 @@ class Outcome:
 
     fell: [S] s, infinite for those that stayed up. travel: [S, 2] m along the start's forward and
     left until the end or the fall.
+    path: [S, T] m forward after each control step; NaN from the fall on, or where nobody looked.
     """
 
     fell: np.ndarray
     travel: np.ndarray
+    path: np.ndarray
     trajectory: Trajectory
 
     @property

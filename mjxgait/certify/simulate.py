@@ -7,9 +7,11 @@ import concurrent.futures
 
 import numpy as np
 
+from mjxgait.certify.config import CertificateConfig
 from mjxgait.certify.outcome import Fall, Outcome, Trajectory
 from mjxgait.certify.starts import Starts
 from mjxgait.certify.stepping import Stepping
+from mjxgait.certify.tasks import how_simulated
 from mjxgait.champion import Champion
 from mjxgait.cores import cores
 from mjxgait.creature import Creature
@@ -27,13 +29,14 @@ def simulate(
     fall: Fall | None = None,
     threads: int = 0,
 ) -> Outcome:
-    """Simulates the champion from every start.
+    """Simulates the champion from every start, to the task's nominal goal where that has none.
 
     Args:
       record: R, how many of the first simulations to record; these run to the end even after a
         fall, the others stop there.
       refine: physics steps per control step: the controller stays what it was, its torque is held
         in between.
+      fall: when one is down; by default as its task has it.
       heading: [T] rad, commanded heading at each control step; None walks straight ahead.
       threads: 0 takes the machine's cores. The result does not depend on it.
     """
@@ -41,7 +44,9 @@ def simulate(
     # Dealt out like cards, so that each thread gets its share of every kind of start.
     shares = [np.arange(i, len(starts), threads) for i in range(min(threads, len(starts)))]
     steps = round(seconds / creature.model.opt.timestep)
-    fall = fall or Fall()
+    task = how_simulated(champion.task)
+    fall = fall or task.fall(CertificateConfig())
+    starts = task.aimed(starts, CertificateConfig())
 
     def run(share: np.ndarray) -> Outcome:
         return Stepping(
@@ -56,6 +61,7 @@ def simulate(
     return Outcome(
         fell=np.concatenate([p.fell for p in parts])[order],
         travel=np.concatenate([p.travel for p in parts])[order],
+        path=np.concatenate([p.path for p in parts])[order],
         trajectory=Trajectory(
             creature.model.opt.timestep,
             *(np.concatenate([getattr(p.trajectory, f) for p in parts])[kept] for f in fields),

@@ -25,6 +25,7 @@ class Starts:
     push: [S, 2] m/s, sudden change of the trunk's horizontal velocity in the world.
     end: [S] s, from which nobody looks any more: who is up until then has stayed up.
       Infinite for the end of the simulation.
+    goal: [S] m ahead of the start; 0 where the task has none.
     """
 
     joint_offset: np.ndarray
@@ -39,6 +40,7 @@ class Starts:
     push_time: np.ndarray
     push: np.ndarray
     end: np.ndarray
+    goal: np.ndarray
 
     def __len__(self) -> int:
         return len(self.friction)
@@ -84,6 +86,7 @@ def nominal_starts(creature: Creature, count: int) -> Starts:
         push_time=np.full(count, np.inf),
         push=np.zeros((count, 2)),
         end=np.full(count, np.inf),
+        goal=np.zeros(count),
     )
 
 

@@ -26,6 +26,7 @@ class State:
     foot_height: [S, F] m, lowest point above the floor; empty where nobody asks.
     mass_matrix: [S, nv, nv]. bias: [S, nv], Coriolis and gravity less passive forces.
     constraint_force: [S, nv], of the previous step's solve.
+    goal: [S] m ahead of the start; None where the task has none.
     """
 
     start: StartFrame
@@ -41,6 +42,7 @@ class State:
     mass_matrix: np.ndarray
     bias: np.ndarray
     constraint_force: np.ndarray
+    goal: np.ndarray | None = None
 
 
 Sense = Callable[[Creature, State], np.ndarray]
@@ -93,10 +95,20 @@ SENSES: Mapping[str, Sense] = {
         state.trunk_angvel * (state.trunk_rot @ creature.forward)
     ).sum(1),
 }
+
+
+def _to_goal(creature: Creature, state: State) -> np.ndarray:
+    goal = 0.0 if state.goal is None else state.goal
+    return goal - _along(state, state.start.forward)
+
+
+ADDED: Mapping[str, Sense] = {"goal_distance": _to_goal}
+"""Those that a shipped task adds (docs/hop.md)."""
 FOOT_SENSES = ("foot_height", "contact")
 """Those for which `foot_height` must be told."""
 
 
 def sense(creature: Creature, state: State, names: Collection[str]) -> dict[str, np.ndarray]:
     """The senses of these names, each [S, ...]."""
-    return {name: SENSES[name](creature, state) for name in names if name in SENSES}
+    known = {**SENSES, **ADDED}
+    return {name: known[name](creature, state) for name in names if name in known}

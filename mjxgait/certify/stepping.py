@@ -94,7 +94,7 @@ class Stepping:
         """Steps until the end, leaving out what has fallen and is not recorded."""
         count, time_step = len(self.starts), self.creature.model.opt.timestep
         fell = np.full(count, np.inf)
-        travel = np.zeros((count, 2))
+        travel, path = np.zeros((count, 2)), np.full((count, steps), np.nan)
         leader, waiting = self._alike()
         running = np.setdiff1d(np.arange(count), waiting)
         film = self._empty_film(steps)
@@ -104,11 +104,13 @@ class Stepping:
             if len(waiting) and np.isinf(fell[leader]):
                 released = waiting[self._pushed(waiting, k)]
                 self._follow(released, leader)
+                path[released, :k] = path[leader, :k]
                 running, waiting = np.union1d(running, released), np.setdiff1d(waiting, released)
             self._push(running, k)
             commanded = None if heading is None else float(heading[k])
             self._control_step(running, k, commanded, film)
             travel[running] = self._travel(running)
+            path[running, k] = travel[running, 0]
             down = running[self._down(running)]
             fell[down] = np.minimum(fell[down], (k + 1) * time_step)
             watched = (k + 1) * time_step < self.starts.end[running]
@@ -119,16 +121,18 @@ class Stepping:
                     & ((running < self.record) | np.isinf(fell[running]))
                 ]
         fell[waiting], travel[waiting] = fell[leader], travel[leader]
-        return Outcome(fell, travel, film)
+        path[waiting] = path[leader]
+        return Outcome(fell, travel, path, film)
 
     def _alike(self) -> tuple[int, np.ndarray]:
         """One simulation that stands for others until they are pushed, and those others.
 
         Nothing tells them apart before, so a quarter of all steps need not be taken.
         """
-        alike = np.flatnonzero(self.starts.undisturbed)
+        alike, goal = np.flatnonzero(self.starts.undisturbed), self.starts.goal
         if not len(alike):
             return 0, alike
+        alike = alike[goal[alike] == goal[alike[0]]]
         leader = int(alike[self.starts.push_time[alike].argmax()])
         return leader, alike[(alike != leader) & (alike >= self.record)]
 
@@ -203,6 +207,7 @@ class Stepping:
             mass_matrix=self.layout.dense(self.mass[running]),
             bias=self.bias[running] - self.passive[running],
             constraint_force=self.last_force[running],
+            goal=self.starts.goal[running],
         )
 
     def _foot_height(self, running: np.ndarray) -> np.ndarray:

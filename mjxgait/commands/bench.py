@@ -11,6 +11,7 @@ import tyro
 from mjxgait.creature import load_creature
 from mjxgait.errors import UserError
 from mjxgait.parts import resolve_config
+from mjxgait.settings.config import UseConfig
 from mjxgait.settings.shipped import data_folder, find_creature
 
 
@@ -82,7 +83,9 @@ def _measured(folder: Path, options: BenchOptions) -> dict[str, Any]:
     from mjxgait.bench.contest import contest
 
     settings = load_creature(folder).settings
-    config = resolve_config(settings.train, settings.creature.name)
+    # The rivals walk by key poses, whatever else the creature usually does.
+    walking = dataclasses.asdict(UseConfig())
+    config = resolve_config(settings.train, settings.creature.name, use=walking)
     evolution = dataclasses.replace(config.evolution, population=options.population)
     # The rivals' joints all have the creature's own gains.
     rollout = dataclasses.replace(config.rollout, gains=0.0)

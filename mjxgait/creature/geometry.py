@@ -71,7 +71,13 @@ def leg_lengths(
 ) -> np.ndarray:
     """[feet] height in m of each leg's first joint above the floor; a leg is the part of the
     tree that leads to one foot body only.
+
+    What stands on its trunk has no leg: all that hangs on it counts, up to the highest joint.
     """
+    if {model.jnt_bodyid[j] for j in joints}.isdisjoint(
+        b for foot in feet for b in ancestors(model, foot)
+    ):
+        return np.full(len(feet), max(data.xanchor[j][2] for j in joints))
     chains = {foot: ancestors(model, foot) for foot in feet}
     lengths = []
     for foot, chain in chains.items():

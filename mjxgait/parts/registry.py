@@ -31,6 +31,12 @@ def _walk() -> type:
     return Walk
 
 
+def _hop() -> type:
+    from mjxgait.tasks.hop.task import Hop
+
+    return Hop
+
+
 def _programs() -> type:
     from mjxgait.control.programs.controller import Programs
 
@@ -39,7 +45,7 @@ def _programs() -> type:
 
 SHIPPED: Mapping[str, Mapping[str, Maker]] = {
     "controller": {"poses": _poses, "program": _programs},
-    "task": {"walk": _walk},
+    "task": {"walk": _walk, "hop": _hop},
 }
 """By kind and name; the classes are imported when they are needed."""
 

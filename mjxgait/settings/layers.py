@@ -61,11 +61,14 @@ def _chosen(layers: Sequence[tuple[str, Mapping[str, Any]]], use: Mapping[str, s
 
 
 def _without_absent(layer: Mapping[str, Any], use: UseConfig) -> dict[str, Any]:
-    """A layer that was written for the controller and the task of the default."""
-    usual = UseConfig()
+    """A layer without what it says to a controller or a task that takes no part.
+
+    It was written for those that it names itself, and else for those of the default.
+    """
+    meant = build(UseConfig, layer.get("use", {}), "[use]")
     absent = {
-        "controller": use.controller != usual.controller,
-        "fitness": use.task != usual.task,
+        "controller": use.controller != meant.controller,
+        "fitness": use.task != meant.task,
     }
     return {key: value for key, value in layer.items() if not absent.get(key)}
 
@@ -93,7 +96,8 @@ def _file_layers(
             )
         if not isinstance(own, Mapping):
             raise UserError(f"{path}: creature.{name} = {own!r}: give a table of config keys")
-        if "use" not in general:
+        # That of the creature at hand is read below, for whoever takes part.
+        if name != creature_name and "use" not in {**general, **own}:
             build(Config, own, f"{path}: [creature.{name}]")
     mine = creatures.get(creature_name, {})
     return standalone, [(str(path), general), (f"{path}: [creature.{creature_name}]", mine)]

@@ -26,6 +26,7 @@ class Starts:
     heaviness: [R, nbody - 1] factors on the parts' masses and inertias; None where all are 1.
     numbers: leaves [R, ...], the bodies that follow from it, as the plant reads them.
     ground: leaves [R, ...], each trial's own; None where it is flat.
+    goal: [R] m ahead of the start; None where the task has none.
     """
 
     qpos: jax.Array
@@ -38,6 +39,7 @@ class Starts:
     ground: Ground | None = None
     heaviness: jax.Array | None = None
     numbers: Any = None
+    goal: jax.Array | None = None
 
 
 def draw_starts(key: jax.Array, creature: Creature, config: RolloutConfig) -> Starts:

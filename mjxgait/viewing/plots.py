@@ -8,11 +8,13 @@ from pathlib import Path
 import jax.numpy as jnp
 import numpy as np
 
+from mjxgait.creature import Creature
 from mjxgait.errors import UserError
+from mjxgait.parts import make_task
+from mjxgait.parts.registry import what_ends
 from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.folder import CHAMPION, METRICS, open_champion, open_run, read_metrics
 from mjxgait.settings.config import Config
-from mjxgait.tasks.walk.fitness import TERMS, signed_weights
 from mjxgait.viewing.curves import Lines, progress_figures
 from mjxgait.viewing.filmstrip import draw_filmstrip
 from mjxgait.viewing.gaitplots import gait_figures
@@ -31,14 +33,14 @@ def plot_run(run: Path, out: Path | None = None, formats: Sequence[str] = FORMAT
     Raises:
       UserError: not a run folder, nothing to plot yet, or the folder cannot be written.
     """
-    _, config = open_run(run)
+    creature, config = open_run(run)
     lines = read_metrics(run / METRICS)
     if not lines:
         raise UserError(
             f"{run}: nothing to plot; the run ended before its first generation was done"
         )
     out = out or run / PLOTS
-    figures = dict(progress_figures(lines, _weights(config, lines)))
+    figures = dict(progress_figures(lines, _weights(creature, config, lines)))
     if (run / CHAMPION).exists():
         walk = record_walk(*open_champion(run), SECONDS)
         figures |= dict(gait_figures(walk)) | {
@@ -54,7 +56,9 @@ def plot_run(run: Path, out: Path | None = None, formats: Sequence[str] = FORMAT
     return files
 
 
-def _weights(config: Config, lines: Lines) -> dict[str, np.ndarray]:
-    """Signed weight of each term, [generations]."""
-    rows = [signed_weights(config.fitness, jnp.int32(line["generation"])) for line in lines]
-    return {name: np.array([float(row[name]) for row in rows]) for name in TERMS}
+def _weights(creature: Creature, config: Config, lines: Lines) -> dict[str, np.ndarray]:
+    """Signed weight of each term of the run's task, [generations]."""
+    step, ends = float(creature.model.opt.timestep), what_ends(creature, config.rollout)
+    task = make_task(creature, step, ends, config)
+    rows = [task.weights(config.fitness, jnp.int32(line["generation"])) for line in lines]
+    return {name: np.array([float(row[name]) for row in rows]) for name in task.terms}

@@ -8,7 +8,7 @@ from certify_made_up import make_champion
 
 from mjxgait.certify.drive import Drive
 from mjxgait.certify.layout import start_frame
-from mjxgait.certify.state import SENSES, State, sense
+from mjxgait.certify.state import ADDED, SENSES, State, sense
 from mjxgait.certify.twins.poses import PoseTwin, pose_cycle
 
 STEP = 0.005
@@ -227,16 +227,15 @@ def test_a_torque_is_only_limited(tiny):
     np.testing.assert_array_equal(got, np.clip(wanted, -12, 12))
 
 
-def test_the_senses_are_those_of_evolution(tiny):
-    """Every name, of a body that lies askew, in C's numbers and in evolution's."""
+def askew(tiny):
+    """A body that lies askew, in C's numbers and in evolution's."""
     import jax.numpy as jnp
 
-    from mjxgait import senses as evolution
     from mjxgait.types import Sensed
 
     rot = rotation("z", 0.7) @ rotation("y", 0.2) @ rotation("x", -0.4)
     state = made_up(tiny, rot, (0.3, -0.1, 0.25), (0.5, -0.7, 0.9), seed=6)
-    sensed = Sensed(
+    return state, Sensed(
         joint_pos=jnp.asarray(state.joint_pos[0]),
         joint_vel=jnp.asarray(state.velocity[0, tiny.dof_adr]),
         bias=jnp.asarray(state.bias[0]),
@@ -247,8 +246,36 @@ def test_the_senses_are_those_of_evolution(tiny):
         geom_pos=jnp.zeros((len(tiny.watched), 3)),
         geom_low=jnp.zeros(len(tiny.watched)).at[:4].set(jnp.asarray(state.foot_height[0])),
     )
+
+
+def test_the_senses_are_those_of_evolution(tiny):
+    """Every name."""
+    import jax.numpy as jnp
+
+    from mjxgait import senses as evolution
+
+    state, sensed = askew(tiny)
     assert SENSES.keys() == evolution.SENSES.keys()
     for name, value in evolution.sense(tiny, sensed, jnp.float32(0.3), SENSES).items():
         ours = sense(tiny, state, [name])[name][0]
         np.testing.assert_allclose(np.asarray(value), ours, atol=1e-6, err_msg=name)
         assert name == "time" or np.any(ours != 0), name
+
+
+def test_the_senses_that_tasks_add_are_those_of_evolution(tiny):
+    """Every name of every shipped task."""
+    import jax.numpy as jnp
+
+    from mjxgait.parts.registry import SHIPPED
+
+    state, sensed = askew(tiny)
+    state = dataclasses.replace(state, goal=np.array([0.8]))
+    found = {}
+    for make in SHIPPED["task"].values():
+        task = make()(tiny, STEP, 1000, tiny.settings.termination)
+        found |= task.senses(jnp.float32(0.8), sensed)
+        assert set(task.adds) <= set(found)
+    assert found.keys() == ADDED.keys()
+    for name, value in found.items():
+        ours = sense(tiny, state, [name])[name][0]
+        np.testing.assert_allclose(np.asarray(value), ours, atol=1e-6, err_msg=name)

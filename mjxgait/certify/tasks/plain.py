@@ -9,6 +9,7 @@ from mjxgait.certify.config import CertificateConfig
 from mjxgait.certify.criteria import Criterion, at_most, parts, physics, speed, upright
 from mjxgait.certify.describe import worst_overlap
 from mjxgait.certify.measure import Recording
+from mjxgait.certify.tasks.staying import StaysUp
 from mjxgait.creature import Creature
 
 
@@ -21,7 +22,7 @@ class HasCriteria(Protocol):
         ...
 
 
-class PlainDemands:
+class PlainDemands(StaysUp):
     """See `Demands`."""
 
     verdict = "it does what its task demands"
@@ -47,8 +48,9 @@ class PlainDemands:
             parts(window, config.parts),
         )
 
-    def report(self, window: Recording, config: CertificateConfig) -> dict[str, Any]:
+    def report(self, whole: Recording, config: CertificateConfig) -> dict[str, Any]:
         """See `Demands`."""
+        window = whole.window(config.warmup)
         v = speed(window)
         return {"speed": v, "overlap": worst_overlap(window), "summary": f"{v:.2f} m/s"}
 

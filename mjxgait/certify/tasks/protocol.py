@@ -8,11 +8,13 @@ import numpy as np
 from mjxgait.certify.config import CertificateConfig
 from mjxgait.certify.criteria import Criterion
 from mjxgait.certify.measure import Recording
+from mjxgait.certify.outcome import Fall, Outcome
+from mjxgait.certify.starts import Starts
 from mjxgait.creature import Creature
 
 
 class Demands(Protocol):
-    """Criteria of one task. Criteria 4 and 5, staying up when disturbed, are everybody's."""
+    """Criteria of one task; `StaysUp` has all of it that concerns disturbed simulations."""
 
     verdict: str
     """What one that passes does."""
@@ -23,7 +25,33 @@ class Demands(Protocol):
         """What a recording decides that nobody has disturbed; `halved` had half the time step."""
         ...
 
-    def report(self, window: Recording, config: CertificateConfig) -> dict[str, Any]:
+    def fall(self, config: CertificateConfig) -> Fall:
+        """When a simulation is down, and nobody looks at it any more."""
+        ...
+
+    def aimed(
+        self, starts: Starts, config: CertificateConfig, rng: np.random.Generator | None = None
+    ) -> Starts:
+        """The starts with what the task adds to those that lack it, such as a goal.
+
+        rng: draws it; without one it is the nominal.
+        """
+        ...
+
+    def succeeded(self, outcome: Outcome, starts: Starts, config: CertificateConfig) -> np.ndarray:
+        """Which [S] of the simulations from perturbed starts did what the task demands."""
+        ...
+
+    def disturbed(
+        self, started: float, pushed: float, config: CertificateConfig
+    ) -> tuple[Criterion, ...]:
+        """Criterion 4 and what else disturbed simulations decide.
+
+        started: share of the perturbed starts that succeeded. pushed: of the pushed that stayed up.
+        """
+        ...
+
+    def report(self, whole: Recording, config: CertificateConfig) -> dict[str, Any]:
         """Numbers without a threshold; `summary` is a line for the screen."""
         ...
 

@@ -1,11 +1,13 @@
 """Which task demands what."""
 
+from mjxgait.certify.tasks.hop import HopDemands
 from mjxgait.certify.tasks.plain import HasCriteria, PlainDemands
 from mjxgait.certify.tasks.protocol import Demands
+from mjxgait.certify.tasks.staying import StaysUp
 from mjxgait.certify.tasks.walk import WalkDemands
 from mjxgait.errors import UserError
 
-_DEMANDS: dict[str, Demands] = {"walk": WalkDemands()}
+_DEMANDS: dict[str, Demands] = {"walk": WalkDemands(), "hop": HopDemands()}
 
 
 def register_demands(task: str, own: HasCriteria) -> None:
@@ -25,3 +27,8 @@ def demands_of(task: str) -> Demands:
             "run folder: name it again with --task FILE.py:CLASS"
         )
     return _DEMANDS[task]
+
+
+def how_simulated(task: str) -> Demands | StaysUp:
+    """What a simulation of it must know: goals and falls; of an unknown task the usual."""
+    return _DEMANDS.get(task) or StaysUp()

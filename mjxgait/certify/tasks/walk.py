@@ -24,6 +24,7 @@ from mjxgait.certify.criteria import (
 from mjxgait.certify.describe import describe, slip_distance
 from mjxgait.certify.measure import Recording
 from mjxgait.certify.strides import clearances, stride_frequency, stride_starts
+from mjxgait.certify.tasks.staying import StaysUp
 from mjxgait.creature import Creature
 
 SPARE = 1.2
@@ -32,7 +33,7 @@ worth an examination.
 """
 
 
-class WalkDemands:
+class WalkDemands(StaysUp):
     """See `Demands`: steady strides that lead forward, in the manner of an animal."""
 
     verdict = "it walks"
@@ -50,9 +51,9 @@ class WalkDemands:
             parts(window, config.parts),
         )
 
-    def report(self, window: Recording, config: CertificateConfig) -> dict[str, Any]:
+    def report(self, whole: Recording, config: CertificateConfig) -> dict[str, Any]:
         """See `Demands`."""
-        told = describe(window, config.gait.clearance)
+        told = describe(whole.window(config.warmup), config.gait.clearance)
         return told | {"summary": f"{told['gait']}, {told['speed']:.2f} m/s"}
 
     def promising(

@@ -1,0 +1,33 @@
+"""What most tasks have in common in the examination: who is disturbed must stay up."""
+
+import numpy as np
+
+from mjxgait.certify import criteria
+from mjxgait.certify.config import CertificateConfig
+from mjxgait.certify.criteria import Criterion
+from mjxgait.certify.outcome import Fall, Outcome
+from mjxgait.certify.starts import Starts
+
+
+class StaysUp:
+    """See `Demands`: criteria 4 and 5 of those that have no goal but to be up in the end."""
+
+    def fall(self, config: CertificateConfig) -> Fall:
+        """See `Demands`: as criterion 1 has it."""
+        return config.upright
+
+    def aimed(
+        self, starts: Starts, config: CertificateConfig, rng: np.random.Generator | None = None
+    ) -> Starts:
+        """See `Demands`: as they are."""
+        return starts
+
+    def succeeded(self, outcome: Outcome, starts: Starts, config: CertificateConfig) -> np.ndarray:
+        """See `Demands`: those that have stayed up."""
+        return outcome.stayed_up
+
+    def disturbed(
+        self, started: float, pushed: float, config: CertificateConfig
+    ) -> tuple[Criterion, ...]:
+        """See `Demands`: 4 and 5."""
+        return criteria.starts(started, config), criteria.pushes(pushed, config)

@@ -1,0 +1,44 @@
+"""Settings of the task of hopping to a goal."""
+
+import dataclasses
+
+from mjxgait.settings.tables import STRICT, Finite, Whole
+
+GOALS = (0.4, 2.0)
+"""m ahead of the start: the nearest and the farthest goal."""
+NOMINAL_GOAL = 1.2
+"""m, of the trial that nobody disturbs."""
+NEAR = 0.05
+"""Share of the goal's distance; who is nearer has arrived."""
+
+
+@dataclasses.dataclass(frozen=True)
+class HopWeights:
+    """Weight of each fitness term (mjxgait/tasks/hop/fitness.py says what each measures).
+
+    All are penalties. As long as all but `distance` sum up to less than `distance`, getting nearer
+    is worth its manner.
+    """
+
+    __pydantic_config__ = STRICT
+    distance: Finite = 1.0
+    time: Finite = 0.1
+    restless: Finite = 0.2
+    ground: Finite = 0.2
+    fall: Finite = 0.2
+    neutral: Finite = 0.1
+    overlap: Finite = 0.1
+
+
+@dataclasses.dataclass(frozen=True)
+class HopConfig:
+    """What is wanted of the way to a goal.
+
+    Attributes:
+      style_ramp: generations over which the style terms (all but distance) grow to their full
+        weight.
+    """
+
+    __pydantic_config__ = STRICT
+    style_ramp: Whole = 20
+    weights: HopWeights = dataclasses.field(default_factory=HopWeights)

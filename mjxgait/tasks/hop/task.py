@@ -1,0 +1,72 @@
+"""Hopping as a task: to a goal some way ahead, and to stay there."""
+
+import dataclasses
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+
+from mjxgait.creature import Creature
+from mjxgait.settings.config import RolloutConfig
+from mjxgait.settings.hop import GOALS, NOMINAL_GOAL, HopConfig
+from mjxgait.tasks.hop.fitness import TERMS, fitness_terms, signed_weights
+from mjxgait.tasks.hop.tally import Tally, empty, goal_distance, updated
+from mjxgait.tasks.plain import PlainTask
+from mjxgait.tasks.trials import Starts, draw_starts
+from mjxgait.types import Sensed
+
+
+class Hop(PlainTask):
+    """One creature's way to a goal; see `PlainTask`. Whoever has a trunk may do it."""
+
+    Settings = HopConfig
+    terms = TERMS
+    outcomes = ("left", "arrival", "seconds")
+    adds = ("goal_distance",)
+
+    def trials(self, key: jax.Array, creature: Creature, settings: RolloutConfig) -> Starts:
+        """See `Task`: starts as everybody's, each with a goal of its own, the first the nominal."""
+        starts = draw_starts(key, creature, settings)
+        low, high = GOALS
+        # A key of its own, so that the starts are those of every other task.
+        drawn = jax.random.uniform(jax.random.fold_in(key, 4), (settings.starts,))
+        goals = (low + (high - low) * drawn).at[0].set(NOMINAL_GOAL)
+        return dataclasses.replace(starts, goal=goals)
+
+    def aim(self, trial: Starts) -> jax.Array:
+        """See `Task`: the goal [] in m ahead of the start."""
+        return jnp.asarray(trial.goal)
+
+    def standards(self, settings: HopConfig) -> tuple[()]:
+        """See `Task`: nothing."""
+        return ()
+
+    def senses(self, aim: jax.Array, sensed: Sensed) -> dict[str, jax.Array]:
+        """See `Task`."""
+        return {"goal_distance": goal_distance(self.creature, aim, sensed)}
+
+    def init(self) -> Tally:
+        """See `Task`."""
+        return empty(self.creature, self.horizon)
+
+    def update(
+        self, tally: Tally, sensed: Sensed, torque: jax.Array, standards: Any, aim: jax.Array
+    ) -> Tally:
+        """See `Task`."""
+        return updated(self.creature, self.step, tally, sensed, aim)
+
+    def judge(self, tally: Tally, settings: HopConfig) -> dict[str, jax.Array]:
+        """See `Task`."""
+        return fitness_terms(self.creature, self.horizon, tally)
+
+    def outcome(self, tally: Tally) -> dict[str, jax.Array]:
+        """See `Task`: m from the goal in the end; s until it first was there, and until the end."""
+        return {
+            "left": jnp.abs(tally.left),
+            "arrival": tally.arrived * self.step,
+            "seconds": tally.steps * self.step,
+        }
+
+    def weights(self, settings: HopConfig, generation: jax.Array) -> dict[str, jax.Array]:
+        """See `Task`."""
+        return signed_weights(settings, generation)

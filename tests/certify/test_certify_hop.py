@@ -1,0 +1,257 @@
+"""What the examiner demands of who hops to a goal, and that every simulation has its own goal."""
+
+import dataclasses
+from collections.abc import Mapping
+
+import jax
+import numpy as np
+import pytest
+from certify_made_up import DOG, make_champion, walk
+
+from mjxgait.certify import CertificateConfig, draws
+from mjxgait.certify.config import HopConfig
+from mjxgait.certify.measure import Recording
+from mjxgait.certify.outcome import Outcome, Trajectory
+from mjxgait.certify.simulate import simulate
+from mjxgait.certify.starts import join, nominal_starts, perturbed_starts, pushed_starts
+from mjxgait.certify.tasks import demands_of
+from mjxgait.certify.tasks.hop import HopDemands
+from mjxgait.champion import Champion
+from mjxgait.creature import Creature
+from mjxgait.settings import hop as evolution
+from mjxgait.settings.config import RolloutConfig
+from mjxgait.tasks.hop.task import Hop
+
+CONFIG, DEMANDS = CertificateConfig(), HopDemands()
+FRAMES, STEP, GOAL = 4400, 0.005, 1.2
+
+
+# Made-up ways of 22 s
+
+
+def to(*places: tuple[float, float]) -> Recording:
+    """A way through these times in s and m ahead, without physics."""
+    times, ways = zip(*places, strict=True)
+    made = walk()
+    forward = np.interp(np.arange(FRAMES) * STEP, times, ways)
+    path = np.stack([forward, 0 * forward, np.full(FRAMES, 0.4)], 1)
+    return dataclasses.replace(made, trunk_pos=path, goal=GOAL)
+
+
+def good() -> Recording:
+    return to((0, 0), (3, 1.21))
+
+
+def changed(at: float, **values: object) -> Recording:
+    """The good way with other values in one frame."""
+    made = good()
+    arrays = {name: np.array(getattr(made, name)) for name in values}
+    for name, array in arrays.items():
+        array[round(at / STEP)] = values[name]
+    return dataclasses.replace(made, **arrays)
+
+
+def failures(whole: Recording, halved: Recording | None = None) -> set[int]:
+    judged = DEMANDS.undisturbed(whole, halved or good(), CONFIG)
+    assert [c.number for c in judged] == [1, 2, 6, 8, 9]
+    return {c.number for c in judged if not c.passed}
+
+
+def test_who_arrives_and_stays_passes():
+    assert failures(good()) == set()
+
+
+@pytest.mark.parametrize(
+    "way",
+    [
+        to((0, 0), (3, 0.93 * GOAL)),
+        to((0, 0), (3, 1.07 * GOAL)),
+        to((0, 0), (22, 2 * GOAL)),
+        to((0, 0), (3, GOAL), (21, GOAL), (21.5, 0.9 * GOAL)),
+        to((0, 0), (3, GOAL), (18, GOAL), (18.1, 0.9 * GOAL), (18.2, GOAL)),
+        to((0, 0), (18, 0), (18.5, GOAL)),
+        to((0, 0)),
+    ],
+    ids=["short", "far", "passes by", "leaves", "is away for a moment", "late", "stands"],
+)
+def test_criterion_2_arrives_and_stays(way: Recording):
+    assert failures(way) == {2}
+    assert failures(good(), halved=way) == {6}
+
+
+@pytest.mark.parametrize("name_and_value", [{"touch": True}, {"trunk_up": 0.1}])
+@pytest.mark.parametrize("at", [0.5, 20.0])
+def test_criterion_1_no_head_on_the_floor_from_the_first_moment_on(at: float, name_and_value: dict):
+    assert failures(changed(at, **name_and_value)) == {1}
+    assert failures(good(), halved=changed(at, **name_and_value)) == {6}
+
+
+def test_it_may_be_as_high_as_it_likes():
+    assert failures(changed(1.0, trunk_pos=[0.4, 0.0, 2.0])) == set()
+
+
+def test_physics_and_parts_hold_from_the_first_moment_on():
+    assert failures(changed(0.5, torque=31.0)) == {8}
+    assert failures(changed(0.5, joint_vel=21.0)) == {8}
+    assert failures(changed(0.5, overlap=0.03 * DOG.hip_height)) == {9}
+
+
+def test_a_way_that_blew_up_passes_nothing():
+    names = ("trunk_pos", "trunk_up", "torque", "overlap", "joint_vel")
+    made = good()
+    late = np.arange(FRAMES) > 3000
+    broken = {n: np.where(late[:, None], np.nan, np.c_[getattr(made, n)]) for n in names}
+    broken["trunk_up"] = broken["trunk_up"][:, 0]
+    assert failures(dataclasses.replace(made, **broken)) == {1, 2, 8, 9}
+
+
+def test_the_report_says_where_it_ends_and_since_when():
+    report = DEMANDS.report(to((0, 0), (3, 1.2), (10, 1.2), (11, 1.1), (12, 1.21)), CONFIG)
+    # Within 0.06 m again at 1.14 m, on its way back from 1.1 to 1.21 m.
+    assert report["arrival"] == pytest.approx(11 + 0.04 / 0.11, abs=0.01)
+    assert report["left"] == pytest.approx(-0.01)
+    assert DEMANDS.report(to((0, 0), (3, 1.0)), CONFIG)["arrival"] is None
+
+
+# Disturbed
+
+
+def became(ways: list[Recording], fell: list[float]) -> Outcome:
+    path = np.stack([way.trunk_pos[:, 0] for way in ways])
+    nothing = np.zeros((0, FRAMES))
+    film = Trajectory(STEP, *[nothing] * 5)
+    return Outcome(np.array(fell), np.zeros((len(ways), 2)), path, film)
+
+
+def test_of_the_disturbed_only_those_succeed_that_stay_up_and_at_their_own_goal(tiny: Creature):
+    ways = [good(), good(), good(), to((0, 0), (3, 0.4)), to((0, 0), (20, 1.2))]
+    starts = nominal_starts(tiny, 5)
+    starts.goal[:] = [1.2, 1.2, 1.3, 0.4, 1.2]
+    outcome = became(ways, [np.inf, 21.0, np.inf, np.inf, np.inf])
+    assert DEMANDS.succeeded(outcome, starts, CONFIG).tolist() == [True, False, False, True, False]
+
+
+def test_nine_of_ten_must_succeed_and_pushes_do_not_count():
+    assert [c.number for c in DEMANDS.disturbed(58 / 64, 0.0, CONFIG)] == [4]
+    assert all(c.passed for c in DEMANDS.disturbed(58 / 64, 0.0, CONFIG))
+    assert not any(c.passed for c in DEMANDS.disturbed(57 / 64, 1.0, CONFIG))
+
+
+def test_walking_is_asked_to_stay_up_and_nothing_else(tiny: Creature):
+    walking, outcome = demands_of("walk"), became([to((0, 0))] * 2, [np.inf, 3.0])
+    starts = nominal_starts(tiny, 2)
+    assert walking.succeeded(outcome, starts, CONFIG).tolist() == [True, False]
+    assert walking.aimed(starts, CONFIG) is starts
+    assert walking.fall(CONFIG) == CONFIG.upright
+    assert [c.number for c in walking.disturbed(1.0, 1.0, CONFIG)] == [4, 5]
+
+
+@pytest.mark.parametrize(
+    ("left", "seconds", "worth"),
+    [([0.01, 0.09], [6, 6], True), ([0.01, 0.2], [6, 6], False), ([0.01, 0.01], [6, 5], False)],
+)
+def test_who_is_worth_an_examination(tiny: Creature, left: list, seconds: list, worth: bool):
+    outcome = {"left": np.array(left), "seconds": np.array(seconds, float)}
+    assert DEMANDS.promising(outcome, 6.0, tiny) is worth
+
+
+# Goals
+
+
+def goals(creature: Creature, draw: draws.Draw) -> np.ndarray:
+    starts = nominal_starts(creature, 64)
+    return DEMANDS.aimed(starts, CONFIG, draw.generator(draws.AIMS)).goal
+
+
+def test_nobody_knows_the_goals_of_the_examination(tiny: Creature, trotter: Champion):
+    """Not evolution, and not who has seen the goals by which champions are chosen."""
+    task = Hop(tiny, STEP, 1000, tiny.settings.termination)
+    trials = task.trials(jax.random.key(0), tiny, RolloutConfig(starts=64)).goal[1:]
+    mine = goals(tiny, draws.own(trotter, CONFIG))
+    assert len(set(mine.tolist())) == 64
+    np.testing.assert_array_equal(mine, goals(tiny, draws.own(trotter, CONFIG)))
+    for known in (trials, goals(tiny, draws.common(CONFIG)), [CONFIG.hop.nominal]):
+        assert not np.isin(mine.astype(np.float32), np.float32(known)).any()
+    low, high = CONFIG.hop.goals
+    assert low <= mine.min() < low + 0.2
+    assert high - 0.2 < mine.max() <= high
+
+
+def test_drawing_goals_changes_nothing_else_of_the_starts(tiny: Creature):
+    starts = perturbed_starts(tiny, 8, np.random.default_rng(0))
+    aimed = DEMANDS.aimed(starts, CONFIG, np.random.default_rng(1))
+    for field in dataclasses.fields(starts):
+        same = np.array_equal(getattr(aimed, field.name), getattr(starts, field.name))
+        assert same is (field.name != "goal")
+
+
+def test_a_goal_that_is_there_stays(tiny: Creature):
+    starts = nominal_starts(tiny, 3)
+    starts.goal[1] = 0.7
+    assert DEMANDS.aimed(starts, CONFIG).goal.tolist() == [1.2, 0.7, 1.2]
+
+
+def test_the_examiner_and_evolution_mean_the_same_goals():
+    demands = HopConfig()
+    assert (demands.goals, demands.nominal) == (evolution.GOALS, evolution.NOMINAL_GOAL)
+    assert demands.near == evolution.NEAR
+
+
+class Pointer:
+    """A twin whose joints show how far it is to the goal."""
+
+    reads, command = ("goal_distance", "forward"), "pose"
+
+    def __init__(self, creature: Creature, champion: Champion, step: float) -> None:
+        self.stand = creature.stand
+
+    def init(self, count: int) -> Mapping[str, np.ndarray]:
+        return {}
+
+    def phase(self, memory: Mapping[str, np.ndarray]) -> np.ndarray:
+        return np.zeros(0)
+
+    def act(self, memory: Mapping, senses: Mapping[str, np.ndarray]) -> tuple[np.ndarray, Mapping]:
+        command = np.tile(self.stand, (len(senses["forward"]), 1))
+        command[:, 0] = 0.1 * senses["goal_distance"]
+        command[:, 1] = senses["forward"]
+        return command, memory
+
+
+@pytest.fixture
+def pointer(tiny: Creature, monkeypatch: pytest.MonkeyPatch) -> Champion:
+    monkeypatch.setattr("mjxgait.certify.stepping.twin_of", Pointer)
+    monkeypatch.setattr(Pointer, "phase", lambda self, memory: np.nan)
+    return dataclasses.replace(make_champion(tiny), task="hop")
+
+
+def test_every_simulation_senses_its_own_goal(tiny: Creature, pointer: Champion):
+    starts = nominal_starts(tiny, 3)
+    starts.goal[:2] = [0.5, 1.9]
+    film = simulate(tiny, pointer, starts, 0.5, record=3).trajectory
+    left, forward = 10 * film.target[..., 0], film.target[..., 1]
+    np.testing.assert_allclose(left + forward, np.tile([[0.5], [1.9], [1.2]], 100), atol=1e-12)
+    assert np.abs(forward).max() > 1e-4
+
+
+def test_who_has_another_goal_is_not_taken_for_the_same(tiny: Creature, pointer: Champion):
+    """Undisturbed simulations are simulated once until their push: not these."""
+    rng = np.random.default_rng(5)
+    pushed = join(pushed_starts(tiny, 2, rng, 0.3, (0.3, 0.4)), nominal_starts(tiny, 1))
+    pushed.goal[:] = [1.2, 2.0, 1.2]
+    together = simulate(tiny, pointer, pushed, 0.5, threads=1)
+    for row in range(3):
+        alone = simulate(tiny, pointer, pushed.rows(slice(row, row + 1)), 0.5)
+        np.testing.assert_array_equal(together.path[row], alone.path[0])
+
+
+def test_the_path_is_that_of_the_recording_and_ends_with_a_fall(tiny: Creature, trotter: Champion):
+    starts = pushed_starts(tiny, 4, np.random.default_rng(5), 0.3, (0.2, 0.6))
+    together = simulate(tiny, trotter, starts, 1.0, threads=1)
+    film = simulate(tiny, trotter, starts, 1.0, record=4)
+    np.testing.assert_array_equal(together.path[:, :-1], film.trajectory.qpos[:, 1:, 0])
+    thrown = pushed_starts(tiny, 1, np.random.default_rng(0), 6.0, (0.1, 0.1))
+    fallen = simulate(tiny, trotter, thrown, 1.0)
+    down = round(float(fallen.fell[0]) / STEP)
+    assert np.isfinite(fallen.path[0, :down]).all()
+    assert np.isnan(fallen.path[0, down:]).all()

@@ -1,0 +1,319 @@
+"""Hopping to a goal: who has which goal, what is counted on the way, and what that is worth."""
+
+import dataclasses
+import json
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from helpers import SHORT, pose_champion, said_by
+
+from mjxgait.certify import record
+from mjxgait.certify.simulate import simulate
+from mjxgait.certify.starts import nominal_starts
+from mjxgait.creature import Creature, load_creature
+from mjxgait.parts import resolve_config
+from mjxgait.parts.own import load
+from mjxgait.parts.settings import build_config
+from mjxgait.runs.experiment import Experiment, build_experiment
+from mjxgait.settings.config import RolloutConfig
+from mjxgait.settings.hop import GOALS, NOMINAL_GOAL, HopConfig, HopWeights
+from mjxgait.settings.shipped import find_creature
+from mjxgait.settings.walk import WalkConfig
+from mjxgait.tasks.falls import Reason
+from mjxgait.tasks.hop.fitness import STYLE, TERMS, fitness_terms, signed_weights
+from mjxgait.tasks.hop.tally import Tally, empty, goal_distance, updated
+from mjxgait.tasks.hop.task import Hop
+from mjxgait.tasks.trials import Starts, draw_starts
+from mjxgait.types import Sensed
+
+STEP, HORIZON = 0.005, 1000
+
+
+@pytest.fixture(scope="module")
+def luxo() -> Creature:
+    return load_creature(find_creature("luxo"))
+
+
+def moment(creature: Creature, forward: float = 0.0, aside: float = 0.0, **other: object) -> Sensed:
+    """Standing, but so many m ahead and to the left of the start."""
+    ahead, left = creature.start_axes
+    still = jnp.zeros(3)
+    values = {
+        "joint_pos": jnp.float32(creature.stand),
+        "joint_vel": jnp.zeros(len(creature.stand)),
+        "bias": jnp.zeros(creature.nv),
+        "trunk_pos": jnp.float32(creature.stand_pos + forward * ahead + aside * left),
+        "trunk_rot": jnp.float32(creature.stand_rot),
+        "trunk_vel": still,
+        "trunk_angvel": still,
+        "geom_pos": jnp.zeros((len(creature.watched), 3)),
+        "geom_low": jnp.ones(len(creature.watched)),
+    }
+    return Sensed(**(values | other))
+
+
+# Goals
+
+
+def trials(creature: Creature, count: int) -> tuple[Starts, Starts]:
+    """Those of hopping, and those that every other task has with the same key."""
+    key, settings = jax.random.key(3), RolloutConfig(starts=count)
+    task = Hop(creature, STEP, HORIZON, creature.settings.termination)
+    return task.trials(key, creature, settings), draw_starts(key, creature, settings)
+
+
+def test_each_trial_has_a_goal_of_its_own_and_the_first_the_nominal(stool: Creature):
+    goals = np.asarray(trials(stool, 200)[0].goal)
+    assert goals[0] == np.float32(NOMINAL_GOAL)
+    assert len(set(goals.tolist())) == 200
+    low, high = GOALS
+    assert low <= goals.min() < low + 0.05
+    assert high - 0.05 < goals.max() <= high
+
+
+def test_but_for_the_goals_the_starts_are_everybodys(stool: Creature):
+    hop, plain = trials(stool, 5)
+    assert plain.goal is None
+    for name in {field.name for field in dataclasses.fields(Starts)} - {"goal"}:
+        np.testing.assert_array_equal(getattr(hop, name), getattr(plain, name), err_msg=name)
+
+
+def test_the_goal_is_sensed_along_the_starts_forward_axis(stool: Creature):
+    goal = jnp.float32(1.0)
+    for forward, aside, left in (
+        (0.3, 0.0, 0.7),
+        (0.3, 0.5, 0.7),
+        (-0.2, 0.0, 1.2),
+        (1.4, 0, -0.4),
+    ):
+        value = goal_distance(stool, goal, moment(stool, forward, aside))
+        assert float(value) == pytest.approx(left, abs=1e-6)
+
+
+# The tally
+
+
+def after(creature: Creature, moments: list[Sensed], goal: float = 1.0) -> Tally:
+    tally = empty(creature, HORIZON)
+    for sensed in moments:
+        tally = updated(creature, STEP, tally, sensed, jnp.float32(goal))
+    return jax.device_get(tally)
+
+
+def test_arrival_is_the_first_step_near_the_goal(stool: Creature):
+    way = [0.0, 0.5, 0.94, 0.96, 1.2, 1.0]
+    tally = after(stool, [moment(stool, forward) for forward in way])
+    assert (tally.steps, tally.arrived) == (6, 3)
+    assert tally.left == pytest.approx(0.0, abs=1e-6)
+    assert after(stool, [moment(stool, 0.5)] * 6).arrived == HORIZON
+
+
+def test_near_is_a_share_of_the_way(stool: Creature):
+    assert after(stool, [moment(stool, 1.91)], goal=2.0).arrived == 0
+    assert after(stool, [moment(stool, 0.37)], goal=0.4).arrived == HORIZON
+
+
+def test_what_moves_after_the_arrival_is_counted(stool: Creature):
+    fast = jnp.array([0.3, 0.0, 0.4])
+    way = [moment(stool, forward, trunk_vel=fast) for forward in (0.0, 0.5, 1.0, 1.0, 0.7, 1.0)]
+    assert after(stool, way).after == pytest.approx(3 * STEP * 0.5)
+
+
+def test_a_touch_counts_for_as_long_as_it_lasts(stool: Creature):
+    feet = len(stool.foot_of)
+    lies = moment(stool, geom_low=jnp.ones(len(stool.watched)).at[feet].set(-0.001))
+    steps = moment(stool, geom_low=jnp.ones(len(stool.watched)).at[0].set(-0.001))
+    assert after(stool, [lies, steps, lies]).ground == 2
+
+
+def test_only_the_last_posture_counts(stool: Creature):
+    bent = moment(stool, joint_pos=jnp.float32(stool.stand + np.array([0.1, -0.2, 0, 0.3])))
+    assert after(stool, [moment(stool), bent]).bent == pytest.approx([0.1, 0.2, 0, 0.3], abs=1e-6)
+    assert not after(stool, [bent, moment(stool)]).bent.any()
+
+
+# The terms
+
+HALF_WAY = {"steps": 1000, "goal": 1.6, "left": 0.8}
+THERE = HALF_WAY | {"left": 0.0}
+
+CASES: list[tuple[str, float, dict]] = [
+    ("distance", 0.5, HALF_WAY),
+    ("distance", 0.5, HALF_WAY | {"left": -0.8}),
+    ("distance", 1.0, {}),
+    ("distance", 2.0, HALF_WAY | {"left": 9.0}),
+    ("time", 1.0, THERE),
+    ("time", 0.25, THERE | {"arrived": 250}),
+    ("restless", 0.5, THERE | {"after": 0.8}),
+    ("restless", 1.0, THERE | {"after": 8.0}),
+    ("ground", 0.3, THERE | {"ground": 300.0}),
+    ("ground", 0.6, THERE | {"ground": 300.0, "steps": 500}),
+    ("fall", 1.0, THERE | {"reason": int(Reason.TIPPED)}),
+    ("fall", 0.0, THERE),
+    # half of a pose range of 80 degrees is 0.698 rad
+    ("neutral", 0.25, THERE | {"bent": [np.radians(40), 0.0, 0.0, 0.0]}),
+    # 0.05 hip heights beyond the 0.005 at which parts only touch
+    ("overlap", 0.5, THERE | {"overlap": 0.055 * 0.5}),
+    # whatever is bad at the goal is half as bad half way, and nothing for who has not moved
+    ("ground", 0.15, HALF_WAY | {"ground": 300.0}),
+    ("fall", 0.0, {"reason": int(Reason.TIPPED)}),
+    ("time", 0.0, HALF_WAY | {"left": 1.7}),
+]
+
+
+@pytest.mark.parametrize(("name", "value", "tally"), CASES)
+def test_a_term_is_what_its_tally_says(stool: Creature, name: str, value: float, tally: dict):
+    body = dataclasses.replace(stool, hip_height=0.5)
+    arrays = {key: jnp.asarray(number) for key, number in tally.items()}
+    filled = dataclasses.replace(empty(body, HORIZON), **arrays)
+    assert float(fitness_terms(body, HORIZON, filled)[name]) == pytest.approx(value, abs=1e-5)
+
+
+def test_every_term_has_a_case_that_is_not_zero():
+    assert {name for name, value, _ in CASES if value} == set(TERMS)
+
+
+@pytest.mark.parametrize("generation", [0, 10, 1000])
+def test_standing_still_is_worse_than_getting_nearer_in_any_manner(generation: int):
+    """The worst manner is every style term at its most, 1, by the share of the way."""
+    weights = {n: float(w) for n, w in signed_weights(HopConfig(), jnp.int32(generation)).items()}
+    manner = sum(weights[name] for name in STYLE)
+    scores = [
+        weights["distance"] * (1 - near) + manner * near for near in np.linspace(0.0, 1.0, 11)
+    ]
+    assert all(np.diff(scores) > 0)
+
+
+def test_style_grows_over_the_generations_and_the_goal_does_not():
+    settings = HopConfig(style_ramp=20, weights=HopWeights(distance=3.0, ground=0.5))
+    by_generation = [signed_weights(settings, jnp.int32(g)) for g in (0, 10, 20, 99)]
+    assert [float(weights["distance"]) for weights in by_generation] == [-3.0] * 4
+    ground = [float(weights["ground"]) for weights in by_generation]
+    assert ground == pytest.approx([0.0, -0.25, -0.5, -0.5])
+    assert float(signed_weights(HopConfig(style_ramp=0), jnp.int32(0))["fall"]) < 0
+
+
+# Episodes
+
+
+@pytest.fixture(scope="module")
+def experiment(stool: Creature) -> Experiment:
+    table = {
+        "use": {"task": "hop"},
+        "evolution": {"population": 6},
+        "rollout": {"seconds": 0.4, "starts": 3, "lanes": 4, "physics": "mjx"},
+    }
+    return build_experiment(stool, build_config(table, "test"))
+
+
+def test_every_episode_is_judged_by_its_own_goal(experiment: Experiment):
+    tally = jax.device_get(jax.jit(experiment.simulate)(experiment.init().genomes).tally)
+    goals = np.asarray(experiment.starts.goal)
+    assert len(set(goals.tolist())) == 3
+    np.testing.assert_array_equal(tally.goal, np.tile(goals, (6, 1)))
+    way = tally.goal - tally.left
+    # In a fifth of a second nobody gets far, and nobody stays where it was.
+    assert (np.abs(way) < 0.4).all()
+    assert np.abs(way).max() > 1e-3
+
+
+REACH = """
+import jax.numpy as jnp
+from mjxgait.control.reals import RealController
+
+
+class Reach(RealController):
+    reads = ("goal_distance",)
+
+    def bounds(self, settings):
+        return {"reach": (0.0 * self.creature.stand, 0.0 * self.creature.stand + 1.0)}
+
+    def act(self, plan, memory, senses):
+        return self.creature.stand + 0.4 * plan["reach"] * senses["goal_distance"], memory
+"""
+ALIKE = {"joint_noise": 0.0, "velocity_noise": 0.0, "friction": (1.0, 1.0), "gains": 0.0, "push": 0}
+
+
+def test_evolution_and_examiner_tell_a_controller_the_same_goals(stool: Creature, tmp_path: Path):
+    """Trials that differ in nothing but their goals, by a controller that does as it reads."""
+    (tmp_path / "reach.py").write_text(REACH)
+    name = load("controller", f"{tmp_path / 'reach.py'}:Reach")
+    table = {
+        "use": {"task": "hop", "controller": name},
+        "evolution": {"population": 6},
+        "rollout": {"seconds": 0.4, "starts": 3, "lanes": 4, "physics": "mjx", **ALIKE},
+    }
+    experiment = build_experiment(stool, build_config(table, "test"))
+    state = experiment.init()
+    tally = jax.device_get(jax.jit(experiment.simulate)(state.genomes).tally)
+    starts = nominal_starts(stool, 3)
+    starts.goal[:] = experiment.starts.goal
+    way = (tally.goal - tally.left)[0]
+    # The tally has seen the state before the last step.
+    path = simulate(stool, experiment.champion(state, {}), starts, 0.4).path[:, -2]
+    np.testing.assert_allclose(way, path, atol=1e-4)
+    assert np.ptp(path) > 1e-2
+
+
+# The lamp
+
+
+def test_the_highest_joint_is_the_hip_of_what_has_no_legs(luxo: Creature):
+    """The neck, above the ankle and both arms."""
+    assert luxo.hip_height == pytest.approx(luxo.stand_height + 0.025 + 0.175 + 0.16)
+
+
+def test_the_lamp_stands(luxo: Creature):
+    standing = record(luxo, pose_champion(luxo, np.stack([luxo.stand] * 2), {}), 3.0)
+    assert standing.trunk_up.min() > 0.999
+    assert not standing.touch.any()
+    last = standing.window(1.0)
+    assert np.abs(last.trunk_pos[:, :2] - last.trunk_pos[0, :2]).max() < 1e-3
+    assert last.foot_force.sum(1) == pytest.approx(luxo.mass * 9.81, rel=0.02)
+
+
+def test_a_lamp_on_its_head_is_told(luxo: Creature):
+    """Folded forward until the shade meets the floor."""
+    folded = np.array([luxo.pose_high[0], luxo.pose_high[1], luxo.pose_low[2]])
+    assert record(luxo, pose_champion(luxo, np.stack([folded] * 2), {}), 2.0).touch.any()
+
+
+def test_the_lamp_hops_unless_told_otherwise(luxo: Creature):
+    usual = resolve_config(luxo.settings.train, luxo.name)
+    assert (usual.use.task, type(usual.fitness)) == ("hop", HopConfig)
+    walking = resolve_config(luxo.settings.train, luxo.name, use={"task": "walk"})
+    assert (walking.use.task, type(walking.fitness)) == ("walk", WalkConfig)
+
+
+def test_a_layer_keeps_what_it_says_to_the_task_that_it_names():
+    train = {"use": {"task": "hop"}, "fitness": {"style_ramp": 7}}
+    assert resolve_config(train, "mine").fitness.style_ramp == 7
+    assert resolve_config(train, "mine", use={"task": "walk"}).fitness == WalkConfig()
+
+
+def test_a_users_file_may_speak_of_the_lamp_alone(luxo: Creature, tmp_path: Path):
+    file = tmp_path / "mine.toml"
+    file.write_text("[creature.luxo.fitness.weights]\ntime = 0.3\n")
+    assert resolve_config(luxo.settings.train, "luxo", file).fitness.weights.time == 0.3
+
+
+def test_a_short_run_ends_with_a_champion_and_a_verdict(tmp_path: Path, capsys):
+    folder, short = tmp_path / "run", tmp_path / "short.toml"
+    short.write_text(SHORT + "[hop]\nstay = 1.0\n")
+    small = "--population 6 --generations 1 --rollout.seconds 0.4 --rollout.lanes 4"
+    rest = "--examination.candidates 0 --no-plots"
+    said_by(
+        capsys, "train", "--env", "luxo", *small.split(), *rest.split(), "--out", folder, code=0
+    )
+    champion = json.loads((folder / "champion.json").read_text())
+    assert champion["task"] == "hop"
+    assert list(champion["terms"]) == list(TERMS)
+    assert set(champion["origin"]["nominal"]) == {"left", "arrival", "seconds"}
+    said_by(capsys, "certify", folder, "--config", short, code=0)
+    certificate = json.loads((folder / "certificate.json").read_text())
+    assert [c["number"] for c in certificate["criteria"]] == [1, 2, 4, 6, 8, 9]
+    assert certificate["report"]["goal"] == NOMINAL_GOAL
+    assert "poses, hop" in said_by(capsys, "inspect", folder, code=0)
