@@ -316,4 +316,4 @@ def test_a_short_run_ends_with_a_champion_and_a_verdict(tmp_path: Path, capsys):
     certificate = json.loads((folder / "certificate.json").read_text())
     assert [c["number"] for c in certificate["criteria"]] == [1, 2, 4, 6, 8, 9]
     assert certificate["report"]["goal"] == NOMINAL_GOAL
-    assert "poses, hop" in said_by(capsys, "inspect", folder, code=0)
+    assert "program, hop" in said_by(capsys, "inspect", folder, code=0)
