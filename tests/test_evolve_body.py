@@ -78,8 +78,15 @@ def tensors(numbers: Any) -> np.ndarray:
     return whole / moments.max()
 
 
-@pytest.mark.parametrize("make", [fast_plant, mjx_plant], ids=["fast", "mjx"])
-def test_a_lanes_body_is_the_one_in_the_scaled_files(shipped: Creature, make: Any):
+def test_a_lanes_body_is_the_one_in_the_scaled_files(shipped: Creature):
+    compare_with_the_scaled_files(shipped, fast_plant)
+
+
+def test_so_it_is_in_plain_mjx(stool: Creature):
+    compare_with_the_scaled_files(stool, mjx_plant)
+
+
+def compare_with_the_scaled_files(shipped: Creature, make: Any) -> None:
     """Every number that the plant reads, from places to the weights of constraints."""
     known, sizes = proportions(shipped), some_sizes(shipped, 3)
     layout, touch = sense_layout(shipped), shipped.settings.termination.touch

@@ -13,11 +13,12 @@ import pytest
 from helpers import small_config, weight_vector
 
 from mjxgait.control.poses import Genome
-from mjxgait.creature import Creature
+from mjxgait.creature import Creature, load_creature
 from mjxgait.runs.experiment import Experiment, build_experiment, evolution_of
 from mjxgait.search.variation import Box, uniform
 from mjxgait.settings.config import Config
 from mjxgait.settings.layers import resolve_config
+from mjxgait.settings.shipped import find_creature
 from mjxgait.simulation.evaluator import Local
 from mjxgait.simulation.rollout import Episodes
 from mjxgait.tasks.falls import Reason
@@ -350,18 +351,19 @@ def test_the_stride_limit_of_a_dog():
     assert stride_limit(20.0) == pytest.approx(3.53, abs=0.01)
 
 
-def test_mjx_agrees_with_c_mujoco(shipped: Creature):
+@pytest.mark.parametrize("name", ["crab", "duck"])
+def test_mjx_agrees_with_c_mujoco(name: str):
     """The same controlled motion, 60 steps through touchdown, in float32 MJX and in float64 C MuJoCo."""
-    config = Config()
+    creature, config = load_creature(find_creature(name)), Config()
     experiment = build_experiment(
-        shipped,
+        creature,
         dataclasses.replace(config, rollout=dataclasses.replace(config.rollout, physics="mjx")),
     )
-    model = shipped.evolution_model
+    model = creature.evolution_model
     data = mujoco.MjData(model)
-    data.qpos[:] = shipped.stand_qpos
+    data.qpos[:] = creature.stand_qpos
     plant = experiment.simulator.plant
-    state = jax.tree.map(lambda leaf: leaf[None], _at_rest(shipped))
+    state = jax.tree.map(lambda leaf: leaf[None], _at_rest(creature))
     torque = np.zeros((1, model.nv), np.float32)
 
     def advance(state, torque):
@@ -372,8 +374,8 @@ def test_mjx_agrees_with_c_mujoco(shipped: Creature):
     rng = np.random.default_rng(0)
     for k in range(60):
         if k % 10 == 0:
-            torque[0, shipped.dof_adr] = (
-                rng.uniform(-0.1, 0.1, len(shipped.dof_adr)) * shipped.torque_limit
+            torque[0, creature.dof_adr] = (
+                rng.uniform(-0.1, 0.1, len(creature.dof_adr)) * creature.torque_limit
             )
         data.qfrc_applied[:] = torque[0]
         state, _ = step(state, torque)
