@@ -42,6 +42,7 @@ def _rate(creature: Body, sensed: Sensed, axis: np.ndarray) -> jax.Array:
 
 SENSES: Mapping[str, Sense] = {
     "time": lambda creature, sensed, time: time,
+    "beat": lambda creature, sensed, time: 2 * (time - jnp.floor(time)) - 1,
     "joint_pos": lambda creature, sensed, time: sensed.joint_pos,
     "joint_vel": lambda creature, sensed, time: sensed.joint_vel,
     "foot_height": lambda creature, sensed, time: foot_heights(creature, sensed),

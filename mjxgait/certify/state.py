@@ -72,6 +72,7 @@ def _right_down(creature: Creature, state: State) -> np.ndarray:
 
 SENSES: Mapping[str, Sense] = {
     "time": lambda creature, state: state.time,
+    "beat": lambda creature, state: 2 * np.mod(state.time, 1.0) - 1,
     "joint_pos": lambda creature, state: state.joint_pos,
     "joint_vel": lambda creature, state: state.velocity[:, creature.dof_adr],
     "foot_height": lambda creature, state: state.foot_height,

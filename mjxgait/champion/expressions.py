@@ -62,6 +62,7 @@ ADDED = {"s0": "goal_distance"}
 """Names of senses that tasks add."""
 SCALARS = {
     "t": "time",
+    "beat": "beat",
     "vx": "forward_vel",
     "vz": "up_vel",
     "px": "forward",
