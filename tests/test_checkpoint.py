@@ -16,7 +16,7 @@ from test_evolution import advance, begin, inputs, toy
 
 from mjxgait.errors import UserError
 from mjxgait.runs.checkpoint import FOLDER, Checkpoints
-from mjxgait.search.evolution import EvolutionState
+from mjxgait.search.state import EvolutionState
 
 DIGEST = "0123456789abcdef"
 

@@ -13,13 +13,8 @@ import pytest
 from mjxgait.control.pose_variation import pose_variation
 from mjxgait.control.poses import Genome
 from mjxgait.search.breeding import parents
-from mjxgait.search.evolution import (
-    Evolution,
-    EvolutionState,
-    GenerationMetrics,
-    Origin,
-    stop_reason,
-)
+from mjxgait.search.evolution import Evolution
+from mjxgait.search.state import EvolutionState, GenerationMetrics, Origin, stop_reason
 from mjxgait.search.variation import Box, first_occurrence
 from mjxgait.settings.config import Config, EvolutionConfig, ForcedConfig
 from mjxgait.settings.traced import traced

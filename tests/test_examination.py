@@ -23,7 +23,7 @@ from mjxgait.runs.exams import Exams
 from mjxgait.runs.experiment import Experiment, build_experiment
 from mjxgait.runs.folder import CERTIFICATE, EXAMS, create_run, read_metrics
 from mjxgait.runs.screen import Screen
-from mjxgait.search.evolution import EvolutionState
+from mjxgait.search.state import EvolutionState
 from mjxgait.settings.config import ExaminationConfig
 
 SECONDS = 0.4

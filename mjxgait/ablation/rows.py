@@ -21,7 +21,7 @@ from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.experiment import Batch, build_batch
 from mjxgait.runs.folder import METRICS, truncate_metrics
 from mjxgait.runs.loop import interruptible, metrics_line, versions
-from mjxgait.search.evolution import EvolutionState
+from mjxgait.search.state import EvolutionState
 from mjxgait.settings.traced import traced
 
 GROUPS, CHAMPIONS = "groups", "champions"

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from mjxgait.creature import Creature
-from mjxgait.creature.load import FLOOR
+from mjxgait.creature.creature import FLOOR
 
 
 def bare_model(creature: Creature) -> tuple[mujoco.MjModel, np.ndarray]:

@@ -14,7 +14,7 @@ from mjxgait.bench.workload import Lap, Workload
 from mjxgait.control.poses import TUNING, Genome
 from mjxgait.creature import load_creature
 from mjxgait.runs.experiment import Experiment, build_experiment, prepare_devices
-from mjxgait.search.evolution import EvolutionState
+from mjxgait.search.state import EvolutionState
 from mjxgait.settings.config import Config
 
 

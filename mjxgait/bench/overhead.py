@@ -23,7 +23,8 @@ from mjxgait.runs.exams import Exams
 from mjxgait.runs.experiment import Experiment, evolution_of
 from mjxgait.runs.folder import EXAMS
 from mjxgait.runs.screen import Screen
-from mjxgait.search.evolution import EvolutionState, GenerationMetrics, Judged
+from mjxgait.search.state import EvolutionState, GenerationMetrics
+from mjxgait.types import Judged
 
 REPEATS = 30
 

@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 
-from mjxgait.creature.load import Creature
+from mjxgait.creature.creature import Creature
 from mjxgait.ground.spec import Place
 
 

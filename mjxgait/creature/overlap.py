@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 
 from mjxgait.creature.bars import Bar, bars_of
-from mjxgait.creature.load import Creature
+from mjxgait.creature.creature import Creature
 
 NEAR = 0.1
 """Hip heights; joints nearer to each other are at one place, like the three of an Euler hip."""

@@ -9,9 +9,9 @@ from collections.abc import Mapping
 import mujoco
 import numpy as np
 
+from mjxgait.creature.creature import Creature
 from mjxgait.creature.frame import vertical_freedom
 from mjxgait.creature.geometry import support_extents
-from mjxgait.creature.load import Creature
 from mjxgait.creature.scale import load_files, scaled_files
 from mjxgait.errors import UserError
 

@@ -1,6 +1,5 @@
 """`import_model`: from a model file to the texts of a creature folder, step by step."""
 
-import copy
 import dataclasses
 import math
 from collections.abc import Sequence
@@ -11,29 +10,24 @@ import numpy as np
 
 from mjxgait.creature import geometry
 from mjxgait.errors import UserError
-from mjxgait.importing.anatomy import Anatomy, find_anatomy, in_plane
+from mjxgait.importing.anatomy import Anatomy
 from mjxgait.importing.balance import steady_balance
 from mjxgait.importing.body import Puppet
-from mjxgait.importing.drive import Drive, plan_drive
-from mjxgait.importing.hold import Held, hold
+from mjxgait.importing.find import find_anatomy
 from mjxgait.importing.mjcf import clean_mjcf
 from mjxgait.importing.notes import Notes, listed
 from mjxgait.importing.orient import find_forward, find_mirror, is_planar, yaw_to
-from mjxgait.importing.parts import Body, one_line, plain_names, rotation
+from mjxgait.importing.parts import one_line, plain_names, rotation
+from mjxgait.importing.root import in_plane
 from mjxgait.importing.same import check_same
 from mjxgait.importing.skeleton import build_bodies
-from mjxgait.importing.soles import guard_parts, lay_soles
 from mjxgait.importing.source import Places, Source, parse_xml
-from mjxgait.importing.stance import SPREADS, Search, drop, level, stance_of
+from mjxgait.importing.stance import stance_of
+from mjxgait.importing.standing import Candidate, first_pose, offered_poses, standing
 from mjxgait.importing.urdf import clean_urdf
 from mjxgait.importing.worker import compile_apart, compile_here
 from mjxgait.importing.write_toml import creature_toml
-from mjxgait.importing.write_xml import compile_own, creature_xml
-
-SINK = 0.0005
-"""m that feet begin in the floor, about as far as they rest in it."""
-STRAIGHT = 0.97
-"""Straightness from which legs count as straight."""
+from mjxgait.importing.write_xml import creature_xml
 
 
 @dataclasses.dataclass(frozen=True)
@@ -63,22 +57,6 @@ class Imported:
     files: dict[str, str]
     notes: Notes
     stands: bool
-
-
-@dataclasses.dataclass(eq=False)
-class Candidate:
-    """A standing pose that was tried: the bodies with their soles, the keyframe, and how it
-    held.
-    """
-
-    puppet: Puppet
-    q: np.ndarray
-    feet: list[list[str]]
-    drive: Drive
-    model: mujoco.MjModel
-    qpos: np.ndarray
-    held: Held
-    notes: Notes
 
 
 def import_model(path: Path, choices: ImportChoices | None = None) -> Imported:
@@ -118,11 +96,13 @@ def _import(path: Path, choices: ImportChoices, notes: Notes) -> Imported:
     puppet = Puppet(
         bodies, [anatomy.bodies.index(b) for b in anatomy.feet], in_plane(model, anatomy.root)
     )
-    start = _start(puppet, model, anatomy)
+    start = first_pose(puppet, model, anatomy)
     puppet.turn(yaw_to(find_forward(puppet, start, choices.forward, notes)))
     planar = is_planar(puppet, start) is not None
     mirror = find_mirror(puppet, start, planar, notes)
-    best = _stand(puppet, _poses(puppet, model, anatomy, source, start), mirror, planar, notes)
+    best = standing(
+        puppet, offered_poses(puppet, model, anatomy, source, start), mirror, planar, notes
+    )
     feet = {name for foot in best.feet for name in foot}
     steady_balance(best.drive, best.puppet.names, best.model, best.qpos, feet, best.notes)
     name = plain_names([choices.name or path.stem], ["creature"])[0]
@@ -193,131 +173,6 @@ def _tell_left_out(model: mujoco.MjModel, anatomy: Anatomy, notes: Notes) -> Non
     names += [f'geom "{model.geom(g).name or g}"' for g in things]
     if names:
         notes.change(f"left out: {listed(names)}", "a walk is evolved on a flat floor, alone")
-
-
-def _start(puppet: Puppet, model: mujoco.MjModel, anatomy: Anatomy) -> np.ndarray:
-    """[J] the pose in which the anatomy was found."""
-    return _angles(puppet, model, anatomy.qpos)
-
-
-def _angles(puppet: Puppet, model: mujoco.MjModel, qpos: np.ndarray) -> np.ndarray:
-    hinge = int(mujoco.mjtJoint.mjJNT_HINGE)
-    q = np.array(
-        [
-            qpos[model.jnt_qposadr[j.id]] if int(model.jnt_type[j.id]) == hinge else 0.0
-            for j in puppet.joints
-        ]
-    )
-    return np.clip(q, puppet.low, puppet.high)
-
-
-def _poses(
-    puppet: Puppet, model: mujoco.MjModel, anatomy: Anatomy, source: Source, start: np.ndarray
-) -> list[tuple[str, np.ndarray]]:
-    """Poses that the file offers, with what they are."""
-    order = sorted(
-        range(model.nkey),
-        key=lambda k: (
-            model.key(k).name.lower() not in ("stand", "standing", "home", "walk", "walking")
-        ),
-    )
-    poses = [
-        (f'the keyframe "{model.key(k).name}"', _angles(puppet, model, model.key_qpos[k]))
-        for k in order[:3]
-    ]
-    poses += [
-        ("init_qpos", _angles(puppet, model, np.array(p)))
-        for p in source.poses
-        if len(p) == model.nq
-    ]
-    poses.append(("the file's zero pose", start))
-    return [(what, q) for what, q in poses if np.isfinite(q).all()]
-
-
-def _stand(
-    puppet: Puppet,
-    offered: list[tuple[str, np.ndarray]],
-    mirror: tuple[np.ndarray, np.ndarray] | None,
-    planar: bool,
-    notes: Notes,
-) -> Candidate:
-    """The first pose that stands, of the file's own and those that a search finds; the best one
-    where none does.
-    """
-    tried: list[tuple[str, Candidate]] = []
-    search = Search(puppet, offered[0][1], mirror, planar)
-    for what, q in offered:
-        tried.append((what, _try(puppet, q, mirror, planar, notes)))
-        # Legs that are straight out have no length left to step with: such a pose is only the
-        # second choice.
-        if tried[-1][1].held.stands and search.stretch(q) < STRAIGHT:
-            break
-    else:
-        for seed, spread in enumerate(SPREADS):
-            tried.append(
-                (
-                    "a search over leg bends",
-                    _try(puppet, search.run(spread, seed)[0], mirror, planar, notes),
-                )
-            )
-            if tried[-1][1].held.stands and search.stretch(tried[-1][1].q) < STRAIGHT:
-                break
-    what, best = max(
-        tried, key=lambda pair: pair[1].held.score - 0.2 * (search.stretch(pair[1].q) > STRAIGHT)
-    )
-    held = best.held
-    notes.changes, notes.guesses = best.notes.changes, best.notes.guesses
-    if held.stands:
-        best.notes.guess(
-            "standing pose",
-            what,
-            "high",
-            f"stood 2 s: sag {held.sag:.3f} rad, upright {held.up:.2f}",
-        )
-    else:
-        touched = f', "{held.touched}" touches the floor' if held.touched else ""
-        best.notes.guess(
-            "standing pose",
-            what,
-            "low",
-            f"it falls: upright {held.up:.2f}, height {held.height:.2f} of the start{touched}",
-        )
-    return best
-
-
-def _try(
-    puppet: Puppet,
-    q: np.ndarray,
-    mirror: tuple[np.ndarray, np.ndarray] | None,
-    planar: bool,
-    notes: Notes,
-) -> Candidate:
-    """Puts the creature on soles in a pose, and lets it stand."""
-    notes, bodies = copy.deepcopy(notes), copy.deepcopy(puppet.bodies)
-    trial = Puppet(bodies, [group[0] for group in puppet.feet])
-    level(trial, q)
-    drop(trial, q)
-    stance = stance_of(trial, q)
-    drive = plan_drive(trial, q, stance, planar, notes)
-    feet = lay_soles(bodies, trial.feet, stance, planar, notes)
-    guard_parts(bodies, trial.feet, trial.trunk, trial.segments(), stance, notes)
-    _name_shapes(bodies)
-    made = Puppet(bodies, [group[0] for group in puppet.feet])
-    drop(made, q, SINK)
-    qpos = made.qpos(q)
-    model = compile_own(creature_xml("trial", bodies, qpos))
-    held = hold(
-        model, qpos, drive.kp, drive.kd, drive.torque, {name for foot in feet for name in foot}
-    )
-    return Candidate(made, q, feet, drive, model, qpos, held, notes)
-
-
-def _name_shapes(bodies: list[Body]) -> None:
-    """A name for each colliding shape that has none."""
-    for body in bodies:
-        unnamed = [s for s in body.shapes if s.solid and not s.name]
-        for i, shape in enumerate(unnamed):
-            shape.name = f"{body.name}_guard" + (f"_{i + 1}" if len(unnamed) > 1 else "")
 
 
 def _folder(

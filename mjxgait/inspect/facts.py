@@ -20,7 +20,7 @@ from mjxgait.inspect.snapshot import Snapshot
 from mjxgait.parts import make_task, resolve_config
 from mjxgait.parts.registry import what_ends
 from mjxgait.runs.folder import CERTIFICATE, CHAMPION
-from mjxgait.search.evolution import Origin
+from mjxgait.search.state import Origin
 from mjxgait.tasks.protocol import Task
 
 KINDS = {

@@ -20,7 +20,7 @@ from mjxgait.errors import UserError
 from mjxgait.runs.examination import due, why_ended
 from mjxgait.runs.folder import CERTIFICATE, CHAMPION, CONFIG, METRICS, open_run, read_metrics
 from mjxgait.runs.stored import FOLDER, Manifest, read_stored, stored_generations
-from mjxgait.search.evolution import EvolutionState, stop_reason
+from mjxgait.search.state import EvolutionState, stop_reason
 from mjxgait.settings.config import Config
 
 

@@ -28,7 +28,7 @@ from mjxgait.runs.stored import (
     read_stored,
     stored_generations,
 )
-from mjxgait.search.evolution import EvolutionState
+from mjxgait.search.state import EvolutionState
 
 OVERHEAD = 2**18
 """Bytes that a checkpoint takes at most beside twice its arrays."""

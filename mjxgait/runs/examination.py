@@ -11,7 +11,7 @@ from mjxgait.champion import Champion
 from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.exams import Exams
 from mjxgait.runs.experiment import Experiment
-from mjxgait.search.evolution import EvolutionState
+from mjxgait.search.state import EvolutionState
 from mjxgait.settings.config import Config, ExaminationConfig
 
 

@@ -15,7 +15,8 @@ from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.runs.blueprint import Blueprint, Numbers, draw_up
-from mjxgait.search.evolution import Evolution, EvolutionState, GenerationMetrics, Proposal
+from mjxgait.search.evolution import Evolution
+from mjxgait.search.state import EvolutionState, GenerationMetrics, Proposal
 from mjxgait.settings.config import Config
 from mjxgait.settings.traced import traced
 from mjxgait.simulation.evaluator import Local

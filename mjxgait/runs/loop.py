@@ -34,7 +34,7 @@ from mjxgait.runs.folder import (
     truncate_metrics,
 )
 from mjxgait.runs.screen import Screen
-from mjxgait.search.evolution import EvolutionState, GenerationMetrics, stop_reason
+from mjxgait.search.state import EvolutionState, GenerationMetrics, stop_reason
 from mjxgait.settings.config import Config
 from mjxgait.tasks.protocol import Task
 

@@ -6,7 +6,7 @@ import numpy as np
 from helpers import weight_vector
 
 from mjxgait.control.poses import TUNING, Genome
-from mjxgait.search.evolution import EvolutionState, Origin
+from mjxgait.search.state import EvolutionState, Origin
 from mjxgait.tasks.score import score
 from mjxgait.tasks.walk.fitness import TERMS
 from mjxgait.tasks.walk.task import Walk
