@@ -14,6 +14,14 @@ class UserError(Exception):
     """
 
 
+def not_loaded(kind: str, name: str) -> UserError:
+    """Of a controller or a task that is code of the user's own and was not named."""
+    return UserError(
+        f'the {kind} is "{name}", which is no part of this program; code is never loaded from a '
+        f"run folder or a settings file: name it with --{kind} FILE.py:CLASS"
+    )
+
+
 def did_you_mean(word: str, known: Iterable[str]) -> str:
     """` (did you mean "x"?)`, or the list of what is known when nothing is near."""
     names = sorted(known)

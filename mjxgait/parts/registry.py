@@ -8,7 +8,7 @@ import numpy as np
 
 from mjxgait.creature import Creature
 from mjxgait.creature.settings import Termination
-from mjxgait.errors import UserError, did_you_mean
+from mjxgait.errors import UserError, did_you_mean, not_loaded
 from mjxgait.settings.config import Config, RolloutConfig
 
 if TYPE_CHECKING:  # JAX takes a second to import
@@ -68,10 +68,7 @@ def find(kind: str, name: str) -> type:
     if name in SHIPPED[kind]:
         return SHIPPED[kind][name]()
     if ":" in name:
-        raise UserError(
-            f'the {kind} is "{name}": code is never loaded from a run folder or a settings file; '
-            f"name it with --{kind} FILE.py:CLASS"
-        )
+        raise not_loaded(kind, name)
     raise UserError(f'there is no {kind} "{name}"; {did_you_mean(name, SHIPPED[kind])}')
 
 

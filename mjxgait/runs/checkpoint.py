@@ -42,7 +42,12 @@ class Checkpoints:
         _keep_threads_quiet()
         self._run, self._folder = run, (run / FOLDER).resolve()
         options = ocp.CheckpointManagerOptions(
-            max_to_keep=3, keep_period=keep_every, cleanup_tmp_directories=True
+            max_to_keep=3,
+            keep_period=keep_every,
+            cleanup_tmp_directories=True,
+            # Threads that wait for a folder which cannot be made do so for five minutes, and so
+            # does the end of the program.
+            async_options=ocp.options.AsyncOptions(create_directories_asynchronously=False),
         )
         handlers = {
             STATE: ocp.StandardCheckpointHandler(),

@@ -5,7 +5,7 @@ from mjxgait.certify.tasks.plain import HasCriteria, PlainDemands
 from mjxgait.certify.tasks.protocol import Demands
 from mjxgait.certify.tasks.staying import StaysUp
 from mjxgait.certify.tasks.walk import WalkDemands
-from mjxgait.errors import UserError
+from mjxgait.errors import not_loaded
 
 _DEMANDS: dict[str, Demands] = {"walk": WalkDemands(), "hop": HopDemands()}
 
@@ -22,10 +22,7 @@ def demands_of(task: str) -> Demands:
       UserError: it is code of the user's own that was not named.
     """
     if task not in _DEMANDS:
-        raise UserError(
-            f'its task is "{task}", which is no part of this program; code is never loaded from a '
-            "run folder: name it again with --task FILE.py:CLASS"
-        )
+        raise not_loaded("task", task)
     return _DEMANDS[task]
 
 

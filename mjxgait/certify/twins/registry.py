@@ -7,7 +7,7 @@ from mjxgait.certify.twins.programs import ProgramTwin
 from mjxgait.certify.twins.protocol import Twin
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
-from mjxgait.errors import UserError
+from mjxgait.errors import not_loaded
 
 Maker = Callable[[Creature, Champion, float], Twin]
 """From creature, champion and step in s."""
@@ -28,8 +28,5 @@ def twin_of(creature: Creature, champion: Champion, step: float) -> Twin:
     """
     champion.check_finite(creature)
     if champion.controller not in _TWINS:
-        raise UserError(
-            f'its controller is "{champion.controller}", which is no part of this program; code '
-            "is never loaded from a run folder: name it again with --controller FILE.py:CLASS"
-        )
+        raise not_loaded("controller", champion.controller)
     return _TWINS[champion.controller](creature, champion, step)
