@@ -70,11 +70,11 @@ class RolloutConfig:
 
     __pydantic_config__ = STRICT
     seconds: Annotated[Positive, SHAPE] = 8.0
-    starts: Annotated[Count, SHAPE] = 2
-    joint_noise: NonNegative = 0.05
-    velocity_noise: NonNegative = 0.1
+    starts: Annotated[Count, SHAPE] = 3
+    joint_noise: NonNegative = 0.1
+    velocity_noise: NonNegative = 0.3
     friction: tuple[Positive, Positive] = (0.8, 1.2)
-    push: NonNegative = 0.15
+    push: NonNegative = 0.2
     gains: Fraction = 0.1
     masses: Annotated[Fraction, SHAPE] = 0.0
     terminate: Annotated[bool, SHAPE] = True

@@ -173,4 +173,4 @@ def test_an_unknown_study_names_the_shipped_ones():
 
 
 def test_stool_is_a_creature_of_a_study(stool: Creature):
-    assert plan(stool, env=str(STOOL)).upper_bound(stool) == 6 * (5 + 1) * 256 * 2 * 1600
+    assert plan(stool, env=str(STOOL)).upper_bound(stool) == 6 * (5 + 1) * 256 * 3 * 1600
