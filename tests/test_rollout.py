@@ -85,7 +85,7 @@ def test_every_genome_is_judged_on_every_start(experiment: Experiment, episodes:
     assert episodes.computed_steps >= episodes.tally.steps.sum()
 
 
-@pytest.mark.parametrize(("lanes", "devices"), [(1, 1), (5, 2), (64, 1)])
+@pytest.mark.parametrize(("lanes", "devices"), [(5, 2), (64, 1)])
 def test_results_do_not_depend_on_lanes_or_devices(
     experiment: Experiment, episodes: Episodes, lanes: int, devices: int
 ):
@@ -237,7 +237,8 @@ def test_the_first_start_is_nominal_and_the_others_are_not(stool: Creature):
     assert float(starts.friction[0]) == 1.0
     assert int(starts.push_step[0]) == NEVER
     noise = np.asarray(starts.qpos[1:, stool.qpos_adr] - stool.stand)
-    assert 0.02 < np.abs(noise).max() <= 0.05
+    widest = config.rollout.joint_noise
+    assert 0.4 * widest < np.abs(noise).max() <= widest
     assert np.allclose(
         np.linalg.norm(starts.push[1:, :2], axis=1),
         config.rollout.push * np.sqrt(9.81 * stool.hip_height),
