@@ -148,7 +148,13 @@ def test_walking_is_asked_to_stay_up_and_nothing_else(tiny: Creature):
 
 @pytest.mark.parametrize(
     ("left", "seconds", "worth"),
-    [([0.01, 0.09], [6, 6], True), ([0.01, 0.2], [6, 6], False), ([0.01, 0.01], [6, 5], False)],
+    [
+        ([0.01, 0.09], [6, 6], True),
+        ([0.01, 0.2], [6, 6], False),
+        ([0.01, 0.01], [6, 5], False),
+        ([0.01] * 9 + [0.2], [6] * 10, True),
+        ([0.01] * 8 + [0.2] * 2, [6] * 10, False),
+    ],
 )
 def test_who_is_worth_an_examination(tiny: Creature, left: list, seconds: list, worth: bool):
     outcome = {"left": np.array(left), "seconds": np.array(seconds, float)}
