@@ -156,6 +156,23 @@ class HopConfig:
 
 
 @dataclasses.dataclass(frozen=True)
+class LimboConfig(HopConfig):
+    """What is demanded of who goes to a goal beneath a bar: as of who hops, and to stay clear.
+
+    Attributes:
+      place: m ahead of the start, of the bar's middle. height: m, of its lower edge.
+      clearance: m that every part must stay away from it, and from all above it.
+    """
+
+    __pydantic_config__ = STRICT
+    nominal: Positive = 1.4
+    goals: tuple[Positive, Positive] = (1.0, 2.0)
+    place: Positive = 0.6
+    height: Positive = 0.35
+    clearance: NonNegative = 0.0
+
+
+@dataclasses.dataclass(frozen=True)
 class CertificateConfig:
     """The examination.
 
@@ -178,6 +195,7 @@ class CertificateConfig:
     physics: PhysicsConfig = dataclasses.field(default_factory=PhysicsConfig)
     parts: PartsConfig = dataclasses.field(default_factory=PartsConfig)
     hop: HopConfig = dataclasses.field(default_factory=HopConfig)
+    limbo: LimboConfig = dataclasses.field(default_factory=LimboConfig)
 
     def __post_init__(self) -> None:
         if self.warmup >= self.seconds:

@@ -62,6 +62,7 @@ def simulate(
         fell=np.concatenate([p.fell for p in parts])[order],
         travel=np.concatenate([p.travel for p in parts])[order],
         path=np.concatenate([p.path for p in parts])[order],
+        clearance=np.concatenate([p.clearance for p in parts])[order],
         trajectory=Trajectory(
             creature.model.opt.timestep,
             *(np.concatenate([getattr(p.trajectory, f) for p in parts])[kept] for f in fields),

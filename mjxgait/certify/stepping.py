@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
+from mjxgait.certify.bar import Clearance
 from mjxgait.certify.drive import Drive
 from mjxgait.certify.layout import Layout, LowestPoint, colliding_geoms, per_foot, start_frame
 from mjxgait.certify.outcome import Fall, Outcome, Trajectory
@@ -87,6 +88,7 @@ class Stepping:
         self.feet = LowestPoint(self.model, feet, self.terrain)
         self.sees_feet = any(name in FOOT_SENSES for name in self.twin.reads)
         self.last_force = np.zeros_like(self.qvel)
+        self.bar = Clearance(creature) if np.isfinite(starts.bar).any() else None
         # What the controller has sent last, for those whose torques come late.
         self.sent = np.zeros((int(starts.delay.max()) + 1, *starts.stiffness.shape))
 
@@ -95,6 +97,7 @@ class Stepping:
         count, time_step = len(self.starts), self.creature.model.opt.timestep
         fell = np.full(count, np.inf)
         travel, path = np.zeros((count, 2)), np.full((count, steps), np.nan)
+        clearance = np.full(count, np.inf)
         leader, waiting = self._alike()
         running = np.setdiff1d(np.arange(count), waiting)
         film = self._empty_film(steps)
@@ -105,12 +108,14 @@ class Stepping:
                 released = waiting[self._pushed(waiting, k)]
                 self._follow(released, leader)
                 path[released, :k] = path[leader, :k]
+                clearance[released] = clearance[leader]
                 running, waiting = np.union1d(running, released), np.setdiff1d(waiting, released)
             self._push(running, k)
             commanded = None if heading is None else float(heading[k])
             self._control_step(running, k, commanded, film)
             travel[running] = self._travel(running)
             path[running, k] = travel[running, 0]
+            clearance[running] = np.minimum(clearance[running], self._clearance(running))
             down = running[self._down(running)]
             fell[down] = np.minimum(fell[down], (k + 1) * time_step)
             watched = (k + 1) * time_step < self.starts.end[running]
@@ -121,8 +126,8 @@ class Stepping:
                     & ((running < self.record) | np.isinf(fell[running]))
                 ]
         fell[waiting], travel[waiting] = fell[leader], travel[leader]
-        path[waiting] = path[leader]
-        return Outcome(fell, travel, path, film)
+        path[waiting], clearance[waiting] = path[leader], clearance[leader]
+        return Outcome(fell, travel, path, clearance, film)
 
     def _alike(self) -> tuple[int, np.ndarray]:
         """One simulation that stands for others until they are pushed, and those others.
@@ -208,6 +213,7 @@ class Stepping:
             bias=self.bias[running] - self.passive[running],
             constraint_force=self.last_force[running],
             goal=self.starts.goal[running],
+            bar=self.starts.bar[running, 0],
         )
 
     def _foot_height(self, running: np.ndarray) -> np.ndarray:
@@ -247,6 +253,12 @@ class Stepping:
         start = self.start
         moved = self.xpos[running, self.creature.trunk] - start.place
         return np.stack([moved @ start.forward, moved @ start.left], 1)
+
+    def _clearance(self, running: np.ndarray) -> np.ndarray:
+        if self.bar is None:
+            return np.full(len(running), np.inf)
+        bar = self.starts.bar[running]
+        return self.bar.of(self.geom_xpos[running], self.geom_xmat[running], bar)
 
     def _sane(self, running: np.ndarray) -> np.ndarray:
         return (np.abs(self.qvel[running]) < BLOWN_UP).all(1)

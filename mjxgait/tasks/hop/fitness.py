@@ -1,6 +1,7 @@
 """From the tally of a way to a goal to named fitness terms, and what each of them counts."""
 
 import dataclasses
+from collections.abc import Mapping
 
 import jax
 import jax.numpy as jnp
@@ -12,7 +13,8 @@ from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.hop.tally import Tally
 
 TERMS = tuple(field.name for field in dataclasses.fields(HopWeights))
-STYLE = tuple(name for name in TERMS if name != "distance")
+GOAL = "distance"
+STYLE = tuple(name for name in TERMS if name != GOAL)
 """The manner of a way: counted as far as there is one, and ramped in over the generations."""
 
 FARTHEST = 2.0
@@ -21,14 +23,16 @@ TOUCHING, DEEP = 0.005, 0.05
 """Hip heights: parts less deep in each other only touch; an overlap so much deeper counts half."""
 
 
-def fitness_terms(creature: Body, horizon: int, tally: Tally) -> dict[str, jax.Array]:
+def fitness_terms(
+    creature: Body, horizon: int, tally: Tally, more: Mapping[str, jax.Array] | None = None
+) -> dict[str, jax.Array]:
     """The terms [] of one episode, each without unit and before its weight; all are at least zero.
 
     Style counts in proportion to how near it got: who has yet to learn to hop must not be punished
     for trying.
 
     Args:
-      horizon: T, steps of a full episode.
+      horizon: T, steps of a full episode. more: style that another task adds.
     """
     away = jnp.abs(tally.left) / tally.goal
     lived = jnp.maximum(tally.steps, 1)
@@ -41,10 +45,11 @@ def fitness_terms(creature: Body, horizon: int, tally: Tally) -> dict[str, jax.A
         "fall": jnp.where(tally.reason == Reason.FINISHED, 0.0, 1.0),
         "neutral": jnp.minimum(jnp.mean(tally.bent / jnp.maximum(half_range, 1e-6)), 1.0),
         "overlap": crossed / (crossed + DEEP),
+        **(more or {}),
     }
     near = jnp.clip(1.0 - away, 0.0, 1.0)
-    terms = {"distance": jnp.minimum(away, FARTHEST)}
-    return terms | {name: near * style[name] for name in STYLE}
+    terms = {GOAL: jnp.minimum(away, FARTHEST)}
+    return terms | {name: near * value for name, value in style.items()}
 
 
 def signed_weights(config: HopConfig, generation: jax.Array) -> dict[str, jax.Array]:
@@ -54,6 +59,6 @@ def signed_weights(config: HopConfig, generation: jax.Array) -> dict[str, jax.Ar
 
     def weight(name: str) -> jax.Array:
         signed = -jnp.float32(getattr(config.weights, name))
-        return signed * ramp if name in STYLE else signed
+        return signed if name == GOAL else signed * ramp
 
-    return {name: weight(name) for name in TERMS}
+    return {field.name: weight(field.name) for field in dataclasses.fields(config.weights)}
