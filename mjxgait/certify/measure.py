@@ -57,7 +57,7 @@ class Recording:
     penetration: [T] m, of the deepest contact with the floor.
     body_speed: [T] m/s, of the fastest body's centre of mass.
     goal: m ahead of the start; 0 where the task has none.
-    clearance: [T] m to the bar, `bar.FAR` at most; empty where the task has none.
+    clearance: [T] m to the bar, `bar.FAR` at most; None where the task has none.
     overlap_pairs: P names of parts that are ever in each other. overlap: [T, P] m, how deep.
     """
 
@@ -79,7 +79,7 @@ class Recording:
     overlap_pairs: tuple[tuple[str, str], ...]
     overlap: np.ndarray
     goal: float = 0.0
-    clearance: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros(0))
+    clearance: np.ndarray | None = None
 
     @property
     def contact(self) -> np.ndarray:
@@ -177,7 +177,7 @@ def measure(
         overlap_pairs=crossed.pairs,
         overlap=crossed.depth if inside else np.zeros((len(qpos), 0)),
         goal=0.0 if aimed is None else float(aimed.goal[row]),
-        clearance=sight.clearance,
+        clearance=None if bar is None else sight.clearance,
     )
 
 
@@ -202,7 +202,7 @@ class _Sight:
             np.full((frames, feet), np.nan) for _ in range(3)
         )
         self.bar, self.over = bar, None if bar is None else Clearance(creature)
-        self.clearance = np.full(0 if bar is None else frames, np.nan)
+        self.clearance = np.full(frames, np.nan)
         self.touch, self.penetration, self.body_speed = (
             np.ones(frames, bool),
             np.full(frames, np.nan),

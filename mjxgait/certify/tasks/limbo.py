@@ -43,14 +43,14 @@ class LimboDemands(HopDemands):
     def basic(self, whole: Recording, wanted: HopConfig) -> tuple[Criterion, ...]:
         """See `HopDemands`: 1, 2 and 3."""
         assert isinstance(wanted, LimboConfig)
-        least = float(whole.clearance.min())
+        least = _least(whole)
         clear = at_least("least clearance (m)", least, wanted.clearance, wanted.clearance + ENOUGH)
         return (*super().basic(whole, wanted), Criterion(3, "clear of the bar", (clear,)))
 
     def report(self, whole: Recording, config: CertificateConfig) -> dict[str, Any]:
         """See `Demands`: of hopping, and the least clearance."""
         told = super().report(whole, config)
-        least = float(whole.clearance.min())
+        least = _least(whole)
         bar = f"a bar {config.limbo.height:g} m high {'cleared' if least > 0 else 'touched'}"
         return told | {"clearance": least, "summary": f"{told['summary']}; {bar}"}
 
@@ -59,3 +59,8 @@ class LimboDemands(HopDemands):
     ) -> bool:
         """See `Demands`: of hopping, and clear of the bar in all its trials."""
         return super().promising(outcome, seconds, creature) and not outcome["bar"].any()
+
+
+def _least(whole: Recording) -> float:
+    """m of all frames; NaN where one is NaN, or where nobody looked."""
+    return np.nan if whole.clearance is None else float(whole.clearance.min())
