@@ -49,9 +49,9 @@ def simulate(
     starts = task.aimed(starts, CertificateConfig())
 
     def run(share: np.ndarray) -> Outcome:
-        return Stepping(
-            creature, champion, starts.rows(share), int((share < record).sum()), refine, fall
-        ).to_the_end(steps, heading)
+        mine, kept = starts.rows(share), int((share < record).sum())
+        stepping = Stepping(creature, champion, mine, kept, refine, fall, task.onward)
+        return stepping.to_the_end(steps, heading)
 
     with concurrent.futures.ThreadPoolExecutor(len(shares)) as pool:
         parts = list(pool.map(run, shares))

@@ -5,6 +5,7 @@ joints, `nq nv` as in MuJoCo.
 """
 
 import copy
+from collections.abc import Callable
 
 import mujoco
 import numpy as np
@@ -23,6 +24,8 @@ from mjxgait.creature import Creature
 
 VELOCITY_STAGE = int(mujoco.mjtStage.mjSTAGE_VEL)
 
+Onward = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
+"""See `tasks.Demands.onward`."""
 BLOWN_UP = 1e4
 """m/s or rad/s, from which a simulation is stopped: beyond any walk, and before MuJoCo itself
 complains in a log file.
@@ -53,14 +56,11 @@ class Stepping:
         record: int,
         refine: int,
         fall: Fall,
+        onward: Onward,
     ) -> None:
-        self.creature, self.starts, self.record, self.refine, self.fall = (
-            creature,
-            starts,
-            record,
-            refine,
-            fall,
-        )
+        self.creature, self.starts, self.fall = creature, starts, fall
+        self.record, self.refine = record, refine
+        self.goal, self.onward = starts.goal.copy(), onward
         step = float(creature.model.opt.timestep)
         self.twin = twin_of(creature, champion, step)
         self.drive = Drive(creature, champion.drive, self.twin.command, step)
@@ -143,7 +143,7 @@ class Stepping:
 
     def _follow(self, rows: np.ndarray, leader: int) -> None:
         """Puts simulations where another one is."""
-        own = (self.qpos, self.qvel, self.warm_start, self.last_force)
+        own = (self.qpos, self.qvel, self.warm_start, self.last_force, self.goal)
         for state in (*own, *self.memory.values()):
             state[rows] = state[leader]
         self.sent[:, rows] = self.sent[:, [leader]]
@@ -167,6 +167,8 @@ class Stepping:
         """The command, and the torque that acts, [running, J] each."""
         state, starts = self._state(running, k), self.starts
         command = self._act(running, state, heading)
+        first, way = self.starts.goal[running], self._travel(running)[:, 0]
+        self.goal[running] = self.onward(self.goal[running], first, way)
         self.sent[k % len(self.sent), running] = self.drive.torque(
             command, state, starts.stiffness[running], starts.damping[running]
         )
@@ -212,7 +214,7 @@ class Stepping:
             mass_matrix=self.layout.dense(self.mass[running]),
             bias=self.bias[running] - self.passive[running],
             constraint_force=self.last_force[running],
-            goal=self.starts.goal[running],
+            goal=self.goal[running],
             bar=self.starts.bar[running, 0],
         )
 

@@ -43,6 +43,12 @@ def _limbo() -> type:
     return Limbo
 
 
+def _travel() -> type:
+    from mjxgait.tasks.hop.travel import Travel
+
+    return Travel
+
+
 def _programs() -> type:
     from mjxgait.control.programs.controller import Programs
 
@@ -51,7 +57,7 @@ def _programs() -> type:
 
 SHIPPED: Mapping[str, Mapping[str, Maker]] = {
     "controller": {"poses": _poses, "program": _programs},
-    "task": {"walk": _walk, "hop": _hop, "limbo": _limbo},
+    "task": {"walk": _walk, "hop": _hop, "limbo": _limbo, "travel": _travel},
 }
 """By kind and name; the classes are imported when they are needed."""
 

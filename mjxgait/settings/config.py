@@ -206,7 +206,7 @@ class UseConfig:
     Attributes:
       controller: what moves the creature: poses, program (docs/programs.md), or FILE.py:CLASS of
         your own (docs/extending.md).
-      task: what the creature is to do: walk, hop, limbo, or FILE.py:CLASS of your own.
+      task: what the creature is to do: walk, hop, limbo, travel, or FILE.py:CLASS of your own.
     """
 
     __pydantic_config__ = STRICT

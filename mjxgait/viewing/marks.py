@@ -3,8 +3,6 @@
 Nothing touches them, and no simulation knows them.
 """
 
-from collections.abc import Sequence
-
 import mujoco
 import numpy as np
 
@@ -24,19 +22,19 @@ BODY = "marks"
 
 
 def marked(
-    creature: Creature, goals: Sequence[tuple[float, float]], bar: np.ndarray | None
+    creature: Creature, goals: np.ndarray, floor: np.ndarray, bar: np.ndarray | None
 ) -> mujoco.MjSpec:
     """The creature and, as its last body, what stands on its way.
 
     Args:
-      goals: m ahead of the start, and m of the floor there. bar: [2] m ahead of the start and above
+      goals: [goals] m ahead of the start. floor: [goals] m, height of the floor there. bar: [2] m ahead of the start and above
         the floor, of its lower edge.
     """
     spec, start = mujoco.MjSpec.from_string(creature.files["creature.xml"]), start_frame(creature)
     body = spec.worldbody.add_body(name=BODY)
     radius = DISC[0] * creature.body_length
-    for ahead, floor in goals:
-        place = [*_ahead(start, ahead)[:2], floor + DISC[1]]
+    for ahead, level in zip(goals, floor, strict=True):
+        place = [*_ahead(start, ahead)[:2], level + DISC[1]]
         _add(body, GEOM.mjGEOM_CYLINDER, GOAL_COLOUR, pos=place, size=[radius, DISC[1], 0])
     if bar is not None:
         _add_bar(body, start, float(bar[0]), float(bar[1]), 1.2 * creature.body_length)

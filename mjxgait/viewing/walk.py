@@ -74,13 +74,20 @@ class Walk:
         """What `shown` is made of; None where nothing stands on its way."""
         if self.start is None:
             return None
-        goal, bar = float(self.start.goal[0]), self.start.bar[0]
+        goals, bar = self._goals(self.start.goal[:1]), self.start.bar[0]
         over = bar if np.isfinite(bar).all() else None
-        if not goal and over is None:
+        if not len(goals) and over is None:
             return None
-        place = (self.creature.stand_pos[:2] + goal * self.forward)[None]
-        level = float(self.ground_heights(place)[0])
-        return marked(self.creature, [(goal, level)] if goal else [], over)
+        places = self.creature.stand_pos[:2] + np.outer(goals, self.forward)
+        return marked(self.creature, goals, self.ground_heights(places), over)
+
+    def _goals(self, first: np.ndarray) -> np.ndarray:
+        """[goals] m ahead of the start, all that it ever had."""
+        goals, onward = list(first[first > 0]), how_simulated(self.champion.task).onward
+        farthest = ((self.trunk_pos[:, :2] - self.trunk_pos[0, :2]) @ self.forward).max()
+        while len(goals) and (after := onward(goals[-1], goals[0], farthest)) > goals[-1]:
+            goals.append(after)
+        return np.array(goals)
 
     @cached_property
     def forward(self) -> np.ndarray:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from mjxgait.certify.config import CertificateConfig, HopConfig, LimboConfig
+from mjxgait.certify.config import CertificateConfig, LimboConfig
 from mjxgait.certify.criteria import Criterion, at_least
 from mjxgait.certify.measure import Recording
 from mjxgait.certify.outcome import Outcome
@@ -24,7 +24,7 @@ class LimboDemands(HopDemands):
     verdict = "it gets to its goal beneath the bar and stays"
 
     def wanted(self, config: CertificateConfig) -> LimboConfig:
-        """See `HopDemands`."""
+        """See `GoalDemands`."""
         return config.limbo
 
     def aimed(
@@ -40,12 +40,11 @@ class LimboDemands(HopDemands):
         clear: np.ndarray = outcome.clearance > config.limbo.clearance
         return super().succeeded(outcome, starts, config) & clear
 
-    def basic(self, whole: Recording, wanted: HopConfig) -> tuple[Criterion, ...]:
-        """See `HopDemands`: 1, 2 and 3."""
-        assert isinstance(wanted, LimboConfig)
-        least = _least(whole)
-        clear = at_least("least clearance (m)", least, wanted.clearance, wanted.clearance + ENOUGH)
-        return (*super().basic(whole, wanted), Criterion(3, "clear of the bar", (clear,)))
+    def basic(self, whole: Recording, config: CertificateConfig) -> tuple[Criterion, ...]:
+        """See `GoalDemands`: 1, 2 and 3."""
+        least, room = _least(whole), config.limbo.clearance
+        clear = at_least("least clearance (m)", least, room, room + ENOUGH)
+        return (*super().basic(whole, config), Criterion(3, "clear of the bar", (clear,)))
 
     def report(self, whole: Recording, config: CertificateConfig) -> dict[str, Any]:
         """See `Demands`: of hopping, and the least clearance."""

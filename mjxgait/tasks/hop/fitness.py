@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import optax
 
 from mjxgait.body import Body
-from mjxgait.settings.hop import HopConfig, HopWeights
+from mjxgait.settings.hop import HopConfig, HopWeights, TravelConfig
 from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.hop.tally import Tally
 
@@ -35,24 +35,28 @@ def fitness_terms(
       horizon: T, steps of a full episode. more: style that another task adds.
     """
     away = jnp.abs(tally.left) / tally.goal
+    near = jnp.clip(1.0 - away, 0.0, 1.0)
+    style = style_terms(creature, horizon, tally) | dict(more or {})
+    terms = {GOAL: jnp.minimum(away, FARTHEST)}
+    return terms | {name: near * value for name, value in style.items()}
+
+
+def style_terms(creature: Body, horizon: int, tally: Tally) -> dict[str, jax.Array]:
+    """The manner [] of one episode, however near it got."""
     lived = jnp.maximum(tally.steps, 1)
     half_range = 0.5 * (creature.pose_high - creature.pose_low).astype(jnp.float32)
     crossed = jnp.maximum(tally.overlap / creature.hip_height - TOUCHING, 0.0)
-    style = {
+    return {
         "time": tally.arrived / horizon,
         "restless": jnp.minimum(tally.after / tally.goal, 1.0),
         "ground": tally.ground / lived,
         "fall": jnp.where(tally.reason == Reason.FINISHED, 0.0, 1.0),
         "neutral": jnp.minimum(jnp.mean(tally.bent / jnp.maximum(half_range, 1e-6)), 1.0),
         "overlap": crossed / (crossed + DEEP),
-        **(more or {}),
     }
-    near = jnp.clip(1.0 - away, 0.0, 1.0)
-    terms = {GOAL: jnp.minimum(away, FARTHEST)}
-    return terms | {name: near * value for name, value in style.items()}
 
 
-def signed_weights(config: HopConfig, generation: jax.Array) -> dict[str, jax.Array]:
+def signed_weights(config: HopConfig | TravelConfig, generation: jax.Array) -> dict[str, jax.Array]:
     """Signed weight [] of each term at a generation []: all negative, style terms ramped in."""
     grown = optax.linear_schedule(0.0, 1.0, 1)(generation / jnp.maximum(config.style_ramp, 1))
     ramp = jnp.where(jnp.asarray(config.style_ramp) > 0, grown, 1.0)

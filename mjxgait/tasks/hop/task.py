@@ -19,7 +19,7 @@ from mjxgait.types import Sensed
 class Hop(PlainTask):
     """One creature's way to a goal; see `PlainTask`. Whoever has a trunk may do it."""
 
-    Settings: ClassVar[type[HopConfig]] = HopConfig
+    Settings: ClassVar[type] = HopConfig
     terms: ClassVar[tuple[str, ...]] = TERMS
     outcomes: ClassVar[tuple[str, ...]] = ("left", "arrival", "seconds")
     adds: ClassVar[tuple[str, ...]] = ("goal_distance",)
