@@ -31,8 +31,8 @@ def task(creature: Creature) -> Travel:
     return Travel(creature, STEP, HORIZON, creature.settings.termination)
 
 
-def aim(goal: float, stride: float) -> Aim:
-    return Aim(jnp.float32(goal), jnp.float32(stride))
+def aim(goal: float, spacing: float) -> Aim:
+    return Aim(jnp.float32(goal), jnp.float32(spacing))
 
 
 @pytest.mark.parametrize(
@@ -44,7 +44,7 @@ def test_a_goal_that_is_near_or_passed_moves_on_by_a_stride(
     """Of half a metre, so near is 2.5 cm from it."""
     moved = task(stool).onward(aim(1.0, 0.5), moment(stool, forward + 0.02))
     assert float(moved.goal) == pytest.approx(goal)
-    assert float(moved.stride) == 0.5
+    assert float(moved.spacing) == 0.5
 
 
 def test_evolution_and_examiner_move_goals_alike(stool: Creature):

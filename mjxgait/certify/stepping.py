@@ -9,9 +9,9 @@ from collections.abc import Callable
 
 import mujoco
 import numpy as np
-from mujoco.batch import Batch
 
 from mjxgait.certify.bar import Clearance
+from mjxgait.certify.batch import batch_of
 from mjxgait.certify.drive import Drive
 from mjxgait.certify.layout import Layout, LowestPoint, colliding_geoms, per_foot, start_frame
 from mjxgait.certify.outcome import Fall, Outcome, Trajectory
@@ -66,7 +66,7 @@ class Stepping:
         self.drive = Drive(creature, champion.drive, self.twin.command, step)
         self.start = start_frame(creature)
         self.model = examined_model(creature, refine)
-        self.batch = _batch(creature, self.model, starts)
+        self.batch = batch_of(creature, self.model, starts)
         self.layout = Layout(self.model)
         self.terrain = terrain_of(creature)
         self.solid = LowestPoint(self.model, colliding_geoms(self.model), self.terrain)
@@ -295,30 +295,3 @@ class Stepping:
             target=blank(joints),
             phase=np.full((self.record, steps), np.nan),
         )
-
-
-def _batch(creature: Creature, model: mujoco.MjModel, starts: Starts) -> Batch:
-    """The simulations at their starts."""
-    batch = Batch(model, len(starts), 1, persistent=True)
-    batch.expand("geom_friction")[:, :, 0] *= starts.friction[:, None]
-    batch.expand("body_mass")[:] *= starts.mass
-    batch.expand("body_inertia")[:] *= starts.mass[:, :, None]
-    batch.expand("opt.gravity")[:] = _gravity(model, starts.slope)
-    # The impedance and not the time constant, which is as short as the time step allows already.
-    impedance = batch.expand("geom_solimp")[:, :, :2]
-    impedance /= impedance + starts.floor[:, None, None] * (1 - impedance)
-    batch.set_const()
-    batch.reset(stage=int(mujoco.mjtStage.mjSTAGE_NONE))
-    qpos = batch.bind("qpos")
-    qpos[:] = creature.stand_qpos
-    qpos[:, creature.qpos_adr] += starts.joint_offset
-    batch.bind("qvel")[:, creature.dof_adr] = starts.joint_velocity
-    return batch
-
-
-def _gravity(model: mujoco.MjModel, slope: np.ndarray) -> np.ndarray:
-    """[S, 3] on slopes [S, 2]: gravity is tilted instead of the floor, see `worlds.sloping`."""
-    angle = np.linalg.norm(slope, axis=1, keepdims=True)
-    uphill = slope / np.where(angle > 0, angle, 1.0)
-    change = np.concatenate([-np.sin(angle) * uphill, 1 - np.cos(angle)], 1)
-    return model.opt.gravity + np.linalg.norm(model.opt.gravity) * change

@@ -51,7 +51,8 @@ def shape(walk: Walk) -> tuple[float, float]:
     """Inches of the figure."""
     stage, frames = Stage([walk], 2 * HEIGHT, HEIGHT), moments(walk)
     camera = _camera(stage, walk, frames)
-    return 14.0, 14.0 * camera.height / camera.width + 0.4
+    width = min(14.0, 4.0 * camera.width / camera.height)
+    return width, width * camera.height / camera.width + 0.4
 
 
 def _camera(stage: Stage, walk: Walk, frames: np.ndarray) -> Camera:

@@ -23,10 +23,10 @@ class Tally(hop.Tally):
 
 @pytree
 class Aim:
-    """goal: [] m ahead of the start, now. stride: [] m from one goal to the next."""
+    """goal: [] m ahead of the start, now. spacing: [] m from one goal to the next."""
 
     goal: jax.Array
-    stride: jax.Array
+    spacing: jax.Array
 
 
 class Travel(Hop):
@@ -44,8 +44,8 @@ class Travel(Hop):
     def onward(self, aim: Any, sensed: Sensed) -> Any:
         """See `Task`: a goal that is near, or passed, moves on."""
         left = hop.goal_distance(self.creature, aim.goal, sensed)
-        reached = left <= NEAR * aim.stride
-        return dataclasses.replace(aim, goal=aim.goal + jnp.where(reached, aim.stride, 0.0))
+        reached = left <= NEAR * aim.spacing
+        return dataclasses.replace(aim, goal=aim.goal + jnp.where(reached, aim.spacing, 0.0))
 
     def senses(self, aim: Any, sensed: Sensed) -> dict[str, jax.Array]:
         """See `Task`."""
@@ -60,7 +60,7 @@ class Travel(Hop):
     ) -> Any:
         """See `Task`."""
         after: Any = super().update(tally, sensed, torque, standards, aim.goal)
-        reached = jnp.round(aim.goal / aim.stride).astype(jnp.int32) - 1
+        reached = jnp.round(aim.goal / aim.spacing).astype(jnp.int32) - 1
         return dataclasses.replace(after, reached=reached)
 
     def judge(self, tally: Any, settings: Any) -> dict[str, jax.Array]:
