@@ -6,8 +6,9 @@ from pathlib import Path
 import pytest
 
 from mjxgait.errors import UserError
+from mjxgait.parts import resolve_config
+from mjxgait.parts.settings import build_config
 from mjxgait.settings.config import Config
-from mjxgait.settings.layers import resolve_config
 from mjxgait.settings.shipped import data_folder, find_creature
 from mjxgait.settings.tables import build, dump_toml, read_toml
 
@@ -21,7 +22,7 @@ def test_every_shipped_config_loads(path: Path):
         key: table.pop(key, default) for key, default in (("standalone", False), ("creature", {}))
     }
     for name, part in (("", table), *own["creature"].items()):
-        assert isinstance(build(Config, part, f"{path}: {name}"), Config)
+        assert isinstance(build_config(part, f"{path}: {name}"), Config)
 
 
 def test_a_config_survives_its_own_file(tmp_path: Path):
@@ -133,6 +134,18 @@ def test_the_thesis_is_the_same_for_all_but_for_what_it_says_of_single_creatures
         assert 5 <= config.rollout.seconds <= 8
         assert 2 <= config.controller.key_poses <= 4
         assert 30 <= config.evolution.population <= 50
+
+
+def test_the_lamp_of_the_papers_has_what_they_say():
+    train = read_toml(find_creature("luxo") / "creature.toml")["train"]
+    config = resolve_config(train, "luxo", Path("gritz_hahn"))
+    assert (config.use.task, config.use.controller) == ("hop", "program")
+    evolution = config.evolution
+    assert (evolution.population, evolution.generations, evolution.offspring) == (250, 50, 250)
+    assert (evolution.crossover, evolution.mutation_rate) == (0.9, 0.0)
+    assert (evolution.forced.enabled, evolution.survival) == (False, "children")
+    assert set(config.controller.functions) == {"+", "-", "*", "/", "ifltz"}
+    assert config.rollout.starts == 1
 
 
 def test_a_broken_file_is_named(tmp_path: Path):

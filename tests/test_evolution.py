@@ -132,6 +132,19 @@ def test_the_best_of_old_and_new_survive():
     assert not np.allclose(state.fitness, best)
 
 
+def test_of_the_parents_only_the_best_lives_on_if_children_take_their_place():
+    never = ForcedConfig(enabled=False)
+    replacing = toy(survival="children", remove_duplicates=False, crossover=0.9, forced=never)
+    history = run(replacing, 12)
+    for (before, _), (after, _) in itertools.pairwise(history):
+        assert after.fitness[0] >= before.fitness[0]
+        assert np.sum(after.born < after.generation) <= 1
+    assert any(
+        np.mean(after.fitness) < np.mean(before.fitness)
+        for (before, _), (after, _) in itertools.pairwise(history)
+    )
+
+
 def test_the_population_is_sorted_and_without_duplicates():
     for state, metrics in run(toy(mutation_rate=0.2, crossover=1.0)):
         assert np.all(np.diff(state.fitness) <= 0)

@@ -15,8 +15,8 @@ from mjxgait.certify.criteria import Criterion
 from mjxgait.certify.draws import AIMS
 from mjxgait.certify.measure import Recording, measure
 from mjxgait.certify.simulate import simulate
-from mjxgait.certify.starts import join, nominal_starts, perturbed_starts
-from mjxgait.certify.tasks import demands_of
+from mjxgait.certify.starts import Starts, join, nominal_starts, perturbed_starts
+from mjxgait.certify.tasks import demands_of, how_simulated
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 
@@ -121,9 +121,9 @@ def glance(
     config = config or CertificateConfig()
     check_body(creature)
     demands = demands_of(champion.task)
-    goal = float(demands.aimed(nominal_starts(creature, 1), config).goal[0])
+    start = demands.aimed(nominal_starts(creature, 1), config)
     whole, halved = (
-        record(creature, champion, config.seconds, refine, threads, goal) for refine in (1, 2)
+        record(creature, champion, config.seconds, refine, threads, start) for refine in (1, 2)
     )
     return Glance(whole, demands.undisturbed(whole, halved, config))
 
@@ -224,23 +224,17 @@ def record(
     seconds: float,
     refine: int = 1,
     threads: int = 0,
-    goal: float = 0.0,
+    start: Starts | None = None,
 ) -> Recording:
     """The undisturbed walk, measured; parts in each other only at the usual time step.
 
-    goal: m ahead, where the task has one.
+    start: how it begins; by default nominal, with the usual goal where the task has one.
     """
-    start = nominal_starts(creature, 1)
-    outcome = simulate(
-        creature,
-        champion,
-        dataclasses.replace(start, goal=np.array([goal])),
-        seconds,
-        record=1,
-        refine=refine,
-        threads=threads,
+    start = how_simulated(champion.task).aimed(
+        nominal_starts(creature, 1) if start is None else start, CertificateConfig()
     )
-    return measure(creature, outcome.trajectory, inside=refine == 1, goal=goal)
+    outcome = simulate(creature, champion, start, seconds, record=1, refine=refine, threads=threads)
+    return measure(creature, outcome.trajectory, inside=refine == 1, aimed=start)
 
 
 def survival(

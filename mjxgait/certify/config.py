@@ -135,24 +135,60 @@ class PartsConfig:
 
 
 @dataclasses.dataclass(frozen=True)
-class HopConfig:
-    """What is demanded of who hops to a goal, instead of 1 to 3 and 7.
+class GoalConfig:
+    """What is demanded of who has a goal, instead of 1 to 3 and 7.
 
     Attributes:
       nominal: m, the goal of the undisturbed way. goals: m, range of the others.
-      near: share of the goal's distance within which one has arrived. stay: s, at the end, all of
-        which it must be there.
+      near: share of the goal's distance within which one has arrived.
       min_up: least product of the trunk's up axis with the world's; below it, one has fallen.
-      arrive: share of the perturbed starts that must arrive and stay.
+      arrive: share of the perturbed starts that must do what the task demands.
     """
 
     __pydantic_config__ = STRICT
     nominal: Positive = 1.2
     goals: tuple[Positive, Positive] = (0.4, 2.0)
     near: Positive = 0.05
-    stay: Positive = 5.0
     min_up: Annotated[float, pydantic.Field(ge=-1, le=1)] = 0.2
     arrive: Fraction = 0.9
+
+
+@dataclasses.dataclass(frozen=True)
+class HopConfig(GoalConfig):
+    """What is demanded of who hops to a goal. stay: s at the end, all of which it is there."""
+
+    __pydantic_config__ = STRICT
+    stay: Positive = 5.0
+
+
+@dataclasses.dataclass(frozen=True)
+class LimboConfig(HopConfig):
+    """What is demanded of who goes to a goal beneath a bar: as of who hops, and to stay clear.
+
+    Attributes:
+      place: m ahead of the start, of the bar's middle. height: m, of its lower edge.
+      clearance: m that every part must stay away from it, and from all above it.
+    """
+
+    __pydantic_config__ = STRICT
+    nominal: Positive = 1.4
+    goals: tuple[Positive, Positive] = (1.0, 2.0)
+    place: Positive = 0.6
+    height: Positive = 0.35
+    clearance: NonNegative = 0.0
+
+
+@dataclasses.dataclass(frozen=True)
+class TravelConfig(GoalConfig):
+    """What is demanded of who travels: goals as of who hops, each reached within `near`.
+
+    Attributes:
+      speed: m/s, least. second_half: its speed over the first half's.
+    """
+
+    __pydantic_config__ = STRICT
+    speed: NonNegative = 0.15
+    second_half: Positive = 0.8
 
 
 @dataclasses.dataclass(frozen=True)
@@ -178,6 +214,8 @@ class CertificateConfig:
     physics: PhysicsConfig = dataclasses.field(default_factory=PhysicsConfig)
     parts: PartsConfig = dataclasses.field(default_factory=PartsConfig)
     hop: HopConfig = dataclasses.field(default_factory=HopConfig)
+    limbo: LimboConfig = dataclasses.field(default_factory=LimboConfig)
+    travel: TravelConfig = dataclasses.field(default_factory=TravelConfig)
 
     def __post_init__(self) -> None:
         if self.warmup >= self.seconds:

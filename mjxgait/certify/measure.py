@@ -8,9 +8,11 @@ import dataclasses
 import mujoco
 import numpy as np
 
+from mjxgait.certify.bar import Clearance
 from mjxgait.certify.layout import LowestPoint, per_foot, start_frame
 from mjxgait.certify.outcome import Trajectory
 from mjxgait.certify.overlap import overlaps
+from mjxgait.certify.starts import Starts
 from mjxgait.certify.stepping import examined_model
 from mjxgait.certify.terrain import terrain_of
 from mjxgait.creature import Creature
@@ -55,6 +57,7 @@ class Recording:
     penetration: [T] m, of the deepest contact with the floor.
     body_speed: [T] m/s, of the fastest body's centre of mass.
     goal: m ahead of the start; 0 where the task has none.
+    clearance: [T] m to the bar, `bar.FAR` at most; None where the task has none.
     overlap_pairs: P names of parts that are ever in each other. overlap: [T, P] m, how deep.
     """
 
@@ -76,6 +79,7 @@ class Recording:
     overlap_pairs: tuple[tuple[str, str], ...]
     overlap: np.ndarray
     goal: float = 0.0
+    clearance: np.ndarray | None = None
 
     @property
     def contact(self) -> np.ndarray:
@@ -127,7 +131,7 @@ def measure(
     trajectory: Trajectory,
     row: int = 0,
     inside: bool = True,
-    goal: float = 0.0,
+    aimed: Starts | None = None,
 ) -> Recording:
     """Looks at one undisturbed simulation again: every stored frame is given to C MuJoCo, whose
     contacts are then read.
@@ -137,11 +141,12 @@ def measure(
     Args:
       inside: whether to look for parts in each other, which takes a quarter of the time with
         meshes.
-      goal: m ahead of the start, where the task has one.
+      aimed: how the simulations began, where the task has a goal or a bar.
     """
     start = start_frame(creature)
     qpos, qvel, torque = trajectory.qpos[row], trajectory.qvel[row], trajectory.torque[row]
-    sight = _Sight(creature, len(qpos))
+    bar = None if aimed is None or np.isinf(aimed.bar[row, 0]) else aimed.bar[row]
+    sight = _Sight(creature, len(qpos), bar)
     for k in range(len(qpos)):
         if not (np.isfinite(qpos[k]).all() and np.isfinite(qvel[k]).all()):
             break
@@ -171,14 +176,15 @@ def measure(
         body_speed=sight.body_speed,
         overlap_pairs=crossed.pairs,
         overlap=crossed.depth if inside else np.zeros((len(qpos), 0)),
-        goal=goal,
+        goal=0.0 if aimed is None else float(aimed.goal[row]),
+        clearance=None if bar is None else sight.clearance,
     )
 
 
 class _Sight:
     """Reads frames from an MjData; NaN (or a touch) where it has not looked."""
 
-    def __init__(self, creature: Creature, frames: int) -> None:
+    def __init__(self, creature: Creature, frames: int, bar: np.ndarray | None) -> None:
         self.creature, self.model = creature, examined_model(creature)
         self.data = mujoco.MjData(self.model)
         feet = len(creature.foot_names)
@@ -195,6 +201,8 @@ class _Sight:
         self.foot_force, self.foot_slip, self.foot_height = (
             np.full((frames, feet), np.nan) for _ in range(3)
         )
+        self.bar, self.over = bar, None if bar is None else Clearance(creature)
+        self.clearance = np.full(frames, np.nan)
         self.touch, self.penetration, self.body_speed = (
             np.ones(frames, bool),
             np.full(frames, np.nan),
@@ -216,6 +224,9 @@ class _Sight:
             _velocity(data, data.xipos, np.arange(self.model.nbody))[1:], axis=1
         ).max()
         self._contacts(k)
+        if self.bar is not None and self.over is not None:
+            poses = data.geom_xpos[None], data.geom_xmat[None]
+            self.clearance[k] = self.over.of(*poses, self.bar[None])[0]
 
     def _contacts(self, k: int) -> None:
         data, contact = self.data, self.data.contact

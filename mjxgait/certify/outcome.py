@@ -59,11 +59,13 @@ class Outcome:
     fell: [S] s, infinite for those that stayed up. travel: [S, 2] m along the start's forward and
     left until the end or the fall.
     path: [S, T] m forward after each control step; NaN from the fall on, or where nobody looked.
+    clearance: [S] m, the least to the bar, `certify.bar.FAR` at most; infinite where there is none.
     """
 
     fell: np.ndarray
     travel: np.ndarray
     path: np.ndarray
+    clearance: np.ndarray
     trajectory: Trajectory
 
     @property

@@ -49,9 +49,9 @@ def simulate(
     starts = task.aimed(starts, CertificateConfig())
 
     def run(share: np.ndarray) -> Outcome:
-        return Stepping(
-            creature, champion, starts.rows(share), int((share < record).sum()), refine, fall
-        ).to_the_end(steps, heading)
+        mine, kept = starts.rows(share), int((share < record).sum())
+        stepping = Stepping(creature, champion, mine, kept, refine, fall, task.onward)
+        return stepping.to_the_end(steps, heading)
 
     with concurrent.futures.ThreadPoolExecutor(len(shares)) as pool:
         parts = list(pool.map(run, shares))
@@ -62,6 +62,7 @@ def simulate(
         fell=np.concatenate([p.fell for p in parts])[order],
         travel=np.concatenate([p.travel for p in parts])[order],
         path=np.concatenate([p.path for p in parts])[order],
+        clearance=np.concatenate([p.clearance for p in parts])[order],
         trajectory=Trajectory(
             creature.model.opt.timestep,
             *(np.concatenate([getattr(p.trajectory, f) for p in parts])[kept] for f in fields),

@@ -26,6 +26,8 @@ class Starts:
     end: [S] s, from which nobody looks any more: who is up until then has stayed up.
       Infinite for the end of the simulation.
     goal: [S] m ahead of the start; 0 where the task has none.
+    bar: [S, 2] m ahead of the start and above the floor, of a bar's lower edge; infinite where the
+      task has none.
     """
 
     joint_offset: np.ndarray
@@ -41,6 +43,7 @@ class Starts:
     push: np.ndarray
     end: np.ndarray
     goal: np.ndarray
+    bar: np.ndarray
 
     def __len__(self) -> int:
         return len(self.friction)
@@ -87,6 +90,7 @@ def nominal_starts(creature: Creature, count: int) -> Starts:
         push=np.zeros((count, 2)),
         end=np.full(count, np.inf),
         goal=np.zeros(count),
+        bar=np.full((count, 2), np.inf),
     )
 
 

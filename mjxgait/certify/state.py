@@ -26,7 +26,7 @@ class State:
     foot_height: [S, F] m, lowest point above the floor; empty where nobody asks.
     mass_matrix: [S, nv, nv]. bias: [S, nv], Coriolis and gravity less passive forces.
     constraint_force: [S, nv], of the previous step's solve.
-    goal: [S] m ahead of the start; None where the task has none.
+    goal, bar: [S] m ahead of the start; None where the task has none.
     """
 
     start: StartFrame
@@ -43,6 +43,7 @@ class State:
     bias: np.ndarray
     constraint_force: np.ndarray
     goal: np.ndarray | None = None
+    bar: np.ndarray | None = None
 
 
 Sense = Callable[[Creature, State], np.ndarray]
@@ -98,13 +99,15 @@ SENSES: Mapping[str, Sense] = {
 }
 
 
-def _to_goal(creature: Creature, state: State) -> np.ndarray:
-    goal = 0.0 if state.goal is None else state.goal
-    return goal - _along(state, state.start.forward)
+def _left(state: State, place: np.ndarray | None) -> np.ndarray:
+    return (0.0 if place is None else place) - _along(state, state.start.forward)
 
 
-ADDED: Mapping[str, Sense] = {"goal_distance": _to_goal}
-"""Those that a shipped task adds (docs/hop.md)."""
+ADDED: Mapping[str, Sense] = {
+    "goal_distance": lambda creature, state: _left(state, state.goal),
+    "bar_distance": lambda creature, state: _left(state, state.bar),
+}
+"""Those that a shipped task adds (docs/hop.md, docs/limbo.md)."""
 FOOT_SENSES = ("foot_height", "contact")
 """Those for which `foot_height` must be told."""
 

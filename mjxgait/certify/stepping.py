@@ -5,11 +5,13 @@ joints, `nq nv` as in MuJoCo.
 """
 
 import copy
+from collections.abc import Callable
 
 import mujoco
 import numpy as np
-from mujoco.batch import Batch
 
+from mjxgait.certify.bar import Clearance
+from mjxgait.certify.batch import batch_of
 from mjxgait.certify.drive import Drive
 from mjxgait.certify.layout import Layout, LowestPoint, colliding_geoms, per_foot, start_frame
 from mjxgait.certify.outcome import Fall, Outcome, Trajectory
@@ -22,6 +24,8 @@ from mjxgait.creature import Creature
 
 VELOCITY_STAGE = int(mujoco.mjtStage.mjSTAGE_VEL)
 
+Onward = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
+"""See `tasks.Demands.onward`."""
 BLOWN_UP = 1e4
 """m/s or rad/s, from which a simulation is stopped: beyond any walk, and before MuJoCo itself
 complains in a log file.
@@ -52,20 +56,17 @@ class Stepping:
         record: int,
         refine: int,
         fall: Fall,
+        onward: Onward,
     ) -> None:
-        self.creature, self.starts, self.record, self.refine, self.fall = (
-            creature,
-            starts,
-            record,
-            refine,
-            fall,
-        )
+        self.creature, self.starts, self.fall = creature, starts, fall
+        self.record, self.refine = record, refine
+        self.goal, self.onward = starts.goal.copy(), onward
         step = float(creature.model.opt.timestep)
         self.twin = twin_of(creature, champion, step)
         self.drive = Drive(creature, champion.drive, self.twin.command, step)
         self.start = start_frame(creature)
         self.model = examined_model(creature, refine)
-        self.batch = _batch(creature, self.model, starts)
+        self.batch = batch_of(creature, self.model, starts)
         self.layout = Layout(self.model)
         self.terrain = terrain_of(creature)
         self.solid = LowestPoint(self.model, colliding_geoms(self.model), self.terrain)
@@ -87,6 +88,7 @@ class Stepping:
         self.feet = LowestPoint(self.model, feet, self.terrain)
         self.sees_feet = any(name in FOOT_SENSES for name in self.twin.reads)
         self.last_force = np.zeros_like(self.qvel)
+        self.bar = Clearance(creature) if np.isfinite(starts.bar).any() else None
         # What the controller has sent last, for those whose torques come late.
         self.sent = np.zeros((int(starts.delay.max()) + 1, *starts.stiffness.shape))
 
@@ -95,6 +97,7 @@ class Stepping:
         count, time_step = len(self.starts), self.creature.model.opt.timestep
         fell = np.full(count, np.inf)
         travel, path = np.zeros((count, 2)), np.full((count, steps), np.nan)
+        clearance = np.full(count, np.inf)
         leader, waiting = self._alike()
         running = np.setdiff1d(np.arange(count), waiting)
         film = self._empty_film(steps)
@@ -105,12 +108,14 @@ class Stepping:
                 released = waiting[self._pushed(waiting, k)]
                 self._follow(released, leader)
                 path[released, :k] = path[leader, :k]
+                clearance[released] = clearance[leader]
                 running, waiting = np.union1d(running, released), np.setdiff1d(waiting, released)
             self._push(running, k)
             commanded = None if heading is None else float(heading[k])
             self._control_step(running, k, commanded, film)
             travel[running] = self._travel(running)
             path[running, k] = travel[running, 0]
+            clearance[running] = np.minimum(clearance[running], self._clearance(running))
             down = running[self._down(running)]
             fell[down] = np.minimum(fell[down], (k + 1) * time_step)
             watched = (k + 1) * time_step < self.starts.end[running]
@@ -121,8 +126,8 @@ class Stepping:
                     & ((running < self.record) | np.isinf(fell[running]))
                 ]
         fell[waiting], travel[waiting] = fell[leader], travel[leader]
-        path[waiting] = path[leader]
-        return Outcome(fell, travel, path, film)
+        path[waiting], clearance[waiting] = path[leader], clearance[leader]
+        return Outcome(fell, travel, path, clearance, film)
 
     def _alike(self) -> tuple[int, np.ndarray]:
         """One simulation that stands for others until they are pushed, and those others.
@@ -138,7 +143,7 @@ class Stepping:
 
     def _follow(self, rows: np.ndarray, leader: int) -> None:
         """Puts simulations where another one is."""
-        own = (self.qpos, self.qvel, self.warm_start, self.last_force)
+        own = (self.qpos, self.qvel, self.warm_start, self.last_force, self.goal)
         for state in (*own, *self.memory.values()):
             state[rows] = state[leader]
         self.sent[:, rows] = self.sent[:, [leader]]
@@ -162,6 +167,8 @@ class Stepping:
         """The command, and the torque that acts, [running, J] each."""
         state, starts = self._state(running, k), self.starts
         command = self._act(running, state, heading)
+        first, way = self.starts.goal[running], self._travel(running)[:, 0]
+        self.goal[running] = self.onward(self.goal[running], first, way)
         self.sent[k % len(self.sent), running] = self.drive.torque(
             command, state, starts.stiffness[running], starts.damping[running]
         )
@@ -207,7 +214,8 @@ class Stepping:
             mass_matrix=self.layout.dense(self.mass[running]),
             bias=self.bias[running] - self.passive[running],
             constraint_force=self.last_force[running],
-            goal=self.starts.goal[running],
+            goal=self.goal[running],
+            bar=self.starts.bar[running, 0],
         )
 
     def _foot_height(self, running: np.ndarray) -> np.ndarray:
@@ -248,6 +256,12 @@ class Stepping:
         moved = self.xpos[running, self.creature.trunk] - start.place
         return np.stack([moved @ start.forward, moved @ start.left], 1)
 
+    def _clearance(self, running: np.ndarray) -> np.ndarray:
+        if self.bar is None:
+            return np.full(len(running), np.inf)
+        bar = self.starts.bar[running]
+        return self.bar.of(self.geom_xpos[running], self.geom_xmat[running], bar)
+
     def _sane(self, running: np.ndarray) -> np.ndarray:
         return (np.abs(self.qvel[running]) < BLOWN_UP).all(1)
 
@@ -281,30 +295,3 @@ class Stepping:
             target=blank(joints),
             phase=np.full((self.record, steps), np.nan),
         )
-
-
-def _batch(creature: Creature, model: mujoco.MjModel, starts: Starts) -> Batch:
-    """The simulations at their starts."""
-    batch = Batch(model, len(starts), 1, persistent=True)
-    batch.expand("geom_friction")[:, :, 0] *= starts.friction[:, None]
-    batch.expand("body_mass")[:] *= starts.mass
-    batch.expand("body_inertia")[:] *= starts.mass[:, :, None]
-    batch.expand("opt.gravity")[:] = _gravity(model, starts.slope)
-    # The impedance and not the time constant, which is as short as the time step allows already.
-    impedance = batch.expand("geom_solimp")[:, :, :2]
-    impedance /= impedance + starts.floor[:, None, None] * (1 - impedance)
-    batch.set_const()
-    batch.reset(stage=int(mujoco.mjtStage.mjSTAGE_NONE))
-    qpos = batch.bind("qpos")
-    qpos[:] = creature.stand_qpos
-    qpos[:, creature.qpos_adr] += starts.joint_offset
-    batch.bind("qvel")[:, creature.dof_adr] = starts.joint_velocity
-    return batch
-
-
-def _gravity(model: mujoco.MjModel, slope: np.ndarray) -> np.ndarray:
-    """[S, 3] on slopes [S, 2]: gravity is tilted instead of the floor, see `worlds.sloping`."""
-    angle = np.linalg.norm(slope, axis=1, keepdims=True)
-    uphill = slope / np.where(angle > 0, angle, 1.0)
-    change = np.concatenate([-np.sin(angle) * uphill, 1 - np.cos(angle)], 1)
-    return model.opt.gravity + np.linalg.norm(model.opt.gravity) * change

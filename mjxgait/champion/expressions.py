@@ -58,7 +58,7 @@ class HasParts(Protocol):
         ...
 
 
-ADDED = {"s0": "goal_distance"}
+ADDED = {"s0": "goal_distance", "b0": "bar_distance"}
 """Names of senses that tasks add."""
 SCALARS = {
     "t": "time",

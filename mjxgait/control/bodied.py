@@ -1,6 +1,7 @@
 """Any controller's genome with the sizes of the body's parts as further genes."""
 
 import dataclasses
+from collections.abc import Mapping
 from typing import Any
 
 import jax
@@ -72,6 +73,10 @@ class BodiedController:
         """See `Controller`."""
         plan = self.controller.genes(genomes.plan, settings)
         return np.concatenate([plan, in_ranges(genomes.sizes, self.box)], axis=1)
+
+    def numbers(self, genomes: Bodied) -> Mapping[str, np.ndarray]:
+        """See `Controller`."""
+        return self.controller.numbers(genomes.plan)
 
     def prepare(self, genome: Bodied, settings: Any) -> Any:
         """See `Controller`."""

@@ -4,6 +4,7 @@ Every function is for one creature; the rollout maps them over its lanes.
 """
 
 import dataclasses
+from collections.abc import Mapping
 from typing import ClassVar
 
 import jax
@@ -87,6 +88,10 @@ class PoseTracker:
     def genes(self, genomes: Genome, settings: PoseConfig) -> np.ndarray:
         """See `Controller`."""
         return in_ranges(genomes, Box(*self.bounds(settings)))
+
+    def numbers(self, genomes: Genome) -> Mapping[str, np.ndarray]:
+        """See `Controller`: none."""
+        return {}
 
     def prepare(self, genome: Genome, config: PoseConfig) -> PoseCycle:
         """The whole cycle of a genome [K, J] under the settings, plain or traced."""

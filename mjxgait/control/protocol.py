@@ -41,6 +41,10 @@ class Controller(Protocol):
         """Genomes [N, ...] as rows [N, genes], in units of each gene's range, to tell how alike they are."""
         ...
 
+    def numbers(self, genomes: Any) -> Mapping[str, np.ndarray]:
+        """Numbers [N] of genomes [N, ...] by name, worth following over the generations."""
+        ...
+
     def prepare(self, genome: Any, settings: Any) -> Any:
         """The plan: what an episode keeps of a genome under the settings, plain or traced."""
         ...

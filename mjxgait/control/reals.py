@@ -60,6 +60,10 @@ class RealController(abc.ABC):
         """See `Controller`."""
         return in_ranges(genomes, self._box(settings))
 
+    def numbers(self, genomes: Any) -> Mapping[str, np.ndarray]:
+        """See `Controller`: none."""
+        return {}
+
     def _box(self, settings: Any) -> Box:
         def edge(end: int) -> dict[str, jax.Array]:
             bounds = self.bounds(settings).items()

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
+from mjxgait.champion import codec_of
 from mjxgait.champion.expressions import ADDED, EMPTY, terminals, to_text
 from mjxgait.inspect.poses import shared, title
 from mjxgait.inspect.snapshot import Snapshot
@@ -17,7 +18,11 @@ class ProgramView:
 
     def facts(self, snapshot: Snapshot, i: int) -> dict[str, Any]:
         """See `GenomeView`."""
-        return {"expressions": _texts(snapshot, i), "nodes": _nodes(snapshot)[i].tolist()}
+        return {
+            "expressions": _texts(snapshot, i),
+            "nodes": _nodes(snapshot)[i].tolist(),
+            "nodes_that_matter": _mattering(snapshot, i),
+        }
 
     def spread(self, snapshot: Snapshot) -> dict[str, Any]:
         """See `GenomeView`: nodes per expression, over the population."""
@@ -43,11 +48,13 @@ class ProgramView:
     ) -> None:
         """See `GenomeView`."""
         table = titled_table(f"{title(individual)}: an expression per joint", console)
-        for heading in ("joint", "nodes", "expression"):
+        for heading in ("joint", "nodes", "that matter", "expression"):
             table.add_column(heading, overflow="fold")
-        pairs = zip(individual["expressions"].items(), individual["nodes"], strict=True)
-        for (joint, text), nodes in pairs:
-            table.add_row(joint, str(nodes), text)
+        sizes = individual["nodes"], individual["nodes_that_matter"]
+        for (joint, text), nodes, matter in zip(
+            individual["expressions"].items(), *sizes, strict=True
+        ):
+            table.add_row(joint, str(nodes), f"{matter} ({matter / nodes:.0%})", text)
         console.print(table)
         if spread:
             mean = np.mean(spread["nodes"]["mean"])
@@ -68,6 +75,13 @@ def _texts(snapshot: Snapshot, i: int) -> dict[str, str]:
     rows = zip(snapshot.genomes["code"][i], snapshot.genomes["value"][i], strict=True)
     texts = (to_text(code, value, known) for code, value in rows)
     return dict(zip(snapshot.creature.joint_names, texts, strict=True))
+
+
+def _mattering(snapshot: Snapshot, i: int) -> list[int]:
+    """[J] nodes that are left of each expression when what makes no difference is gone."""
+    genome = {name: array[i] for name, array in snapshot.genomes.items()}
+    settled = codec_of("program").settled(genome, snapshot.creature)
+    return [int(count) for count in (settled["code"] != EMPTY).sum(axis=1)]
 
 
 def _nodes(snapshot: Snapshot) -> np.ndarray:

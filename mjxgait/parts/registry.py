@@ -37,6 +37,18 @@ def _hop() -> type:
     return Hop
 
 
+def _limbo() -> type:
+    from mjxgait.tasks.limbo.task import Limbo
+
+    return Limbo
+
+
+def _travel() -> type:
+    from mjxgait.tasks.hop.travel import Travel
+
+    return Travel
+
+
 def _programs() -> type:
     from mjxgait.control.programs.controller import Programs
 
@@ -45,7 +57,7 @@ def _programs() -> type:
 
 SHIPPED: Mapping[str, Mapping[str, Maker]] = {
     "controller": {"poses": _poses, "program": _programs},
-    "task": {"walk": _walk, "hop": _hop},
+    "task": {"walk": _walk, "hop": _hop, "limbo": _limbo, "travel": _travel},
 }
 """By kind and name; the classes are imported when they are needed."""
 

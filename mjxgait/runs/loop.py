@@ -8,7 +8,7 @@ import platform
 import signal
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -124,6 +124,7 @@ def _evolve(
         if metrics.generation < 0:
             continue
         line = metrics_line(metrics, time.perf_counter() - began, experiment.simulator.task)
+        line |= followed(experiment.simulator.controller.numbers(state.genomes))
         # The log first: a kill before the checkpoint leaves a line too many, which a resumed run takes out.
         with disk_errors(folder), (folder / METRICS).open("a", encoding="utf-8") as log:
             log.write(json.dumps(line) + "\n")
@@ -151,6 +152,12 @@ def metrics_line(metrics: GenerationMetrics, seconds: float, task: Task) -> dict
     line |= named("term", task.terms, metrics.best_terms)
     line |= named("outcome", task.outcomes, metrics.best_outcome)
     return {key: value if np.isfinite(value) else None for key, value in line.items()}
+
+
+def followed(numbers: Mapping[str, np.ndarray]) -> dict[str, float]:
+    """What a log line has of numbers [P] of a population that is sorted, best first."""
+    best = {f"{name}_best": float(values[0]) for name, values in numbers.items()}
+    return best | {f"{name}_mean": float(values.mean()) for name, values in numbers.items()}
 
 
 def named(kind: str, names: Sequence[str], values: jax.Array) -> dict[str, float]:

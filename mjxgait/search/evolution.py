@@ -16,6 +16,7 @@ from mjxgait.search.breeding import Nursery, parents
 from mjxgait.search.state import EvolutionState, GenerationMetrics, Origin, Proposal
 from mjxgait.search.variation import Variation, first_occurrence
 from mjxgait.settings.config import EvolutionConfig
+from mjxgait.settings.traced import chosen
 from mjxgait.types import Judged
 
 
@@ -176,7 +177,8 @@ class Evolution:
         fresh = jnp.arange(fitness.shape[0]) >= count
         distinct = first_occurrence(pool[0]) | jnp.logical_not(self.config.remove_duplicates)
         admitted = self._admitted(state, fitness, fresh & distinct)
-        tier = jnp.where(state.forced & fresh, jnp.where(admitted, 2, 0), jnp.where(distinct, 1, 0))
+        lives = distinct & (fresh | chosen(self.config.survival, "best"))
+        tier = jnp.where(state.forced & fresh, jnp.where(admitted, 2, 0), jnp.where(lives, 1, 0))
         # The best is never lost, whatever the tiers say.
         tier = jnp.where((jnp.arange(fitness.shape[0]) == jnp.argmax(fitness)) & distinct, 3, tier)
         kept = jnp.lexsort((-fitness, -tier))[:count]

@@ -126,7 +126,8 @@ class EvolutionConfig:
       crossover: share of offspring with two parents, the others have one. crossing: `permute` draws K poses from the parents' 2K in any
         order; `align` leaves each pose in its place.
       pool: whom parents are drawn from: last generation's survivors, or `growing`, which also holds
-        the children born so far (they rank last). unique_children: a child that equals somebody of the
+        the children born so far (they rank last). survival: of the `best` of parents and children,
+        or of `children` alone, and the best so far. unique_children: a child that equals somebody of the
         pool or a sibling is drawn anew before it is simulated (mjxgait/search/breeding.py).
       mutation: `redraw` re-draws two joints of one pose, `single` one joint, `pose` a whole pose, `gaussian` moves every joint of one pose
         by sigma, in units of its range, `mixed` is one or the other of the first and the last. `bit` and `byte` read the value of one joint
@@ -151,6 +152,7 @@ class EvolutionConfig:
     crossing: Literal["permute", "align"] = "align"
     pool: Annotated[Literal["parents", "growing"], SHAPE] = "parents"
     unique_children: Annotated[bool, SHAPE] = False
+    survival: Literal["best", "children"] = "best"
     mutation: Literal["redraw", "single", "pose", "gaussian", "mixed", "bit", "byte"] = "mixed"
     mutation_rate: Fraction = 0.8
     sigma: Positive = 0.12
@@ -206,7 +208,7 @@ class UseConfig:
     Attributes:
       controller: what moves the creature: poses, program (docs/programs.md), or FILE.py:CLASS of
         your own (docs/extending.md).
-      task: what the creature is to do: walk, hop, or FILE.py:CLASS of your own.
+      task: what the creature is to do: walk, hop, limbo, travel, or FILE.py:CLASS of your own.
     """
 
     __pydantic_config__ = STRICT

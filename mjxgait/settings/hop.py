@@ -42,3 +42,23 @@ class HopConfig:
     __pydantic_config__ = STRICT
     style_ramp: Whole = 20
     weights: HopWeights = dataclasses.field(default_factory=HopWeights)
+
+
+@dataclasses.dataclass(frozen=True)
+class TravelWeights:
+    """See `HopWeights`; distance: of the way that is left to the nominal goal, below zero beyond it."""
+
+    __pydantic_config__ = STRICT
+    distance: Finite = 1.0
+    ground: Finite = 0.2
+    fall: Finite = 0.2
+    overlap: Finite = 0.1
+
+
+@dataclasses.dataclass(frozen=True)
+class TravelConfig:
+    """What is wanted of the way from goal to goal; see `HopConfig`."""
+
+    __pydantic_config__ = STRICT
+    style_ramp: Whole = 20
+    weights: TravelWeights = dataclasses.field(default_factory=TravelWeights)

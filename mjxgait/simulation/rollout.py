@@ -219,7 +219,8 @@ class Simulator:
         torque = self.drive.torque(self.plant, lane.rules, body, sensed, workings, command)
         tally = self._per_lane(self._judge)(lane, sensed, torque)
         body = self.plant.advance(body, workings, self._per_lane(self.drive.lift)(torque))
-        return dataclasses.replace(lane, body=body, memory=memory, tally=tally)
+        aim = self._per_lane(self.task.onward)(lane.aim, sensed)
+        return dataclasses.replace(lane, body=body, memory=memory, tally=tally, aim=aim)
 
     def _act(self, lane: Lane, sensed: Sensed) -> tuple[jax.Array, Any]:
         """The controller's command [J] and its memory."""

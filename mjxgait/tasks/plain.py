@@ -56,6 +56,10 @@ class PlainTask(abc.ABC):
         """See `Task`."""
         return {}
 
+    def onward(self, aim: Any, sensed: Sensed) -> Any:
+        """See `Task`: the same."""
+        return aim
+
     def init(self) -> Any:
         """See `Task`."""
         none = jnp.zeros((), jnp.int32)

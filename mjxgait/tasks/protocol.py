@@ -64,6 +64,10 @@ class Task(Protocol):
         """The senses that the task adds, by name."""
         ...
 
+    def onward(self, aim: Any, sensed: Sensed) -> Any:
+        """What it aims at from the next step on."""
+        ...
+
     def init(self) -> Any:
         """The empty tally."""
         ...

@@ -129,12 +129,27 @@ def draw_diversity(axes: Axes, lines: Lines) -> None:
     axes.legend(handles=handles, loc="lower left")
 
 
+def draw_size(axes: Axes, lines: Lines) -> None:
+    """Nodes of all expressions of an individual: of the best, and in the mean."""
+    column = columns(lines)
+    generation = column["generation"]
+    axes.plot(generation, column["nodes_best"], "-", color=DARK, linewidth=2, label="best")
+    axes.plot(generation, column["nodes_mean"], "--", color=DARK, linewidth=1.2, label="mean")
+    shade_forced(axes, column)
+    axes.set(ylabel="nodes of all expressions", title="size of the programs")
+    axes.set_ylim(bottom=0)
+    _label_generations(axes, generation)
+    axes.legend(loc="best")
+
+
 def progress_figures(lines: Lines, weights: Mapping[str, np.ndarray]) -> Figures:
     """The plots of this file by file name."""
+    size: Figures = {"size": ((8, 3.5), lambda drawing: draw_size(drawing.subplots(), lines))}
     return {
         "fitness": ((8, 4.5), lambda drawing: draw_fitness(drawing.subplots(), lines)),
         "terms": ((9.5, 4.5), lambda drawing: draw_terms(drawing.subplots(), lines, weights)),
         "diversity": ((8, 3.5), lambda drawing: draw_diversity(drawing.subplots(), lines)),
+        **(size if "nodes_mean" in lines[0] else {}),
     }
 
 

@@ -95,6 +95,7 @@ def scene_file(stage: Stage, frames: Sequence[int], path: Path) -> None:
     """Writes all that the worker needs: poses [F, N, nq] with each creature in its lane, and the
     camera of every frame.
     """
+    spec = stage.walks[0].marked
     cameras = [stage.camera(frame) for frame in frames]
     first = cameras[0]
     into, creature = first.axes[2], stage.walks[0].creature
@@ -110,7 +111,7 @@ def scene_file(stage: Stage, frames: Sequence[int], path: Path) -> None:
     dark = [n for n in range(min(numbers), max(numbers)) if n % 2 and stage.relief is None]
     np.savez(
         path,
-        xml=np.array(creature.files["creature.xml"]),
+        xml=np.array(spec.to_xml() if spec else creature.files["creature.xml"]),
         size=np.array([stage.width, stage.height]),
         extent=np.array(stage.height / first.scale),
         view=np.array(

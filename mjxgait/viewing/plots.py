@@ -15,11 +15,12 @@ from mjxgait.parts.registry import what_ends
 from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.folder import CHAMPION, METRICS, open_champion, open_run, read_metrics
 from mjxgait.settings.config import Config
+from mjxgait.viewing import strobe, trees
 from mjxgait.viewing.curves import Lines, progress_figures
 from mjxgait.viewing.filmstrip import draw_filmstrip
 from mjxgait.viewing.gaitplots import gait_figures
-from mjxgait.viewing.style import FORMATS, figure, save
-from mjxgait.viewing.walk import record_walk
+from mjxgait.viewing.style import FORMATS, Figures, figure, save
+from mjxgait.viewing.walk import Walk, record_walk
 
 PLOTS = "plots"
 SECONDS = 10.0
@@ -46,6 +47,7 @@ def plot_run(run: Path, out: Path | None = None, formats: Sequence[str] = FORMAT
         figures |= dict(gait_figures(walk)) | {
             "filmstrip": ((12, 4.8), lambda drawing: draw_filmstrip(drawing, walk))
         }
+        figures |= {**_of_goals(walk), **_of_programs(walk)}
     files = []
     with disk_errors(out, "the run itself is safe", f"draw it with mjxgait plot {run}"):
         out.mkdir(parents=True, exist_ok=True)
@@ -54,6 +56,21 @@ def plot_run(run: Path, out: Path | None = None, formats: Sequence[str] = FORMAT
                 compose(drawing)
                 files += save(drawing, out / name, formats)
     return files
+
+
+def _of_goals(walk: Walk) -> Figures:
+    """The way to a goal; nothing where there is none."""
+    if walk.marked is None:
+        return {}
+    return {"strobe": (strobe.shape(walk), lambda drawing: strobe.draw_strobe(drawing, walk))}
+
+
+def _of_programs(walk: Walk) -> Figures:
+    """The champion's expressions; nothing where it has none."""
+    if walk.champion.controller != "program":
+        return {}
+    found = trees.expressions_of(walk.creature, walk.champion)
+    return {"expressions": (trees.shape(found), lambda drawing: trees.draw_trees(drawing, found))}
 
 
 def _weights(creature: Creature, config: Config, lines: Lines) -> dict[str, np.ndarray]:

@@ -30,8 +30,7 @@ class Stage:
 
     def __init__(self, walks: Sequence[Walk], width: int, height: int) -> None:
         self.walks, self.width, self.height = walks, width, height
-        creature = walks[0].creature
-        self.painter = Painter(creature.model)
+        self.painter = Painter(walks[0].shown)
         self.origin = walks[0].trunk_pos[0, :2]
         self.forward = walks[0].forward
         self.frames = max(len(walk.qpos) for walk in walks)
@@ -87,19 +86,16 @@ class Stage:
     def _place_lanes(self) -> None:
         forward = np.append(self.forward, 0.0)
         self.left = np.cross([0.0, 0.0, 1.0], forward)
-        pos, rot = (
-            poses[0][self.painter.geoms] for poses in self.walks[0].geom_poses(np.array([0]))
-        )
+        model = self.walks[0].creature.model
+        own = self.painter.geoms[self.painter.geoms < model.ngeom]
+        pos, rot = (poses[0][own] for poses in self.walks[0].geom_poses(np.array([0])))
         side = pos @ self.left - (pos @ self.left).mean()
-        self.painter.far = np.clip(side / max(float(np.abs(side).max()), 1e-6), 0.0, 1.0)
+        far = np.clip(side / max(float(np.abs(side).max()), 1e-6), 0.0, 1.0)
+        self.painter.far[: len(own)] = far
         directions = np.concatenate(
             [np.column_stack([COMPASS, 0 * COMPASS[:, 0]]), [[0, 0, 1], [0, 0, -1]]]
         )
-        self.outline = (
-            Silhouettes(self.walks[0].creature.model, self.painter.geoms)
-            .outermost(pos, rot, directions)
-            .reshape(-1, 3)
-        )
+        self.outline = Silhouettes(model, own).outermost(pos, rot, directions).reshape(-1, 3)
         self.top = float(self.outline[:, 2].max())
         self.back = float(((self.outline[:, :2] - self.origin) @ self.forward).min())
         across, along = np.ptp(self.outline @ self.left), np.ptp(self.outline @ forward)

@@ -10,15 +10,18 @@ from functools import cached_property
 import mujoco
 import numpy as np
 
+from mjxgait.certify.config import CertificateConfig
 from mjxgait.certify.layout import Ground
 from mjxgait.certify.measure import Recording, measure
 from mjxgait.certify.outcome import Trajectory
 from mjxgait.certify.simulate import simulate
-from mjxgait.certify.starts import nominal_starts
+from mjxgait.certify.starts import Starts, nominal_starts
 from mjxgait.certify.strides import stride_starts
+from mjxgait.certify.tasks import how_simulated
 from mjxgait.certify.terrain import terrain_of
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
+from mjxgait.viewing.marks import marked
 
 WARMUP = 2.0
 """s until a gait has settled; strides are taken from after it where there are enough."""
@@ -31,13 +34,14 @@ class Walk:
     """One walk.
 
     qpos: [T, nq]. fell: s, infinite when it stayed up. It ends with the time asked for, or soon
-    after the fall.
+    after the fall. start: how it began, with its goal and its bar where the task has them.
     """
 
     creature: Creature
     champion: Champion
     trajectory: Trajectory
     fell: float
+    start: Starts | None = None
 
     @property
     def time_step(self) -> float:
@@ -58,6 +62,32 @@ class Walk:
     def recording(self) -> Recording:
         """What a look at every frame measured."""
         return measure(self.creature, self.trajectory)
+
+    @cached_property
+    def shown(self) -> mujoco.MjModel:
+        """The creature's model, and after its own bodies and geoms what stands on its way."""
+        spec = self.marked
+        return self.creature.model if spec is None else spec.compile()
+
+    @cached_property
+    def marked(self) -> mujoco.MjSpec | None:
+        """What `shown` is made of; None where nothing stands on its way."""
+        if self.start is None:
+            return None
+        goals, bar = self._goals(self.start.goal[:1]), self.start.bar[0]
+        over = bar if np.isfinite(bar).all() else None
+        if not len(goals) and over is None:
+            return None
+        places = self.creature.stand_pos[:2] + np.outer(goals, self.forward)
+        return marked(self.creature, goals, self.ground_heights(places), over)
+
+    def _goals(self, first: np.ndarray) -> np.ndarray:
+        """[goals] m ahead of the start, all that it ever had."""
+        goals, onward = list(first[first > 0]), how_simulated(self.champion.task).onward
+        farthest = ((self.trunk_pos[:, :2] - self.trunk_pos[0, :2]) @ self.forward).max()
+        while len(goals) and (after := onward(goals[-1], goals[0], farthest)) > goals[-1]:
+            goals.append(after)
+        return np.array(goals)
 
     @cached_property
     def forward(self) -> np.ndarray:
@@ -110,15 +140,15 @@ class Walk:
         )
 
     def geom_poses(self, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """World positions [T, G, 3] m and rotations [T, G, 3, 3] of the geoms at some frames."""
-        return _poses(self.creature.model, self.qpos[frames], ("geom_xpos", "geom_xmat"))
+        """World positions [T, G, 3] m and rotations [T, G, 3, 3] of all that is shown."""
+        return _poses(self.shown, self.qpos[frames], ("geom_xpos", "geom_xmat"))
 
 
 def record_walk(creature: Creature, champion: Champion, seconds: float) -> Walk:
     """Simulates the champion on the creature's ground, without noise or pushes."""
-    outcome = simulate(
-        creature, champion, nominal_starts(creature, 1), seconds, record=1, threads=1
-    )
+    task = how_simulated(champion.task)
+    start = task.aimed(nominal_starts(creature, 1), CertificateConfig())
+    outcome = simulate(creature, champion, start, seconds, record=1, threads=1)
     film, fell = outcome.trajectory, float(outcome.fell[0])
     finite = np.isfinite(film.qpos[0]).all(1) & np.isfinite(film.qvel[0]).all(1)
     last = len(finite) if finite.all() else int(np.argmin(finite))
@@ -129,7 +159,7 @@ def record_walk(creature: Creature, champion: Champion, seconds: float) -> Walk:
         name: getattr(film, name)[:, frames]
         for name in ("qpos", "qvel", "torque", "target", "phase")
     }
-    return Walk(creature, champion, dataclasses.replace(film, **kept), fell)
+    return Walk(creature, champion, dataclasses.replace(film, **kept), fell, start)
 
 
 def _poses(

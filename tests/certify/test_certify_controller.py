@@ -269,7 +269,7 @@ def test_the_senses_that_tasks_add_are_those_of_evolution(tiny):
     from mjxgait.parts.registry import SHIPPED
 
     state, sensed = askew(tiny)
-    state = dataclasses.replace(state, goal=np.array([0.8]))
+    state = dataclasses.replace(state, goal=np.array([0.8]), bar=np.array([0.6]))
     found = {}
     for make in SHIPPED["task"].values():
         task = make()(tiny, STEP, 1000, tiny.settings.termination)

@@ -120,7 +120,8 @@ def became(ways: list[Recording], fell: list[float]) -> Outcome:
     path = np.stack([way.trunk_pos[:, 0] for way in ways])
     nothing = np.zeros((0, FRAMES))
     film = Trajectory(STEP, *[nothing] * 5)
-    return Outcome(np.array(fell), np.zeros((len(ways), 2)), path, film)
+    clear = np.full(len(ways), np.inf)
+    return Outcome(np.array(fell), np.zeros((len(ways), 2)), path, clear, film)
 
 
 def test_of_the_disturbed_only_those_succeed_that_stay_up_and_at_their_own_goal(tiny: Creature):

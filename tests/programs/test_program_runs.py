@@ -1,6 +1,7 @@
 """A creature that is moved by expressions: evolved, written, edited by hand, examined again."""
 
 import json
+import re
 import shutil
 from pathlib import Path
 
@@ -11,9 +12,11 @@ from helpers import SHORT, STOOL, said_by
 import mjxgait
 from mjxgait.certify.simulate import simulate
 from mjxgait.certify.starts import nominal_starts
-from mjxgait.champion import read_champion
+from mjxgait.champion import codec_of, read_champion
+from mjxgait.champion.expressions import EMPTY
 from mjxgait.inspect import facts, read_snapshot
-from mjxgait.runs.folder import CHAMPION
+from mjxgait.runs.folder import CHAMPION, METRICS, read_metrics
+from mjxgait.viewing.plots import plot_run
 
 
 @pytest.fixture(scope="module")
@@ -75,10 +78,34 @@ def test_inspect_prints_the_expressions(run: mjxgait.Run, capsys: pytest.Capture
     said = said_by(capsys, "inspect", run.folder, code=0)
     told = facts(read_snapshot(run.folder))["champion"]
     assert "an expression per joint" in said
-    for joint, text in told["expressions"].items():
+    for (joint, text), nodes in zip(told["expressions"].items(), told["nodes"], strict=True):
         assert joint in said
-        assert text.count("(") + text.count(" ") >= 0
-    assert sum(told["nodes"]) > 0
+        assert len(re.findall(r"[^\s()]+", text)) == nodes
+
+
+def test_inspect_tells_how_many_nodes_matter(run: mjxgait.Run, capsys: pytest.CaptureFixture):
+    """Those that are left in the champion's file, which is simplified."""
+    snapshot = read_snapshot(run.folder)
+    told = facts(snapshot)["champion"]
+    settled = codec_of("program").settled(
+        {name: array[0] for name, array in snapshot.genomes.items()}, snapshot.creature
+    )
+    assert told["nodes_that_matter"] == (settled["code"] != EMPTY).sum(1).tolist()
+    assert all(m <= n for m, n in zip(told["nodes_that_matter"], told["nodes"], strict=True))
+    share = told["nodes_that_matter"][0] / told["nodes"][0]
+    assert f"{share:.0%}" in said_by(capsys, "inspect", run.folder, code=0)
+
+
+def test_the_size_of_programs_is_told_of_every_generation(run: mjxgait.Run):
+    lines, nodes = read_metrics(run.folder / METRICS), facts(read_snapshot(run.folder))
+    assert len(lines) == 3
+    assert lines[-1]["nodes_best"] == sum(nodes["champion"]["nodes"])
+    assert lines[-1]["nodes_mean"] == pytest.approx(
+        sum(nodes["diversity"]["nodes"]["mean"]), rel=1e-6
+    )
+    drawn = {file.stem for file in plot_run(run.folder, run.folder / "plots", ("svg",))}
+    assert {"size", "expressions"} <= drawn
+    assert "strobe" not in drawn
 
 
 def test_an_edited_expression_is_what_moves(run: mjxgait.Run, edited: Path):

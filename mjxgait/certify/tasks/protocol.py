@@ -38,6 +38,13 @@ class Demands(Protocol):
         """
         ...
 
+    def onward(self, goal: np.ndarray, first: np.ndarray, way: np.ndarray) -> np.ndarray:
+        """The goals from the next moment on, m ahead of the start.
+
+        goal: now. first: at the start. way: m of the trunk ahead of the start.
+        """
+        ...
+
     def succeeded(self, outcome: Outcome, starts: Starts, config: CertificateConfig) -> np.ndarray:
         """Which [S] of the simulations from perturbed starts did what the task demands."""
         ...

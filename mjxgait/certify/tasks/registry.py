@@ -1,13 +1,20 @@
 """Which task demands what."""
 
 from mjxgait.certify.tasks.hop import HopDemands
+from mjxgait.certify.tasks.limbo import LimboDemands
 from mjxgait.certify.tasks.plain import HasCriteria, PlainDemands
 from mjxgait.certify.tasks.protocol import Demands
 from mjxgait.certify.tasks.staying import StaysUp
+from mjxgait.certify.tasks.travel import TravelDemands
 from mjxgait.certify.tasks.walk import WalkDemands
 from mjxgait.errors import not_loaded
 
-_DEMANDS: dict[str, Demands] = {"walk": WalkDemands(), "hop": HopDemands()}
+_DEMANDS: dict[str, Demands] = {
+    "walk": WalkDemands(),
+    "hop": HopDemands(),
+    "limbo": LimboDemands(),
+    "travel": TravelDemands(),
+}
 
 
 def register_demands(task: str, own: HasCriteria) -> None:

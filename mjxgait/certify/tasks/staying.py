@@ -22,6 +22,10 @@ class StaysUp:
         """See `Demands`: as they are."""
         return starts
 
+    def onward(self, goal: np.ndarray, first: np.ndarray, way: np.ndarray) -> np.ndarray:
+        """See `Demands`: the same."""
+        return goal
+
     def succeeded(self, outcome: Outcome, starts: Starts, config: CertificateConfig) -> np.ndarray:
         """See `Demands`: those that have stayed up."""
         return outcome.stayed_up

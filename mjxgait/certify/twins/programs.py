@@ -23,6 +23,7 @@ NAMED = {
     "py": "aside",
     "pz": "trunk_height",
     "s0": "goal_distance",
+    "b0": "bar_distance",
 }
 PARTS = {"a": "joint_pos", "w": "joint_vel", "c": "contact"}
 """By the letter before the number of a joint or a foot."""

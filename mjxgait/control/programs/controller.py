@@ -1,6 +1,6 @@
 """A controller whose genome is one expression per joint (Gritz & Hahn 1995, 1997)."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 import jax
@@ -8,7 +8,13 @@ import jax.numpy as jnp
 import numpy as np
 
 from mjxgait.body import Body
-from mjxgait.champion.expressions import FUNCTION_CODES, Terminal, chosen_terminals, terminals
+from mjxgait.champion.expressions import (
+    EMPTY,
+    FUNCTION_CODES,
+    Terminal,
+    chosen_terminals,
+    terminals,
+)
 from mjxgait.control.programs.evaluate import Listing, evaluate, listed
 from mjxgait.control.programs.grow import Words
 from mjxgait.control.programs.operators import program_variation
@@ -57,6 +63,10 @@ class Programs:
         """See `Controller`: any other node is a difference."""
         code, value = (np.asarray(leaf) for leaf in (genomes.code, genomes.value))
         return np.concatenate([leaf.reshape(len(leaf), -1) for leaf in (code, value)], axis=1)
+
+    def numbers(self, genomes: Trees) -> Mapping[str, np.ndarray]:
+        """See `Controller`: nodes of all expressions."""
+        return {"nodes": (np.asarray(genomes.code) != EMPTY).sum(axis=(1, 2))}
 
     def prepare(self, genome: Trees, settings: ProgramConfig) -> Listing:
         """See `Controller`."""

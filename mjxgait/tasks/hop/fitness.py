@@ -1,18 +1,20 @@
 """From the tally of a way to a goal to named fitness terms, and what each of them counts."""
 
 import dataclasses
+from collections.abc import Mapping
 
 import jax
 import jax.numpy as jnp
 import optax
 
 from mjxgait.body import Body
-from mjxgait.settings.hop import HopConfig, HopWeights
+from mjxgait.settings.hop import HopConfig, HopWeights, TravelConfig
 from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.hop.tally import Tally
 
 TERMS = tuple(field.name for field in dataclasses.fields(HopWeights))
-STYLE = tuple(name for name in TERMS if name != "distance")
+GOAL = "distance"
+STYLE = tuple(name for name in TERMS if name != GOAL)
 """The manner of a way: counted as far as there is one, and ramped in over the generations."""
 
 FARTHEST = 2.0
@@ -21,20 +23,30 @@ TOUCHING, DEEP = 0.005, 0.05
 """Hip heights: parts less deep in each other only touch; an overlap so much deeper counts half."""
 
 
-def fitness_terms(creature: Body, horizon: int, tally: Tally) -> dict[str, jax.Array]:
+def fitness_terms(
+    creature: Body, horizon: int, tally: Tally, more: Mapping[str, jax.Array] | None = None
+) -> dict[str, jax.Array]:
     """The terms [] of one episode, each without unit and before its weight; all are at least zero.
 
     Style counts in proportion to how near it got: who has yet to learn to hop must not be punished
     for trying.
 
     Args:
-      horizon: T, steps of a full episode.
+      horizon: T, steps of a full episode. more: style that another task adds.
     """
     away = jnp.abs(tally.left) / tally.goal
+    near = jnp.clip(1.0 - away, 0.0, 1.0)
+    style = style_terms(creature, horizon, tally) | dict(more or {})
+    terms = {GOAL: jnp.minimum(away, FARTHEST)}
+    return terms | {name: near * value for name, value in style.items()}
+
+
+def style_terms(creature: Body, horizon: int, tally: Tally) -> dict[str, jax.Array]:
+    """The manner [] of one episode, however near it got."""
     lived = jnp.maximum(tally.steps, 1)
     half_range = 0.5 * (creature.pose_high - creature.pose_low).astype(jnp.float32)
     crossed = jnp.maximum(tally.overlap / creature.hip_height - TOUCHING, 0.0)
-    style = {
+    return {
         "time": tally.arrived / horizon,
         "restless": jnp.minimum(tally.after / tally.goal, 1.0),
         "ground": tally.ground / lived,
@@ -42,18 +54,15 @@ def fitness_terms(creature: Body, horizon: int, tally: Tally) -> dict[str, jax.A
         "neutral": jnp.minimum(jnp.mean(tally.bent / jnp.maximum(half_range, 1e-6)), 1.0),
         "overlap": crossed / (crossed + DEEP),
     }
-    near = jnp.clip(1.0 - away, 0.0, 1.0)
-    terms = {"distance": jnp.minimum(away, FARTHEST)}
-    return terms | {name: near * style[name] for name in STYLE}
 
 
-def signed_weights(config: HopConfig, generation: jax.Array) -> dict[str, jax.Array]:
+def signed_weights(config: HopConfig | TravelConfig, generation: jax.Array) -> dict[str, jax.Array]:
     """Signed weight [] of each term at a generation []: all negative, style terms ramped in."""
     grown = optax.linear_schedule(0.0, 1.0, 1)(generation / jnp.maximum(config.style_ramp, 1))
     ramp = jnp.where(jnp.asarray(config.style_ramp) > 0, grown, 1.0)
 
     def weight(name: str) -> jax.Array:
         signed = -jnp.float32(getattr(config.weights, name))
-        return signed * ramp if name in STYLE else signed
+        return signed if name == GOAL else signed * ramp
 
-    return {name: weight(name) for name in TERMS}
+    return {field.name: weight(field.name) for field in dataclasses.fields(config.weights)}

@@ -1,5 +1,7 @@
 """What a way to a goal leaves behind, updated once per step for one creature."""
 
+import dataclasses
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -58,10 +60,9 @@ def updated(creature: Body, step: float, tally: Tally, sensed: Sensed, goal: jax
     near = jnp.abs(left) <= NEAR * goal
     arrived = jnp.where(near, jnp.minimum(tally.arrived, tally.steps), tally.arrived)
     moved = jnp.linalg.norm(sensed.trunk_vel) * step
-    return Tally(
+    return dataclasses.replace(
+        tally,
         steps=tally.steps + 1,
-        reason=tally.reason,
-        overlap=tally.overlap,
         goal=goal,
         left=left,
         arrived=arrived,

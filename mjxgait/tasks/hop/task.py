@@ -1,7 +1,7 @@
 """Hopping as a task: to a goal some way ahead, and to stay there."""
 
 import dataclasses
-from typing import Any
+from typing import Any, ClassVar
 
 import jax
 import jax.numpy as jnp
@@ -19,25 +19,27 @@ from mjxgait.types import Sensed
 class Hop(PlainTask):
     """One creature's way to a goal; see `PlainTask`. Whoever has a trunk may do it."""
 
-    Settings = HopConfig
-    terms = TERMS
-    outcomes = ("left", "arrival", "seconds")
-    adds = ("goal_distance",)
+    Settings: ClassVar[type] = HopConfig
+    terms: ClassVar[tuple[str, ...]] = TERMS
+    outcomes: ClassVar[tuple[str, ...]] = ("left", "arrival", "seconds")
+    adds: ClassVar[tuple[str, ...]] = ("goal_distance",)
+    goals: ClassVar[tuple[float, float]] = GOALS
+    nominal: ClassVar[float] = NOMINAL_GOAL
 
     def trials(self, key: jax.Array, creature: Creature, settings: RolloutConfig) -> Starts:
         """See `Task`: starts as everybody's, each with a goal of its own, the first the nominal."""
         starts = draw_starts(key, creature, settings)
-        low, high = GOALS
+        low, high = self.goals
         # A key of its own, so that the starts are those of every other task.
         drawn = jax.random.uniform(jax.random.fold_in(key, 4), (settings.starts,))
-        goals = (low + (high - low) * drawn).at[0].set(NOMINAL_GOAL)
+        goals = (low + (high - low) * drawn).at[0].set(self.nominal)
         return dataclasses.replace(starts, goal=goals)
 
     def aim(self, trial: Starts) -> jax.Array:
         """See `Task`: the goal [] in m ahead of the start."""
         return jnp.asarray(trial.goal)
 
-    def standards(self, settings: HopConfig) -> tuple[()]:
+    def standards(self, settings: Any) -> Any:
         """See `Task`: nothing."""
         return ()
 

@@ -1,0 +1,66 @@
+"""What is demanded of who goes to a goal beneath a bar: what hopping demands, and to stay clear."""
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from mjxgait.certify.config import CertificateConfig, LimboConfig
+from mjxgait.certify.criteria import Criterion, at_least
+from mjxgait.certify.measure import Recording
+from mjxgait.certify.outcome import Outcome
+from mjxgait.certify.starts import Starts
+from mjxgait.certify.tasks.hop import HopDemands
+from mjxgait.creature import Creature
+
+ENOUGH = 0.01
+"""m; more clearance is no better."""
+
+
+class LimboDemands(HopDemands):
+    """See `Demands`. Whoever is at the goal has passed the bar: goals lie beyond it."""
+
+    verdict = "it gets to its goal beneath the bar and stays"
+
+    def wanted(self, config: CertificateConfig) -> LimboConfig:
+        """See `GoalDemands`."""
+        return config.limbo
+
+    def aimed(
+        self, starts: Starts, config: CertificateConfig, rng: np.random.Generator | None = None
+    ) -> Starts:
+        """See `Demands`: a goal and a bar for each that has none yet."""
+        bar = np.array([config.limbo.place, config.limbo.height])
+        given = np.where(np.isfinite(starts.bar), starts.bar, bar)
+        return dataclasses.replace(super().aimed(starts, config, rng), bar=given)
+
+    def succeeded(self, outcome: Outcome, starts: Starts, config: CertificateConfig) -> np.ndarray:
+        """See `Demands`: those that stayed up and clear, arrived, and stayed there."""
+        clear: np.ndarray = outcome.clearance > config.limbo.clearance
+        return super().succeeded(outcome, starts, config) & clear
+
+    def basic(self, whole: Recording, config: CertificateConfig) -> tuple[Criterion, ...]:
+        """See `GoalDemands`: 1, 2 and 3."""
+        least, room = _least(whole), config.limbo.clearance
+        clear = at_least("least clearance (m)", least, room, room + ENOUGH)
+        return (*super().basic(whole, config), Criterion(3, "clear of the bar", (clear,)))
+
+    def report(self, whole: Recording, config: CertificateConfig) -> dict[str, Any]:
+        """See `Demands`: of hopping, and the least clearance."""
+        told = super().report(whole, config)
+        least = _least(whole)
+        bar = f"a bar {config.limbo.height:g} m high {'cleared' if least > 0 else 'touched'}"
+        return told | {"clearance": least, "summary": f"{told['summary']}; {bar}"}
+
+    def promising(
+        self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
+    ) -> bool:
+        """See `Demands`: of hopping, where a trial that touched the bar has failed."""
+        lived = np.where(outcome["bar"] > 0, 0.0, outcome["seconds"])
+        return super().promising({**outcome, "seconds": lived}, seconds, creature)
+
+
+def _least(whole: Recording) -> float:
+    """m of all frames; NaN where one is NaN, or where nobody looked."""
+    return np.nan if whole.clearance is None else float(whole.clearance.min())

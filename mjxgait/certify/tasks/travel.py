@@ -1,0 +1,74 @@
+"""What is demanded of who travels from goal to goal: to get on, and not to stop."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from mjxgait.certify.config import CertificateConfig, TravelConfig
+from mjxgait.certify.criteria import Criterion, at_least
+from mjxgait.certify.describe import worst_overlap
+from mjxgait.certify.measure import Recording
+from mjxgait.certify.outcome import Outcome
+from mjxgait.certify.starts import Starts
+from mjxgait.certify.tasks.goals import GoalDemands
+from mjxgait.creature import Creature
+
+
+class TravelDemands(GoalDemands):
+    """See `Demands`. A goal that is near, or passed, moves on by as much as it was away at first."""
+
+    verdict = "it travels from goal to goal"
+    share = "share that travels"
+
+    def wanted(self, config: CertificateConfig) -> TravelConfig:
+        """See `GoalDemands`."""
+        return config.travel
+
+    def onward(self, goal: np.ndarray, first: np.ndarray, way: np.ndarray) -> np.ndarray:
+        """See `Demands`."""
+        reached = goal - way <= CertificateConfig().travel.near * first
+        return np.where(reached, goal + first, goal)
+
+    def succeeded(self, outcome: Outcome, starts: Starts, config: CertificateConfig) -> np.ndarray:
+        """See `Demands`: those that stayed up and were fast enough."""
+        seconds = outcome.path.shape[1] * outcome.trajectory.time_step
+        return outcome.stayed_up & (outcome.path[:, -1] >= config.travel.speed * seconds)
+
+    def second(self, whole: Recording, config: CertificateConfig) -> Criterion:
+        """See `GoalDemands`: fast enough, and not much slower in the second half."""
+        wanted = config.travel
+        way = whole.trunk_pos[:, 0]
+        half, seconds = len(way) // 2, len(way) * whole.time_step
+        kept = (way[-1] - way[half]) / way[half] if way[half] > 0 else np.nan
+        return Criterion(
+            2,
+            "travels",
+            (
+                at_least("speed (m/s)", way[-1] / seconds, wanted.speed),
+                at_least("second half's speed / first", kept, wanted.second_half, 1.0),
+            ),
+        )
+
+    def report(self, whole: Recording, config: CertificateConfig) -> dict[str, Any]:
+        """See `Demands`: how far it gets, and by how many goals."""
+        way, goal, goals = whole.trunk_pos[:, 0], np.array(whole.goal), 0
+        for place in np.maximum.accumulate(way):
+            ahead = self.onward(goal, np.array(whole.goal), place)
+            goals, goal = goals + int(ahead > goal), ahead
+        seconds = len(way) * whole.time_step
+        return {
+            "goal": whole.goal,
+            "goals": goals,
+            "way": float(way[-1]),
+            "overlap": worst_overlap(whole),
+            "summary": f"{way[-1]:.2f} m and {goals} goals in {seconds:g} s",
+        }
+
+    def promising(
+        self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
+    ) -> bool:
+        """See `Demands`: up to the end and fast enough in all its trials."""
+        whole = seconds - 0.5 * creature.model.opt.timestep
+        fast = outcome["way"] >= CertificateConfig().travel.speed * seconds
+        return bool((outcome["seconds"] > whole).all() and fast.all())

@@ -1,0 +1,78 @@
+"""Limbo as a task: to a goal beneath a bar, of which every part must stay clear."""
+
+import dataclasses
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+
+from mjxgait.creature import Creature
+from mjxgait.errors import UserError
+from mjxgait.ground.spec import parse_ground
+from mjxgait.settings.config import RolloutConfig
+from mjxgait.settings.limbo import GOALS, NOMINAL_GOAL, LimboConfig, LimboWeights
+from mjxgait.tasks.hop import tally as hop
+from mjxgait.tasks.hop.fitness import fitness_terms
+from mjxgait.tasks.hop.task import Hop
+from mjxgait.tasks.limbo.bar import bar_distance, intrusion
+from mjxgait.tasks.trials import Starts
+from mjxgait.types import Sensed, pytree
+
+HALF = 0.1
+"""Hip heights; a body so deep in the place of the bar counts half."""
+
+
+@pytree
+class Tally(hop.Tally):
+    """See `hop.Tally`. bar: [] m, the deepest that it was in the place of the bar."""
+
+    bar: jax.Array
+
+
+class Limbo(Hop):
+    """One creature's way to a goal beneath a bar; see `Hop`."""
+
+    Settings = LimboConfig
+    terms = tuple(field.name for field in dataclasses.fields(LimboWeights))
+    outcomes = (*Hop.outcomes, "bar")
+    adds = (*Hop.adds, "bar_distance")
+    goals, nominal = GOALS, NOMINAL_GOAL
+
+    def trials(self, key: jax.Array, creature: Creature, settings: RolloutConfig) -> Starts:
+        """See `Task`.
+
+        Raises:
+          UserError: the ground is not flat, where no bar has one height.
+        """
+        if not parse_ground(settings.ground).flat:
+            raise UserError(f"rollout.ground = {settings.ground}: task limbo needs flat ground")
+        return super().trials(key, creature, settings)
+
+    def standards(self, settings: Any) -> Any:
+        """See `Task`: the height [] of the bar in m."""
+        return jnp.asarray(settings.height, jnp.float32)
+
+    def senses(self, aim: jax.Array, sensed: Sensed) -> dict[str, jax.Array]:
+        """See `Task`."""
+        return super().senses(aim, sensed) | {"bar_distance": bar_distance(self.creature, sensed)}
+
+    def init(self) -> Tally:
+        """See `Task`."""
+        return Tally(**vars(super().init()), bar=jnp.zeros(()))
+
+    def update(
+        self, tally: Any, sensed: Sensed, torque: jax.Array, standards: Any, aim: jax.Array
+    ) -> Any:
+        """See `Task`."""
+        after: Any = super().update(tally, sensed, torque, standards, aim)
+        deepest = jnp.maximum(tally.bar, intrusion(self.creature, sensed, standards))
+        return dataclasses.replace(after, bar=deepest)
+
+    def judge(self, tally: Any, settings: Any) -> dict[str, jax.Array]:
+        """See `Task`."""
+        bar = tally.bar / (tally.bar + HALF * self.creature.hip_height)
+        return fitness_terms(self.creature, self.horizon, tally, {"bar": bar})
+
+    def outcome(self, tally: Any) -> dict[str, jax.Array]:
+        """See `Task`: of hopping, and m that the deepest part was in the place of the bar."""
+        return super().outcome(tally) | {"bar": tally.bar}

@@ -1,0 +1,296 @@
+"""Limbo: what a body reaches into above a bar, what that is worth, and what the examiner says."""
+
+import dataclasses
+import json
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+import pytest
+from helpers import SHORT, pose_champion, said_by
+
+from mjxgait.certify import CertificateConfig, record
+from mjxgait.certify.bar import FAR, Clearance
+from mjxgait.certify.bar import RADIUS as EXAMINED_RADIUS
+from mjxgait.certify.config import LimboConfig as Demanded
+from mjxgait.certify.measure import Recording
+from mjxgait.certify.outcome import Outcome, Trajectory
+from mjxgait.certify.simulate import simulate
+from mjxgait.certify.starts import nominal_starts, perturbed_starts
+from mjxgait.certify.tasks import demands_of
+from mjxgait.champion import Champion
+from mjxgait.creature import Creature, load_creature
+from mjxgait.creature.geometry import support_extents
+from mjxgait.errors import UserError
+from mjxgait.parts.settings import build_config
+from mjxgait.runs.experiment import build_experiment
+from mjxgait.settings import limbo as evolution
+from mjxgait.settings.config import RolloutConfig
+from mjxgait.settings.limbo import BAR_PLACE, LimboConfig
+from mjxgait.settings.shipped import find_creature
+from mjxgait.tasks.hop.fitness import signed_weights
+from mjxgait.tasks.limbo.bar import bar_distance, intrusion
+from mjxgait.tasks.limbo.task import Limbo
+from mjxgait.types import Sensed
+
+CONFIG, DEMANDS = CertificateConfig(), demands_of("limbo")
+STEP, HORIZON, HEIGHT = 0.005, 1000, 0.35
+
+
+@pytest.fixture(scope="module")
+def luxo() -> Creature:
+    return load_creature(find_creature("luxo"))
+
+
+@pytest.fixture(scope="module")
+def looker(luxo: Creature) -> Clearance:
+    return Clearance(luxo)
+
+
+def posed(
+    creature: Creature, ahead: float, up: float = 0.0, joints: object = None
+) -> mujoco.MjData:
+    """Standing (or with these joint angles) so far ahead of the start and above the floor, m."""
+    data = mujoco.MjData(creature.model)
+    data.qpos[:] = creature.stand_qpos
+    data.qpos[[0, 2]] += ahead, up
+    if joints is not None:
+        data.qpos[creature.qpos_adr] = joints
+    mujoco.mj_kinematics(creature.model, data)
+    return data
+
+
+def sensed(creature: Creature, data: mujoco.MjData) -> Sensed:
+    """What evolution would know of it; heights by MuJoCo's kinematics."""
+    model, low = creature.model, []
+    for g in creature.watched:
+        ball, box, round_part = support_extents(model.geom_type[g], model.geom_size[g])
+        down = data.geom_xmat[g].reshape(3, 3)[2]
+        reach = ball + np.abs(down) @ box + np.linalg.norm(down * round_part)
+        low.append(data.geom_xpos[g, 2] - reach)
+    still = jnp.zeros(3)
+    return Sensed(
+        joint_pos=jnp.float32(data.qpos[creature.qpos_adr]),
+        joint_vel=jnp.zeros(len(creature.stand)),
+        bias=jnp.zeros(creature.nv),
+        trunk_pos=jnp.float32(data.xpos[creature.trunk]),
+        trunk_rot=jnp.float32(data.xmat[creature.trunk].reshape(3, 3)),
+        trunk_vel=still,
+        trunk_angvel=still,
+        geom_pos=jnp.float32(data.geom_xpos[creature.watched]),
+        geom_low=jnp.float32(np.array(low)),
+    )
+
+
+def depth(creature: Creature, data: mujoco.MjData, height: float = HEIGHT) -> float:
+    return float(intrusion(creature, sensed(creature, data), height))
+
+
+def clearance(looker: Clearance, data: mujoco.MjData, height: float = HEIGHT) -> float:
+    bar = np.array([[BAR_PLACE, height]])
+    return float(looker.of(data.geom_xpos[None], data.geom_xmat[None], bar)[0])
+
+
+# Evolution
+
+
+def test_who_stands_below_the_bar_is_in_it_by_what_is_higher(luxo: Creature):
+    """The highest point of the lamp is at 0.42 m, ahead of its base."""
+    deep = depth(luxo, posed(luxo, BAR_PLACE - 0.1))
+    assert 0.42 - HEIGHT <= deep < 0.42 - HEIGHT + 0.03
+    assert depth(luxo, posed(luxo, BAR_PLACE - 0.1), height=0.45) == 0.0
+
+
+def test_who_is_away_from_it_is_clear(luxo: Creature):
+    assert depth(luxo, posed(luxo, 0.0)) == 0.0
+    assert depth(luxo, posed(luxo, BAR_PLACE + 0.4)) == 0.0
+
+
+def test_it_is_no_better_to_fly_over(luxo: Creature):
+    deep = [depth(luxo, posed(luxo, BAR_PLACE, up)) for up in (0.0, 0.3, 0.6, 1.0)]
+    assert min(deep) > 0
+    assert all(np.diff(deep) > 0.2)
+
+
+def poses(creature: Creature, count: int) -> list[mujoco.MjData]:
+    """Anything it can do around the bar, some of it high up."""
+    rng = np.random.default_rng(0)
+    return [
+        posed(
+            creature,
+            BAR_PLACE + rng.uniform(-0.4, 0.4),
+            abs(rng.normal(0.0, 0.05)),
+            rng.uniform(creature.pose_low, creature.pose_high),
+        )
+        for _ in range(count)
+    ]
+
+
+@pytest.mark.parametrize("height", [0.25, 0.3, 0.35])
+def test_what_evolution_takes_for_clear_is_clear(luxo: Creature, looker: Clearance, height: float):
+    """Of all parts, rods and springs between the watched geoms too."""
+    found = [(depth(luxo, d, height), clearance(looker, d, height)) for d in poses(luxo, 400)]
+    deep, clear = np.array(found).T
+    assert (deep == 0).sum() > 50
+    assert clear[deep == 0].min() > 0
+
+
+def test_it_is_not_much_too_careful(luxo: Creature):
+    """Who is lower than the bar by 3.5 cm, or farther than that before or behind it, is clear."""
+    for data in poses(luxo, 200):
+        tops = data.geom_xpos[1:, 2] + luxo.model.geom_rbound[1:]
+        assert depth(luxo, data, float(tops.max()) + 0.035) == 0
+    assert depth(luxo, posed(luxo, BAR_PLACE - 0.15928 - 0.035)) == 0
+
+
+def test_the_bar_is_sensed(luxo: Creature):
+    for ahead in (0.0, 0.2, 1.0):
+        value = bar_distance(luxo, sensed(luxo, posed(luxo, ahead)))
+        assert float(value) == pytest.approx(BAR_PLACE - ahead, abs=1e-6)
+
+
+def test_the_deepest_counts_and_a_run_through_the_bar_is_worth_less(luxo: Creature):
+    task = Limbo(luxo, STEP, HORIZON, luxo.settings.termination)
+    moments = [sensed(luxo, posed(luxo, ahead)) for ahead in (0.0, 0.5, 1.4)]
+    tally = task.init()
+    for moment in moments:
+        tally = task.update(tally, moment, jnp.zeros(3), jnp.float32(HEIGHT), jnp.float32(1.4))
+    assert float(tally.bar) == pytest.approx(depth(luxo, posed(luxo, 0.5)))
+    terms = task.judge(tally, LimboConfig())
+    deep = float(tally.bar) / luxo.hip_height
+    assert float(terms["bar"]) == pytest.approx(deep / (deep + 0.1), rel=1e-5)
+    clear = task.judge(dataclasses.replace(tally, bar=jnp.zeros(())), LimboConfig())
+    assert float(clear["bar"]) == 0.0
+    assert all(float(clear[name]) == float(terms[name]) for name in task.terms if name != "bar")
+    assert float(task.outcome(tally)["bar"]) == float(tally.bar)
+
+
+def test_to_run_through_the_bar_is_better_than_to_stay_before_it(luxo: Creature):
+    """Else nobody would ever learn to get beneath it."""
+    task = Limbo(luxo, STEP, HORIZON, luxo.settings.termination)
+    weights = signed_weights(LimboConfig(), jnp.int32(1000))
+    assert set(weights) == set(task.terms)
+    assert sum(float(w) for w in weights.values()) > 2 * float(weights["distance"])
+
+
+def test_all_goals_lie_beyond_the_bar(luxo: Creature):
+    task = Limbo(luxo, STEP, HORIZON, luxo.settings.termination)
+    goals = np.asarray(task.trials(jax.random.key(0), luxo, RolloutConfig(starts=100)).goal)
+    assert goals[0] == np.float32(evolution.NOMINAL_GOAL)
+    assert goals.min() > BAR_PLACE + luxo.body_length
+    with pytest.raises(UserError, match=r"slope:0.1.*flat"):
+        task.trials(jax.random.key(0), luxo, RolloutConfig(ground="slope:0.1"))
+
+
+def test_a_lower_bar_is_a_setting_of_the_same_program(stool: Creature):
+    tables = [{"fitness": {"height": height}} for height in (0.1, 5.0)]
+    common = {"use": {"task": "limbo"}, "evolution": {"population": 6}}
+    rollout = {"seconds": 0.2, "starts": 2, "lanes": 4, "physics": "mjx"}
+    built = [
+        build_experiment(stool, build_config({**common, **table, "rollout": rollout}, "test"))
+        for table in tables
+    ]
+    low, high = (experiment.row.settings for experiment in built)
+    assert jax.tree.structure(low) == jax.tree.structure(high)
+
+
+# The examiner
+
+
+def test_evolution_and_examiner_mean_the_same_bar_and_the_same_goals():
+    demands = Demanded()
+    assert (demands.place, EXAMINED_RADIUS) == (BAR_PLACE, evolution.BAR_RADIUS)
+    assert demands.height == LimboConfig().height == HEIGHT
+    assert (demands.goals, demands.nominal) == (evolution.GOALS, evolution.NOMINAL_GOAL)
+
+
+def test_the_clearance_is_the_distance_of_the_nearest_part(luxo: Creature, looker: Clearance):
+    """Of the foremost: the rim of the shade, 0.159 m ahead of the base's middle."""
+    front = BAR_PLACE - EXAMINED_RADIUS - 0.15928
+    assert clearance(looker, posed(luxo, front - 0.03)) == pytest.approx(0.03, abs=1e-3)
+    assert clearance(looker, posed(luxo, front + 0.01)) == pytest.approx(-0.01, abs=2e-3)
+    assert clearance(looker, posed(luxo, 0.0)) == FAR
+    # 0.4199 m high, below a bar at 0.45 m.
+    assert clearance(looker, posed(luxo, BAR_PLACE - 0.09), 0.45) == pytest.approx(0.03, abs=2e-3)
+
+
+def test_above_the_bar_nothing_is_clear(luxo: Creature, looker: Clearance):
+    assert clearance(looker, posed(luxo, BAR_PLACE, up=1.0)) < 0
+
+
+def test_each_simulation_has_its_own_bar(luxo: Creature, looker: Clearance):
+    data = posed(luxo, 0.0)
+    pos, rot = (np.repeat(a[None], 3, 0) for a in (data.geom_xpos, data.geom_xmat))
+    bars = np.array([[0.2, 0.35], [0.1, 0.45], [5.0, 0.1]])
+    close, below, far = looker.of(pos, rot, bars)
+    assert (close, far) == (pytest.approx(0.2 - 0.01 - 0.159, abs=1e-3), FAR)
+    assert below == pytest.approx(0.45 - 0.42, abs=5e-3)
+
+
+def became(clear: list[float]) -> Outcome:
+    """Ways to the goal that all arrive."""
+    count = len(clear)
+    path, nothing = np.full((count, 4400), 1.4), np.zeros((0, 4400))
+    film = Trajectory(STEP, *[nothing] * 5)
+    return Outcome(np.full(count, np.inf), np.zeros((count, 2)), path, np.array(clear), film)
+
+
+def test_of_the_disturbed_only_those_succeed_that_are_clear(luxo: Creature):
+    starts = DEMANDS.aimed(nominal_starts(luxo, 4), CONFIG)
+    outcome = became([0.1, 0.001, -0.001, np.nan])
+    assert DEMANDS.succeeded(outcome, starts, CONFIG).tolist() == [True, True, False, False]
+
+
+def still(creature: Creature) -> Champion:
+    """One that stands."""
+    made = pose_champion(creature, np.stack([creature.stand] * 2), {})
+    return dataclasses.replace(made, task="limbo")
+
+
+def standing(creature: Creature, goal: float, bar: float) -> Recording:
+    """One that stands, with its goal and a bar at such places."""
+    starts = nominal_starts(creature, 1)
+    starts.goal[:], starts.bar[:] = goal, (bar, HEIGHT)
+    return record(creature, still(creature), 6.0, start=starts)
+
+
+@pytest.mark.parametrize(
+    ("bar", "failed"), [(0.6, set()), (0.1, {3}), (-0.1, set())], ids=["far", "head", "low elbow"]
+)
+def test_criterion_3_no_part_touches_the_bar(luxo: Creature, bar: float, failed: set[int]):
+    recording = standing(luxo, 0.001, bar)
+    criteria = DEMANDS.basic(recording, CONFIG)
+    assert {c.number for c in criteria if not c.passed} - {2} == failed
+
+
+def test_perturbed_starts_are_watched_too(luxo: Creature):
+    starts = DEMANDS.aimed(perturbed_starts(luxo, 3, np.random.default_rng(0)), CONFIG)
+    starts.bar[1:, 0] = 0.1, 0.25
+    outcome = simulate(luxo, still(luxo), starts, 0.2)
+    assert outcome.clearance[0] == FAR
+    assert outcome.clearance[1] < 0 < outcome.clearance[2] < FAR
+
+
+def test_who_is_worth_an_examination(luxo: Creature):
+    there = {"left": np.zeros(2), "seconds": np.full(2, 8.0)}
+    assert DEMANDS.promising(there | {"bar": np.zeros(2)}, 8.0, luxo)
+    assert not DEMANDS.promising(there | {"bar": np.array([0.0, 0.001])}, 8.0, luxo)
+
+
+def test_a_short_run_ends_with_a_champion_and_a_verdict(tmp_path: Path, capsys):
+    folder, short = tmp_path / "run", tmp_path / "short.toml"
+    short.write_text(SHORT + "[limbo]\nstay = 1.0\n")
+    small = "--population 6 --generations 1 --rollout.seconds 0.4 --rollout.lanes 4"
+    rest = "--examination.candidates 0 --no-plots --task limbo --controller.senses b0 a0"
+    said_by(
+        capsys, "train", "--env", "luxo", *small.split(), *rest.split(), "--out", folder, code=0
+    )
+    champion = json.loads((folder / "champion.json").read_text())
+    assert list(champion["terms"]) == list(Limbo.terms)
+    assert set(champion["origin"]["nominal"]) == {"left", "arrival", "seconds", "bar"}
+    said_by(capsys, "certify", folder, "--config", short, code=0)
+    certificate = json.loads((folder / "certificate.json").read_text())
+    assert [c["number"] for c in certificate["criteria"]] == [1, 2, 3, 4, 6, 8, 9]
+    assert certificate["report"]["goal"] == evolution.NOMINAL_GOAL

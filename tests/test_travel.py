@@ -1,0 +1,158 @@
+"""Travelling: a goal that moves on when it is reached, in evolution and in the examination."""
+
+import dataclasses
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from certify_made_up import walk
+from test_hop import ALIKE, HORIZON, REACH, STEP, moment
+
+from mjxgait.certify import CertificateConfig
+from mjxgait.certify.config import TravelConfig as Demanded
+from mjxgait.certify.measure import Recording
+from mjxgait.certify.outcome import Outcome, Trajectory
+from mjxgait.certify.simulate import simulate
+from mjxgait.certify.starts import nominal_starts
+from mjxgait.certify.tasks import demands_of
+from mjxgait.creature import Creature
+from mjxgait.parts.own import load
+from mjxgait.parts.settings import build_config
+from mjxgait.runs.experiment import build_experiment
+from mjxgait.settings.hop import GOALS, NEAR, NOMINAL_GOAL, TravelConfig
+from mjxgait.tasks.hop.travel import Aim, Travel
+
+CONFIG, DEMANDS = CertificateConfig(), demands_of("travel")
+
+
+def task(creature: Creature) -> Travel:
+    return Travel(creature, STEP, HORIZON, creature.settings.termination)
+
+
+def aim(goal: float, spacing: float) -> Aim:
+    return Aim(jnp.float32(goal), jnp.float32(spacing))
+
+
+@pytest.mark.parametrize(
+    ("forward", "goal"), [(0.0, 1.0), (0.94, 1.0), (0.96, 1.5), (1.2, 1.5), (1.44, 1.5)]
+)
+def test_a_goal_that_is_near_or_passed_moves_on_by_a_stride(
+    stool: Creature, forward: float, goal: float
+):
+    """Of half a metre, so near is 2.5 cm from it."""
+    moved = task(stool).onward(aim(1.0, 0.5), moment(stool, forward + 0.02))
+    assert float(moved.goal) == pytest.approx(goal)
+    assert float(moved.spacing) == 0.5
+
+
+def test_evolution_and_examiner_move_goals_alike(stool: Creature):
+    rng = np.random.default_rng(0)
+    first = rng.uniform(*GOALS, 200)
+    goal, way = first * rng.integers(1, 4, 200), rng.uniform(-1, 6, 200)
+    theirs = DEMANDS.onward(goal, first, way)
+    ours = [
+        float(task(stool).onward(aim(g, f), moment(stool, w)).goal)
+        for g, f, w in zip(goal, first, way, strict=True)
+    ]
+    np.testing.assert_allclose(ours, theirs, atol=1e-5)
+    assert 0 < (theirs > goal).sum() < 200
+
+
+def test_the_goal_of_other_tasks_stays(stool: Creature):
+    goal, way = np.array([1.0, 0.4]), np.array([1.0, 3.0])
+    for name in ("walk", "hop", "limbo"):
+        assert demands_of(name).onward(goal, goal, way) is goal
+
+
+def test_what_counts_is_the_way_and_what_is_told_are_the_goals(stool: Creature):
+    travel, goal = task(stool), aim(0.5, 0.5)
+    tally = travel.init()
+    assert float(travel.outcome(tally)["way"]) == 0
+    for forward in (0.0, 0.3, 0.49, 0.8, 1.01, 1.1):
+        sensed = moment(stool, forward)
+        tally = travel.update(tally, sensed, jnp.zeros(4), (), goal)
+        goal = travel.onward(goal, sensed)
+    told = travel.outcome(tally)
+    assert (float(told["goals"]), float(told["way"])) == (2.0, pytest.approx(1.1, abs=1e-6))
+    terms = travel.judge(tally, TravelConfig())
+    assert set(terms) == set(travel.terms)
+    assert float(terms["distance"]) == pytest.approx(1 - 1.1 / NOMINAL_GOAL, abs=1e-6)
+    far = dataclasses.replace(tally, goal=jnp.float32(9.0), left=jnp.float32(0.3))
+    assert float(travel.judge(far, TravelConfig())["distance"]) < -6
+
+
+def test_a_controller_is_told_the_same_moving_goals(
+    stool: Creature, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """Strides of a few millimetres, so that all are reached in a fraction of a second."""
+    monkeypatch.setattr(Travel, "goals", (0.004, 0.012))
+    monkeypatch.setattr(Travel, "nominal", 0.008)
+    (tmp_path / "reach.py").write_text(REACH.replace("0.4 * plan", "40.0 * plan"))
+    name = load("controller", f"{tmp_path / 'reach.py'}:Reach")
+    table = {
+        "use": {"task": "travel", "controller": name},
+        "evolution": {"population": 6},
+        "rollout": {"seconds": 0.4, "starts": 3, "lanes": 4, "physics": "mjx", **ALIKE},
+    }
+    experiment = build_experiment(stool, build_config(table, "test"))
+    state = experiment.init()
+    tally = jax.device_get(jax.jit(experiment.simulate)(state.genomes).tally)
+    best = int(tally.reached.sum(1).argmax())
+    assert tally.reached[best].max() >= 1
+    starts = nominal_starts(stool, 3)
+    starts.goal[:] = experiment.starts.goal
+    champion = experiment.champion(state, {}, best)
+    path = simulate(stool, champion, starts, 0.4).path[:, -2]
+    np.testing.assert_allclose((tally.goal - tally.left)[best], path, atol=1e-4)
+
+
+# The examiner
+
+
+def test_the_examiner_and_evolution_mean_the_same_goals():
+    demands = Demanded()
+    assert (demands.goals, demands.nominal, demands.near) == (GOALS, NOMINAL_GOAL, NEAR)
+
+
+def way(*places: tuple[float, float]) -> np.ndarray:
+    """[T] m ahead through these times in s and places in m, of 22 s."""
+    return np.interp(np.arange(4400) * STEP, *zip(*places, strict=True))
+
+
+def recorded(forward: np.ndarray) -> Recording:
+    path = np.stack([forward, 0 * forward, 0 * forward + 0.4], 1)
+    return dataclasses.replace(walk(), trunk_pos=path, goal=NOMINAL_GOAL)
+
+
+@pytest.mark.parametrize(
+    ("forward", "passes"),
+    [
+        (way((0, 0), (22, 4.4)), True),
+        (way((0, 0), (22, 3.0)), False),
+        (way((0, 0), (11, 4.0), (22, 4.5)), False),
+        (way((0, 0), (22, -4.0)), False),
+        (np.full(4400, np.nan), False),
+    ],
+    ids=["travels", "slow", "stops", "backwards", "blew up"],
+)
+def test_criterion_2_it_gets_on_and_does_not_stop(forward: np.ndarray, passes: bool):
+    assert DEMANDS.second(recorded(forward), CONFIG).passed is passes
+
+
+def test_the_report_counts_goals():
+    report = DEMANDS.report(recorded(way((0, 0), (22, 3.7))), CONFIG)
+    assert (report["goals"], report["way"]) == (3, pytest.approx(3.7, abs=1e-3))
+
+
+def test_of_the_disturbed_those_succeed_that_are_fast_enough_and_up(stool: Creature):
+    path = np.stack([way((0, 0), (22, end)) for end in (4.0, 3.0, 4.0)])
+    film = Trajectory(STEP, *[np.zeros((0, 4400))] * 5)
+    clear = np.full(3, np.inf)
+    outcome = Outcome(np.array([np.inf, np.inf, 20.0]), np.zeros((3, 2)), path, clear, film)
+    starts = DEMANDS.aimed(nominal_starts(stool, 3), CONFIG)
+    assert DEMANDS.succeeded(outcome, starts, CONFIG).tolist() == [True, False, False]
+    promising = {"way": np.full(2, 0.15 * 8 + 0.01), "seconds": np.full(2, 8.0)}
+    assert DEMANDS.promising(promising, 8.0, stool)
+    assert not DEMANDS.promising(promising | {"way": np.array([2.0, 1.0])}, 8.0, stool)
