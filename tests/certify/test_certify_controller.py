@@ -1,6 +1,7 @@
 """The NumPy controller against docs/controller.md, by hand."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -273,7 +274,8 @@ def test_the_senses_that_tasks_add_are_those_of_evolution(tiny):
     found = {}
     for make in SHIPPED["task"].values():
         task = make()(tiny, STEP, 1000, tiny.settings.termination)
-        found |= task.senses(jnp.float32(0.8), sensed)
+        aim = task.aim(SimpleNamespace(goal=jnp.float32(0.8)))
+        found |= task.senses(aim, sensed)
         assert set(task.adds) <= set(found)
     assert found.keys() == ADDED.keys()
     for name, value in found.items():
