@@ -78,6 +78,7 @@ def tensors(numbers: Any) -> np.ndarray:
     return whole / moments.max()
 
 
+@pytest.mark.parametrize("shipped", ["crab", "duck"], indirect=True)
 def test_a_lanes_body_is_the_one_in_the_scaled_files(shipped: Creature):
     compare_with_the_scaled_files(shipped, fast_plant)
 
@@ -106,6 +107,7 @@ def compare_with_the_scaled_files(shipped: Creature, make: Any) -> None:
     np.testing.assert_allclose(tensors(ours), tensors(theirs), rtol=0, atol=1e-5)
 
 
+@pytest.mark.parametrize("shipped", ["crab", "luxo"], indirect=True)
 def test_it_stands_as_high_above_the_floor(shipped: Creature):
     known, sizes = proportions(shipped), some_sizes(shipped, 4)
     plant = fast_plant(shipped.model, sense_layout(shipped), None)

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
-from helpers import SHORT, pose_champion, said_by
+from helpers import SHORT, STOOL, pose_champion, said_by
 
 from mjxgait.certify import CertificateConfig, record
 from mjxgait.certify.bar import FAR, Clearance
@@ -283,10 +283,8 @@ def test_a_short_run_ends_with_a_champion_and_a_verdict(tmp_path: Path, capsys):
     folder, short = tmp_path / "run", tmp_path / "short.toml"
     short.write_text(SHORT + "[limbo]\nstay = 1.0\n")
     small = "--population 6 --generations 1 --rollout.seconds 0.4 --rollout.lanes 4"
-    rest = "--examination.candidates 0 --no-plots --task limbo --controller.senses b0 a0"
-    said_by(
-        capsys, "train", "--env", "luxo", *small.split(), *rest.split(), "--out", folder, code=0
-    )
+    rest = "--examination.candidates 0 --no-plots --task limbo"
+    said_by(capsys, "train", "--env", STOOL, *small.split(), *rest.split(), "--out", folder, code=0)
     champion = json.loads((folder / "champion.json").read_text())
     assert list(champion["terms"]) == list(Limbo.terms)
     assert set(champion["origin"]["nominal"]) == {"left", "arrival", "seconds", "bar"}
