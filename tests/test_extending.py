@@ -1,5 +1,6 @@
 """docs/extending.md does what it says."""
 
+import csv
 import json
 import re
 import shlex
@@ -88,6 +89,7 @@ env = "{STOOL.as_posix()}"
 seeds = 2
 generations = 1
 certify = false
+grounds = ["flat", "rough:0.1"]
 
 [base]
 use = {{ controller = "my.py:Spin" }}
@@ -104,12 +106,15 @@ settings = {{ evolution = {{ mutation_rate = 0.2 }} }}
 
 
 def test_it_takes_part_in_studies(folder: Path, monkeypatch: pytest.MonkeyPatch):
-    """The processes that measure champions load it as well."""
+    """The processes that measure champions, here on two grounds, load it as well."""
     monkeypatch.chdir(folder)
     (folder / "study.toml").write_text(STUDY)
     assert call("ablate study.toml --controller my.py:Spin --out study") == 0
-    lines = (folder / "study" / "results.csv").read_text().splitlines()
-    assert len(lines) == 1 + 4
+    with (folder / "study" / "results.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 4
+    assert any(row["walk"] != row["walk on rough:0.1"] for row in rows)
+    assert "## On rough:0.1" in (folder / "study" / "report.md").read_text()
 
 
 def test_no_code_is_loaded_from_a_run(trained: Path, capfd, monkeypatch):
