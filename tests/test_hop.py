@@ -237,16 +237,20 @@ class Reach(RealController):
 ALIKE = {"joint_noise": 0.0, "velocity_noise": 0.0, "friction": (1.0, 1.0), "gains": 0.0, "push": 0}
 
 
-def test_evolution_and_examiner_tell_a_controller_the_same_goals(stool: Creature, tmp_path: Path):
+def reaching(stool: Creature, folder: Path, task: str, source: str = REACH) -> Experiment:
     """Trials that differ in nothing but their goals, by a controller that does as it reads."""
-    (tmp_path / "reach.py").write_text(REACH)
-    name = load("controller", f"{tmp_path / 'reach.py'}:Reach")
+    (folder / "reach.py").write_text(source)
+    name = load("controller", f"{folder / 'reach.py'}:Reach")
     table = {
-        "use": {"task": "hop", "controller": name},
+        "use": {"task": task, "controller": name},
         "evolution": {"population": 6},
         "rollout": {"seconds": 0.4, "starts": 3, "lanes": 4, "physics": "mjx", **ALIKE},
     }
-    experiment = build_experiment(stool, build_config(table, "test"))
+    return build_experiment(stool, build_config(table, "test"))
+
+
+def test_evolution_and_examiner_tell_a_controller_the_same_goals(stool: Creature, tmp_path: Path):
+    experiment = reaching(stool, tmp_path, "hop")
     state = experiment.init()
     tally = jax.device_get(jax.jit(experiment.simulate)(state.genomes).tally)
     starts = nominal_starts(stool, 3)

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from certify_made_up import walk
-from test_hop import ALIKE, HORIZON, REACH, STEP, moment
+from test_hop import HORIZON, REACH, STEP, moment, reaching
 
 from mjxgait.certify import CertificateConfig
 from mjxgait.certify.config import TravelConfig as Demanded
@@ -18,9 +18,6 @@ from mjxgait.certify.simulate import simulate
 from mjxgait.certify.starts import nominal_starts
 from mjxgait.certify.tasks import demands_of
 from mjxgait.creature import Creature
-from mjxgait.parts.own import load
-from mjxgait.parts.settings import build_config
-from mjxgait.runs.experiment import build_experiment
 from mjxgait.settings.hop import GOALS, NEAR, NOMINAL_GOAL, TravelConfig
 from mjxgait.tasks.hop.travel import Aim, Travel
 
@@ -89,14 +86,8 @@ def test_a_controller_is_told_the_same_moving_goals(
     """Strides of a few millimetres, so that all are reached in a fraction of a second."""
     monkeypatch.setattr(Travel, "goals", (0.004, 0.012))
     monkeypatch.setattr(Travel, "nominal", 0.008)
-    (tmp_path / "reach.py").write_text(REACH.replace("0.4 * plan", "40.0 * plan"))
-    name = load("controller", f"{tmp_path / 'reach.py'}:Reach")
-    table = {
-        "use": {"task": "travel", "controller": name},
-        "evolution": {"population": 6},
-        "rollout": {"seconds": 0.4, "starts": 3, "lanes": 4, "physics": "mjx", **ALIKE},
-    }
-    experiment = build_experiment(stool, build_config(table, "test"))
+    source = REACH.replace("0.4 * plan", "40.0 * plan")
+    experiment = reaching(stool, tmp_path, "travel", source)
     state = experiment.init()
     tally = jax.device_get(jax.jit(experiment.simulate)(state.genomes).tally)
     best = int(tally.reached.sum(1).argmax())

@@ -79,15 +79,12 @@ def measure_here(creature: str, point: Point) -> dict[str, Any]:
     Memory in MiB, at most.
     """
     from mjxgait.bench.ours import Ours
+    from mjxgait.bench.workload import walking
     from mjxgait.creature import load_creature
-    from mjxgait.parts import resolve_config
-    from mjxgait.settings.config import UseConfig
     from mjxgait.settings.shipped import find_creature
 
     folder = find_creature(creature)
-    settings = load_creature(folder).settings
-    walking = dataclasses.asdict(UseConfig())
-    config = resolve_config(settings.train, settings.creature.name, use=walking)
+    config = walking(load_creature(folder).settings)
     rollout = dataclasses.replace(
         config.rollout, starts=point.starts, seconds=point.seconds, lanes=point.lanes
     )

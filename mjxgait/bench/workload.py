@@ -11,7 +11,15 @@ import numpy as np
 
 from mjxgait.certify.twins.poses import pose_cycle
 from mjxgait.creature import Creature, load_creature
-from mjxgait.settings.config import Config
+from mjxgait.creature.settings import CreatureSettings
+from mjxgait.parts import resolve_config
+from mjxgait.settings.config import Config, UseConfig
+
+
+def walking(settings: CreatureSettings) -> Config:
+    """The settings in a contest: the rivals walk by key poses, whatever else the creature does."""
+    use = dataclasses.asdict(UseConfig())
+    return resolve_config(settings.train, settings.creature.name, use=use)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

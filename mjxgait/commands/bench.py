@@ -10,8 +10,6 @@ import tyro
 
 from mjxgait.creature import load_creature
 from mjxgait.errors import UserError
-from mjxgait.parts import resolve_config
-from mjxgait.settings.config import UseConfig
 from mjxgait.settings.shipped import data_folder, find_creature
 
 
@@ -81,11 +79,10 @@ def _folders(names: Sequence[str]) -> list[Path]:
 
 def _measured(folder: Path, options: BenchOptions) -> dict[str, Any]:
     from mjxgait.bench.contest import contest
+    from mjxgait.bench.workload import walking
 
     settings = load_creature(folder).settings
-    # The rivals walk by key poses, whatever else the creature usually does.
-    walking = dataclasses.asdict(UseConfig())
-    config = resolve_config(settings.train, settings.creature.name, use=walking)
+    config = walking(settings)
     evolution = dataclasses.replace(config.evolution, population=options.population)
     # The rivals' joints all have the creature's own gains.
     rollout = dataclasses.replace(config.rollout, gains=0.0)

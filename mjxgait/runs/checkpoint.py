@@ -91,7 +91,7 @@ class Checkpoints:
         )
         size = sum(leaf.nbytes for leaf in arrays.values())
         with disk_errors(self._folder):
-            # Where Orbax cannot make its folder, its threads wait five minutes for one another.
+            # Told before anything of it is written.
             try_room(self._folder, 2 * size + OVERHEAD)
             self._manager.save(manifest.generation, args=args, force=True)
 

@@ -62,7 +62,9 @@ def _of_goals(walk: Walk) -> Figures:
     """The way to a goal; nothing where there is none."""
     if walk.marked is None:
         return {}
-    return {"strobe": (strobe.shape(walk), lambda drawing: strobe.draw_strobe(drawing, walk))}
+    picture = strobe.strobe(walk)
+    shape = strobe.shape(picture)
+    return {"strobe": (shape, lambda drawing: strobe.draw_strobe(drawing, walk, picture))}
 
 
 def _of_programs(walk: Walk) -> Figures:

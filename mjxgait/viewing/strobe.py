@@ -37,22 +37,20 @@ def strobe(walk: Walk) -> Image.Image:
     )
 
 
-def draw_strobe(drawing: Figure, walk: Walk) -> None:
+def draw_strobe(drawing: Figure, walk: Walk, picture: Image.Image) -> None:
     """The picture as a figure, so that it can be saved like the plots."""
     frames = moments(walk)
     axes = drawing.subplots()
-    axes.imshow(strobe(walk), interpolation="lanczos")
+    axes.imshow(picture, interpolation="lanczos")
     axes.set_axis_off()
     name, seconds = walk.creature.name.replace("_", " "), frames[-1] * walk.time_step
     axes.set_title(f"{name}: {len(frames)} moments of {seconds:.1f} s")
 
 
-def shape(walk: Walk) -> tuple[float, float]:
+def shape(picture: Image.Image) -> tuple[float, float]:
     """Inches of the figure."""
-    stage, frames = Stage([walk], 2 * HEIGHT, HEIGHT), moments(walk)
-    camera = _camera(stage, walk, frames)
-    width = min(14.0, 4.0 * camera.width / camera.height)
-    return width, width * camera.height / camera.width + 0.4
+    width = min(14.0, 4.0 * picture.width / picture.height)
+    return width, width * picture.height / picture.width + 0.4
 
 
 def _camera(stage: Stage, walk: Walk, frames: np.ndarray) -> Camera:

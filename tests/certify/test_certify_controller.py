@@ -263,6 +263,18 @@ def test_the_senses_are_those_of_evolution(tiny):
         assert name == "time" or np.any(ours != 0), name
 
 
+@pytest.mark.parametrize(("time", "beat"), [(0.0, -1.0), (0.75, 0.5), (1.0, -1.0), (7.25, -0.5)])
+def test_the_beat_begins_anew_every_second(tiny, time, beat):
+    import jax.numpy as jnp
+
+    from mjxgait import senses as evolution
+
+    state, sensed = askew(tiny)
+    state = dataclasses.replace(state, time=np.array([time]))
+    assert sense(tiny, state, ["beat"])["beat"].tolist() == [beat]
+    assert float(evolution.sense(tiny, sensed, jnp.float32(time), ["beat"])["beat"]) == beat
+
+
 def test_the_senses_that_tasks_add_are_those_of_evolution(tiny):
     """Every name of every shipped task."""
     import jax.numpy as jnp

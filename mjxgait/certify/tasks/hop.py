@@ -12,6 +12,7 @@ from mjxgait.certify.measure import Recording
 from mjxgait.certify.outcome import Outcome
 from mjxgait.certify.starts import Starts
 from mjxgait.certify.tasks.goals import GoalDemands
+from mjxgait.certify.tasks.staying import to_the_end
 from mjxgait.creature import Creature
 
 
@@ -62,11 +63,9 @@ class HopDemands(GoalDemands):
         """See `Demands`: up to the end, and near enough to be near every goal, in as many of its
         trials as the examiner asks for.
         """
-        # Half a step, for an episode lasts a whole number of them.
-        whole = seconds - 0.5 * creature.model.opt.timestep
         demands = self.wanted(CertificateConfig())
         near = outcome["left"] <= demands.near * demands.goals[1]
-        return bool(((outcome["seconds"] > whole) & near).mean() >= demands.arrive)
+        return bool((to_the_end(outcome, seconds, creature) & near).mean() >= demands.arrive)
 
 
 def farthest(left: np.ndarray, goal: np.ndarray, frames: int) -> np.ndarray:

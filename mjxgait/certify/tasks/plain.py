@@ -9,7 +9,7 @@ from mjxgait.certify.config import CertificateConfig
 from mjxgait.certify.criteria import Criterion, at_most, parts, physics, speed, upright
 from mjxgait.certify.describe import worst_overlap
 from mjxgait.certify.measure import Recording
-from mjxgait.certify.tasks.staying import StaysUp
+from mjxgait.certify.tasks.staying import StaysUp, to_the_end
 from mjxgait.creature import Creature
 
 
@@ -58,7 +58,7 @@ class PlainDemands(StaysUp):
         self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
     ) -> bool:
         """See `Demands`: to the end in all its trials."""
-        return bool((outcome["seconds"] > seconds - 0.5 * creature.model.opt.timestep).all())
+        return bool(to_the_end(outcome, seconds, creature).all())
 
     def _basic(self, whole: Recording, config: CertificateConfig) -> tuple[Criterion, ...]:
         window = whole.window(config.warmup)

@@ -1,5 +1,7 @@
 """What most tasks have in common in the examination: who is disturbed must stay up."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from mjxgait.certify import criteria
@@ -7,6 +9,7 @@ from mjxgait.certify.config import CertificateConfig
 from mjxgait.certify.criteria import Criterion
 from mjxgait.certify.outcome import Fall, Outcome
 from mjxgait.certify.starts import Starts
+from mjxgait.creature import Creature
 
 
 class StaysUp:
@@ -35,3 +38,10 @@ class StaysUp:
     ) -> tuple[Criterion, ...]:
         """See `Demands`: 4 and 5."""
         return criteria.starts(started, config), criteria.pushes(pushed, config)
+
+
+def to_the_end(outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature) -> np.ndarray:
+    """Which [R] of an individual's trials in evolution lasted as long as an episode does."""
+    # Half a step, for an episode lasts a whole number of them.
+    lasted: np.ndarray = outcome["seconds"] > seconds - 0.5 * creature.model.opt.timestep
+    return lasted

@@ -12,6 +12,7 @@ from mjxgait.certify.measure import Recording
 from mjxgait.certify.outcome import Outcome
 from mjxgait.certify.starts import Starts
 from mjxgait.certify.tasks.goals import GoalDemands
+from mjxgait.certify.tasks.staying import to_the_end
 from mjxgait.creature import Creature
 
 
@@ -69,6 +70,5 @@ class TravelDemands(GoalDemands):
         self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
     ) -> bool:
         """See `Demands`: up to the end and fast enough in all its trials."""
-        whole = seconds - 0.5 * creature.model.opt.timestep
         fast = outcome["way"] >= CertificateConfig().travel.speed * seconds
-        return bool((outcome["seconds"] > whole).all() and fast.all())
+        return bool(to_the_end(outcome, seconds, creature).all() and fast.all())

@@ -24,7 +24,7 @@ from mjxgait.certify.criteria import (
 from mjxgait.certify.describe import describe, slip_distance
 from mjxgait.certify.measure import Recording
 from mjxgait.certify.strides import clearances, stride_frequency, stride_starts
-from mjxgait.certify.tasks.staying import StaysUp
+from mjxgait.certify.tasks.staying import StaysUp, to_the_end
 from mjxgait.creature import Creature
 
 SPARE = 1.2
@@ -61,9 +61,8 @@ class WalkDemands(StaysUp):
     ) -> bool:
         """See `Demands`: up to the end in all its trials, and clearly faster than it must be."""
         wanted = SPARE * CertificateConfig().progress.speed * seconds * creature.body_length
-        # Half a step, for an episode lasts a whole number of them.
-        whole = seconds - 0.5 * creature.model.opt.timestep
-        return bool((outcome["seconds"] > whole).all() and (outcome["forward"] >= wanted).all())
+        lived = to_the_end(outcome, seconds, creature)
+        return bool(lived.all() and (outcome["forward"] >= wanted).all())
 
 
 def basic(whole: Recording, config: CertificateConfig) -> tuple[Criterion, Criterion, Criterion]:
