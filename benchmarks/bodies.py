@@ -111,8 +111,8 @@ def build(
 def start(creature: Creature, every: Any) -> BodyState:
     """Standing, the joints a little off, differently in each lane."""
     qpos = np.tile(creature.stand_qpos[:, None], LANES)
-    noise = np.random.default_rng(0).uniform(-0.1, 0.1, (len(creature.qpos_adr), LANES))
-    qpos[creature.qpos_adr] += noise
+    noise = np.random.default_rng(0).uniform(-0.1, 0.1, (len(creature.joints.qpos_adr), LANES))
+    qpos[creature.joints.qpos_adr] += noise
     still = jnp.zeros((creature.model.nv, LANES))
     return BodyState(jnp.asarray(qpos, jnp.float32), still, still, still, jnp.ones(LANES), every)
 
@@ -122,7 +122,12 @@ def follow(creature: Creature, plant: Plant, state: BodyState) -> tuple[BodyStat
     step = float(creature.model.opt.timestep)
     kp, kd, limit, goal = (
         np.float32(x)[:, None]
-        for x in (creature.kp, creature.kd, creature.torque_limit, creature.stand)
+        for x in (
+            creature.gains.kp,
+            creature.gains.kd,
+            creature.gains.torque_limit,
+            creature.joints.stand,
+        )
     )
     sensed, workings = plant.forward(state)
     pull = spd.pd_force(sensed.joint_pos, sensed.joint_vel, goal, kp, kd, step)
@@ -130,14 +135,14 @@ def follow(creature: Creature, plant: Plant, state: BodyState) -> tuple[BodyStat
     force = lift(pull) + state.constraint_force - sensed.bias
     braked = jnp.broadcast_to(step * kd, pull.shape)
     acceleration = plant.solve_damped(workings, lift(braked), force)
-    torque = spd.limited_torque(pull, acceleration[creature.dof_adr], braked, limit)
+    torque = spd.limited_torque(pull, acceleration[creature.joints.dof_adr], braked, limit)
     return plant.advance(state, workings, lift(torque)), sensed
 
 
 def lifted(creature: Creature, joints: jax.Array) -> jax.Array:
     """Joint values [J, L] at their places among the degrees of freedom, which are the last."""
-    first = int(creature.dof_adr[0])
-    assert list(creature.dof_adr) == list(range(first, creature.model.nv))
+    first = int(creature.joints.dof_adr[0])
+    assert list(creature.joints.dof_adr) == list(range(first, creature.model.nv))
     return jnp.pad(joints, ((first, 0), (0, 0)))
 
 

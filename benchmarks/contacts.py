@@ -71,7 +71,7 @@ def main() -> None:
         "body            placement points  near  ours, us (best)    C, us (best)  C/ours  compile"
     )
     for env in options.env:
-        own = len(load_creature(data_folder("envs") / env).foot_of)
+        own = len(load_creature(data_folder("envs") / env).feet.foot_of)
         for placement in options.placement:
             for count in (n for n in options.points if n >= own):
                 points.append(measure(env, placement, count, options.rounds))
@@ -128,7 +128,7 @@ def with_points(env: str, placement: str, count: int) -> Creature:
     plain = load_creature(folder)
     bodies = host_bodies(plain, placement)
     tree = ElementTree.fromstring((folder / "creature.xml").read_text(encoding="utf-8"))
-    names = [f"point{i}" for i in range(count - len(plain.foot_of))]
+    names = [f"point{i}" for i in range(count - len(plain.feet.foot_of))]
     for i, name in enumerate(names):
         body = bodies[i % len(bodies)]
         where = placed(plain, body, i // len(bodies), ABOVE[placement])
@@ -155,7 +155,7 @@ def with_points(env: str, placement: str, count: int) -> Creature:
 def host_bodies(creature: Creature, placement: str) -> list[int]:
     """Bodies that carry points; each has joints of its own."""
     if placement == "feet":
-        feet = creature.model.geom_bodyid[creature.watched[: len(creature.foot_of)]]
+        feet = creature.model.geom_bodyid[creature.feet.watched[: len(creature.feet.foot_of)]]
         return sorted({int(body) for body in feet})
     return [b for b in range(1, creature.model.nbody) if creature.model.body_jntnum[b]]
 
@@ -174,7 +174,11 @@ def placed(creature: Creature, body: int, turn: int, above: float) -> np.ndarray
 def tread(creature: Creature) -> Trace:
     """Stable PD in C MuJoCo, its targets swaying: the first lane stands, the last one treads."""
     rng, model = np.random.default_rng(0), quiet(creature)
-    data, mass, joints = mujoco.MjData(model), np.zeros((model.nv, model.nv)), creature.dof_adr
+    data, mass, joints = (
+        mujoco.MjData(model),
+        np.zeros((model.nv, model.nv)),
+        creature.joints.dof_adr,
+    )
     h, sign = float(model.opt.timestep), rng.choice([-1, 1], len(joints))
     states, torques = [], []
     for swing, phase in zip(np.linspace(0, 0.1, LANES), rng.uniform(0, 6, LANES), strict=True):
@@ -182,16 +186,18 @@ def tread(creature: Creature) -> Trace:
         data.qpos[:] = creature.stand_qpos
         for t in range(STEPS):
             mujoco.mj_step1(model, data)
-            goal = creature.stand + swing * sign * np.sin(4 * np.pi * h * t + phase)
-            q, v = data.qpos[creature.qpos_adr], data.qvel[joints]
+            goal = creature.joints.stand + swing * sign * np.sin(4 * np.pi * h * t + phase)
+            q, v = data.qpos[creature.joints.qpos_adr], data.qvel[joints]
             force = -data.qfrc_bias + data.qfrc_passive
-            pull = creature.kp * (goal - q - h * v) - creature.kd * v
+            pull = creature.gains.kp * (goal - q - h * v) - creature.gains.kd * v
             force[joints] += pull
             mujoco.mj_fullM(model, data, mass)
-            mass[joints, joints] += h * creature.kd
+            mass[joints, joints] += h * creature.gains.kd
             acceleration = np.linalg.solve(mass, force)[joints]
             data.qfrc_applied[joints] = np.clip(
-                pull - h * creature.kd * acceleration, -creature.torque_limit, creature.torque_limit
+                pull - h * creature.gains.kd * acceleration,
+                -creature.gains.torque_limit,
+                creature.gains.torque_limit,
             )
             states.append(np.concatenate([data.qpos, data.qvel, data.qacc_warmstart]))
             torques.append(data.qfrc_applied.copy())

@@ -32,7 +32,7 @@ class Depths:
     def __init__(self, creature: Creature) -> None:
         self.model, self.data = creature.model, mujoco.MjData(creature.model)
         self._place(creature.stand_qpos)
-        near = neighbours(self.model, self.data, NEAR * creature.hip_height)
+        near = neighbours(self.model, self.data, NEAR * creature.frame.hip_height)
         body = self.model.geom_bodyid
         moving = np.flatnonzero(self.model.body_weldid[body] != 0)
         self.pairs = np.array(
@@ -76,14 +76,14 @@ def describe(folder: Path) -> str:
     creature, walk = walk_of(folder)
     depths = Depths(creature)
     found = [depths.of(qpos) for qpos in walk[::EVERY]]
-    deep = np.array([depth for depth, _ in found]) / creature.hip_height
+    deep = np.array([depth for depth, _ in found]) / creature.frame.hip_height
     names = " in ".join(max(found)[1])
     passed, speed = "not examined", np.nan
     if (folder / CERTIFICATE).exists():
         text = json.loads((folder / CERTIFICATE).read_text(encoding="utf-8"))
         passed, speed = "yes" if text["passed"] else "no", text["report"]["speed"]
     return (
-        f"| {folder.name} | {deep.max() * creature.hip_height * 1e3:.1f} mm, {deep.max():.1%} "
+        f"| {folder.name} | {deep.max() * creature.frame.hip_height * 1e3:.1f} mm, {deep.max():.1%} "
         f"| {names} "
         f"| {(deep > WORTH).mean():.0%} | {passed} | {speed:.2f} |"
     )

@@ -114,7 +114,7 @@ def examine(
         "starts": count,
         "plain": {
             "up": share_up(plain),
-            "body_lengths_per_second": way / SECONDS / creature.body_length,
+            "body_lengths_per_second": way / SECONDS / creature.frame.body_length,
         },
     }
     for amplitude in BUMPS:
@@ -170,7 +170,9 @@ def slopes(creature: Creature, champion: Champion, starts: Starts, sign: int) ->
     managed, steepest = {}, 0.0
     for degrees in SLOPES:
         outcome = simulate(sloping(creature, sign * np.radians(degrees)), champion, starts, SECONDS)
-        share = float((outcome.stayed_up & (outcome.travel[:, 0] > creature.body_length)).mean())
+        share = float(
+            (outcome.stayed_up & (outcome.travel[:, 0] > creature.frame.body_length)).mean()
+        )
         managed[f"{degrees:g}"] = {"managed": share, "forward": float(outcome.travel[:, 0].mean())}
         if share < 0.9:
             break
@@ -231,12 +233,15 @@ def turn(creature: Creature, champion: Champion, degrees: float, rate: float) ->
 def headings(creature: Creature, qpos: np.ndarray) -> np.ndarray:
     """[T] rad, left positive, without jumps, from positions [T, nq]."""
     data = mujoco.MjData(creature.model)
-    forward, left = creature.stand_rot @ creature.forward, creature.stand_rot @ creature.left
+    forward, left = (
+        creature.frame.stand_rot @ creature.frame.forward,
+        creature.frame.stand_rot @ creature.frame.left,
+    )
     angle = np.full(len(qpos), np.nan)
     for k in np.flatnonzero(np.isfinite(qpos).all(1)):
         data.qpos[:] = qpos[k]
         mujoco.mj_kinematics(creature.model, data)
-        nose = data.xmat[creature.trunk].reshape(3, 3) @ creature.forward
+        nose = data.xmat[creature.trunk].reshape(3, 3) @ creature.frame.forward
         angle[k] = np.arctan2(nose @ left, nose @ forward)
     return np.unwrap(angle)
 

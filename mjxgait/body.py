@@ -5,93 +5,33 @@ inputs of the program, which then serves every body of the same make-up.
 """
 
 import dataclasses
-from typing import Any
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 
 from mjxgait.creature import Creature
+from mjxgait.creature.anatomy import Corrections, Feet, Frame, Gains, Joints, Mirror
 from mjxgait.creature.settings import Termination
 from mjxgait.types import Number, pytree
 
-NUMBERS = (
-    *("forward", "left", "up", "stand_pos", "stand_height"),
-    *("stand", "pose_low", "pose_high", "joint_low", "joint_high"),
-    *("kp", "kd", "torque_limit", "sign"),
-    *("steer_bend", "steer_stride", "balance_pitch", "balance_roll"),
-    *("hip_height", "body_length", "mass"),
-)
-"""Of a creature, by the names that it has for them."""
-
-
-@dataclasses.dataclass(frozen=True)
-class Makeup:
-    """What must be the same in two bodies that one program serves; names are numbered.
-
-    dof_adr, partner: [J]. foot_of: [F]; see `Creature`.
-    """
-
-    dof_adr: tuple[int, ...]
-    partner: tuple[int, ...]
-    foot_of: tuple[int, ...]
-    feet: int
-    symmetric: bool
-    nv: int
+for part in (Frame, Joints, Gains, Mirror, Corrections, Feet):
+    fields = dataclasses.fields(part)
+    static = [field.name for field in fields if field.metadata.get("static")]
+    numbers = [field.name for field in fields if field.name not in static]
+    jax.tree_util.register_dataclass(part, numbers, static)
 
 
 @pytree
 class GivenBody:
-    """A body whose numbers are inputs of the program; numbers by the names of `NUMBERS`."""
+    """A body whose numbers are inputs of the program; see `Creature`."""
 
-    numbers: dict[str, Number]
-    axes: tuple[Number, Number]
-    makeup: Makeup = dataclasses.field(metadata={"static": True})
-
-    def __getattr__(self, name: str) -> Any:
-        if name in NUMBERS:
-            return self.numbers[name]
-        raise AttributeError(f"a body in a compiled program has no {name}")
-
-    @property
-    def start_axes(self) -> tuple[Any, Any]:
-        """See `Creature`."""
-        return self.axes
-
-    @property
-    def joint_names(self) -> tuple[str, ...]:
-        """Numbers instead of names: those are no part of a program."""
-        return tuple(map(str, range(len(self.makeup.dof_adr))))
-
-    @property
-    def foot_names(self) -> tuple[str, ...]:
-        """See `joint_names`."""
-        return tuple(map(str, range(self.makeup.feet)))
-
-    @property
-    def dof_adr(self) -> np.ndarray:
-        """See `Creature`."""
-        return np.array(self.makeup.dof_adr)
-
-    @property
-    def partner(self) -> np.ndarray:
-        """See `Creature`."""
-        return np.array(self.makeup.partner)
-
-    @property
-    def foot_of(self) -> np.ndarray:
-        """See `Creature`."""
-        return np.array(self.makeup.foot_of)
-
-    @property
-    def symmetric(self) -> bool:
-        """See `Creature`."""
-        return self.makeup.symmetric
-
-    @property
-    def nv(self) -> int:
-        """See `Creature`."""
-        return self.makeup.nv
+    frame: Frame
+    joints: Joints
+    gains: Gains
+    mirror: Mirror
+    corrections: Corrections
+    feet: Feet
+    nv: int = dataclasses.field(metadata={"static": True})
 
 
 Body = Creature | GivenBody
@@ -110,27 +50,26 @@ class Ends:
 
 
 def given_body(creature: Creature) -> GivenBody:
-    """A creature's numbers in single precision."""
-
-    def single(value: Any) -> jax.Array:
-        return jnp.asarray(value, jnp.float32)
-
-    forward, left = creature.start_axes
-    return GivenBody(
-        numbers={name: single(getattr(creature, name)) for name in NUMBERS},
-        axes=(single(forward), single(left)),
-        makeup=Makeup(
-            dof_adr=tuple(map(int, creature.dof_adr)),
-            partner=tuple(map(int, creature.partner)),
-            foot_of=tuple(map(int, creature.foot_of)),
-            feet=len(creature.foot_names),
-            symmetric=creature.symmetric,
-            nv=creature.nv,
+    """A creature's numbers in single precision; names are numbered, for they shape no program."""
+    given = GivenBody(
+        frame=creature.frame,
+        joints=dataclasses.replace(creature.joints, names=_numbered(creature.joints.names)),
+        gains=creature.gains,
+        mirror=creature.mirror,
+        corrections=creature.corrections,
+        feet=dataclasses.replace(
+            creature.feet, names=_numbered(creature.feet.names), seen=(), others=()
         ),
+        nv=creature.nv,
     )
+    return jax.tree.map(lambda value: jnp.asarray(value, jnp.float32), given)
 
 
 def given_ends(ends: Termination) -> Ends:
     """What ends an episode, in single precision."""
     low, high = (jnp.float32(height) for height in ends.height)
     return Ends(jnp.float32(ends.min_up), (low, high), ends.touch)
+
+
+def _numbered(names: tuple[str, ...]) -> tuple[str, ...]:
+    return tuple(map(str, range(len(names))))

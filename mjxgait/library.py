@@ -216,7 +216,7 @@ def walk(run: Run | Place, seconds: float = 12.0) -> dict[str, np.ndarray]:
     columns |= {"pitch": seen.pitch, "roll": seen.roll}
     joints = {"pos": seen.joint_pos, "vel": seen.joint_vel, "torque": seen.torque}
     feet = {"height": seen.foot_height, "force": seen.foot_force}
-    for names, values in ((creature.joint_names, joints), (creature.foot_names, feet)):
+    for names, values in ((creature.joints.names, joints), (creature.feet.names, feet)):
         columns |= {
             f"{what}_{name}": array[:, i]
             for what, array in values.items()

@@ -21,13 +21,15 @@ Sense = Callable[[Body, Sensed, jax.Array], jax.Array]
 
 
 def _heading(creature: Body, sensed: Sensed, time: jax.Array) -> jax.Array:
-    nose = sensed.trunk_rot @ creature.forward.astype(np.float32)
-    forward, left = creature.start_axes
+    nose = sensed.trunk_rot @ creature.frame.forward.astype(np.float32)
+    forward, left = creature.frame.start_axes
     return jnp.arctan2(nose @ left, nose @ forward)
 
 
 def _along(creature: Body, sensed: Sensed, axis: int) -> jax.Array:
-    return (sensed.trunk_pos - creature.stand_pos.astype(np.float32)) @ creature.start_axes[axis]
+    return (
+        sensed.trunk_pos - creature.frame.stand_pos.astype(np.float32)
+    ) @ creature.frame.start_axes[axis]
 
 
 def _attitude(creature: Body, sensed: Sensed, axis: np.ndarray) -> jax.Array:
@@ -55,14 +57,16 @@ SENSES: Mapping[str, Sense] = {
     "heading": _heading,
     "forward": lambda creature, sensed, time: _along(creature, sensed, 0),
     "aside": lambda creature, sensed, time: _along(creature, sensed, 1),
-    "forward_vel": lambda creature, sensed, time: sensed.trunk_vel @ creature.start_axes[0],
+    "forward_vel": lambda creature, sensed, time: sensed.trunk_vel @ creature.frame.start_axes[0],
     "up_vel": lambda creature, sensed, time: sensed.trunk_vel[2],
     "pitch": lambda creature, sensed, time: (
-        -jnp.arcsin(_attitude(creature, sensed, creature.forward))
+        -jnp.arcsin(_attitude(creature, sensed, creature.frame.forward))
     ),
-    "roll": lambda creature, sensed, time: jnp.arcsin(_attitude(creature, sensed, creature.left)),
-    "pitch_rate": lambda creature, sensed, time: _rate(creature, sensed, creature.left),
-    "roll_rate": lambda creature, sensed, time: _rate(creature, sensed, creature.forward),
+    "roll": lambda creature, sensed, time: jnp.arcsin(
+        _attitude(creature, sensed, creature.frame.left)
+    ),
+    "pitch_rate": lambda creature, sensed, time: _rate(creature, sensed, creature.frame.left),
+    "roll_rate": lambda creature, sensed, time: _rate(creature, sensed, creature.frame.forward),
 }
 """Names, with shapes and units in docs/controller.md."""
 
@@ -109,5 +113,7 @@ def contacts(creature: Body, sensed: Sensed) -> jax.Array:
 
 def foot_geoms(creature: Body) -> list[slice]:
     """Of each foot, its places among the watched geoms."""
-    groups = [np.flatnonzero(creature.foot_of == foot) for foot in range(len(creature.foot_names))]
+    groups = [
+        np.flatnonzero(creature.feet.foot_of == foot) for foot in range(len(creature.feet.names))
+    ]
     return [slice(int(group[0]), int(group[-1]) + 1) for group in groups]

@@ -91,7 +91,7 @@ def make_body(folder: Path) -> Creature:
 
 def poses(creature: Creature) -> np.ndarray:
     """A trot: one diagonal pair swings while the other pushes."""
-    column = {name: i for i, name in enumerate(creature.joint_names)}
+    column = {name: i for i, name in enumerate(creature.joints.names)}
     found = np.zeros((2, 8))
     for leg in LEGS:
         swings = leg in ("front_left", "hind_right")

@@ -1,5 +1,6 @@
 """What several tests need."""
 
+import dataclasses
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -36,6 +37,17 @@ def small_config(**tables: dict) -> Config:
     for name, values in tables.items():
         table[name] = {**table.get(name, {}), **values}
     return build(Config, table, "test")
+
+
+def altered(creature: Creature, **facts: Any) -> Creature:
+    """The creature with other facts: fields of a part as a mapping, or a fact of its own."""
+    changes = {
+        name: dataclasses.replace(getattr(creature, name), **value)
+        if isinstance(value, Mapping)
+        else value
+        for name, value in facts.items()
+    }
+    return dataclasses.replace(creature, **changes)
 
 
 def weight_vector(config: WalkConfig, generation: jax.Array) -> jax.Array:

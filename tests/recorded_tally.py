@@ -33,12 +33,15 @@ class Frames:
             pos.append(data.xpos[creature.trunk].copy())
             rot.append(data.xmat[creature.trunk].reshape(3, 3).copy())
             spin.append(velocity[:3].copy())
-            low.append([lowest(model, data, g) for g in creature.watched])
-            place.append(data.geom_xpos[creature.watched, :2].copy())
+            low.append([lowest(model, data, g) for g in creature.feet.watched])
+            place.append(data.geom_xpos[creature.feet.watched, :2].copy())
         self.trunk_pos, self.trunk_rot, self.spin = np.array(pos), np.array(rot), np.array(spin)
         self.low, self.place = np.array(low), np.array(place)
-        self.joints, self.speeds = self.qpos[:, creature.qpos_adr], self.qvel[:, creature.dof_adr]
-        self.up = self.trunk_rot[:, 2] @ creature.up
+        self.joints, self.speeds = (
+            self.qpos[:, creature.joints.qpos_adr],
+            self.qvel[:, creature.joints.dof_adr],
+        )
+        self.up = self.trunk_rot[:, 2] @ creature.frame.up
         self.touch = self.low[:, 4:].min(1) < 0
 
 
@@ -56,7 +59,7 @@ def lowest(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> float:
 def end(frames: Frames, fall: Termination | Fall | None = None) -> tuple[int, Reason]:
     """The first frame that ends an episode, and why; the number of frames where none does."""
     limits = fall or frames.creature.settings.termination
-    height = frames.trunk_pos[:, 2] / frames.creature.stand_height
+    height = frames.trunk_pos[:, 2] / frames.creature.frame.stand_height
     # Where several hold, the one further down counts.
     found = np.full(len(height), Reason.FINISHED)
     if limits.touch:
@@ -76,11 +79,11 @@ def tally_of(frames: Frames, steps: int, half: int, clearance: float) -> dict[st
     creature, torque = frames.creature, frames.torque[:steps]
     joints, speeds = frames.joints[:steps], frames.speeds[:steps]
     low, place = frames.low[:steps, :4], frames.place[:steps, :4]
-    forward, left = frames.trunk_pos[:steps, :2].T - creature.stand_pos[:2, None]
-    nose = frames.trunk_rot[steps - 1] @ creature.forward
+    forward, left = frames.trunk_pos[:steps, :2].T - creature.frame.stand_pos[:2, None]
+    nose = frames.trunk_rot[steps - 1] @ creature.frame.forward
     down = low < CONTACT_GAP
     slid = np.linalg.norm(np.diff(place, axis=0), axis=2) * (down[1:] & down[:-1])
-    outside = (joints < creature.pose_low) | (joints > creature.pose_high)
+    outside = (joints < creature.joints.pose_low) | (joints > creature.joints.pose_high)
     return {
         "steps": steps,
         "forward": forward[-1],
@@ -97,9 +100,9 @@ def tally_of(frames: Frames, steps: int, half: int, clearance: float) -> dict[st
         "wobble": (frames.spin[:steps] ** 2).sum(),
         "touch": frames.touch[:steps].sum(),
         "work": np.maximum(torque * speeds, 0).sum() * creature.model.opt.timestep,
-        "saturation": (np.abs(torque) >= creature.torque_limit).mean(1).sum(),
+        "saturation": (np.abs(torque) >= creature.gains.torque_limit).mean(1).sum(),
         "limits": outside.mean(1).sum(),
-        **_swings(low, SWING * creature.hip_height, clearance),
+        **_swings(low, SWING * creature.frame.hip_height, clearance),
     }
 
 

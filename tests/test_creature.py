@@ -25,47 +25,49 @@ def edited(tmp_path: Path, file: str, old: str, new: str) -> Path:
 
 
 def test_shipped_creatures_are_believable_animals(shipped: Creature):
-    assert 0.1 < shipped.hip_height < 1.0
-    assert 0.1 < shipped.body_length < 2.0
-    stands_on_its_trunk = shipped.model.body(shipped.trunk).name in shipped.foot_names
+    assert 0.1 < shipped.frame.hip_height < 1.0
+    assert 0.1 < shipped.frame.body_length < 2.0
+    stands_on_its_trunk = shipped.model.body(shipped.trunk).name in shipped.feet.names
     # Legs under a body are shorter than it; a lamp has none, and is taller than it is long.
-    assert (shipped.hip_height < shipped.body_length) is not stands_on_its_trunk
-    assert 2 < shipped.mass < 60
-    assert (shipped.torque_limit <= 3.0 * shipped.mass).all()
-    assert np.degrees(shipped.pose_high - shipped.pose_low).max() <= 100
+    assert (shipped.frame.hip_height < shipped.frame.body_length) is not stands_on_its_trunk
+    assert 2 < shipped.frame.mass < 60
+    assert (shipped.gains.torque_limit <= 3.0 * shipped.frame.mass).all()
+    assert np.degrees(shipped.joints.pose_high - shipped.joints.pose_low).max() <= 100
 
 
 def test_a_pose_span_is_as_wide_as_the_joint_allows(shipped: Creature):
     """About the middle of the creature's own range, moved where that would leave the joint's."""
     wide = shipped.spanned(90.0)
-    room = shipped.joint_high - shipped.joint_low
-    assert np.allclose(wide.pose_high - wide.pose_low, np.minimum(np.pi / 2, room))
-    assert (wide.pose_low >= shipped.joint_low - 1e-9).all()
-    assert (wide.pose_high <= shipped.joint_high + 1e-9).all()
-    free = (wide.pose_low > shipped.joint_low) & (wide.pose_high < shipped.joint_high)
-    middle, own = (c.pose_low + c.pose_high for c in (wide, shipped))
+    room = shipped.joints.high - shipped.joints.low
+    assert np.allclose(wide.joints.pose_high - wide.joints.pose_low, np.minimum(np.pi / 2, room))
+    assert (wide.joints.pose_low >= shipped.joints.low - 1e-9).all()
+    assert (wide.joints.pose_high <= shipped.joints.high + 1e-9).all()
+    free = (wide.joints.pose_low > shipped.joints.low) & (
+        wide.joints.pose_high < shipped.joints.high
+    )
+    middle, own = (c.joints.pose_low + c.joints.pose_high for c in (wide, shipped))
     assert free.any()
     assert np.allclose(middle[free], own[free])
 
 
 def test_without_a_span_pose_ranges_are_those_of_the_file(shipped: Creature):
     same = shipped.spanned(0.0)
-    assert (same.pose_low == shipped.pose_low).all()
-    assert (same.pose_high == shipped.pose_high).all()
+    assert (same.joints.pose_low == shipped.joints.pose_low).all()
+    assert (same.joints.pose_high == shipped.joints.pose_high).all()
 
 
 def test_mirroring_twice_is_nothing(shipped: Creature):
-    pose = np.random.default_rng(0).uniform(-1, 1, len(shipped.joint_names))
-    once = shipped.sign * pose[shipped.partner]
-    assert np.allclose(shipped.sign * once[shipped.partner], pose)
+    pose = np.random.default_rng(0).uniform(-1, 1, len(shipped.joints.names))
+    once = shipped.mirror.sign * pose[shipped.mirror.partner]
+    assert np.allclose(shipped.mirror.sign * once[shipped.mirror.partner], pose)
 
 
 def test_mirror_map_agrees_with_the_names(shipped: Creature):
-    for name, partner in zip(shipped.joint_names, shipped.partner, strict=True):
+    for name, partner in zip(shipped.joints.names, shipped.mirror.partner, strict=True):
         swapped = re.sub(
             "left|right", lambda side: {"left": "right", "right": "left"}[side.group()], name
         )
-        assert shipped.joint_names[partner] == swapped
+        assert shipped.joints.names[partner] == swapped
 
 
 def test_mirror_signs_of_single_joints():
@@ -94,10 +96,10 @@ def test_a_joint_without_partner_is_named():
 def test_pose_ranges_are_degrees_about_the_standing_angle_within_the_joints(
     stool: Creature, tmp_path: Path
 ):
-    assert np.allclose(stool.pose_low, stool.stand - np.radians(40))
-    assert np.allclose(stool.pose_high, stool.stand + np.radians(40))
+    assert np.allclose(stool.joints.pose_low, stool.joints.stand - np.radians(40))
+    assert np.allclose(stool.joints.pose_high, stool.joints.stand + np.radians(40))
     wide = load_creature(edited(tmp_path, "creature.toml", "[-40, 40]", "[-40, 80]"))
-    assert np.allclose(wide.pose_high, 1.05)
+    assert np.allclose(wide.joints.pose_high, 1.05)
 
 
 def test_the_mirror_map_can_be_overridden(tmp_path: Path):
@@ -110,7 +112,7 @@ def test_the_mirror_map_can_be_overridden(tmp_path: Path):
     folder = edited(
         tmp_path, "creature.toml", "[joints]", f"[mirror]\npairs = [{', '.join(pairs)}]\n\n[joints]"
     )
-    assert load_creature(folder).sign.tolist() == [-1, -1, -1, -1]
+    assert load_creature(folder).mirror.sign.tolist() == [-1, -1, -1, -1]
 
 
 def test_names_and_mirror_map_must_not_contradict_each_other(tmp_path: Path):

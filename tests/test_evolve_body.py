@@ -43,9 +43,9 @@ def test_mirrored_parts_share_a_size(shipped: Creature):
     assert len(set(named)) == len(named)
     assert trunk not in named
     assert set(named) | {trunk} == {model.body(b).name for b in range(1, model.nbody)}
-    if shipped.symmetric:
-        body_of = model.dof_bodyid[shipped.dof_adr]
-        for joint, partner in enumerate(shipped.partner):
+    if shipped.mirror.symmetric:
+        body_of = model.dof_bodyid[shipped.joints.dof_adr]
+        for joint, partner in enumerate(shipped.mirror.partner):
             pair = {model.body(body_of[j]).name for j in (joint, partner)}
             assert any(pair <= set(names) for names in known.names), pair
 
@@ -117,7 +117,7 @@ def test_it_stands_as_high_above_the_floor(shipped: Creature):
     other = grown(shipped, known.by_part(sizes))
     np.testing.assert_allclose(grew.qpos, other.stand_qpos, atol=2e-5)
     # What stands on its trunk, which keeps its size, stands as it did.
-    stands_on_its_trunk = shipped.model.body(shipped.trunk).name in shipped.foot_names
+    stands_on_its_trunk = shipped.model.body(shipped.trunk).name in shipped.feet.names
     moved = abs(other.stand_qpos - shipped.stand_qpos).max() > 1e-3
     assert moved != stands_on_its_trunk
 

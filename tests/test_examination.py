@@ -60,7 +60,7 @@ def state_with(
     """A population whose best walks at a speed in body lengths/s on both starts."""
     state, names = experiment.init(), experiment.simulator.task.outcomes
     best = np.zeros(state.outcome.shape[1:], np.float32)
-    best[:, names.index("forward")] = speed * SECONDS * experiment.creature.body_length
+    best[:, names.index("forward")] = speed * SECONDS * experiment.creature.frame.body_length
     best[:, names.index("seconds")] = [SECONDS, alive * SECONDS]
     return dataclasses.replace(
         state, generation=jnp.int32(generation), outcome=state.outcome.at[0].set(best)

@@ -5,7 +5,7 @@ import dataclasses
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from helpers import small_config, weight_vector
+from helpers import altered, small_config, weight_vector
 
 from mjxgait.creature import Creature
 from mjxgait.tasks.falls import Reason
@@ -61,7 +61,7 @@ CASES: list[tuple[str, float, dict]] = [
 @pytest.fixture(scope="module")
 def body(stool: Creature) -> Creature:
     """Of round measures."""
-    return dataclasses.replace(stool, body_length=1.0, hip_height=0.5, mass=20.0)
+    return altered(stool, frame={"body_length": 1.0, "hip_height": 0.5, "mass": 20.0})
 
 
 def terms_of(body: Creature, tally: dict, **fitness: float) -> dict[str, float]:

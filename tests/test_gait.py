@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from helpers import pose_champion
+from helpers import altered, pose_champion
 
 from mjxgait.certify.twins.poses import PoseTwin
 from mjxgait.control.poses import (
@@ -34,7 +34,9 @@ from mjxgait.types import Sensed
 def random_poses(creature: Creature, count: int = 3) -> np.ndarray:
     return (
         np.random.default_rng(1)
-        .uniform(creature.pose_low, creature.pose_high, (count, len(creature.joint_names)))
+        .uniform(
+            creature.joints.pose_low, creature.joints.pose_high, (count, len(creature.joints.names))
+        )
         .astype(np.float32)
     )
 
@@ -52,12 +54,12 @@ def sensed(
         joint_pos=jnp.asarray(joints, jnp.float32),
         joint_vel=jnp.zeros(len(joints)),
         bias=jnp.zeros(creature.model.nv),
-        trunk_pos=jnp.asarray(np.add(creature.stand_pos, [0, offset, 0]), jnp.float32),
+        trunk_pos=jnp.asarray(np.add(creature.frame.stand_pos, [0, offset, 0]), jnp.float32),
         trunk_rot=jnp.asarray(np.eye(3) if rotation is None else rotation, jnp.float32),
         trunk_vel=nothing,
         trunk_angvel=nothing if spin is None else jnp.asarray(spin, jnp.float32),
-        geom_pos=jnp.zeros((len(creature.watched), 3)),
-        geom_low=jnp.zeros(len(creature.watched)),
+        geom_pos=jnp.zeros((len(creature.feet.watched), 3)),
+        geom_low=jnp.zeros(len(creature.feet.watched)),
     )
     return sense(creature, moment, jnp.zeros(()), PoseTracker.reads)
 
@@ -87,7 +89,11 @@ def tuning(**genes: float) -> jax.Array:
 def test_the_cycle_is_exact_at_the_key_poses_and_their_mirror_images(shipped: Creature):
     poses = random_poses(shipped)
     cycle = pose_cycle(shipped, jnp.asarray(poses))
-    mirrored = shipped.sign * poses[:, shipped.partner] if shipped.symmetric else poses[:0]
+    mirrored = (
+        shipped.mirror.sign * poses[:, shipped.mirror.partner]
+        if shipped.mirror.symmetric
+        else poses[:0]
+    )
     assert len(cycle) == len(poses) + len(mirrored)
     for i, pose in enumerate([*poses, *mirrored]):
         assert np.allclose(interpolate(cycle, jnp.int32(i * 4), 4, 6), pose, atol=1e-6)
@@ -103,10 +109,7 @@ def test_the_cycle_is_periodic_and_linear_between_neighbours(stool: Creature):
 
 
 def test_an_unsymmetric_creature_is_not_mirrored(stool: Creature):
-    alone = dataclasses.replace(stool.settings.mirror, symmetric=False)
-    lopsided = dataclasses.replace(
-        stool, settings=dataclasses.replace(stool.settings, mirror=alone)
-    )
+    lopsided = altered(stool, mirror={"symmetric": False})
     cycle = tracker(lopsided).prepare(
         Genome(jnp.asarray(random_poses(stool)), tuning()), settings()
     )
@@ -144,7 +147,7 @@ def test_the_clock_moves_on_whatever_the_creature_does(stool: Creature):
         Genome(jnp.asarray(random_poses(stool)), tuning(period=0.8)), settings(advance="clock")
     )
     state = GaitState(jnp.int32(0), jnp.int32(79))
-    _, state = control.act(cycle, state, sensed(stool, stool.stand + 1))
+    _, state = control.act(cycle, state, sensed(stool, stool.joints.stand + 1))
     assert int(state.position) == 12
 
 
@@ -158,7 +161,7 @@ def test_the_clock_is_the_examiners_on_every_step(
     poses, genes = random_poses(stool), tuning(period=period)
     control = tracker(stool)
     cycle = control.prepare(Genome(jnp.asarray(poses), genes), rules)
-    blocked = sensed(stool, stool.stand + 1)
+    blocked = sensed(stool, stool.joints.stand + 1)
 
     def moved(state: GaitState, _: None) -> tuple[GaitState, jax.Array]:
         _, state = control.act(cycle, state, blocked)
@@ -201,13 +204,13 @@ def test_signs_of_the_corrections(
     expected: tuple[str, float],
 ):
     weight = {expected[0]: np.array([1.0, 0, 0, 0])}
-    creature = dataclasses.replace(stool, **weight, body_length=0.5)
+    creature = altered(stool, corrections=weight, frame={"body_length": 0.5})
     genes = jnp.zeros(len(TUNING)).at[gene].set(1.0)
     change = corrections(
         creature,
         genes,
-        jnp.asarray(stool.stand, jnp.float32),
-        sensed(stool, stool.stand, rotation, offset),
+        jnp.asarray(stool.joints.stand, jnp.float32),
+        sensed(stool, stool.joints.stand, rotation, offset),
     )
     assert np.allclose(change, [expected[1], 0, 0, 0], atol=1e-5)
 
@@ -219,40 +222,43 @@ def test_signs_of_the_corrections(
 )
 def test_rates_of_the_trunk_are_its_own(stool: Creature, gene: int, weight: str, expected: float):
     """About the trunk's axes, wherever it heads: it looks left, and turns in the world's frame."""
-    creature = dataclasses.replace(stool, **{weight: np.array([1.0, 0, 0, 0])})
+    creature = altered(stool, corrections={weight: np.array([1.0, 0, 0, 0])})
     left_turned = turned(2, np.pi / 2)
-    moving = sensed(stool, stool.stand, left_turned, spin=left_turned @ [0.2, 0.3, 5.0])
-    genes, stand = jnp.zeros(len(TUNING)).at[gene].set(1.0), jnp.asarray(stool.stand, jnp.float32)
+    moving = sensed(stool, stool.joints.stand, left_turned, spin=left_turned @ [0.2, 0.3, 5.0])
+    genes, stand = (
+        jnp.zeros(len(TUNING)).at[gene].set(1.0),
+        jnp.asarray(stool.joints.stand, jnp.float32),
+    )
     change = corrections(creature, genes, stand, moving)
     assert np.allclose(change, [expected, 0, 0, 0], atol=1e-5)
 
 
 def test_steering_lengthens_the_stride(stool: Creature):
     """What a pose is away from the standing one counts more on the outer side of the turn."""
-    creature = dataclasses.replace(stool, steer_stride=np.array([1.0, -1.0, 0.5, 0]))
+    creature = altered(stool, corrections={"steer_stride": np.array([1.0, -1.0, 0.5, 0])})
     genes, pose = jnp.zeros(len(TUNING)).at[STEER].set(1.0), np.array([0.3, 0.3, -0.2, 0.1])
-    target = jnp.asarray(stool.stand + pose, jnp.float32)
-    change = corrections(creature, genes, target, sensed(stool, stool.stand, turned(2, 0.2)))
+    target = jnp.asarray(stool.joints.stand + pose, jnp.float32)
+    change = corrections(creature, genes, target, sensed(stool, stool.joints.stand, turned(2, 0.2)))
     assert np.allclose(change, [0.06, -0.06, -0.02, 0], atol=1e-5)
 
 
 def test_the_target_keeps_to_the_joint_ranges(stool: Creature):
-    narrow = dataclasses.replace(stool, joint_low=np.full(4, -0.1), joint_high=np.full(4, 0.2))
+    narrow = altered(stool, joints={"low": np.full(4, -0.1), "high": np.full(4, 0.2)})
     control, poses = tracker(narrow), jnp.array([[3.0, -3.0, 0.1, 0.0]] * 2)
     cycle = control.prepare(Genome(poses, tuning()), settings(key_poses=2, mirror=False))
-    target, _ = control.act(cycle, control.init(), sensed(stool, stool.stand))
+    target, _ = control.act(cycle, control.init(), sensed(stool, stool.joints.stand))
     assert np.allclose(target, [0.2, -0.1, 0.1, 0.0], atol=1e-6)
 
 
 def test_without_genes_there_is_no_correction(shipped: Creature):
-    tipped = sensed(shipped, shipped.stand, turned(0, 0.3) @ turned(2, 0.4), 0.3)
+    tipped = sensed(shipped, shipped.joints.stand, turned(0, 0.3) @ turned(2, 0.4), 0.3)
     assert not np.any(
-        corrections(shipped, tuning(), jnp.asarray(shipped.stand + 0.2, jnp.float32), tipped)
+        corrections(shipped, tuning(), jnp.asarray(shipped.joints.stand + 0.2, jnp.float32), tipped)
     )
 
 
 def test_genes_and_bounds_have_the_order_of_the_config(stool: Creature):
     low, high = tracker(stool).bounds(settings(key_poses=2))
     assert (TUNING[THRESHOLD], TUNING[PERIOD], TUNING[STEER]) == ("threshold", "period", "steer")
-    assert np.allclose(low.key_poses, stool.pose_low)
+    assert np.allclose(low.key_poses, stool.joints.pose_low)
     assert bool(jnp.all(low.tuning <= high.tuning))

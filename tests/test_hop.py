@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from helpers import SHORT, pose_champion, said_by
+from helpers import SHORT, altered, pose_champion, said_by
 
 from mjxgait.certify import record
 from mjxgait.certify.simulate import simulate
@@ -39,18 +39,18 @@ def luxo() -> Creature:
 
 def moment(creature: Creature, forward: float = 0.0, aside: float = 0.0, **other: object) -> Sensed:
     """Standing, but so many m ahead and to the left of the start."""
-    ahead, left = creature.start_axes
+    ahead, left = creature.frame.start_axes
     still = jnp.zeros(3)
     values = {
-        "joint_pos": jnp.float32(creature.stand),
-        "joint_vel": jnp.zeros(len(creature.stand)),
+        "joint_pos": jnp.float32(creature.joints.stand),
+        "joint_vel": jnp.zeros(len(creature.joints.stand)),
         "bias": jnp.zeros(creature.nv),
-        "trunk_pos": jnp.float32(creature.stand_pos + forward * ahead + aside * left),
-        "trunk_rot": jnp.float32(creature.stand_rot),
+        "trunk_pos": jnp.float32(creature.frame.stand_pos + forward * ahead + aside * left),
+        "trunk_rot": jnp.float32(creature.frame.stand_rot),
         "trunk_vel": still,
         "trunk_angvel": still,
-        "geom_pos": jnp.zeros((len(creature.watched), 3)),
-        "geom_low": jnp.ones(len(creature.watched)),
+        "geom_pos": jnp.zeros((len(creature.feet.watched), 3)),
+        "geom_low": jnp.ones(len(creature.feet.watched)),
     }
     return Sensed(**(values | other))
 
@@ -123,14 +123,14 @@ def test_what_moves_after_the_arrival_is_counted(stool: Creature):
 
 
 def test_a_touch_counts_for_as_long_as_it_lasts(stool: Creature):
-    feet = len(stool.foot_of)
-    lies = moment(stool, geom_low=jnp.ones(len(stool.watched)).at[feet].set(-0.001))
-    steps = moment(stool, geom_low=jnp.ones(len(stool.watched)).at[0].set(-0.001))
+    feet = len(stool.feet.foot_of)
+    lies = moment(stool, geom_low=jnp.ones(len(stool.feet.watched)).at[feet].set(-0.001))
+    steps = moment(stool, geom_low=jnp.ones(len(stool.feet.watched)).at[0].set(-0.001))
     assert after(stool, [lies, steps, lies]).ground == 2
 
 
 def test_only_the_last_posture_counts(stool: Creature):
-    bent = moment(stool, joint_pos=jnp.float32(stool.stand + np.array([0.1, -0.2, 0, 0.3])))
+    bent = moment(stool, joint_pos=jnp.float32(stool.joints.stand + np.array([0.1, -0.2, 0, 0.3])))
     assert after(stool, [moment(stool), bent]).bent == pytest.approx([0.1, 0.2, 0, 0.3], abs=1e-6)
     assert not after(stool, [bent, moment(stool)]).bent.any()
 
@@ -166,7 +166,7 @@ CASES: list[tuple[str, float, dict]] = [
 
 @pytest.mark.parametrize(("name", "value", "tally"), CASES)
 def test_a_term_is_what_its_tally_says(stool: Creature, name: str, value: float, tally: dict):
-    body = dataclasses.replace(stool, hip_height=0.5)
+    body = altered(stool, frame={"hip_height": 0.5})
     arrays = {key: jnp.asarray(number) for key, number in tally.items()}
     filled = dataclasses.replace(empty(body, HORIZON), **arrays)
     assert float(fitness_terms(body, HORIZON, filled)[name]) == pytest.approx(value, abs=1e-5)
@@ -229,10 +229,10 @@ class Reach(RealController):
     reads = ("goal_distance",)
 
     def bounds(self, settings):
-        return {"reach": (0.0 * self.creature.stand, 0.0 * self.creature.stand + 1.0)}
+        return {"reach": (0.0 * self.creature.joints.stand, 0.0 * self.creature.joints.stand + 1.0)}
 
     def act(self, plan, memory, senses):
-        return self.creature.stand + 0.4 * plan["reach"] * senses["goal_distance"], memory
+        return self.creature.joints.stand + 0.4 * plan["reach"] * senses["goal_distance"], memory
 """
 ALIKE = {"joint_noise": 0.0, "velocity_noise": 0.0, "friction": (1.0, 1.0), "gains": 0.0, "push": 0}
 
@@ -267,21 +267,21 @@ def test_evolution_and_examiner_tell_a_controller_the_same_goals(stool: Creature
 
 def test_the_highest_joint_is_the_hip_of_what_has_no_legs(luxo: Creature):
     """The neck, above the ankle and both arms."""
-    assert luxo.hip_height == pytest.approx(luxo.stand_height + 0.025 + 0.175 + 0.16)
+    assert luxo.frame.hip_height == pytest.approx(luxo.frame.stand_height + 0.025 + 0.175 + 0.16)
 
 
 def test_the_lamp_stands(luxo: Creature):
-    standing = record(luxo, pose_champion(luxo, np.stack([luxo.stand] * 2), {}), 3.0)
+    standing = record(luxo, pose_champion(luxo, np.stack([luxo.joints.stand] * 2), {}), 3.0)
     assert standing.trunk_up.min() > 0.999
     assert not standing.touch.any()
     last = standing.window(1.0)
     assert np.abs(last.trunk_pos[:, :2] - last.trunk_pos[0, :2]).max() < 1e-3
-    assert last.foot_force.sum(1) == pytest.approx(luxo.mass * 9.81, rel=0.02)
+    assert last.foot_force.sum(1) == pytest.approx(luxo.frame.mass * 9.81, rel=0.02)
 
 
 def test_a_lamp_on_its_head_is_told(luxo: Creature):
     """Folded forward until the shade meets the floor."""
-    folded = np.array([luxo.pose_high[0], luxo.pose_high[1], luxo.pose_low[2]])
+    folded = np.array([luxo.joints.pose_high[0], luxo.joints.pose_high[1], luxo.joints.pose_low[2]])
     assert record(luxo, pose_champion(luxo, np.stack([folded] * 2), {}), 2.0).touch.any()
 
 

@@ -67,7 +67,7 @@ def test_another_body_has_the_same_program(stools: str, change: str, tmp_path: P
 def test_a_shape_more_needs_no_program_of_its_own(stools: str, stool: Creature, tmp_path: Path):
     """There is room for shapes that may touch the floor and for pairs that may overlap."""
     other = saddled(tmp_path / "other")
-    assert len(other.watched) > len(stool.watched)
+    assert len(other.feet.watched) > len(stool.feet.watched)
     assert program(other, **INPUTS) == stools
 
 
@@ -77,7 +77,7 @@ def test_room_that_nothing_is_in_changes_nothing(tmp_path: Path):
     tight, roomy = fast_plant(*known), fast_plant(*known, roomy=True)
     rng, lanes = np.random.default_rng(0), 8
     qpos = np.tile(creature.stand_qpos[:, None], lanes)
-    qpos[creature.qpos_adr] += rng.normal(size=(len(creature.qpos_adr), lanes))
+    qpos[creature.joints.qpos_adr] += rng.normal(size=(len(creature.joints.qpos_adr), lanes))
     qpos[2] += np.linspace(-0.3, 0.1, lanes)
     zero = np.zeros((creature.nv, lanes))
     state = BodyState(*map(np.float32, (qpos, zero, zero, zero, np.ones(lanes))))
@@ -85,7 +85,7 @@ def test_room_that_nothing_is_in_changes_nothing(tmp_path: Path):
     np.testing.assert_allclose(depths[0], depths[1], atol=1e-6)
     assert np.ptp(depths[0]) > 1e-3
     seen = [np.asarray(jax.jit(plant.forward)(state)[0].geom_low) for plant in (tight, roomy)]
-    feet = len(creature.foot_of)
+    feet = len(creature.feet.foot_of)
     np.testing.assert_allclose(seen[0][:feet], seen[1][:feet], atol=1e-6)
     np.testing.assert_allclose(seen[0][feet:].min(0), seen[1][feet:].min(0), atol=1e-6)
 

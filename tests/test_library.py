@@ -55,11 +55,11 @@ def test_a_walk_is_columns_over_time(run: mjxgait.Run):
     rows = len(columns["time"])
     assert {column.shape for column in columns.values()} == {(rows,)}
     assert np.allclose(np.diff(columns["time"]), run.creature.model.opt.timestep)
-    feet, joints = run.creature.foot_names, run.creature.joint_names
+    feet, joints = run.creature.feet.names, run.creature.joints.names
     assert {f"force_{foot}" for foot in feet} | {f"torque_{j}" for j in joints} <= set(columns)
     # It stands on its feet: together they bear about its weight.
     force = sum(columns[f"force_{foot}"] for foot in feet)
-    assert force.mean() == pytest.approx(9.81 * run.creature.mass, rel=0.3)
+    assert force.mean() == pytest.approx(9.81 * run.creature.frame.mass, rel=0.3)
 
 
 def test_the_examination_again_comes_to_the_same(run: mjxgait.Run, tmp_path: Path):

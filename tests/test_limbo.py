@@ -57,7 +57,7 @@ def posed(
     data.qpos[:] = creature.stand_qpos
     data.qpos[[0, 2]] += ahead, up
     if joints is not None:
-        data.qpos[creature.qpos_adr] = joints
+        data.qpos[creature.joints.qpos_adr] = joints
     mujoco.mj_kinematics(creature.model, data)
     return data
 
@@ -65,21 +65,21 @@ def posed(
 def sensed(creature: Creature, data: mujoco.MjData) -> Sensed:
     """What evolution would know of it; heights by MuJoCo's kinematics."""
     model, low = creature.model, []
-    for g in creature.watched:
+    for g in creature.feet.watched:
         ball, box, round_part = support_extents(model.geom_type[g], model.geom_size[g])
         down = data.geom_xmat[g].reshape(3, 3)[2]
         reach = ball + np.abs(down) @ box + np.linalg.norm(down * round_part)
         low.append(data.geom_xpos[g, 2] - reach)
     still = jnp.zeros(3)
     return Sensed(
-        joint_pos=jnp.float32(data.qpos[creature.qpos_adr]),
-        joint_vel=jnp.zeros(len(creature.stand)),
+        joint_pos=jnp.float32(data.qpos[creature.joints.qpos_adr]),
+        joint_vel=jnp.zeros(len(creature.joints.stand)),
         bias=jnp.zeros(creature.nv),
         trunk_pos=jnp.float32(data.xpos[creature.trunk]),
         trunk_rot=jnp.float32(data.xmat[creature.trunk].reshape(3, 3)),
         trunk_vel=still,
         trunk_angvel=still,
-        geom_pos=jnp.float32(data.geom_xpos[creature.watched]),
+        geom_pos=jnp.float32(data.geom_xpos[creature.feet.watched]),
         geom_low=jnp.float32(np.array(low)),
     )
 
@@ -122,7 +122,7 @@ def poses(creature: Creature, count: int) -> list[mujoco.MjData]:
             creature,
             BAR_PLACE + rng.uniform(-0.4, 0.4),
             abs(rng.normal(0.0, 0.05)),
-            rng.uniform(creature.pose_low, creature.pose_high),
+            rng.uniform(creature.joints.pose_low, creature.joints.pose_high),
         )
         for _ in range(count)
     ]
@@ -159,7 +159,7 @@ def test_the_deepest_counts_and_a_run_through_the_bar_is_worth_less(luxo: Creatu
         tally = task.update(tally, moment, jnp.zeros(3), jnp.float32(HEIGHT), jnp.float32(1.4))
     assert float(tally.bar) == pytest.approx(depth(luxo, posed(luxo, 0.5)))
     terms = task.judge(tally, LimboConfig())
-    deep = float(tally.bar) / luxo.hip_height
+    deep = float(tally.bar) / luxo.frame.hip_height
     assert float(terms["bar"]) == pytest.approx(deep / (deep + 0.1), rel=1e-5)
     clear = task.judge(dataclasses.replace(tally, bar=jnp.zeros(())), LimboConfig())
     assert float(clear["bar"]) == 0.0
@@ -179,7 +179,7 @@ def test_all_goals_lie_beyond_the_bar(luxo: Creature):
     task = Limbo(luxo, STEP, HORIZON, luxo.settings.termination)
     goals = np.asarray(task.trials(jax.random.key(0), luxo, RolloutConfig(starts=100)).goal)
     assert goals[0] == np.float32(evolution.NOMINAL_GOAL)
-    assert goals.min() > BAR_PLACE + luxo.body_length
+    assert goals.min() > BAR_PLACE + luxo.frame.body_length
     with pytest.raises(UserError, match=r"slope:0.1.*flat"):
         task.trials(jax.random.key(0), luxo, RolloutConfig(ground="slope:0.1"))
 
@@ -245,7 +245,7 @@ def test_of_the_disturbed_only_those_succeed_that_are_clear(luxo: Creature):
 
 def still(creature: Creature) -> Champion:
     """One that stands."""
-    made = pose_champion(creature, np.stack([creature.stand] * 2), {})
+    made = pose_champion(creature, np.stack([creature.joints.stand] * 2), {})
     return dataclasses.replace(made, task="limbo")
 
 

@@ -161,19 +161,19 @@ def reason_to_end(
     experiment: Experiment, height: float = 1.0, up: float = 1.0, low: float = 0.1
 ) -> Reason:
     """What is said of a creature as high above its stand, its trunk so upright, other parts so low."""
-    creature, joints = experiment.creature, jnp.zeros(len(experiment.creature.joint_names))
+    creature, joints = experiment.creature, jnp.zeros(len(experiment.creature.joints.names))
     tilt, zero = np.arccos(up), jnp.zeros(3)
     turned = [[1, 0, 0], [0, np.cos(tilt), -np.sin(tilt)], [0, np.sin(tilt), np.cos(tilt)]]
     sensed = Sensed(
         joint_pos=joints,
         joint_vel=joints,
         bias=jnp.zeros(creature.model.nv),
-        trunk_pos=jnp.array([0.0, 0.0, height * creature.stand_height]),
+        trunk_pos=jnp.array([0.0, 0.0, height * creature.frame.stand_height]),
         trunk_rot=jnp.array(turned),
         trunk_vel=zero,
         trunk_angvel=zero,
-        geom_pos=jnp.zeros((len(creature.watched), 3)),
-        geom_low=jnp.full(len(creature.watched), low),
+        geom_pos=jnp.zeros((len(creature.feet.watched), 3)),
+        geom_low=jnp.full(len(creature.feet.watched), low),
     )
     return Reason(int(experiment.simulator.reason(sensed, ())))
 
@@ -236,12 +236,12 @@ def test_the_first_start_is_nominal_and_the_others_are_not(stool: Creature):
     assert not starts.qvel[0].any()
     assert float(starts.friction[0]) == 1.0
     assert int(starts.push_step[0]) == NEVER
-    noise = np.asarray(starts.qpos[1:, stool.qpos_adr] - stool.stand)
+    noise = np.asarray(starts.qpos[1:, stool.joints.qpos_adr] - stool.joints.stand)
     widest = config.rollout.joint_noise
     assert 0.4 * widest < np.abs(noise).max() <= widest
     assert np.allclose(
         np.linalg.norm(starts.push[1:, :2], axis=1),
-        config.rollout.push * np.sqrt(9.81 * stool.hip_height),
+        config.rollout.push * np.sqrt(9.81 * stool.frame.hip_height),
     )
     assert ((starts.push_step[1:] >= 100) & (starts.push_step[1:] < 300)).all()
     assert len(set(np.asarray(starts.friction[1:]).tolist())) == 4
@@ -251,7 +251,7 @@ def standing_terms(experiment: Experiment) -> dict[str, float]:
     """The terms of an individual whose key poses are the standing pose."""
     still = genomes(experiment, 7)
     poses = jnp.broadcast_to(
-        jnp.asarray(experiment.creature.stand, jnp.float32), still.key_poses.shape
+        jnp.asarray(experiment.creature.joints.stand, jnp.float32), still.key_poses.shape
     )
     tally = jax.tree.map(
         lambda leaf: leaf[0, 0],
@@ -277,7 +277,7 @@ def test_style_counts_in_proportion_to_the_walk(experiment: Experiment):
         experiment.config.fitness,
         experiment.simulator.steps,
     )
-    enough = config.speed * horizon * 0.005 * creature.body_length
+    enough = config.speed * horizon * 0.005 * creature.frame.body_length
     for share in (0.0, 0.5, 1.0):
         tally = dataclasses.replace(
             experiment.simulator.task.init(),
@@ -296,12 +296,13 @@ def test_beyond_the_wanted_speed_distance_counts_little(experiment: Experiment):
     )
     lengths = config.speed * horizon * 0.005
     tally = dataclasses.replace(
-        experiment.simulator.task.init(), forward=jnp.float32(3 * lengths * creature.body_length)
+        experiment.simulator.task.init(),
+        forward=jnp.float32(3 * lengths * creature.frame.body_length),
     )
     term = float(fitness_terms(creature, config, 0.005, horizon, tally)["distance"])
     assert term == pytest.approx(lengths * (1 + 2 * BEYOND), rel=1e-5)
     metres = experiment.simulator.task.outcome(tally)["forward"]
-    assert float(metres) == pytest.approx(3 * lengths * creature.body_length, rel=1e-4)
+    assert float(metres) == pytest.approx(3 * lengths * creature.frame.body_length, rel=1e-4)
 
 
 def test_a_fall_scores_below_everybody_who_stays_up(experiment: Experiment, stool: Creature):
@@ -375,8 +376,8 @@ def test_mjx_agrees_with_c_mujoco(name: str):
     rng = np.random.default_rng(0)
     for k in range(60):
         if k % 10 == 0:
-            torque[0, creature.dof_adr] = (
-                rng.uniform(-0.1, 0.1, len(creature.dof_adr)) * creature.torque_limit
+            torque[0, creature.joints.dof_adr] = (
+                rng.uniform(-0.1, 0.1, len(creature.joints.dof_adr)) * creature.gains.torque_limit
             )
         data.qfrc_applied[:] = torque[0]
         state, _ = step(state, torque)

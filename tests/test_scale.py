@@ -18,10 +18,10 @@ def test_a_whole_creature_scales_as_geometry_says(shipped: Creature):
     mine, its = shipped.model, big.model
     assert np.allclose(its.body_mass, s**3 * mine.body_mass)
     assert np.allclose(its.body_inertia, s**5 * mine.body_inertia, rtol=1e-4)
-    assert big.hip_height == pytest.approx(s * shipped.hip_height, rel=1e-3)
-    assert big.body_length == pytest.approx(s * shipped.body_length, rel=1e-3)
+    assert big.frame.hip_height == pytest.approx(s * shipped.frame.hip_height, rel=1e-3)
+    assert big.frame.body_length == pytest.approx(s * shipped.frame.body_length, rel=1e-3)
     assert np.allclose(its.body_pos[2:], s * mine.body_pos[2:], atol=1e-6)
-    assert np.array_equal(big.kp, shipped.kp)
+    assert np.array_equal(big.gains.kp, shipped.gains.kp)
     assert big.digest != shipped.digest
 
 
@@ -32,7 +32,7 @@ def test_only_what_matches_changes():
         factor = 1.3**3 if name.endswith("_lower") else 1.0
         its = longer.model.body(name).mass[0]
         assert its == pytest.approx(factor * dog.model.body(name).mass[0], rel=1e-5), name
-    assert longer.hip_height > dog.hip_height
+    assert longer.frame.hip_height > dog.frame.hip_height
 
 
 def test_it_stands_on_its_feet_as_before(stool: Creature):
@@ -41,11 +41,11 @@ def test_it_stands_on_its_feet_as_before(stool: Creature):
         data = mujoco.MjData(creature.model)
         data.qpos[:] = creature.stand_qpos
         mujoco.mj_kinematics(creature.model, data)
-        feet = creature.watched[:4]
+        feet = creature.feet.watched[:4]
         low = data.geom_xpos[feet, 2] - creature.model.geom_size[feet, 0]
         assert np.allclose(low, low[0], atol=1e-9)
         assert low[0] == pytest.approx(0.0, abs=2e-3)
-    assert tall.hip_height == pytest.approx(1.5 * stool.hip_height, rel=0.02)
+    assert tall.frame.hip_height == pytest.approx(1.5 * stool.frame.hip_height, rel=0.02)
 
 
 def test_patterns_multiply_and_none_changes_nothing(stool: Creature):
@@ -99,4 +99,4 @@ def test_a_mesh_is_not_scaled_in_silence(stool: Creature):
 def test_the_library_scales_too(stool: Creature):
     from helpers import STOOL
 
-    assert load_creature(STOOL, {"*": 0.8}).mass == pytest.approx(0.8**3 * stool.mass)
+    assert load_creature(STOOL, {"*": 0.8}).frame.mass == pytest.approx(0.8**3 * stool.frame.mass)

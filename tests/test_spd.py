@@ -66,7 +66,7 @@ def moment(creature: Creature, case: Case) -> tuple[mujoco.MjData, np.ndarray]:
     rng, data = np.random.default_rng(case.seed), mujoco.MjData(creature.model)
     data.qpos[:] = creature.stand_qpos
     data.qpos[2] += 0.5
-    data.qpos[creature.qpos_adr] += rng.uniform(-0.5, 0.5, 4)
+    data.qpos[creature.joints.qpos_adr] += rng.uniform(-0.5, 0.5, 4)
     data.qvel[:] = rng.uniform(-1, 1, creature.model.nv)
     mujoco.mj_forward(creature.model, data)
     return data, rng.uniform(-5, 5, creature.model.nv)
@@ -74,9 +74,13 @@ def moment(creature: Creature, case: Case) -> tuple[mujoco.MjData, np.ndarray]:
 
 def wanted(creature: Creature, case: Case) -> np.ndarray:
     """The torque [J] by the paper, or by the textbook."""
-    (data, constraint), joints = moment(creature, case), creature.dof_adr
-    q, v = data.qpos[creature.qpos_adr], data.qvel[joints]
-    kp, kd, limit = case.stiffness * creature.kp, case.damping * creature.kd, creature.torque_limit
+    (data, constraint), joints = moment(creature, case), creature.joints.dof_adr
+    q, v = data.qpos[creature.joints.qpos_adr], data.qvel[joints]
+    kp, kd, limit = (
+        case.stiffness * creature.gains.kp,
+        case.damping * creature.gains.kd,
+        creature.gains.torque_limit,
+    )
     if not case.stable:
         return np.clip(-kp * (q - TARGET) - kd * v, -limit, limit)
     mass = np.zeros((creature.model.nv, creature.model.nv))
@@ -133,7 +137,9 @@ def test_agrees_with_the_paper_in_float64(
 
 
 def test_the_cases_reach_the_limit_and_do_not(stool: Creature):
-    share = {name: np.abs(wanted(stool, case)) / stool.torque_limit for name, case in CASES.items()}
+    share = {
+        name: np.abs(wanted(stool, case)) / stool.gains.torque_limit for name, case in CASES.items()
+    }
     assert (share["at its limit"] == 1).any()
     assert (share["soft and slow"] < 1).all()
 
@@ -169,12 +175,12 @@ def stiff(tmp_path_factory: pytest.TempPathFactory) -> Creature:
 def test_stands_where_plain_pd_blows_up(stiff: Creature):
     """Our torque on our plant for a second on the floor: stable in one lane, plain in the other."""
     simulator, lanes = simulator_of(stiff, "auto"), [Case(stable=True), Case(stable=False)]
-    law, target = rules(lanes), jnp.tile(jnp.float32(stiff.stand)[:, None], 2)
+    law, target = rules(lanes), jnp.tile(jnp.float32(stiff.joints.stand)[:, None], 2)
 
     def step(state: BodyState) -> tuple[BodyState, jax.Array]:
         sensed, workings = simulator.plant.forward(state)
         torque = simulator.drive.torque(simulator.plant, law, state, sensed, workings, target)
-        force = jnp.zeros((stiff.model.nv, 2)).at[stiff.dof_adr].set(torque)
+        force = jnp.zeros((stiff.model.nv, 2)).at[stiff.joints.dof_adr].set(torque)
         return simulator.plant.advance(state, workings, force), sensed.joint_vel
 
     still = jnp.zeros((stiff.model.nv, 2))

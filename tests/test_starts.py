@@ -55,8 +55,8 @@ def test_noise_fills_its_width_to_both_sides_and_is_that_of_joints_only(stool: C
     starts = drawn(stool, joint_noise=0.1, velocity_noise=0.5)
     shift = starts.qpos - np.float32(stool.stand_qpos)
     for noise, places, width in (
-        (shift, stool.qpos_adr, 0.1),
-        (starts.qvel, stool.dof_adr, 0.5),
+        (shift, stool.joints.qpos_adr, 0.1),
+        (starts.qvel, stool.joints.dof_adr, 0.5),
     ):
         assert width * 0.95 < noise[1:, places].max() <= width
         assert -width * 0.95 > noise[1:, places].min() >= -width
@@ -83,7 +83,7 @@ def test_pushes_go_all_ways_along_the_ground_in_the_middle_of_the_episode(stool:
     starts = drawn(stool, push=0.2)
     push = starts.push[1:]
     assert not push[:, 2:].any()
-    assert np.allclose(np.hypot(*push[:, :2].T), 0.2 * np.sqrt(9.81 * stool.hip_height))
+    assert np.allclose(np.hypot(*push[:, :2].T), 0.2 * np.sqrt(9.81 * stool.frame.hip_height))
     assert all((np.sign(push[:, :2]) == way).all(1).any() for way in ((1, 1), (1, -1), (-1, 1)))
     assert starts.push_step[0] == NEVER
     assert ((starts.push_step[1:] >= 100) & (starts.push_step[1:] < 300)).all()

@@ -36,7 +36,7 @@ def recordings(body: Creature) -> list[Frames]:
 
 
 def clearance_of(body: Creature) -> float:
-    return CONFIGS[0].fitness.clearance * body.hip_height
+    return CONFIGS[0].fitness.clearance * body.frame.hip_height
 
 
 def sensed_of(frames: Frames) -> Sensed:

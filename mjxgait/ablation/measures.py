@@ -192,7 +192,7 @@ def _walk(creature: Creature, champion: Champion) -> tuple[float, float, float]:
         nominal_starts(creature, 1), perturbed_starts(creature, STARTS, np.random.default_rng(SEED))
     )
     outcome = simulate(creature, champion, starts, SECONDS, threads=1)
-    speed = outcome.travel[:, 0] / creature.body_length / SECONDS
+    speed = outcome.travel[:, 0] / creature.frame.body_length / SECONDS
     return (
         float(speed[1:].mean()),
         float(outcome.stayed_up[1:].mean()),

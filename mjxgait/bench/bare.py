@@ -18,12 +18,12 @@ def bare_model(creature: Creature) -> tuple[mujoco.MjModel, np.ndarray]:
     full = creature.evolution_model
     names = [full.geom(g).name for g in range(full.ngeom)]
     if "" in names or not _only_the_floor_is_touched(full):
-        return full, creature.watched
+        return full, creature.feet.watched
     spec = mujoco.MjSpec.from_string(creature.files["creature.xml"])
     for body in spec.bodies[1:]:
         _keep_inertia(body, full)
     contacts = _contacts(full)
-    kept = {FLOOR, *(names[g] for g in creature.watched), *(names[g] for g in contacts)}
+    kept = {FLOOR, *(names[g] for g in creature.feet.watched), *(names[g] for g in contacts)}
     for geom in list(spec.geoms):
         if geom.name in kept:
             geom.contype = geom.conaffinity = 0
@@ -32,7 +32,7 @@ def bare_model(creature: Creature) -> tuple[mujoco.MjModel, np.ndarray]:
     for geom, mixed in contacts.items():
         spec.add_pair(geomname1=FLOOR, geomname2=names[geom], **mixed)
     bare = spec.compile()
-    return bare, np.array([bare.geom(names[g]).id for g in creature.watched], int)
+    return bare, np.array([bare.geom(names[g]).id for g in creature.feet.watched], int)
 
 
 def _only_the_floor_is_touched(full: mujoco.MjModel) -> bool:

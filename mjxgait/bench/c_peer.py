@@ -82,9 +82,9 @@ def _work(
 ) -> tuple[ctypes.Structure, list[np.ndarray]]:
     """`Work` of c_peer.c, whose fields are these in this order, and the arrays it points to."""
     law, limits = Law(creature, workload), creature.settings.termination
-    forbidden = watched[len(creature.foot_of) :] if limits.touch else watched[:0]
+    forbidden = watched[len(creature.feet.foot_of) :] if limits.touch else watched[:0]
     integers = {
-        "joints": len(creature.stand),
+        "joints": len(creature.joints.stand),
         "poses": law.poses,
         "interpolation": law.interpolation,
         "starts": len(workload.qpos),
@@ -96,15 +96,15 @@ def _work(
         "root_dof": law.root,
     }
     numbers = {
-        "body_length": creature.body_length,
-        "stand_height": creature.stand_height,
+        "body_length": creature.frame.body_length,
+        "stand_height": creature.frame.stand_height,
         "min_up": limits.min_up,
         "lowest": limits.height[0],
         "highest": limits.height[1],
     }
     addresses = {
-        "qpos_adr": creature.qpos_adr,
-        "dof_adr": creature.dof_adr,
+        "qpos_adr": creature.joints.qpos_adr,
+        "dof_adr": creature.joints.dof_adr,
         "geom": forbidden,
         "push_step": workload.push_step,
     }
@@ -127,17 +127,17 @@ def _body(creature: Creature, law: Law, forbidden: LowestPoint) -> dict[str, np.
     return {
         "kp": law.kp,
         "kd": law.kd,
-        "limit": creature.torque_limit,
-        "low": creature.joint_low,
-        "high": creature.joint_high,
-        "stand": creature.stand,
-        "steer_bend": creature.steer_bend,
-        "steer_stride": creature.steer_stride,
-        "balance_pitch": creature.balance_pitch,
-        "balance_roll": creature.balance_roll,
+        "limit": creature.gains.torque_limit,
+        "low": creature.joints.low,
+        "high": creature.joints.high,
+        "stand": creature.joints.stand,
+        "steer_bend": creature.corrections.steer_bend,
+        "steer_stride": creature.corrections.steer_stride,
+        "balance_pitch": creature.corrections.balance_pitch,
+        "balance_roll": creature.corrections.balance_roll,
         "reach": np.column_stack([forbidden.radius, forbidden.box, forbidden.ellipsoid]),
         "axes": law.axes.T,
-        "up": creature.up,
+        "up": creature.frame.up,
         "start": law.start,
         "forward": law.forward,
         "left": law.left,

@@ -47,7 +47,7 @@ class DartPeer:
         # which is the model's.
         self.kd = np.concatenate([np.zeros(FREE_DOFS), self.law.kd])
         self.damping = np.diag(self.kd * self.law.step)
-        self.limit = np.concatenate([np.zeros(FREE_DOFS), self.creature.torque_limit])
+        self.limit = np.concatenate([np.zeros(FREE_DOFS), self.creature.gains.torque_limit])
 
     def lap(self) -> tuple[int, float]:
         """Useful steps, and the sum over episodes of the distance forward in m."""
@@ -119,9 +119,9 @@ class DartPeer:
 
     def _down(self, running: list["_Lane"], pos: np.ndarray, rot: np.ndarray) -> np.ndarray:
         limits = self.creature.settings.termination
-        height = pos[:, 2] / self.creature.stand_height
+        height = pos[:, 2] / self.creature.frame.stand_height
         fine = (
-            (rot[:, 2] @ self.creature.up >= limits.min_up)
+            (rot[:, 2] @ self.creature.frame.up >= limits.min_up)
             & (height >= limits.height[0])
             & (height <= limits.height[1])
         )
@@ -193,7 +193,7 @@ def _skeleton(creature: Creature, model: mujoco.MjModel) -> tuple[Any, dict[int,
             dartpy.dynamics.Inertia(float(model.body_mass[body]), model.body_ipos[body], inertia)
         )
         nodes[body] = node
-    for geom in creature.watched[: len(creature.foot_of)]:
+    for geom in creature.feet.watched[: len(creature.feet.foot_of)]:
         _sphere(nodes[int(model.geom_bodyid[geom])], model, int(geom))
     return skeleton, nodes
 
@@ -259,7 +259,7 @@ def _forbidden_spheres(
     a capsule its two ends.
     """
     balls = []
-    for geom in creature.watched[len(creature.foot_of) :]:
+    for geom in creature.feet.watched[len(creature.feet.foot_of) :]:
         body, centre, size = (
             int(model.geom_bodyid[geom]),
             model.geom_pos[geom],

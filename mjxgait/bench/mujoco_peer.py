@@ -50,7 +50,7 @@ class MujocoPeer:
         self.geom_xpos, self.geom_xmat = bind("geom_xpos"), bind("geom_xmat")
         self.passive = bind("qfrc_passive") if _has_passive(self.model) else None
         self.forbidden = LowestPoint(
-            self.model, self.creature.watched[len(self.creature.foot_of) :]
+            self.model, self.creature.feet.watched[len(self.creature.feet.foot_of) :]
         )
         self.law = Law(self.creature, workload)
         self.damped = DampedSolve(self.model, self.creature)
@@ -98,7 +98,9 @@ class MujocoPeer:
         pushed[:, law.dof] += force
         acceleration = self.damped.solve(self.mass[rows], pushed)[:, law.dof]
         self.applied[rows, law.dof] = np.clip(
-            force - law.step * law.kd * acceleration, -creature.torque_limit, creature.torque_limit
+            force - law.step * law.kd * acceleration,
+            -creature.gains.torque_limit,
+            creature.gains.torque_limit,
         )
         self.position[rows] = law.advance(genome, self.position[rows], target, q, self.steps[rows])
         self.batch.step(None if isinstance(rows, slice) else rows, stage=VELOCITY_STAGE)
@@ -132,8 +134,8 @@ class MujocoPeer:
         Negated comparisons: what is not a number is down.
         """
         creature, limits = self.creature, self.creature.settings.termination
-        up = self.xmat[rows, creature.trunk, 6:] @ creature.up
-        height = self.xpos[rows, creature.trunk, 2] / creature.stand_height
+        up = self.xmat[rows, creature.trunk, 6:] @ creature.frame.up
+        height = self.xpos[rows, creature.trunk, 2] / creature.frame.stand_height
         fine = (up >= limits.min_up) & (height >= limits.height[0]) & (height <= limits.height[1])
         if limits.touch:
             fine &= self.forbidden.lowest(self.geom_xpos[rows], self.geom_xmat[rows]) >= 0
@@ -146,17 +148,22 @@ class Law:
     def __init__(self, creature: Creature, workload: Workload) -> None:
         self.creature, settings = creature, workload.config.controller
         self.cycle, self.tuning = workload.cycles(creature), workload.tuning
-        self.step, self.kp, self.kd = float(creature.model.opt.timestep), creature.kp, creature.kd
-        self.qpos, self.dof = _span(creature.qpos_adr), _span(creature.dof_adr)
+        self.step, self.kp, self.kd = (
+            float(creature.model.opt.timestep),
+            creature.gains.kp,
+            creature.gains.kd,
+        )
+        self.qpos, self.dof = _span(creature.joints.qpos_adr), _span(creature.joints.dof_adr)
         self.interpolation, self.by_clock = settings.interpolation, settings.advance == "clock"
         self.poses = self.cycle.shape[1]
         self.length = self.poses * settings.interpolation
         self.root = Layout(creature.model).root_dof + 3
-        self.start = creature.stand_pos
+        self.start = creature.frame.stand_pos
         self.forward, self.left = (
-            _horizontal(creature.stand_rot @ axis) for axis in (creature.forward, creature.left)
+            _horizontal(creature.frame.stand_rot @ axis)
+            for axis in (creature.frame.forward, creature.frame.left)
         )
-        self.axes = np.stack([creature.forward, creature.left], 1)
+        self.axes = np.stack([creature.frame.forward, creature.frame.left], 1)
         self.balances = any(
             np.any(self.tuning[name]) for name in ("pitch", "pitch_rate", "roll", "roll_rate")
         )
@@ -180,9 +187,12 @@ class Law:
         forward = axes[:, :, 0]
         wrong = np.arctan2(forward @ self.left, forward @ self.forward) + (
             pos - self.start
-        ) @ self.left / (2 * creature.body_length)
+        ) @ self.left / (2 * creature.frame.body_length)
         steer = np.clip(gain["steer"][genome] * wrong, -0.5, 0.5)[:, None]
-        target += steer * (creature.steer_bend + creature.steer_stride * (target - creature.stand))
+        target += steer * (
+            creature.corrections.steer_bend
+            + creature.corrections.steer_stride * (target - creature.joints.stand)
+        )
         if self.balances:
             spin = (rot @ v[:, self.root : self.root + 3, None])[:, None, :, 0] @ axes
             lean = np.arcsin(np.clip(axes[:, 2], -1, 1))
@@ -197,9 +207,10 @@ class Law:
                 0.5,
             )
             target += (
-                pitch[:, None] * creature.balance_pitch + roll[:, None] * creature.balance_roll
+                pitch[:, None] * creature.corrections.balance_pitch
+                + roll[:, None] * creature.corrections.balance_roll
             )
-        return np.clip(target, creature.joint_low, creature.joint_high, out=target)
+        return np.clip(target, creature.joints.low, creature.joints.high, out=target)
 
     def advance(
         self,
@@ -233,8 +244,8 @@ class DampedSolve:
         )
         self.entry, self.size = entry.ravel(), model.nv
         self.damping = np.zeros(model.nC)
-        self.damping[entry[creature.dof_adr, creature.dof_adr]] = (
-            float(creature.model.opt.timestep) * creature.kd
+        self.damping[entry[creature.joints.dof_adr, creature.joints.dof_adr]] = (
+            float(creature.model.opt.timestep) * creature.gains.kd
         )
 
     def solve(self, mass: np.ndarray, force: np.ndarray) -> np.ndarray:

@@ -22,8 +22,8 @@ def batch_of(creature: Creature, model: mujoco.MjModel, starts: Starts) -> Batch
     batch.reset(stage=int(mujoco.mjtStage.mjSTAGE_NONE))
     qpos = batch.bind("qpos")
     qpos[:] = creature.stand_qpos
-    qpos[:, creature.qpos_adr] += starts.joint_offset
-    batch.bind("qvel")[:, creature.dof_adr] = starts.joint_velocity
+    qpos[:, creature.joints.qpos_adr] += starts.joint_offset
+    batch.bind("qvel")[:, creature.joints.dof_adr] = starts.joint_velocity
     return batch
 
 

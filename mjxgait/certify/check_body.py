@@ -76,18 +76,18 @@ class _Body:
         stand = np.array([self.stand[j.qposadr[0]] for j in self.joints])
         yield "trunk", creature.trunk, self.trunk.id
         yield "standing pose", creature.stand_qpos, self.stand
-        yield "standing trunk's place", creature.stand_pos, self.data.xpos[self.trunk.id]
-        yield "standing trunk's rotation", creature.stand_rot, self.trunk_rot
-        yield "forward axis", creature.forward, forward
-        yield "left axis", creature.left, left
-        yield "up axis", creature.up, up
-        yield "hip height in m", creature.hip_height, self.hip_height()
-        yield "mass in kg", creature.mass, mujoco.mj_getTotalmass(self.model)
-        yield "number of joints", len(creature.joint_names), len(self.joints)
-        yield "feet", list(map(self._body_id, creature.foot_names)), self.feet
-        yield "positions' places", creature.qpos_adr, [j.qposadr[0] for j in self.joints]
-        yield "velocities' places", creature.dof_adr, [j.dofadr[0] for j in self.joints]
-        yield "standing angles", creature.stand, stand
+        yield "standing trunk's place", creature.frame.stand_pos, self.data.xpos[self.trunk.id]
+        yield "standing trunk's rotation", creature.frame.stand_rot, self.trunk_rot
+        yield "forward axis", creature.frame.forward, forward
+        yield "left axis", creature.frame.left, left
+        yield "up axis", creature.frame.up, up
+        yield "hip height in m", creature.frame.hip_height, self.hip_height()
+        yield "mass in kg", creature.frame.mass, mujoco.mj_getTotalmass(self.model)
+        yield "number of joints", len(creature.joints.names), len(self.joints)
+        yield "feet", list(map(self._body_id, creature.feet.names)), self.feet
+        yield "positions' places", creature.joints.qpos_adr, [j.qposadr[0] for j in self.joints]
+        yield "velocities' places", creature.joints.dof_adr, [j.dofadr[0] for j in self.joints]
+        yield "standing angles", creature.joints.stand, stand
         for key, value in self.drives(creature, stand):
             for name, mine, expected in zip(self.names, *value, strict=True):
                 yield f'{key} of joint "{name}"', mine, expected
@@ -98,13 +98,13 @@ class _Body:
         """Gains, limits and weights [J] of the creature, and by its files."""
         low, high = np.array([self._range(j) for j in self.joints]).T
         pose = np.radians([self.setting(name, "range", [-45.0, 45.0]) for name in self.names])
-        yield "lower limit", (creature.joint_low, low)
-        yield "upper limit", (creature.joint_high, high)
-        yield "lowest pose", (creature.pose_low, np.maximum(stand + pose[:, 0], low))
-        yield "highest pose", (creature.pose_high, np.minimum(stand + pose[:, 1], high))
+        yield "lower limit", (creature.joints.low, low)
+        yield "upper limit", (creature.joints.high, high)
+        yield "lowest pose", (creature.joints.pose_low, np.maximum(stand + pose[:, 0], low))
+        yield "highest pose", (creature.joints.pose_high, np.minimum(stand + pose[:, 1], high))
         for key in ("kp", "kd", "torque_limit"):
             values = np.array([self.setting(name, key) for name in self.names], float)
-            yield key, (getattr(creature, key), values)
+            yield key, (getattr(creature.gains, key), values)
         for group, key in (
             ("steering", "bend"),
             ("steering", "stride"),
@@ -113,7 +113,7 @@ class _Body:
         ):
             field = f"{'steer' if group == 'steering' else group}_{key}"
             weights = np.array([self.weight(name, group, key) for name in self.names])
-            yield f"{group} weight ({key})", (getattr(creature, field), weights)
+            yield f"{group} weight ({key})", (getattr(creature.corrections, field), weights)
 
     def axes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Forward, left and up in the trunk's frame, from cross products in the world."""
@@ -158,9 +158,9 @@ class _Body:
             along = self.data.geom_xpos[parts] @ forward
             reach = self.model.geom_rbound[parts]
             low, high = np.ptp(along), (along + reach).max() - (along - reach).min()
-        if not low - EXACT <= creature.body_length <= high + EXACT:
+        if not low - EXACT <= creature.frame.body_length <= high + EXACT:
             raise UserError(
-                f"{creature.name}: its body length is {creature.body_length:g} m, but by its files "
+                f"{creature.name}: its body length is {creature.frame.body_length:g} m, but by its files "
                 f"it is {low:.3g} to {high:.3g} m; nothing it does can be examined"
             )
 
@@ -172,7 +172,7 @@ class _Body:
         rng, stated = np.random.default_rng(0), self.table.get("mirror", {}).get("pairs", [])
         for pair in stated:
             j = self.names.index(pair["joint"])
-            found = self.names[creature.partner[j]], int(creature.sign[j])
+            found = self.names[creature.mirror.partner[j]], int(creature.mirror.sign[j])
             if found != (said := (pair["partner"], pair.get("sign", 1))):
                 raise UserError(
                     f'{creature.name}: joint "{pair["joint"]}" mirrors {found[0]} with sign '
@@ -186,15 +186,15 @@ class _Body:
         for _ in range(4):
             pose = stand + free * rng.uniform(-SWING, SWING, len(stand))
             parts, image = self._parts(pose), self._parts(_mirrored(creature, pose))
-            for j, partner in enumerate(creature.partner):
+            for j, partner in enumerate(creature.mirror.partner):
                 turned = parts[1][partner] @ base[1][partner].T
                 image_turned = image[1][j] @ base_image[1][j].T
                 angle = np.linalg.norm(flip @ turned @ flip - image_turned) / np.sqrt(2)
                 away = np.linalg.norm(flip @ parts[0][partner] - image[0][j])
-                if angle > LIKENESS or away > LIKENESS * creature.hip_height:
+                if angle > LIKENESS or away > LIKENESS * creature.frame.hip_height:
                     raise UserError(
                         f'{creature.name}: joint "{self.names[j]}" does not mirror '
-                        f'"{self.names[partner]}" with sign {creature.sign[j]}: in a random pose '
+                        f'"{self.names[partner]}" with sign {creature.mirror.sign[j]}: in a random pose '
                         f"it is {away:.3g} m and {angle:.2g} rad off; settle it in [mirror] pairs"
                     )
 
@@ -236,7 +236,7 @@ class _Body:
 
 def _mirrored(creature: Creature, pose: np.ndarray) -> np.ndarray:
     """[J] the mirror image of a pose, as the creature's map says."""
-    return creature.sign * pose[creature.partner]
+    return creature.mirror.sign * pose[creature.mirror.partner]
 
 
 def _show(value: Any) -> str:

@@ -34,7 +34,7 @@ class Drive:
         A pose is followed by stable PD (Tan, Liu & Turk 2011) or plain PD.
         stiffness, damping: factors on kp and kd, [S, J] or one for all.
         """
-        limit = self.creature.torque_limit
+        limit = self.creature.gains.torque_limit
         if self.command == "pose":
             wanted = self._pull(wanted, state, stiffness, damping)
         return np.clip(wanted, -limit, limit)
@@ -47,9 +47,9 @@ class Drive:
         damping: np.ndarray | float,
     ) -> np.ndarray:
         creature, step = self.creature, self.step
-        kp = stiffness * self.settings.stiffness * creature.kp
-        kd = damping * self.settings.damping * creature.kd
-        v = state.velocity[:, creature.dof_adr]
+        kp = stiffness * self.settings.stiffness * creature.gains.kp
+        kd = damping * self.settings.damping * creature.gains.kd
+        v = state.velocity[:, creature.joints.dof_adr]
         if self.settings.law == "pd":
             return -kp * (state.joint_pos - target) - kd * v
         spring_damper = -kp * (state.joint_pos + step * v - target) - kd * v
@@ -63,7 +63,7 @@ class Drive:
 
         damping: [J] or [S, J], time step times kd.
         """
-        dof = self.creature.dof_adr
+        dof = self.creature.joints.dof_adr
         force = -state.bias
         if self.settings.constraint_forces:
             force = force + state.constraint_force

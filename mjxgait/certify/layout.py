@@ -60,7 +60,9 @@ def start_frame(creature: Creature) -> StartFrame:
     data.qpos[:] = creature.stand_qpos
     mujoco.mj_kinematics(creature.model, data)
     rot = data.xmat[creature.trunk].reshape(3, 3)
-    forward, left = (_horizontal(rot @ axis) for axis in (creature.forward, creature.left))
+    forward, left = (
+        _horizontal(rot @ axis) for axis in (creature.frame.forward, creature.frame.left)
+    )
     return StartFrame(data.xpos[creature.trunk].copy(), forward, left)
 
 
@@ -71,8 +73,8 @@ def _horizontal(vector: np.ndarray) -> np.ndarray:
 
 def per_foot(creature: Creature, heights: np.ndarray) -> np.ndarray:
     """[S, F] the least of the heights [S, geoms] of each foot's geoms."""
-    feet = range(len(creature.foot_names))
-    return np.stack([heights[:, creature.foot_of == foot].min(1) for foot in feet], 1)
+    feet = range(len(creature.feet.names))
+    return np.stack([heights[:, creature.feet.foot_of == foot].min(1) for foot in feet], 1)
 
 
 class LowestPoint:

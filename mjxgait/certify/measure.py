@@ -105,24 +105,26 @@ def dimensions(creature: Creature) -> Dimensions:
     data = mujoco.MjData(model)
     data.qpos[:] = creature.stand_qpos
     mujoco.mj_kinematics(model, data)
-    axes = data.xmat[creature.trunk].reshape(3, 3) @ np.stack([creature.forward, creature.left], 1)
-    feet = creature.watched[: len(creature.foot_of)]
+    axes = data.xmat[creature.trunk].reshape(3, 3) @ np.stack(
+        [creature.frame.forward, creature.frame.left], 1
+    )
+    feet = creature.feet.watched[: len(creature.feet.foot_of)]
     places = (data.geom_xpos[feet] - data.xpos[creature.trunk]) @ axes
-    middles = [places[creature.foot_of == n].mean(0) for n in range(len(creature.foot_names))]
+    middles = [places[creature.feet.foot_of == n].mean(0) for n in range(len(creature.feet.names))]
     return Dimensions(
-        stand_height=creature.stand_height,
-        hip_height=creature.hip_height,
-        body_length=creature.body_length,
-        mass=creature.mass,
+        stand_height=creature.frame.stand_height,
+        hip_height=creature.frame.hip_height,
+        body_length=creature.frame.body_length,
+        mass=creature.frame.mass,
         gravity=float(-model.opt.gravity[2]),
-        torque_limit=tuple(map(float, creature.torque_limit)),
+        torque_limit=tuple(map(float, creature.gains.torque_limit)),
         joint_range=tuple(
             (float(low), float(high))
-            for low, high in zip(creature.joint_low, creature.joint_high, strict=True)
+            for low, high in zip(creature.joints.low, creature.joints.high, strict=True)
         ),
-        foot_names=creature.foot_names,
+        foot_names=creature.feet.names,
         foot_places=tuple((float(forward), float(left)) for forward, left in middles),
-        crawler=len(creature.ground) > 0,
+        crawler=len(creature.feet.ground) > 0,
     )
 
 
@@ -152,7 +154,8 @@ def measure(
             break
         sight.look(k, qpos[k], qvel[k], torque[k])
     forward, left, up = (
-        sight.trunk_rot @ axis for axis in (creature.forward, creature.left, creature.up)
+        sight.trunk_rot @ axis
+        for axis in (creature.frame.forward, creature.frame.left, creature.frame.up)
     )
     moved = sight.trunk_pos - start.place * [1, 1, 0]
     ground = terrain_of(creature)
@@ -165,8 +168,8 @@ def measure(
         trunk_up=up[:, 2],
         pitch=-np.arcsin(np.clip(forward[:, 2], -1, 1)),
         roll=np.arcsin(np.clip(left[:, 2], -1, 1)),
-        joint_pos=qpos[:, creature.qpos_adr],
-        joint_vel=qvel[:, creature.dof_adr],
+        joint_pos=qpos[:, creature.joints.qpos_adr],
+        joint_vel=qvel[:, creature.joints.dof_adr],
         torque=torque,
         foot_force=sight.foot_force,
         foot_slip=sight.foot_slip,
@@ -187,12 +190,12 @@ class _Sight:
     def __init__(self, creature: Creature, frames: int, bar: np.ndarray | None) -> None:
         self.creature, self.model = creature, examined_model(creature)
         self.data = mujoco.MjData(self.model)
-        feet = len(creature.foot_names)
-        foot_geoms = creature.watched[: len(creature.foot_of)]
+        feet = len(creature.feet.names)
+        foot_geoms = creature.feet.watched[: len(creature.feet.foot_of)]
         self.reach = LowestPoint(self.model, foot_geoms, terrain_of(creature))
         self.foot_of_geom = np.full(self.model.ngeom, -1)
-        self.foot_of_geom[foot_geoms] = creature.foot_of
-        self.may_touch = np.isin(np.arange(self.model.ngeom), [*foot_geoms, *creature.ground])
+        self.foot_of_geom[foot_geoms] = creature.feet.foot_of
+        self.may_touch = np.isin(np.arange(self.model.ngeom), [*foot_geoms, *creature.feet.ground])
         self.floor = self.model.geom("floor").id
         self.trunk_pos, self.trunk_rot = (
             np.full((frames, 3), np.nan),
@@ -212,7 +215,7 @@ class _Sight:
     def look(self, k: int, qpos: np.ndarray, qvel: np.ndarray, torque: np.ndarray) -> None:
         data, creature = self.data, self.creature
         data.qpos[:], data.qvel[:] = qpos, qvel
-        data.qfrc_applied[creature.dof_adr] = torque
+        data.qfrc_applied[creature.joints.dof_adr] = torque
         mujoco.mj_forward(self.model, data)
         self.trunk_pos[k], self.trunk_rot[k] = (
             data.xpos[creature.trunk],

@@ -75,7 +75,7 @@ def neighbours(model: mujoco.MjModel, creature: Creature) -> list[tuple[int, int
         between = chains[one] ^ chains[other]
         anchors = data.xanchor[np.isin(model.jnt_bodyid, list(between))]
         return len(between) < 2 or bool(
-            np.linalg.norm(np.ptp(anchors, axis=0)) <= ONE_PLACE * creature.hip_height
+            np.linalg.norm(np.ptp(anchors, axis=0)) <= ONE_PLACE * creature.frame.hip_height
         )
 
     moving = range(1, model.nbody)

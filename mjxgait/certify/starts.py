@@ -75,7 +75,7 @@ def join(*parts: Starts) -> Starts:
 
 def nominal_starts(creature: Creature, count: int) -> Starts:
     """Undisturbed ones."""
-    joints = len(creature.joint_names)
+    joints = len(creature.joints.names)
     return Starts(
         joint_offset=np.zeros((count, joints)),
         joint_velocity=np.zeros((count, joints)),

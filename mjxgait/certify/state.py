@@ -50,7 +50,7 @@ Sense = Callable[[Creature, State], np.ndarray]
 
 
 def _heading(creature: Creature, state: State) -> np.ndarray:
-    nose = state.trunk_rot @ creature.forward
+    nose = state.trunk_rot @ creature.frame.forward
     return np.arctan2(nose @ state.start.left, nose @ state.start.forward)
 
 
@@ -64,18 +64,18 @@ def _height(state: State) -> np.ndarray:
 
 
 def _nose_down(creature: Creature, state: State) -> np.ndarray:
-    return -np.arcsin(np.clip((state.trunk_rot @ creature.forward)[:, 2], -1, 1))
+    return -np.arcsin(np.clip((state.trunk_rot @ creature.frame.forward)[:, 2], -1, 1))
 
 
 def _right_down(creature: Creature, state: State) -> np.ndarray:
-    return np.arcsin(np.clip((state.trunk_rot @ creature.left)[:, 2], -1, 1))
+    return np.arcsin(np.clip((state.trunk_rot @ creature.frame.left)[:, 2], -1, 1))
 
 
 SENSES: Mapping[str, Sense] = {
     "time": lambda creature, state: state.time,
     "beat": lambda creature, state: 2 * np.mod(state.time, 1.0) - 1,
     "joint_pos": lambda creature, state: state.joint_pos,
-    "joint_vel": lambda creature, state: state.velocity[:, creature.dof_adr],
+    "joint_vel": lambda creature, state: state.velocity[:, creature.joints.dof_adr],
     "foot_height": lambda creature, state: state.foot_height,
     "contact": lambda creature, state: (state.foot_height < CONTACT_GAP).astype(float),
     "trunk_pos": lambda creature, state: state.trunk_pos,
@@ -91,10 +91,10 @@ SENSES: Mapping[str, Sense] = {
     "pitch": _nose_down,
     "roll": _right_down,
     "pitch_rate": lambda creature, state: (
-        state.trunk_angvel * (state.trunk_rot @ creature.left)
+        state.trunk_angvel * (state.trunk_rot @ creature.frame.left)
     ).sum(1),
     "roll_rate": lambda creature, state: (
-        state.trunk_angvel * (state.trunk_rot @ creature.forward)
+        state.trunk_angvel * (state.trunk_rot @ creature.frame.forward)
     ).sum(1),
 }
 

@@ -70,7 +70,7 @@ class Stepping:
         self.layout = Layout(self.model)
         self.terrain = terrain_of(creature)
         self.solid = LowestPoint(self.model, colliding_geoms(self.model), self.terrain)
-        others = creature.watched[len(creature.foot_of) :]
+        others = creature.feet.watched[len(creature.feet.foot_of) :]
         self.forbidden = LowestPoint(self.model, others, self.terrain)
         bind = self.batch.bind
         self.qpos, self.qvel, self.applied = bind("qpos"), bind("qvel"), bind("qfrc_applied")
@@ -84,7 +84,7 @@ class Stepping:
         self.geom_xpos, self.geom_xmat = bind("geom_xpos"), bind("geom_xmat")
         self._lift()
         self.memory = dict(self.twin.init(len(starts)))
-        feet = creature.watched[: len(creature.foot_of)]
+        feet = creature.feet.watched[: len(creature.feet.foot_of)]
         self.feet = LowestPoint(self.model, feet, self.terrain)
         self.sees_feet = any(name in FOOT_SENSES for name in self.twin.reads)
         self.last_force = np.zeros_like(self.qvel)
@@ -175,7 +175,7 @@ class Stepping:
         # Before the first torque has arrived it acts already, as if the body had been held so.
         arrived = np.maximum(k - starts.delay[running], 0) % len(self.sent)
         torque = self.sent[arrived, running]
-        self.applied[running[:, None], self.creature.dof_adr] = torque
+        self.applied[running[:, None], self.creature.joints.dof_adr] = torque
         self.batch.step(running, stage=VELOCITY_STAGE)
         self.last_force[running] = self.constraint[running]
         return command, torque
@@ -203,7 +203,7 @@ class Stepping:
             start=self.start,
             ground=self.terrain,
             time=np.full(len(running), k * creature.model.opt.timestep),
-            joint_pos=self.qpos[running[:, None], creature.qpos_adr],
+            joint_pos=self.qpos[running[:, None], creature.joints.qpos_adr],
             velocity=velocity,
             trunk_pos=self.xpos[running, creature.trunk],
             trunk_rot=rot,
@@ -268,10 +268,10 @@ class Stepping:
     def _down(self, running: np.ndarray) -> np.ndarray:
         """Negated comparisons, so that a simulation that is NaN counts as down."""
         trunk = self.creature.trunk
-        up = self.xmat[running, trunk].reshape(-1, 3, 3)[:, 2] @ self.creature.up
+        up = self.xmat[running, trunk].reshape(-1, 3, 3)[:, 2] @ self.creature.frame.up
         x, y, z = self.xpos[running, trunk].T
         above = z - self.terrain.height(x, y) if self.terrain else z
-        height = above / self.creature.stand_height
+        height = above / self.creature.frame.stand_height
         fine = (
             self._sane(running)
             & (up > self.fall.min_up)
@@ -286,7 +286,7 @@ class Stepping:
         def blank(width: int) -> np.ndarray:
             return np.full((self.record, steps, width), np.nan)
 
-        joints = len(self.creature.dof_adr)
+        joints = len(self.creature.joints.dof_adr)
         return Trajectory(
             self.creature.model.opt.timestep,
             qpos=blank(self.model.nq),

@@ -101,7 +101,10 @@ def terrain_of(creature: Creature) -> Ground | None:
     if creature.terrain.flat:
         return None
     return Terrain(
-        creature.terrain, start_frame(creature), creature.hip_height, creature.body_length
+        creature.terrain,
+        start_frame(creature),
+        creature.frame.hip_height,
+        creature.frame.body_length,
     )
 
 
@@ -140,8 +143,8 @@ def grounded_model(creature: Creature) -> mujoco.MjModel:
 
 def sampled(terrain: Terrain, creature: Creature) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Heights [rows across, columns along] in m, the grid's middle [2] and half its sides [2]."""
-    along, across = (cell * creature.hip_height for cell in CELLS[terrain.spec.kind])
-    length = creature.body_length
+    along, across = (cell * creature.frame.hip_height for cell in CELLS[terrain.spec.kind])
+    length = creature.frame.body_length
     ahead = np.arange(-BEHIND * length, AHEAD * length + along, along)
     count = int(np.ceil(ASIDE * length / across))
     left = np.arange(-count, count + 1) * across

@@ -20,7 +20,7 @@ def sloping(creature: Creature, angle: float) -> Creature:
     takes the slope for level.
     """
     model = copy.copy(creature.model)
-    forward = (creature.stand_rot @ creature.forward) * [1.0, 1.0, 0.0]
+    forward = (creature.frame.stand_rot @ creature.frame.forward) * [1.0, 1.0, 0.0]
     forward /= np.linalg.norm(forward)
     model.opt.gravity[:] = model.opt.gravity[2] * (
         np.sin(angle) * forward + [0.0, 0.0, np.cos(angle)]

@@ -44,17 +44,26 @@ class Terminal:
     index: int | None = None
 
 
+class Named(Protocol):
+    """Parts with names."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """One per part."""
+        ...
+
+
 class HasParts(Protocol):
     """What is told of a body."""
 
     @property
-    def joint_names(self) -> tuple[str, ...]:
-        """Of the actuated joints."""
+    def joints(self) -> Named:
+        """The actuated ones."""
         ...
 
     @property
-    def foot_names(self) -> tuple[str, ...]:
-        """Of the feet."""
+    def feet(self) -> Named:
+        """Each a body, of one shape or several."""
         ...
 
 
@@ -79,9 +88,9 @@ SCALARS = {
 def terminals(body: HasParts, added: Sequence[str] = ()) -> tuple[Terminal, ...]:
     """All that a body senses, and those of the senses `added` by a task that have a name."""
     rows: list[tuple[str, str, int | None]] = [(n, sense, None) for n, sense in SCALARS.items()]
-    for j in range(len(body.joint_names)):
+    for j in range(len(body.joints.names)):
         rows += [(f"a{j}", "joint_pos", j), (f"w{j}", "joint_vel", j)]
-    rows += [(f"c{f}", "contact", f) for f in range(len(body.foot_names))]
+    rows += [(f"c{f}", "contact", f) for f in range(len(body.feet.names))]
     own = [Terminal(n, FIRST_SENSE + i, sense, k) for i, (n, sense, k) in enumerate(rows)]
     given = [
         Terminal(name, FIRST_ADDED + i, sense)

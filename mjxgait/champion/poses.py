@@ -26,16 +26,16 @@ class PoseCodec:
         """See `Codec`. mirrored: whether the mirror images of the poses follow them."""
         return {
             "key_poses": [
-                dict(zip(creature.joint_names, map(float, pose), strict=True))
+                dict(zip(creature.joints.names, map(float, pose), strict=True))
                 for pose in genome["key_poses"]
             ],
-            "mirrored": creature.symmetric and settings.mirror,
+            "mirrored": creature.mirror.symmetric and settings.mirror,
             "tuning": dict(zip(TUNING, map(float, genome["tuning"]), strict=True)),
         }
 
     def genome(self, document: Mapping[str, Any], creature: Creature) -> dict[str, np.ndarray]:
         """See `Codec`."""
-        poses = [[pose[name] for name in creature.joint_names] for pose in document["key_poses"]]
+        poses = [[pose[name] for name in creature.joints.names] for pose in document["key_poses"]]
         tuning = [document["tuning"][name] for name in TUNING]
         return {"key_poses": np.array(poses, float), "tuning": np.array(tuning, float)}
 
@@ -49,7 +49,7 @@ class PoseCodec:
         for place in np.argwhere(~np.isfinite(poses)):
             k, j = map(int, place)
             raise UserError(
-                f'key pose {k + 1} has {poses[k, j]} rad for joint "{creature.joint_names[j]}": '
+                f'key pose {k + 1} has {poses[k, j]} rad for joint "{creature.joints.names[j]}": '
                 "this champion cannot move; take one of another generation"
             )
         for name, value in zip(TUNING, genome["tuning"], strict=True):
@@ -61,5 +61,5 @@ class PoseCodec:
 
     def shapes(self, settings: PoseConfig, creature: Creature) -> dict[str, tuple[int, ...]]:
         """See `Codec`."""
-        poses = (settings.key_poses, len(creature.joint_names))
+        poses = (settings.key_poses, len(creature.joints.names))
         return {"key_poses": poses, "tuning": (len(TUNING),)}

@@ -21,7 +21,7 @@ class ProgramCodec:
     ) -> dict[str, Any]:
         """See `Codec`. expressions: by joint. nodes: the most that one may have."""
         known = terminals(creature, tuple(ADDED.values()))
-        rows = zip(creature.joint_names, genome["code"], genome["value"], strict=True)
+        rows = zip(creature.joints.names, genome["code"], genome["value"], strict=True)
         return {
             "expressions": {name: to_text(code, value, known) for name, code, value in rows},
             "nodes": int(genome["code"].shape[1]),
@@ -44,11 +44,11 @@ class ProgramCodec:
         """See `Codec`."""
         known, nodes = terminals(creature, tuple(ADDED.values())), int(document["nodes"])
         texts = document["expressions"]
-        if missing := [name for name in creature.joint_names if name not in texts]:
+        if missing := [name for name in creature.joints.names if name not in texts]:
             raise UserError(f'no expression for joint "{missing[0]}"')
         pairs = [
             to_arrays(str(texts[name]), known, nodes, f'expression of joint "{name}"')
-            for name in creature.joint_names
+            for name in creature.joints.names
         ]
         code, value = (np.stack(rows) for rows in zip(*pairs, strict=True))
         return {"code": code, "value": value}
@@ -61,12 +61,12 @@ class ProgramCodec:
         """See `Codec`."""
         for j, place in np.argwhere(~np.isfinite(genome["value"])):
             raise UserError(
-                f'the expression of joint "{creature.joint_names[j]}" has a constant that is '
+                f'the expression of joint "{creature.joints.names[j]}" has a constant that is '
                 f"{genome['value'][j, place]}: this champion cannot move; take one of another "
                 "generation"
             )
 
     def shapes(self, settings: ProgramConfig, creature: Creature) -> dict[str, tuple[int, ...]]:
         """See `Codec`."""
-        shape = (len(creature.joint_names), settings.nodes)
+        shape = (len(creature.joints.names), settings.nodes)
         return {"code": shape, "value": shape}

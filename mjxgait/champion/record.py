@@ -109,7 +109,13 @@ def as_table(settings: Any) -> dict[str, Any]:
 
 def write_champion(champion: Champion, creature: Creature, path: Path) -> None:
     """Writes the file in one go: it is either the old one or the new one."""
-    gains = zip(creature.joint_names, creature.kp, creature.kd, creature.torque_limit, strict=True)
+    gains = zip(
+        creature.joints.names,
+        creature.gains.kp,
+        creature.gains.kd,
+        creature.gains.torque_limit,
+        strict=True,
+    )
     codec = codec_of(champion.controller)
     document = {
         "schema": SCHEMA,

@@ -61,7 +61,7 @@ class Drive:
         command: jax.Array,
     ) -> jax.Array:
         """Joint torques in N·m; [J] per lane, as are rules, states and command."""
-        limit = self.creature.torque_limit.astype(np.float32)
+        limit = self.creature.gains.torque_limit.astype(np.float32)
         if self.command == "torque":
             return per_lane(plant, lambda wanted: jnp.clip(wanted, -limit, limit))(command)
         force, braked, damping = per_lane(plant, self._pull)(
@@ -72,7 +72,7 @@ class Drive:
             force, body.constraint_force, pushed, sensed.bias
         )
         acceleration = plant.solve_damped(workings, damping, total)
-        adr = self.creature.dof_adr
+        adr = self.creature.joints.dof_adr
         return per_lane(plant, lambda f, a, b: spd.limited_torque(f, a[adr], b, limit))(
             force, acceleration, braked
         )
@@ -85,15 +85,15 @@ class Drive:
         Plain PD is stable PD that looks no step ahead.
         """
         kp, kd = (
-            self.creature.kp.astype(np.float32) * rules.stiffness,
-            self.creature.kd.astype(np.float32) * rules.damping,
+            self.creature.gains.kp.astype(np.float32) * rules.stiffness,
+            self.creature.gains.kd.astype(np.float32) * rules.damping,
         )
         ahead = jnp.where(rules.stable, self.step, 0.0)
         return spd.pd_force(pos, vel, goal, kp, kd, ahead), ahead * kd, self.lift(self.step * kd)
 
     def lift(self, joints: ArrayLike) -> jax.Array:
         """Joint values [J] at their places among the degrees of freedom [nv], zero elsewhere."""
-        adr, nv = self.creature.dof_adr, self.creature.nv
+        adr, nv = self.creature.joints.dof_adr, self.creature.nv
         if np.array_equal(adr, np.arange(adr[0], adr[0] + len(adr))):
             return jnp.pad(jnp.asarray(joints), (adr[0], nv - adr[-1] - 1))
         return jnp.zeros(nv, jnp.float32).at[adr].set(joints)

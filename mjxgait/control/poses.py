@@ -74,12 +74,14 @@ class PoseTracker:
             jnp.stack([jnp.float32(getattr(config.tuning, name)[end]) for name in TUNING])
             for end in (0, 1)
         )
-        shape = (config.key_poses, len(self.creature.joint_names))
+        shape = (config.key_poses, len(self.creature.joints.names))
 
         def genome(pose: Number, tuning: jax.Array) -> Genome:
             return Genome(jnp.broadcast_to(jnp.asarray(pose, jnp.float32), shape), tuning)
 
-        return genome(self.creature.pose_low, low), genome(self.creature.pose_high, high)
+        return genome(self.creature.joints.pose_low, low), genome(
+            self.creature.joints.pose_high, high
+        )
 
     def variation(self, settings: PoseConfig, evolution: EvolutionConfig) -> Variation:
         """See `Controller`."""
@@ -117,7 +119,7 @@ class PoseTracker:
         target = interpolate(cycle.poses, state.position, cycle.interpolation, cycle.count)
         target = target + corrections(creature, cycle.tuning, target, senses)
         target = jnp.clip(
-            target, creature.joint_low.astype(np.float32), creature.joint_high.astype(np.float32)
+            target, creature.joints.low.astype(np.float32), creature.joints.high.astype(np.float32)
         )
         steps = state.steps + 1
         positions = cycle.count * cycle.interpolation
@@ -129,10 +131,10 @@ class PoseTracker:
 
 def pose_cycle(creature: Body, key_poses: jax.Array) -> jax.Array:
     """The closed cycle [C, J]: the key poses [K, J] and, for a symmetric creature, their mirror images."""
-    if not creature.symmetric:
+    if not creature.mirror.symmetric:
         return key_poses
     return jnp.concatenate(
-        [key_poses, creature.sign.astype(np.float32) * key_poses[:, creature.partner]]
+        [key_poses, creature.mirror.sign.astype(np.float32) * key_poses[:, creature.mirror.partner]]
     )
 
 
@@ -166,7 +168,7 @@ def interpolate(
 
 def corrections(creature: Body, tuning: jax.Array, target: jax.Array, senses: Senses) -> jax.Array:
     """Change [J] of the target pose by steering and balance; zero where the genes are zero."""
-    aside = senses["aside"] / (2 * creature.body_length)
+    aside = senses["aside"] / (2 * creature.frame.body_length)
     steer = _clip(tuning[STEER] * (senses["heading"] + aside))
     pitch, roll = (
         _clip(tuning[angle] * senses[name] + tuning[rate] * senses[f"{name}_rate"])
@@ -175,11 +177,11 @@ def corrections(creature: Body, tuning: jax.Array, target: jax.Array, senses: Se
     bend, stride, on_pitch, on_roll, stand = (
         value.astype(np.float32)
         for value in (
-            creature.steer_bend,
-            creature.steer_stride,
-            creature.balance_pitch,
-            creature.balance_roll,
-            creature.stand,
+            creature.corrections.steer_bend,
+            creature.corrections.steer_stride,
+            creature.corrections.balance_pitch,
+            creature.corrections.balance_roll,
+            creature.joints.stand,
         )
     )
     return (target - stand) * steer * stride + steer * bend + pitch * on_pitch + roll * on_roll

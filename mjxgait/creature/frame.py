@@ -10,7 +10,10 @@ from mjxgait.ground.spec import Place
 def start_place(creature: Creature) -> Place:
     """Where the creature starts on its ground."""
     return Place(
-        creature.stand_pos, creature.start_axes[0], creature.hip_height, creature.body_length
+        creature.frame.stand_pos,
+        creature.frame.start_axes[0],
+        creature.frame.hip_height,
+        creature.frame.body_length,
     )
 
 

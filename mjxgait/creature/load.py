@@ -10,13 +10,14 @@ import mujoco
 import numpy as np
 
 from mjxgait.creature import geometry
-from mjxgait.creature.creature import FLOOR, HINGE, Creature
+from mjxgait.creature.anatomy import Corrections, Feet, Frame, Gains, Joints, Mirror
+from mjxgait.creature.creature import FLOOR, HINGE, SLIDE, Creature
+from mjxgait.creature.mirrored import mirrored
 from mjxgait.creature.settings import CreatureSettings, JointException
 from mjxgait.creature.world import check_world
 from mjxgait.errors import UserError, did_you_mean
 from mjxgait.settings.tables import build, read_toml
 
-SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)
 NOT_ALONE = re.compile(
     r"<\s*(!DOCTYPE|!ENTITY|include|plugin|extension|replicate|composite|flexcomp|attach|model|size)\b|[\s\"'](file\w*|\w+dir)\s*="
 )
@@ -69,6 +70,34 @@ def _assemble(
     check_world(model, trunk, _id(model, mujoco.mjtObj.mjOBJ_GEOM, FLOOR, "the floor"))
     data = _standing(model, settings.creature.keyframe)
     axes = _trunk_axes(data.xmat[trunk].reshape(3, 3), np.array(settings.creature.forward))
+    found = _actuated(model, trunk)
+    names = [model.joint(j).name for j in found]
+    values = _joint_values(settings, names)
+    partner, sign = mirrored(model, data, settings, found, axes)
+    creature = Creature(
+        settings=settings,
+        files=files,
+        model=model,
+        trunk=trunk,
+        stand_qpos=data.qpos.copy(),
+        frame=_frame(model, data, settings, axes, found),
+        joints=_joints(model, data, found, np.radians(values["range"])),
+        gains=Gains(values["kp"], values["kd"], values["torque_limit"]),
+        mirror=Mirror(sign, tuple(map(int, partner)), settings.mirror.symmetric),
+        corrections=Corrections(
+            steer_bend=_weights(settings.steering.bend, names, "steering.bend"),
+            steer_stride=_weights(settings.steering.stride, names, "steering.stride"),
+            balance_pitch=_weights(settings.balance.pitch, names, "balance.pitch"),
+            balance_roll=_weights(settings.balance.roll, names, "balance.roll"),
+        ),
+        feet=_feet(model, settings),
+    )
+    _check(creature, data)
+    return creature
+
+
+def _actuated(model: mujoco.MjModel, trunk: int) -> list[int]:
+    """Ids of the joints that are driven: all hinges and slides but the trunk's."""
     joints = [
         j
         for j in range(model.njnt)
@@ -76,63 +105,52 @@ def _assemble(
     ]
     if not joints:
         raise UserError("the model has no hinge joint below its trunk, so there is nothing to move")
-    names = [model.joint(j).name for j in joints]
-    qpos_adr, dof_adr = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
-    stand = data.qpos[qpos_adr]
-    values = _joint_values(settings, names)
-    joint_range = np.where(
-        (model.jnt_range[joints] == 0).all(1, keepdims=True),
-        [-np.inf, np.inf],
-        model.jnt_range[joints],
+    return joints
+
+
+def _joints(
+    model: mujoco.MjModel, data: mujoco.MjData, joints: list[int], poses: np.ndarray
+) -> Joints:
+    """poses: [J, 2] rad, how far targets reach about the standing pose."""
+    stand, given = data.qpos[model.jnt_qposadr[joints]], model.jnt_range[joints]
+    endless = (given == 0).all(1, keepdims=True)
+    low, high = np.where(endless, [-np.inf, np.inf], given).T
+    return Joints(
+        names=tuple(model.joint(j).name for j in joints),
+        qpos=tuple(map(int, model.jnt_qposadr[joints])),
+        dofs=tuple(map(int, model.jnt_dofadr[joints])),
+        stand=stand,
+        pose_low=np.maximum(stand + poses[:, 0], low),
+        pose_high=np.minimum(stand + poses[:, 1], high),
+        low=low,
+        high=high,
     )
-    feet, feet_geoms = _feet(model, settings.creature.feet)
-    ground = np.array(
-        [
-            _id(model, mujoco.mjtObj.mjOBJ_GEOM, g, "creature.ground")
-            for g in settings.creature.ground
-        ],
-        dtype=int,
-    )
-    partner, sign = _mirror(model, data, settings, joints, names, axes)
-    world = data.xmat[trunk].reshape(3, 3) @ axes.T
-    creature = Creature(
-        settings=settings,
-        files=files,
-        model=model,
-        trunk=trunk,
+
+
+def _frame(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    settings: CreatureSettings,
+    axes: np.ndarray,
+    joints: list[int],
+) -> Frame:
+    trunk = model.body(settings.creature.trunk).id
+    rotation = data.xmat[trunk].reshape(3, 3).copy()
+    feet, _ = _foot_bodies(model, settings.creature.feet)
+    ahead = (rotation @ axes[0]) * [1, 1, 0]
+    ahead = ahead / np.linalg.norm(ahead)
+    length = settings.creature.body_length
+    return Frame(
         forward=axes[0],
         left=axes[1],
         up=axes[2],
-        stand_qpos=data.qpos.copy(),
         stand_pos=data.xpos[trunk].copy(),
-        stand_rot=data.xmat[trunk].reshape(3, 3).copy(),
-        joint_names=tuple(names),
-        qpos_adr=qpos_adr,
-        dof_adr=dof_adr,
-        stand=stand,
-        pose_low=np.maximum(stand + np.radians(values["range"][:, 0]), joint_range[:, 0]),
-        pose_high=np.minimum(stand + np.radians(values["range"][:, 1]), joint_range[:, 1]),
-        joint_low=joint_range[:, 0],
-        joint_high=joint_range[:, 1],
-        kp=values["kp"],
-        kd=values["kd"],
-        torque_limit=values["torque_limit"],
-        partner=partner,
-        sign=sign,
-        steer_bend=_weights(settings.steering.bend, names, "steering.bend"),
-        steer_stride=_weights(settings.steering.stride, names, "steering.stride"),
-        balance_pitch=_weights(settings.balance.pitch, names, "balance.pitch"),
-        balance_roll=_weights(settings.balance.roll, names, "balance.roll"),
-        watched=np.array([*feet_geoms, *_forbidden(model, feet_geoms, ground)], dtype=int),
-        foot_of=np.array([feet.index(model.geom_bodyid[g]) for g in feet_geoms]),
-        foot_names=tuple(model.body(b).name for b in feet),
-        ground=ground,
+        stand_rot=rotation,
+        start_axes=(ahead.astype(np.float32), np.cross([0, 0, 1], ahead).astype(np.float32)),
         hip_height=float(geometry.leg_lengths(model, data, feet, joints).mean()),
-        body_length=settings.creature.body_length or geometry.body_length(model, data, world[:, 0]),
+        body_length=length or geometry.body_length(model, data, rotation @ axes[0]),
         mass=float(model.body_mass.sum()),
     )
-    _check(creature, data)
-    return creature
 
 
 def _id(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str, key: str) -> int:
@@ -202,7 +220,19 @@ def _weights(table: Mapping[str, float], names: list[str], key: str) -> np.ndarr
     return weights
 
 
-def _feet(model: mujoco.MjModel, names: tuple[str, ...]) -> tuple[list[int], list[int]]:
+def _feet(model: mujoco.MjModel, settings: CreatureSettings) -> Feet:
+    bodies, stepping = _foot_bodies(model, settings.creature.feet)
+    kind = mujoco.mjtObj.mjOBJ_GEOM
+    ground = [_id(model, kind, name, "creature.ground") for name in settings.creature.ground]
+    return Feet(
+        names=tuple(model.body(b).name for b in bodies),
+        geoms=tuple(bodies.index(int(model.geom_bodyid[g])) for g in stepping),
+        seen=(*stepping, *_forbidden(model, stepping, ground)),
+        others=tuple(ground),
+    )
+
+
+def _foot_bodies(model: mujoco.MjModel, names: tuple[str, ...]) -> tuple[list[int], list[int]]:
     """Foot bodies, and foot geoms in the order of their feet; geoms on one body are one foot."""
     if not names:
         raise UserError("creature.feet is empty; name the geoms that step on the floor")
@@ -211,69 +241,12 @@ def _feet(model: mujoco.MjModel, names: tuple[str, ...]) -> tuple[list[int], lis
     return bodies, sorted(geoms, key=lambda g: bodies.index(int(model.geom_bodyid[g])))
 
 
-def _forbidden(model: mujoco.MjModel, feet: list[int], ground: np.ndarray) -> list[int]:
+def _forbidden(model: mujoco.MjModel, feet: list[int], ground: list[int]) -> list[int]:
     floor = _id(model, mujoco.mjtObj.mjOBJ_GEOM, FLOOR, "the floor")
     colliding = [
         g for g in range(model.ngeom) if model.geom_contype[g] or model.geom_conaffinity[g]
     ]
-    return [
-        g
-        for g in colliding
-        if g not in {floor, *feet, *ground.tolist()} and model.geom_bodyid[g] != 0
-    ]
-
-
-def _mirror(
-    model: mujoco.MjModel,
-    data: mujoco.MjData,
-    settings: CreatureSettings,
-    joints: list[int],
-    names: list[str],
-    axes: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Partner [J] and sign [J]: those that the file states, the others from the geometry;
-    without symmetry everyone is their own.
-    """
-    partner, sign = np.arange(len(joints)), np.ones(len(joints), dtype=int)
-    if not settings.mirror.symmetric:
-        return partner, sign
-    for pair in settings.mirror.pairs:
-        for name in (pair.joint, pair.partner):
-            if name not in names:
-                raise UserError(
-                    f'mirror.pairs: no joint is called "{name}"; {did_you_mean(name, names)}'
-                )
-        partner[names.index(pair.joint)], sign[names.index(pair.joint)] = (
-            names.index(pair.partner),
-            pair.sign,
-        )
-    stated = {pair.joint for pair in settings.mirror.pairs}
-    free = np.array([i for i, name in enumerate(names) if name not in stated], dtype=int)
-    if len(free):
-        trunk, chosen = model.body(settings.creature.trunk).id, [joints[i] for i in free]
-        frame = axes @ data.xmat[trunk].reshape(3, 3).T
-        anchors, directions = (
-            (data.xanchor[chosen] - data.xpos[trunk]) @ frame.T,
-            data.xaxis[chosen] @ frame.T,
-        )
-        near = 0.02 * float(np.ptp(data.xanchor[joints], axis=0).max() + 0.05)
-        found, sign[free] = geometry.mirror_map(
-            anchors, directions, model.jnt_type[chosen] == SLIDE, [names[i] for i in free], near
-        )
-        partner[free] = free[found]
-    _check_names(names, partner)
-    return partner, sign
-
-
-def _check_names(names: list[str], partner: np.ndarray) -> None:
-    """The geometry and the names must not contradict each other."""
-    for name, other in zip(names, (names[p] for p in partner), strict=True):
-        swapped = name.replace("left", "\0").replace("right", "left").replace("\0", "right")
-        if swapped != name and swapped in names and swapped != other:
-            raise UserError(
-                f'joint "{name}" mirrors to "{other}" by its geometry but to "{swapped}" by its '
-                "name; settle it in [mirror] pairs"
-            )
+    return [g for g in colliding if g not in {floor, *feet, *ground} and model.geom_bodyid[g] != 0]
 
 
 def _check(creature: Creature, data: mujoco.MjData) -> None:
@@ -283,16 +256,16 @@ def _check(creature: Creature, data: mujoco.MjData) -> None:
     model, h = creature.model, creature.model.opt.timestep
     mass = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, mass)
-    inertia = 1 / np.diag(np.linalg.inv(mass))[creature.dof_adr]
-    for j, name in enumerate(creature.joint_names):
-        if creature.pose_low[j] > creature.pose_high[j]:
+    inertia = 1 / np.diag(np.linalg.inv(mass))[creature.joints.dof_adr]
+    for j, name in enumerate(creature.joints.names):
+        if creature.joints.pose_low[j] > creature.joints.pose_high[j]:
             raise UserError(
                 f'joint "{name}": its pose range lies outside its range in creature.xml; widen one '
                 "of them"
             )
-        if h * h * creature.kp[j] >= (4 * inertia[j] + 2 * h * creature.kd[j]) / 3:
-            need = (1.5 * h * h * creature.kp[j] - 2 * inertia[j]) / h
+        if h * h * creature.gains.kp[j] >= (4 * inertia[j] + 2 * h * creature.gains.kd[j]) / 3:
+            need = (1.5 * h * h * creature.gains.kp[j] - 2 * inertia[j]) / h
             raise UserError(
-                f'joint "{name}": kp = {creature.kp[j]:g} is unstable at a time step of {h:g} s; '
+                f'joint "{name}": kp = {creature.gains.kp[j]:g} is unstable at a time step of {h:g} s; '
                 f"raise kd to {need:.3g} or lower kp"
             )

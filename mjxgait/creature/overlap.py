@@ -94,14 +94,14 @@ def find_crossings(creature: Creature) -> Crossings:
     data.qpos[:] = creature.stand_qpos
     mujoco.mj_kinematics(model, data)
     geoms, bars = all_bars(model)
-    strangers = ~neighbours(model, data, NEAR * creature.hip_height)
+    strangers = ~neighbours(model, data, NEAR * creature.frame.hip_height)
     body = model.geom_bodyid[geoms]
     first, second = np.nonzero(np.triu(strangers[body][:, body], 1))
     everything = _joined(model, geoms, bars, first, second)
     stand, deepest = _standing_and_deepest(creature, everything)
     shapes = geoms[first] * model.ngeom + geoms[second]
     allowed = _of_their_shapes(shapes, stand)
-    kept = _deepest_of_each(shapes, deepest - allowed, -CLOSE * creature.hip_height)
+    kept = _deepest_of_each(shapes, deepest - allowed, -CLOSE * creature.frame.hip_height)
     return _joined(model, geoms, bars, first[kept], second[kept], allowed[kept])
 
 
@@ -173,7 +173,7 @@ def _standing_and_deepest(creature: Creature, pairs: Crossings) -> tuple[np.ndar
     """
     poses = _poses(creature)
     length = np.linalg.norm(pairs.half, axis=1) + pairs.radius
-    most = length[pairs.first] + length[pairs.second] + CLOSE * creature.hip_height
+    most = length[pairs.first] + length[pairs.second] + CLOSE * creature.frame.hip_height
     near = np.zeros(len(pairs.first), dtype=bool)
     placed = [bar_places(creature.model, qpos, pairs) for qpos in poses]
     for centre, _ in placed:
@@ -194,13 +194,13 @@ def _poses(creature: Creature) -> list[np.ndarray]:
     They are uniform, and every other one is at the ends of all ranges.
     """
     rng = np.random.default_rng(0)
-    wide = BEYOND * (creature.pose_high - creature.pose_low)
-    low = np.maximum(creature.pose_low - wide, creature.joint_low)
-    high = np.minimum(creature.pose_high + wide, creature.joint_high)
+    wide = BEYOND * (creature.joints.pose_high - creature.joints.pose_low)
+    low = np.maximum(creature.joints.pose_low - wide, creature.joints.low)
+    high = np.minimum(creature.joints.pose_high + wide, creature.joints.high)
     share = rng.uniform(size=(SAMPLES, len(low)))
     share[::2] = np.round(share[::2])
     poses = np.tile(creature.stand_qpos, (SAMPLES + 1, 1))
-    poses[1:, creature.qpos_adr] = low + share * (high - low)
+    poses[1:, creature.joints.qpos_adr] = low + share * (high - low)
     return list(poses)
 
 

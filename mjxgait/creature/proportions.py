@@ -70,7 +70,7 @@ def grown(creature: Creature, sizes: Mapping[str, float]) -> Creature:
     if not sizes:
         return creature
     # Steering is in body lengths, as evolution had them.
-    files = scaled_files(creature.files, sizes, body_length=creature.body_length)
+    files = scaled_files(creature.files, sizes, body_length=creature.frame.body_length)
     return dataclasses.replace(load_files(files), terrain=creature.terrain)
 
 
@@ -101,10 +101,10 @@ def _jointed(model: mujoco.MjModel, body: int) -> int:
 def _partner(creature: Creature, body: int) -> int:
     """The mirror image of a body with joints, by its first that is actuated."""
     model = creature.model
-    on = np.flatnonzero(model.dof_bodyid[creature.dof_adr] == body)
+    on = np.flatnonzero(model.dof_bodyid[creature.joints.dof_adr] == body)
     if not len(on):
         return body
-    return int(model.dof_bodyid[creature.dof_adr[creature.partner[on[0]]]])
+    return int(model.dof_bodyid[creature.joints.dof_adr[creature.mirror.partner[on[0]]]])
 
 
 def _heights(creature: Creature) -> tuple[np.ndarray, np.ndarray]:

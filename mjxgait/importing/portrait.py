@@ -39,10 +39,15 @@ def standing(creature: Creature) -> Held:
     """How it stands for two seconds."""
     feet = {
         creature.model.geom(int(g)).name
-        for g in [*creature.watched[: len(creature.foot_of)], *creature.ground]
+        for g in [*creature.feet.watched[: len(creature.feet.foot_of)], *creature.feet.ground]
     }
     return hold(
-        creature.model, creature.stand_qpos, creature.kp, creature.kd, creature.torque_limit, feet
+        creature.model,
+        creature.stand_qpos,
+        creature.gains.kp,
+        creature.gains.kd,
+        creature.gains.torque_limit,
+        feet,
     )
 
 
@@ -51,22 +56,29 @@ def facts(creature: Creature) -> list[str]:
     held = standing(creature)
     state = "stands" if held.stands else "does not stand"
     touched = f', "{held.touched}" touches the floor' if held.touched else ""
-    names = creature.joint_names
-    pairs = [(a, int(b)) for a, b in enumerate(creature.partner) if a < b]
-    own = [names[a] for a, b in enumerate(creature.partner) if a == b]
+    names = creature.joints.names
+    pairs = [(a, int(b)) for a, b in enumerate(creature.mirror.partner) if a < b]
+    own = [names[a] for a, b in enumerate(creature.mirror.partner) if a == b]
     mirror = (
-        [f"  {names[a]} <-> {'-' if creature.sign[a] < 0 else ''}{names[b]}" for a, b in pairs]
-        if creature.symmetric
+        [
+            f"  {names[a]} <-> {'-' if creature.mirror.sign[a] < 0 else ''}{names[b]}"
+            for a, b in pairs
+        ]
+        if creature.mirror.symmetric
         else []
     )
     return [
-        f"{creature.name}: {creature.mass:.3g} kg, hip height {creature.hip_height:.3g} m, body "
-        f"length {creature.body_length:.3g} m",
-        f"joints: {len(names)}, feet: {', '.join(creature.foot_names)}",
+        f"{creature.name}: {creature.frame.mass:.3g} kg, hip height {creature.frame.hip_height:.3g} m, body "
+        f"length {creature.frame.body_length:.3g} m",
+        f"joints: {len(names)}, feet: {', '.join(creature.feet.names)}",
         f"it {state} for 2 s: upright {held.up:.2f}, height {held.height:.2f} of the start, joints "
         f"sag {held.sag:.3f} rad{touched}",
         *(["mirror pairs:", *mirror] if mirror else ["no mirror image"]),
-        *([f"their own mirror image: {', '.join(own)}"] if creature.symmetric and own else []),
+        *(
+            [f"their own mirror image: {', '.join(own)}"]
+            if creature.mirror.symmetric and own
+            else []
+        ),
     ]
 
 
@@ -94,7 +106,7 @@ def portrait(creature: Creature) -> Image.Image:
 
 
 def _camera(creature: Creature, painter: Painter, places: tuple[np.ndarray, np.ndarray]) -> Camera:
-    forward = (creature.stand_rot @ creature.forward)[:2]
+    forward = (creature.frame.stand_rot @ creature.frame.forward)[:2]
     flat = Camera(
         np.zeros(3),
         forward / np.linalg.norm(forward),
@@ -124,12 +136,12 @@ def _camera(creature: Creature, painter: Painter, places: tuple[np.ndarray, np.n
 def _mark_feet(
     draw: ImageDraw.ImageDraw, camera: Camera, creature: Creature, data: mujoco.MjData
 ) -> None:
-    for g in creature.watched[: len(creature.foot_of)]:
+    for g in creature.feet.watched[: len(creature.feet.foot_of)]:
         _ring(draw, camera.pixels(data.geom_xpos[g]), 13, FOOT)
-    for g in creature.ground:
+    for g in creature.feet.ground:
         _ring(draw, camera.pixels(data.geom_xpos[g]), 13, GROUND)
-    for foot, name in enumerate(creature.foot_names):
-        geom = creature.watched[np.flatnonzero(creature.foot_of == foot)[0]]
+    for foot, name in enumerate(creature.feet.names):
+        geom = creature.feet.watched[np.flatnonzero(creature.feet.foot_of == foot)[0]]
         x, y = camera.pixels(data.geom_xpos[geom])
         draw.text((x, y + 16), name, fill=FOOT, font=font(13), anchor="ma")
 
@@ -145,21 +157,23 @@ def _mark_joints(
     draw: ImageDraw.ImageDraw, camera: Camera, creature: Creature, data: mujoco.MjData
 ) -> None:
     """A dot with a number per joint; joints at one point stand side by side."""
-    firsts = dict.fromkeys(min(j, int(partner)) for j, partner in enumerate(creature.partner))
+    firsts = dict.fromkeys(
+        min(j, int(partner)) for j, partner in enumerate(creature.mirror.partner)
+    )
     numbers = {first: n for n, first in enumerate(firsts)}
     at_point: dict[tuple[int, int], int] = {}
-    for j, name in enumerate(creature.joint_names):
+    for j, name in enumerate(creature.joints.names):
         anchor = camera.pixels(data.xanchor[creature.model.joint(name).id])
-        partner = int(creature.partner[j])
+        partner = int(creature.mirror.partner[j])
         number = numbers[min(j, partner)]
         spot = (round(anchor[0] / 12), round(anchor[1] / 12))
         beside = at_point.get(spot, 0)
         at_point[spot] = beside + 1
         x, y = anchor + np.array([22.0 * beside, 0.0])
         alone = partner == j
-        fill = ALONE if alone or not creature.symmetric else PAIRS[number % len(PAIRS)]
+        fill = ALONE if alone or not creature.mirror.symmetric else PAIRS[number % len(PAIRS)]
         draw.ellipse([x - 9, y - 9, x + 9, y + 9], fill=fill, outline=DARK_INK)
-        sign = "-" if creature.symmetric and creature.sign[j] < 0 else ""
+        sign = "-" if creature.mirror.symmetric and creature.mirror.sign[j] < 0 else ""
         draw.text(
             (x, y),
             f"{sign}{number + 1}",
@@ -174,14 +188,16 @@ def _mark_axes(
 ) -> None:
     origin, length = (
         data.xpos[creature.trunk],
-        min(0.6 * creature.body_length, 0.9 * creature.stand_height),
+        min(0.6 * creature.frame.body_length, 0.9 * creature.frame.stand_height),
     )
     for axis, colour, name in (
-        (creature.forward, FORWARD, "forward"),
-        (creature.left, LEFT, "left"),
-        (creature.up, UP, "up"),
+        (creature.frame.forward, FORWARD, "forward"),
+        (creature.frame.left, LEFT, "left"),
+        (creature.frame.up, UP, "up"),
     ):
-        a, b = camera.pixels(np.stack([origin, origin + length * (creature.stand_rot @ axis)]))
+        a, b = camera.pixels(
+            np.stack([origin, origin + length * (creature.frame.stand_rot @ axis)])
+        )
         draw.line([tuple(a), tuple(b)], fill=colour, width=4)
         along = (b - a) / max(float(np.linalg.norm(b - a)), 1e-9)
         across = np.array([-along[1], along[0]])

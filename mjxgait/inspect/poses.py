@@ -18,7 +18,9 @@ class PoseView:
     def facts(self, snapshot: Snapshot, i: int) -> dict[str, Any]:
         """See `GenomeView`."""
         creature, genomes = snapshot.creature, snapshot.genomes
-        ranges = zip(creature.joint_names, creature.pose_low, creature.pose_high, strict=True)
+        ranges = zip(
+            creature.joints.names, creature.joints.pose_low, creature.joints.pose_high, strict=True
+        )
         return {
             "tuning": dict(zip(TUNING, map(float, genomes["tuning"][i]), strict=True)),
             "key_poses_deg": [
@@ -33,7 +35,7 @@ class PoseView:
         """See `GenomeView`: per joint the mean over the key poses."""
         poses, tuning = snapshot.genomes["key_poses"], snapshot.genomes["tuning"]
         spread = np.degrees(poses.std(axis=0).mean(axis=0))
-        room = np.degrees(snapshot.creature.pose_high - snapshot.creature.pose_low)
+        room = np.degrees(snapshot.creature.joints.pose_high - snapshot.creature.joints.pose_low)
         return {
             "spread_deg": _by_joint(snapshot, spread),
             "spread_of_range": _by_joint(snapshot, spread / np.maximum(room, 1e-9)),
@@ -44,7 +46,7 @@ class PoseView:
         """See `GenomeView`: of the key poses only where the joints are the same."""
         mine, other = a.genomes, b.genomes
         comparable = (
-            a.creature.joint_names == b.creature.joint_names
+            a.creature.joints.names == b.creature.joints.names
             and mine["key_poses"].shape[1:] == other["key_poses"].shape[1:]
         )
         pairs = zip(TUNING, mine["tuning"][0], other["tuning"][0], strict=True)
@@ -109,9 +111,9 @@ def title(individual: Mapping[str, Any]) -> str:
 
 def _moved(a: Snapshot, b: Snapshot) -> dict[str, list[float]]:
     change = np.degrees(b.genomes["key_poses"][0] - a.genomes["key_poses"][0])
-    columns = zip(a.creature.joint_names, change.T, strict=True)
+    columns = zip(a.creature.joints.names, change.T, strict=True)
     return {name: [float(value) for value in column] for name, column in columns}
 
 
 def _by_joint(snapshot: Snapshot, values: Iterable[float]) -> dict[str, float]:
-    return dict(zip(snapshot.creature.joint_names, map(float, values), strict=True))
+    return dict(zip(snapshot.creature.joints.names, map(float, values), strict=True))

@@ -32,7 +32,7 @@ class ProgramView:
     def difference(self, a: Snapshot, b: Snapshot) -> dict[str, Any]:
         """See `GenomeView`."""
         mine, other = _texts(a, 0), _texts(b, 0)
-        comparable = a.creature.joint_names == b.creature.joint_names
+        comparable = a.creature.joints.names == b.creature.joints.names
         alike = a.genomes["code"].shape[1:] == b.genomes["code"].shape[1:]
         return {
             "same_individuals": shared(a, b) if comparable and alike else None,
@@ -74,7 +74,7 @@ def _texts(snapshot: Snapshot, i: int) -> dict[str, str]:
     known = terminals(snapshot.creature, tuple(ADDED.values()))
     rows = zip(snapshot.genomes["code"][i], snapshot.genomes["value"][i], strict=True)
     texts = (to_text(code, value, known) for code, value in rows)
-    return dict(zip(snapshot.creature.joint_names, texts, strict=True))
+    return dict(zip(snapshot.creature.joints.names, texts, strict=True))
 
 
 def _mattering(snapshot: Snapshot, i: int) -> list[int]:

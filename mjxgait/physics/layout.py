@@ -30,8 +30,8 @@ def sense_layout(creature: Creature) -> SenseLayout:
     """The layout of a creature."""
     return SenseLayout(
         creature.trunk,
-        creature.qpos_adr,
-        creature.dof_adr,
-        creature.watched,
-        len(creature.foot_of),
+        creature.joints.qpos_adr,
+        creature.joints.dof_adr,
+        creature.feet.watched,
+        len(creature.feet.foot_of),
     )

@@ -26,8 +26,8 @@ class Reason(IntEnum):
 
 def why_fallen(creature: Body, limits: Termination | Ends, sensed: Sensed) -> jax.Array:
     """The `Reason` [] to end the episode at this moment; `FINISHED` while all is well."""
-    up = (sensed.trunk_rot @ creature.up.astype(np.float32))[2]
-    height = trunk_height(sensed) / creature.stand_height
+    up = (sensed.trunk_rot @ creature.frame.up.astype(np.float32))[2]
+    height = trunk_height(sensed) / creature.frame.stand_height
     reason = jnp.zeros((), jnp.int32)
     if limits.touch:
         reason = jnp.where(touches(creature, sensed), Reason.TOUCHED, reason)
@@ -40,5 +40,5 @@ def why_fallen(creature: Body, limits: Termination | Ends, sensed: Sensed) -> ja
 
 def touches(creature: Body, sensed: Sensed) -> jax.Array:
     """Whether [] a part touches the floor that is neither foot nor ground contact."""
-    others = sensed.geom_low[len(creature.foot_of) :]
+    others = sensed.geom_low[len(creature.feet.foot_of) :]
     return jnp.min(others, initial=1.0) < 0.0

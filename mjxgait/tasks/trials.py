@@ -48,7 +48,7 @@ def draw_starts(key: jax.Array, creature: Creature, config: RolloutConfig) -> St
     key_pos, key_vel, key_friction, key_direction, key_moment = jax.random.split(key, 5)
     key_stiffness, key_damping = jax.random.split(jax.random.fold_in(key, 1))
     perturbed = (jnp.arange(count) > 0)[:, None]
-    joints = len(creature.joint_names)
+    joints = len(creature.joints.names)
     qpos = jnp.tile(jnp.asarray(creature.stand_qpos, jnp.float32), (count, 1))
     noise = (
         perturbed * config.joint_noise * jax.random.uniform(key_pos, (count, joints), minval=-1.0)
@@ -63,7 +63,7 @@ def draw_starts(key: jax.Array, creature: Creature, config: RolloutConfig) -> St
     )
     angle = jax.random.uniform(key_direction, (count,), maxval=2 * jnp.pi)
     direction = perturbed * jnp.stack([jnp.cos(angle), jnp.sin(angle)], axis=1)
-    speed = config.push * float(np.sqrt(-creature.model.opt.gravity[2] * creature.hip_height))
+    speed = config.push * float(np.sqrt(-creature.model.opt.gravity[2] * creature.frame.hip_height))
     steps = round(config.seconds / creature.model.opt.timestep)
     moment = jax.random.randint(
         key_moment, (count,), steps // 4, max(3 * steps // 4, steps // 4 + 1)
@@ -74,8 +74,8 @@ def draw_starts(key: jax.Array, creature: Creature, config: RolloutConfig) -> St
         return 1.0 + perturbed * config.gains * spread
 
     return Starts(
-        qpos=qpos.at[:, creature.qpos_adr].add(noise),
-        qvel=jnp.zeros((count, creature.model.nv)).at[:, creature.dof_adr].set(spin),
+        qpos=qpos.at[:, creature.joints.qpos_adr].add(noise),
+        qvel=jnp.zeros((count, creature.model.nv)).at[:, creature.joints.dof_adr].set(spin),
         friction=jnp.where(perturbed[:, 0], friction, 1.0),
         push=speed * direction @ horizontal_freedoms(creature),
         push_step=jnp.where(perturbed[:, 0], moment, NEVER),

@@ -34,7 +34,7 @@ def draw_footfalls(axes: Axes, walk: Walk) -> None:
     """A bar while a foot carries weight (Hildebrand's diagram)."""
     window, what = gait_window(walk)
     contact, step = walk.recording.contact[window], walk.time_step
-    names = walk.creature.foot_names
+    names = walk.creature.feet.names
     share = contact.mean(0)
     for row, foot in enumerate(contact.T):
         padded = np.diff(np.concatenate([[0], foot.astype(int), [0]]))
@@ -83,7 +83,7 @@ def draw_joints(drawing: Figure, walk: Walk) -> None:
         j = order[place]
         panel.plot(time, targets[:, j], "--", color=MIDDLE, linewidth=1.2, label="target")
         panel.plot(time, angles[:, j], "-", color=DARK, linewidth=1.5, label="angle")
-        panel.set_title(_plain(walk.creature.joint_names[j]), fontsize=9)
+        panel.set_title(_plain(walk.creature.joints.names[j]), fontsize=9)
         _mark_strides(panel, walk, window)
         panel.set_xlim(0, time[-1])
         panel.tick_params(labelsize=8)
@@ -99,10 +99,10 @@ def draw_trunk(drawing: Figure, walk: Walk) -> None:
     time = np.arange(len(recording.trunk_pos)) * step
     above, below = drawing.subplots(2, 1, sharex=True)
     above.plot(time, recording.trunk_pos[:, 2], "-", color=DARK, linewidth=1)
-    above.axhline(walk.creature.stand_height, color=MIDDLE, linestyle=":", label="standing")
+    above.axhline(walk.creature.frame.stand_height, color=MIDDLE, linestyle=":", label="standing")
     above.set(ylabel="height (m)", title="trunk: height above the floor and forward speed")
     above.set_ylim(
-        0, max(1.35 * np.nanmax(recording.trunk_pos[:, 2]), 1.4 * walk.creature.stand_height)
+        0, max(1.35 * np.nanmax(recording.trunk_pos[:, 2]), 1.4 * walk.creature.frame.stand_height)
     )
     speed = np.gradient(recording.trunk_pos[:, 0], step)
     below.plot(time, speed, "-", color="0.7", linewidth=0.8, label="at each moment")
@@ -133,7 +133,7 @@ def gait_figures(walk: Walk) -> Figures:
     rows = -(-len(_partner_order(walk)) // 2)
     return {
         "footfalls": (
-            (9, 0.9 + 0.42 * len(walk.creature.foot_names)),
+            (9, 0.9 + 0.42 * len(walk.creature.feet.names)),
             lambda drawing: draw_footfalls(drawing.subplots(), walk),
         ),
         "joints": ((9, 1.0 + 1.15 * rows), lambda drawing: draw_joints(drawing, walk)),
@@ -156,7 +156,7 @@ def _mark_strides(axes: Axes, walk: Walk, window: slice) -> None:
 
 def _partner_order(walk: Walk) -> list[int]:
     """Joints left and right beside each other, then those of the middle."""
-    partner = walk.creature.partner
+    partner = walk.creature.mirror.partner
     pairs = [(j, int(p)) for j, p in enumerate(partner) if j < p]
     paired = [j for pair in pairs for j in pair]
     return paired + [j for j, p in enumerate(partner) if j == p]

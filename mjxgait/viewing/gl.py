@@ -118,7 +118,7 @@ def scene_file(stage: Stage, frames: Sequence[int], path: Path) -> None:
             [
                 np.degrees(np.arctan2(into[1], into[0])),
                 -np.degrees(first.elevation),
-                20 * creature.body_length,
+                20 * creature.frame.body_length,
             ]
         ),
         centre=np.array([camera.centre for camera in cameras]),
@@ -139,7 +139,7 @@ def _ground(stage: Stage) -> dict[str, Any]:
     if stage.relief is None:
         return {}
     creature, room = stage.walks[0].creature, 2.5 * stage.width / stage.camera(0).scale
-    cell, lanes = GROUND_CELL * creature.hip_height, stage.lanes @ stage.left
+    cell, lanes = GROUND_CELL * creature.frame.hip_height, stage.lanes @ stage.left
     ahead = np.arange(stage.way[:, 0].min() - room, stage.way[:, 0].max() + room, cell)
     aside = stage.way[:, 1]
     left = np.arange(aside.min() + lanes.min() - room, aside.max() + lanes.max() + 2 * room, cell)

@@ -32,12 +32,12 @@ def marked(
     """
     spec, start = mujoco.MjSpec.from_string(creature.files["creature.xml"]), start_frame(creature)
     body = spec.worldbody.add_body(name=BODY)
-    radius = DISC[0] * creature.body_length
+    radius = DISC[0] * creature.frame.body_length
     for ahead, level in zip(goals, floor, strict=True):
         place = [*_ahead(start, ahead)[:2], level + DISC[1]]
         _add(body, GEOM.mjGEOM_CYLINDER, GOAL_COLOUR, pos=place, size=[radius, DISC[1], 0])
     if bar is not None:
-        _add_bar(body, start, float(bar[0]), float(bar[1]), 1.2 * creature.body_length)
+        _add_bar(body, start, float(bar[0]), float(bar[1]), 1.2 * creature.frame.body_length)
     return spec
 
 

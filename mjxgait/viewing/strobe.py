@@ -24,7 +24,7 @@ ELEVATION = np.radians(8.0)
 def moments(walk: Walk) -> np.ndarray:
     """Frames at even distances along the way, from the first to the one that got farthest."""
     way = np.maximum.accumulate((walk.trunk_pos[:, :2] - walk.trunk_pos[0, :2]) @ walk.forward)
-    count = min(round(way[-1] / (SPACING * walk.creature.body_length)) + 1, MOST)
+    count = min(round(way[-1] / (SPACING * walk.creature.frame.body_length)) + 1, MOST)
     return np.unique(np.searchsorted(way, np.linspace(0.0, way[-1], count)))
 
 
@@ -57,7 +57,7 @@ def _camera(stage: Stage, walk: Walk, frames: np.ndarray) -> Camera:
     """Holds the way, half a body at both ends, and the highest that it gets."""
     moved = walk.trunk_pos[frames] - walk.trunk_pos[0]
     way = moved[:, :2] @ walk.forward
-    length = float(np.ptp(way)) + 2.4 * walk.creature.body_length
+    length = float(np.ptp(way)) + 2.4 * walk.creature.frame.body_length
     high = stage.top + max(float(moved[:, 2].max()), 0.0)
     side = dataclasses.replace(stage.camera(0), azimuth=0.0, elevation=ELEVATION)
     scale = min(HEIGHT / (ROOM * high), WIDEST / length)

@@ -64,7 +64,7 @@ def _lay(expression: Expression, first: int, depth: int, nodes: list[Node]) -> t
 def expressions_of(creature: Creature, champion: Champion) -> Mapping[str, Expression]:
     """By joint."""
     known, genome = terminals(creature, tuple(ADDED.values())), champion.genome
-    rows = zip(creature.joint_names, genome["code"], genome["value"], strict=True)
+    rows = zip(creature.joints.names, genome["code"], genome["value"], strict=True)
     return {joint: nested(code, value, known) for joint, code, value in rows}
 
 

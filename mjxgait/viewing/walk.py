@@ -78,7 +78,7 @@ class Walk:
         over = bar if np.isfinite(bar).all() else None
         if not len(goals) and over is None:
             return None
-        places = self.creature.stand_pos[:2] + np.outer(goals, self.forward)
+        places = self.creature.frame.stand_pos[:2] + np.outer(goals, self.forward)
         return marked(self.creature, goals, self.ground_heights(places), over)
 
     def _goals(self, first: np.ndarray) -> np.ndarray:
@@ -92,7 +92,7 @@ class Walk:
     @cached_property
     def forward(self) -> np.ndarray:
         """[2] horizontal unit vector, in the world, in which the creature starts out."""
-        axis = (self.creature.stand_rot @ self.creature.forward)[:2]
+        axis = (self.creature.frame.stand_rot @ self.creature.frame.forward)[:2]
         return axis / np.linalg.norm(axis)
 
     @cached_property

@@ -54,7 +54,7 @@ def build_page(walk: Walk, loop: WalkLoop, sections: str) -> str:
     )
     stride = loop.times[-1] / loop.strides
     lead = (
-        f"{loop.speed:.2f} m/s, {loop.speed / walk.creature.body_length:.2f} body lengths per "
+        f"{loop.speed:.2f} m/s, {loop.speed / walk.creature.frame.body_length:.2f} body lengths per "
         f"second; a stride takes {stride:.2f} s and leads {loop.advance / loop.strides:.2f} m "
         "forward."
     )
@@ -126,8 +126,8 @@ def _origin(creature: Creature, champion: Champion) -> str:
     rows = [
         [
             "creature",
-            f"{creature.name} (body {creature.digest}), {creature.mass:.1f} kg, "
-            f"{len(creature.joint_names)} joints",
+            f"{creature.name} (body {creature.digest}), {creature.frame.mass:.1f} kg, "
+            f"{len(creature.joints.names)} joints",
         ],
         ["fitness", f"{champion.fitness:.3f}"],
         ["found in generation", str(origin.get("born", "unknown"))],

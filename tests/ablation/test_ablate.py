@@ -209,7 +209,7 @@ def test_a_study_whose_measuring_is_killed_says_so_and_goes_on(
         command("ablate", "--resume", folder), stdout=subprocess.PIPE, stderr=subprocess.PIPE
     )
     worker_of(process).kill()
-    said = process.communicate(timeout=100)[1].decode()
+    said = process.communicate(timeout=300)[1].decode()
     assert process.returncode == 2
     assert re.fullmatch(
         f"mjxgait: {folder}: .* was killed from outside, .* go on with "

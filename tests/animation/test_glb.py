@@ -106,8 +106,8 @@ def test_the_loop_is_the_recorded_walk(loop):
     """Closing the seam moves no joint far: the strides were steady."""
     walk = loop.walk
     starts = walk.steady_strides(loop.strides)
-    recorded = walk.qpos[starts[0] : starts[1], walk.creature.qpos_adr]
-    looped = loop.qpos[:, walk.creature.qpos_adr]
+    recorded = walk.qpos[starts[0] : starts[1], walk.creature.joints.qpos_adr]
+    looped = loop.qpos[:, walk.creature.joints.qpos_adr]
     nearest = np.abs(looped[:, None] - recorded[None]).max(2).min(1)
     assert nearest.max() < np.radians(3.0)
 
@@ -160,7 +160,7 @@ def test_one_skin_whose_rest_is_the_standing_pose(loop):
     points = np.concatenate(
         [read(document, p.attributes.POSITION) for p in document.meshes[0].primitives]
     )
-    assert abs(points[:, 1].min()) < 0.02 * loop.walk.creature.stand_height + 0.005
+    assert abs(points[:, 1].min()) < 0.02 * loop.walk.creature.frame.stand_height + 0.005
 
 
 @pytest.mark.parametrize(

@@ -50,9 +50,9 @@ def creature():
 def workload(creature):
     rng = np.random.default_rng(0)
     genomes, starts, nv = 3, 2, creature.model.nv
-    poses = creature.stand + 0.1 * rng.normal(size=(genomes, 2, len(creature.stand)))
+    poses = creature.joints.stand + 0.1 * rng.normal(size=(genomes, 2, len(creature.joints.stand)))
     qpos = np.tile(creature.stand_qpos, (starts, 1))
-    qpos[1, creature.qpos_adr] += 0.02
+    qpos[1, creature.joints.qpos_adr] += 0.02
     return Workload(
         folder=find_creature("tall_quadruped"),
         config=Config(),
@@ -78,7 +78,7 @@ def test_the_law_is_the_examiners(creature, workload):
         start_frame(creature),
         None,
         np.zeros(count),
-        creature.stand + v[:, 6:] * 0.1,
+        creature.joints.stand + v[:, 6:] * 0.1,
         v,
         pos,
         rot,
@@ -104,7 +104,9 @@ def test_the_solve_is_a_solve(creature):
     mujoco.mj_forward(model, data)
     dense = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, dense)
-    dense[creature.dof_adr, creature.dof_adr] += model.opt.timestep * creature.kd
+    dense[creature.joints.dof_adr, creature.joints.dof_adr] += (
+        model.opt.timestep * creature.gains.kd
+    )
     force = np.arange(model.nv, dtype=float)
     found = DampedSolve(model, creature).solve(data.M[None], force[None])[0]
     np.testing.assert_allclose(found, np.linalg.solve(dense, force), rtol=1e-8)

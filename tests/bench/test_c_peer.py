@@ -39,13 +39,14 @@ def made_up(name: str) -> Workload:
     folder, rng, genomes, starts = find_creature(name), np.random.default_rng(0), 6, 2
     creature = load_creature(folder)
     qpos = np.tile(creature.stand_qpos, (starts, 1))
-    qpos[1, creature.qpos_adr] += 0.02
+    qpos[1, creature.joints.qpos_adr] += 0.02
     push = np.zeros((starts, creature.model.nv))
     push[1, :2] = 0.3, -0.2
     return Workload(
         folder=folder,
         config=Config(),
-        key_poses=creature.stand + 0.2 * rng.normal(size=(genomes, 2, len(creature.stand))),
+        key_poses=creature.joints.stand
+        + 0.2 * rng.normal(size=(genomes, 2, len(creature.joints.stand))),
         tuning={name: value * rng.uniform(0.5, 1, genomes) for name, value in TUNING.items()},
         qpos=qpos,
         qvel=0.1 * rng.normal(size=push.shape),
@@ -101,7 +102,7 @@ def test_the_bare_model_moves_as_the_whole_one(shipped):
     assert bare.npair
     (qpos, contacts, places), (bare_qpos, bare_contacts, bare_places) = (
         dropped(model, geoms, shipped)
-        for model, geoms in ((whole, shipped.watched), (bare, watched))
+        for model, geoms in ((whole, shipped.feet.watched), (bare, watched))
     )
     assert contacts == bare_contacts > 0
     np.testing.assert_allclose(bare_qpos, qpos, atol=1e-9)
@@ -126,7 +127,7 @@ def test_a_model_whose_parts_touch_each_other_stays_whole(stool):
     )
     same, watched = bare_model(dataclasses.replace(stool, model=model, settings=settings))
     assert same is model
-    assert watched is stool.watched
+    assert watched is stool.feet.watched
 
 
 def test_without_a_compiler_the_reason_is_said(walks, monkeypatch):

@@ -69,7 +69,7 @@ DRIVE = {field.name for field in dataclasses.fields(DriveConfig)}
 
 def make_champion(creature, key_poses=None, tuning=None, **settings):
     """A champion that stands, unless poses say otherwise; settings of the controller or the drive."""
-    poses = np.stack([creature.stand] * 2) if key_poses is None else key_poses
+    poses = np.stack([creature.joints.stand] * 2) if key_poses is None else key_poses
     drive = {name: settings.pop(name) for name in DRIVE & settings.keys()}
     return pose_champion(
         creature,

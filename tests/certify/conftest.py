@@ -20,7 +20,7 @@ def trotter(tiny):
     """One diagonal pair swings while the other pushes: hip and knee angles per leg, found by
     hand.
     """
-    column = {name: i for i, name in enumerate(tiny.joint_names)}
+    column = {name: i for i, name in enumerate(tiny.joints.names)}
     poses = np.zeros((2, 8))
     for leg in LEGS:
         swings = leg in ("front_left", "hind_right")

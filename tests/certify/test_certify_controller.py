@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from certify_made_up import make_champion
+from helpers import altered
 
 from mjxgait.certify.drive import Drive
 from mjxgait.certify.layout import start_frame
@@ -28,7 +29,7 @@ def rotation(axis, angle):
 
 def made_up(creature, rot=None, pos=(0.0, 0.0, 0.3035), angvel=(0.0, 0.0, 0.0), seed=None, count=1):
     """A state; standing still unless a seed draws joints, velocities and dynamics."""
-    nv, joints = creature.model.nv, len(creature.stand)
+    nv, joints = creature.model.nv, len(creature.joints.stand)
     rng = np.random.default_rng(seed)
     draw = (
         (lambda *shape: rng.normal(0, 0.3, shape))
@@ -40,7 +41,7 @@ def made_up(creature, rot=None, pos=(0.0, 0.0, 0.3035), angvel=(0.0, 0.0, 0.0), 
         start=start_frame(creature),
         ground=None,
         time=np.full(count, 0.3),
-        joint_pos=creature.stand + draw(count, joints),
+        joint_pos=creature.joints.stand + draw(count, joints),
         velocity=draw(count, nv),
         trunk_pos=np.tile(pos, (count, 1)),
         trunk_rot=np.tile(np.eye(3) if rot is None else rot, (count, 1, 1)),
@@ -67,7 +68,7 @@ def drive(creature, **settings):
 
 
 def poses(creature, count=2):
-    return np.random.default_rng(5).uniform(-0.4, 0.4, (count, len(creature.stand)))
+    return np.random.default_rng(5).uniform(-0.4, 0.4, (count, len(creature.joints.stand)))
 
 
 @pytest.mark.parametrize("count", [1, 2, 3])
@@ -77,13 +78,16 @@ def test_the_cycle_passes_through_the_key_poses_and_their_mirror_images(tiny, co
     assert control.length == 2 * count * 7
     at_poses = control.planned(np.arange(2 * count) * 7)
     mirrored = np.array(
-        [[tiny.sign[j] * pose[tiny.partner[j]] for j in range(8)] for pose in key_poses]
+        [
+            [tiny.mirror.sign[j] * pose[tiny.mirror.partner[j]] for j in range(8)]
+            for pose in key_poses
+        ]
     )
     np.testing.assert_array_equal(at_poses, [*key_poses, *mirrored])
 
 
 def test_mirroring_swaps_left_and_right(tiny):
-    names = list(tiny.joint_names)
+    names = list(tiny.joints.names)
     pose = np.zeros((1, 8))
     pose[0, names.index("front_left_hip")], pose[0, names.index("hind_right_knee")] = 0.3, -0.2
     image = pose_cycle(pose, tiny)[1]
@@ -93,7 +97,7 @@ def test_mirroring_swaps_left_and_right(tiny):
 
 
 def test_a_roll_joint_changes_sign_in_the_mirror(tiny):
-    rolling = dataclasses.replace(tiny, sign=-tiny.sign)
+    rolling = altered(tiny, mirror={"sign": -tiny.mirror.sign})
     np.testing.assert_array_equal(pose_cycle(np.full((1, 8), 0.1), rolling)[1], np.full(8, -0.1))
 
 
@@ -110,10 +114,7 @@ def test_between_poses_the_target_is_linear_and_the_cycle_closes(tiny):
 
 
 def test_an_unsymmetric_creature_is_not_mirrored(tiny):
-    settings = dataclasses.replace(
-        tiny.settings, mirror=dataclasses.replace(tiny.settings.mirror, symmetric=False)
-    )
-    lopsided = dataclasses.replace(tiny, settings=settings)
+    lopsided = altered(tiny, mirror={"symmetric": False})
     assert len(pose_cycle(poses(tiny), lopsided)) == 2
 
 
@@ -121,7 +122,9 @@ def test_heading_to_the_left_and_being_on_the_left_are_positive(tiny):
     control = twin(tiny, tuning={"steer": 0.5})
     assert control.corrections(felt(tiny, rotation("z", 0.3)))[0] == pytest.approx(0.15)
     on_the_left = felt(tiny, pos=(4.0, 0.2, 0.3))
-    assert control.corrections(on_the_left)[0] == pytest.approx(0.5 * 0.2 / (2 * tiny.body_length))
+    assert control.corrections(on_the_left)[0] == pytest.approx(
+        0.5 * 0.2 / (2 * tiny.frame.body_length)
+    )
     assert control.corrections(felt(tiny, rotation("z", 3.0)))[0] == pytest.approx(0.5)
 
 
@@ -143,24 +146,26 @@ def test_rates_are_positive_when_the_angles_grow(tiny):
 def test_the_corrected_target_is_the_sum_on_the_page(tiny):
     key_poses = poses(tiny)
     stand = np.full(8, 0.05)
-    creature = dataclasses.replace(tiny, stand=stand)
+    creature = altered(tiny, joints={"stand": stand})
     control = twin(creature, key_poses, {"steer": 1.0, "pitch": 1.0, "roll": 1.0})
     rot = rotation("z", 0.1) @ rotation("y", 0.2)
     u, p, r = (float(part[0]) for part in control.corrections(felt(creature, rot)))
     target = control.target(np.array([0]), felt(creature, rot))[0]
     for j in range(8):
-        want = stand[j] + (key_poses[0, j] - stand[j]) * (1 + u * creature.steer_stride[j])
+        want = stand[j] + (key_poses[0, j] - stand[j]) * (
+            1 + u * creature.corrections.steer_stride[j]
+        )
         want += (
-            u * creature.steer_bend[j]
-            + p * creature.balance_pitch[j]
-            + r * creature.balance_roll[j]
+            u * creature.corrections.steer_bend[j]
+            + p * creature.corrections.balance_pitch[j]
+            + r * creature.corrections.balance_roll[j]
         )
         assert target[j] == pytest.approx(want, abs=1e-14)
 
 
 def test_the_target_keeps_to_the_joint_ranges(tiny):
     control = twin(tiny, np.full((2, 8), 3.0))
-    np.testing.assert_array_equal(control.target(np.array([0]), felt(tiny))[0], tiny.joint_high)
+    np.testing.assert_array_equal(control.target(np.array([0]), felt(tiny))[0], tiny.joints.high)
 
 
 @pytest.mark.parametrize("constraint_forces", [False, True])
@@ -171,34 +176,41 @@ def test_stable_pd_against_the_dense_formula(tiny, constraint_forces):
     got = drive(tiny, constraint_forces=constraint_forces).torque(target, state)
     for s in range(3):
         kp, kd, q, wish = (np.zeros(nv) for _ in range(4))
-        kp[tiny.dof_adr], kd[tiny.dof_adr] = tiny.kp, tiny.kd
-        q[tiny.dof_adr], wish[tiny.dof_adr] = state.joint_pos[s], target[s]
+        kp[tiny.joints.dof_adr], kd[tiny.joints.dof_adr] = tiny.gains.kp, tiny.gains.kd
+        q[tiny.joints.dof_adr], wish[tiny.joints.dof_adr] = state.joint_pos[s], target[s]
         p = -kp * (q + h * state.velocity[s] - wish)
         d = -kd * state.velocity[s]
         force = p + d - state.bias[s] + (state.constraint_force[s] if constraint_forces else 0)
         acc = np.linalg.inv(state.mass_matrix[s] + h * np.diag(kd)) @ force
-        want = np.clip((p + d - h * kd * acc)[tiny.dof_adr], -tiny.torque_limit, tiny.torque_limit)
+        want = np.clip(
+            (p + d - h * kd * acc)[tiny.joints.dof_adr],
+            -tiny.gains.torque_limit,
+            tiny.gains.torque_limit,
+        )
         np.testing.assert_allclose(got[s], want, atol=1e-9)
 
 
 def test_stable_pd_predicts_the_acceleration_that_its_own_torque_makes(tiny):
-    loose = dataclasses.replace(tiny, torque_limit=np.full(8, 1e9))
+    loose = altered(tiny, gains={"torque_limit": np.full(8, 1e9)})
     state, target, h = made_up(tiny, seed=3), np.full((1, 8), 0.1), STEP
     torque = drive(loose).torque(target, state)[0]
     force = -state.bias[0]
-    force[tiny.dof_adr] += torque
-    acc = np.linalg.solve(state.mass_matrix[0], force)[tiny.dof_adr]
-    v = state.velocity[0, tiny.dof_adr]
+    force[tiny.joints.dof_adr] += torque
+    acc = np.linalg.solve(state.mass_matrix[0], force)[tiny.joints.dof_adr]
+    v = state.velocity[0, tiny.joints.dof_adr]
     np.testing.assert_allclose(
         torque,
-        -tiny.kp * (state.joint_pos[0] + h * v - target[0]) - tiny.kd * (v + h * acc),
+        -tiny.gains.kp * (state.joint_pos[0] + h * v - target[0]) - tiny.gains.kd * (v + h * acc),
         rtol=1e-9,
     )
 
 
 def test_plain_pd(tiny):
     state, target = made_up(tiny, seed=4), np.full((1, 8), 0.1)
-    want = -tiny.kp * (state.joint_pos - target) - tiny.kd * state.velocity[:, tiny.dof_adr]
+    want = (
+        -tiny.gains.kp * (state.joint_pos - target)
+        - tiny.gains.kd * state.velocity[:, tiny.joints.dof_adr]
+    )
     got = drive(tiny, law="pd").torque(target, state)
     np.testing.assert_allclose(got, np.clip(want, -12, 12))
 
@@ -238,14 +250,14 @@ def askew(tiny):
     state = made_up(tiny, rot, (0.3, -0.1, 0.25), (0.5, -0.7, 0.9), seed=6)
     return state, Sensed(
         joint_pos=jnp.asarray(state.joint_pos[0]),
-        joint_vel=jnp.asarray(state.velocity[0, tiny.dof_adr]),
+        joint_vel=jnp.asarray(state.velocity[0, tiny.joints.dof_adr]),
         bias=jnp.asarray(state.bias[0]),
         trunk_pos=jnp.asarray(state.trunk_pos[0]),
         trunk_rot=jnp.asarray(rot),
         trunk_vel=jnp.asarray(state.trunk_vel[0]),
         trunk_angvel=jnp.asarray(state.trunk_angvel[0]),
-        geom_pos=jnp.zeros((len(tiny.watched), 3)),
-        geom_low=jnp.zeros(len(tiny.watched)).at[:4].set(jnp.asarray(state.foot_height[0])),
+        geom_pos=jnp.zeros((len(tiny.feet.watched), 3)),
+        geom_low=jnp.zeros(len(tiny.feet.watched)).at[:4].set(jnp.asarray(state.foot_height[0])),
     )
 
 

@@ -37,14 +37,14 @@ def seen_from_above(model, x, y):
 )
 def test_the_field_is_the_ground_and_ends_far_away(tiny, text):
     model, terrain = grounded_model(tiny.on(text)), terrain_of(tiny.on(text))
-    places = np.random.default_rng(0).uniform(-6, 6, (60, 2)) * tiny.body_length
-    places[:, 0] += 10 * tiny.body_length
+    places = np.random.default_rng(0).uniform(-6, 6, (60, 2)) * tiny.frame.body_length
+    places[:, 0] += 10 * tiny.frame.body_length
     found = [seen_from_above(model, *place) for place in places]
-    wrong = np.abs(found - terrain.height(*places.T)) / tiny.hip_height
+    wrong = np.abs(found - terrain.height(*places.T)) / tiny.frame.hip_height
     assert np.median(wrong) < 1e-3
     # The edge of a step is no wider than three cells.
     assert wrong.max() < (0.02 if "steps" in text else 2e-3)
-    assert np.ptp(found) > 0.05 * tiny.hip_height
+    assert np.ptp(found) > 0.05 * tiny.frame.hip_height
 
 
 def test_the_body_stays_what_it_is(tiny, rough):
@@ -58,9 +58,9 @@ def test_the_body_stays_what_it_is(tiny, rough):
 def test_heights_are_told_above_the_ground(rough):
     """Balls put on the ground anywhere are at height zero there, and not above the plane."""
     terrain, model = terrain_of(rough), examined_model(rough)
-    feet = rough.watched[: len(rough.foot_of)]
+    feet = rough.feet.watched[: len(rough.feet.foot_of)]
     size = model.geom_size[feet, 0]
-    places = np.random.default_rng(1).uniform(3, 9, (30, len(feet), 2)) * rough.body_length
+    places = np.random.default_rng(1).uniform(3, 9, (30, len(feet), 2)) * rough.frame.body_length
     xpos, xmat = np.zeros((30, model.ngeom, 3)), np.tile(np.eye(3).ravel(), (30, model.ngeom, 1))
     steep = np.linalg.norm(terrain.steepness(*np.moveaxis(places, 2, 0)), axis=0)
     up = size * np.sqrt(1 + steep**2)
@@ -84,12 +84,15 @@ def test_a_walk_up_is_told_as_one(tiny, trotter):
     outcome = simulate(up, trotter, nominal_starts(up, 1), 8.0, record=1)
     assert outcome.stayed_up.all()
     risen, whole = outcome.trajectory.qpos[0, :, 2], measure(up, outcome.trajectory)
-    assert risen[-100:].mean() - risen[:100].mean() > 0.1 * tiny.hip_height
-    assert np.ptp(whole.trunk_pos[:, 2]) < 0.3 * tiny.hip_height
+    assert risen[-100:].mean() - risen[:100].mean() > 0.1 * tiny.frame.hip_height
+    assert np.ptp(whole.trunk_pos[:, 2]) < 0.3 * tiny.frame.hip_height
     assert whole.contact.mean() > 0.2
-    assert np.nanmax(whole.penetration) < CertificateConfig().physics.penetration * tiny.hip_height
+    assert (
+        np.nanmax(whole.penetration)
+        < CertificateConfig().physics.penetration * tiny.frame.hip_height
+    )
     carrying = whole.foot_height[whole.contact]
-    assert np.abs(carrying).max() < 0.02 * tiny.hip_height
+    assert np.abs(carrying).max() < 0.02 * tiny.frame.hip_height
     assert whole.touch.mean() == 0.0
 
 

@@ -210,7 +210,7 @@ class Pointer:
     reads, command = ("goal_distance", "forward"), "pose"
 
     def __init__(self, creature: Creature, champion: Champion, step: float) -> None:
-        self.stand = creature.stand
+        self.stand = creature.joints.stand
 
     def init(self, count: int) -> Mapping[str, np.ndarray]:
         return {}

@@ -25,7 +25,7 @@ def standing(creature, count=1, **angles):
     """[count, nq]; angles of joints by name in the last frame."""
     qpos = np.tile(creature.stand_qpos, (count, 1))
     for name, angle in angles.items():
-        qpos[-1, creature.qpos_adr[creature.joint_names.index(name)]] = angle
+        qpos[-1, creature.joints.qpos_adr[creature.joints.names.index(name)]] = angle
     return qpos
 
 
@@ -108,7 +108,7 @@ def test_frames_that_are_not_finite_are_not_looked_at(short):
 
 
 def test_a_body_whose_legs_cross_fails_the_ninth_criterion_and_is_told_which(short):
-    column = {name: i for i, name in enumerate(short.joint_names)}
+    column = {name: i for i, name in enumerate(short.joints.names)}
     poses = np.zeros((2, 8))
     for leg in LEGS:
         poses[:, column[f"{leg}_hip"]] = 0.5 if leg.startswith("front") else -0.5
@@ -117,7 +117,7 @@ def test_a_body_whose_legs_cross_fails_the_ninth_criterion_and_is_told_which(sho
     assert not judged[9].passed
     worst = worst_overlap(record(short, crossed, 2.0).window(0.5))
     assert {part.split("_")[0] for part in worst["parts"]} == {"front", "hind"}
-    assert worst["depth"] > 0.02 * short.hip_height
+    assert worst["depth"] > 0.02 * short.frame.hip_height
     assert worst["share"] > 0.5
 
 
@@ -130,4 +130,4 @@ def test_a_body_that_stands_free_passes_the_ninth(short):
 def test_the_ninth_measures_what_exceeds_in_hip_heights(short):
     window = record(short, make_champion(short), 2.0)
     deep = dataclasses.replace(window, overlap=np.array([[0.0, 0.003], [0.001, 0.0]]))
-    assert criteria.parts(deep, SHORT.parts).measures[0].value == 0.003 / short.hip_height
+    assert criteria.parts(deep, SHORT.parts).measures[0].value == 0.003 / short.frame.hip_height

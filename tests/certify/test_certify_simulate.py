@@ -76,12 +76,12 @@ def plain_loop(creature, champion, starts, row, seconds):
     torques = []
     data.qpos[:] = creature.stand_qpos
     mujoco.mj_kinematics(model, data)
-    feet = creature.watched[:4]
+    feet = creature.feet.watched[:4]
     usual = data.geom_xpos[feet, 2].min()
-    data.qpos[creature.qpos_adr] += starts.joint_offset[row]
+    data.qpos[creature.joints.qpos_adr] += starts.joint_offset[row]
     mujoco.mj_kinematics(model, data)
     data.qpos[2] += max(0.0, usual - data.geom_xpos[feet, 2].min())
-    data.qvel[creature.dof_adr] = starts.joint_velocity[row]
+    data.qvel[creature.joints.dof_adr] = starts.joint_velocity[row]
     mass = np.zeros((model.nv, model.nv))
     for k in range(round(seconds / model.opt.timestep)):
         if int(np.floor(min(starts.push_time[row], 1e6) / model.opt.timestep)) == k:
@@ -95,7 +95,7 @@ def plain_loop(creature, champion, starts, row, seconds):
             start=start_frame(creature),
             ground=None,
             time=np.array([k * step]),
-            joint_pos=data.qpos[None, creature.qpos_adr],
+            joint_pos=data.qpos[None, creature.joints.qpos_adr],
             velocity=data.qvel[None],
             trunk_pos=data.xpos[None, creature.trunk],
             trunk_rot=rot[None],
@@ -109,7 +109,7 @@ def plain_loop(creature, champion, starts, row, seconds):
         target, memory = control.act(memory, sense(creature, state, control.reads))
         gains = starts.stiffness[[row]], starts.damping[[row]]
         torques.append(drive.torque(target, state, *gains)[0])
-        data.qfrc_applied[creature.dof_adr] = torques[max(k - starts.delay[row], 0)]
+        data.qfrc_applied[creature.joints.dof_adr] = torques[max(k - starts.delay[row], 0)]
         mujoco.mj_step2(model, data)
     return np.array(states)
 
@@ -182,7 +182,7 @@ def test_a_standing_creature_stands(tiny):
 
 def test_a_standing_creature_is_carried_by_its_feet_and_does_not_slide(tiny):
     recording = record(tiny, make_champion(tiny), 2.0).window(1.0)
-    assert recording.foot_force.sum(1) == pytest.approx(tiny.mass * 9.81, rel=0.01)
+    assert recording.foot_force.sum(1) == pytest.approx(tiny.frame.mass * 9.81, rel=0.01)
     assert recording.contact.all()
     assert not recording.touch.any()
     assert recording.foot_slip.max() < 5e-3
@@ -205,7 +205,7 @@ def test_slip_is_that_of_the_material_at_the_contact(tiny, trotter):
         data.qpos[:], data.qvel[:] = outcome.trajectory.qpos[0, k], outcome.trajectory.qvel[0, k]
         mujoco.mj_forward(model, data)
         for contact in data.contact:
-            foot = list(tiny.watched[:4]).index(max(contact.geom))
+            foot = list(tiny.feet.watched[:4]).index(max(contact.geom))
             mujoco.mj_jac(model, data, jac, None, contact.pos, model.geom_bodyid[max(contact.geom)])
             if recording.contact[k, foot]:
                 assert recording.foot_slip[k, foot] == pytest.approx(
@@ -221,7 +221,9 @@ def test_the_recording_looks_along_the_start(tiny, trotter):
     np.testing.assert_allclose(
         recording.trunk_pos[:, :2], outcome.trajectory.qpos[0, :, :2], atol=1e-12
     )
-    np.testing.assert_array_equal(recording.joint_pos, outcome.trajectory.qpos[0][:, tiny.qpos_adr])
+    np.testing.assert_array_equal(
+        recording.joint_pos, outcome.trajectory.qpos[0][:, tiny.joints.qpos_adr]
+    )
     assert np.abs(recording.torque).max() <= 12.0
     assert recording.touch.sum() == 0
 

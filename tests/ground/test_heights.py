@@ -13,17 +13,17 @@ from mjxgait.types import Sensed
 
 def standing(creature: Creature, above: float, floor: float | None) -> Sensed:
     """As it starts, but so many m higher."""
-    nothing, count = jnp.zeros(3), len(creature.joint_names)
+    nothing, count = jnp.zeros(3), len(creature.joints.names)
     return Sensed(
-        joint_pos=jnp.asarray(creature.stand),
+        joint_pos=jnp.asarray(creature.joints.stand),
         joint_vel=jnp.zeros(count),
         bias=jnp.zeros(creature.model.nv),
-        trunk_pos=jnp.asarray(creature.stand_pos + np.array([0.0, 0.0, above])),
-        trunk_rot=jnp.asarray(creature.stand_rot),
+        trunk_pos=jnp.asarray(creature.frame.stand_pos + np.array([0.0, 0.0, above])),
+        trunk_rot=jnp.asarray(creature.frame.stand_rot),
         trunk_vel=nothing,
         trunk_angvel=nothing,
-        geom_pos=jnp.zeros((len(creature.watched), 3)),
-        geom_low=jnp.full(len(creature.watched), 0.01),
+        geom_pos=jnp.zeros((len(creature.feet.watched), 3)),
+        geom_low=jnp.full(len(creature.feet.watched), 0.01),
         floor=None if floor is None else jnp.float32(floor),
     )
 
@@ -38,7 +38,7 @@ def test_height_counts_above_the_ground(stool: Creature):
 def test_a_controller_may_read_it(stool: Creature):
     moment = standing(stool, 2.0, 1.9)
     found = sense(stool, moment, jnp.float32(0), ["trunk_height"])["trunk_height"]
-    np.testing.assert_allclose(found, stool.stand_height + 0.1, atol=1e-5)
+    np.testing.assert_allclose(found, stool.frame.stand_height + 0.1, atol=1e-5)
     level = dataclasses.replace(moment, floor=None)
     above = sense(stool, level, jnp.float32(0), ["trunk_height"])["trunk_height"]
-    np.testing.assert_allclose(above, stool.stand_height + 2.0, atol=1e-5)
+    np.testing.assert_allclose(above, stool.frame.stand_height + 2.0, atol=1e-5)

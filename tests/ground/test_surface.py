@@ -36,8 +36,8 @@ def laid(creature: Creature, text: str) -> Ground:
 def places(creature: Creature, reach: float, count: int = 400) -> np.ndarray:
     """[2, count] m, at random within so many body lengths of the start."""
     rng = np.random.default_rng(0)
-    around = rng.uniform(-1, 1, (2, count)) * reach * creature.body_length
-    return around + creature.stand_pos[:2, None]
+    around = rng.uniform(-1, 1, (2, count)) * reach * creature.frame.body_length
+    return around + creature.frame.stand_pos[:2, None]
 
 
 @pytest.mark.parametrize("text", TEXTS)
@@ -72,7 +72,7 @@ def test_it_is_level_where_a_creature_starts(stool: Creature, text: str):
 
 def test_it_is_as_high_and_as_steep_as_asked(stool: Creature):
     forward, left = start_place(stool).forward, np.array([0.0, 1.0])
-    far = stool.stand_pos[:2] + 10 * stool.body_length * forward[:2]
+    far = stool.frame.stand_pos[:2] + 10 * stool.frame.body_length * forward[:2]
 
     def rise(text: str, way: np.ndarray) -> float:
         """Per metre."""
@@ -82,12 +82,12 @@ def test_it_is_as_high_and_as_steep_as_asked(stool: Creature):
     assert rise("slope:0.2", forward[:2]) == pytest.approx(0.2, abs=1e-4)
     assert rise("slope:0.2:down", forward[:2]) == pytest.approx(-0.2, abs=1e-4)
     assert rise("slope:0.2:across", left) == pytest.approx(0.2, abs=1e-4)
-    assert rise("steps:0.1", stool.hip_height * forward[:2]) == pytest.approx(
-        0.1 * stool.hip_height, abs=1e-4
+    assert rise("steps:0.1", stool.frame.hip_height * forward[:2]) == pytest.approx(
+        0.1 * stool.frame.hip_height, abs=1e-4
     )
     for text in ("bumps:0.1", "rough:0.1"):
         highest = np.abs(height(laid(stool, text), *places(stool, 20.0, 20_000))).max()
-        assert 0.08 * stool.hip_height < highest <= 0.1 * stool.hip_height
+        assert 0.08 * stool.frame.hip_height < highest <= 0.1 * stool.frame.hip_height
 
 
 def test_every_trial_has_ground_of_its_own_and_the_first_the_named_one(stool: Creature):

@@ -1,6 +1,5 @@
 """Importing small animals with the faults of real files: repaired, found or refused."""
 
-import dataclasses
 import os
 import tomllib
 from pathlib import Path
@@ -8,7 +7,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-from helpers import pose_champion
+from helpers import altered, pose_champion
 from importing.models import BIPED, QUADRUPED, ROLLING
 
 from mjxgait.certify.simulate import simulate
@@ -40,10 +39,10 @@ def told(imported: Imported, words: str) -> bool:
 def test_a_quadruped_stands_on_four_feet_and_knows_its_left_and_right(tmp_path):
     creature, imported = bring(tmp_path, QUADRUPED)
     assert imported.stands
-    assert len(creature.foot_names) == 4
-    assert creature.symmetric
-    names = creature.joint_names
-    assert names[creature.partner[names.index("fl_knee")]] == "fr_knee"
+    assert len(creature.feet.names) == 4
+    assert creature.mirror.symmetric
+    names = creature.joints.names
+    assert names[creature.mirror.partner[names.index("fl_knee")]] == "fr_knee"
     assert standing(creature).stands
     for words in (
         "free joint added",
@@ -55,8 +54,8 @@ def test_a_quadruped_stands_on_four_feet_and_knows_its_left_and_right(tmp_path):
         "[high]",
     ):
         assert told(imported, words), words
-    assert creature.steer_stride[names.index("fl_hip")] == 0.5
-    assert creature.steer_stride[names.index("fr_hip")] == -0.5
+    assert creature.corrections.steer_stride[names.index("fl_hip")] == 0.5
+    assert creature.corrections.steer_stride[names.index("fr_hip")] == -0.5
 
 
 @pytest.mark.parametrize(
@@ -92,7 +91,7 @@ def test_a_body_shorter_than_its_legs_is_as_long_as_they_are(tmp_path):
     for kind, text in (("urdf", BIPED), ("xml", QUADRUPED)):
         creature, imported = bring(tmp_path, text, kind)
         assert told(imported, "body_length") == (text is BIPED)
-        assert creature.body_length > 0.95 * creature.hip_height
+        assert creature.frame.body_length > 0.95 * creature.frame.hip_height
 
 
 def test_joints_with_heavy_rotors_are_stiff_and_strong_enough_to_stride(tmp_path):
@@ -103,16 +102,16 @@ def test_joints_with_heavy_rotors_are_stiff_and_strong_enough_to_stride(tmp_path
     quick, imported = bring(
         tmp_path, QUADRUPED.replace("<default>", '<default><joint armature="1"/>')
     )
-    pendulum = np.sqrt(9.81 / quick.hip_height)
-    assert (np.sqrt(quick.kp / 1.1) > 4 * pendulum).all()
-    assert (quick.kd > 0.9 * np.sqrt(quick.kp)).all()
-    assert (quick.torque_limit > 5 * slow.torque_limit).all()
+    pendulum = np.sqrt(9.81 / quick.frame.hip_height)
+    assert (np.sqrt(quick.gains.kp / 1.1) > 4 * pendulum).all()
+    assert (quick.gains.kd > 0.9 * np.sqrt(quick.gains.kp)).all()
+    assert (quick.gains.torque_limit > 5 * slow.gains.torque_limit).all()
     assert told(imported, "own inertia")
 
 
 def motionless(creature: Creature, gains: dict[str, float]) -> Champion:
     """A gait whose only pose is the stance."""
-    return pose_champion(creature, np.tile(creature.stand, (2, 1)), gains)
+    return pose_champion(creature, np.tile(creature.joints.stand, (2, 1)), gains)
 
 
 @pytest.mark.parametrize("axis", ["pitch", "roll"])
@@ -124,10 +123,11 @@ def test_it_stands_with_the_strongest_balance_feedback(tmp_path, axis):
     ranges = resolve_config(creature.settings.train, creature.name).controller.tuning
     gains = {name: getattr(ranges, name)[1] for name in (axis, f"{axis}_rate")}
     starts = perturbed_starts(creature, 8, np.random.default_rng(0))
-    assert getattr(creature, f"balance_{axis}").any()
+    assert getattr(creature.corrections, f"balance_{axis}").any()
     assert simulate(creature, motionless(creature, gains), starts, 4.0).stayed_up.all()
     # The test can fail: with the full weights it does.
-    loud = dataclasses.replace(creature, balance_roll=np.sign(creature.balance_roll))
+    full = np.sign(creature.corrections.balance_roll)
+    loud = altered(creature, corrections={"balance_roll": full})
     assert (
         axis == "pitch" or not simulate(loud, motionless(loud, gains), starts, 4.0).stayed_up.all()
     )
@@ -136,11 +136,11 @@ def test_it_stands_with_the_strongest_balance_feedback(tmp_path, axis):
 def test_mujoco_reads_the_same_masses_and_joints_from_both_files(tmp_path):
     creature, _ = bring(tmp_path, QUADRUPED)
     before = mujoco.MjModel.from_xml_string(QUADRUPED)
-    for name in creature.joint_names:
+    for name in creature.joints.names:
         a, b = before.joint(name), creature.model.joint(name)
         np.testing.assert_allclose(a.axis, b.axis, atol=1e-9)
         np.testing.assert_allclose(a.pos, b.pos, atol=1e-9)
-    np.testing.assert_allclose(before.body_mass.sum(), creature.mass, rtol=1e-9)
+    np.testing.assert_allclose(before.body_mass.sum(), creature.frame.mass, rtol=1e-9)
     np.testing.assert_allclose(
         np.sort(before.body_inertia.ravel()),
         np.sort(creature.model.body_inertia.ravel()),
@@ -151,12 +151,12 @@ def test_mujoco_reads_the_same_masses_and_joints_from_both_files(tmp_path):
 def test_a_urdf_biped_stands_without_its_meshes(tmp_path):
     creature, imported = bring(tmp_path, BIPED, "urdf")
     assert imported.stands
-    assert creature.foot_names == ("left_foot", "right_foot")
-    assert creature.symmetric
+    assert creature.feet.names == ("left_foot", "right_foot")
+    assert creature.mirror.symmetric
     assert told(imported, ".dae")
-    np.testing.assert_allclose(creature.torque_limit, 40.0)
-    hip = creature.joint_names.index("left_hip_roll")
-    assert creature.balance_roll[hip] != 0
+    np.testing.assert_allclose(creature.gains.torque_limit, 40.0)
+    hip = creature.joints.names.index("left_hip_roll")
+    assert creature.corrections.balance_roll[hip] != 0
 
 
 @pytest.mark.parametrize("missing", ["mass", "inertia"])
@@ -174,7 +174,7 @@ def test_degrees_in_a_urdf_are_read_as_degrees(tmp_path):
         tmp_path, BIPED.replace('lower="-1.2" upper="1.2"', 'lower="-69" upper="69"'), "urdf"
     )
     assert told(imported, "read as degrees")
-    np.testing.assert_allclose(creature.joint_high, np.radians(69), rtol=1e-6)
+    np.testing.assert_allclose(creature.joints.high, np.radians(69), rtol=1e-6)
 
 
 def test_y_up_by_gravity_is_turned(tmp_path):
@@ -184,7 +184,7 @@ def test_y_up_by_gravity_is_turned(tmp_path):
     )
     creature, imported = bring(tmp_path, tilted)
     assert imported.stands
-    assert (creature.stand_rot @ creature.up)[2] == pytest.approx(1, abs=0.01)
+    assert (creature.frame.stand_rot @ creature.frame.up)[2] == pytest.approx(1, abs=0.01)
 
 
 def test_a_planar_walker_gets_wide_feet(tmp_path):
@@ -205,7 +205,7 @@ def test_a_planar_walker_gets_wide_feet(tmp_path):
     creature, imported = bring(tmp_path, text)
     assert imported.stands
     assert told(imported, "widened across")
-    assert creature.joint_names[creature.partner[0]] == "right_hip"
+    assert creature.joints.names[creature.mirror.partner[0]] == "right_hip"
     assert creature.model.nv == 6 + 6
 
 
@@ -265,8 +265,8 @@ def test_no_mesh_outside_the_model_s_folder_is_read(tmp_path):
 
 def test_joints_are_kept_and_frozen_as_told(tmp_path):
     creature, _ = bring(tmp_path, QUADRUPED, keep=("neck",), freeze=("f*_knee",))
-    assert "neck" in creature.joint_names
-    assert "fl_knee" not in creature.joint_names
+    assert "neck" in creature.joints.names
+    assert "fl_knee" not in creature.joints.names
 
 
 def test_the_command_writes_a_folder_and_check_draws_it(tmp_path, capsys):

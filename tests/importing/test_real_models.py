@@ -51,10 +51,10 @@ def test_file_to_standing_creature(tmp_path: Path, name: str):
     write_folder(tmp_path / "mine", imported)
     creature = load_creature(tmp_path / "mine")
     assert standing(creature).stands == imported.stands == (name not in FALLS)
-    assert len(creature.foot_names) == FEET.get(name, len(creature.foot_names))
-    assert creature.mass == pytest.approx(MASS.get(name, creature.mass), rel=1e-3)
-    assert (creature.pose_low <= creature.stand + 1e-9).all()
-    assert (creature.pose_high >= creature.stand - 1e-9).all()
+    assert len(creature.feet.names) == FEET.get(name, len(creature.feet.names))
+    assert creature.frame.mass == pytest.approx(MASS.get(name, creature.frame.mass), rel=1e-3)
+    assert (creature.joints.pose_low <= creature.joints.stand + 1e-9).all()
+    assert (creature.joints.pose_high >= creature.joints.stand - 1e-9).all()
     assert not creature.model.nu + creature.model.neq + creature.model.ntendon
     assert imported.notes.changes
     assert {"forward", "trunk", "feet", "standing pose", "mirror", "kp, kd"} <= {
@@ -95,8 +95,8 @@ def test_a_stance_that_was_searched_has_no_foot_within_the_hips(tmp_path: Path, 
     data = mujoco.MjData(creature.model)
     data.qpos[:] = creature.stand_qpos
     mujoco.mj_kinematics(creature.model, data)
-    left = creature.stand_rot @ creature.left
-    for geom in creature.watched[: len(creature.foot_of)]:
+    left = creature.frame.stand_rot @ creature.frame.left
+    for geom in creature.feet.watched[: len(creature.feet.foot_of)]:
         bodies = ancestors(creature.model, int(creature.model.geom_bodyid[geom]))
         hips = [
             data.xanchor[j] @ left
@@ -104,7 +104,9 @@ def test_a_stance_that_was_searched_has_no_foot_within_the_hips(tmp_path: Path, 
             if creature.model.jnt_bodyid[j] in bodies
         ]
         hip = max(hips, key=abs)
-        assert data.geom_xpos[geom] @ left * np.sign(hip) > abs(hip) - 0.03 * creature.hip_height
+        assert (
+            data.geom_xpos[geom] @ left * np.sign(hip) > abs(hip) - 0.03 * creature.frame.hip_height
+        )
 
 
 DOGS = ("unitree a1", "unitree go2", "laikago", "mini cheetah", "solo12", "anymal b")

@@ -23,7 +23,7 @@ def make_state(creature, config, generation):
     """
     ranks = np.arange(POPULATION)
     poses = (
-        np.broadcast_to(creature.stand, (POPULATION, 2, len(creature.joint_names)))
+        np.broadcast_to(creature.joints.stand, (POPULATION, 2, len(creature.joints.names)))
         + np.radians(ranks + generation)[:, None, None]
     )
     terms = np.zeros((POPULATION, config.rollout.starts, len(TERMS)), np.float32)

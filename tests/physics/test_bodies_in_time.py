@@ -66,8 +66,8 @@ def test_a_shipped_quadruped_whose_body_is_varied(quadrupeds: list[mujoco.MjMode
     plant = fast_plant(creature.evolution_model, layout)
     numbers = stacked([plant.parameters_of(model, layout) for model in quadrupeds])
     qpos = np.tile(creature.stand_qpos, (4, 1))
-    qpos[:, creature.qpos_adr] += 0.1 * np.random.default_rng(1).normal(
-        size=(4, len(creature.qpos_adr))
+    qpos[:, creature.joints.qpos_adr] += 0.1 * np.random.default_rng(1).normal(
+        size=(4, len(creature.joints.qpos_adr))
     )
     qpos[:, 2] -= 0.01
     still = np.zeros((4, creature.model.nv))

@@ -103,7 +103,7 @@ def lying(creature: Creature, bodies: int) -> BodyState:
     """Lanes in front; hips turned so that parts come into each other."""
     model = creature.model
     qpos = np.tile(creature.stand_qpos, (bodies, 1))
-    qpos[:, creature.qpos_adr] = np.linspace(0.5, 0.6, bodies)[:, None] * (1, 1, -1, -1)
+    qpos[:, creature.joints.qpos_adr] = np.linspace(0.5, 0.6, bodies)[:, None] * (1, 1, -1, -1)
     still = np.zeros((bodies, model.nv))
     return BodyState(qpos, still, still, still, np.ones(bodies))
 

@@ -97,7 +97,7 @@ def expected(
     """What the examiner's recordings mean for the tally, by settings and disturbance."""
     found = {}
     for name, config, outcome in zip(SETTINGS, CONFIGS, outcomes, strict=True):
-        clearance = config.fitness.clearance * body.hip_height
+        clearance = config.fitness.clearance * body.frame.hip_height
         for row, disturbance in enumerate(DISTURBANCES):
             frames = Frames(body, outcome.trajectory, row)
             steps, reason = end(frames, FALL)

@@ -28,8 +28,10 @@ def held(creature: Creature, qpos: np.ndarray, qvel: np.ndarray) -> np.ndarray:
     """[nv, ...] torques towards the standing pose from states [nq, ...] and [nv, ...]."""
     over = (slice(None), *(None,) * (qpos.ndim - 1))
     force = np.zeros(qvel.shape)
-    away = creature.stand[over] - qpos[creature.qpos_adr]
-    force[creature.dof_adr] = creature.kp[over] * away - creature.kd[over] * qvel[creature.dof_adr]
+    away = creature.joints.stand[over] - qpos[creature.joints.qpos_adr]
+    force[creature.joints.dof_adr] = (
+        creature.gains.kp[over] * away - creature.gains.kd[over] * qvel[creature.joints.dof_adr]
+    )
     return force
 
 
@@ -38,7 +40,7 @@ def test_creatures_come_to_rest_at_the_same_place(stool: Creature):
     terrain, spec = terrain_of(creature), creature.terrain
     assert terrain is not None
     qpos = np.tile(creature.stand_qpos[:, None], LANES)
-    qpos[0] += np.linspace(3, 8, LANES) * creature.body_length
+    qpos[0] += np.linspace(3, 8, LANES) * creature.frame.body_length
     qpos[1] += np.linspace(-1, 1, LANES)
     qpos[2] += terrain.height(qpos[0], qpos[1]) + DROP
 

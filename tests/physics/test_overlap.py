@@ -68,8 +68,8 @@ def crossed(creature: Creature, rng: np.random.Generator) -> np.ndarray:
     turn = rng.normal(size=4)
     qpos[3:7] = turn / np.linalg.norm(turn)
     toward = {"front": 1.0, "hind": -1.0}
-    signs = np.array([toward[name.split("_")[0]] for name in creature.joint_names])
-    qpos[creature.qpos_adr] = signs * rng.uniform(0.7, 0.8, len(signs))
+    signs = np.array([toward[name.split("_")[0]] for name in creature.joints.names])
+    qpos[creature.joints.qpos_adr] = signs * rng.uniform(0.7, 0.8, len(signs))
     return qpos
 
 
@@ -174,8 +174,8 @@ def test_the_crabs_claws_are_seen_by_its_front_legs():
     qpos = crab.stand_qpos.copy()
     for side in ("left", "right"):
         for joint, degrees in (("swing", 30), ("lift", 0), ("knee", -30)):
-            index = crab.joint_names.index(f"front_{side}_{joint}")
-            qpos[crab.qpos_adr[index]] += np.radians(degrees)
+            index = crab.joints.names.index(f"front_{side}_{joint}")
+            qpos[crab.joints.qpos_adr[index]] += np.radians(degrees)
     pairs = find_crossings(crab)
     assert pair_depths(pairs, *bar_places(crab.model, qpos, pairs)).max() > 0.02
 
@@ -265,7 +265,7 @@ def test_the_tally_keeps_the_deepest_of_the_time_that_counts(stool: Creature):
 def term(creature: Creature, tally: Tally, forward: float) -> float:
     config = WalkConfig(speed=1.0)
     tally = dataclasses.replace(
-        tally, forward=jnp.float32(forward * creature.body_length), steps=jnp.int32(200)
+        tally, forward=jnp.float32(forward * creature.frame.body_length), steps=jnp.int32(200)
     )
     return float(fitness_terms(creature, config, 0.005, 200, tally)["overlap"])
 
@@ -274,7 +274,7 @@ def test_the_term_grows_with_depth_and_counts_as_far_as_there_is_a_walk(stool: C
     empty = Judge(stool, 0.005, 8).init()
 
     def at(depth: float, forward: float = 1.0) -> float:
-        metres = jnp.float32(depth * stool.hip_height)
+        metres = jnp.float32(depth * stool.frame.hip_height)
         return term(stool, dataclasses.replace(empty, overlap=metres), forward)
 
     assert at(0.0) == at(0.9 * TOUCHING) == 0.0
@@ -292,8 +292,8 @@ def test_a_walker_whose_legs_cross_is_seen_and_nobody_else(stool: Creature):
         stool, small_config(rollout={"lanes": 3, "starts": 1, "physics": "mjx"})
     )
     low, high = experiment.simulator.controller.bounds(experiment.config.controller)
-    signs = np.array([1.0 if "front" in name else -1.0 for name in stool.joint_names])
-    standing = np.broadcast_to(stool.stand, low.key_poses.shape)
+    signs = np.array([1.0 if "front" in name else -1.0 for name in stool.joints.names])
+    standing = np.broadcast_to(stool.joints.stand, low.key_poses.shape)
     poses = np.stack([standing] * 5)
     poses[2] = np.where(signs > 0, high.key_poses, low.key_poses)
     genomes = dataclasses.replace(

@@ -62,7 +62,7 @@ def test_evolution_and_examiner_move_everybody_alike(run: mjxgait.Run):
 
 def test_the_champion_is_written_for_people_and_stays_who_it_is(run: mjxgait.Run):
     document = json.loads((run.folder / CHAMPION).read_text())
-    assert set(document["genome"]["expressions"]) == set(run.creature.joint_names)
+    assert set(document["genome"]["expressions"]) == set(run.creature.joints.names)
     kept = read_champion(run.folder / CHAMPION, run.creature)
     assert kept.fingerprint == read_snapshot(run.folder).champion(1).fingerprint
 
@@ -109,7 +109,7 @@ def test_the_size_of_programs_is_told_of_every_generation(run: mjxgait.Run):
 
 
 def test_an_edited_expression_is_what_moves(run: mjxgait.Run, edited: Path):
-    joint, changed = run.creature.joint_names[0], mjxgait.open(edited)
+    joint, changed = run.creature.joints.names[0], mjxgait.open(edited)
     edit(edited, joint, "0.3")
     assert np.allclose(mjxgait.walk(changed, 1.0)[f"pos_{joint}"][-20:], 0.3, atol=0.15)
     edit(edited, joint, "(/ t (- a0 a0))")
@@ -123,7 +123,7 @@ def test_an_edited_expression_is_what_moves(run: mjxgait.Run, edited: Path):
 def test_a_mistake_names_the_file_and_the_joint(
     run: mjxgait.Run, edited: Path, text: str, words: str, capsys: pytest.CaptureFixture
 ):
-    joint = run.creature.joint_names[1]
+    joint = run.creature.joints.names[1]
     edit(edited, joint, text)
     (edited / "short.toml").write_text(SHORT)
     said = said_by(capsys, "certify", edited, "--config", edited / "short.toml", code=2)

@@ -15,8 +15,8 @@ from mjxgait.settings.control import PoseConfig
 def treading(creature, degrees=4.0, period=0.5):
     """Key poses a few degrees around the standing one, by the clock."""
     rng = np.random.default_rng(3)
-    poses = creature.stand + np.radians(
-        rng.uniform(-degrees, degrees, (2, len(creature.joint_names)))
+    poses = creature.joints.stand + np.radians(
+        rng.uniform(-degrees, degrees, (2, len(creature.joints.names)))
     )
     return pose_champion(
         creature,
@@ -31,7 +31,7 @@ def treading(creature, degrees=4.0, period=0.5):
 def falling(creature):
     """Legs straight out to one side: it falls at once."""
     upright = treading(creature)
-    poses = np.stack([creature.pose_high, creature.pose_high])
+    poses = np.stack([creature.joints.pose_high, creature.joints.pose_high])
     return dataclasses.replace(upright, genome={**upright.genome, "key_poses": poses})
 
 

@@ -38,13 +38,13 @@ def test_a_walk_has_nothing_on_its_way(stool_walk: Walk):
 def test_the_goal_of_hopping_is_a_disc_on_the_floor(stool: Creature):
     walk = record_walk(stool, dataclasses.replace(treading(stool), task="hop"), 0.5)
     ((place, size),) = marks(walk).values()
-    ahead = (place[:2] - stool.stand_pos[:2]) @ walk.forward
+    ahead = (place[:2] - stool.frame.stand_pos[:2]) @ walk.forward
     assert (ahead, place[2]) == (pytest.approx(1.2), size[1])
 
 
 def test_the_bar_is_where_the_examiner_has_it(limbo: Walk):
     place, size = marks(limbo)["mjGEOM_CAPSULE"]
-    ahead = (place[:2] - limbo.creature.stand_pos[:2]) @ limbo.forward
+    ahead = (place[:2] - limbo.creature.frame.stand_pos[:2]) @ limbo.forward
     assert (ahead, place[2] - size[0]) == (pytest.approx(0.6), pytest.approx(0.35))
     assert {"mjGEOM_CYLINDER", "mjGEOM_CAPSULE"} == set(marks(limbo))
 

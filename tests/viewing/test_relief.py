@@ -18,7 +18,7 @@ def climb(stool_walk):
     """The walk on the spot moved ten body lengths up a slope."""
     creature = stool_walk.creature.on("slope:0.2")
     qpos = stool_walk.trajectory.qpos.copy()
-    way = np.linspace(0, 10 * creature.body_length, qpos.shape[1])
+    way = np.linspace(0, 10 * creature.frame.body_length, qpos.shape[1])
     qpos[0, :, :2] += way[:, None] * stool_walk.forward
     moved = dataclasses.replace(stool_walk, creature=creature)
     qpos[0, :, 2] += moved.ground_heights(qpos[0, :, :2])
@@ -77,5 +77,5 @@ def test_the_gl_worker_gets_the_same_ground(climb, tmp_path):
 
 def test_a_file_for_a_viewer_without_ground_stays_at_one_height(climb):
     take = walk_take(climb)
-    assert np.ptp(take.qpos[:, 2]) < 0.3 * climb.creature.hip_height
-    assert take.advance == pytest.approx(10 * climb.creature.body_length, rel=0.1)
+    assert np.ptp(take.qpos[:, 2]) < 0.3 * climb.creature.frame.hip_height
+    assert take.advance == pytest.approx(10 * climb.creature.frame.body_length, rel=0.1)

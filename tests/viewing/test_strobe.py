@@ -28,7 +28,7 @@ def test_moments_are_evenly_far_apart_and_the_last_is_the_farthest(stool_walk: W
     chosen = strobe.moments(sent(stool_walk, ways))
     steps = np.diff(ways[chosen])
     assert (chosen[0], chosen[-1]) == (0, 49)
-    spacing = strobe.SPACING * stool_walk.creature.body_length
+    spacing = strobe.SPACING * stool_walk.creature.frame.body_length
     assert abs(steps - spacing).max() < 0.2 * spacing
 
 

@@ -60,7 +60,7 @@ class WalkDemands(StaysUp):
         self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
     ) -> bool:
         """See `Demands`: up to the end in all its trials, and clearly faster than it must be."""
-        wanted = SPARE * CertificateConfig().progress.speed * seconds * creature.body_length
+        wanted = SPARE * CertificateConfig().progress.speed * seconds * creature.frame.body_length
         lived = to_the_end(outcome, seconds, creature)
         return bool(lived.all() and (outcome["forward"] >= wanted).all())
 

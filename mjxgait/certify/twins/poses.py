@@ -52,23 +52,23 @@ class PoseTwin:
         """Target [S, J] in rad with steering and balance, within the joints' ranges."""
         creature = self.creature
         steer, pitch, roll = (part[:, None] for part in self.corrections(senses))
-        stretched = creature.stand + (self.planned(position) - creature.stand) * (
-            1 + steer * creature.steer_stride
+        stretched = creature.joints.stand + (self.planned(position) - creature.joints.stand) * (
+            1 + steer * creature.corrections.steer_stride
         )
         target = (
             stretched
-            + steer * creature.steer_bend
-            + pitch * creature.balance_pitch
-            + roll * creature.balance_roll
+            + steer * creature.corrections.steer_bend
+            + pitch * creature.corrections.balance_pitch
+            + roll * creature.corrections.balance_roll
         )
-        return np.clip(target, creature.joint_low, creature.joint_high)
+        return np.clip(target, creature.joints.low, creature.joints.high)
 
     def corrections(
         self, senses: Mapping[str, np.ndarray]
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """`u`, `p` and `r` of docs/controller.md, [S] each."""
         gain = self.tuning
-        wrong = senses["heading"] + senses["aside"] / (2 * self.creature.body_length)
+        wrong = senses["heading"] + senses["aside"] / (2 * self.creature.frame.body_length)
         pitch = gain["pitch"] * senses["pitch"] + gain["pitch_rate"] * senses["pitch_rate"]
         roll = gain["roll"] * senses["roll"] + gain["roll_rate"] * senses["roll_rate"]
         return (
@@ -99,6 +99,6 @@ def pose_cycle(key_poses: np.ndarray, creature: Creature) -> np.ndarray:
     """[C, J] rad: the key poses [K, J], followed by their mirror images where the creature is
     symmetric.
     """
-    if not creature.symmetric:
+    if not creature.mirror.symmetric:
         return key_poses
-    return np.concatenate([key_poses, creature.sign * key_poses[:, creature.partner]])
+    return np.concatenate([key_poses, creature.mirror.sign * key_poses[:, creature.mirror.partner]])

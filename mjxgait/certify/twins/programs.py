@@ -101,7 +101,7 @@ class ProgramTwin:
         document = codec_of("program").document(champion.genome, champion.settings, creature)
         texts = document["expressions"]
         self.creature = creature
-        self.expressions = [read(texts[joint]) for joint in creature.joint_names]
+        self.expressions = [read(texts[joint]) for joint in creature.joints.names]
         names = set().union(*map(names_in, self.expressions))
         # The time tells how many there are, whatever else it reads.
         self.reads = tuple(sorted({"time", *(sense_of(name)[0] for name in names)}))
@@ -115,7 +115,9 @@ class ProgramTwin:
         count = len(senses["time"])
         rows = [np.broadcast_to(value_of(e, senses), count) for e in self.expressions]
         angles = np.stack(rows, axis=1)
-        return np.clip(angles, self.creature.pose_low, self.creature.pose_high), memory
+        return np.clip(
+            angles, self.creature.joints.pose_low, self.creature.joints.pose_high
+        ), memory
 
     def phase(self, memory: Memory) -> np.ndarray:
         """See `Twin`: it has no cycle."""

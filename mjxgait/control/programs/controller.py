@@ -57,7 +57,7 @@ class Programs:
 
     def variation(self, settings: ProgramConfig, evolution: EvolutionConfig) -> Variation:
         """See `Controller`."""
-        return program_variation(self.words, len(self.creature.joint_names), settings)
+        return program_variation(self.words, len(self.creature.joints.names), settings)
 
     def genes(self, genomes: Trees, settings: ProgramConfig) -> np.ndarray:
         """See `Controller`: any other node is a difference."""
@@ -82,5 +82,5 @@ class Programs:
             senses[t.sense] if t.index is None else senses[t.sense][t.index] for t in self.known
         ]
         angle = evaluate(plan, jnp.stack(seen))
-        low, high = self.creature.pose_low, self.creature.pose_high
+        low, high = self.creature.joints.pose_low, self.creature.joints.pose_high
         return jnp.clip(angle, low.astype(np.float32), high.astype(np.float32)), memory

@@ -44,8 +44,8 @@ def fitness_terms(
 def style_terms(creature: Body, horizon: int, tally: Tally) -> dict[str, jax.Array]:
     """The manner [] of one episode, however near it got."""
     lived = jnp.maximum(tally.steps, 1)
-    half_range = 0.5 * (creature.pose_high - creature.pose_low).astype(jnp.float32)
-    crossed = jnp.maximum(tally.overlap / creature.hip_height - TOUCHING, 0.0)
+    half_range = 0.5 * (creature.joints.pose_high - creature.joints.pose_low).astype(jnp.float32)
+    crossed = jnp.maximum(tally.overlap / creature.frame.hip_height - TOUCHING, 0.0)
     return {
         "time": tally.arrived / horizon,
         "restless": jnp.minimum(tally.after / tally.goal, 1.0),

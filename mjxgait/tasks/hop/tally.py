@@ -45,7 +45,7 @@ def empty(creature: Body, horizon: int) -> Tally:
         arrived=jnp.full((), horizon, jnp.int32),
         after=zero,
         ground=zero,
-        bent=jnp.zeros(len(creature.joint_names)),
+        bent=jnp.zeros(len(creature.joints.names)),
     )
 
 
@@ -68,5 +68,5 @@ def updated(creature: Body, step: float, tally: Tally, sensed: Sensed, goal: jax
         arrived=arrived,
         after=tally.after + jnp.where(arrived < tally.steps, moved, 0.0),
         ground=tally.ground + touches(creature, sensed),
-        bent=jnp.abs(sensed.joint_pos - creature.stand.astype(np.float32)),
+        bent=jnp.abs(sensed.joint_pos - creature.joints.stand.astype(np.float32)),
     )

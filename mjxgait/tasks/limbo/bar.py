@@ -28,7 +28,7 @@ def intrusion(creature: Body, sensed: Sensed, height: jax.Array | float) -> jax.
     which some are laid (`SLOPES`); where they miss an edge the hull is a little too large. So it
     counts no less to fly over the bar than to run into it. The floor must be the plane z = 0.
     """
-    forward, _ = creature.start_axes
+    forward, _ = creature.frame.start_axes
     from_trunk = (sensed.geom_pos - sensed.trunk_pos) @ forward
     ahead, up = from_trunk - bar_distance(creature, sensed), sensed.geom_pos[:, 2]
     radius = up - sensed.geom_low + (BAR_RADIUS + MARGIN)

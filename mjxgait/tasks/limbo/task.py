@@ -70,7 +70,7 @@ class Limbo(Hop):
 
     def judge(self, tally: Any, settings: Any) -> dict[str, jax.Array]:
         """See `Task`."""
-        bar = tally.bar / (tally.bar + HALF * self.creature.hip_height)
+        bar = tally.bar / (tally.bar + HALF * self.creature.frame.hip_height)
         return fitness_terms(self.creature, self.horizon, tally, {"bar": bar})
 
     def outcome(self, tally: Any) -> dict[str, jax.Array]:

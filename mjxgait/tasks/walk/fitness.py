@@ -42,7 +42,7 @@ def fitness_terms(
       step: s. horizon: T, steps of a full episode.
     """
     lived = jnp.maximum(tally.steps, 1)
-    length = creature.body_length
+    length = creature.frame.body_length
     moved = jnp.maximum(tally.forward, 0.25 * length)
     rate = jnp.mean(tally.swings) / lived / step
     # As often as the foot in the middle; one that swings less often has not left the floor.
@@ -51,7 +51,7 @@ def fitness_terms(
     low_feet = jnp.mean(dragged / jnp.maximum(jnp.maximum(tally.swings, strides), 1.0))
     duty = tally.contact / lived
     second_half = tally.forward - tally.forward_half
-    crossed = jnp.maximum(tally.overlap / creature.hip_height - TOUCHING, 0.0)
+    crossed = jnp.maximum(tally.overlap / creature.frame.hip_height - TOUCHING, 0.0)
     enough = _enough(config.speed, horizon * step)
     values = {
         "distance": _counted(tally.forward / length, enough),
@@ -60,14 +60,16 @@ def fitness_terms(
         "fade": jnp.maximum(tally.forward_half - second_half, 0.0) / length,
         "slip": jnp.max(tally.slip) / moved,
         "clearance": jnp.where(strides > 0, low_feet, 1.0),
-        "frequency": jnp.maximum(rate / stride_limit(creature.mass) - config.frequency, 0.0),
+        "frequency": jnp.maximum(rate / stride_limit(creature.frame.mass) - config.frequency, 0.0),
         "duty": jnp.max(jnp.maximum(duty - 0.8, 0.0) + jnp.maximum(0.25 - duty, 0.0)) / 0.2,
         "airborne": tally.airborne / lived,
-        "foot_height": jnp.maximum(tally.foot_height / lived / creature.hip_height - 0.25, 0.0),
+        "foot_height": jnp.maximum(
+            tally.foot_height / lived / creature.frame.hip_height - 0.25, 0.0
+        ),
         "tilt": tally.tilt / lived,
         "wobble": jnp.sqrt(tally.wobble / lived + 1e-12),
         "touch": tally.touch / lived,
-        "energy": tally.work / (creature.mass * 9.81 * moved),
+        "energy": tally.work / (creature.frame.mass * 9.81 * moved),
         "saturation": tally.saturation / lived,
         "limits": tally.limits / lived,
         "overlap": crossed / (crossed + DEEP),

@@ -67,7 +67,7 @@ class Judge:
 
     def init(self) -> Tally:
         """The empty tally."""
-        feet = len(self.creature.foot_names)
+        feet = len(self.creature.feet.names)
         values = {field.name: jnp.zeros(()) for field in dataclasses.fields(Tally)}
         counts = {name: jnp.zeros((), jnp.int32) for name in ("steps", "reason")}
         names = ("swings", "swinging", "shortfall", "peak", "contact", "slip", "foot_down")
@@ -87,20 +87,20 @@ class Judge:
           torque: [J] N·m. clearance: [] m wanted of each foot in each of its swings.
         """
         creature = self.creature
-        start_forward, start_left = creature.start_axes
-        moved = sensed.trunk_pos - creature.stand_pos.astype(np.float32)
-        forward_axis = sensed.trunk_rot @ creature.forward.astype(np.float32)
-        up = (sensed.trunk_rot @ creature.up.astype(np.float32))[2]
+        start_forward, start_left = creature.frame.start_axes
+        moved = sensed.trunk_pos - creature.frame.stand_pos.astype(np.float32)
+        forward_axis = sensed.trunk_rot @ creature.frame.forward.astype(np.float32)
+        up = (sensed.trunk_rot @ creature.frame.up.astype(np.float32))[2]
         low, pos = self._feet(sensed)
         down = (low < CONTACT_GAP).astype(jnp.float32)
         peak = jnp.maximum(tally.peak, low)
         missing = jnp.clip(1.0 - peak / jnp.maximum(clearance, 1e-6), 0.0, 1.0)
         slid = jnp.linalg.norm(pos - tally.foot_pos, axis=1) * down * tally.foot_down
-        rise = SWING * creature.hip_height
+        rise = SWING * creature.frame.hip_height
         swinging = jnp.where(low > rise, 1.0, jnp.where(low < 0.5 * rise, 0.0, tally.swinging))
         fallen = jnp.maximum(tally.swinging - swinging, 0.0)
-        outside = (sensed.joint_pos < creature.pose_low.astype(np.float32)) | (
-            sensed.joint_pos > creature.pose_high.astype(np.float32)
+        outside = (sensed.joint_pos < creature.joints.pose_low.astype(np.float32)) | (
+            sensed.joint_pos > creature.joints.pose_high.astype(np.float32)
         )
         steps = tally.steps + 1
         forward = moved @ start_forward
@@ -126,7 +126,7 @@ class Judge:
             touch=tally.touch + touches(creature, sensed),
             work=tally.work + jnp.sum(jnp.maximum(torque * sensed.joint_vel, 0.0)) * self.step,
             saturation=tally.saturation
-            + jnp.mean(jnp.abs(torque) >= creature.torque_limit.astype(np.float32)),
+            + jnp.mean(jnp.abs(torque) >= creature.gains.torque_limit.astype(np.float32)),
             limits=tally.limits + jnp.mean(outside),
             overlap=tally.overlap,
         )

@@ -25,7 +25,7 @@ class Walk(PlainTask):
 
     def standards(self, settings: WalkConfig) -> jax.Array:
         """See `Task`: the clearance [] in m that is wanted of each swing."""
-        return jnp.asarray(settings.clearance * self.creature.hip_height, jnp.float32)
+        return jnp.asarray(settings.clearance * self.creature.frame.hip_height, jnp.float32)
 
     def init(self) -> Tally:
         """See `Task`."""
