@@ -26,6 +26,7 @@ FLOORS = (
     ("certify",),
     ("simulation",),
     ("tasks", "control"),
+    ("blocks",),
     ("search",),
     ("champion", "physics", "senses"),
     ("body",),

@@ -9,7 +9,7 @@ All contacts' values lie side by side in arrays [C, L], the limits' in [M, L]. F
 import dataclasses
 from collections.abc import Callable, Sequence
 from itertools import groupby
-from typing import Any
+from typing import Any, Protocol
 
 import jax
 import jax.numpy as jnp
@@ -25,23 +25,73 @@ from mjxgait.physics.fast.kinematics import Motion, Pose
 from mjxgait.physics.fast.lanes import Pin, add, turn
 from mjxgait.physics.fast.parameters import Softness
 from mjxgait.physics.fast.structure import Structure, scalars
+from mjxgait.physics.fast.treematrix import Rows, Sparsity
 
 SMALLEST_FRICTION = 1e-5
 """mjMINMU, under which MuJoCo's engine lets no friction coefficient fall."""
+
+
+class Limited(Protocol):
+    """A limit."""
+
+    @property
+    def dof(self) -> int:
+        """The degree of freedom that it stops."""
+        ...
+
+
+class Shape(Protocol):
+    """What shapes the solver's program."""
+
+    @property
+    def pattern(self) -> Sparsity:
+        """Of the mass matrix, and of what contacts add to it."""
+        ...
+
+    @property
+    def limits(self) -> Sequence[Limited]:
+        """In the order of their values."""
+        ...
+
+    @property
+    def iterations(self) -> int:
+        """Newton steps at most."""
+        ...
+
+    @property
+    def line_iterations(self) -> int:
+        """Steps of a line search at most."""
+        ...
+
+
+class Operators(Protocol):
+    """The Jacobian J of all contacts, however it is stored."""
+
+    def along(self, vector: Sequence[jax.Array]) -> Directions:
+        """J x for x [nv] of [L]."""
+        ...
+
+    def gathered(self, force: Directions) -> dict[int, jax.Array]:
+        """J^T f: per degree of freedom that moves a contact, [L]."""
+        ...
+
+    def stiffened(self, mass: Rows, stiffness: Sequence[jax.Array]) -> Rows:
+        """Rows of M + J^T D J; of each contact D along nn, n1, n2, 11 and 22."""
+        ...
 
 
 @dataclasses.dataclass(frozen=True)
 class Constraints:
     """All that the solver needs to know.
 
-    structure. footing: the contacts' Jacobian, None without contacts. friction: [C, L].
+    structure: its shape. footing: the contacts' Jacobian, None without contacts. friction: [C, L].
     reference: what the accelerations along normal and tangents are compared with.
     weight: [C, L] inverse regulariser of an edge, zero where there is no contact.
     sign, limit_reference, limit_weight: [M, L], the same of limits.
     """
 
-    structure: Structure
-    footing: Footing | None
+    structure: Shape
+    footing: Operators | None
     friction: jax.Array
     reference: Directions
     weight: jax.Array
@@ -170,7 +220,7 @@ def _contact_terms(
     structure, touch, pin = footing.structure, footing.touch, footing.pin
     contacts = structure.columns.contacts
     mu = jnp.maximum(contacts.friction * friction, SMALLEST_FRICTION)
-    impedance, depth = _soften(contacts.softness, structure.topology.contact_power, touch.distance)
+    impedance, depth = soften(contacts.softness, structure.topology.contact_power, touch.distance)
     stiffness, damping = contacts.softness.stiffness, contacts.softness.damping
     # Regulariser of all edges (MJX `_efc_contact_pyramidal`): inverse mass along an edge, scaled by friction.
     inverse_mass = contacts.weight * (1 + mu * mu) * 2 * mu * mu / structure.impratio
@@ -195,7 +245,7 @@ def _limit_terms(
     over_low, under_high = pos - limits.low, limits.high - pos
     sign = jnp.where(over_low < under_high, 1.0, -1.0)
     stiffness, damping = limits.softness.stiffness, limits.softness.damping
-    impedance, depth = _soften(
+    impedance, depth = soften(
         limits.softness, structure.topology.limit_power, jnp.minimum(over_low, under_high)
     )
     weight = jnp.where(
@@ -204,7 +254,7 @@ def _limit_terms(
     return pin(sign), pin(-damping * sign * vel - stiffness * impedance * depth), pin(weight)
 
 
-def _soften(
+def soften(
     softness: Softness, powers: Sequence[float], distance: jax.Array
 ) -> tuple[Any, jax.Array]:
     """Impedance and distance less margin of constraints [C, L] (computation docs, "Impedance")."""

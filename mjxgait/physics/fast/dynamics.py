@@ -7,6 +7,7 @@ Bodies' or degrees of freedom's values are [n, L] per component, or packed for t
 
 import dataclasses
 from collections.abc import Sequence
+from typing import Protocol
 
 import jax
 import jax.numpy as jnp
@@ -56,9 +57,32 @@ class Inertia:
         return Motion(plus(turned, cross(self.moment, motion.shift)), shifted)
 
 
-def inertias(structure: Structure, poses: Sequence[Pose], like: jax.Array, pin: Pin) -> Inertia:
+class Masses(Protocol):
+    """How heavy bodies are and where: see `Parameters`, with the lanes innermost."""
+
+    @property
+    def mass(self) -> Number:
+        """[B, L] kg."""
+        ...
+
+    @property
+    def com(self) -> Number:
+        """[B, 3, L] m."""
+        ...
+
+    @property
+    def axes(self) -> Number:
+        """[B, 2 or 3, 3, L] principal axes."""
+        ...
+
+    @property
+    def inertia(self) -> Number:
+        """[B, 3, L] kg m^2."""
+        ...
+
+
+def inertias(x: Masses, poses: Sequence[Pose], like: jax.Array, pin: Pin) -> Inertia:
     """Of all bodies."""
-    x = structure.columns
     pos = pin(table([pose.pos for pose in poses], like))
     rot = [pin(table([pose.rot[j] for pose in poses], like)) for j in range(3)]
 
@@ -124,12 +148,12 @@ def _groups(body: BodySlot) -> list[range]:
     ]
 
 
-def _motion_cross(a: Motion, b: Motion) -> Motion:
+def motion_cross(a: Motion, b: Motion) -> Motion:
     """Rate of change of a motion b carried along by a."""
     return Motion(cross(a.spin, b.spin), plus(cross(a.spin, b.shift), cross(a.shift, b.spin)))
 
 
-def _force_cross(a: Motion, force: Motion) -> Motion:
+def force_cross(a: Motion, force: Motion) -> Motion:
     """Rate of change of a momentum carried along by a."""
     return Motion(
         plus(cross(a.spin, force.spin), cross(a.shift, force.shift)), cross(a.spin, force.shift)
@@ -142,13 +166,13 @@ def bias_force(
     """Coriolis, centrifugal and gravity force (`qfrc_bias`) [nv, L], and every body's velocity [6, L]."""
     steps = Motion(scale(qvel, freedom.spin), scale(qvel, freedom.shift))
     moving, before = down(structure, pack(steps.parts, pin), np.zeros((6, 1), qvel.dtype), pin)
-    carried = _motion_cross(unpack(before), steps)
+    carried = motion_cross(unpack(before), steps)
     upwards = -column((0.0, 0.0, 0.0, *structure.gravity), qvel.dtype)
     swept, _ = down(structure, pack(carried.parts, pin), upwards, pin)
     velocity = unpack(pin(jnp.stack(moving)))
     momentum = body.times(velocity)
     momentum = Motion(pin(momentum.spin), pin(momentum.shift))
-    inert, whirling = body.times(unpack(pin(jnp.stack(swept)))), _force_cross(velocity, momentum)
+    inert, whirling = body.times(unpack(pin(jnp.stack(swept)))), force_cross(velocity, momentum)
     own = [a + b for a, b in zip(inert.parts, whirling.parts, strict=True)]
     force = unpack(by_dof(structure, up(structure, pack(own, pin), pin), pin))
     return dot(freedom.parts, force.parts), moving

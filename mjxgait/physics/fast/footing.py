@@ -117,20 +117,20 @@ class Footing:
         stiffness: of each contact D along nn, n1, n2, 11 and 22 (D is zero along 12), [C, L].
         """
         tree, moves = self.structure.carriers, self.touch.moves
-        held = self._summed(_spatial(self.touch.frames.stiffness(stiffness), self.touch.points))
+        held = self._summed(spatial(self.touch.frames.stiffness(stiffness), self.touch.points))
         rows = dict(enumerate(mass))
         if moves.turns is not None:
             xx, yy, zz, xy, xz, yz = held[tree.root][15:]
             slides = [jnp.stack([xx]), jnp.stack([xy, yy]), jnp.stack([xz, yz, zz])]
             turning = Motion(axes(moves.turns), (0.0, 0.0, 0.0))
-            spatial = [held[tree.root][c] for c in range(21)]
-            turned = rooted(_resistance(spatial, turning), moves.turns, self.pin)
+            held_root = [held[tree.root][c] for c in range(21)]
+            turned = rooted(resistance(held_root, turning), moves.turns, self.pin)
             rows |= {k: mass[k] + slides[k] for k in range(3)}
             rows |= {3 + j: mass[3 + j] + turned[j, : 4 + j] for j in range(3)}
         if moves.freedom is not None:
             below = jnp.stack([held[b] for b in tree.body_of])
             motion = Motion(axes(moves.freedom), axes(moves.freedom[:, 3:]))
-            force = self.pin(_resistance([below[:, c] for c in range(21)], motion))
+            force = self.pin(resistance([below[:, c] for c in range(21)], motion))
             added = moves.along_chains(tree, force, self.pin)
             rows |= {k: mass[k] + row for k, row in zip(tree.dofs, added, strict=True)}
         return tuple(rows[k] for k in range(len(mass)))
@@ -151,7 +151,7 @@ class Footing:
         return sums
 
 
-def _spatial(stiffness: Sequence[jax.Array], points: Sequence[jax.Array]) -> list[jax.Array]:
+def spatial(stiffness: Sequence[jax.Array], points: Sequence[jax.Array]) -> list[jax.Array]:
     """A spring's stiffness at a point, as felt at the origin: 6 angular, 9 mixed, 6 linear.
 
     The mixed ones are the force along x, y, z per turn about x, then about y, then about z.
@@ -170,11 +170,11 @@ def _spatial(stiffness: Sequence[jax.Array], points: Sequence[jax.Array]) -> lis
     return [*angular, *(component for force in turns for component in force), *stiffness]
 
 
-def _resistance(spatial: Sequence[jax.Array], motion: Motion) -> tuple[jax.Array, ...]:
-    """Moment and force of a spatial stiffness, ordered as by `_spatial`, against a motion."""
-    sxx, syy, szz, sxy, sxz, syz = spatial[:6]
-    about = (spatial[6:9], spatial[9:12], spatial[12:15])
-    lxx, lyy, lzz, lxy, lxz, lyz = spatial[15:]
+def resistance(stiffness: Sequence[jax.Array], motion: Motion) -> tuple[jax.Array, ...]:
+    """Moment and force of a spatial stiffness, ordered as by `spatial`, against a motion."""
+    sxx, syy, szz, sxy, sxz, syz = stiffness[:6]
+    about = (stiffness[6:9], stiffness[9:12], stiffness[12:15])
+    lxx, lyy, lzz, lxy, lxz, lyz = stiffness[15:]
     spin, shift = motion.spin, motion.shift
     moment = plus(
         (dot((sxx, sxy, sxz), spin), dot((sxy, syy, syz), spin), dot((sxz, syz, szz), spin)),

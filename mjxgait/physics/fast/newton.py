@@ -19,6 +19,8 @@ from mjxgait.physics.fast.treematrix import Rows, factor, multiply, on_pivot, so
 Lanes = jax.Array
 Search = tuple[Lanes, Lanes, Lanes, Lanes, jax.Array]
 """Bracket, length, whether the lane goes on, and the number of evaluations."""
+MANY = 32
+"""Rows of contacts, from which on sums over them are folded."""
 FLAT = 1e-5
 """Of the slope at the start: where less is left, a line search is over."""
 Edges = list[jax.Array]
@@ -61,7 +63,7 @@ def constrained_acceleration(
 
 def _minimised(problem: Problem, start: Iterate) -> Iterate:
     """Newton steps until no lane's active rows change any more (the step before was then exact), or the model's number of iterations."""
-    limit = problem.constraints.structure.topology.iterations
+    limit = problem.constraints.structure.iterations
     if limit == 1:
         return _improved(problem, start)
 
@@ -112,8 +114,26 @@ def _weights(c: Constraints) -> Edges:
 
 def _total(parts: Sequence[jax.Array]) -> Lanes:
     """Sum over all rows of all arrays [n, L]."""
+    if max(part.shape[0] for part in parts) > MANY:
+        return _folded(parts)
     rows = [part[n] for part in parts for n in range(part.shape[0])]
     return sum(rows[1:], rows[0])
+
+
+def _folded(parts: Sequence[jax.Array]) -> Lanes:
+    """The same by halves: a term for each of hundreds of rows is more than XLA makes fast code of."""
+    sums: dict[int, jax.Array] = {}
+    for part in parts:
+        count = part.shape[0]
+        sums[count] = sums[count] + part if count in sums else part
+    ends = []
+    for rows in sums.values():
+        while rows.shape[0] > 1:
+            half, odd = divmod(rows.shape[0], 2)
+            whole = rows[:half] + rows[half : 2 * half]
+            rows = jnp.concatenate([whole, rows[-1:]]) if odd else whole
+        ends.append(rows[0])
+    return sum(ends[1:], ends[0])
 
 
 def _dot(a: Sequence[Lanes], b: Sequence[Lanes]) -> Lanes:
@@ -207,7 +227,7 @@ def _line_search(
         return slope + length * curvature + _total(pulls), curvature + _total(stiffs)
 
     def unfinished(carry: Search) -> jax.Array:
-        return (carry[-1] < c.structure.topology.line_iterations) & jnp.any(carry[-2] > 0)
+        return (carry[-1] < c.structure.line_iterations) & jnp.any(carry[-2] > 0)
 
     def narrowed(carry: Search) -> Search:
         low, high, length, going, count = carry

@@ -161,7 +161,7 @@ class FastPlant:
         pin = pinned_by(like)
         poses, freedoms = posture(structure, state.qpos, pin)
         freedom = motions(freedoms, like, pin)
-        body = inertias(structure, poses, like, pin)
+        body = inertias(structure.columns, poses, like, pin)
         bias, moving = bias_force(structure, body, freedom, state.qvel, pin)
         bias = bias + _resistance(structure, state)
         if self.topology.water:

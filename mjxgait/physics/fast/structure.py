@@ -88,6 +88,16 @@ class Structure:
         return self.topology.contacts
 
     @property
+    def iterations(self) -> int:
+        """Of the contact solver."""
+        return self.topology.iterations
+
+    @property
+    def line_iterations(self) -> int:
+        """Of its line search."""
+        return self.topology.line_iterations
+
+    @property
     def limits(self) -> tuple[LimitSlot, ...]:
         """Of hinges and slides."""
         return self.topology.limits

@@ -38,7 +38,7 @@ def _at_rest(structure: Structure) -> tuple[jax.Array, jax.Array]:
     poses, freedoms = posture(structure, _rest(structure), pin)
     freedom = motions(freedoms, like, pin)
     paths = motion_paths(structure, freedom, pin)
-    rows = mass_rows(structure, inertias(structure, poses, like, pin), freedom, paths, pin)
+    rows = mass_rows(structure, inertias(structure.columns, poses, like, pin), freedom, paths, pin)
     lower = jnp.zeros((len(rows), len(rows)), like.dtype)
     for k, chain in enumerate(topology.pattern.chains):
         lower = lower.at[k, np.array(chain)].set(rows[k][:, 0])

@@ -1,0 +1,98 @@
+"""What a step of a mixed population costs, against the tall quadruped's, by turns on one core.
+
+    python benchmarks/blocks.py
+
+64 lanes; the blocks' are 64 random bodies, each lane another, driven by sines on land and in water,
+the quadruped treads. Processor time, best of the rounds; without controllers and tasks.
+"""
+
+import argparse
+import time
+from collections.abc import Callable
+
+import jax
+import jax.numpy as jnp
+
+from mjxgait import load_creature
+from mjxgait.blocks.genotype import Capacity, Ranges, random_graph
+from mjxgait.blocks.phenotype import body_of
+from mjxgait.physics import make_plant
+from mjxgait.physics.trees.plant import TreePlant
+from mjxgait.physics.trees.tree import Surroundings
+from mjxgait.types import BodyState
+
+LANES, STEPS = 64, 200
+Run = Callable[[], BodyState]
+
+
+def blocks(capacity: Capacity, around: Surroundings) -> Run:
+    """Random bodies, dropped or afloat."""
+
+    def grow(key: jax.Array):
+        return body_of(random_graph(key, capacity, Ranges()), capacity)
+
+    bodies = jax.jit(jax.vmap(grow))(jax.random.split(jax.random.key(0), LANES))
+    tree = jax.tree.map(lambda leaf: jnp.moveaxis(leaf, 0, -1), bodies.tree)
+    still = jnp.zeros((capacity.links + 5, LANES))
+    qpos = jnp.zeros((capacity.links + 6, LANES)).at[2].set(0.4).at[3].set(1.0)
+    torque = jnp.concatenate([still[:6], 0.3 * bodies.strength.T[1:]])
+    return stepped(
+        TreePlant(around),
+        BodyState(qpos, still, still, still, jnp.ones(LANES), parameters=tree),
+        torque,
+    )
+
+
+def quadruped() -> Run:
+    """The tall one with whole-body contacts, as `train` simulates it."""
+    creature = load_creature("tall_quadruped")
+    plant, _ = make_plant(creature, "auto", False)
+    qpos = jnp.tile(jnp.asarray(creature.stand_qpos, jnp.float32)[:, None], (1, LANES))
+    still = jnp.zeros((creature.nv, LANES))
+    body = BodyState(qpos, still, still, still, jnp.ones(LANES))
+    return stepped(plant, body, still.at[6:].set(3.0))
+
+
+def stepped(plant, body: BodyState, torque: jax.Array) -> Run:
+    """Compiled, and run once."""
+
+    @jax.jit
+    def go(body: BodyState, torque: jax.Array) -> BodyState:
+        def one(step: jax.Array, body: BodyState) -> BodyState:
+            found = plant.forward(body)
+            workings = found[1] if isinstance(found, tuple) else found
+            return plant.advance(body, workings, jnp.sin(0.05 * step) * torque)
+
+        return jax.lax.fori_loop(0, STEPS, one, body)
+
+    jax.block_until_ready(go(body, torque))
+    return lambda: jax.block_until_ready(go(body, torque))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--rounds", type=int, default=9)
+    rounds = parser.parse_args().rounds
+    water = Surroundings(floor=False, gravity=0.0, drag=300.0)
+    runs = {"tall quadruped": quadruped()}
+    for links in (12, 16):
+        capacity = Capacity(links=links)
+        runs[f"blocks, {links} links, land"] = blocks(capacity, Surroundings())
+        runs[f"blocks, {links} links, water"] = blocks(capacity, water)
+    best = dict.fromkeys(runs, float("inf"))
+    for _ in range(rounds):
+        for name, run in runs.items():
+            began = time.process_time()
+            run()
+            best[name] = min(best[name], time.process_time() - began)
+    base = best["tall quadruped"]
+    print("| | µs per creature-step | of the tall quadruped's rate |")
+    print("|---|---|---|")
+    for name, seconds in best.items():
+        print(f"| {name} | {seconds / STEPS / LANES * 1e6:.2f} | {base / seconds:.2f} |")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,77 @@
+"""Where the links are and how each degree of freedom moves them, about the root's own place."""
+
+from collections.abc import Sequence
+
+import jax
+import jax.numpy as jnp
+
+from mjxgait.physics.fast.kinematics import Motion, Pose, unit_quaternion
+from mjxgait.physics.fast.lanes import Pin, axes, cross, rotation, sin_cos, total
+from mjxgait.physics.trees.tree import Tree
+
+
+def posture(tree: Tree, qpos: jax.Array, pin: Pin) -> list[Pose]:
+    """Forward kinematics of qpos [7 + n - 1, L]: every link."""
+    columns = [jnp.stack(column) for column in rotation(unit_quaternion(qpos[3:7]))]
+    none = jnp.zeros_like(columns[0])
+    known = [pin(jnp.concatenate([*columns, none]))]
+    sines, cosines = sin_cos(qpos[7:])
+    for link in range(1, tree.links):
+        above = total([known[a] * tree.parent[link, a] for a in range(link)])
+        rot, pos = [above[:3], above[3:6], above[6:9]], above[9:]
+
+        def turned(local: jax.Array, rot: Sequence[jax.Array] = rot) -> jax.Array:
+            return total([axis * local[j] for j, axis in enumerate(rot)])
+
+        x, y, z = (turned(tree.turn[link, axis]) for axis in range(3))
+        sin, cos = sines[link - 1], cosines[link - 1]
+        place = pos + turned(tree.place[link])
+        known.append(pin(jnp.concatenate([x * cos + y * sin, y * cos - x * sin, z, place])))
+    origin = qpos[:3]
+    return [Pose(origin, k[9:], (k[:3], k[3:6], k[6:9])) for k in known]
+
+
+def motions(tree: Tree, poses: Sequence[Pose], pin: Pin) -> Motion:
+    """What each link's hinge does to it and all below at unit velocity; components [n, L].
+
+    Zero for the root, and for what does not move.
+    """
+    axis = jnp.stack([pose.rot[2] for pose in poses]) * tree.moves[:, None]
+    place = jnp.stack([pose.pos for pose in poses])
+    shift = cross(axes(place), axes(axis))
+    return Motion(axes(pin(axis)), pin(shift))
+
+
+def root_turns(poses: Sequence[Pose]) -> jax.Array:
+    """[3, 3, L] the axes about which the root turns."""
+    return jnp.stack(poses[0].rot)
+
+
+def down(tree: Tree, own: jax.Array, pin: Pin) -> jax.Array:
+    """Per link the sum [c, L] over itself and all above; own: [n, c, L]."""
+    return pin(
+        jnp.stack(
+            [
+                total([own[a] * tree.above[link, a] for a in range(link + 1)])
+                for link in range(tree.links)
+            ]
+        )
+    )
+
+
+def up(tree: Tree, own: jax.Array, pin: Pin) -> jax.Array:
+    """Per link the sum [c, L] over itself and all below; own: [n, c, L]."""
+    return pin(
+        jnp.stack(
+            [
+                total([own[below] * tree.above[below, link] for below in range(link, tree.links)])
+                for link in range(tree.links)
+            ]
+        )
+    )
+
+
+def root_motion(turns: jax.Array, vector: Sequence[jax.Array]) -> jax.Array:
+    """[6, L] of the root under the first six of [nv] velocities, angular before linear."""
+    spin = total([turns[j] * vector[3 + j] for j in range(3)])
+    return jnp.concatenate([spin, jnp.stack(vector[:3])])

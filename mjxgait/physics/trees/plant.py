@@ -1,0 +1,104 @@
+"""The step of a mixed population."""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+
+from mjxgait.physics.fast.dynamics import inertias
+from mjxgait.physics.fast.kernel import one_kernel
+from mjxgait.physics.fast.kinematics import Motion, Pose
+from mjxgait.physics.fast.lanes import pinned_by
+from mjxgait.physics.fast.newton import Problem, constrained_acceleration
+from mjxgait.physics.fast.plant import turned
+from mjxgait.physics.fast.treematrix import Rows
+from mjxgait.physics.trees.dynamics import bias_links, generalised, mass_rows, velocities
+from mjxgait.physics.trees.motion import motions, posture, root_turns
+from mjxgait.physics.trees.touch import BlockFooting, Touch, lowest_corners, make_constraints
+from mjxgait.physics.trees.tree import Surroundings, Tree
+from mjxgait.physics.trees.water import drag_links
+from mjxgait.types import BodyState, pytree
+
+
+@pytree
+class Moment:
+    """What a step has computed of the present.
+
+    pos: [n, 3, L] m of the links from the root, rot: [n, 3, 3, L] their axes (rows), moving:
+    [n, 6, L] their velocities about the root's place. mass: rows. bias: [nv, L]. touch: None
+    without a floor.
+    """
+
+    pos: jax.Array
+    rot: jax.Array
+    moving: jax.Array
+    turns: jax.Array
+    freedom: tuple[jax.Array, ...]
+    mass: Rows
+    bias: jax.Array
+    touch: Touch | None
+
+
+@dataclasses.dataclass(frozen=True)
+class TreePlant:
+    """One MuJoCo step of blocks, each lane with a tree of its own in `BodyState.parameters`."""
+
+    around: Surroundings
+
+    def forward(self, state: BodyState) -> Moment:
+        """Position and velocity dependent terms of the current state."""
+        return one_kernel(self._forward)(state)
+
+    def advance(self, state: BodyState, moment: Moment, torque: jax.Array) -> BodyState:
+        """The state one step later under applied generalised forces [nv, L]."""
+        after = one_kernel(self._advance)(state, moment, torque)
+        return dataclasses.replace(after, parameters=state.parameters)
+
+    def _forward(self, state: BodyState) -> Moment:
+        tree: Tree = state.parameters
+        around, like = self.around, state.friction
+        pin = pinned_by(like)
+        poses = posture(tree, state.qpos, pin)
+        freedom, turns = motions(tree, poses, pin), root_turns(poses)
+        body = inertias(tree, poses, like, pin)
+        moving = velocities(tree, turns, freedom, list(state.qvel), pin)
+        force = bias_links(tree, body, freedom, moving, state.qvel, around.gravity, pin)
+        if around.drag:
+            force = force - drag_links(tree, poses, body, moving, around.drag, pin)
+        bias = jnp.stack(generalised(tree, turns, freedom, force, pin))
+        resisted = jnp.concatenate([jnp.zeros_like(bias[:6]), tree.damping[1:] * state.qvel[6:]])
+        return Moment(
+            pos=jnp.stack([pose.pos for pose in poses]),
+            rot=_rows(poses),
+            moving=moving,
+            turns=turns,
+            freedom=freedom.parts,
+            mass=mass_rows(tree, turns, freedom, body, pin),
+            bias=pin(bias + resisted),
+            touch=pin(lowest_corners(tree, poses)) if around.floor else None,
+        )
+
+    def _advance(self, state: BodyState, moment: Moment, torque: jax.Array) -> BodyState:
+        tree: Tree = state.parameters
+        step, touch, pin = self.around.step, moment.touch, pinned_by(state.friction)
+        spin_x, spin_y, spin_z, *shift = moment.freedom
+        freedom = Motion((spin_x, spin_y, spin_z), (shift[0], shift[1], shift[2]))
+        points = (moment.turns[0],) * 3 if touch is None else touch.points
+        footing = BlockFooting(tree, moment.turns, freedom, points, pin)
+        constraints = make_constraints(
+            tree, self.around, footing, touch, state.friction, state.qpos, state.qvel
+        )
+        problem = Problem(moment.mass, list(torque - moment.bias), constraints, pin)
+        acceleration, pushed = constrained_acceleration(problem, list(state.warmstart))
+        warmstart = jnp.stack(acceleration)
+        qvel = state.qvel + step * warmstart
+        turned_root = turned(state.qpos[3:7], qvel[3:6], step)
+        shifted, bent = state.qpos[:3] + step * qvel[:3], state.qpos[7:] + step * qvel[6:]
+        qpos = jnp.concatenate([shifted, jnp.stack(turned_root), bent])
+        return BodyState(qpos, qvel, warmstart, jnp.stack(pushed), state.friction)
+
+
+def _rows(poses: Sequence[Pose]) -> Any:
+    return jnp.stack([jnp.stack(pose.rot) for pose in poses])

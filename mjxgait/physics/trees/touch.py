@@ -1,0 +1,177 @@
+"""Blocks on level ground: four corners of each that may touch it, and the Jacobian of all of them.
+
+Contacts' values are [4 n, L], corner after corner, each of all links.
+"""
+
+import dataclasses
+from collections.abc import Sequence
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from mjxgait.physics.fast.constraints import Constraints, soften
+from mjxgait.physics.fast.dynamics import pack
+from mjxgait.physics.fast.footing import resistance, spatial
+from mjxgait.physics.fast.frames import Directions, Level
+from mjxgait.physics.fast.kinematics import Motion, Pose
+from mjxgait.physics.fast.lanes import Pin, axes, cross, plus, total
+from mjxgait.physics.fast.parameters import Softness
+from mjxgait.physics.fast.treematrix import Rows
+from mjxgait.physics.trees.dynamics import generalised, tree_rows, velocities
+from mjxgait.physics.trees.motion import up
+from mjxgait.physics.trees.tree import Dense, Surroundings, Tree
+from mjxgait.types import pytree
+
+CORNERS = 4
+IMPEDANCE = np.array([0.9, 0.95, 0.001, 0.5], np.float32).reshape(1, 4, 1)
+POWER = (2.0,)
+"""MuJoCo's default `solimp`."""
+TIME_CONSTANT = 0.02
+"""s, MuJoCo's default `solref`, critically damped."""
+LEVEL = Level()
+
+
+@pytree
+class Touch:
+    """distance: [4 n, L] m above the ground; points: x, y, z [4 n, L] m from the origin."""
+
+    distance: jax.Array
+    points: tuple[jax.Array, jax.Array, jax.Array]
+
+
+def lowest_corners(tree: Tree, poses: Sequence[Pose]) -> Touch:
+    """The four corners of each block that are below its centre: those that may touch a plane.
+
+    With the half axes pointing down and the steepest first, K, A and B: K + A + B, K + A - B,
+    K - A + B, and K - A - B or, where that is above the centre, its opposite.
+    """
+    rot = [jnp.stack([pose.rot[j] for pose in poses]) for j in range(3)]
+
+    def turned(local: jax.Array) -> list[jax.Array]:
+        return [total([local[:, j] * rot[j][:, i] for j in range(3)]) for i in range(3)]
+
+    halves = [turned(tree.axes[:, k] * tree.half[:, k, None]) for k in range(3)]
+    down = [[-jnp.where(half[2] > 0, 1.0, -1.0) * x for x in half] for half in halves]
+    steep = [half[2] for half in down]
+    first = (steep[0] <= steep[1]) & (steep[0] <= steep[2])
+    last = ~first & (steep[2] < steep[1])
+    most = [jnp.where(first, x, jnp.where(last, z, y)) for x, y, z in zip(*down, strict=True)]
+    one = [jnp.where(first, y, x) for x, y in zip(down[0], down[1], strict=True)]
+    other = [jnp.where(last, y, z) for y, z in zip(down[1], down[2], strict=True)]
+    below = jnp.where(most[2] - one[2] - other[2] > 0, -1.0, 1.0)
+    centre = plus(axes(jnp.stack([pose.pos for pose in poses])), turned(tree.com))
+    x, y, z = (
+        jnp.concatenate([c + k + a + b, c + k + a - b, c + k - a + b, c + below * (k - a - b)])
+        for c, k, a, b in zip(centre, most, one, other, strict=True)
+    )
+    distance = z + poses[0].origin[2]
+    return Touch(distance, (x, y, z - 0.5 * distance))
+
+
+@dataclasses.dataclass(frozen=True)
+class BlockFooting:
+    """The operators of one state; compare `physics.fast.footing`."""
+
+    tree: Tree
+    turns: jax.Array
+    freedom: Motion
+    points: tuple[jax.Array, jax.Array, jax.Array]
+    pin: Pin
+
+    def along(self, vector: Sequence[jax.Array]) -> Directions:
+        """J x for x [nv] of [L]."""
+        moving = velocities(self.tree, self.turns, self.freedom, vector, self.pin)
+        motion = jnp.concatenate([moving] * CORNERS)
+        velocity = plus(axes(motion[:, 3:]), cross(axes(motion), self.points))
+        return self.pin(LEVEL.into((velocity[0], velocity[1], velocity[2])))
+
+    def gathered(self, force: Directions) -> dict[int, jax.Array]:
+        """J^T f, per degree of freedom [L]."""
+        pull = LEVEL.out(force)
+        wrench = self._folded([*cross(self.points, pull), *pull])
+        shares = generalised(self.tree, self.turns, self.freedom, wrench, self.pin)
+        return dict(enumerate(self.pin(shares)))
+
+    def stiffened(self, mass: Rows, stiffness: Sequence[jax.Array]) -> Rows:
+        """Rows of M + J^T D J; stiffness as in `physics.fast.footing`."""
+        held = up(
+            self.tree, self._folded(spatial(LEVEL.stiffness(stiffness), self.points)), self.pin
+        )
+        entries = [held[:, c] for c in range(21)]
+        force = Motion(*_halves(resistance(entries, self.freedom)))
+        spin = (self.turns[:, 0], self.turns[:, 1], self.turns[:, 2])
+        turning = Motion(spin, (0.0, 0.0, 0.0))
+        root = Motion(*_halves(resistance([held[0, c] for c in range(21)], turning)))
+        rows = tree_rows(self.tree, self.turns, self.freedom, force, root, self.pin)
+        xx, yy, zz, xy, xz, yz = (held[0, c] for c in range(15, 21))
+        rows[:3] = [jnp.stack([xx]), jnp.stack([xy, yy]), jnp.stack([xz, yz, zz])]
+        return tuple(a + b for a, b in zip(mass, rows, strict=True))
+
+    def _folded(self, values: Sequence[jax.Array]) -> jax.Array:
+        """Components [4 n, L] of contacts summed over each block: [n, components, L]."""
+        n = self.tree.links
+        corners = [[value[k * n : (k + 1) * n] for k in range(CORNERS)] for value in values]
+        return pack([total(corner) for corner in corners], self.pin)
+
+
+def make_constraints(
+    tree: Tree,
+    around: Surroundings,
+    footing: BlockFooting,
+    touch: Touch | None,
+    friction: jax.Array,
+    qpos: jax.Array,
+    qvel: jax.Array,
+) -> Constraints:
+    """Those of the current state: all corners, all limits. friction: [L], a factor."""
+    pin, shape = footing.pin, Dense(tree.links, around.iterations, around.line_iterations)
+    limit = _limits(tree, around, qpos, qvel, pin)
+    if touch is None:
+        empty = jnp.zeros((0, *friction.shape), friction.dtype)
+        return Constraints(shape, None, empty, (empty, empty, empty), empty, *limit)
+    law = _law(around)
+    impedance, depth = soften(law, POWER, touch.distance)
+    mu = jnp.broadcast_to(around.friction * friction, depth.shape)
+    # As in `physics.fast.constraints`: the inverse mass along an edge of the pyramid.
+    inverse = jnp.concatenate([tree.body_weight] * CORNERS) * (1 + mu * mu) * 2 * mu * mu
+    active = (depth < 0) & (jnp.concatenate([tree.solid] * CORNERS) > 0)
+    weight = jnp.where(active, impedance / jnp.maximum(inverse * (1 - impedance), 1e-15), 0.0)
+    normal, first, second = footing.along(list(qvel))
+    reference = (
+        -law.damping * normal - law.stiffness * impedance * depth,
+        -law.damping * first,
+        -law.damping * second,
+    )
+    return Constraints(shape, footing, pin(mu), pin(reference), pin(weight), *limit)
+
+
+def _limits(
+    tree: Tree, around: Surroundings, qpos: jax.Array, qvel: jax.Array, pin: Pin
+) -> tuple[jax.Array, jax.Array, jax.Array]:
+    law = _law(around)
+    below, above = qpos[7:] - tree.low[1:], tree.high[1:] - qpos[7:]
+    sign = jnp.where(below < above, 1.0, -1.0)
+    impedance, depth = soften(law, POWER, jnp.minimum(below, above))
+    active = (depth < 0) & (tree.moves[1:] > 0)
+    inverse = tree.dof_weight[1:] * (1 - impedance)
+    weight = jnp.where(active, impedance / jnp.maximum(inverse, 1e-15), 0.0)
+    reference = -law.damping * sign * qvel[6:] - law.stiffness * impedance * depth
+    return pin(sign), pin(reference), pin(weight)
+
+
+def _law(around: Surroundings) -> Softness:
+    """Of every constraint (MuJoCo's computation docs, "Reference")."""
+    most = float(IMPEDANCE[0, 1, 0])
+    time = most * max(TIME_CONSTANT, 2 * around.step)
+    stiffness, damping, none = (
+        np.full((1, 1), x, np.float32) for x in (1 / time**2, 2 / time, 0.0)
+    )
+    return Softness(stiffness, damping, IMPEDANCE, none)
+
+
+def _halves(
+    values: tuple[jax.Array, ...],
+) -> tuple[tuple[jax.Array, jax.Array, jax.Array], tuple[jax.Array, jax.Array, jax.Array]]:
+    a, b, c, d, e, f = values
+    return (a, b, c), (d, e, f)

@@ -1,0 +1,150 @@
+"""Random bodies of blocks, each lane another, against C MuJoCo on the model of each."""
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+import pytest
+
+from mjxgait.blocks.genotype import Capacity, Ranges, random_graph
+from mjxgait.blocks.phenotype import Body, body_of
+from mjxgait.blocks.xml import body_xml
+from mjxgait.physics.trees.plant import TreePlant
+from mjxgait.physics.trees.tree import Surroundings
+from mjxgait.types import BodyState
+
+CAPACITY, LANES = Capacity(), 96
+ON_LAND = Surroundings(iterations=20, line_iterations=20)
+IN_WATER = Surroundings(floor=False, gravity=0.0, drag=300.0)
+
+
+@pytest.fixture(scope="module")
+def bodies() -> Body:
+    def grow(key: jax.Array) -> Body:
+        return body_of(random_graph(key, CAPACITY, Ranges()), CAPACITY)
+
+    return jax.jit(jax.vmap(grow))(jax.random.split(jax.random.key(1), LANES))
+
+
+def one(bodies: Body, lane: int) -> Body:
+    return jax.tree.map(lambda leaf: np.asarray(leaf[lane]), bodies)
+
+
+def links_of(body: Body, model: mujoco.MjModel) -> list[int]:
+    """The link of each hinge of the model, in its order."""
+    names = [model.joint(j).name.removeprefix("part").split("_") for j in range(1, model.njnt)]
+    return [
+        int(
+            np.flatnonzero((body.part == int(p)) & (body.hinge == int(h)) & (body.tree.moves > 0))[
+                0
+            ]
+        )
+        for p, h in names
+    ]
+
+
+def moments(bodies: Body, height: float, seed: int = 0) -> BodyState:
+    """A state per lane: any attitude, joints bent beyond their ranges, everything in motion."""
+    rng, moves = np.random.default_rng(seed), np.asarray(bodies.tree.moves)[:, 1:].T
+    quat = rng.normal(size=(4, LANES))
+    bent = rng.uniform(-1.2, 1.2, moves.shape) * moves
+    place = np.array([0.3, -0.2, height])[:, None] * np.ones(LANES)
+    qvel = np.concatenate([rng.normal(size=(6, LANES)), 3 * rng.normal(size=moves.shape) * moves])
+    still = jnp.zeros(qvel.shape)
+    return BodyState(
+        qpos=jnp.float32(np.concatenate([place, quat / np.linalg.norm(quat, axis=0), bent])),
+        qvel=jnp.float32(qvel),
+        warmstart=still,
+        constraint_force=still,
+        friction=jnp.ones(LANES),
+        parameters=jax.tree.map(lambda leaf: jnp.moveaxis(leaf, 0, -1), bodies.tree),
+    )
+
+
+def in_mujoco(
+    body: Body, state: BodyState, lane: int, around: Surroundings
+) -> tuple[mujoco.MjModel, mujoco.MjData, list[int]]:
+    """The lane's body and state; and the links of its hinges."""
+    model = mujoco.MjModel.from_xml_string(body_xml(body, around))
+    model.opt.tolerance, model.opt.iterations = 1e-12, 100
+    data, links = mujoco.MjData(model), links_of(body, model)
+    qpos, qvel = (np.asarray(x)[:, lane] for x in (state.qpos, state.qvel))
+    data.qpos[:] = [*qpos[:7], *(qpos[6 + link] for link in links)]
+    data.qvel[:] = [*qvel[:6], *(qvel[5 + link] for link in links)]
+    return model, data, links
+
+
+def test_bodies_weigh_what_mujoco_says(bodies: Body):
+    for lane in range(LANES):
+        body = one(bodies, lane)
+        model = mujoco.MjModel.from_xml_string(body_xml(body, ON_LAND))
+        links = links_of(body, model)
+        parts = np.flatnonzero(body.parts.exists)
+        assert model.nbody == 1 + len(parts)
+        assert body.tree.mass.sum() == pytest.approx(model.body_mass.sum(), rel=1e-5)
+        np.testing.assert_allclose(body.tree.dof_weight[links], model.dof_invweight0[6:], rtol=1e-3)
+        weights = [model.body(f"part{part}").invweight0[0] for part in parts]
+        np.testing.assert_allclose(
+            body.tree.body_weight[body.parts.last[parts]], weights, rtol=1e-3
+        )
+
+
+@pytest.mark.parametrize("around", [ON_LAND, Surroundings(floor=False)], ids=["land", "air"])
+def test_a_step_is_that_of_c_mujoco(bodies: Body, around: Surroundings):
+    plant, state = TreePlant(around), moments(bodies, 0.3)
+    moves = np.concatenate([np.zeros((6, LANES)), np.asarray(bodies.tree.moves)[:, 1:].T])
+    torque = np.random.default_rng(2).normal(size=moves.shape) * moves * 5
+    after = jax.jit(lambda s, u: plant.advance(s, plant.forward(s), u))(state, jnp.float32(torque))
+    wrong, touching = [], 0
+    for lane in range(LANES):
+        model, data, links = in_mujoco(one(bodies, lane), state, lane, around)
+        data.qfrc_applied[6:] = torque[[5 + link for link in links], lane]
+        mujoco.mj_step(model, data)
+        touching += data.ncon
+        mine = np.asarray(after.qvel)[[*range(6), *(5 + link for link in links)], lane]
+        wrong.append(np.abs(mine - data.qvel).max() / (1 + np.abs(data.qacc).max() * around.step))
+    assert (touching > LANES) is around.floor
+    assert np.median(wrong) < 1e-5
+    assert np.max(wrong) < 2e-3
+    still = np.asarray(after.qvel)[6:][moves[6:] == 0]
+    assert not still.any(), "what is not there does not move"
+
+
+def test_water_pushes_every_point_of_a_face_along_its_normal(bodies: Body):
+    """Summed up over a grid of points, 12 by 12 on each face."""
+    state = moments(bodies, 1.0)
+    calm = Surroundings(floor=False, gravity=0.0)
+    wet, dry = (
+        np.asarray(jax.jit(TreePlant(around).forward)(state).bias) for around in (IN_WATER, calm)
+    )
+    for lane in range(0, LANES, 4):
+        model, data, links = in_mujoco(one(bodies, lane), state, lane, IN_WATER)
+        mujoco.mj_forward(model, data)
+        force = np.zeros(model.nv)
+        for geom in range(model.ngeom):
+            for point, push in pushed(model, data, geom):
+                body = model.geom_bodyid[geom]
+                mujoco.mj_applyFT(model, data, push, np.zeros(3), point, body, force)
+        rows = [*range(6), *(5 + link for link in links)]
+        found = (dry - wet)[rows, lane]
+        np.testing.assert_allclose(found, force, atol=0.01 * np.abs(force).max())
+
+
+def pushed(model: mujoco.MjModel, data: mujoco.MjData, geom: int):
+    """Points of a block's faces with the force on each."""
+    half, rotation = model.geom_size[geom], data.geom_xmat[geom].reshape(3, 3)
+    grid = (np.arange(12) + 0.5) / 6 - 1
+    jacobian = np.zeros((3, model.nv))
+    for axis in range(3):
+        i, j = (axis + 1) % 3, (axis + 2) % 3
+        area = 4 * half[i] * half[j] / len(grid) ** 2
+        for side in (-1, 1):
+            for u in grid:
+                for v in grid:
+                    local = np.zeros(3)
+                    local[[axis, i, j]] = side * half[axis], u * half[i], v * half[j]
+                    point = data.geom_xpos[geom] + rotation @ local
+                    mujoco.mj_jac(model, data, jacobian, None, point, model.geom_bodyid[geom])
+                    normal = side * rotation[:, axis]
+                    speed = normal @ jacobian @ data.qvel
+                    yield point, -IN_WATER.drag * area * speed * normal

@@ -1,0 +1,140 @@
+"""Graphs grow into bodies: as a plain list would, within their room, and mirror images are such."""
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from blocks.plain_growth import plain_parts
+
+from mjxgait.blocks.genotype import JOINTS, Capacity, Graph, Ranges, random_graph
+from mjxgait.blocks.growth import Parts, grown
+from mjxgait.blocks.phenotype import Body, body_of
+
+CAPACITY, COUNT = Capacity(), 1000
+
+
+def draw(count: int, seed: int = 0) -> Graph:
+    keys = jax.random.split(jax.random.key(seed), count)
+    return jax.vmap(lambda key: random_graph(key, CAPACITY, Ranges()))(keys)
+
+
+def one(tree, place: int):
+    return jax.tree.map(lambda leaf: leaf[place], tree)
+
+
+@pytest.fixture(scope="module")
+def graphs() -> Graph:
+    return jax.tree.map(np.asarray, draw(COUNT))
+
+
+@pytest.fixture(scope="module")
+def parts(graphs: Graph) -> Parts:
+    grow = jax.jit(jax.vmap(lambda graph: grown(graph, CAPACITY)))
+    return jax.tree.map(np.asarray, grow(graphs))
+
+
+def test_a_body_grows_as_a_plain_list_does(graphs: Graph, parts: Parts):
+    sizes = set()
+    for place in range(COUNT):
+        mine, plain = one(parts, place), plain_parts(one(graphs, place), CAPACITY)
+        count = len(plain)
+        sizes.add(count)
+        assert mine.exists.tolist() == [True] * count + [False] * (CAPACITY.parts - count)
+        for name in ("node", "parent", "copies", "last"):
+            assert getattr(mine, name)[:count].tolist() == [part[name] for part in plain], name
+        for name in ("half", "place"):
+            expected = np.stack([part[name] for part in plain])
+            np.testing.assert_allclose(getattr(mine, name)[:count], expected, atol=1e-5)
+        columns = np.stack([part["columns"] for part in plain])
+        np.testing.assert_allclose(mine.turn[:count], np.swapaxes(columns, 1, 2), atol=1e-5)
+    assert {1, 2, 3, 4, 5, 6} < sizes
+
+
+def test_a_body_keeps_to_its_room(parts: Parts):
+    assert parts.exists.sum(1).max() <= CAPACITY.parts
+    assert (parts.last * parts.exists).max() < CAPACITY.links
+    rows = parts.turn[parts.exists]
+    np.testing.assert_allclose(
+        np.swapaxes(rows, 1, 2) @ rows, np.tile(np.eye(3), (len(rows), 1, 1)), atol=1e-5
+    )
+    np.testing.assert_allclose(np.linalg.det(rows), 1, atol=1e-5)
+
+
+def test_the_same_graph_grows_into_the_same_body():
+    graph = draw(3)
+    first, again = (jax.vmap(lambda g: grown(g, CAPACITY))(graph) for _ in range(2))
+    for a, b in zip(jax.tree.leaves(first), jax.tree.leaves(again), strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+def star(
+    mirror: int, recursion: int = 0, joint: str = "universal", terminal: bool = False
+) -> Graph:
+    """A root with one kind of limb on its side, which may carry another of itself."""
+    base = one(draw(1), 0)
+    count = CAPACITY.connections
+    order = np.arange(count)
+    return dataclasses.replace(
+        base,
+        half=jnp.full((CAPACITY.nodes, 3), 0.1),
+        joint=jnp.full(CAPACITY.nodes, JOINTS.index(joint)),
+        recursion=jnp.full(CAPACITY.nodes, recursion),
+        source=jnp.asarray(np.where(order == 0, 0, 1)),
+        target=jnp.ones(count, int),
+        used=jnp.asarray(order < 2),
+        place=jnp.tile(jnp.array([0.2, 1.0, 0.3]), (count, 1)),
+        turn=jnp.tile(jnp.array([0.3, 0.4, -0.2]), (count, 1)),
+        scale=jnp.full(count, 0.9),
+        mirror=jnp.asarray(np.where(order == 0, mirror, 0)),
+        terminal=jnp.asarray((order == 1) & terminal),
+    )
+
+
+@pytest.mark.parametrize(("recursion", "parts"), [(0, 2), (1, 3), (3, 5)])
+def test_a_node_follows_itself_as_often_as_it_may(recursion: int, parts: int):
+    found = grown(star(mirror=0, recursion=recursion, joint="twist"), CAPACITY)
+    assert int(found.exists.sum()) == parts
+    assert found.depth[:parts].tolist() == [0, 0, *range(1, recursion + 1)]
+
+
+def test_what_is_terminal_grows_at_the_end_only():
+    """The limb's own connection leads to itself: at its end it may not follow itself any more."""
+    assert int(grown(star(mirror=0, recursion=2, terminal=True), CAPACITY).exists.sum()) == 2
+
+
+def test_a_pair_grows_together_or_not_at_all():
+    """Each limb has three hinges: eleven links have room for three limbs."""
+    body = body_of(star(mirror=2, recursion=1, joint="spherical"), CAPACITY)
+    assert int(body.parts.exists.sum()) == 4
+    pairs = grown(star(mirror=2), dataclasses.replace(CAPACITY, parts=2))
+    assert int(pairs.exists.sum()) == 1
+
+
+def test_a_pair_is_the_mirror_image_of_each_other():
+    body = body_of(star(mirror=2, recursion=1, joint="universal"), CAPACITY)
+    places, axes = joints_in_the_world(body)
+    copies = np.asarray(body.parts.copies)[np.asarray(body.part)]
+    left, right = (np.flatnonzero((copies == image) & moving(body)) for image in (0, 1))
+    assert len(left) == len(right) == 4
+    flip, sign = np.array([1.0, -1.0, 1.0]), np.asarray(body.sign)[:, None]
+    np.testing.assert_allclose(places[right], places[left] * flip, atol=1e-6)
+    # A turn is mirrored to the turn the other way about the axis's image.
+    np.testing.assert_allclose((sign * axes)[right], -(sign * axes)[left] * flip, atol=1e-6)
+    assert np.asarray(body.strength)[left].tolist() == np.asarray(body.strength)[right].tolist()
+
+
+def moving(body: Body) -> np.ndarray:
+    return np.asarray(body.tree.moves) > 0
+
+
+def joints_in_the_world(body: Body) -> tuple[np.ndarray, np.ndarray]:
+    """Places and axes [n, 3] of all links, with all angles at 0."""
+    tree = jax.tree.map(np.asarray, body.tree)
+    places, frames = [np.zeros(3)], [np.eye(3)]
+    for link in range(1, tree.links):
+        parent = int(tree.parent[link].argmax())
+        places.append(places[parent] + tree.place[link] @ frames[parent])
+        frames.append(tree.turn[link] @ frames[parent])
+    return np.stack(places), np.stack(frames)[:, 2]
