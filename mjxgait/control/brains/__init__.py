@@ -1,0 +1,1 @@
+"""Brains of evolved creatures: networks of Sims' neurons."""
