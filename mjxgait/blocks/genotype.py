@@ -1,6 +1,7 @@
 """The graph that a body grows from.
 
-Letters: `N` nodes, `C` connections, `P` parts that may grow, `n` links (`physics.trees`).
+Letters: `N` nodes, `C` connections that leave each, `P` parts that may grow, `n` links
+(`physics.trees`).
 """
 
 import dataclasses
@@ -17,13 +18,13 @@ JOINTS = ("rigid", "revolute", "twist", "universal", "bend-twist", "twist-bend",
 
 @dataclasses.dataclass(frozen=True)
 class Capacity:
-    """How much room there is: nodes and connections of a genotype, parts and links of a body.
+    """How much room there is: nodes, connections that leave each, parts and links of a body.
 
     A part needs as many links as its joint has hinges, and at least one.
     """
 
     nodes: int = 6
-    connections: int = 12
+    connections: int = 3
     parts: int = 12
     links: int = 12
 
@@ -46,17 +47,16 @@ class Graph:
     Nodes: half [N, 3] m, half of a block's sizes; joint [N], to the parent, a place in `JOINTS`;
     swing [N, 3] rad, how far each hinge turns either way; recursion [N], how often a node may
     follow itself on one branch.
-    Connections: source, target [C] nodes; used [C]; place [C, 3], a direction from the parent
-    block's middle, in its half sizes, that leaves it where the child is joined; turn [C, 3] rad
-    about the joint's outward axis and the two others; scale [C]; mirror [C], 0 as it is, 1 as its
-    mirror image, 2 both; terminal [C], whether it grows only where its node may recur no more.
+    Connections, [N, C]: target, a node; used; place [N, C, 3], a direction from the parent block's
+    middle, in its half sizes, that leaves it where the child is joined; turn [N, C, 3] rad about the
+    joint's outward axis and the two others; scale; mirror, 0 as it is, 1 as its mirror image, 2
+    both; terminal, whether it grows only where its own node may recur no more.
     """
 
     half: jax.Array
     joint: jax.Array
     swing: jax.Array
     recursion: jax.Array
-    source: jax.Array
     target: jax.Array
     used: jax.Array
     place: jax.Array
@@ -67,7 +67,9 @@ class Graph:
 
 
 def random_graph(key: jax.Array, capacity: Capacity, ranges: Ranges) -> Graph:
-    """A genotype drawn at random. The first connections make a chain of two to four nodes."""
+    """A genotype drawn at random. The first connections of its first nodes make a chain of two to
+    four, and of the others one in five is used.
+    """
     keys = iter(jax.random.split(key, 16))
     nodes, connections = capacity.nodes, capacity.connections
 
@@ -78,20 +80,21 @@ def random_graph(key: jax.Array, capacity: Capacity, ranges: Ranges) -> Graph:
         return jax.random.randint(next(keys), shape, 0, count)
 
     sizes = jnp.exp(between((math.log(ranges.half[0]), math.log(ranges.half[1])), nodes, 3))
-    length = 1 + numbered(min(3, nodes), 1)[0]
-    order = jnp.arange(connections)
-    extra = jax.random.bernoulli(next(keys), 0.2, (connections,)) & (order < 2 * length)
+    length = 1 + numbered(min(3, nodes - 1), 1)[0]
+    order = jnp.arange(nodes)[:, None]
+    chain = (jnp.arange(connections) == 0) & (order < length)
+    extra = jax.random.bernoulli(next(keys), 0.2, (nodes, connections)) & (order <= length)
+    each = (nodes, connections)
     return Graph(
         half=sizes,
         joint=numbered(len(JOINTS), nodes),
         swing=between(ranges.swing, nodes, 3),
         recursion=numbered(ranges.recursion + 1, nodes),
-        source=jnp.where(order < length, order, numbered(nodes, connections) % length),
-        target=jnp.where(order < length, order + 1, numbered(nodes, connections) % (length + 1)),
-        used=(order < length) | extra,
-        place=between((-1.0, 1.0), connections, 3),
-        turn=between((-ranges.turn, ranges.turn), connections, 3),
-        scale=between(ranges.scale, connections),
-        mirror=numbered(3, connections),
-        terminal=jax.random.bernoulli(next(keys), 0.1, (connections,)),
+        target=jnp.where(chain, order + 1, numbered(nodes, *each) % (length + 1)),
+        used=chain | extra,
+        place=between((-1.0, 1.0), *each, 3),
+        turn=between((-ranges.turn, ranges.turn), *each, 3),
+        scale=between(ranges.scale, *each),
+        mirror=numbered(3, *each),
+        terminal=jax.random.bernoulli(next(keys), 0.1, each),
     )

@@ -52,15 +52,16 @@ class _Growing:
 
 def grown(graph: Graph, capacity: Capacity) -> Parts:
     """The body of a graph."""
-    connections = graph.source.shape[0]
+    connections = graph.target.shape[1]
 
     def step(turn: jax.Array, growing: _Growing) -> _Growing:
         part, connection = turn // connections, turn % connections
-        grows = _grows(graph, capacity, growing, part, connection)
-        mirror = graph.mirror[connection]
+        place = growing.parts.node[part], connection
+        grows = _grows(graph, capacity, growing, part, place)
+        mirror = graph.mirror[place]
         for image in (0, 1):
             wanted = grows & ((mirror == image) | (mirror == 2))
-            growing = _with_part(graph, growing, part, connection, image, wanted)
+            growing = _with_part(graph, growing, part, place, image, wanted)
         return growing
 
     growing = jax.lax.fori_loop(0, capacity.parts * connections, step, _seed(graph, capacity))
@@ -91,21 +92,24 @@ def _seed(graph: Graph, capacity: Capacity) -> _Growing:
     )
 
 
+Place = tuple[jax.Array, jax.Array]
+"""A connection: its node, and which of the node's."""
+
+
 def _grows(
-    graph: Graph, capacity: Capacity, growing: _Growing, part: jax.Array, connection: jax.Array
+    graph: Graph, capacity: Capacity, growing: _Growing, part: jax.Array, place: Place
 ) -> jax.Array:
     """Whether [] a connection grows on a part; a pair grows together or not at all."""
-    source, target = graph.source[connection], graph.target[connection]
+    source, target = place[0], graph.target[place]
     times, limit = growing.branch[part], graph.recursion + 1
-    here = growing.parts.exists[part] & (growing.parts.node[part] == source)
     allowed = (times[target] < limit[target]) & (
-        ~graph.terminal[connection] | (times[source] >= limit[source])
+        ~graph.terminal[place] | (times[source] >= limit[source])
     )
-    images = jnp.where(graph.mirror[connection] == 2, 2, 1)
+    images = jnp.where(graph.mirror[place] == 2, 2, 1)
     room = (growing.count + images <= capacity.parts) & (
         growing.links + images * _links(graph, target) <= capacity.links
     )
-    return here & graph.used[connection] & allowed & room
+    return growing.parts.exists[part] & graph.used[place] & allowed & room
 
 
 def _links(graph: Graph, node: jax.Array) -> jax.Array:
@@ -117,17 +121,17 @@ def _with_part(
     graph: Graph,
     growing: _Growing,
     part: jax.Array,
-    connection: jax.Array,
+    at: Place,
     image: int,
     grows: jax.Array,
 ) -> _Growing:
     """With one more part where it grows. image: 1 for the mirrored copy."""
-    parts, target, times = growing.parts, graph.target[connection], growing.branch[part]
+    parts, target, times = growing.parts, graph.target[at], growing.branch[part]
     needed = _links(graph, target)
     place = jnp.where(grows, growing.count, len(parts.node))  # out of bounds: dropped
     copies = parts.copies[part] ^ image
-    scale = growing.scale[part] * graph.scale[connection]
-    at, axes = joined(parts.half[part], graph.place[connection], graph.turn[connection])
+    scale = growing.scale[part] * graph.scale[at]
+    joint, axes = joined(parts.half[part], graph.place[at], graph.turn[at])
     flip = jnp.where(copies > 0, jnp.array([1.0, -1.0, 1.0]), 1.0)
 
     def put(array: jax.Array, value: jax.Array) -> jax.Array:
@@ -140,7 +144,7 @@ def _with_part(
             parent=put(parts.parent, part),
             copies=put(parts.copies, copies),
             half=put(parts.half, _size(graph.half[target], scale)),
-            place=put(parts.place, at * flip),
+            place=put(parts.place, joint * flip),
             turn=put(parts.turn, axes * flip[:, None] * flip),
             last=put(parts.last, growing.links + needed - 1),
             depth=put(parts.depth, times[target]),

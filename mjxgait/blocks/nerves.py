@@ -6,7 +6,6 @@ Letters: `N` nodes, `Q` neurons of a node, `M` central ones; 3 inputs each, 3 ef
 import dataclasses
 
 import jax
-import jax.numpy as jnp
 
 from mjxgait.types import pytree
 
@@ -37,14 +36,13 @@ class NerveRoom:
 
 @pytree
 class Nerves:
-    """The genotype beside a `Graph`.
+    """What each node brings along.
 
     kind: [N, Q] places in `NEURONS`; source: [N, Q, 3] and weight: [N, Q, 3] of their inputs.
-    effect_source, effect_weight: [N, 3] what drives each hinge to the parent. central_…: [M, …].
+    effect_source, effect_weight: [N, 3] what drives each hinge to the parent.
 
     A source is a number: 0 the constant 1; then the part's own sensors, its own neurons, its
-    parent's, its first child's, and the central ones. Central neurons sense and neighbour what the
-    root part does.
+    parent's, its first child's, and the central ones.
     """
 
     kind: jax.Array
@@ -52,34 +50,36 @@ class Nerves:
     weight: jax.Array
     effect_source: jax.Array
     effect_weight: jax.Array
-    central_kind: jax.Array
-    central_source: jax.Array
-    central_weight: jax.Array
+
+
+@pytree
+class Centre:
+    """The central neurons, [M], as in `Nerves`. They have the root part's sources."""
+
+    kind: jax.Array
+    source: jax.Array
+    weight: jax.Array
 
 
 def random_nerves(key: jax.Array, nodes: int, room: NerveRoom) -> Nerves:
     """Drawn at random: any function, any source; weights are normal."""
-    keys = iter(jax.random.split(key, 8))
+    own, source, weight = jax.random.split(key, 3)
+    kinds, sources, weights = _random_neurons(own, (nodes, room.local), room)
+    effects = jax.random.randint(source, (nodes, 3), 0, room.codes)
+    return Nerves(kinds, sources, weights, effects, jax.random.normal(weight, (nodes, 3)))
 
-    def numbered(count: int, *shape: int) -> jax.Array:
-        return jax.random.randint(next(keys), shape, 0, count)
 
-    def normal(*shape: int) -> jax.Array:
-        return jax.random.normal(next(keys), shape)
+def random_centre(key: jax.Array, room: NerveRoom) -> Centre:
+    """Drawn at random, as `random_nerves`."""
+    return Centre(*_random_neurons(key, (room.central,), room))
 
-    return Nerves(
-        kind=numbered(len(NEURONS), nodes, room.local),
-        source=numbered(room.codes, nodes, room.local, INPUTS),
-        weight=normal(nodes, room.local, INPUTS),
-        effect_source=numbered(room.codes, nodes, 3),
-        effect_weight=normal(nodes, 3),
-        central_kind=numbered(len(NEURONS), room.central),
-        central_source=numbered(room.codes, room.central, INPUTS),
-        central_weight=normal(room.central, INPUTS),
+
+def _random_neurons(
+    key: jax.Array, shape: tuple[int, ...], room: NerveRoom
+) -> tuple[jax.Array, jax.Array, jax.Array]:
+    kind, source, weight = jax.random.split(key, 3)
+    return (
+        jax.random.randint(kind, shape, 0, len(NEURONS)),
+        jax.random.randint(source, (*shape, INPUTS), 0, room.codes),
+        jax.random.normal(weight, (*shape, INPUTS)),
     )
-
-
-def no_nerves(nodes: int, room: NerveRoom) -> Nerves:
-    """Sums of nothing."""
-    shapes = jax.eval_shape(lambda: random_nerves(jax.random.key(0), nodes, room))
-    return jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), shapes)

@@ -8,7 +8,7 @@ the central ones last.
 import jax
 import jax.numpy as jnp
 
-from mjxgait.blocks.nerves import INPUTS, SENSORS, NerveRoom, Nerves
+from mjxgait.blocks.nerves import INPUTS, SENSORS, Centre, NerveRoom, Nerves
 from mjxgait.blocks.phenotype import Body
 from mjxgait.types import pytree
 
@@ -42,7 +42,7 @@ def value_count(parts: int, links: int, room: NerveRoom) -> int:
     return first_neuron(parts, links) + parts * room.local + room.central
 
 
-def wired(nerves: Nerves, body: Body, room: NerveRoom) -> Brain:
+def wired(nerves: Nerves, centre: Centre, body: Body, room: NerveRoom) -> Brain:
     """The wires of a body. What leads to a part that there is not, carries nothing."""
     parts, exists = body.parts, body.parts.exists
     count, node = len(exists), parts.node
@@ -53,16 +53,16 @@ def wired(nerves: Nerves, body: Body, room: NerveRoom) -> Brain:
 
     every = jnp.arange(count)
     source = found(nerves.source[node], every).reshape(-1, INPUTS)
-    central = found(nerves.central_source, jnp.zeros(room.central, int))
+    central = found(centre.source, jnp.zeros(room.central, int))
     alive = jnp.repeat(exists, room.local)
     weight = nerves.weight[node].reshape(-1, INPUTS) * alive[:, None]
     part, hinge = body.part, body.hinge
     code = nerves.effect_source[node[part], hinge]
     part_sign = 1.0 - 2.0 * parts.copies
     return Brain(
-        kind=jnp.concatenate([nerves.kind[node].reshape(-1), nerves.central_kind]),
+        kind=jnp.concatenate([nerves.kind[node].reshape(-1), centre.kind]),
         source=jnp.concatenate([source, central]),
-        weight=jnp.concatenate([weight, nerves.central_weight]),
+        weight=jnp.concatenate([weight, centre.weight]),
         drive=places[part, code],
         pull=nerves.effect_weight[node[part], hinge] * body.strength * body.sign,
         sign=body.sign,

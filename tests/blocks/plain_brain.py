@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from mjxgait.blocks.nerves import NEURONS, NerveRoom, Nerves
+from mjxgait.blocks.nerves import NEURONS, Centre, NerveRoom, Nerves
 from mjxgait.blocks.phenotype import Body
 
 
@@ -53,8 +53,8 @@ def fire(name: str, a: float, b: float, c: float, memory: float, dt: float) -> t
 class PlainBrain:
     """Arrays of one body, in NumPy."""
 
-    def __init__(self, nerves: Nerves, body: Body, room: NerveRoom) -> None:
-        self.nerves, self.body, self.room = nerves, body, room
+    def __init__(self, nerves: Nerves, centre: Centre, body: Body, room: NerveRoom) -> None:
+        self.nerves, self.centre, self.body, self.room = nerves, centre, body, room
         self.parts = [int(p) for p in np.flatnonzero(body.parts.exists)]
         self.values = {(p, q): 0.0 for p in [*self.parts, "centre"] for q in range(9)}
         self.memory = dict(self.values)
@@ -84,7 +84,7 @@ class PlainBrain:
 
     def step(self, angles: np.ndarray, contact: np.ndarray, light: np.ndarray, dt: float) -> dict:
         """Torque by (part, hinge)."""
-        body, nerves = self.body, self.nerves
+        body, nerves, centre = self.body, self.nerves, self.centre
         hinges = {
             (int(body.part[link]), int(body.hinge[link])): link
             for link in np.flatnonzero(body.tree.moves)
@@ -99,7 +99,7 @@ class PlainBrain:
                     genes = nerves.kind[node, q], nerves.source[node, q], nerves.weight[node, q]
                     after[part, q], kept[part, q] = self.fired(part, q, part, genes, seen, dt / 2)
             for q in range(self.room.central):
-                genes = nerves.central_kind[q], nerves.central_source[q], nerves.central_weight[q]
+                genes = centre.kind[q], centre.source[q], centre.weight[q]
                 after["centre", q], kept["centre", q] = self.fired(
                     "centre", q, 0, genes, seen, dt / 2
                 )

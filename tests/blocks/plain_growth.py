@@ -34,24 +34,26 @@ def plain_parts(graph: Graph, capacity: Capacity) -> list[dict]:
     parts = [{"node": 0, "parent": 0, "copies": 0, "scale": 1.0, "branch": {0: 1}, "half": root}]
     parts[0] |= {"place": np.zeros(3), "columns": np.eye(3), "last": 0}
     for number, part in enumerate(parts):
-        for c in np.flatnonzero(graph.used & (graph.source == part["node"])):
-            node, times = int(graph.target[c]), part["branch"]
+        for place in zip(
+            [part["node"]] * 9, np.flatnonzero(graph.used[part["node"]]), strict=False
+        ):
+            node, times = int(graph.target[place]), part["branch"]
             if times.get(node, 0) > graph.recursion[node]:
                 continue
-            if graph.terminal[c] and times[part["node"]] <= graph.recursion[part["node"]]:
+            if graph.terminal[place] and times[part["node"]] <= graph.recursion[part["node"]]:
                 continue
-            needed, images = max(HINGES[graph.joint[node]], 1), IMAGES[int(graph.mirror[c])]
+            needed, images = max(HINGES[graph.joint[node]], 1), IMAGES[int(graph.mirror[place])]
             if len(parts) + len(images) > capacity.parts:
                 continue
             if links + len(images) * needed > capacity.links:
                 continue
             for image in images:
                 links += needed
-                scale = part["scale"] * graph.scale[c]
-                place, columns = joined(part["half"], graph.place[c], graph.turn[c])
+                scale = part["scale"] * graph.scale[place]
+                joint, columns = joined(part["half"], graph.place[place], graph.turn[place])
                 copies = part["copies"] ^ image
                 if copies:
-                    place, columns = mirror @ place, mirror @ columns @ mirror
+                    joint, columns = mirror @ joint, mirror @ columns @ mirror
                 parts.append(
                     {
                         "node": node,
@@ -60,7 +62,7 @@ def plain_parts(graph: Graph, capacity: Capacity) -> list[dict]:
                         "scale": scale,
                         "branch": times | {node: times.get(node, 0) + 1},
                         "half": np.clip(graph.half[node] * scale, SMALLEST, LARGEST),
-                        "place": place,
+                        "place": joint,
                         "columns": columns,
                         "last": links - 1,
                     }

@@ -7,7 +7,7 @@ import pytest
 from blocks.plain_brain import PlainBrain, fire
 
 from mjxgait.blocks.genotype import Capacity, Ranges, random_graph
-from mjxgait.blocks.nerves import NEURONS, NerveRoom, random_nerves
+from mjxgait.blocks.nerves import NEURONS, NerveRoom, random_centre, random_nerves
 from mjxgait.blocks.phenotype import body_of
 from mjxgait.blocks.wiring import wired
 from mjxgait.control.brains.neurons import fired
@@ -50,16 +50,21 @@ def test_a_brain_thinks_as_a_plain_network_does():
     """Where a threshold is met within rounding, two networks may part: not more than a few do."""
 
     def make(key: jax.Array):
-        first, second = jax.random.split(key)
+        first, second, third = jax.random.split(key, 3)
         graph = random_graph(first, CAPACITY, Ranges())
         body, nerves = body_of(graph, CAPACITY), random_nerves(second, CAPACITY.nodes, ROOM)
-        return body, nerves, wired(nerves, body, ROOM)
+        centre = random_centre(third, ROOM)
+        return body, nerves, centre, wired(nerves, centre, body, ROOM)
 
-    bodies, nerves, brains = jax.jit(jax.vmap(make))(jax.random.split(jax.random.key(3), COUNT))
+    bodies, nerves, centres, brains = jax.jit(jax.vmap(make))(
+        jax.random.split(jax.random.key(3), COUNT)
+    )
     think = jax.jit(jax.vmap(lambda b, m, p: thought(b, m, p, STEP)))
     neurons = CAPACITY.parts * ROOM.local + ROOM.central
     minds = jax.vmap(lambda _: blank(neurons))(jnp.arange(COUNT))
-    plain = [PlainBrain(one(nerves, i), one(bodies, i), ROOM) for i in range(COUNT)]
+    plain = [
+        PlainBrain(one(nerves, i), one(centres, i), one(bodies, i), ROOM) for i in range(COUNT)
+    ]
     rng, wrong, driven = np.random.default_rng(4), np.zeros(COUNT), 0
     for _ in range(4):
         angles = np.float32(rng.uniform(-1, 1, (COUNT, CAPACITY.links)))
@@ -86,7 +91,7 @@ def test_a_mirror_image_pulls_the_other_way():
 
     body = body_of(star(mirror=2, joint="universal"), CAPACITY)
     nerves = random_nerves(jax.random.key(5), CAPACITY.nodes, ROOM)
-    brain = wired(nerves, body, ROOM)
+    brain = wired(nerves, random_centre(jax.random.key(6), ROOM), body, ROOM)
     sign, copies = np.asarray(body.sign), np.asarray(body.parts.copies)[np.asarray(body.part)]
     bent = np.where(moving(body), 0.3 + 0.1 * np.asarray(body.hinge), 0.0) * sign
     ahead = np.where(np.asarray(body.parts.copies)[:, None] > 0, [0.2, -0.4, 0.1], [0.2, 0.4, 0.1])

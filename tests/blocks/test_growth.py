@@ -74,21 +74,20 @@ def star(
 ) -> Graph:
     """A root with one kind of limb on its side, which may carry another of itself."""
     base = one(draw(1), 0)
-    count = CAPACITY.connections
-    order = np.arange(count)
+    each = (CAPACITY.nodes, CAPACITY.connections)
+    node, order = np.indices(each)
     return dataclasses.replace(
         base,
         half=jnp.full((CAPACITY.nodes, 3), 0.1),
         joint=jnp.full(CAPACITY.nodes, JOINTS.index(joint)),
         recursion=jnp.full(CAPACITY.nodes, recursion),
-        source=jnp.asarray(np.where(order == 0, 0, 1)),
-        target=jnp.ones(count, int),
-        used=jnp.asarray(order < 2),
-        place=jnp.tile(jnp.array([0.2, 1.0, 0.3]), (count, 1)),
-        turn=jnp.tile(jnp.array([0.3, 0.4, -0.2]), (count, 1)),
-        scale=jnp.full(count, 0.9),
-        mirror=jnp.asarray(np.where(order == 0, mirror, 0)),
-        terminal=jnp.asarray((order == 1) & terminal),
+        target=jnp.ones(each, int),
+        used=jnp.asarray((node < 2) & (order == 0)),
+        place=jnp.tile(jnp.array([0.2, 1.0, 0.3]), (*each, 1)),
+        turn=jnp.tile(jnp.array([0.3, 0.4, -0.2]), (*each, 1)),
+        scale=jnp.full(each, 0.9),
+        mirror=jnp.asarray(np.where(node == 0, mirror, 0)),
+        terminal=jnp.asarray((node == 1) & terminal),
     )
 
 

@@ -1,0 +1,221 @@
+"""How graphs with nerves vary: mutation, crossover and grafting (Sims 1994, section 5).
+
+Letters: `N` nodes, `C` connections of each. Everything that belongs to a node has `N` in front, so
+nodes move as wholes.
+"""
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+
+from mjxgait.blocks.genotype import Capacity, Graph, Ranges, random_graph
+from mjxgait.blocks.nerves import Centre, NerveRoom, Nerves, random_centre, random_nerves
+from mjxgait.types import pytree
+
+
+@pytree
+class Genotype:
+    """A creature's: its body's graph, its nodes' nerves, and its central neurons."""
+
+    graph: Graph
+    nerves: Nerves
+    centre: Centre
+
+
+@dataclasses.dataclass(frozen=True)
+class Rates:
+    """How a mutation changes a genotype.
+
+    value: chance of each number, kind and flag of what grows, divided by how many there are, so
+    that it is how many change on average. sigma: of a number's change, as a share of its range.
+    connection: chance of one more or one less. node: of a new node.
+    """
+
+    value: float = 4.0
+    sigma: float = 0.2
+    connection: float = 0.3
+    node: float = 0.1
+
+
+@dataclasses.dataclass(frozen=True)
+class Kin:
+    """What all genotypes of a population share."""
+
+    capacity: Capacity
+    room: NerveRoom
+    ranges: Ranges
+    rates: Rates = Rates()
+
+    def create(self, key: jax.Array) -> Genotype:
+        """One drawn at random."""
+        body, nerves, centre = jax.random.split(key, 3)
+        return Genotype(
+            random_graph(body, self.capacity, self.ranges),
+            random_nerves(nerves, self.capacity.nodes, self.room),
+            random_centre(centre, self.room),
+        )
+
+    def mutate(self, key: jax.Array, genotype: Genotype) -> Genotype:
+        """Values change, connections come and go, an unconnected node is drawn anew."""
+        value, fresh, connect, node = jax.random.split(key, 4)
+        other = self.create(fresh)
+        changed = _with_new_node(node, genotype, other, self.rates.node)
+        changed = dataclasses.replace(
+            changed, graph=_reconnected(connect, changed.graph, other.graph, self.rates.connection)
+        )
+        return self._moved(value, changed, other)
+
+    def cross(self, key: jax.Array, mother: Genotype, father: Genotype) -> Genotype:
+        """The first nodes of one, the others of the other, up to two points of crossing over."""
+        nodes = self.capacity.nodes
+        low, high = jnp.sort(jax.random.randint(key, (2,), 0, nodes + 1))
+        order = jnp.arange(nodes)
+        return _chosen((order < low) | (order >= high), mother, father)
+
+    def graft(self, key: jax.Array, mother: Genotype, father: Genotype) -> Genotype:
+        """The father's graph, as far as there is room among the mother's unconnected nodes, hung
+        on one of the mother's connections.
+        """
+        nodes, connections = mother.graph.target.shape
+        free = ~reachable(mother.graph)
+        place = jnp.argsort(~free, stable=True)  # of the father's nodes, the free ones first
+        has_room = jnp.arange(nodes) < free.sum()
+        source = jnp.zeros(nodes, int).at[place].set(jnp.arange(nodes))
+        graph, nerves = jax.tree.map(lambda leaf: leaf[source], (father.graph, father.nerves))
+        kept = graph.used & has_room[graph.target]
+        graph = dataclasses.replace(graph, target=place[graph.target], used=kept)
+        hung = _chosen(~free, mother, Genotype(graph, nerves, mother.centre))
+        alive = jnp.where(reachable(mother.graph), 0.0, -jnp.inf)
+        choice = jax.random.categorical(key, jnp.repeat(alive, connections))
+        at = choice // connections, choice % connections
+        graph = hung.graph
+        joined = dataclasses.replace(
+            graph,
+            target=graph.target.at[at].set(place[0]),
+            used=graph.used.at[at].set(True),
+        )
+        grafted = dataclasses.replace(hung, graph=joined)
+        return jax.tree.map(lambda a, b: jnp.where(free.any(), a, b), grafted, mother)
+
+    def _moved(self, key: jax.Array, genotype: Genotype, other: Genotype) -> Genotype:
+        """Numbers shifted by a normal step, kinds and flags drawn anew, a few of each."""
+        alive = reachable(genotype.graph)
+        leaves, shape = jax.tree.flatten(_without_used(genotype))
+        fresh = jax.tree.leaves(_without_used(other))
+        sizes = [leaf.size // leaf.shape[0] for leaf in leaves if leaf.shape[0] == len(alive)]
+        chance = self.rates.value / (jnp.sum(alive) * sum(sizes))
+        keys = jax.random.split(key, len(leaves))
+        moved = [
+            _shifted(k, leaf, new, chance, self.rates.sigma, bounds)
+            for k, leaf, new, bounds in zip(keys, leaves, fresh, self._bounds(shape), strict=True)
+        ]
+        found = jax.tree.unflatten(shape, moved)
+        return dataclasses.replace(
+            found, graph=dataclasses.replace(found.graph, used=genotype.graph.used)
+        )
+
+    def _bounds(self, shape: jax.tree_util.PyTreeDef) -> list[tuple[float, float]]:
+        """Lowest and highest value of each leaf; of kinds they do not matter."""
+        ranges, names = self.ranges, {"half": self.ranges.half, "swing": self.ranges.swing}
+        names |= {"scale": ranges.scale, "turn": (-ranges.turn, ranges.turn), "place": (-1.0, 1.0)}
+        placed = jax.tree.unflatten(shape, range(shape.num_leaves))
+        found = [(-4.0, 4.0)] * shape.num_leaves
+        for name, bounds in names.items():
+            found[getattr(placed.graph, name)] = bounds
+        return found
+
+
+def reachable(graph: Graph) -> jax.Array:
+    """Whether [N] a node is connected to the first."""
+    nodes = graph.target.shape[0]
+    leads = jnp.any(
+        (graph.target[:, :, None] == jnp.arange(nodes)) & graph.used[:, :, None], axis=1
+    )
+
+    def wider(_: int, known: jax.Array) -> jax.Array:
+        return known | jnp.any(leads & known[:, None], axis=0)
+
+    return jax.lax.fori_loop(0, nodes, wider, jnp.arange(nodes) == 0)
+
+
+def _with_new_node(key: jax.Array, genotype: Genotype, other: Genotype, chance: float) -> Genotype:
+    """One node that is not connected, drawn anew, and a connection to it."""
+    happens, pick, source = jax.random.split(key, 3)
+    alive = reachable(genotype.graph)
+    nodes, connections = genotype.graph.target.shape
+    free = jnp.argmax(jax.random.uniform(pick, (nodes,)) * ~alive)
+    new = _chosen(jnp.arange(nodes) != free, genotype, other)
+    # What the new node is connected to is itself new.
+    target = new.graph.target.at[free].set(0)
+    used = new.graph.used.at[free].set(False)
+    spare = alive[:, None] & ~used
+    slot = jnp.argmax(jax.random.uniform(source, (nodes, connections)) * spare)
+    at = slot // connections, slot % connections
+    graph = dataclasses.replace(
+        new.graph, target=target.at[at].set(free), used=used.at[at].set(True)
+    )
+    new = dataclasses.replace(new, graph=graph)
+    ok = jax.random.bernoulli(happens, chance) & ~alive.all() & spare.any()
+    return jax.tree.map(lambda a, b: jnp.where(ok, a, b), new, genotype)
+
+
+def _reconnected(key: jax.Array, graph: Graph, other: Graph, chance: float) -> Graph:
+    """One connection more or less, the new one drawn at random between nodes that are connected."""
+    happens, which, slot, target = jax.random.split(key, 4)
+    alive = reachable(graph)
+    nodes, connections = graph.target.shape
+    adds = jax.random.bernoulli(which)
+    open_slots = alive[:, None] & jnp.where(adds, ~graph.used, graph.used)
+    chosen = jnp.argmax(jax.random.uniform(slot, (nodes, connections)) * open_slots)
+    here = (jnp.arange(nodes * connections) == chosen).reshape(nodes, connections)
+    here = here & open_slots & jax.random.bernoulli(happens, chance)
+    node = jax.random.categorical(target, jnp.where(alive, 0.0, -jnp.inf))
+    names = ("place", "turn", "scale", "mirror", "terminal")
+    fresh = {
+        name: jnp.where(
+            here.reshape(*here.shape, *[1] * (getattr(graph, name).ndim - 2)) & adds,
+            getattr(other, name),
+            getattr(graph, name),
+        )
+        for name in names
+    }
+    return dataclasses.replace(
+        graph,
+        used=jnp.where(here, adds, graph.used),
+        target=jnp.where(here & adds, node, graph.target),
+        **fresh,
+    )
+
+
+def _shifted(
+    key: jax.Array,
+    leaf: jax.Array,
+    new: jax.Array,
+    chance: jax.Array,
+    sigma: float,
+    bounds: tuple[float, float],
+) -> jax.Array:
+    which, how = jax.random.split(key)
+    changes = jax.random.bernoulli(which, chance, leaf.shape)
+    if not jnp.issubdtype(leaf.dtype, jnp.floating):
+        return jnp.where(changes, new, leaf)
+    low, high = bounds
+    step = sigma * (high - low) * jax.random.normal(how, leaf.shape)
+    return jnp.where(changes, jnp.clip(leaf + step, low, high), leaf)
+
+
+def _without_used(genotype: Genotype) -> Genotype:
+    """Which connections are used is changed elsewhere; None is no leaf."""
+    graph = dataclasses.replace(genotype.graph, used=None)  # type: ignore[arg-type]
+    return dataclasses.replace(genotype, graph=graph)
+
+
+def _chosen(first: jax.Array, one: Genotype, other: Genotype) -> Genotype:
+    """Node by node [N] the one's or the other's; the central neurons are the one's."""
+
+    def pick(a: jax.Array, b: jax.Array) -> jax.Array:
+        return jnp.where(first.reshape(-1, *[1] * (a.ndim - 1)), a, b)
+
+    graph, nerves = jax.tree.map(pick, (one.graph, one.nerves), (other.graph, other.nerves))
+    return Genotype(graph, nerves, one.centre)

@@ -1,0 +1,135 @@
+"""Variation of graphs is closed: whatever it makes is a graph within its ranges, and grows."""
+
+import dataclasses
+from collections.abc import Callable
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from mjxgait.blocks.genotype import JOINTS, Capacity, Ranges
+from mjxgait.blocks.growth import grown
+from mjxgait.blocks.nerves import NEURONS, NerveRoom
+from mjxgait.blocks.variation import Genotype, Kin, Rates, reachable
+
+CAPACITY, ROOM, RANGES, COUNT = Capacity(), NerveRoom(), Ranges(), 2000
+KIN = Kin(CAPACITY, ROOM, RANGES, Rates(value=20.0, connection=0.8, node=0.8))
+BUSY = ("mutate", "cross", "graft")
+
+
+@pytest.fixture(scope="module")
+def parents() -> tuple[Genotype, Genotype]:
+    create = jax.jit(jax.vmap(KIN.create))
+    first, second = (create(jax.random.split(jax.random.key(seed), COUNT)) for seed in (0, 1))
+    return first, second
+
+
+def children(name: str, parents: tuple[Genotype, Genotype], seed: int = 2) -> Genotype:
+    keys = jax.random.split(jax.random.key(seed), COUNT)
+    function: Callable = getattr(KIN, name)
+    return jax.jit(jax.vmap(function))(keys, *parents[: 1 if name == "mutate" else 2])
+
+
+@pytest.fixture(scope="module", params=BUSY)
+def bred(request: pytest.FixtureRequest, parents: tuple[Genotype, Genotype]) -> Genotype:
+    """Children of children of children, so that what goes wrong a little adds up."""
+    pair = parents
+    for seed in range(3):
+        pair = children(request.param, pair, seed), children(request.param, pair[::-1], seed + 10)
+    return jax.tree.map(np.asarray, pair[0])
+
+
+def test_children_are_graphs_within_their_ranges(bred: Genotype):
+    graph, nerves, centre = bred.graph, bred.nerves, bred.centre
+    bounds = [
+        (graph.half, *RANGES.half),
+        (graph.swing, *RANGES.swing),
+        (graph.scale, *RANGES.scale),
+        (graph.place, -1, 1),
+        (graph.turn, -RANGES.turn, RANGES.turn),
+        (graph.joint, 0, len(JOINTS) - 1),
+        (graph.recursion, 0, RANGES.recursion),
+        (graph.target, 0, CAPACITY.nodes - 1),
+        (graph.mirror, 0, 2),
+        *((part.kind, 0, len(NEURONS) - 1) for part in (nerves, centre)),
+        *((part.source, 0, ROOM.codes - 1) for part in (nerves, centre)),
+        (nerves.effect_source, 0, ROOM.codes - 1),
+    ]
+    for values, low, high in bounds:
+        assert np.isfinite(values).all()
+        assert values.min() >= low - 1e-6
+        assert values.max() <= high + 1e-6
+
+
+def test_children_grow_and_are_not_all_the_same(bred: Genotype):
+    parts = jax.jit(jax.vmap(lambda graph: grown(graph, CAPACITY)))(bred.graph)
+    count = np.asarray(parts.exists.sum(1))
+    assert count.min() >= 1
+    assert len(np.unique(count)) > 6
+
+
+def test_the_same_key_gives_the_same_child(parents: tuple[Genotype, Genotype]):
+    for name in BUSY:
+        first, again = (children(name, parents) for _ in range(2))
+        for a, b in zip(jax.tree.leaves(first), jax.tree.leaves(again), strict=True):
+            np.testing.assert_array_equal(a, b)
+
+
+def test_crossing_over_moves_nodes_as_wholes(parents: tuple[Genotype, Genotype]):
+    mother, father = (jax.tree.map(np.asarray, p) for p in parents)
+    child = jax.tree.map(np.asarray, children("cross", parents))
+    came = {}
+    for name in ("graph", "nerves"):
+        for field in dataclasses.fields(getattr(child, name)):
+            mine, hers, his = (
+                getattr(getattr(g, name), field.name).reshape(COUNT, CAPACITY.nodes, -1)
+                for g in (child, mother, father)
+            )
+            came[name, field.name] = ((mine == hers).all(2), (mine == his).all(2))
+    hers, his = (np.stack([found[k] for found in came.values()]).all(0) for k in (0, 1))
+    assert (hers | his).all()
+    assert 0.4 < hers.mean() < 0.9
+    np.testing.assert_array_equal(child.centre.kind, mother.centre.kind)
+
+
+def test_a_graft_hangs_the_others_root_on_ones_own_tree(parents: tuple[Genotype, Genotype]):
+    mother, father = parents
+    child = children("graft", parents)
+    alive = jax.vmap(reachable)
+    before, after = np.asarray(alive(mother.graph)), np.asarray(alive(child.graph))
+    room = ~before.all(1)
+    half, his = np.asarray(child.graph.half), np.asarray(father.graph.half)
+    # The father's root takes the first node that was free, and is reached.
+    first = np.argmax(~before, axis=1)
+    rows = np.arange(COUNT)
+    np.testing.assert_array_equal(half[rows, first][room], his[:, 0][room])
+    assert after[rows, first][room].all()
+    same = jax.tree.map(lambda a, b: bool((a[~room] == b[~room]).all()), child, mother)
+    assert all(jax.tree.leaves(same)), "without room nothing is grafted"
+
+
+def test_a_mutation_changes_a_few_values(parents: tuple[Genotype, Genotype]):
+    calm = Kin(CAPACITY, ROOM, RANGES, Rates(value=4.0, connection=0.0, node=0.0))
+    keys = jax.random.split(jax.random.key(3), COUNT)
+    child = jax.jit(jax.vmap(calm.mutate))(keys, parents[0])
+    alive = np.asarray(jax.vmap(reachable)(parents[0].graph))
+    changes = np.zeros(COUNT)
+    for name in ("graph", "nerves"):
+        leaves = zip(*(jax.tree.leaves(getattr(g, name)) for g in (child, parents[0])), strict=True)
+        for mine, hers in leaves:
+            differs = np.asarray(mine != hers).reshape(COUNT, CAPACITY.nodes, -1).sum(2)
+            changes += (differs * alive).sum(1)
+    # A kind that is drawn anew may be what it was.
+    assert 2.5 < changes.mean() < 4.2
+    assert jnp.array_equal(child.graph.used, parents[0].graph.used)
+
+
+def test_nodes_and_connections_come_and_go(parents: tuple[Genotype, Genotype]):
+    child = children("mutate", parents)
+    used, before = (np.asarray(g.graph.used).sum((1, 2)) for g in (child, parents[0]))
+    assert (used > before).mean() > 0.2
+    assert (used < before).mean() > 0.05
+    alive, were = (np.asarray(jax.vmap(reachable)(g.graph)).sum(1) for g in (child, parents[0]))
+    assert (alive > were).mean() > 0.2
+    assert (alive < were).mean() > 0.03
