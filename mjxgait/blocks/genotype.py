@@ -10,10 +10,8 @@ import math
 import jax
 import jax.numpy as jnp
 
+from mjxgait.champion.blocks.material import JOINTS
 from mjxgait.types import pytree
-
-JOINTS = ("rigid", "revolute", "twist", "universal", "bend-twist", "twist-bend", "spherical")
-"""Sims' kinds of joint, by number."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -44,7 +42,8 @@ class Ranges:
 class Graph:
     """A body's genotype. Node 0 is where growth begins.
 
-    Nodes: half [N, 3] m, half of a block's sizes; joint [N], to the parent, a place in `JOINTS`;
+    Nodes: half [N, 3] m, half of a block's sizes; joint [N], to the parent, a place in
+    `champion.blocks.material.JOINTS`;
     swing [N, 3] rad, how far each hinge turns either way; recursion [N], how often a node may
     follow itself on one branch.
     Connections, [N, C]: target, a node; used; place [N, C, 3], a direction from the parent block's

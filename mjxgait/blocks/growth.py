@@ -9,12 +9,11 @@ import jax.numpy as jnp
 import numpy as np
 
 from mjxgait.blocks.genotype import Capacity, Graph
+from mjxgait.champion.blocks.material import AXES, LARGEST, SMALLEST
 from mjxgait.types import pytree
 
-HINGES = np.array([0, 1, 1, 2, 2, 2, 3])
+HINGES = np.array([len(axes) for axes in AXES])
 """How many hinges each of `JOINTS` has."""
-SMALLEST, LARGEST = 0.015, 0.6
-"""m; no half size becomes smaller or larger by scaling."""
 
 
 @pytree

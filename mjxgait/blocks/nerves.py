@@ -7,18 +7,8 @@ import dataclasses
 
 import jax
 
+from mjxgait.champion.blocks.material import INPUTS, NEURONS, SENSORS
 from mjxgait.types import pytree
-
-NEURONS = (
-    *("sum", "product", "divide", "sum-threshold", "greater-than", "sign-of", "min", "max", "abs"),
-    *("if", "interpolate", "sin", "cos", "atan", "log", "expt", "sigmoid", "integrate"),
-    *("differentiate", "smooth", "memory", "oscillate-wave", "oscillate-saw"),
-)
-"""Sims' functions, by number."""
-INPUTS = 3
-SENSORS = 7
-"""Of a part: the angles of up to three hinges, whether it touches the ground, and the light's
-direction along its own three axes."""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -9,22 +9,13 @@ import numpy as np
 
 from mjxgait.blocks.genotype import Capacity, Graph
 from mjxgait.blocks.growth import HINGES, Parts, grown
+from mjxgait.champion.blocks.material import AXES, DAMPING, DENSITY, ROTOR, STRENGTH
 from mjxgait.physics.trees.tree import Tree
 from mjxgait.physics.trees.weights import weighed
 from mjxgait.types import pytree
 
-TURNS_ABOUT = np.array(
-    [[2, 2, 2], [2, 2, 2], [0, 0, 0], [1, 2, 2], [2, 0, 0], [0, 2, 2], [0, 1, 2]]
-)
-"""Per kind of joint the part's axes that its hinges turn about, the first nearest to the parent."""
-DENSITY = 1000.0
-"""kg/m³, water's."""
-STRENGTH = 1000.0
-"""N/m: the largest torque of a hinge over the cross-section of what it joins (Sims 1994)."""
-DAMPING = 0.05
-"""s: a hinge's damping over its strength."""
-ROTOR = 0.01
-"""s: its armature over its damping, so that the smallest blocks can be simulated."""
+TURNS_ABOUT = np.array([(*axes, *[2] * (3 - len(axes))) for axes in AXES])
+"""Per kind of joint the part's axes that its hinges turn about; 2 where there is none."""
 
 
 @pytree
@@ -53,7 +44,7 @@ def body_of(graph: Graph, capacity: Capacity) -> Body:
     link = jnp.arange(capacity.links)[:, None]
     own = parts.exists & (first <= link) & (link <= parts.last)
     there, part = own.any(1), own.argmax(1)
-    hinge = jnp.arange(capacity.links) - first[part]
+    hinge = jnp.where(there, jnp.arange(capacity.links) - first[part], 0)
     moves = there & (hinges[part] > 0)
     swing = graph.swing[parts.node[part], hinge]
     strength = _strength(parts, part) * moves

@@ -8,8 +8,9 @@ the central ones last.
 import jax
 import jax.numpy as jnp
 
-from mjxgait.blocks.nerves import INPUTS, SENSORS, Centre, NerveRoom, Nerves
+from mjxgait.blocks.nerves import Centre, NerveRoom, Nerves
 from mjxgait.blocks.phenotype import Body
+from mjxgait.champion.blocks.material import INPUTS, SENSORS
 from mjxgait.types import pytree
 
 NOTHING, ONE = 0, 1

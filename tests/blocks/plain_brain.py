@@ -4,8 +4,9 @@ import math
 
 import numpy as np
 
-from mjxgait.blocks.nerves import NEURONS, Centre, NerveRoom, Nerves
+from mjxgait.blocks.nerves import Centre, NerveRoom, Nerves
 from mjxgait.blocks.phenotype import Body
+from mjxgait.champion.blocks.material import NEURONS
 
 
 def fire(name: str, a: float, b: float, c: float, memory: float, dt: float) -> tuple[float, float]:

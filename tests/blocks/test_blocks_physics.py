@@ -5,10 +5,12 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
+from blocks.made_up import genome_of, one
 
-from mjxgait.blocks.genotype import Capacity, Ranges, random_graph
+from mjxgait.blocks.genotype import Capacity, Graph, Ranges, random_graph
 from mjxgait.blocks.phenotype import Body, body_of
-from mjxgait.blocks.xml import body_xml
+from mjxgait.champion.blocks.parts import grow
+from mjxgait.champion.blocks.xml import body_xml
 from mjxgait.physics.trees.plant import TreePlant
 from mjxgait.physics.trees.tree import Surroundings
 from mjxgait.types import BodyState
@@ -19,15 +21,21 @@ IN_WATER = Surroundings(floor=False, gravity=0.0, drag=300.0)
 
 
 @pytest.fixture(scope="module")
-def bodies() -> Body:
-    def grow(key: jax.Array) -> Body:
-        return body_of(random_graph(key, CAPACITY, Ranges()), CAPACITY)
-
-    return jax.jit(jax.vmap(grow))(jax.random.split(jax.random.key(1), LANES))
+def graphs() -> Graph:
+    draw = jax.jit(jax.vmap(lambda key: random_graph(key, CAPACITY, Ranges())))
+    return draw(jax.random.split(jax.random.key(1), LANES))
 
 
-def one(bodies: Body, lane: int) -> Body:
-    return jax.tree.map(lambda leaf: np.asarray(leaf[lane]), bodies)
+@pytest.fixture(scope="module")
+def bodies(graphs: Graph) -> Body:
+    return jax.jit(jax.vmap(lambda graph: body_of(graph, CAPACITY)))(graphs)
+
+
+def model_of(graph: Graph, around: Surroundings) -> mujoco.MjModel:
+    """In MuJoCo, of parts that were grown without JAX."""
+    parts = grow(genome_of(graph), CAPACITY.parts, CAPACITY.links)
+    friction = around.friction if around.floor else None
+    return mujoco.MjModel.from_xml_string(body_xml(parts, around.step, around.gravity, friction))
 
 
 def links_of(body: Body, model: mujoco.MjModel) -> list[int]:
@@ -62,10 +70,10 @@ def moments(bodies: Body, height: float, seed: int = 0) -> BodyState:
 
 
 def in_mujoco(
-    body: Body, state: BodyState, lane: int, around: Surroundings
+    graph: Graph, body: Body, state: BodyState, lane: int, around: Surroundings
 ) -> tuple[mujoco.MjModel, mujoco.MjData, list[int]]:
     """The lane's body and state; and the links of its hinges."""
-    model = mujoco.MjModel.from_xml_string(body_xml(body, around))
+    model = model_of(graph, around)
     model.opt.tolerance, model.opt.iterations = 1e-12, 100
     data, links = mujoco.MjData(model), links_of(body, model)
     qpos, qvel = (np.asarray(x)[:, lane] for x in (state.qpos, state.qvel))
@@ -74,10 +82,10 @@ def in_mujoco(
     return model, data, links
 
 
-def test_bodies_weigh_what_mujoco_says(bodies: Body):
+def test_bodies_weigh_what_mujoco_says(graphs: Graph, bodies: Body):
     for lane in range(LANES):
         body = one(bodies, lane)
-        model = mujoco.MjModel.from_xml_string(body_xml(body, ON_LAND))
+        model = model_of(one(graphs, lane), ON_LAND)
         links = links_of(body, model)
         parts = np.flatnonzero(body.parts.exists)
         assert model.nbody == 1 + len(parts)
@@ -90,14 +98,14 @@ def test_bodies_weigh_what_mujoco_says(bodies: Body):
 
 
 @pytest.mark.parametrize("around", [ON_LAND, Surroundings(floor=False)], ids=["land", "air"])
-def test_a_step_is_that_of_c_mujoco(bodies: Body, around: Surroundings):
+def test_a_step_is_that_of_c_mujoco(graphs: Graph, bodies: Body, around: Surroundings):
     plant, state = TreePlant(around), moments(bodies, 0.3)
     moves = np.concatenate([np.zeros((6, LANES)), np.asarray(bodies.tree.moves)[:, 1:].T])
     torque = np.random.default_rng(2).normal(size=moves.shape) * moves * 5
     after = jax.jit(lambda s, u: plant.advance(s, plant.forward(s), u))(state, jnp.float32(torque))
     wrong, touching = [], 0
     for lane in range(LANES):
-        model, data, links = in_mujoco(one(bodies, lane), state, lane, around)
+        model, data, links = in_mujoco(one(graphs, lane), one(bodies, lane), state, lane, around)
         data.qfrc_applied[6:] = torque[[5 + link for link in links], lane]
         mujoco.mj_step(model, data)
         touching += data.ncon
@@ -110,7 +118,7 @@ def test_a_step_is_that_of_c_mujoco(bodies: Body, around: Surroundings):
     assert not still.any(), "what is not there does not move"
 
 
-def test_water_pushes_every_point_of_a_face_along_its_normal(bodies: Body):
+def test_water_pushes_every_point_of_a_face_along_its_normal(graphs: Graph, bodies: Body):
     """Summed up over a grid of points, 12 by 12 on each face."""
     state = moments(bodies, 1.0)
     calm = Surroundings(floor=False, gravity=0.0)
@@ -118,7 +126,7 @@ def test_water_pushes_every_point_of_a_face_along_its_normal(bodies: Body):
         np.asarray(jax.jit(TreePlant(around).forward)(state).bias) for around in (IN_WATER, calm)
     )
     for lane in range(0, LANES, 4):
-        model, data, links = in_mujoco(one(bodies, lane), state, lane, IN_WATER)
+        model, data, links = in_mujoco(one(graphs, lane), one(bodies, lane), state, lane, IN_WATER)
         mujoco.mj_forward(model, data)
         force = np.zeros(model.nv)
         for geom in range(model.ngeom):

@@ -4,20 +4,18 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from blocks.made_up import one
 from blocks.plain_brain import PlainBrain, fire
 
 from mjxgait.blocks.genotype import Capacity, Ranges, random_graph
-from mjxgait.blocks.nerves import NEURONS, NerveRoom, random_centre, random_nerves
+from mjxgait.blocks.nerves import NerveRoom, random_centre, random_nerves
 from mjxgait.blocks.phenotype import body_of
 from mjxgait.blocks.wiring import wired
+from mjxgait.champion.blocks.material import NEURONS
 from mjxgait.control.brains.neurons import fired
 from mjxgait.control.brains.thought import Perceived, blank, thought
 
 CAPACITY, ROOM, COUNT, STEP = Capacity(), NerveRoom(), 200, 0.01
-
-
-def one(tree, place: int):
-    return jax.tree.map(lambda leaf: np.asarray(leaf[place]), tree)
 
 
 @pytest.mark.parametrize("name", NEURONS)

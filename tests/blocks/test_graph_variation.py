@@ -8,10 +8,11 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from mjxgait.blocks.genotype import JOINTS, Capacity, Ranges
+from mjxgait.blocks.genotype import Capacity, Ranges
 from mjxgait.blocks.growth import grown
-from mjxgait.blocks.nerves import NEURONS, NerveRoom
+from mjxgait.blocks.nerves import NerveRoom
 from mjxgait.blocks.variation import Genotype, Kin, Rates, reachable
+from mjxgait.champion.blocks.material import JOINTS, NEURONS
 
 CAPACITY, ROOM, RANGES, COUNT = Capacity(), NerveRoom(), Ranges(), 2000
 KIN = Kin(CAPACITY, ROOM, RANGES, Rates(value=20.0, connection=0.8, node=0.8))

@@ -6,11 +6,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from blocks.plain_growth import plain_parts
+from blocks.made_up import genome_of, one
 
-from mjxgait.blocks.genotype import JOINTS, Capacity, Graph, Ranges, random_graph
+from mjxgait.blocks.genotype import Capacity, Graph, Ranges, random_graph
 from mjxgait.blocks.growth import Parts, grown
 from mjxgait.blocks.phenotype import Body, body_of
+from mjxgait.champion.blocks.material import JOINTS
+from mjxgait.champion.blocks.parts import grow
 
 CAPACITY, COUNT = Capacity(), 1000
 
@@ -18,10 +20,6 @@ CAPACITY, COUNT = Capacity(), 1000
 def draw(count: int, seed: int = 0) -> Graph:
     keys = jax.random.split(jax.random.key(seed), count)
     return jax.vmap(lambda key: random_graph(key, CAPACITY, Ranges()))(keys)
-
-
-def one(tree, place: int):
-    return jax.tree.map(lambda leaf: leaf[place], tree)
 
 
 @pytest.fixture(scope="module")
@@ -38,16 +36,20 @@ def parts(graphs: Graph) -> Parts:
 def test_a_body_grows_as_a_plain_list_does(graphs: Graph, parts: Parts):
     sizes = set()
     for place in range(COUNT):
-        mine, plain = one(parts, place), plain_parts(one(graphs, place), CAPACITY)
+        mine, genome = one(parts, place), genome_of(one(graphs, place))
+        plain = grow(genome, CAPACITY.parts, CAPACITY.links)
         count = len(plain)
         sizes.add(count)
         assert mine.exists.tolist() == [True] * count + [False] * (CAPACITY.parts - count)
-        for name in ("node", "parent", "copies", "last"):
-            assert getattr(mine, name)[:count].tolist() == [part[name] for part in plain], name
+        assert mine.node[:count].tolist() == [part.node for part in plain]
+        assert mine.parent[1:count].tolist() == [part.parent for part in plain[1:]]
+        assert mine.copies[:count].tolist() == [part.mirrored for part in plain]
+        links = np.cumsum([max(len(part.hinges), 1) for part in plain]) - 1
+        assert mine.last[:count].tolist() == links.tolist()
         for name in ("half", "place"):
-            expected = np.stack([part[name] for part in plain])
+            expected = np.stack([getattr(part, name) for part in plain])
             np.testing.assert_allclose(getattr(mine, name)[:count], expected, atol=1e-5)
-        columns = np.stack([part["columns"] for part in plain])
+        columns = np.stack([part.axes for part in plain])
         np.testing.assert_allclose(mine.turn[:count], np.swapaxes(columns, 1, 2), atol=1e-5)
     assert {1, 2, 3, 4, 5, 6} < sizes
 

@@ -1,0 +1,26 @@
+"""What genes mean, and what blocks are made of: the constants that both growths share."""
+
+JOINTS = ("rigid", "revolute", "twist", "universal", "bend-twist", "twist-bend", "spherical")
+"""Sims' kinds of joint, by number."""
+AXES = ((), (2,), (0,), (1, 2), (2, 0), (0, 2), (0, 1, 2))
+"""Per kind the part's own axes that its hinges turn about, the first nearest to the parent."""
+NEURONS = (
+    *("sum", "product", "divide", "sum-threshold", "greater-than", "sign-of", "min", "max", "abs"),
+    *("if", "interpolate", "sin", "cos", "atan", "log", "expt", "sigmoid", "integrate"),
+    *("differentiate", "smooth", "memory", "oscillate-wave", "oscillate-saw"),
+)
+"""Sims' functions, by number."""
+INPUTS = 3
+SENSORS = 7
+"""Of a part: the angles of up to three hinges, whether it touches the ground, and the light's
+direction along its own three axes."""
+SMALLEST, LARGEST = 0.015, 0.6
+"""m; no half size becomes smaller or larger by scaling."""
+DENSITY = 1000.0
+"""kg/m³, water's."""
+STRENGTH = 1000.0
+"""N/m: the largest torque of a hinge over the cross-section of what it moves (Sims 1994)."""
+DAMPING = 0.2
+"""s: a hinge's damping over its strength; so none turns faster than 5 rad/s by itself."""
+ROTOR = 0.01
+"""s: its armature over its damping, so that the smallest blocks can be simulated."""
