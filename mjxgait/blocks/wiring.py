@@ -1,8 +1,8 @@
 """From the nerves' genotype to the wires of one grown body.
 
 Letters: `P` parts, `n` links, `Q` and `M` neurons as in `nerves`; `V` values: nothing (0), the
-constant 1, the angles of all links, contacts and light of all parts, and all neurons, part by part,
-the central ones last.
+constant 1, the angles, contacts and light of all links, and all neurons, part by part, the central
+ones last. A part touches and sees with the link that carries its block.
 """
 
 import jax
@@ -21,7 +21,7 @@ class Brain:
     """A body's own. kind: [P Q + M]; source: [P Q + M, 3] places among the values, weight the same.
 
     drive: [n] which value pulls a link's hinge, pull: [n] N·m at a value of 1; both of link order.
-    sign: [n] of angles, as the genes mean them; part_sign: [P], -1 in a mirror image.
+    sign: [n] of angles, as the genes mean them; image: [n], -1 in a mirror image.
     """
 
     kind: jax.Array
@@ -30,17 +30,17 @@ class Brain:
     drive: jax.Array
     pull: jax.Array
     sign: jax.Array
-    part_sign: jax.Array
+    image: jax.Array
 
 
-def first_neuron(parts: int, links: int) -> int:
+def first_neuron(links: int) -> int:
     """The place of the first neuron among the values."""
-    return 2 + links + parts + 3 * parts
+    return 2 + links + links + 3 * links
 
 
 def value_count(parts: int, links: int, room: NerveRoom) -> int:
     """V."""
-    return first_neuron(parts, links) + parts * room.local + room.central
+    return first_neuron(links) + parts * room.local + room.central
 
 
 def wired(nerves: Nerves, centre: Centre, body: Body, room: NerveRoom) -> Brain:
@@ -59,7 +59,6 @@ def wired(nerves: Nerves, centre: Centre, body: Body, room: NerveRoom) -> Brain:
     weight = nerves.weight[node].reshape(-1, INPUTS) * alive[:, None]
     part, hinge = body.part, body.hinge
     code = nerves.effect_source[node[part], hinge]
-    part_sign = 1.0 - 2.0 * parts.copies
     return Brain(
         kind=jnp.concatenate([nerves.kind[node].reshape(-1), centre.kind]),
         source=jnp.concatenate([source, central]),
@@ -67,7 +66,7 @@ def wired(nerves: Nerves, centre: Centre, body: Body, room: NerveRoom) -> Brain:
         drive=places[part, code],
         pull=nerves.effect_weight[node[part], hinge] * body.strength * body.sign,
         sign=body.sign,
-        part_sign=part_sign,
+        image=1.0 - 2.0 * parts.copies[part],
     )
 
 
@@ -80,9 +79,9 @@ def _places(body: Body, room: NerveRoom) -> jax.Array:
     own = (body.part[None, :, None] == every[:, :, None]) & moves[None, :, None]
     own = own & (body.hinge[None, :, None] == jnp.arange(3))
     angles = jnp.where(own.any(1), 2 + own.argmax(1), NOTHING)
-    contact = 2 + links + every
-    light = 2 + links + count + 3 * every + jnp.arange(3)
-    first = first_neuron(count, links)
+    contact = 2 + links + parts.last[:, None]
+    light = 2 + 2 * links + 3 * parts.last[:, None] + jnp.arange(3)
+    first = first_neuron(links)
 
     def neurons(part: jax.Array, there: jax.Array) -> jax.Array:
         return jnp.where(there[:, None], first + part[:, None] * local + jnp.arange(local), NOTHING)

@@ -70,9 +70,9 @@ class PlainBrain:
         if code < 3:
             return seen["angle"].get((part, code), 0.0)
         if code == 3:
-            return float(seen["contact"][part])
+            return float(seen["contact"][parts.last[part]])
         if code < 7:
-            return float(seen["light"][part, code - 4]) * (flip if code == 5 else 1.0)
+            return float(seen["light"][parts.last[part], code - 4]) * (flip if code == 5 else 1.0)
         code -= 7
         if code < local:
             return self.values[part, code]

@@ -66,8 +66,8 @@ def test_a_brain_thinks_as_a_plain_network_does():
     rng, wrong, driven = np.random.default_rng(4), np.zeros(COUNT), 0
     for _ in range(4):
         angles = np.float32(rng.uniform(-1, 1, (COUNT, CAPACITY.links)))
-        contact = np.float32(rng.integers(0, 2, (COUNT, CAPACITY.parts)))
-        light = np.float32(rng.normal(size=(COUNT, CAPACITY.parts, 3)))
+        contact = np.float32(rng.integers(0, 2, (COUNT, CAPACITY.links)))
+        light = np.float32(rng.normal(size=(COUNT, CAPACITY.links, 3)))
         torque, minds = think(brains, minds, Perceived(angles, contact, light))
         for i in range(COUNT):
             body = one(bodies, i)
@@ -92,8 +92,8 @@ def test_a_mirror_image_pulls_the_other_way():
     brain = wired(nerves, random_centre(jax.random.key(6), ROOM), body, ROOM)
     sign, copies = np.asarray(body.sign), np.asarray(body.parts.copies)[np.asarray(body.part)]
     bent = np.where(moving(body), 0.3 + 0.1 * np.asarray(body.hinge), 0.0) * sign
-    ahead = np.where(np.asarray(body.parts.copies)[:, None] > 0, [0.2, -0.4, 0.1], [0.2, 0.4, 0.1])
-    perceived = Perceived(jnp.float32(bent), jnp.zeros(CAPACITY.parts), jnp.float32(ahead))
+    ahead = np.where(copies[:, None] > 0, [0.2, -0.4, 0.1], [0.2, 0.4, 0.1])
+    perceived = Perceived(jnp.float32(bent), jnp.zeros(CAPACITY.links), jnp.float32(ahead))
     mind = blank(CAPACITY.parts * ROOM.local + ROOM.central)
     for _ in range(3):
         torque, mind = thought(brain, mind, perceived, STEP)

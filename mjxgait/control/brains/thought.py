@@ -1,6 +1,6 @@
 """A brain's control step: what is sensed goes in, torques come out.
 
-Letters: `n` links, `P` parts, `K` neurons.
+Letters: `n` links, `K` neurons.
 """
 
 import jax
@@ -24,7 +24,7 @@ class Mind:
 
 @pytree
 class Perceived:
-    """angles: [n] rad. contact: [P] 0 or 1. light: [P, 3], its direction in each block's own axes."""
+    """angles: [n] rad. contact: [n] 0 or 1. light: [n, 3], its direction in each block's own axes."""
 
     angles: jax.Array
     contact: jax.Array
@@ -42,9 +42,7 @@ def thought(brain: Brain, mind: Mind, perceived: Perceived, step: float) -> tupl
 
     All neurons fire at once, on the values of the tick before.
     """
-    mirrored = jnp.stack([jnp.ones_like(brain.part_sign), brain.part_sign], axis=1)[
-        :, jnp.array([0, 1, 0])
-    ]
+    mirrored = jnp.stack([jnp.ones_like(brain.image), brain.image], axis=1)[:, jnp.array([0, 1, 0])]
     known = jnp.concatenate(
         [
             jnp.array([0.0, 1.0]),
