@@ -1,0 +1,38 @@
+"""Settings of creatures whose bodies and brains evolve together."""
+
+import dataclasses
+from typing import Annotated
+
+import pydantic
+
+from mjxgait.settings.tables import SHAPE, STRICT, Fraction, NonNegative, Positive
+
+Room = Annotated[int, pydantic.Field(ge=1), SHAPE]
+
+
+@dataclasses.dataclass(frozen=True)
+class BrainConfig:
+    """Graphs of blocks with nerves (Sims 1994).
+
+    Attributes:
+      nodes, connections: room of a graph, and of each node. parts, links: room of a body; a part
+        needs a link per hinge, and at least one.
+      local, central: neurons of each node, and of none.
+      values: how many values change in a mutation, on average. sigma: by how much, as a share of
+        their ranges. connect, grow: chance of a connection more or less, and of a new node.
+      crossover, grafting: shares of the offspring with two parents; the others have one.
+    """
+
+    __pydantic_config__ = STRICT
+    nodes: Room = 6
+    connections: Room = 3
+    parts: Room = 12
+    links: Annotated[int, pydantic.Field(ge=2), SHAPE] = 12
+    local: Room = 3
+    central: Room = 4
+    values: NonNegative = 4.0
+    sigma: Positive = 0.2
+    connect: Fraction = 0.3
+    grow: Fraction = 0.1
+    crossover: Fraction = 0.3
+    grafting: Fraction = 0.3
