@@ -59,8 +59,7 @@ def stepped(plant, body: BodyState, torque: jax.Array) -> Run:
     @jax.jit
     def go(body: BodyState, torque: jax.Array) -> BodyState:
         def one(step: jax.Array, body: BodyState) -> BodyState:
-            found = plant.forward(body)
-            workings = found[1] if isinstance(found, tuple) else found
+            _, workings = plant.forward(body)
             return plant.advance(body, workings, jnp.sin(0.05 * step) * torque)
 
         return jax.lax.fori_loop(0, STEPS, one, body)

@@ -87,7 +87,7 @@ class Judged:
 
 
 class Plant(Protocol):
-    """Batched physics of one creature, one step split around the controller.
+    """Batched physics, one step split around the controller.
 
     Every array has one more axis than documented on the state: the lanes, at position `lane_axis`
     (0 in front, -1 innermost).
@@ -99,17 +99,44 @@ class Plant(Protocol):
         ...
 
     @property
+    def note(self) -> str:
+        """What a user should know about the choice of this plant; empty if nothing."""
+        ...
+
+    def forward(self, state: BodyState) -> tuple[Sensed, Any]:
+        """Position and velocity dependent terms of the current state, and the plant's own
+        workings for the two calls below.
+        """
+        ...
+
+    def solve_damped(self, workings: Any, damping: jax.Array, force: jax.Array) -> jax.Array:
+        """Accelerations `(M + diag(damping))^-1 force`; damping and force: `[nv]` per lane."""
+        ...
+
+    def advance(self, state: BodyState, workings: Any, torque: jax.Array) -> BodyState:
+        """The state one `sim_dt` later under applied generalised forces `torque` `[nv]`;
+        friction passes through.
+        """
+        ...
+
+    def overlap(self, state: BodyState) -> jax.Array:
+        """The deepest [] m that parts are in each other, beyond their depth when standing.
+
+        Parts that are neighbours do not count; negative where all are apart.
+        """
+        ...
+
+
+class ModelPlant(Plant, Protocol):
+    """The physics of one creature's model, whose numbers may be others."""
+
+    @property
     def parameters(self) -> Any:
         """The numbers of the body that all lanes have: the plant's own pytree, without lanes.
 
         They are constants of the program, or its inputs (`with_parameters`). A `BodyState` with
         parameters has its own instead.
         """
-        ...
-
-    @property
-    def note(self) -> str:
-        """What a user should know about the choice of this plant; empty if nothing."""
         ...
 
     def parameters_of(self, model: Any, layout: Any, crossings: Any = None) -> Any:
@@ -137,28 +164,5 @@ class Plant(Protocol):
 
         Weights of constraints are computed anew. The depth at which two bars may stand is scaled
         by the mean of their factors.
-        """
-        ...
-
-    def forward(self, state: BodyState) -> tuple[Sensed, Any]:
-        """Position and velocity dependent terms of the current state, and the plant's own
-        workings for the two calls below.
-        """
-        ...
-
-    def solve_damped(self, workings: Any, damping: jax.Array, force: jax.Array) -> jax.Array:
-        """Accelerations `(M + diag(damping))^-1 force`; damping and force: `[nv]` per lane."""
-        ...
-
-    def advance(self, state: BodyState, workings: Any, torque: jax.Array) -> BodyState:
-        """The state one `sim_dt` later under applied generalised forces `torque` `[nv]`;
-        friction passes through.
-        """
-        ...
-
-    def overlap(self, state: BodyState) -> jax.Array:
-        """The deepest [] m that parts are in each other, beyond their depth when standing.
-
-        Parts that are neighbours do not count; negative where all are apart.
         """
         ...

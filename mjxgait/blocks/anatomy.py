@@ -8,11 +8,10 @@ from mjxgait.creature.anatomy import Corrections, Feet, Frame, Gains, Joints, Mi
 AXES = np.eye(3, dtype=np.float32)
 
 
-def anatomy(links: int, place: np.ndarray) -> GivenBody:
+def anatomy(links: int) -> GivenBody:
     """What controllers, tasks and senses are told of all bodies with so many links.
 
-    Every link but the root's has a hinge, and every link's block is a foot. place: [3] m, where the
-    root starts.
+    Every link but the root's has a hinge, and every link's block is a foot.
     """
     hinges, none = links - 1, np.zeros(links - 1, np.float32)
     endless = np.full(hinges, np.inf, np.float32)
@@ -20,7 +19,7 @@ def anatomy(links: int, place: np.ndarray) -> GivenBody:
         forward=AXES[0],
         left=AXES[1],
         up=AXES[2],
-        stand_pos=np.asarray(place, np.float32),
+        stand_pos=np.zeros(3, np.float32),
         stand_rot=AXES,
         start_axes=(AXES[0], AXES[1]),
         hip_height=1.0,

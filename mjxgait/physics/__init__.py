@@ -13,7 +13,7 @@ from mjxgait.physics.fast import UnsupportedModel, fast_plant
 from mjxgait.physics.fast.support import check_supported
 from mjxgait.physics.layout import OtherTopology, sense_layout
 from mjxgait.physics.plain import mjx_plant
-from mjxgait.types import Plant
+from mjxgait.types import ModelPlant
 
 SLOWER = "15 to 30"
 """How many times as long a creature-step takes in plain MJX (docs/performance.md)."""
@@ -21,7 +21,7 @@ SLOWER = "15 to 30"
 
 def make_plant(
     creature: Creature, physics: Literal["auto", "mjx"], touch_ends: bool, roomy: bool = False
-) -> tuple[Plant, int]:
+) -> tuple[ModelPlant, int]:
     """The plant of a creature, and how many lanes per device suit it.
 
     Args:
@@ -47,7 +47,7 @@ def make_plant(
         ) from None
 
 
-def parameters_of(plant: Plant, creature: Creature, touch_ends: bool) -> Any:
+def parameters_of(plant: ModelPlant, creature: Creature, touch_ends: bool) -> Any:
     """The numbers of a creature, for the plant of another one of the same topology.
 
     Raises:

@@ -3,26 +3,33 @@
 import dataclasses
 import functools
 from functools import partial
-from typing import Any
+from typing import Any, Protocol
 
 import jax
 import numpy as np
 from jax.sharding import Mesh
 
+from mjxgait.blocks.anatomy import anatomy
 from mjxgait.body import Body, Ends, GivenBody, given_body, given_ends
 from mjxgait.control.bodied import BodiedController
+from mjxgait.control.brains.controller import capacity_of
 from mjxgait.control.drive import Drive
 from mjxgait.creature import Creature
 from mjxgait.creature.settings import Termination
 from mjxgait.parts import make_controller, make_task
-from mjxgait.parts.registry import what_ends
+from mjxgait.parts.registry import find, what_ends
 from mjxgait.physics import make_plant
-from mjxgait.runs.growth import Growth, growth_of
+from mjxgait.physics.trees.plant import TreePlant
+from mjxgait.physics.trees.tree import Surroundings
+from mjxgait.runs.growth import GraphGrowth, SizeGrowth, growth_of
 from mjxgait.senses import check_senses
 from mjxgait.settings.config import Config
 from mjxgait.simulation.rollout import AXIS, Simulator
 from mjxgait.tasks.trials import Starts
-from mjxgait.types import Plant, pytree
+from mjxgait.types import ModelPlant, pytree
+
+GRAVITY, DRAG, LANES = 9.81, 500.0, 64
+"""m/s²; N·s/m³ of water; simulations per device."""
 
 
 @pytree
@@ -34,6 +41,33 @@ class Numbers:
     plant: Any
 
 
+class Plan(Protocol):
+    """What the host knows of a program before it is traced."""
+
+    @property
+    def creature(self) -> Creature:
+        """Under the settings that shape its program."""
+        ...
+
+    @property
+    def numbers(self) -> Numbers | None:
+        """What to hand to the program; None where the body is a constant of it, or grows."""
+        ...
+
+    @property
+    def own(self) -> Simulator:
+        """With all constants in it: what the host asks about the program."""
+        ...
+
+    def embodied(self, starts: Starts) -> Starts:
+        """The starts with the bodies that follow from them."""
+        ...
+
+    def simulator(self, numbers: Numbers | None = None) -> Simulator:
+        """Of the creature itself, or of whatever body has these numbers."""
+        ...
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class Blueprint:
     """A creature under the settings that shape its program. plant, lanes: see `make_plant`.
@@ -43,9 +77,9 @@ class Blueprint:
 
     creature: Creature
     config: Config
-    plant: Plant
+    plant: ModelPlant
     lanes: int
-    growth: Growth | None = None
+    growth: SizeGrowth | None = None
 
     @property
     def numbers(self) -> Numbers | None:
@@ -78,7 +112,7 @@ class Blueprint:
             numbers.body, numbers.ends, self.plant.with_parameters(numbers.plant)
         )
 
-    def _simulator(self, body: Body, ends: Termination | Ends, plant: Plant) -> Simulator:
+    def _simulator(self, body: Body, ends: Termination | Ends, plant: ModelPlant) -> Simulator:
         step = float(self.creature.model.opt.timestep)
         controller = make_controller(body, step, self.config)
         if self.growth is not None:
@@ -99,12 +133,66 @@ class Blueprint:
         )
 
 
-def draw_up(creature: Creature, config: Config) -> Blueprint:
+@dataclasses.dataclass(frozen=True, eq=False)
+class GrownBlueprint:
+    """See `Plan`: every genome grows a body of its own. creature: lends its settings and its step."""
+
+    creature: Creature
+    config: Config
+
+    @property
+    def numbers(self) -> None:
+        """See `Plan`."""
+        return None
+
+    @functools.cached_property
+    def own(self) -> Simulator:
+        """See `Plan`."""
+        return self.simulator()
+
+    def embodied(self, starts: Starts) -> Starts:
+        """See `Plan`."""
+        return starts
+
+    def simulator(self, numbers: Numbers | None = None) -> Simulator:
+        """See `Plan`."""
+        config, step = self.config, float(self.creature.model.opt.timestep)
+        settings: Any = config.controller
+        capacity = capacity_of(settings)
+        body = anatomy(capacity.links)
+        ends = what_ends(self.creature, config.rollout)
+        controller = make_controller(body, step, config)
+        task = make_task(body, step, ends, config)
+        water = getattr(task, "water", False)
+        around = Surroundings(
+            step=step, floor=not water, gravity=0.0 if water else GRAVITY, drag=DRAG * water
+        )
+        plant = TreePlant(around)
+        return Simulator(
+            creature=body,
+            plant=plant,
+            controller=controller,
+            drive=Drive(body, step, controller.command),
+            task=task,
+            steps=max(round(config.rollout.seconds / step), 1),
+            lanes=config.rollout.lanes or LANES,
+            mesh=Mesh(np.array(jax.devices()), (AXIS,)),
+            bodies=partial(GraphGrowth(capacity).body, plant),
+        )
+
+
+def draw_up(creature: Creature, config: Config) -> Plan:
     """The blueprint of a run.
 
     Raises:
       UserError: the physics does not support the creature's model.
     """
+    if getattr(find("controller", config.use.controller), "grows", False):
+        return GrownBlueprint(creature, config)
+    return _of_model(creature, config)
+
+
+def _of_model(creature: Creature, config: Config) -> Blueprint:
     creature = creature.spanned(config.evolution.pose_span)
     touch = what_ends(creature, config.rollout).touch
     inputs = config.rollout.body == "inputs"

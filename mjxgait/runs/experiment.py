@@ -14,7 +14,7 @@ from jax.sharding import NamedSharding, PartitionSpec
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
-from mjxgait.runs.blueprint import Blueprint, Numbers, draw_up
+from mjxgait.runs.blueprint import Numbers, Plan, draw_up
 from mjxgait.search.evolution import Evolution
 from mjxgait.search.state import EvolutionState, GenerationMetrics, Proposal
 from mjxgait.settings.config import Config
@@ -58,7 +58,7 @@ class Experiment:
 
     creature: Creature
     config: Config
-    blueprint: Blueprint
+    blueprint: Plan
     row: Row
 
     @cached_property
@@ -231,7 +231,7 @@ def evolution_of(simulator: Simulator, settings: Config) -> Evolution:
 
 @partial(jax.jit, static_argnums=0)
 def _initial(
-    blueprint: Blueprint, numbers: Numbers | None, settings: Config, key: jax.Array
+    blueprint: Plan, numbers: Numbers | None, settings: Config, key: jax.Array
 ) -> EvolutionState:
     """The same compiled function for every run, alone or beside others, so that they begin with the same bits."""
     simulator = blueprint.simulator(numbers)
@@ -240,7 +240,7 @@ def _initial(
 
 
 def _generation(
-    blueprint: Blueprint, numbers: Numbers | None, rows: Row, states: EvolutionState
+    blueprint: Plan, numbers: Numbers | None, rows: Row, states: EvolutionState
 ) -> tuple[EvolutionState, GenerationMetrics]:
     """One generation of all rows [B]. Row by row but for the simulations, so that a row reads nothing of its neighbours."""
 
@@ -261,7 +261,7 @@ def _generation(
     return jax.lax.map(absorb, (rows, states, proposals, judged))
 
 
-def _experiment(blueprint: Blueprint, config: Config) -> Experiment:
+def _experiment(blueprint: Plan, config: Config) -> Experiment:
     creature = blueprint.creature.on(config.rollout.ground)
     key = jax.random.fold_in(jax.random.key(config.seed), 1)
     starts = blueprint.own.task.trials(key, creature, config.rollout)

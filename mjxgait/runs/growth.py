@@ -1,27 +1,50 @@
 """The body that a genome has, where bodies evolve."""
 
 import dataclasses
+from typing import Any, Protocol
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
+from mjxgait.blocks.genotype import Capacity
+from mjxgait.blocks.phenotype import body_of
+from mjxgait.blocks.variation import Genotype
 from mjxgait.control.bodied import Bodied
 from mjxgait.creature import Creature
 from mjxgait.creature.proportions import Proportions, check_sizes, proportions
 from mjxgait.settings.config import Config
 from mjxgait.tasks.trials import Starts
-from mjxgait.types import Plant
+from mjxgait.types import ModelPlant
+
+
+class Growth(Protocol):
+    """From a genome to the body that is simulated."""
+
+    def body(self, plant: Any, genome: Any, start: Starts) -> Starts:
+        """The start [] with the genome's own body."""
+        ...
+
+
+@dataclasses.dataclass(frozen=True)
+class GraphGrowth:
+    """Bodies of blocks, from graphs."""
+
+    capacity: Capacity
+
+    def body(self, plant: Any, genome: Genotype, start: Starts) -> Starts:
+        """See `Growth`."""
+        return dataclasses.replace(start, numbers=body_of(genome.graph, self.capacity).tree)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Growth:
+class SizeGrowth:
     """From sizes to the numbers that the plant reads, and to a start that stands as high."""
 
     proportions: Proportions
 
-    def body(self, plant: Plant, genome: Bodied, start: Starts) -> Starts:
-        """The start [] with the genome's own body."""
+    def body(self, plant: ModelPlant, genome: Bodied, start: Starts) -> Starts:
+        """See `Growth`."""
         known = self.proportions
         # The trunk's place is -1, where the factor is 1.
         factors = jnp.exp(jnp.append(genome.sizes, 0.0))[known.size_of]
@@ -40,7 +63,7 @@ class Growth:
         return jnp.min(fixed + reach.sum(1)) - jnp.min(fixed + jnp.sum(reach * factors, axis=1))
 
 
-def growth_of(creature: Creature, config: Config) -> Growth | None:
+def growth_of(creature: Creature, config: Config) -> SizeGrowth | None:
     """None where the body stays as it is.
 
     Raises:
@@ -50,4 +73,4 @@ def growth_of(creature: Creature, config: Config) -> Growth | None:
     if most == 1.0:
         return None
     check_sizes(creature, most)
-    return Growth(proportions(creature))
+    return SizeGrowth(proportions(creature))

@@ -102,7 +102,9 @@ def test_a_step_is_that_of_c_mujoco(graphs: Graph, bodies: Body, around: Surroun
     plant, state = TreePlant(around), moments(bodies, 0.3)
     moves = np.concatenate([np.zeros((6, LANES)), np.asarray(bodies.tree.moves)[:, 1:].T])
     torque = np.random.default_rng(2).normal(size=moves.shape) * moves * 5
-    after = jax.jit(lambda s, u: plant.advance(s, plant.forward(s), u))(state, jnp.float32(torque))
+    after = jax.jit(lambda s, u: plant.advance(s, plant.forward(s)[1], u))(
+        state, jnp.float32(torque)
+    )
     wrong, touching = [], 0
     for lane in range(LANES):
         model, data, links = in_mujoco(one(graphs, lane), one(bodies, lane), state, lane, around)
@@ -123,7 +125,7 @@ def test_water_pushes_every_point_of_a_face_along_its_normal(graphs: Graph, bodi
     state = moments(bodies, 1.0)
     calm = Surroundings(floor=False, gravity=0.0)
     wet, dry = (
-        np.asarray(jax.jit(TreePlant(around).forward)(state).bias) for around in (IN_WATER, calm)
+        np.asarray(jax.jit(TreePlant(around).forward)(state)[1].bias) for around in (IN_WATER, calm)
     )
     for lane in range(0, LANES, 4):
         model, data, links = in_mujoco(one(graphs, lane), one(bodies, lane), state, lane, IN_WATER)

@@ -33,6 +33,7 @@ class Brains:
 
     Settings: ClassVar[type] = BrainConfig
     command: ClassVar[Command] = "torque"
+    grows: ClassVar[bool] = True
 
     @classmethod
     def told(
@@ -75,8 +76,8 @@ class Brains:
 
     def numbers(self, genomes: Genotype) -> Mapping[str, np.ndarray]:
         """See `Controller`: of how many parts they are."""
-        grow = jax.jit(jax.vmap(lambda graph: grown(graph, self.capacity).exists.sum()))
-        return {"parts": np.asarray(grow(genomes.graph))}
+        parts = jax.vmap(lambda graph: grown(graph, self.capacity))(genomes.graph)
+        return {"parts": np.asarray(parts.exists.sum(axis=1))}
 
     def prepare(self, genome: Genotype, settings: BrainConfig) -> Brain:
         """See `Controller`: the wires of the body that the genome grows into."""

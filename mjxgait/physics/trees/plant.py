@@ -10,16 +10,19 @@ import jax.numpy as jnp
 from mjxgait.physics.fast.dynamics import inertias
 from mjxgait.physics.fast.kernel import one_kernel
 from mjxgait.physics.fast.kinematics import Motion, Pose
-from mjxgait.physics.fast.lanes import pinned_by
+from mjxgait.physics.fast.lanes import pinned_by, total
 from mjxgait.physics.fast.newton import Problem, constrained_acceleration
 from mjxgait.physics.fast.plant import turned
-from mjxgait.physics.fast.treematrix import Rows
+from mjxgait.physics.fast.treematrix import Rows, factor, on_pivot, solve, sparsity
 from mjxgait.physics.trees.dynamics import bias_links, generalised, mass_rows, velocities
 from mjxgait.physics.trees.motion import motions, posture, root_turns
 from mjxgait.physics.trees.touch import BlockFooting, Touch, lowest_corners, make_constraints
 from mjxgait.physics.trees.tree import Surroundings, Tree
 from mjxgait.physics.trees.water import drag_links
-from mjxgait.types import BodyState, pytree
+from mjxgait.types import BodyState, Sensed, pytree
+
+FAR = 1e3
+"""m, how high above the ground a block is that there is not."""
 
 
 @pytree
@@ -46,17 +49,27 @@ class TreePlant:
     """One MuJoCo step of blocks, each lane with a tree of its own in `BodyState.parameters`."""
 
     around: Surroundings
+    note: str = ""
+    lane_axis: int = -1
 
-    def forward(self, state: BodyState) -> Moment:
-        """Position and velocity dependent terms of the current state."""
+    def forward(self, state: BodyState) -> tuple[Sensed, Moment]:
+        """See `Plant.forward`."""
         return one_kernel(self._forward)(state)
 
-    def advance(self, state: BodyState, moment: Moment, torque: jax.Array) -> BodyState:
-        """The state one step later under applied generalised forces [nv, L]."""
-        after = one_kernel(self._advance)(state, moment, torque)
+    def solve_damped(self, workings: Moment, damping: jax.Array, force: jax.Array) -> jax.Array:
+        """See `Plant.solve_damped`."""
+        return jnp.stack(one_kernel(_solve_damped)(workings.mass, damping, force))
+
+    def overlap(self, state: BodyState) -> jax.Array:
+        """See `Plant.overlap`: parts pass through each other."""
+        return jnp.full_like(state.friction, -jnp.inf)
+
+    def advance(self, state: BodyState, workings: Moment, torque: jax.Array) -> BodyState:
+        """See `Plant.advance`."""
+        after = one_kernel(self._advance)(state, workings, torque)
         return dataclasses.replace(after, parameters=state.parameters)
 
-    def _forward(self, state: BodyState) -> Moment:
+    def _forward(self, state: BodyState) -> tuple[Sensed, Moment]:
         tree: Tree = state.parameters
         around, like = self.around, state.friction
         pin = pinned_by(like)
@@ -69,7 +82,7 @@ class TreePlant:
             force = force - drag_links(tree, poses, body, moving, around.drag, pin)
         bias = jnp.stack(generalised(tree, turns, freedom, force, pin))
         resisted = jnp.concatenate([jnp.zeros_like(bias[:6]), tree.damping[1:] * state.qvel[6:]])
-        return Moment(
+        moment = Moment(
             pos=jnp.stack([pose.pos for pose in poses]),
             rot=_rows(poses),
             moving=moving,
@@ -79,6 +92,7 @@ class TreePlant:
             bias=pin(bias + resisted),
             touch=pin(lowest_corners(tree, poses)) if around.floor else None,
         )
+        return _sensed(tree, state, poses, moving, moment.bias), moment
 
     def _advance(self, state: BodyState, moment: Moment, torque: jax.Array) -> BodyState:
         tree: Tree = state.parameters
@@ -98,6 +112,37 @@ class TreePlant:
         shifted, bent = state.qpos[:3] + step * qvel[:3], state.qpos[7:] + step * qvel[6:]
         qpos = jnp.concatenate([shifted, jnp.stack(turned_root), bent])
         return BodyState(qpos, qvel, warmstart, jnp.stack(pushed), state.friction)
+
+
+def _sensed(
+    tree: Tree, state: BodyState, poses: Sequence[Pose], moving: jax.Array, bias: jax.Array
+) -> Sensed:
+    """The trunk is the root; every block is watched, and what there is not is far up."""
+    rot = [jnp.stack([pose.rot[j] for pose in poses]) for j in range(3)]
+
+    def turned(local: jax.Array) -> list[jax.Array]:
+        return [total([local[:, j] * rot[j][:, i] for j in range(3)]) for i in range(3)]
+
+    place = jnp.stack([pose.pos for pose in poses])
+    centre = [c + place[:, i] + state.qpos[i] for i, c in enumerate(turned(tree.com))]
+    reach = total([tree.half[:, k] * jnp.abs(turned(tree.axes[:, k])[2]) for k in range(3)])
+    return Sensed(
+        joint_pos=state.qpos[7:],
+        joint_vel=state.qvel[6:],
+        bias=bias,
+        trunk_pos=state.qpos[:3],
+        trunk_rot=jnp.stack(poses[0].rot, axis=1),
+        trunk_vel=state.qvel[:3],
+        trunk_angvel=moving[0, :3],
+        geom_pos=jnp.stack(centre, axis=1),
+        geom_low=jnp.where(tree.solid > 0, centre[2] - reach, FAR),
+    )
+
+
+def _solve_damped(mass: Rows, damping: jax.Array, force: jax.Array) -> list[jax.Array]:
+    pattern = sparsity(range(-1, len(mass) - 1))
+    damped = tuple(on_pivot(row, damping[k]) for k, row in enumerate(mass))
+    return solve(pattern, factor(pattern, damped), list(force))
 
 
 def _rows(poses: Sequence[Pose]) -> Any:

@@ -1,0 +1,97 @@
+"""Swimming as a task: to get as far as possible from where one is after a while, any way."""
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import jax
+import jax.numpy as jnp
+
+from mjxgait.creature import Creature
+from mjxgait.settings.config import RolloutConfig
+from mjxgait.settings.swim import SwimConfig, SwimWeights
+from mjxgait.tasks import protocol
+from mjxgait.tasks.plain import PlainTask
+from mjxgait.tasks.protocol import FINISHED
+from mjxgait.tasks.trials import NEVER, Starts
+from mjxgait.types import Sensed, pytree
+
+WILD = 1
+"""Why an episode ends early: faster than anything that swims."""
+FASTEST_HINGE, FASTEST = 60.0, 15.0
+"""rad/s, m/s."""
+
+
+@pytree
+class Tally(protocol.Tally):
+    """See `protocol.Tally`. settled, place: [3] m of the trunk when counting began, and now."""
+
+    settled: jax.Array
+    place: jax.Array
+
+
+class Swim(PlainTask):
+    """See `Task`: in water, from rest, without a floor. The way from there is as the crow flies."""
+
+    Settings: ClassVar[type] = SwimConfig
+    water: ClassVar[bool] = True
+    terms = tuple(field.name for field in dataclasses.fields(SwimWeights))
+    outcomes = ("way", "seconds")
+
+    def trials(self, key: jax.Array, creature: Creature, settings: RolloutConfig) -> Starts:
+        """See `Task`: at rest; all but the first with bent joints."""
+        count, joints = settings.starts, len(self.creature.joints.names)
+        bent = settings.joint_noise * jax.random.uniform(key, (count, joints), minval=-1.0)
+        bent = bent * (jnp.arange(count) > 0)[:, None]
+        root = jnp.zeros((count, 7)).at[:, 3].set(1.0)
+        still = jnp.zeros((count, self.creature.nv))
+        return Starts(
+            qpos=jnp.concatenate([root, bent], axis=1),
+            qvel=still,
+            friction=jnp.ones(count),
+            push=still,
+            push_step=jnp.full(count, NEVER),
+            stiffness=jnp.ones((count, joints)),
+            damping=jnp.ones((count, joints)),
+        )
+
+    def standards(self, settings: SwimConfig) -> jax.Array:
+        """See `Task`: the step [] from which on the way counts."""
+        return jnp.round(settings.settle / self.step).astype(jnp.int32)
+
+    def init(self) -> Tally:
+        """See `Task`."""
+        none, nowhere = jnp.zeros((), jnp.int32), jnp.zeros(3)
+        return Tally(none, none, jnp.zeros(()), nowhere, nowhere)
+
+    def ended(self, sensed: Sensed, aim: Any) -> jax.Array:
+        """See `Task`: what nothing alive does is no swimming."""
+        speed = jnp.sqrt(jnp.sum(sensed.trunk_vel**2))
+        wild = (jnp.max(jnp.abs(sensed.joint_vel)) > FASTEST_HINGE) | (speed > FASTEST)
+        return jnp.where(wild, WILD, FINISHED)
+
+    def update(
+        self, tally: Tally, sensed: Sensed, torque: jax.Array, standards: Any, aim: Any
+    ) -> Tally:
+        """See `Task`."""
+        place = sensed.trunk_pos
+        settled = jnp.where(tally.steps <= standards, place, tally.settled)
+        return dataclasses.replace(tally, steps=tally.steps + 1, settled=settled, place=place)
+
+    def judge(self, tally: Tally, settings: SwimConfig) -> Mapping[str, jax.Array]:
+        """See `Task`: m/s over the time that counts, whether it lived to its end or not."""
+        counted = jnp.maximum(self.horizon * self.step - settings.settle, self.step)
+        return {"speed": _way(tally) / counted, "overlap": tally.overlap}
+
+    def outcome(self, tally: Tally) -> Mapping[str, jax.Array]:
+        """See `Task`: m from where counting began, and s until the end."""
+        return {"way": _way(tally), "seconds": tally.steps * self.step}
+
+    def weights(self, settings: SwimConfig, generation: jax.Array) -> Mapping[str, jax.Array]:
+        """See `Task`."""
+        counts = settings.weights
+        return {"speed": jnp.asarray(counts.speed), "overlap": -jnp.asarray(counts.overlap)}
+
+
+def _way(tally: Tally) -> jax.Array:
+    return jnp.sqrt(jnp.sum((tally.place - tally.settled) ** 2))
