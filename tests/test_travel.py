@@ -16,7 +16,7 @@ from mjxgait.certify.measure import Recording
 from mjxgait.certify.outcome import Outcome, Trajectory
 from mjxgait.certify.simulate import simulate
 from mjxgait.certify.starts import nominal_starts
-from mjxgait.certify.tasks import demands_of
+from mjxgait.certify.tasks import demands_of, travel
 from mjxgait.creature import Creature
 from mjxgait.settings.hop import GOALS, NEAR, NOMINAL_GOAL, TravelConfig
 from mjxgait.tasks.hop.travel import Aim, Travel
@@ -104,7 +104,7 @@ def test_a_controller_is_told_the_same_moving_goals(
 
 def test_the_examiner_and_evolution_mean_the_same_goals():
     demands = Demanded()
-    assert (demands.goals, demands.nominal, demands.near) == (GOALS, NOMINAL_GOAL, NEAR)
+    assert (demands.goals, demands.nominal, travel.NEAR) == (GOALS, NOMINAL_GOAL, NEAR)
 
 
 def way(*places: tuple[float, float]) -> np.ndarray:

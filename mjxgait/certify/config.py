@@ -140,7 +140,6 @@ class GoalConfig:
 
     Attributes:
       nominal: m, the goal of the undisturbed way. goals: m, range of the others.
-      near: share of the goal's distance within which one has arrived.
       min_up: least product of the trunk's up axis with the world's; below it, one has fallen.
       arrive: share of the perturbed starts that must do what the task demands.
     """
@@ -148,16 +147,21 @@ class GoalConfig:
     __pydantic_config__ = STRICT
     nominal: Positive = 1.2
     goals: tuple[Positive, Positive] = (0.4, 2.0)
-    near: Positive = 0.05
     min_up: Annotated[float, pydantic.Field(ge=-1, le=1)] = 0.2
     arrive: Fraction = 0.9
 
 
 @dataclasses.dataclass(frozen=True)
 class HopConfig(GoalConfig):
-    """What is demanded of who hops to a goal. stay: s at the end, all of which it is there."""
+    """What is demanded of who hops to a goal.
+
+    Attributes:
+      near: share of the goal's distance within which one has arrived.
+      stay: s at the end, all of which it is there.
+    """
 
     __pydantic_config__ = STRICT
+    near: Positive = 0.05
     stay: Positive = 5.0
 
 
@@ -180,7 +184,8 @@ class LimboConfig(HopConfig):
 
 @dataclasses.dataclass(frozen=True)
 class TravelConfig(GoalConfig):
-    """What is demanded of who travels: goals as of who hops, each reached within `near`.
+    """What is demanded of who travels: goals as of who hops; within which distance one is reached
+    is the task's own (docs/hop.md), and no demand.
 
     Attributes:
       speed: m/s, least. second_half: its speed over the first half's.

@@ -5,17 +5,21 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from blocks.made_up import one
-from blocks.plain_brain import PlainBrain, fire
 
-from mjxgait.blocks.genotype import Capacity, Ranges, random_graph
+from mjxgait.blocks.genotype import Capacity, Ranges
 from mjxgait.blocks.nerves import NerveRoom, random_centre, random_nerves
-from mjxgait.blocks.phenotype import body_of
+from mjxgait.blocks.phenotype import Body, body_of
+from mjxgait.blocks.variation import Genotype, Kin
 from mjxgait.blocks.wiring import wired
+from mjxgait.certify.twins.brains import BrainTwin, fire
 from mjxgait.champion.blocks.material import NEURONS
+from mjxgait.champion.blocks.parts import grow
 from mjxgait.control.brains.neurons import fired
 from mjxgait.control.brains.thought import Perceived, blank, thought
+from mjxgait.runs.experiment import arrays_of
 
 CAPACITY, ROOM, COUNT, STEP = Capacity(), NerveRoom(), 200, 0.01
+KIN = Kin(CAPACITY, ROOM, Ranges())
 
 
 @pytest.mark.parametrize("name", NEURONS)
@@ -25,12 +29,9 @@ def test_a_neuron_is_the_function_of_its_name(name: str):
     inputs[:20, 1] = 0.0
     kinds = jnp.full(300, NEURONS.index(name))
     output, kept = fired(kinds, jnp.asarray(inputs), jnp.float32(memory), 0.005)
-    plain = [
-        fire(name, *map(float, row), float(m), 0.005)
-        for row, m in zip(inputs, np.float32(memory), strict=True)
-    ]
-    np.testing.assert_allclose(output, [p[0] for p in plain], atol=2e-4)
-    np.testing.assert_allclose(kept, [p[1] for p in plain], atol=2e-4)
+    plain, remembered = fire(name, np.float64(inputs).T, memory, 0.005)
+    np.testing.assert_allclose(output, plain, atol=2e-4)
+    np.testing.assert_allclose(kept, remembered, atol=2e-4)
 
 
 def test_nothing_that_comes_in_makes_a_value_that_is_not_finite():
@@ -44,43 +45,56 @@ def test_nothing_that_comes_in_makes_a_value_that_is_not_finite():
         assert np.isfinite(kept).all(), NEURONS[kind]
 
 
-def test_a_brain_thinks_as_a_plain_network_does():
-    """Where a threshold is met within rounding, two networks may part: not more than a few do."""
+def test_a_brain_thinks_as_its_twin_does():
+    """Where a threshold is met within rounding, the two may part: not more than a few do."""
 
     def make(key: jax.Array):
-        first, second, third = jax.random.split(key, 3)
-        graph = random_graph(first, CAPACITY, Ranges())
-        body, nerves = body_of(graph, CAPACITY), random_nerves(second, CAPACITY.nodes, ROOM)
-        centre = random_centre(third, ROOM)
-        return body, nerves, centre, wired(nerves, centre, body, ROOM)
+        genotype = KIN.create(key)
+        body = body_of(genotype.graph, CAPACITY)
+        return genotype, body, wired(genotype.nerves, genotype.centre, body, ROOM)
 
-    bodies, nerves, centres, brains = jax.jit(jax.vmap(make))(
-        jax.random.split(jax.random.key(3), COUNT)
-    )
+    genotypes, bodies, brains = jax.jit(jax.vmap(make))(jax.random.split(jax.random.key(3), COUNT))
     think = jax.jit(jax.vmap(lambda b, m, p: thought(b, m, p, STEP)))
     neurons = CAPACITY.parts * ROOM.local + ROOM.central
     minds = jax.vmap(lambda _: blank(neurons))(jnp.arange(COUNT))
-    plain = [
-        PlainBrain(one(nerves, i), one(centres, i), one(bodies, i), ROOM) for i in range(COUNT)
-    ]
+    links, twins = zip(
+        *(twin(one(genotypes, i), one(bodies, i)) for i in range(COUNT)), strict=True
+    )
+    memories = [t.init(1) for t in twins]
     rng, wrong, driven = np.random.default_rng(4), np.zeros(COUNT), 0
     for _ in range(4):
         angles = np.float32(rng.uniform(-1, 1, (COUNT, CAPACITY.links)))
         contact = np.float32(rng.integers(0, 2, (COUNT, CAPACITY.links)))
         light = np.float32(rng.normal(size=(COUNT, CAPACITY.links, 3)))
         torque, minds = think(brains, minds, Perceived(angles, contact, light))
-        for i in range(COUNT):
-            body = one(bodies, i)
-            for (part, hinge), value in (
-                plain[i].step(angles[i], contact[i], light[i], STEP).items()
-            ):
-                link = np.flatnonzero((body.part == part) & (body.hinge == hinge))[0]
-                most = max(float(body.strength[link]), 1e-9)
-                wrong[i] = max(wrong[i], abs(float(torque[i, link]) - value) / most)
-                driven += abs(value) > 0
+        for i in np.flatnonzero([len(found) > 0 for found in links]):
+            last = one(bodies, i).parts.last[: len(twins[i].parts)]
+            senses = {
+                "joint_pos": angles[i][None, links[i]],
+                "contact": contact[i][None, last],
+                "light": light[i][None, last],
+            }
+            plain, memories[i] = twins[i].act(memories[i], senses)
+            most = one(bodies, i).strength[links[i]]
+            wrong[i] = max(
+                wrong[i], (np.abs(np.asarray(torque)[i, links[i]] - plain[0]) / most).max()
+            )
+            driven += int((plain != 0).any())
     assert driven > COUNT
     assert np.median(wrong) < 1e-5
     assert np.mean(wrong > 1e-2) < 0.03
+
+
+def twin(genotype: Genotype, body: Body) -> tuple[list[int], BrainTwin]:
+    """The links of all hinges, part by part, and the brain that moves them."""
+    genome = arrays_of(genotype)
+    parts = grow(genome, CAPACITY.parts, CAPACITY.links)
+    hinges = [(p, h) for p, part in enumerate(parts) for h in range(len(part.hinges))]
+    links = [
+        int(np.flatnonzero((body.part == p) & (body.hinge == h) & (body.tree.moves > 0))[0])
+        for p, h in hinges
+    ]
+    return links, BrainTwin(genome, parts, hinges, STEP)
 
 
 def test_a_mirror_image_pulls_the_other_way():

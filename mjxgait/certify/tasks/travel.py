@@ -15,6 +15,9 @@ from mjxgait.certify.tasks.goals import GoalDemands
 from mjxgait.certify.tasks.staying import to_the_end
 from mjxgait.creature import Creature
 
+NEAR = 0.05
+"""Of a goal's distance from the one before: who is nearer has reached it (docs/hop.md)."""
+
 
 class TravelDemands(GoalDemands):
     """See `Demands`. A goal that is near, or passed, moves on by as much as it was away at first."""
@@ -28,7 +31,7 @@ class TravelDemands(GoalDemands):
 
     def onward(self, goal: np.ndarray, first: np.ndarray, way: np.ndarray) -> np.ndarray:
         """See `Demands`."""
-        reached = goal - way <= CertificateConfig().travel.near * first
+        reached = goal - way <= NEAR * first
         return np.where(reached, goal + first, goal)
 
     def succeeded(self, outcome: Outcome, starts: Starts, config: CertificateConfig) -> np.ndarray:
