@@ -14,12 +14,17 @@ SPIN, ROLL = 0.005, 0.0001
 
 
 def body_xml(
-    parts: Sequence[Part], step: float, gravity: float, friction: float | None, height: float = 1.0
+    parts: Sequence[Part],
+    step: float,
+    gravity: float,
+    friction: float | None,
+    height: float = 1.0,
+    keyframe: str = "",
 ) -> str:
     """The model's text. Parts are called `part0` (the root), … and their hinges `part1_0`, ….
 
-    step: s. gravity: m/s². friction: of a floor at z = 0; None where there is none. height: m, of
-    the root's middle.
+    step: s. gravity: m/s². friction: of a floor at z = 0; None for one that nothing touches. height:
+    m, of the root's middle. keyframe: name of one with all angles at 0.
     """
     root = ET.Element("mujoco", model="blocks")
     ET.SubElement(root, "compiler", angle="radian")
@@ -28,9 +33,9 @@ def body_xml(
     ET.SubElement(option, "flag", eulerdamp="disable")
     world = ET.SubElement(root, "worldbody")
     sticking = {} if friction is None else {"friction": _text((friction, SPIN, ROLL))}
-    if friction is not None:
-        plane = {"type": "plane", "size": "0 0 1", "contype": "0", "conaffinity": "1"}
-        ET.SubElement(world, "geom", {"name": "floor", **plane, **sticking})
+    touched = "0" if friction is None else "1"
+    plane = {"type": "plane", "size": "0 0 1", "contype": "0", "conaffinity": touched}
+    ET.SubElement(world, "geom", {"name": "floor", **plane, **sticking})
     bodies: list[ET.Element] = []
     for number, part in enumerate(parts):
         if part.parent < 0:
@@ -46,6 +51,10 @@ def body_xml(
             )
         _with_joints_and_block(own, number, part, sticking)
         bodies.append(own)
+    if keyframe:
+        hinges = sum(len(part.hinges) for part in parts)
+        place = _text((0, 0, height, 1, 0, 0, 0, *[0] * hinges))
+        ET.SubElement(ET.SubElement(root, "keyframe"), "key", name=keyframe, qpos=place)
     ET.indent(root)
     return ET.tostring(root, encoding="unicode")
 

@@ -1,0 +1,59 @@
+"""A grown body is a creature like any other: two files that load, and stand on the ground."""
+
+import jax
+import mujoco
+import numpy as np
+import pytest
+from blocks.made_up import genome_of, one
+
+from mjxgait.blocks.genotype import Capacity, Ranges, random_graph
+from mjxgait.champion.blocks.folder import body_files
+from mjxgait.champion.blocks.parts import grow
+from mjxgait.creature.scale import load_files
+from mjxgait.errors import UserError
+
+CAPACITY, COUNT = Capacity(), 60
+
+
+@pytest.fixture(scope="module")
+def grown_parts() -> list:
+    draw = jax.jit(jax.vmap(lambda key: random_graph(key, CAPACITY, Ranges())))
+    graphs = draw(jax.random.split(jax.random.key(8), COUNT))
+    every = (genome_of(one(graphs, place)) for place in range(COUNT))
+    return [grow(genome, CAPACITY.parts, CAPACITY.links) for genome in every]
+
+
+def test_grown_bodies_are_creatures(grown_parts: list):
+    tried = 0
+    for parts in grown_parts:
+        hinges = [(part, h) for part in parts for h in range(len(part.hinges))]
+        if not hinges:
+            with pytest.raises(UserError, match="has no hinge"):
+                body_files(parts, "grown", 0.005, 9.81, 0.9, "on land")
+            continue
+        creature = load_files(body_files(parts, "grown", 0.005, 9.81, 0.9, "on land"))
+        tried += 1
+        assert len(creature.joints.names) == len(hinges)
+        assert len(creature.feet.names) == len(parts)
+        strengths = dict(zip(creature.joints.names, creature.gains.torque_limit, strict=True))
+        for number, part in enumerate(parts):
+            for hinge in range(len(part.hinges)):
+                assert strengths[f"part{number}_{hinge}"] == pytest.approx(part.strength)
+        data = mujoco.MjData(creature.model)
+        mujoco.mj_resetDataKeyframe(creature.model, data, 0)
+        data.qpos[2] -= 1e-3
+        mujoco.mj_forward(creature.model, data)
+        deepest = min(contact.dist for contact in data.contact)
+        assert deepest == pytest.approx(-1e-3, abs=1e-6), "it rests on its lowest corner"
+    assert tried > COUNT / 2
+
+
+def test_nothing_touches_the_floor_of_a_swimmer(grown_parts: list):
+    parts = next(p for p in grown_parts if sum(len(part.hinges) for part in p) > 3)
+    creature = load_files(body_files(parts, "swimmer", 0.005, 0.0, None, "in water"))
+    data = mujoco.MjData(creature.model)
+    mujoco.mj_resetDataKeyframe(creature.model, data, 0)
+    data.qpos[2] = 0.0
+    mujoco.mj_forward(creature.model, data)
+    assert data.ncon == 0
+    assert np.all(creature.model.opt.gravity == 0)
