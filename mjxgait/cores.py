@@ -5,6 +5,7 @@ import multiprocessing
 import os
 import signal
 from collections.abc import Callable, Iterator
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 
 SINGLE_THREADED = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
@@ -48,7 +49,23 @@ def process_per_core(
         single_threaded(),
         concurrent.futures.ProcessPoolExecutor(count, context, _begin, (prepare,)) as pool,
     ):
-        yield pool
+        try:
+            _start(pool, count)
+            yield pool
+        except concurrent.futures.BrokenExecutor:
+            # The pool waits for ever for one that was being started while another was killed.
+            for child in multiprocessing.active_children():
+                child.kill()
+            raise
+
+
+def _start(pool: concurrent.futures.Executor, count: int) -> None:
+    """All processes at once, so that none is started later while another is killed."""
+    try:
+        for _ in range(count):
+            pool.submit(int)
+    except OSError as error:
+        raise BrokenProcessPool("a process was killed as the others were started") from error
 
 
 def _begin(prepare: Callable[[], object] | None) -> None:

@@ -208,7 +208,9 @@ def test_a_study_whose_measuring_is_killed_says_so_and_goes_on(
     process = subprocess.Popen(
         command("ablate", "--resume", folder), stdout=subprocess.PIPE, stderr=subprocess.PIPE
     )
-    worker_of(process).kill()
+    worker = worker_of(process)
+    time.sleep(1.0)  # at work, and not while it is started
+    worker.kill()
     said = process.communicate(timeout=300)[1].decode()
     assert process.returncode == 2
     assert re.fullmatch(

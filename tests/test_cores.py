@@ -1,0 +1,32 @@
+"""Processes that use a core each: who loses one says so, and does not wait for it."""
+
+import subprocess
+import sys
+
+LOSES_ONE = """
+import multiprocessing, threading, time
+from concurrent.futures.process import BrokenProcessPool
+from mjxgait.cores import process_per_core
+
+def kill_the_first():
+    while not (children := multiprocessing.active_children()):
+        time.sleep(0.0005)
+    children[0].kill()
+
+for _ in range(8):  # the moment decides
+    killer = threading.Thread(target=kill_the_first)
+    killer.start()
+    try:
+        with process_per_core(4) as pool:
+            killer.join()
+            list(pool.map(time.sleep, [0.5] * 4))
+    except BrokenProcessPool:
+        print("lost")
+"""
+
+
+def test_a_process_that_is_killed_as_it_starts_is_not_waited_for():
+    done = subprocess.run(
+        [sys.executable, "-c", LOSES_ONE], capture_output=True, text=True, timeout=60, check=True
+    )
+    assert done.stdout.split() == ["lost"] * 8
