@@ -24,7 +24,7 @@ from mjxgait.physics.fast import fast_plant
 from mjxgait.physics.layout import sense_layout
 from mjxgait.physics.plain import mjx_plant
 from mjxgait.runs.folder import BODY, CHAMPION
-from mjxgait.runs.growth import Growth
+from mjxgait.runs.growth import SizeGrowth
 from mjxgait.tasks.trials import draw_starts
 
 MOST = 1.3
@@ -113,7 +113,7 @@ def test_it_stands_as_high_above_the_floor(shipped: Creature):
     plant = fast_plant(shipped.model, sense_layout(shipped), None)
     config = mjxgait.settings.config.RolloutConfig(starts=1)
     start = jax.tree.map(lambda x: x[0], draw_starts(jax.random.key(0), shipped, config))
-    grew = Growth(known).body(plant, Bodied({}, jnp.float32(sizes)), start)
+    grew = SizeGrowth(known).body(plant, Bodied({}, jnp.float32(sizes)), start)
     other = grown(shipped, known.by_part(sizes))
     np.testing.assert_allclose(grew.qpos, other.stand_qpos, atol=2e-5)
     # What stands on its trunk, which keeps its size, stands as it did.
