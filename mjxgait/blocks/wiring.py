@@ -20,7 +20,8 @@ NOTHING, ONE = 0, 1
 class Brain:
     """A body's own. kind: [P Q + M]; source: [P Q + M, 3] places among the values, weight the same.
 
-    drive: [n] which value pulls a link's hinge, pull: [n] N·m at a value of 1; both of link order.
+    drive: [n] which value pulls a link's hinge, gain: [n] times what, pull: [n] N·m at the most that
+    it can.
     sign: [n] of angles, as the genes mean them; image: [n], -1 in a mirror image.
     """
 
@@ -28,6 +29,7 @@ class Brain:
     source: jax.Array
     weight: jax.Array
     drive: jax.Array
+    gain: jax.Array
     pull: jax.Array
     sign: jax.Array
     image: jax.Array
@@ -64,7 +66,8 @@ def wired(nerves: Nerves, centre: Centre, body: Body, room: NerveRoom) -> Brain:
         source=jnp.concatenate([source, central]),
         weight=jnp.concatenate([weight, centre.weight]),
         drive=places[part, code],
-        pull=nerves.effect_weight[node[part], hinge] * body.strength * body.sign,
+        gain=nerves.effect_weight[node[part], hinge],
+        pull=body.strength * body.sign,
         sign=body.sign,
         image=1.0 - 2.0 * parts.copies[part],
     )

@@ -184,9 +184,9 @@ class BrainTwin:
         """[S] N·m of a hinge."""
         own = self.parts[part]
         code = int(self.genome["nerves.effect_source"][own.node, hinge])
-        wanted = np.clip(self._source(part, code, values, senses), -1.0, 1.0)
         weight = float(self.genome["nerves.effect_weight"][own.node, hinge])
-        return weight * own.strength * _sign(own, hinge) * wanted
+        wanted = np.clip(weight * self._source(part, code, values, senses), -1.0, 1.0)
+        return own.strength * _sign(own, hinge) * wanted
 
 
 def _sign(part: Part, hinge: int) -> float:

@@ -56,4 +56,4 @@ def thought(brain: Brain, mind: Mind, perceived: Perceived, step: float) -> tupl
         inputs = jnp.concatenate([known, values])[brain.source] * brain.weight
         values, memory = fired(brain.kind, inputs, memory, step / TICKS)
     wanted = jnp.concatenate([known, values])[brain.drive]
-    return brain.pull * jnp.clip(wanted, -1.0, 1.0), Mind(values, memory)
+    return brain.pull * jnp.clip(brain.gain * wanted, -1.0, 1.0), Mind(values, memory)
