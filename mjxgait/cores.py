@@ -60,11 +60,15 @@ def process_per_core(
 
 
 def _start(pool: concurrent.futures.Executor, count: int) -> None:
-    """All processes at once, so that none is started later while another is killed."""
+    """All processes at once, so that none is started later while another is killed.
+
+    Who loses one closes the pool's queues. One that is being started then meets a closed handle
+    (OSError), or its number taken by another file (ValueError).
+    """
     try:
         for _ in range(count):
             pool.submit(int)
-    except OSError as error:
+    except (OSError, ValueError) as error:
         raise BrokenProcessPool("a process was killed as the others were started") from error
 
 

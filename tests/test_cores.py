@@ -27,6 +27,6 @@ for _ in range(8):  # the moment decides
 
 def test_a_process_that_is_killed_as_it_starts_is_not_waited_for():
     done = subprocess.run(
-        [sys.executable, "-c", LOSES_ONE], capture_output=True, text=True, timeout=60, check=True
+        [sys.executable, "-c", LOSES_ONE], capture_output=True, text=True, timeout=60, check=False
     )
-    assert done.stdout.split() == ["lost"] * 8
+    assert done.stdout.split() == ["lost"] * 8, done.stderr
