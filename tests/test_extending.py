@@ -133,6 +133,7 @@ def test_no_code_is_loaded_from_a_run(trained: Path, capfd, monkeypatch):
         ("--controller my.py:Stand", "must inherit from mjxgait.control.reals.RealController"),
         ("--controller half.py:Half", "Half lacks act"),
         ("--controller broken.py:X", "cannot be loaded (ZeroDivisionError"),
+        ("--controller rare.py:Rare", "Rare.every = 3: must be one of 1, 2, 4, 8, 16"),
         ("--controller posse", 'did you mean "poses"'),
         ("--task my.py", "give FILE.py:CLASS"),
         ("--task", "name one of walk"),
@@ -149,6 +150,9 @@ def test_a_mistake_is_one_sentence(folder: Path, arguments, words, capfd, monkey
     (folder / "broken.py").write_text("1 / 0\n")
     wild = f"class Wild(RealController):\n    reads = ('jont_pos',)\n{bounds}{act}"
     (folder / "wild.py").write_text(head + wild)
+    (folder / "rare.py").write_text(
+        f"{head}class Rare(RealController):\n    every = 3\n{bounds}{act}"
+    )
     assert call(f"train --env {STOOL} --out runs/none {arguments}") == 2
     said = capfd.readouterr().err
     assert words in said

@@ -84,6 +84,7 @@ class Stepping:
         self.geom_xpos, self.geom_xmat = bind("geom_xpos"), bind("geom_xmat")
         self._lift()
         self.memory = dict(self.twin.init(len(starts)))
+        self.command = np.zeros_like(starts.stiffness)
         feet = creature.feet.watched[: len(creature.feet.foot_of)]
         self.feet = LowestPoint(self.model, feet, self.terrain)
         self.sees_feet = any(name in FOOT_SENSES for name in self.twin.reads)
@@ -143,7 +144,7 @@ class Stepping:
 
     def _follow(self, rows: np.ndarray, leader: int) -> None:
         """Puts simulations where another one is."""
-        own = (self.qpos, self.qvel, self.warm_start, self.last_force, self.goal)
+        own = (self.qpos, self.qvel, self.warm_start, self.last_force, self.goal, self.command)
         for state in (*own, *self.memory.values()):
             state[rows] = state[leader]
         self.sent[:, rows] = self.sent[:, [leader]]
@@ -166,7 +167,9 @@ class Stepping:
     ) -> tuple[np.ndarray, np.ndarray]:
         """The command, and the torque that acts, [running, J] each."""
         state, starts = self._state(running, k), self.starts
-        command = self._act(running, state, heading)
+        if k % self.twin.every == 0:
+            self.command[running] = self._act(running, state, heading)
+        command = self.command[running]
         first, way = self.starts.goal[running], self._travel(running)[:, 0]
         self.goal[running] = self.onward(self.goal[running], first, way)
         self.sent[k % len(self.sent), running] = self.drive.torque(

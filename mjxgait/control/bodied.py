@@ -41,6 +41,11 @@ class BodiedController:
         return self.controller.command
 
     @property
+    def every(self) -> int:
+        """See `Controller`."""
+        return self.controller.every
+
+    @property
     def box(self) -> Box:
         """Of the sizes [Z]."""
         end = jnp.full(self.sizes, np.log(self.most), jnp.float32)

@@ -67,6 +67,7 @@ class PoseTracker:
     step: float
     reads = ("joint_pos", "heading", "aside", "pitch", "roll", "pitch_rate", "roll_rate")
     command: ClassVar[Command] = "pose"
+    every: ClassVar[int] = 1
 
     def bounds(self, config: PoseConfig) -> tuple[Genome, Genome]:
         """Lowest and highest genome: key_poses [K, J], tuning [E]."""

@@ -33,6 +33,14 @@ class Controller(Protocol):
         """What `act` sends."""
         ...
 
+    @property
+    def every(self) -> int:
+        """Control steps from one command to the next; in between the last one holds.
+
+        One of `settings.control.HOLDS`.
+        """
+        ...
+
     def variation(self, settings: Any, evolution: EvolutionConfig) -> Variation:
         """The operators of its kind of genome, under settings plain or traced."""
         ...

@@ -29,6 +29,7 @@ class RealController(abc.ABC):
     Settings: ClassVar[type] = NoSettings
     reads: ClassVar[tuple[str, ...]] = ()
     command: ClassVar[Command] = "pose"
+    every: ClassVar[int] = 1
 
     def __init__(self, creature: Body, step: float) -> None:
         self.creature, self.step = creature, step

@@ -31,6 +31,7 @@ class SameCode:
         # The time tells how many there are, whatever else it reads.
         self.reads: tuple[str, ...] = (*controller.reads, "time")
         self.command: Command = controller.command
+        self.every: int = controller.every
         self.first, self.tree = jax.tree.flatten(jax.device_get(controller.init()))
 
         def act(memory: Any, senses: Any) -> tuple[jax.Array, Any]:

@@ -7,6 +7,20 @@ import pydantic
 
 from mjxgait.settings.tables import SHAPE, STRICT, Count, Interval, Positive
 
+HOLDS = (1, 2, 4, 8, 16)
+"""Control steps from one command to the next that there can be."""
+
+
+def holds(steps: int) -> int:
+    """For how many steps a command stays.
+
+    Raises:
+      ValueError: not so many.
+    """
+    if steps not in HOLDS:
+        raise ValueError(f"must be one of {', '.join(map(str, HOLDS))} control steps")
+    return steps
+
 
 @dataclasses.dataclass(frozen=True)
 class TuningRanges:

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import pydantic
 
+from mjxgait.settings.control import holds
 from mjxgait.settings.tables import SHAPE, STRICT, Fraction, Interval, NonNegative, Positive
 
 FUNCTIONS = {
@@ -39,6 +40,7 @@ class ProgramConfig:
 
     Attributes:
       functions: that an expression may use; besides them constants and senses.
+      every: control steps from one evaluation to the next; in between the angles stay.
       senses: patterns of the names of senses that it may use; docs/programs.md lists them.
       nodes: the most that an expression may have. depth: the most that it may be deep.
       initial_depth: of the first expressions, half of them full and half grown.
@@ -57,6 +59,7 @@ class ProgramConfig:
         "/",
         "ifltz",
     )
+    every: Annotated[int, pydantic.AfterValidator(holds), SHAPE] = 4
     senses: Annotated[tuple[str, ...], SHAPE] = ("*",)
     nodes: Annotated[int, pydantic.Field(ge=3, le=1024), SHAPE] = 128
     depth: Annotated[int, pydantic.Field(ge=1), SHAPE] = 17

@@ -43,6 +43,7 @@ class Lane:
 
     job: [] place in the device's queue. plan, memory: the controller's. tally, aim, standards: the
     task's. rules: the drive's. push as in `Starts`.
+    command: [J] the controller's latest; None where each step has one of its own.
     """
 
     job: jax.Array
@@ -55,6 +56,7 @@ class Lane:
     rules: Rules
     push: jax.Array
     push_step: jax.Array
+    command: jax.Array | None = None
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -146,7 +148,7 @@ class Simulator:
             carry: tuple[Lane, Any, jax.Array, jax.Array],
         ) -> tuple[Lane, Any, jax.Array, jax.Array]:
             lane, results, taken, rounds = carry
-            lane = jax.lax.fori_loop(0, CHECK_EVERY, lambda _, lane: self._step(lane), lane)
+            lane = jax.lax.fori_loop(0, CHECK_EVERY, self._step, lane)
             lane = self._look_for_overlap(lane)
             done = (lane.tally.steps >= self.steps) | (lane.tally.reason != FINISHED)
             results = store(results, jnp.where(done, lane.job, queue), lane.tally)
@@ -209,18 +211,41 @@ class Simulator:
             rules=self.drive.rules(mine.drive, start.stiffness, start.damping),
             push=start.push,
             push_step=start.push_step,
+            command=jnp.zeros(len(self.creature.joints.names)) if self._holds else None,
         )
 
-    def _step(self, lane: Lane) -> Lane:
-        """All lanes one control step on. A lane whose episode has ended moves on too, but its tally stands still."""
+    @property
+    def _holds(self) -> bool:
+        """Whether commands stay for several steps."""
+        return self.controller.every > 1
+
+    def _step(self, k: jax.Array, lane: Lane) -> Lane:
+        """All lanes one control step on. A lane whose episode has ended moves on too, but its tally stands still.
+
+        k: [] steps since lanes took their latest episodes, as all lanes have it.
+        """
         body = self._per_lane(_push)(lane)
         sensed, workings = self.plant.forward(body)
-        command, memory = self._per_lane(self._act)(lane, sensed)
+        command, memory = self._command(k, lane, sensed)
         torque = self.drive.torque(self.plant, lane.rules, body, sensed, workings, command)
         tally = self._per_lane(self._judge)(lane, sensed, torque)
         body = self.plant.advance(body, workings, self._per_lane(self.drive.lift)(torque))
         aim = self._per_lane(self.task.onward)(lane.aim, sensed)
-        return dataclasses.replace(lane, body=body, memory=memory, tally=tally, aim=aim)
+        kept = command if self._holds else None
+        return dataclasses.replace(
+            lane, body=body, memory=memory, tally=tally, aim=aim, command=kept
+        )
+
+    def _command(self, k: jax.Array, lane: Lane, sensed: Sensed) -> tuple[jax.Array, Any]:
+        """The commands of a step, and the controllers' memories."""
+
+        def asked() -> tuple[jax.Array, Any]:
+            return self._per_lane(self._act)(lane, sensed)
+
+        if not self._holds:
+            return asked()
+        due = k % self.controller.every == 0
+        return jax.lax.cond(due, asked, lambda: (lane.command, lane.memory))
 
     def _act(self, lane: Lane, sensed: Sensed) -> tuple[jax.Array, Any]:
         """The controller's command [J] and its memory."""

@@ -23,7 +23,7 @@ from mjxgait.viewing.plots import plot_run
 def run(tmp_path_factory: pytest.TempPathFactory) -> mjxgait.Run:
     settings = {
         "controller": {"nodes": 32, "senses": ["a*", "t", "v?", "pitch"]},
-        "rollout": {"seconds": 0.5, "lanes": 8},
+        "rollout": {"seconds": 0.2, "lanes": 8},
         "examination": {"candidates": 0},
     }
     return mjxgait.train(
@@ -49,15 +49,30 @@ def edit(folder: Path, joint: str, text: str) -> None:
     (folder / CHAMPION).write_text(json.dumps(document))
 
 
+def commanded(run: mjxgait.Run, folder: Path) -> np.ndarray:
+    """What a folder's champion wants of the first joint at each step of a fifth of a second."""
+    champion = read_champion(folder / CHAMPION, run.creature)
+    outcome = simulate(run.creature, champion, nominal_starts(run.creature, 1), 0.2, record=1)
+    return outcome.trajectory.target[0, :, 0]
+
+
 def test_evolution_and_examiner_move_everybody_alike(run: mjxgait.Run):
     """The examiner reads the expressions as text, one node after the other."""
     snapshot = read_snapshot(run.folder)
     told = snapshot.arrays["outcome"][:, 0, 0]
     everybody = [snapshot.champion(rank + 1) for rank in range(len(told))]
-    starts = nominal_starts(run.creature, 1)
-    seen = [simulate(run.creature, one, starts, 0.5).travel[0, 0] for one in everybody]
+    starts, step = nominal_starts(run.creature, 1), run.creature.model.opt.timestep
+    # The tally has seen the state before the last step.
+    seen = [simulate(run.creature, one, starts, 0.2 - step).travel[0, 0] for one in everybody]
     assert np.ptp(told) > 0.01
     assert np.median(abs(np.array(seen) - told)) < 1e-3
+
+
+def test_an_expression_is_asked_every_fourth_step(run: mjxgait.Run, edited: Path):
+    joint = run.creature.joints.names[0]
+    edit(edited, joint, "t")
+    told, step = commanded(run, edited), run.creature.model.opt.timestep
+    assert told == pytest.approx(np.arange(len(told)) // 4 * 4 * step)
 
 
 def test_the_champion_is_written_for_people_and_stays_who_it_is(run: mjxgait.Run):
@@ -111,7 +126,7 @@ def test_the_size_of_programs_is_told_of_every_generation(run: mjxgait.Run):
 def test_an_edited_expression_is_what_moves(run: mjxgait.Run, edited: Path):
     joint, changed = run.creature.joints.names[0], mjxgait.open(edited)
     edit(edited, joint, "0.3")
-    assert np.allclose(mjxgait.walk(changed, 1.0)[f"pos_{joint}"][-20:], 0.3, atol=0.15)
+    assert commanded(run, edited) == pytest.approx(np.full(40, 0.3))
     edit(edited, joint, "(/ t (- a0 a0))")
     assert np.isfinite(mjxgait.walk(changed, 0.3)[f"pos_{joint}"]).all()
 
@@ -138,6 +153,7 @@ def test_a_mistake_names_the_file_and_the_joint(
         (("--controller.functions", "+", "pow"), '"pow" is no function'),
         (("--controller.senses", "a0", "nose"), 'there is no "nose" here'),
         (("--controller.initial-depth", "2", "40"), "must be a range"),
+        (("--controller.every", "3"), "must be one of 1, 2, 4, 8, 16 control steps"),
     ],
 )
 def test_settings_that_cannot_be_are_one_sentence(

@@ -91,6 +91,7 @@ class BrainTwin:
     """
 
     command: ClassVar[Command] = "torque"
+    every: ClassVar[int] = 1
     reads: ClassVar[tuple[str, ...]] = ("joint_pos", "contact", "light")
 
     def __init__(

@@ -19,6 +19,7 @@ class PoseTwin:
 
     reads = ("joint_pos", "heading", "aside", "pitch", "roll", "pitch_rate", "roll_rate")
     command: ClassVar[Command] = "pose"
+    every: ClassVar[int] = 1
 
     def __init__(self, creature: Creature, champion: Champion, step: float) -> None:
         self.creature, self.settings, self.step = creature, champion.settings, step

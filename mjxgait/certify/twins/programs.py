@@ -100,7 +100,7 @@ class ProgramTwin:
     def __init__(self, creature: Creature, champion: Champion, step: float) -> None:
         document = codec_of("program").document(champion.genome, champion.settings, creature)
         texts = document["expressions"]
-        self.creature = creature
+        self.creature, self.every = creature, int(champion.settings.every)
         self.expressions = [read(texts[joint]) for joint in creature.joints.names]
         names = set().union(*map(names_in, self.expressions))
         # The time tells how many there are, whatever else it reads.

@@ -26,6 +26,11 @@ class Twin(Protocol):
         """Whether `act` sends joint angles in rad or torques in N·m."""
         ...
 
+    @property
+    def every(self) -> int:
+        """Control steps from one command to the next; in between the last one holds."""
+        ...
+
     def init(self, count: int) -> Memory:
         """The memory at the start of `count` simulations."""
         ...

@@ -33,6 +33,7 @@ class Brains:
 
     Settings: ClassVar[type] = BrainConfig
     command: ClassVar[Command] = "torque"
+    every: ClassVar[int] = 1
     grows: ClassVar[bool] = True
 
     @classmethod

@@ -44,7 +44,7 @@ class Programs:
     def __init__(
         self, creature: Body, step: float, settings: ProgramConfig, added: Sequence[str] = ()
     ) -> None:
-        self.creature, self.step = creature, step
+        self.creature, self.step, self.every = creature, step, settings.every
         self.known: tuple[Terminal, ...] = chosen_terminals(
             terminals(creature, added), settings.senses
         )
