@@ -8,7 +8,7 @@ mjxgait.walk(run)["trunk_z"]
 """
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +27,6 @@ from mjxgait.runs.folder import (
     EXAMS,
     METRICS,
     create_run,
-    new_run_folder,
     open_champion,
     open_run,
     read_metrics,
@@ -90,11 +89,16 @@ class Run:
         }
 
 
-def load_creature(env: Place, scale: Mapping[str, float] | None = None) -> Creature:
+def load_creature(
+    env: Place,
+    scale: Mapping[str, float] | None = None,
+    tell: Callable[[str], object] = lambda said: None,
+) -> Creature:
     """A shipped creature by name, a creature folder, or a model file (MJCF, URDF) as it is.
 
     Args:
       scale: factors of the parts' size by pattern of their names (docs/creature.md).
+      tell: called with what was found in a model file.
 
     Raises:
       UserError: there is none, or it cannot be used; says why.
@@ -104,7 +108,9 @@ def load_creature(env: Place, scale: Mapping[str, float] | None = None) -> Creat
         return scaled(load_folder(find_creature(str(env))), scale or {})
     from mjxgait.importing import import_model
 
-    return scaled(load_files(import_model(path).files), scale or {})
+    imported = import_model(path)
+    tell(imported.notes.text())
+    return scaled(load_files(imported.files), scale or {})
 
 
 def train(
@@ -155,8 +161,7 @@ def train(
     evolution = {key: value for key, value in short.items() if value is not None}
     table = merge(dataclasses.asdict(resolved), {"seed": seed, "evolution": evolution})
     chosen = build(type(resolved), merge(table, settings or {}), "the settings given to train")
-    folder = Path(out) if out else new_run_folder(creature.name, chosen.seed)
-    create_run(folder, creature, chosen)
+    folder = create_run(Path(out) if out else None, creature, chosen)
     prepare_devices()
     screen = Screen(Console(quiet=True)) if quiet else Screen()
     loop.train(folder, creature, chosen, screen)

@@ -9,21 +9,20 @@ from typing import Annotated
 
 import tyro
 
-from mjxgait.creature import Creature, load_creature
-from mjxgait.creature.scale import load_files, parse_scales, scaled
+from mjxgait.creature import Creature
+from mjxgait.creature.scale import parse_scales
 from mjxgait.errors import INTERRUPTED, UserError
+from mjxgait.library import load_creature
 from mjxgait.parts import resolve_config
 from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.folder import (
     METRICS,
     PLOT,
     create_run,
-    new_run_folder,
     open_run,
     read_metrics,
 )
 from mjxgait.settings.config import Config, ExaminationConfig
-from mjxgait.settings.shipped import find_creature
 from mjxgait.settings.tables import build, merge
 
 
@@ -98,8 +97,7 @@ def train_command(arguments: Sequence[str]) -> int:
             )
         folder = options.resume
     else:
-        folder = options.out or new_run_folder(creature.name, config.seed)
-        create_run(folder, creature, config)
+        folder = create_run(options.out, creature, config)
     prepare_devices()
     with following(folder) if options.view else contextlib.nullcontext():
         ended = loop.train(
@@ -155,23 +153,12 @@ def _layers(arguments: Sequence[str]) -> tuple[Creature, Config]:
         raise UserError(str(error)) from None
     if given.resume:
         return open_run(Path(given.resume))
-    creature = scaled(_creature(given.env or TrainOptions.env), parse_scales(given.scale or ()))
+    scales = parse_scales(given.scale or ())
+    creature = load_creature(given.env or TrainOptions.env, scales, tell=print)
     file = Path(given.config) if given.config else None
     named = {kind: getattr(given, f"use.{kind}") for kind in ("controller", "task")}
     use = {kind: name for kind, name in named.items() if name}
     return creature, resolve_config(creature.settings.train, creature.name, file, use)
-
-
-def _creature(env: str) -> Creature:
-    """The creature of a name or folder; a model file (MJCF or URDF) is imported on the fly."""
-    path = Path(env)
-    if not path.is_file():
-        return load_creature(find_creature(env))
-    from mjxgait.importing import import_model
-
-    imported = import_model(path)
-    print(imported.notes.text())
-    return load_files(imported.files)
 
 
 def _settings(options: TrainOptions) -> Config:

@@ -15,12 +15,13 @@ CONFIG, CREATURE, METRICS, CHAMPION = "config.toml", "creature", "metrics.jsonl"
 CERTIFICATE, EXAMS, PLOT, BODY = "certificate.json", "exams.jsonl", "fitness.png", "body"
 
 
-def create_run(folder: Path, creature: Creature, config: Config) -> None:
-    """Makes the run folder with the exact creature and settings.
+def create_run(folder: Path | None, creature: Creature, config: Config) -> Path:
+    """Makes the run folder with the exact creature and settings; by default a new one under runs/.
 
     Raises:
       UserError: the folder holds something already, or cannot be written.
     """
+    folder = folder or _new_run_folder(creature.name, config.seed)
     try:
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             holds = "another run" if (folder / CONFIG).exists() else "something else"
@@ -32,6 +33,7 @@ def create_run(folder: Path, creature: Creature, config: Config) -> None:
         (folder / CONFIG).write_text(dump_toml(config), encoding="utf-8")
     except OSError as error:
         raise UserError(f"{folder}: cannot be written ({error.strerror})") from None
+    return folder
 
 
 def keep_body(folder: Path, creature: Creature) -> None:
@@ -41,7 +43,7 @@ def keep_body(folder: Path, creature: Creature) -> None:
         (folder / name).write_text(text, encoding="utf-8")
 
 
-def new_run_folder(creature: str, seed: int) -> Path:
+def _new_run_folder(creature: str, seed: int) -> Path:
     """The first folder under runs/ that is not there yet."""
     names = (
         f"{creature}-seed{seed}{suffix}" for suffix in ("", *(f"-{i}" for i in range(2, 10_000)))
