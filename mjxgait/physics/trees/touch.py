@@ -15,11 +15,11 @@ from mjxgait.physics.fast.dynamics import pack
 from mjxgait.physics.fast.footing import resistance, spatial
 from mjxgait.physics.fast.frames import Directions, Level
 from mjxgait.physics.fast.kinematics import Motion, Pose
-from mjxgait.physics.fast.lanes import Pin, axes, cross, plus, total
+from mjxgait.physics.fast.lanes import Pin, axes, cross, plus, total, turn_each
 from mjxgait.physics.fast.parameters import Softness
 from mjxgait.physics.fast.treematrix import Rows
 from mjxgait.physics.trees.dynamics import generalised, tree_rows, velocities
-from mjxgait.physics.trees.motion import up
+from mjxgait.physics.trees.motion import centres, frames, up
 from mjxgait.physics.trees.tree import Dense, Surroundings, Tree
 from mjxgait.types import pytree
 
@@ -46,12 +46,8 @@ def lowest_corners(tree: Tree, poses: Sequence[Pose]) -> Touch:
     With the half axes pointing down and the steepest first, K, A and B: K + A + B, K + A - B,
     K - A + B, and K - A - B or, where that is above the centre, its opposite.
     """
-    rot = [jnp.stack([pose.rot[j] for pose in poses]) for j in range(3)]
-
-    def turned(local: jax.Array) -> list[jax.Array]:
-        return [total([local[:, j] * rot[j][:, i] for j in range(3)]) for i in range(3)]
-
-    halves = [turned(tree.axes[:, k] * tree.half[:, k, None]) for k in range(3)]
+    rot = frames(poses)
+    halves = [turn_each(rot, tree.axes[:, k] * tree.half[:, k, None]) for k in range(3)]
     down = [[-jnp.where(half[2] > 0, 1.0, -1.0) * x for x in half] for half in halves]
     steep = [half[2] for half in down]
     first = (steep[0] <= steep[1]) & (steep[0] <= steep[2])
@@ -60,10 +56,9 @@ def lowest_corners(tree: Tree, poses: Sequence[Pose]) -> Touch:
     one = [jnp.where(first, y, x) for x, y in zip(down[0], down[1], strict=True)]
     other = [jnp.where(last, y, z) for y, z in zip(down[1], down[2], strict=True)]
     below = jnp.where(most[2] - one[2] - other[2] > 0, -1.0, 1.0)
-    centre = plus(axes(jnp.stack([pose.pos for pose in poses])), turned(tree.com))
     x, y, z = (
         jnp.concatenate([c + k + a + b, c + k + a - b, c + k - a + b, c + below * (k - a - b)])
-        for c, k, a, b in zip(centre, most, one, other, strict=True)
+        for c, k, a, b in zip(centres(tree, poses), most, one, other, strict=True)
     )
     distance = z + poses[0].origin[2]
     return Touch(distance, (x, y, z - 0.5 * distance))
