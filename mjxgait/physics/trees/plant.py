@@ -16,12 +16,9 @@ from mjxgait.physics.fast.treematrix import Rows, factor, on_pivot, solve, spars
 from mjxgait.physics.trees.dynamics import bias_links, generalised, mass_rows, velocities
 from mjxgait.physics.trees.motion import centres, frames, motions, posture, root_turns
 from mjxgait.physics.trees.touch import BlockFooting, Touch, lowest_corners, make_constraints
-from mjxgait.physics.trees.tree import Surroundings, Tree
+from mjxgait.physics.trees.tree import FAR, Surroundings, Tree
 from mjxgait.physics.trees.water import drag_links
 from mjxgait.types import BodyState, Sensed, pytree
-
-FAR = 1e3
-"""m, how high above the ground a block is that there is not."""
 
 
 @pytree
