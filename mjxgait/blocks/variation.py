@@ -11,6 +11,7 @@ import jax.numpy as jnp
 
 from mjxgait.blocks.genotype import Capacity, Graph, Ranges, random_graph
 from mjxgait.blocks.nerves import Centre, NerveRoom, Nerves, random_centre, random_nerves
+from mjxgait.settings.brains import BrainConfig
 from mjxgait.types import pytree
 
 
@@ -32,10 +33,10 @@ class Rates:
     connection: chance of one more or one less. node: of a new node.
     """
 
-    value: float = 4.0
-    sigma: float = 0.2
-    connection: float = 0.3
-    node: float = 0.1
+    value: float = BrainConfig.values
+    sigma: float = BrainConfig.sigma
+    connection: float = BrainConfig.connect
+    node: float = BrainConfig.grow
 
 
 @dataclasses.dataclass(frozen=True)
