@@ -126,6 +126,18 @@ def test_a_mutation_changes_a_few_values(parents: tuple[Genotype, Genotype]):
     assert jnp.array_equal(child.graph.used, parents[0].graph.used)
 
 
+def test_as_many_central_neurons_as_nodes_change_nothing_of_a_graphs_mutation():
+    """They do not grow, so they do not count among the values of which a few change."""
+    graphs = []
+    for central in (CAPACITY.nodes, CAPACITY.nodes + 1):
+        kin = Kin(CAPACITY, NerveRoom(central=central), RANGES)
+        keys = jax.random.split(jax.random.key(4), 100)
+        child = jax.jit(jax.vmap(lambda key, kin=kin: kin.mutate(key, kin.create(key))))(keys)
+        graphs.append(child.graph)
+    for a, b in zip(*map(jax.tree.leaves, graphs), strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
 def test_nodes_and_connections_come_and_go(parents: tuple[Genotype, Genotype]):
     child = children("mutate", parents)
     used, before = (np.asarray(g.graph.used).sum((1, 2)) for g in (child, parents[0]))
