@@ -1,5 +1,7 @@
 """A run whose bodies grow is made of the same parts as every other."""
 
+from typing import Any
+
 import pytest
 
 from mjxgait.control.brains.controller import Brains
@@ -7,25 +9,35 @@ from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.parts.registry import add_own
 from mjxgait.parts.settings import build_config
-from mjxgait.runs.blueprint import draw_up
+from mjxgait.physics.trees.tree import Surroundings
+from mjxgait.runs.blueprint import DRAG, draw_up
+from mjxgait.simulation.rollout import Simulator
 from mjxgait.tasks.swim import Swim
 
 
 class Smelling(Brains):
     """A brain with a mistake."""
 
-    def __init__(self, *told) -> None:
+    def __init__(self, *told: Any) -> None:
         super().__init__(*told)
         self.reads = (*self.reads, "contcat")
 
 
-def test_a_brain_reads_only_what_there_is_to_sense(stool: Creature):
+def swimmer(stool: Creature, controller: type) -> Simulator:
+    """The stool lends its time step."""
     add_own("task", "swim", Swim)
-    for kind in (Brains, Smelling):
-        add_own("controller", kind.__name__, kind)
-    use = {"controller": "Brains", "task": "swim"}
-    simulator = draw_up(stool, build_config({"use": use}, "test")).simulator()
-    assert simulator.controller.reads == ("joint_pos", "contact")
-    wrong = build_config({"use": use | {"controller": "Smelling"}}, "test")
+    add_own("controller", controller.__name__, controller)
+    use = {"controller": controller.__name__, "task": "swim"}
+    return draw_up(stool, build_config({"use": use}, "test")).simulator()
+
+
+def test_a_brain_reads_only_what_there_is_to_sense(stool: Creature):
+    assert swimmer(stool, Brains).controller.reads == ("joint_pos", "contact")
     with pytest.raises(UserError, match='there is no sense "contcat"'):
-        draw_up(stool, wrong).simulator()
+        swimmer(stool, Smelling)
+
+
+def test_who_swims_has_water_and_neither_ground_nor_weight(stool: Creature):
+    plant: Any = swimmer(stool, Brains).plant
+    step = float(stool.model.opt.timestep)
+    assert plant.around == Surroundings(step=step, floor=False, gravity=0.0, drag=DRAG)

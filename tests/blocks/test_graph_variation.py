@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from blocks.made_up import one
 
 from mjxgait.blocks.genotype import Capacity, Ranges
 from mjxgait.blocks.growth import grown
@@ -108,6 +109,25 @@ def test_a_graft_hangs_the_others_root_on_ones_own_tree(parents: tuple[Genotype,
     assert after[rows, first][room].all()
     same = jax.tree.map(lambda a, b: bool((a[~room] == b[~room]).all()), child, mother)
     assert all(jax.tree.leaves(same)), "without room nothing is grafted"
+
+
+def test_what_is_grafted_is_connected_as_it_was(parents: tuple[Genotype, Genotype]):
+    """The father's nodes in their new places lead to his, and what found no room is not led to."""
+    mother, father = (jax.tree.map(np.asarray, p) for p in parents)
+    child = jax.tree.map(np.asarray, children("graft", parents))
+    free = ~np.asarray(jax.vmap(reachable)(mother.graph))
+    led, dropped = 0, 0
+    for row in range(COUNT):
+        # His first nodes take the free places in order.
+        places = np.flatnonzero(free[row])
+        mine, his = one(child.graph, row), one(father.graph, row)
+        for node, place in enumerate(places):
+            kept = his.used[node] & (his.target[node] < len(places))
+            assert mine.used[place].tolist() == kept.tolist()
+            assert mine.target[place][kept].tolist() == places[his.target[node][kept]].tolist()
+            led, dropped = led + kept.sum(), dropped + (his.used[node] & ~kept).sum()
+    assert led > COUNT
+    assert dropped > COUNT / 10
 
 
 def test_a_mutation_changes_a_few_values(parents: tuple[Genotype, Genotype]):
