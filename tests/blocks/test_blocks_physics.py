@@ -19,6 +19,7 @@ from mjxgait.types import BodyState
 CAPACITY, LANES = Capacity(), 96
 ON_LAND = Surroundings(iterations=20, line_iterations=20)
 IN_WATER = Surroundings(floor=False, gravity=0.0, drag=300.0)
+forward = jax.jit(TreePlant(ON_LAND).forward)
 
 
 @pytest.fixture(scope="module")
@@ -123,7 +124,7 @@ def test_a_step_is_that_of_c_mujoco(graphs: Graph, bodies: Body, around: Surroun
 
 def test_what_is_sensed_is_where_it_is_in_c_mujoco(graphs: Graph, bodies: Body):
     state = moments(bodies, 0.3)
-    sensed = jax.tree.map(np.asarray, jax.jit(TreePlant(ON_LAND).forward)(state)[0])
+    sensed = jax.tree.map(np.asarray, forward(state)[0])
     for lane in range(LANES):
         body = one(bodies, lane)
         model, data, links = in_mujoco(one(graphs, lane), body, state, lane, ON_LAND)
@@ -144,3 +145,18 @@ def test_what_is_sensed_is_where_it_is_in_c_mujoco(graphs: Graph, bodies: Body):
         np.testing.assert_allclose(sensed.trunk_rot[..., lane], turned, atol=1e-5)
         spin = turned @ data.qvel[3:6]
         np.testing.assert_allclose(sensed.trunk_angvel[:, lane], spin, atol=1e-5)
+
+
+def test_the_corners_that_touch_are_those_of_c_mujoco(graphs: Graph, bodies: Body):
+    """The four that are below a block's middle, however deep in the ground it is."""
+    state = moments(bodies, 0.0)
+    distance = np.asarray(forward(state)[1].touch.distance).reshape(-1, CAPACITY.links, LANES)
+    for lane in range(LANES):
+        body = one(bodies, lane)
+        model, data, _ = in_mujoco(one(graphs, lane), body, state, lane, ON_LAND)
+        mujoco.mj_forward(model, data)
+        for part in np.flatnonzero(body.parts.exists):
+            block = model.geom(f"block{part}").id
+            touching = sorted(c.dist for c in data.contact if block in (c.geom1, c.geom2))
+            mine = np.sort(distance[:, body.parts.last[part], lane])
+            np.testing.assert_allclose(mine[mine < 0], touching, atol=1e-5)
