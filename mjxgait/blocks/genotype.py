@@ -11,6 +11,7 @@ import jax
 import jax.numpy as jnp
 
 from mjxgait.champion.blocks.material import JOINTS
+from mjxgait.settings.brains import BrainConfig
 from mjxgait.types import pytree
 
 
@@ -21,10 +22,10 @@ class Capacity:
     A part needs as many links as its joint has hinges, and at least one.
     """
 
-    nodes: int = 6
-    connections: int = 3
-    parts: int = 12
-    links: int = 12
+    nodes: int = BrainConfig.nodes
+    connections: int = BrainConfig.connections
+    parts: int = BrainConfig.parts
+    links: int = BrainConfig.links
 
 
 @dataclasses.dataclass(frozen=True)

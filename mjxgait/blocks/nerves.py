@@ -8,6 +8,7 @@ import dataclasses
 import jax
 
 from mjxgait.champion.blocks.material import INPUTS, NEURONS, SENSORS
+from mjxgait.settings.brains import BrainConfig
 from mjxgait.types import pytree
 
 
@@ -15,8 +16,8 @@ from mjxgait.types import pytree
 class NerveRoom:
     """How many neurons a node has, and how many are central."""
 
-    local: int = 3
-    central: int = 4
+    local: int = BrainConfig.local
+    central: int = BrainConfig.central
 
     @property
     def codes(self) -> int:

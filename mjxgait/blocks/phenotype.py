@@ -20,8 +20,7 @@ TURNS_ABOUT = np.array([(*axes, *[2] * (3 - len(axes))) for axes in AXES])
 
 @pytree
 class Body:
-    """A phenotype. part: [n] whose part a link is; hinge: [n] which of its hinges; axis:
-    [n] the part's own axis that it turns about.
+    """A phenotype. part: [n] whose part a link is; hinge: [n] which of its hinges.
 
     strength: [n] N·m. sign: [n], -1 where an angle is that of a mirror image.
     """
@@ -30,7 +29,6 @@ class Body:
     tree: Tree
     part: jax.Array
     hinge: jax.Array
-    axis: jax.Array
     strength: jax.Array
     sign: jax.Array
 
@@ -63,7 +61,7 @@ def body_of(graph: Graph, capacity: Capacity) -> Body:
     axis = jnp.asarray(TURNS_ABOUT)[kind[part], hinge]
     # Blocks are mirrored along y, and a turn about y is its own mirror image.
     sign = 1.0 - 2.0 * parts.copies[part] * (axis != 1)
-    return Body(parts, weighed(tree), part, hinge, axis, strength, sign)
+    return Body(parts, weighed(tree), part, hinge, strength, sign)
 
 
 def _frames(kind: jax.Array, hinge: jax.Array) -> jax.Array:

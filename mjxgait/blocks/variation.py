@@ -11,6 +11,7 @@ import jax.numpy as jnp
 
 from mjxgait.blocks.genotype import Capacity, Graph, Ranges, random_graph
 from mjxgait.blocks.nerves import Centre, NerveRoom, Nerves, random_centre, random_nerves
+from mjxgait.settings.brains import BrainConfig
 from mjxgait.types import pytree
 
 
@@ -32,10 +33,10 @@ class Rates:
     connection: chance of one more or one less. node: of a new node.
     """
 
-    value: float = 4.0
-    sigma: float = 0.2
-    connection: float = 0.3
-    node: float = 0.1
+    value: float = BrainConfig.values
+    sigma: float = BrainConfig.sigma
+    connection: float = BrainConfig.connect
+    node: float = BrainConfig.grow
 
 
 @dataclasses.dataclass(frozen=True)
@@ -101,10 +102,11 @@ class Kin:
     def _moved(self, key: jax.Array, genotype: Genotype, other: Genotype) -> Genotype:
         """Numbers shifted by a normal step, kinds and flags drawn anew, a few of each."""
         alive = reachable(genotype.graph)
-        leaves, shape = jax.tree.flatten(_without_used(genotype))
+        varied = _without_used(genotype)
+        leaves, shape = jax.tree.flatten(varied)
         fresh = jax.tree.leaves(_without_used(other))
-        sizes = [leaf.size // leaf.shape[0] for leaf in leaves if leaf.shape[0] == len(alive)]
-        chance = self.rates.value / (jnp.sum(alive) * sum(sizes))
+        of_nodes = jax.tree.leaves((varied.graph, varied.nerves))
+        chance = self.rates.value / (jnp.sum(alive) * sum(leaf[0].size for leaf in of_nodes))
         keys = jax.random.split(key, len(leaves))
         moved = [
             _shifted(k, leaf, new, chance, self.rates.sigma, bounds)

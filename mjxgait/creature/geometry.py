@@ -6,6 +6,7 @@ import numpy as np
 from mjxgait.errors import UserError
 
 GEOM = mujoco.mjtGeom
+DOWN = np.array([0.0, 0.0, -1.0])
 
 
 def support_extents(geom_type: int, size: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
@@ -48,6 +49,17 @@ def geom_reach(
         + np.abs(u) @ box
         + np.sqrt(((u * ellipsoid) ** 2).sum())
     )
+
+
+def shapes(model: mujoco.MjModel) -> list[int]:
+    """The geoms of bodies that may touch something."""
+    collides = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
+    return [int(g) for g in np.flatnonzero(collides & (model.geom_bodyid != 0))]
+
+
+def lowest(model: mujoco.MjModel, data: mujoco.MjData) -> float:
+    """m, the lowest point of what may touch something."""
+    return min(-geom_reach(model, data, g, DOWN) for g in shapes(model))
 
 
 def body_length(model: mujoco.MjModel, data: mujoco.MjData, forward: np.ndarray) -> float:

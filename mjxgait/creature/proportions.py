@@ -11,7 +11,7 @@ import numpy as np
 
 from mjxgait.creature.creature import Creature
 from mjxgait.creature.frame import vertical_freedom
-from mjxgait.creature.geometry import support_extents
+from mjxgait.creature.geometry import DOWN, geom_reach, shapes
 from mjxgait.creature.scale import load_files, scaled_files
 from mjxgait.errors import UserError
 
@@ -129,19 +129,12 @@ def _heights(creature: Creature) -> tuple[np.ndarray, np.ndarray]:
         reach[body] = reach[parent]
         reach[body, parent] += place
         reach[body, body] += data.xpos[body, 2] - data.xpos[parent, 2] - place - slid
-    shapes = [
-        g
-        for g in range(model.ngeom)
-        if model.geom_bodyid[g] and (model.geom_contype[g] or model.geom_conaffinity[g])
-    ]
-    rows = reach[model.geom_bodyid[shapes]].copy()
-    for row, g in zip(rows, shapes, strict=True):
+    geoms = shapes(model)
+    rows = reach[model.geom_bodyid[geoms]].copy()
+    for row, g in zip(rows, geoms, strict=True):
         body = int(model.geom_bodyid[g])
-        radius, box, ellipsoid = support_extents(int(model.geom_type[g]), model.geom_size[g])
-        down = np.abs(data.geom_xmat[g].reshape(3, 3)[2])
-        low = data.geom_xpos[g, 2] - radius - down @ box - np.linalg.norm(down * ellipsoid)
-        row[body] += low - data.xpos[body, 2]
-    return fixed[model.geom_bodyid[shapes]], rows[:, 1:]
+        row[body] += -geom_reach(model, data, g, DOWN) - data.xpos[body, 2]
+    return fixed[model.geom_bodyid[geoms]], rows[:, 1:]
 
 
 def _slid(model: mujoco.MjModel, data: mujoco.MjData, body: int) -> float:

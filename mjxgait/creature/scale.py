@@ -13,7 +13,7 @@ import tomli_w
 
 from mjxgait.creature import Creature, load_creature
 from mjxgait.creature.frame import vertical_freedom
-from mjxgait.creature.geometry import support_extents
+from mjxgait.creature.geometry import lowest
 from mjxgait.errors import UserError, did_you_mean
 
 MODEL, SETTINGS = "creature.xml", "creature.toml"
@@ -144,17 +144,8 @@ def _stand(spec: mujoco.MjSpec, height: float) -> None:
 
 
 def _lowest(model: mujoco.MjModel) -> float:
-    """m, the lowest point of what can collide, in the first keyframe."""
+    """m, the lowest point in the first keyframe."""
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, 0)
     mujoco.mj_kinematics(model, data)
-    heights = []
-    for geom in range(model.ngeom):
-        collides = model.geom_contype[geom] or model.geom_conaffinity[geom]
-        if model.geom_bodyid[geom] == 0 or not collides:
-            continue
-        radius, box, ellipsoid = support_extents(int(model.geom_type[geom]), model.geom_size[geom])
-        down = np.abs(data.geom_xmat[geom].reshape(3, 3)[2])
-        reach = radius + down @ box + np.linalg.norm(down * ellipsoid)
-        heights.append(data.geom_xpos[geom][2] - reach)
-    return float(min(heights))
+    return lowest(model, data)

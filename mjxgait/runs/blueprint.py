@@ -14,6 +14,7 @@ from mjxgait.body import Body, Ends, GivenBody, given_body, given_ends
 from mjxgait.control.bodied import BodiedController
 from mjxgait.control.brains.controller import capacity_of
 from mjxgait.control.drive import Drive
+from mjxgait.control.protocol import Controller
 from mjxgait.creature import Creature
 from mjxgait.creature.settings import Termination
 from mjxgait.parts import make_controller, make_task
@@ -21,12 +22,13 @@ from mjxgait.parts.registry import find, what_ends
 from mjxgait.physics import make_plant
 from mjxgait.physics.trees.plant import TreePlant
 from mjxgait.physics.trees.tree import Surroundings
-from mjxgait.runs.growth import GraphGrowth, SizeGrowth, growth_of
+from mjxgait.runs.growth import GraphGrowth, Growth, SizeGrowth, growth_of
 from mjxgait.senses import check_senses
-from mjxgait.settings.config import Config
+from mjxgait.settings.config import Config, RolloutConfig
 from mjxgait.simulation.rollout import AXIS, Simulator
+from mjxgait.tasks.protocol import Task
 from mjxgait.tasks.trials import Starts
-from mjxgait.types import ModelPlant, pytree
+from mjxgait.types import ModelPlant, Plant, pytree
 
 GRAVITY, DRAG, LANES = 9.81, 500.0, 64
 """m/s²; N·s/m³ of water; simulations per device."""
@@ -119,18 +121,8 @@ class Blueprint:
             sizes = len(self.growth.proportions.names)
             controller = BodiedController(controller, sizes, self.config.evolution.body)
         task = make_task(body, step, ends, self.config)
-        check_senses(controller.reads, task.adds)
-        return Simulator(
-            creature=body,
-            plant=plant,
-            controller=controller,
-            drive=Drive(body, step, controller.command),
-            task=task,
-            steps=max(round(self.config.rollout.seconds / step), 1),
-            lanes=self.config.rollout.lanes or self.lanes,
-            mesh=Mesh(np.array(jax.devices()), (AXIS,)),
-            bodies=None if self.growth is None else partial(self.growth.body, plant),
-        )
+        growth, rollout = self.growth, self.config.rollout
+        return _assembled(body, step, plant, controller, task, rollout, self.lanes, growth)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -167,18 +159,37 @@ class GrownBlueprint:
         around = Surroundings(
             step=step, floor=not water, gravity=0.0 if water else GRAVITY, drag=DRAG * water
         )
-        plant = TreePlant(around)
-        return Simulator(
-            creature=body,
-            plant=plant,
-            controller=controller,
-            drive=Drive(body, step, controller.command),
-            task=task,
-            steps=max(round(config.rollout.seconds / step), 1),
-            lanes=config.rollout.lanes or LANES,
-            mesh=Mesh(np.array(jax.devices()), (AXIS,)),
-            bodies=partial(GraphGrowth(capacity).body, plant),
-        )
+        plant, growth = TreePlant(around), GraphGrowth(capacity)
+        return _assembled(body, step, plant, controller, task, config.rollout, LANES, growth)
+
+
+def _assembled(
+    body: Body,
+    step: float,
+    plant: Plant,
+    controller: Controller,
+    task: Task,
+    rollout: RolloutConfig,
+    lanes: int,
+    growth: Growth | None,
+) -> Simulator:
+    """Of parts that belong together. lanes: where the settings leave them open.
+
+    Raises:
+      UserError: the controller reads what nobody senses.
+    """
+    check_senses(controller.reads, task.adds)
+    return Simulator(
+        creature=body,
+        plant=plant,
+        controller=controller,
+        drive=Drive(body, step, controller.command),
+        task=task,
+        steps=max(round(rollout.seconds / step), 1),
+        lanes=rollout.lanes or lanes,
+        mesh=Mesh(np.array(jax.devices()), (AXIS,)),
+        bodies=None if growth is None else partial(growth.body, plant),
+    )
 
 
 def draw_up(creature: Creature, config: Config) -> Plan:

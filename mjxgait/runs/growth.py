@@ -33,8 +33,11 @@ class GraphGrowth:
     capacity: Capacity
 
     def body(self, plant: Any, genome: Genotype, start: Starts) -> Starts:
-        """See `Growth`."""
-        return dataclasses.replace(start, numbers=body_of(genome.graph, self.capacity).tree)
+        """See `Growth`. What has no hinge is not bent."""
+        tree = body_of(genome.graph, self.capacity).tree
+        bent = start.qpos[7:] * tree.moves[1:]
+        qpos = jnp.concatenate([start.qpos[:7], bent])
+        return dataclasses.replace(start, qpos=qpos, numbers=tree)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -11,6 +11,7 @@ from mjxgait.blocks.genotype import Capacity, Graph, Ranges, random_graph
 from mjxgait.blocks.phenotype import Body, body_of
 from mjxgait.champion.blocks.parts import grow
 from mjxgait.champion.blocks.xml import body_xml
+from mjxgait.creature.geometry import DOWN, geom_reach
 from mjxgait.physics.trees.plant import TreePlant
 from mjxgait.physics.trees.tree import Surroundings
 from mjxgait.types import BodyState
@@ -18,6 +19,7 @@ from mjxgait.types import BodyState
 CAPACITY, LANES = Capacity(), 96
 ON_LAND = Surroundings(iterations=20, line_iterations=20)
 IN_WATER = Surroundings(floor=False, gravity=0.0, drag=300.0)
+forward = jax.jit(TreePlant(ON_LAND).forward)
 
 
 @pytest.fixture(scope="module")
@@ -118,3 +120,43 @@ def test_a_step_is_that_of_c_mujoco(graphs: Graph, bodies: Body, around: Surroun
     assert np.max(wrong) < 2e-3
     still = np.asarray(after.qvel)[6:][moves[6:] == 0]
     assert not still.any(), "what is not there does not move"
+
+
+def test_what_is_sensed_is_where_it_is_in_c_mujoco(graphs: Graph, bodies: Body):
+    state = moments(bodies, 0.3)
+    sensed = jax.tree.map(np.asarray, forward(state)[0])
+    for lane in range(LANES):
+        body = one(bodies, lane)
+        model, data, links = in_mujoco(one(graphs, lane), body, state, lane, ON_LAND)
+        mujoco.mj_forward(model, data)
+        parts = np.flatnonzero(body.parts.exists)
+        last, blocks = body.parts.last[parts], [model.geom(f"block{part}").id for part in parts]
+        lows = [-geom_reach(model, data, block, DOWN) for block in blocks]
+        np.testing.assert_allclose(sensed.geom_low[last, lane], lows, atol=1e-5)
+        np.testing.assert_allclose(
+            sensed.geom_pos[last, :, lane], data.geom_xpos[blocks], atol=1e-5
+        )
+        nothing = np.setdiff1d(np.arange(CAPACITY.links), last)
+        assert (sensed.geom_low[nothing, lane] > 100).all(), "what is not there touches nothing"
+        hinges = np.array(links, int) - 1
+        np.testing.assert_allclose(sensed.joint_pos[hinges, lane], data.qpos[7:], atol=1e-6)
+        np.testing.assert_allclose(sensed.joint_vel[hinges, lane], data.qvel[6:], atol=1e-6)
+        turned = data.xmat[1].reshape(3, 3)
+        np.testing.assert_allclose(sensed.trunk_rot[..., lane], turned, atol=1e-5)
+        spin = turned @ data.qvel[3:6]
+        np.testing.assert_allclose(sensed.trunk_angvel[:, lane], spin, atol=1e-5)
+
+
+def test_the_corners_that_touch_are_those_of_c_mujoco(graphs: Graph, bodies: Body):
+    """The four that are below a block's middle, however deep in the ground it is."""
+    state = moments(bodies, 0.0)
+    distance = np.asarray(forward(state)[1].touch.distance).reshape(-1, CAPACITY.links, LANES)
+    for lane in range(LANES):
+        body = one(bodies, lane)
+        model, data, _ = in_mujoco(one(graphs, lane), body, state, lane, ON_LAND)
+        mujoco.mj_forward(model, data)
+        for part in np.flatnonzero(body.parts.exists):
+            block = model.geom(f"block{part}").id
+            touching = sorted(c.dist for c in data.contact if block in (c.geom1, c.geom2))
+            mine = np.sort(distance[:, body.parts.last[part], lane])
+            np.testing.assert_allclose(mine[mine < 0], touching, atol=1e-5)

@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from blocks.made_up import one
 
 from mjxgait.blocks.genotype import Capacity, Ranges
 from mjxgait.blocks.growth import grown
@@ -110,6 +111,25 @@ def test_a_graft_hangs_the_others_root_on_ones_own_tree(parents: tuple[Genotype,
     assert all(jax.tree.leaves(same)), "without room nothing is grafted"
 
 
+def test_what_is_grafted_is_connected_as_it_was(parents: tuple[Genotype, Genotype]):
+    """The father's nodes in their new places lead to his, and what found no room is not led to."""
+    mother, father = (jax.tree.map(np.asarray, p) for p in parents)
+    child = jax.tree.map(np.asarray, children("graft", parents))
+    free = ~np.asarray(jax.vmap(reachable)(mother.graph))
+    led, dropped = 0, 0
+    for row in range(COUNT):
+        # His first nodes take the free places in order.
+        places = np.flatnonzero(free[row])
+        mine, his = one(child.graph, row), one(father.graph, row)
+        for node, place in enumerate(places):
+            kept = his.used[node] & (his.target[node] < len(places))
+            assert mine.used[place].tolist() == kept.tolist()
+            assert mine.target[place][kept].tolist() == places[his.target[node][kept]].tolist()
+            led, dropped = led + kept.sum(), dropped + (his.used[node] & ~kept).sum()
+    assert led > COUNT
+    assert dropped > COUNT / 10
+
+
 def test_a_mutation_changes_a_few_values(parents: tuple[Genotype, Genotype]):
     calm = Kin(CAPACITY, ROOM, RANGES, Rates(value=4.0, connection=0.0, node=0.0))
     keys = jax.random.split(jax.random.key(3), COUNT)
@@ -124,6 +144,18 @@ def test_a_mutation_changes_a_few_values(parents: tuple[Genotype, Genotype]):
     # A kind that is drawn anew may be what it was.
     assert 2.5 < changes.mean() < 4.2
     assert jnp.array_equal(child.graph.used, parents[0].graph.used)
+
+
+def test_as_many_central_neurons_as_nodes_change_nothing_of_a_graphs_mutation():
+    """They do not grow, so they do not count among the values of which a few change."""
+    graphs = []
+    for central in (CAPACITY.nodes, CAPACITY.nodes + 1):
+        kin = Kin(CAPACITY, NerveRoom(central=central), RANGES)
+        keys = jax.random.split(jax.random.key(4), 100)
+        child = jax.jit(jax.vmap(lambda key, kin=kin: kin.mutate(key, kin.create(key))))(keys)
+        graphs.append(child.graph)
+    for a, b in zip(*map(jax.tree.leaves, graphs), strict=True):
+        np.testing.assert_array_equal(a, b)
 
 
 def test_nodes_and_connections_come_and_go(parents: tuple[Genotype, Genotype]):

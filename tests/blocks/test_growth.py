@@ -1,6 +1,7 @@
 """Graphs grow into bodies: as a plain list would, within their room, and mirror images are such."""
 
 import dataclasses
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -11,8 +12,11 @@ from blocks.made_up import genome_of, one
 from mjxgait.blocks.genotype import Capacity, Graph, Ranges, random_graph
 from mjxgait.blocks.growth import Parts, grown
 from mjxgait.blocks.phenotype import Body, body_of
+from mjxgait.blocks.variation import Genotype
 from mjxgait.champion.blocks.material import JOINTS
 from mjxgait.champion.blocks.parts import grow
+from mjxgait.runs.growth import GraphGrowth
+from mjxgait.tasks.trials import Starts
 
 CAPACITY, COUNT = Capacity(), 1000
 
@@ -124,6 +128,17 @@ def test_a_pair_is_the_mirror_image_of_each_other():
     # A turn is mirrored to the turn the other way about the axis's image.
     np.testing.assert_allclose((sign * axes)[right], -(sign * axes)[left] * flip, atol=1e-6)
     assert np.asarray(body.strength)[left].tolist() == np.asarray(body.strength)[right].tolist()
+
+
+def test_what_has_no_hinge_starts_unbent():
+    """A start bends every hinge that there may be; what is rigid would stay bent for ever."""
+    nobody: Any = None
+    bent = jnp.full(7 + CAPACITY.links - 1, 0.3)
+    start = Starts(bent, *[jnp.zeros(1)] * 6)
+    for joint, hinges in (("rigid", 0), ("universal", 2)):
+        genome = Genotype(star(mirror=0, joint=joint), nobody, nobody)
+        qpos = np.asarray(GraphGrowth(CAPACITY).body(nobody, genome, start).qpos)
+        np.testing.assert_allclose(qpos, [0.3] * (7 + hinges) + [0] * (11 - hinges), atol=1e-7)
 
 
 def moving(body: Body) -> np.ndarray:

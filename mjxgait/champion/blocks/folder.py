@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 
 import mujoco
-import numpy as np
 import tomli_w
 
 from mjxgait.champion.blocks.parts import Part
 from mjxgait.champion.blocks.xml import body_xml
+from mjxgait.creature.geometry import lowest
 from mjxgait.errors import UserError
 
 SOFT = 0.01
@@ -61,7 +61,4 @@ def _resting_height(xml: str) -> float:
     model = mujoco.MjModel.from_xml_string(xml)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    blocks = np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_BOX)
-    down = np.abs(data.geom_xmat[blocks].reshape(-1, 3, 3)[:, 2])
-    lowest = (data.geom_xpos[blocks, 2] - (down * model.geom_size[blocks]).sum(1)).min()
-    return float(data.body("part0").xpos[2] - lowest)
+    return float(data.body("part0").xpos[2] - lowest(model, data))

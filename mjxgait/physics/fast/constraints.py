@@ -2,19 +2,17 @@
 
 A contact of MuJoCo's pyramidal cone has four edges, normal plus or minus friction times each tangent. Here it is kept in its three
 directions (normal, first, second tangent), of which the edges are combinations, and the friction enters late.
-All contacts' values lie side by side in arrays [C, L], the limits' in [M, L]. Formulas: MuJoCo documentation, "Computation", sections
-"Constraint model" and "Contact", and MJX's constraint.py.
+All contacts' values lie side by side in arrays [C, L], the limits' in [M, L].
+Formulas: see `springs`.
 """
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import groupby
 from typing import Any, Protocol
 
 import jax
 import jax.numpy as jnp
-import mujoco
-import numpy as np
 
 from mjxgait.ground.surface import Ground, contact
 from mjxgait.physics.fast.carriers import Carriers
@@ -23,12 +21,9 @@ from mjxgait.physics.fast.footing import Footing, Moves, Touch
 from mjxgait.physics.fast.frames import Directions, Frames, Level, Tilted, Turned
 from mjxgait.physics.fast.kinematics import Motion, Pose
 from mjxgait.physics.fast.lanes import Pin, add, turn
-from mjxgait.physics.fast.parameters import Softness
+from mjxgait.physics.fast.springs import Springs, contact_terms, limit_terms
 from mjxgait.physics.fast.structure import Structure, scalars
 from mjxgait.physics.fast.treematrix import Rows, Sparsity
-
-SMALLEST_FRICTION = 1e-5
-"""mjMINMU, under which MuJoCo's engine lets no friction coefficient fall."""
 
 
 class Limited(Protocol):
@@ -217,23 +212,15 @@ def make_constraints(
 def _contact_terms(
     footing: Footing, friction: jax.Array, qvel: jax.Array
 ) -> tuple[jax.Array, Directions, jax.Array]:
-    structure, touch, pin = footing.structure, footing.touch, footing.pin
-    contacts = structure.columns.contacts
-    mu = jnp.maximum(contacts.friction * friction, SMALLEST_FRICTION)
-    impedance, depth = soften(contacts.softness, structure.topology.contact_power, touch.distance)
-    stiffness, damping = contacts.softness.stiffness, contacts.softness.damping
-    # Regulariser of all edges (MJX `_efc_contact_pyramidal`): inverse mass along an edge, scaled by friction.
-    inverse_mass = contacts.weight * (1 + mu * mu) * 2 * mu * mu / structure.impratio
-    weight = jnp.where(
-        depth < 0, impedance / jnp.maximum(inverse_mass * (1 - impedance), mujoco.mjMINVAL), 0.0
+    structure, contacts = footing.structure, footing.structure.columns.contacts
+    return contact_terms(
+        Springs(contacts.softness, structure.topology.contact_power, contacts.weight),
+        footing.touch.distance,
+        contacts.friction * friction,
+        footing.along(list(qvel)),
+        footing.pin,
+        structure.impratio,
     )
-    normal, first, second = footing.along(list(qvel))
-    reference = (
-        -damping * normal - stiffness * impedance * depth,
-        -damping * first,
-        -damping * second,
-    )
-    return pin(mu), pin(reference), pin(weight)
 
 
 def _limit_terms(
@@ -242,33 +229,5 @@ def _limit_terms(
     slots, limits = structure.limits, structure.columns.limits
     pos = jnp.stack([qpos[limit.qpos] for limit in slots])
     vel = jnp.stack([qvel[limit.dof] for limit in slots])
-    over_low, under_high = pos - limits.low, limits.high - pos
-    sign = jnp.where(over_low < under_high, 1.0, -1.0)
-    stiffness, damping = limits.softness.stiffness, limits.softness.damping
-    impedance, depth = soften(
-        limits.softness, structure.topology.limit_power, jnp.minimum(over_low, under_high)
-    )
-    weight = jnp.where(
-        depth < 0, impedance / jnp.maximum(limits.weight * (1 - impedance), mujoco.mjMINVAL), 0.0
-    )
-    return pin(sign), pin(-damping * sign * vel - stiffness * impedance * depth), pin(weight)
-
-
-def soften(
-    softness: Softness, powers: Sequence[float], distance: jax.Array
-) -> tuple[Any, jax.Array]:
-    """Impedance and distance less margin of constraints [C, L] (computation docs, "Impedance")."""
-    low, high, width, mid = (softness.impedance[:, n] for n in range(4))
-    power = np.array(powers, distance.dtype)[:, None]
-    depth = distance - softness.margin
-    x = jnp.minimum(jnp.abs(depth) / width, 1.0)
-    raised = _power(power)
-    y = jnp.where(
-        x < mid, raised(x) / raised(mid) * mid, 1 - raised(1 - x) / raised(1 - mid) * (1 - mid)
-    )
-    return low + y * (high - low), depth
-
-
-def _power(power: np.ndarray) -> Callable[..., jax.Array]:
-    """x to the power; MuJoCo's default 2 without transcendental functions."""
-    return (lambda x: x * x) if np.all(power == 2) else (lambda x: jnp.power(x, power))
+    springs = Springs(limits.softness, structure.topology.limit_power, limits.weight)
+    return limit_terms(springs, pos - limits.low, limits.high - pos, vel, pin)

@@ -27,6 +27,7 @@ from mjxgait.physics.fast.lanes import (
     scale,
     table,
     total,
+    turn_each,
 )
 from mjxgait.physics.fast.slots import BALL, FREE, HINGE, SLIDE, BodySlot
 from mjxgait.physics.fast.structure import Structure
@@ -85,12 +86,8 @@ def inertias(x: Masses, poses: Sequence[Pose], like: jax.Array, pin: Pin) -> Ine
     """Of all bodies."""
     pos = pin(table([pose.pos for pose in poses], like))
     rot = [pin(table([pose.rot[j] for pose in poses], like)) for j in range(3)]
-
-    def turned(local: Number) -> Vector:
-        return tuple(total([local[:, j] * rot[j][:, i] for j in range(3)]) for i in range(3))
-
-    center = pin(plus(axes(pos), turned(x.com)))
-    first, second = pin((turned(x.axes[:, 0]), turned(x.axes[:, 1])))
+    center = pin(plus(axes(pos), turn_each(rot, x.com)))
+    first, second = pin((turn_each(rot, x.axes[:, 0]), turn_each(rot, x.axes[:, 1])))
     # Two principal axes carry what their moments differ from the third; the third's goes to the identity.
     least, mass = x.inertia[:, 2], x.mass
     a, b = x.inertia[:, 0] - least, x.inertia[:, 1] - least

@@ -119,6 +119,12 @@ def turn(matrix: Sequence[Any], vector: Sequence[Scalar]) -> Any:
     return dot(matrix, vector)
 
 
+def turn_each(matrices: Sequence[Any], vectors: Number) -> Vector:
+    """`turn` of n vectors [n, 3, L], each by its own three columns [n, 3, L]; components [n, L]."""
+    x, y, z = (total([vectors[:, j] * matrices[j][:, i] for j in range(3)]) for i in range(3))
+    return x, y, z
+
+
 def axes(array: jax.Array) -> Vector:
     """Components of vectors stored together: [n, 3, L] to three [n, L]."""
     return array[:, 0], array[:, 1], array[:, 2]

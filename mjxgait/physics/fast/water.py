@@ -15,7 +15,17 @@ import numpy as np
 
 from mjxgait.physics.fast.dynamics import Inertia, by_dof, pack, unpack, up
 from mjxgait.physics.fast.kinematics import Motion, Pose
-from mjxgait.physics.fast.lanes import Pin, Vector, cross, dot, plus, scale, table, total
+from mjxgait.physics.fast.lanes import (
+    Pin,
+    Vector,
+    cross,
+    dot,
+    plus,
+    scale,
+    table,
+    total,
+    turn_each,
+)
 from mjxgait.physics.fast.structure import Structure
 from mjxgait.types import Number
 
@@ -54,13 +64,7 @@ def principal_axes(
 ) -> tuple[Vector, Vector, Vector]:
     """The three principal axes of every body in the world, components [B, L] each."""
     rot = [pin(table([pose.rot[j] for pose in poses], like)) for j in range(3)]
-    local = structure.columns.axes
-
-    def turned(n: int) -> Vector:
-        x, y, z = (total([local[:, n, j] * rot[j][:, i] for j in range(3)]) for i in range(3))
-        return x, y, z
-
-    first, second = turned(0), turned(1)
+    first, second = (turn_each(rot, structure.columns.axes[:, n]) for n in (0, 1))
     return first, second, cross(first, second)
 
 

@@ -6,7 +6,19 @@ import jax
 import jax.numpy as jnp
 
 from mjxgait.physics.fast.kinematics import Motion, Pose, unit_quaternion
-from mjxgait.physics.fast.lanes import Pin, axes, cross, rotation, sin_cos, total
+from mjxgait.physics.fast.lanes import (
+    Pin,
+    Vector,
+    axes,
+    cross,
+    parts,
+    plus,
+    rotation,
+    sin_cos,
+    total,
+    turn,
+    turn_each,
+)
 from mjxgait.physics.trees.tree import Tree
 
 
@@ -19,13 +31,9 @@ def posture(tree: Tree, qpos: jax.Array, pin: Pin) -> list[Pose]:
     for link in range(1, tree.links):
         above = total([known[a] * tree.parent[link, a] for a in range(link)])
         rot, pos = [above[:3], above[3:6], above[6:9]], above[9:]
-
-        def turned(local: jax.Array, rot: Sequence[jax.Array] = rot) -> jax.Array:
-            return total([axis * local[j] for j, axis in enumerate(rot)])
-
-        x, y, z = (turned(tree.turn[link, axis]) for axis in range(3))
+        x, y, z = (turn(rot, parts(tree.turn[link, axis])) for axis in range(3))
         sin, cos = sines[link - 1], cosines[link - 1]
-        place = pos + turned(tree.place[link])
+        place = pos + turn(rot, parts(tree.place[link]))
         known.append(pin(jnp.concatenate([x * cos + y * sin, y * cos - x * sin, z, place])))
     origin = qpos[:3]
     return [Pose(origin, k[9:], (k[:3], k[3:6], k[6:9])) for k in known]
@@ -40,6 +48,17 @@ def motions(tree: Tree, poses: Sequence[Pose], pin: Pin) -> Motion:
     place = jnp.stack([pose.pos for pose in poses])
     shift = cross(axes(place), axes(axis))
     return Motion(axes(pin(axis)), pin(shift))
+
+
+def frames(poses: Sequence[Pose]) -> list[jax.Array]:
+    """The three axes of all links, [n, 3, L] each; see `turn_each`."""
+    return [jnp.stack([pose.rot[j] for pose in poses]) for j in range(3)]
+
+
+def centres(tree: Tree, poses: Sequence[Pose]) -> Vector:
+    """The middles of all blocks, components [n, L] m from the origin."""
+    place = jnp.stack([pose.pos for pose in poses])
+    return plus(axes(place), turn_each(frames(poses), tree.com))
 
 
 def root_turns(poses: Sequence[Pose]) -> jax.Array:

@@ -2,7 +2,6 @@
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -10,33 +9,26 @@ import jax.numpy as jnp
 from mjxgait.physics.fast.dynamics import inertias
 from mjxgait.physics.fast.kernel import one_kernel
 from mjxgait.physics.fast.kinematics import Motion, Pose
-from mjxgait.physics.fast.lanes import pinned_by, total
+from mjxgait.physics.fast.lanes import pinned_by, total, turn_each
 from mjxgait.physics.fast.newton import Problem, constrained_acceleration
 from mjxgait.physics.fast.plant import turned
 from mjxgait.physics.fast.treematrix import Rows, factor, on_pivot, solve, sparsity
 from mjxgait.physics.trees.dynamics import bias_links, generalised, mass_rows, velocities
-from mjxgait.physics.trees.motion import motions, posture, root_turns
+from mjxgait.physics.trees.motion import centres, frames, motions, posture, root_turns
 from mjxgait.physics.trees.touch import BlockFooting, Touch, lowest_corners, make_constraints
-from mjxgait.physics.trees.tree import Surroundings, Tree
+from mjxgait.physics.trees.tree import FAR, Surroundings, Tree
 from mjxgait.physics.trees.water import drag_links
 from mjxgait.types import BodyState, Sensed, pytree
-
-FAR = 1e3
-"""m, how high above the ground a block is that there is not."""
 
 
 @pytree
 class Moment:
     """What a step has computed of the present.
 
-    pos: [n, 3, L] m of the links from the root, rot: [n, 3, 3, L] their axes (rows), moving:
-    [n, 6, L] their velocities about the root's place. mass: rows. bias: [nv, L]. touch: None
-    without a floor.
+    turns: [3, 3, L] the root's axes. freedom: components [n, L] of what each hinge moves.
+    mass: rows. bias: [nv, L]. touch: None without a floor.
     """
 
-    pos: jax.Array
-    rot: jax.Array
-    moving: jax.Array
     turns: jax.Array
     freedom: tuple[jax.Array, ...]
     mass: Rows
@@ -83,9 +75,6 @@ class TreePlant:
         bias = jnp.stack(generalised(tree, turns, freedom, force, pin))
         resisted = jnp.concatenate([jnp.zeros_like(bias[:6]), tree.damping[1:] * state.qvel[6:]])
         moment = Moment(
-            pos=jnp.stack([pose.pos for pose in poses]),
-            rot=_rows(poses),
-            moving=moving,
             turns=turns,
             freedom=freedom.parts,
             mass=mass_rows(tree, turns, freedom, body, pin),
@@ -118,14 +107,10 @@ def _sensed(
     tree: Tree, state: BodyState, poses: Sequence[Pose], moving: jax.Array, bias: jax.Array
 ) -> Sensed:
     """The trunk is the root; every block is watched, and what there is not is far up."""
-    rot = [jnp.stack([pose.rot[j] for pose in poses]) for j in range(3)]
-
-    def turned(local: jax.Array) -> list[jax.Array]:
-        return [total([local[:, j] * rot[j][:, i] for j in range(3)]) for i in range(3)]
-
-    place = jnp.stack([pose.pos for pose in poses])
-    centre = [c + place[:, i] + state.qpos[i] for i, c in enumerate(turned(tree.com))]
-    reach = total([tree.half[:, k] * jnp.abs(turned(tree.axes[:, k])[2]) for k in range(3)])
+    rot = frames(poses)
+    centre = [c + state.qpos[i] for i, c in enumerate(centres(tree, poses))]
+    heights = [turn_each(rot, tree.axes[:, k])[2] for k in range(3)]
+    reach = total([tree.half[:, k] * jnp.abs(height) for k, height in enumerate(heights)])
     return Sensed(
         joint_pos=state.qpos[7:],
         joint_vel=state.qvel[6:],
@@ -143,7 +128,3 @@ def _solve_damped(mass: Rows, damping: jax.Array, force: jax.Array) -> list[jax.
     pattern = sparsity(range(-1, len(mass) - 1))
     damped = tuple(on_pivot(row, damping[k]) for k, row in enumerate(mass))
     return solve(pattern, factor(pattern, damped), list(force))
-
-
-def _rows(poses: Sequence[Pose]) -> Any:
-    return jnp.stack([jnp.stack(pose.rot) for pose in poses])

@@ -10,17 +10,18 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from mjxgait.physics.fast.constraints import Constraints, soften
+from mjxgait.physics.fast.constraints import Constraints
 from mjxgait.physics.fast.dynamics import pack
 from mjxgait.physics.fast.footing import resistance, spatial
 from mjxgait.physics.fast.frames import Directions, Level
 from mjxgait.physics.fast.kinematics import Motion, Pose
-from mjxgait.physics.fast.lanes import Pin, axes, cross, plus, total
+from mjxgait.physics.fast.lanes import Pin, axes, cross, plus, total, turn_each
 from mjxgait.physics.fast.parameters import Softness
+from mjxgait.physics.fast.springs import Springs, contact_terms, limit_terms
 from mjxgait.physics.fast.treematrix import Rows
 from mjxgait.physics.trees.dynamics import generalised, tree_rows, velocities
-from mjxgait.physics.trees.motion import up
-from mjxgait.physics.trees.tree import Dense, Surroundings, Tree
+from mjxgait.physics.trees.motion import centres, frames, up
+from mjxgait.physics.trees.tree import FAR, Dense, Surroundings, Tree
 from mjxgait.types import pytree
 
 CORNERS = 4
@@ -34,7 +35,10 @@ LEVEL = Level()
 
 @pytree
 class Touch:
-    """distance: [4 n, L] m above the ground; points: x, y, z [4 n, L] m from the origin."""
+    """distance: [4 n, L] m above the ground, `FAR` of what there is not.
+
+    points: x, y, z [4 n, L] m from the origin.
+    """
 
     distance: jax.Array
     points: tuple[jax.Array, jax.Array, jax.Array]
@@ -46,12 +50,8 @@ def lowest_corners(tree: Tree, poses: Sequence[Pose]) -> Touch:
     With the half axes pointing down and the steepest first, K, A and B: K + A + B, K + A - B,
     K - A + B, and K - A - B or, where that is above the centre, its opposite.
     """
-    rot = [jnp.stack([pose.rot[j] for pose in poses]) for j in range(3)]
-
-    def turned(local: jax.Array) -> list[jax.Array]:
-        return [total([local[:, j] * rot[j][:, i] for j in range(3)]) for i in range(3)]
-
-    halves = [turned(tree.axes[:, k] * tree.half[:, k, None]) for k in range(3)]
+    rot = frames(poses)
+    halves = [turn_each(rot, tree.axes[:, k] * tree.half[:, k, None]) for k in range(3)]
     down = [[-jnp.where(half[2] > 0, 1.0, -1.0) * x for x in half] for half in halves]
     steep = [half[2] for half in down]
     first = (steep[0] <= steep[1]) & (steep[0] <= steep[2])
@@ -60,13 +60,13 @@ def lowest_corners(tree: Tree, poses: Sequence[Pose]) -> Touch:
     one = [jnp.where(first, y, x) for x, y in zip(down[0], down[1], strict=True)]
     other = [jnp.where(last, y, z) for y, z in zip(down[1], down[2], strict=True)]
     below = jnp.where(most[2] - one[2] - other[2] > 0, -1.0, 1.0)
-    centre = plus(axes(jnp.stack([pose.pos for pose in poses])), turned(tree.com))
     x, y, z = (
         jnp.concatenate([c + k + a + b, c + k + a - b, c + k - a + b, c + below * (k - a - b)])
-        for c, k, a, b in zip(centre, most, one, other, strict=True)
+        for c, k, a, b in zip(centres(tree, poses), most, one, other, strict=True)
     )
     distance = z + poses[0].origin[2]
-    return Touch(distance, (x, y, z - 0.5 * distance))
+    there = jnp.concatenate([tree.solid] * CORNERS) > 0
+    return Touch(jnp.where(there, distance, FAR), (x, y, z - 0.5 * distance))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -126,41 +126,20 @@ def make_constraints(
 ) -> Constraints:
     """Those of the current state: all corners, all limits. friction: [L], a factor."""
     pin, shape = footing.pin, Dense(tree.links, around.iterations, around.line_iterations)
-    limit = _limits(tree, around, qpos, qvel, pin)
+    softness = _softness(around)
+    over_low, under_high = qpos[7:] - tree.low[1:], tree.high[1:] - qpos[7:]
+    hinges = Springs(softness, POWER, tree.dof_weight[1:])
+    limit = limit_terms(hinges, over_low, under_high, qvel[6:], pin)
     if touch is None:
         empty = jnp.zeros((0, *friction.shape), friction.dtype)
         return Constraints(shape, None, empty, (empty, empty, empty), empty, *limit)
-    law = _law(around)
-    impedance, depth = soften(law, POWER, touch.distance)
-    mu = jnp.broadcast_to(around.friction * friction, depth.shape)
-    # As in `physics.fast.constraints`: the inverse mass along an edge of the pyramid.
-    inverse = jnp.concatenate([tree.body_weight] * CORNERS) * (1 + mu * mu) * 2 * mu * mu
-    active = (depth < 0) & (jnp.concatenate([tree.solid] * CORNERS) > 0)
-    weight = jnp.where(active, impedance / jnp.maximum(inverse * (1 - impedance), 1e-15), 0.0)
-    normal, first, second = footing.along(list(qvel))
-    reference = (
-        -law.damping * normal - law.stiffness * impedance * depth,
-        -law.damping * first,
-        -law.damping * second,
-    )
-    return Constraints(shape, footing, pin(mu), pin(reference), pin(weight), *limit)
+    corners = Springs(softness, POWER, jnp.concatenate([tree.body_weight] * CORNERS))
+    mu = jnp.broadcast_to(around.friction * friction, touch.distance.shape)
+    contact = contact_terms(corners, touch.distance, mu, footing.along(list(qvel)), pin)
+    return Constraints(shape, footing, *contact, *limit)
 
 
-def _limits(
-    tree: Tree, around: Surroundings, qpos: jax.Array, qvel: jax.Array, pin: Pin
-) -> tuple[jax.Array, jax.Array, jax.Array]:
-    law = _law(around)
-    below, above = qpos[7:] - tree.low[1:], tree.high[1:] - qpos[7:]
-    sign = jnp.where(below < above, 1.0, -1.0)
-    impedance, depth = soften(law, POWER, jnp.minimum(below, above))
-    active = (depth < 0) & (tree.moves[1:] > 0)
-    inverse = tree.dof_weight[1:] * (1 - impedance)
-    weight = jnp.where(active, impedance / jnp.maximum(inverse, 1e-15), 0.0)
-    reference = -law.damping * sign * qvel[6:] - law.stiffness * impedance * depth
-    return pin(sign), pin(reference), pin(weight)
-
-
-def _law(around: Surroundings) -> Softness:
+def _softness(around: Surroundings) -> Softness:
     """Of every constraint (MuJoCo's computation docs, "Reference")."""
     most = float(IMPEDANCE[0, 1, 0])
     time = most * max(TIME_CONSTANT, 2 * around.step)

@@ -11,6 +11,9 @@ import jax
 from mjxgait.physics.fast.treematrix import Sparsity, sparsity
 from mjxgait.types import pytree
 
+FAR = 1e3
+"""m, how high above the ground a block is that there is not."""
+
 
 @pytree
 class Tree:

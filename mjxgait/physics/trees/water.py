@@ -7,7 +7,8 @@ import jax.numpy as jnp
 
 from mjxgait.physics.fast.dynamics import Inertia, pack, unpack
 from mjxgait.physics.fast.kinematics import Pose
-from mjxgait.physics.fast.lanes import Pin, cross, dot, plus, total
+from mjxgait.physics.fast.lanes import Pin, cross, dot, plus, turn_each
+from mjxgait.physics.trees.motion import frames
 from mjxgait.physics.trees.tree import Tree
 
 
@@ -24,12 +25,11 @@ def drag_links(
     mass = jnp.where(tree.solid > 0, tree.mass, 1.0)
     centre = tuple(h / mass for h in body.moment)
     drift = plus(velocity.shift, cross(velocity.spin, (centre[0], centre[1], centre[2])))
-    rot = [jnp.stack([pose.rot[j] for pose in poses]) for j in range(3)]
+    rot = frames(poses)
     push: list[jax.Array] = [jnp.zeros_like(mass)] * 3
     twist: list[jax.Array] = [jnp.zeros_like(mass)] * 3
     for k in range(3):
-        local, (i, j) = tree.axes[:, k], ((k + 1) % 3, (k + 2) % 3)
-        axis = [total([local[:, m] * rot[m][:, c] for m in range(3)]) for c in range(3)]
+        axis, (i, j) = turn_each(rot, tree.axes[:, k]), ((k + 1) % 3, (k + 2) % 3)
         a, b, c = (tree.half[:, n] for n in (k, i, j))
         slow = -8 * drag * b * c * tree.solid * dot(axis, drift)
         # Faces i and j move along their normals by how far a point is from the axis.
