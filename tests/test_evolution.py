@@ -269,6 +269,14 @@ def test_parents_are_two_and_the_better_are_drawn_more_often(selection: str):
     assert np.allclose(counts, expected, atol=0.01)
 
 
+@pytest.mark.parametrize("rivals", [1, 6])
+def test_the_best_of_more_rivals_is_better(rivals: int):
+    mothers, _ = parents(jax.random.key(0), 20_000, 10, "tournament", rivals)
+    # The best of n is place k or worse if all n are.
+    worse = (1 - np.arange(11) / 10) ** rivals
+    assert np.bincount(mothers, minlength=10) / 20_000 == pytest.approx(-np.diff(worse), abs=0.015)
+
+
 def test_one_generation_is_traced_once():
     traces = []
 

@@ -23,26 +23,26 @@ mutated.
 
 
 def parents(
-    key: jax.Array, count: int, population: jax.Array | int, selection: Any
+    key: jax.Array, count: int, population: jax.Array | int, selection: Any, rivals: int = 2
 ) -> tuple[jax.Array, jax.Array]:
     """Places [count] of mothers and fathers in a population sorted best first; never the same
     individual twice.
 
     `uniform` draws all alike; `rank` falls linearly to zero with rank (Baker 1985, pressure 2);
-    `tournament` takes the better of two.
+    `tournament` takes the best of so many rivals.
     """
     key_mother, key_father = jax.random.split(key)
 
     def draw(key: jax.Array, among: jax.Array | int) -> jax.Array:
         uniformly = jax.random.randint(key, (count,), 0, among)
-        best_of_two = jnp.min(jax.random.randint(key, (count, 2), 0, among), axis=1)
+        best = jnp.min(jax.random.randint(key, (count, rivals), 0, among), axis=1)
         by_rank = jnp.floor(among * (1 - jnp.sqrt(1 - jax.random.uniform(key, (count,))))).astype(
             jnp.int32
         )
         return jnp.where(
             chosen(selection, "uniform"),
             uniformly,
-            jnp.where(chosen(selection, "tournament"), best_of_two, by_rank),
+            jnp.where(chosen(selection, "tournament"), best, by_rank),
         )
 
     mothers, others = draw(key_mother, population), draw(key_father, population - 1)
@@ -94,7 +94,7 @@ class Nursery:
         key_parents, key_cross, key_whether, key_mutate, key_mutated = jax.random.split(key, 5)
         mother, father = (
             jax.tree.map(lambda leaf, i=place[0]: leaf[i], pool)
-            for place in parents(key_parents, 1, among, config.selection)
+            for place in parents(key_parents, 1, among, config.selection, config.rivals)
         )
         crosses = jax.random.bernoulli(key_whether, config.crossover)
         child = _either(crosses, self.variation.cross(key_cross, mother, father), mother)

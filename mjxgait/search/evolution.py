@@ -109,7 +109,9 @@ class Evolution:
             bred, of_two = Nursery(config, self.variation).children(key, state.genomes)
             return bred, jnp.where(of_two, int(Origin.CROSSOVER), int(Origin.MUTATION))
         key_parents, key_cross, key_whether, key_mutate, key_mutated = jax.random.split(key, 5)
-        mothers, fathers = parents(key_parents, count, config.population, config.selection)
+        mothers, fathers = parents(
+            key_parents, count, config.population, config.selection, config.rivals
+        )
         mother, father = (
             jax.tree.map(lambda leaf, i=i: leaf[i], state.genomes) for i in (mothers, fathers)
         )

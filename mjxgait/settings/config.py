@@ -122,7 +122,8 @@ class EvolutionConfig:
       pose_range: share of each joint's pose range, about its middle, in which key poses lie.
       pose_span: deg; width of every hinge's pose range, about its middle in creature.toml, as far as
         the joint's range in creature.xml allows; 0 leaves the ranges of creature.toml.
-      initial: uniform draws or a Latin hypercube, over the middle `initial_spread` of each gene's range. selection: how parents are drawn.
+      initial: uniform draws or a Latin hypercube, over the middle `initial_spread` of each gene's range. selection: how parents are drawn
+        (mjxgait/search/breeding.py); rivals: of a tournament.
       crossover: share of offspring with two parents, the others have one. crossing: `permute` draws K poses from the parents' 2K in any
         order; `align` leaves each pose in its place.
       pool: whom parents are drawn from: last generation's survivors, or `growing`, which also holds
@@ -148,6 +149,7 @@ class EvolutionConfig:
     initial: Literal["uniform", "latin"] = "uniform"
     initial_spread: Fraction = 0.6
     selection: Literal["uniform", "rank", "tournament"] = "rank"
+    rivals: Annotated[Count, SHAPE] = 2
     crossover: Fraction = 0.7
     crossing: Literal["permute", "align"] = "align"
     pool: Annotated[Literal["parents", "growing"], SHAPE] = "parents"
