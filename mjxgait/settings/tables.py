@@ -92,7 +92,7 @@ def build(cls: type[T], table: Table, where: str) -> T:
       UserError: names the first key that is unknown, missing, of a wrong type or out of range, and what it may be.
     """
     try:
-        return _adapter(cls).validate_python(dict(table))
+        return _adapter(cls).validate_python(dict(table))  # type: ignore[arg-type]
     except pydantic.ValidationError as error:
         problems = error.errors(include_url=False)
         # A misspelt key is also a missing one: the misspelling is what the user can mend.

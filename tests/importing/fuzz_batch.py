@@ -15,7 +15,6 @@ from mjxgait.errors import UserError
 from mjxgait.importing import ImportChoices, import_model, stance
 from mjxgait.settings.layers import resolve_config
 
-
 stance.FIRST, stance.ROUNDS = 60, 4  # it is the files that are hostile, not the search
 
 
