@@ -27,8 +27,7 @@ STOOL = Path(__file__).parent / "data" / "stool"
 def small_config(**tables: dict) -> Config:
     """A config for runs of a second: few individuals, short episodes.
 
-    Of the same shape as `test_run.SMALL`, and with MJX as the study of `test_ablate`: they share
-    its program.
+    Of the same shape as `test_run.SMALL`: they share its program.
     """
     table = {
         "evolution": {"population": 6, "generations": 3},

@@ -53,6 +53,12 @@ class Toy(Evolution):
     problem: Problem
 
     def step(self, state: EvolutionState) -> tuple[EvolutionState, GenerationMetrics]:
+        return self.step_and_births(state)[:2]
+
+    def step_and_births(
+        self, state: EvolutionState
+    ) -> tuple[EvolutionState, GenerationMetrics, Genome]:
+        """The next state, what there is to tell, and who was born."""
         proposal = self.propose(state)
         terms = self.problem.value(proposal.offspring)[:, None, None]
         judged = Judged(
@@ -62,7 +68,7 @@ class Toy(Evolution):
             sim_steps=jnp.int32(0),
             computed_steps=jnp.int32(0),
         )
-        return self.absorb(state, proposal, judged)
+        return *self.absorb(state, proposal, judged), proposal.offspring
 
 
 def toy(problem: Problem = CENTRE, **settings) -> Toy:
@@ -94,9 +100,7 @@ def begin(settings: EvolutionConfig, problem: Problem, key: jax.Array) -> Evolut
 def advance(
     settings: EvolutionConfig, problem: Problem, state: EvolutionState
 ) -> tuple[EvolutionState, GenerationMetrics, Genome]:
-    """The next state, what there is to tell, and who was born."""
-    evolution = made(settings, problem)
-    return *evolution.step(state), evolution.propose(state).offspring
+    return made(settings, problem).step_and_births(state)
 
 
 def run(

@@ -11,11 +11,9 @@ from helpers import small_config
 
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
-from mjxgait.runs.experiment import build_batch, build_experiment
+from mjxgait.runs.experiment import Batch, Step, build_batch
 from mjxgait.settings.config import Config, EvolutionConfig
 from mjxgait.settings.traced import chosen, traced
-
-pytestmark = pytest.mark.usefixtures("as_shipped")
 
 
 def shape(**tables: dict) -> object:
@@ -91,13 +89,16 @@ VARIANTS = {
         "controller": {"advance": "clock"},
         "evolution": {"mutation": "bit", "selection": "tournament"},
     },
-    "weights": {"fitness": {"weights": {"slip": 3.0}}},
-    "without pushes": {"rollout": {"push": 0.0}},
 }
-"""As many rows as the study of `test_ablate` has: they share the program."""
-
-
-ALONE = ("as it is", "another seed", "plain PD", "bit flips by the clock")
+OTHERWISE = {
+    "seed": 5,
+    "drive": {"law": "pd"},
+    "controller": {"advance": "clock"},
+    "evolution": {"mutation": "bit", "selection": "tournament"},
+    "fitness": {"weights": {"slip": 3.0}},
+    "rollout": {"push": 0.0},
+}
+"""These at once, a weight and a push that others do not have."""
 
 
 def variant(tables: dict) -> Config:
@@ -111,28 +112,41 @@ def variant(tables: dict) -> Config:
     return dataclasses.replace(small_config(**tables), seed=seed)
 
 
-def test_a_row_equals_the_run_that_runs_alone_to_the_bit(stool: Creature):
-    configs = {name: variant(tables) for name, tables in VARIANTS.items()}
-    batch = build_batch(stool, list(configs.values()))
-    step, states = batch.compile(), batch.place(batch.init())
+@pytest.fixture(scope="module")
+def batch(stool: Creature) -> Batch:
+    return build_batch(stool, [variant(tables) for tables in VARIANTS.values()])
+
+
+@pytest.fixture(scope="module")
+def step(batch: Batch, as_shipped: None) -> Step:
+    return batch.compile()
+
+
+def test_one_program_serves_every_value(stool: Creature):
+    """Another seed, weight or mutation is found in the compilation cache: the program's text is the same."""
+    texts = [build_batch(stool, [variant(v)]).lower().as_text() for v in ({}, OTHERWISE)]
+    assert texts[0] == texts[1]
+
+
+def test_a_row_equals_the_run_that_runs_alone_to_the_bit(stool: Creature, batch: Batch, step: Step):
+    states = batch.place(batch.init())
     for _ in range(3):
         states, metrics = step(states)
-    for row, (name, config) in enumerate(configs.items()):
-        if name not in ALONE:
-            continue
-        alone = build_experiment(stool, config)
-        step_alone, state = alone.compile(), alone.place(alone.init())
+    # One program serves every value, so it is compiled once; the numbers of the body are in it.
+    program = build_batch(stool, [variant({})]).compile().func
+    for row, tables in enumerate(VARIANTS.values()):
+        alone = build_batch(stool, [variant(tables)])
+        rows, state = alone.place(alone.rows), alone.place(alone.init())
         for _ in range(3):
-            state, metrics_alone = step_alone(state)
-        assert np.array_equal(state.fitness, states.fitness[row])
-        assert np.array_equal(state.genomes.key_poses, states.genomes.key_poses[row])
-        assert float(metrics_alone.best) == float(metrics.best[row])
-        assert int(metrics_alone.sim_steps) == int(metrics.sim_steps[row])
+            state, metrics_alone = program(None, rows, state)
+        assert np.array_equal(state.fitness[0], states.fitness[row])
+        assert np.array_equal(state.genomes.key_poses[0], states.genomes.key_poses[row])
+        assert float(metrics_alone.best[0]) == float(metrics.best[row])
+        assert int(metrics_alone.sim_steps[0]) == int(metrics.sim_steps[row])
 
 
-def test_a_row_that_goes_non_finite_does_not_touch_the_others(stool: Creature):
-    batch = build_batch(stool, [variant({"seed": seed}) for seed in range(len(VARIANTS))])
-    step, states = batch.compile(), batch.init()
+def test_a_row_that_goes_non_finite_does_not_touch_the_others(batch: Batch, step: Step):
+    states = batch.init()
     poisoned = dataclasses.replace(
         states,
         genomes=dataclasses.replace(
@@ -144,14 +158,6 @@ def test_a_row_that_goes_non_finite_does_not_touch_the_others(stool: Creature):
     others = np.arange(len(VARIANTS)) != 1
     assert np.array_equal(sound.fitness[others], mixed.fitness[others])
     assert not np.isfinite(metrics.best[1])
-
-
-def test_one_program_serves_every_value(stool: Creature):
-    """Another seed, weight or mutation is found in the compilation cache: the program's text is the same."""
-    texts = {
-        build_batch(stool, [variant(tables)]).lower().as_text() for tables in VARIANTS.values()
-    }
-    assert len(texts) == 1
 
 
 def test_settings_of_different_shapes_are_refused(stool: Creature):

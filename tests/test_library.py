@@ -13,7 +13,7 @@ import mjxgait
 from mjxgait.errors import UserError
 
 SMALL = {
-    "rollout": {"seconds": 0.4, "lanes": 4},
+    "rollout": {"seconds": 0.4, "starts": 2, "lanes": 4},
     "examination": {"candidates": 1, "draws": 2},
 }
 

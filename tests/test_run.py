@@ -112,8 +112,10 @@ def test_one_plain_line_per_generation_where_there_is_no_terminal(finished: tupl
     )
 
 
-def test_the_same_seed_gives_the_same_champion(finished: tuple[Path, str], tmp_path: Path):
-    mjxgait("train", *SMALL, "--out", tmp_path / "again")
+def test_the_same_seed_gives_the_same_champion(
+    finished: tuple[Path, str], tmp_path: Path, capsys: pytest.CaptureFixture
+):
+    said_by(capsys, "train", *SMALL, "--out", tmp_path / "again", code=0)
     assert result(tmp_path / "again") == result(finished[0])
     assert without_times(tmp_path / "again") == without_times(finished[0])
 
@@ -147,7 +149,7 @@ MOMENTS = ("generation 1", "save 1", "save 3", "generation 5", "save 6")
 
 
 def test_a_run_killed_again_and_again_goes_on_to_the_same_champion_bit_for_bit(
-    finished: tuple[Path, str], tmp_path: Path
+    finished: tuple[Path, str], tmp_path: Path, capsys: pytest.CaptureFixture
 ):
     """Killed in generations and amid checkpoints: each time it goes on from what was left."""
     folder, codes = tmp_path / "killed", []
@@ -158,13 +160,13 @@ def test_a_run_killed_again_and_again_goes_on_to_the_same_champion_bit_for_bit(
         codes.append(kill_when(ready, *begin))
         begin = ("train", "--resume", folder)
     assert codes.count(-signal.SIGKILL) >= 4, "at most one moment may have passed unseen"
-    mjxgait(*begin)
+    said_by(capsys, *begin, code=0)
     assert result(folder) == result(finished[0])
     assert without_times(folder) == without_times(finished[0])
 
 
 def test_killed_between_two_checkpoints_it_repeats_what_came_after_the_first(
-    finished: tuple[Path, str], tmp_path: Path
+    finished: tuple[Path, str], tmp_path: Path, capsys: pytest.CaptureFixture
 ):
     folder = tmp_path / "killed"
     arguments = ("train", *SMALL, "--checkpoint-every", "5", "--out", folder)
@@ -172,28 +174,30 @@ def test_killed_between_two_checkpoints_it_repeats_what_came_after_the_first(
     assert sorted(
         int(path.name) for path in (folder / "checkpoints").iterdir() if path.name.isdigit()
     ) == [0]
-    mjxgait("train", "--resume", folder)
+    said_by(capsys, "train", "--resume", folder, code=0)
     assert result(folder) == result(finished[0])
     assert without_times(folder) == without_times(finished[0])
 
 
 def test_going_on_from_an_earlier_checkpoint_drops_the_later_and_comes_to_the_same_end(
-    finished: tuple[Path, str], tmp_path: Path
+    finished: tuple[Path, str], tmp_path: Path, capsys: pytest.CaptureFixture
 ):
     folder = tmp_path / "again"
     shutil.copytree(finished[0], folder)
-    said = mjxgait("train", "--resume", folder, "--generation", "5", "--no-plots")
+    said = said_by(capsys, "train", "--resume", folder, "--generation", "5", "--no-plots", code=0)
     assert "Dropped the checkpoints after generation 5: 6, 7; they come anew." in said
     assert result(folder) == result(finished[0])
     assert without_times(folder) == without_times(finished[0])
     assert {path.name for path in folder.iterdir()} == {p.name for p in finished[0].iterdir()}
 
 
-def test_twice_interrupted_is_the_same_too(finished: tuple[Path, str], tmp_path: Path):
+def test_twice_interrupted_is_the_same_too(
+    finished: tuple[Path, str], tmp_path: Path, capsys: pytest.CaptureFixture
+):
     folder = tmp_path / "stopped"
-    mjxgait("train", *SMALL, "--generations", "2", "--out", folder)
-    mjxgait("train", "--resume", folder, "--generations", "4")
-    mjxgait("train", "--resume", folder, "--generations", "7")
+    said_by(capsys, "train", *SMALL, "--generations", "2", "--out", folder, code=0)
+    for last in ("4", "7"):
+        said_by(capsys, "train", "--resume", folder, "--generations", last, code=0)
     assert result(folder) == result(finished[0])
 
 

@@ -103,7 +103,7 @@ def test_the_bodies_of_a_run_weigh_what_their_starts_say(stool: Creature):
     config = small_config(rollout={**NONE, "masses": 0.2, "starts": 3})
     experiment = build_experiment(stool, config)
     numbers, plain = experiment.starts.numbers, experiment.simulator.plant.parameters
-    masses = experiment.simulator.plant.heavier(plain, experiment.starts.heaviness[1])
+    masses = jax.jit(experiment.simulator.plant.heavier)(plain, experiment.starts.heaviness[1])
     for leaf, its in zip(jax.tree.leaves(numbers), jax.tree.leaves(masses), strict=True):
         np.testing.assert_allclose(leaf[1], its, rtol=1e-6)
     # Nothing else tells the starts apart: where the masses count, everybody moves otherwise in each.

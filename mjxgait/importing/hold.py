@@ -104,7 +104,7 @@ def hold(
 
 
 def _touching(model: mujoco.MjModel, data: mujoco.MjData, feet: set[str]) -> str:
-    for geom in {int(g) for contact in data.contact for g in contact.geom}:
+    for geom in set(data.contact.geom.ravel().tolist()):
         name = model.geom(geom).name
         if name != "floor" and name not in feet:
             return str(model.body(int(model.geom_bodyid[geom])).name)

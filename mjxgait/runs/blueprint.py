@@ -102,8 +102,9 @@ class Blueprint:
         if starts.heaviness is None:
             return starts
         one, heavier = self.plant.parameters, self.plant.heavier
-        numbers = jax.vmap(lambda factors: heavier(one, factors))(starts.heaviness)
-        return dataclasses.replace(starts, numbers=numbers)
+        # As one program, or each of its hundreds of operations is compiled alone.
+        every = jax.jit(jax.vmap(lambda factors: heavier(one, factors)))
+        return dataclasses.replace(starts, numbers=every(starts.heaviness))
 
     def simulator(self, numbers: Numbers | None = None) -> Simulator:
         """Of the creature itself, or of whatever body has these numbers."""

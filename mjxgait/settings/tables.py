@@ -3,6 +3,7 @@
 import dataclasses
 import tomllib
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -91,12 +92,18 @@ def build(cls: type[T], table: Table, where: str) -> T:
       UserError: names the first key that is unknown, missing, of a wrong type or out of range, and what it may be.
     """
     try:
-        return pydantic.TypeAdapter(cls).validate_python(dict(table))
+        return _adapter(cls).validate_python(dict(table))  # type: ignore[arg-type]
     except pydantic.ValidationError as error:
         problems = error.errors(include_url=False)
         # A misspelt key is also a missing one: the misspelling is what the user can mend.
         problems.sort(key=lambda problem: problem["type"] != UNKNOWN)
         raise UserError(f"{where}: {_sentence(cls, problems[0])}") from None
+
+
+@cache
+def _adapter(cls: type) -> pydantic.TypeAdapter:
+    """What checks tables for a dataclass; to make one takes longer than to use it."""
+    return pydantic.TypeAdapter(cls)
 
 
 def _sentence(cls: type, problem: Mapping[str, Any]) -> str:

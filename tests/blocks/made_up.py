@@ -11,7 +11,7 @@ from mjxgait.blocks.genotype import Graph
 
 def one(tree: Any, place: int) -> Any:
     """One of many, in NumPy."""
-    return jax.tree.map(lambda leaf: np.asarray(leaf[place]), tree)
+    return jax.tree.map(lambda leaf: np.asarray(leaf)[place], tree)
 
 
 def genome_of(graph: Graph) -> dict[str, np.ndarray]:

@@ -1,16 +1,18 @@
 """Brains: the arrays think what a plain network thinks, whatever the genes."""
 
+from functools import partial
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from blocks.made_up import one
 
-from mjxgait.blocks.genotype import Capacity, Ranges
+from mjxgait.blocks.genotype import Capacity, Graph, Ranges
 from mjxgait.blocks.nerves import NerveRoom, random_centre, random_nerves
 from mjxgait.blocks.phenotype import Body, body_of
 from mjxgait.blocks.variation import Genotype, Kin
-from mjxgait.blocks.wiring import wired
+from mjxgait.blocks.wiring import Brain, wired
 from mjxgait.certify.twins.brains import BrainTwin, fire
 from mjxgait.champion.blocks.material import NEURONS
 from mjxgait.champion.blocks.parts import grow
@@ -20,6 +22,7 @@ from mjxgait.runs.experiment import arrays_of
 
 CAPACITY, ROOM, COUNT, STEP = Capacity(), NerveRoom(), 200, 0.01
 KIN = Kin(CAPACITY, ROOM, Ranges())
+FIRED = jax.jit(fired, static_argnums=3)
 
 
 @pytest.mark.parametrize("name", NEURONS)
@@ -28,7 +31,7 @@ def test_a_neuron_is_the_function_of_its_name(name: str):
     inputs, memory = rng.normal(0, 3, (300, 3)).astype(np.float32), rng.uniform(0, 1, 300)
     inputs[:20, 1] = 0.0
     kinds = jnp.full(300, NEURONS.index(name))
-    output, kept = fired(kinds, jnp.asarray(inputs), jnp.float32(memory), 0.005)
+    output, kept = FIRED(kinds, jnp.asarray(inputs), jnp.float32(memory), 0.005)
     plain, remembered = fire(name, np.float64(inputs).T, memory, 0.005)
     np.testing.assert_allclose(output, plain, atol=2e-4)
     np.testing.assert_allclose(kept, remembered, atol=2e-4)
@@ -38,7 +41,7 @@ def test_nothing_that_comes_in_makes_a_value_that_is_not_finite():
     values = np.array([0.0, 1e-30, -1e-4, 3.0, -10.0, 1e8, -1e30], np.float32)
     inputs = np.stack(np.meshgrid(values, values, values), -1).reshape(-1, 3)
     for kind in range(len(NEURONS)):
-        output, kept = fired(
+        output, kept = FIRED(
             jnp.full(len(inputs), kind), jnp.asarray(inputs), jnp.ones(len(inputs)), 0.005
         )
         assert np.isfinite(output).all(), NEURONS[kind]
@@ -101,16 +104,21 @@ def test_a_mirror_image_pulls_the_other_way():
     """The two of a pair sense and do the same, seen in a mirror: their torques mirror each other."""
     from blocks.test_growth import moving, star
 
-    body = body_of(star(mirror=2, joint="universal"), CAPACITY)
-    nerves = random_nerves(jax.random.key(5), CAPACITY.nodes, ROOM)
-    brain = wired(nerves, random_centre(jax.random.key(6), ROOM), body, ROOM)
+    @jax.jit
+    def born(graph: Graph) -> tuple[Body, Brain]:
+        body = body_of(graph, CAPACITY)
+        nerves = random_nerves(jax.random.key(5), CAPACITY.nodes, ROOM)
+        return body, wired(nerves, random_centre(jax.random.key(6), ROOM), body, ROOM)
+
+    body, brain = born(star(mirror=2, joint="universal"))
     sign, copies = np.asarray(body.sign), np.asarray(body.parts.copies)[np.asarray(body.part)]
     bent = np.where(moving(body), 0.3 + 0.1 * np.asarray(body.hinge), 0.0) * sign
     ahead = np.where(copies[:, None] > 0, [0.2, -0.4, 0.1], [0.2, 0.4, 0.1])
     perceived = Perceived(jnp.float32(bent), jnp.zeros(CAPACITY.links), jnp.float32(ahead))
     mind = blank(CAPACITY.parts * ROOM.local + ROOM.central)
+    think = jax.jit(partial(thought, step=STEP))
     for _ in range(3):
-        torque, mind = thought(brain, mind, perceived, STEP)
+        torque, mind = think(brain, mind, perceived)
     left, right = (np.flatnonzero(moving(body) & (copies == image)) for image in (0, 1))
     np.testing.assert_allclose(
         np.asarray(torque)[left] * sign[left], np.asarray(torque)[right] * sign[right], rtol=1e-5

@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable
+from functools import cache
 
 import jax
 import jax.numpy as jnp
@@ -18,6 +19,7 @@ from mjxgait.champion.blocks.material import JOINTS, NEURONS
 CAPACITY, ROOM, RANGES, COUNT = Capacity(), NerveRoom(), Ranges(), 2000
 KIN = Kin(CAPACITY, ROOM, RANGES, Rates(value=20.0, connection=0.8, node=0.8))
 BUSY = ("mutate", "cross", "graft")
+ALIVE = jax.jit(jax.vmap(reachable))
 
 
 @pytest.fixture(scope="module")
@@ -27,10 +29,15 @@ def parents() -> tuple[Genotype, Genotype]:
     return first, second
 
 
+@cache
+def breeder(name: str) -> Callable[..., Genotype]:
+    """Compiled once for all children of a kind."""
+    return jax.jit(jax.vmap(getattr(KIN, name)))
+
+
 def children(name: str, parents: tuple[Genotype, Genotype], seed: int = 2) -> Genotype:
     keys = jax.random.split(jax.random.key(seed), COUNT)
-    function: Callable = getattr(KIN, name)
-    return jax.jit(jax.vmap(function))(keys, *parents[: 1 if name == "mutate" else 2])
+    return breeder(name)(keys, *parents[: 1 if name == "mutate" else 2])
 
 
 @pytest.fixture(scope="module", params=BUSY)
@@ -98,8 +105,7 @@ def test_crossing_over_moves_nodes_as_wholes(parents: tuple[Genotype, Genotype])
 def test_a_graft_hangs_the_others_root_on_ones_own_tree(parents: tuple[Genotype, Genotype]):
     mother, father = parents
     child = children("graft", parents)
-    alive = jax.vmap(reachable)
-    before, after = np.asarray(alive(mother.graph)), np.asarray(alive(child.graph))
+    before, after = np.asarray(ALIVE(mother.graph)), np.asarray(ALIVE(child.graph))
     room = ~before.all(1)
     half, his = np.asarray(child.graph.half), np.asarray(father.graph.half)
     # The father's root takes the first node that was free, and is reached.
@@ -134,7 +140,7 @@ def test_a_mutation_changes_a_few_values(parents: tuple[Genotype, Genotype]):
     calm = Kin(CAPACITY, ROOM, RANGES, Rates(value=4.0, connection=0.0, node=0.0))
     keys = jax.random.split(jax.random.key(3), COUNT)
     child = jax.jit(jax.vmap(calm.mutate))(keys, parents[0])
-    alive = np.asarray(jax.vmap(reachable)(parents[0].graph))
+    alive = np.asarray(ALIVE(parents[0].graph))
     changes = np.zeros(COUNT)
     for name in ("graph", "nerves"):
         leaves = zip(*(jax.tree.leaves(getattr(g, name)) for g in (child, parents[0])), strict=True)
@@ -163,6 +169,6 @@ def test_nodes_and_connections_come_and_go(parents: tuple[Genotype, Genotype]):
     used, before = (np.asarray(g.graph.used).sum((1, 2)) for g in (child, parents[0]))
     assert (used > before).mean() > 0.2
     assert (used < before).mean() > 0.05
-    alive, were = (np.asarray(jax.vmap(reachable)(g.graph)).sum(1) for g in (child, parents[0]))
+    alive, were = (np.asarray(ALIVE(g.graph)).sum(1) for g in (child, parents[0]))
     assert (alive > were).mean() > 0.2
     assert (alive < were).mean() > 0.03

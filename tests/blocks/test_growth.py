@@ -19,11 +19,13 @@ from mjxgait.runs.growth import GraphGrowth
 from mjxgait.tasks.trials import Starts
 
 CAPACITY, COUNT = Capacity(), 1000
+CREATE = jax.jit(jax.vmap(lambda key: random_graph(key, CAPACITY, Ranges())))
+GROW = jax.jit(jax.vmap(lambda graph: grown(graph, CAPACITY)))
+EMBODY = jax.jit(lambda graph: body_of(graph, CAPACITY))
 
 
 def draw(count: int, seed: int = 0) -> Graph:
-    keys = jax.random.split(jax.random.key(seed), count)
-    return jax.vmap(lambda key: random_graph(key, CAPACITY, Ranges()))(keys)
+    return CREATE(jax.random.split(jax.random.key(seed), count))
 
 
 @pytest.fixture(scope="module")
@@ -33,8 +35,7 @@ def graphs() -> Graph:
 
 @pytest.fixture(scope="module")
 def parts(graphs: Graph) -> Parts:
-    grow = jax.jit(jax.vmap(lambda graph: grown(graph, CAPACITY)))
-    return jax.tree.map(np.asarray, grow(graphs))
+    return jax.tree.map(np.asarray, GROW(graphs))
 
 
 def test_a_body_grows_as_a_plain_list_does(graphs: Graph, parts: Parts):
@@ -70,7 +71,7 @@ def test_a_body_keeps_to_its_room(parts: Parts):
 
 def test_the_same_graph_grows_into_the_same_body():
     graph = draw(3)
-    first, again = (jax.vmap(lambda g: grown(g, CAPACITY))(graph) for _ in range(2))
+    first, again = (GROW(graph) for _ in range(2))
     for a, b in zip(jax.tree.leaves(first), jax.tree.leaves(again), strict=True):
         np.testing.assert_array_equal(a, b)
 
@@ -111,14 +112,14 @@ def test_what_is_terminal_grows_at_the_end_only():
 
 def test_a_pair_grows_together_or_not_at_all():
     """Each limb has three hinges: eleven links have room for three limbs."""
-    body = body_of(star(mirror=2, recursion=1, joint="spherical"), CAPACITY)
+    body = EMBODY(star(mirror=2, recursion=1, joint="spherical"))
     assert int(body.parts.exists.sum()) == 4
     pairs = grown(star(mirror=2), dataclasses.replace(CAPACITY, parts=2))
     assert int(pairs.exists.sum()) == 1
 
 
 def test_a_pair_is_the_mirror_image_of_each_other():
-    body = body_of(star(mirror=2, recursion=1, joint="universal"), CAPACITY)
+    body = EMBODY(star(mirror=2, recursion=1, joint="universal"))
     places, axes = joints_in_the_world(body)
     copies = np.asarray(body.parts.copies)[np.asarray(body.part)]
     left, right = (np.flatnonzero((copies == image) & moving(body)) for image in (0, 1))

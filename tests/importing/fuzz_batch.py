@@ -12,8 +12,10 @@ from importing.models import QUADRUPED
 
 from mjxgait.creature import load_creature
 from mjxgait.errors import UserError
-from mjxgait.importing import ImportChoices, import_model
+from mjxgait.importing import ImportChoices, import_model, stance
 from mjxgait.settings.layers import resolve_config
+
+stance.FIRST, stance.ROUNDS = 60, 4  # it is the files that are hostile, not the search
 
 
 def main(scratch: Path, share: int, shares: int) -> None:

@@ -1,6 +1,7 @@
 """One program, many bodies: lanes whose bodies differ, against each body alone and C MuJoCo."""
 
 import dataclasses
+from collections.abc import Callable
 from typing import Any
 
 import jax
@@ -67,10 +68,15 @@ def numbers(plant: Plant, models: list[mujoco.MjModel]) -> list[Any]:
 
 
 @pytest.fixture(scope="module")
-def together(plant: Plant, numbers: list[Any], moment: Moment) -> Any:
+def batch(plant: Plant, numbers: list[Any], moment: Moment) -> Callable[..., Any]:
+    """The program of all bodies in one batch."""
+    return compiled(everything(plant), *moment.for_plant(plant, stacked(numbers)))
+
+
+@pytest.fixture(scope="module")
+def together(plant: Plant, numbers: list[Any], moment: Moment, batch: Callable[..., Any]) -> Any:
     """All bodies in one batch; lanes in front."""
-    arguments = moment.for_plant(plant, stacked(numbers))
-    return in_front(plant, compiled(everything(plant), *arguments)(*arguments))
+    return in_front(plant, batch(*moment.for_plant(plant, stacked(numbers))))
 
 
 def close(ours: Any, theirs: Any, tolerance: float) -> None:
@@ -143,12 +149,14 @@ def test_a_lane_keeps_its_body(plant: Plant, numbers: list[Any], together: Any):
         np.testing.assert_array_equal(a, np.float32(b))
 
 
-def test_none_is_the_plants_own(plant: Plant, moment: Moment, tight: float):
+def test_none_is_the_plants_own(
+    plant: Plant, moment: Moment, batch: Callable[..., Any], tight: float
+):
     """Constants and inputs of the same numbers give the same."""
     own = stacked([plant.parameters] * BODIES)
     given, none = moment.for_plant(plant, own), moment.for_plant(plant)
     ours = compiled(everything(plant), *none)(*none)
-    theirs = compiled(everything(plant), *given)(*given)
+    theirs = batch(*given)
     assert ours[2].parameters is None
     theirs = (*theirs[:2], dataclasses.replace(theirs[2], parameters=None))
     for a, b in zip(jax.tree.leaves(ours), jax.tree.leaves(theirs), strict=True):

@@ -42,7 +42,8 @@ def tallies(request: pytest.FixtureRequest, stool: Creature) -> tuple[Tally, lis
     settings = {"physics": request.param, "lanes": 2, "starts": len(BODIES), "terminate": False}
     experiment = build_experiment(stool, small_config(rollout=settings))
     simulator, plant = experiment.simulator, experiment.simulator.plant
-    numbers = jax.device_get([plant.heavier(plant.parameters, factor) for factor in BODIES])
+    heavier = jax.jit(plant.heavier)
+    numbers = jax.device_get([heavier(plant.parameters, factor) for factor in BODIES])
     box = Box(*simulator.controller.bounds(experiment.config.controller))
     arguments = jax.tree.map(
         lambda leaf: leaf[None],

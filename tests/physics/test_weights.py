@@ -81,5 +81,5 @@ def test_shipped_creatures(shipped: Creature):
     model, layout = shipped.evolution_model, sense_layout(shipped)
     factor = factors(model, 6)
     plant = fast_plant(model, layout)
-    ours = plant.heavier(plant.parameters, jnp.float32(factor))
+    ours = jax.jit(plant.heavier)(plant.parameters, jnp.float32(factor))
     assert_same(ours, plant.parameters_of(heavier_model(model, factor), layout))
