@@ -149,6 +149,21 @@ def test_of_the_parents_only_the_best_lives_on_if_children_take_their_place():
     )
 
 
+def test_the_elite_is_judged_once_more():
+    """Whoever lives on does so with the verdict of the latest judge, and nobody else does."""
+    never = ForcedConfig(enabled=False)
+    keeping = toy(survival="children", elite=3, forced=never)
+    (before, _), settings = run(keeping, 4)[-1], inputs(keeping)[0]
+    after, _, births = jax.device_get(advance(settings, Problem(slope=2.0), before))
+    poses = births.key_poses
+    np.testing.assert_array_equal(poses[:3], before.genomes.key_poses[:3])
+    assert not any((poses[3:] == old).all((1, 2)).any() for old in before.genomes.key_poses[:3])
+    np.testing.assert_allclose(after.fitness, 2 * near_zero(after.genomes), rtol=1e-6)
+    lived = {tuple(pose.ravel()) for pose in after.genomes.key_poses[after.born < after.generation]}
+    assert lived == {tuple(pose.ravel()) for pose in before.genomes.key_poses[:3]}
+    assert set(after.born[after.born < after.generation]) <= set(before.born)
+
+
 def test_the_population_is_sorted_and_without_duplicates():
     for state, metrics in run(toy(mutation_rate=0.2, crossover=1.0)):
         assert np.all(np.diff(state.fitness) <= 0)

@@ -145,6 +145,10 @@ CASES: list[tuple[str, float, dict]] = [
     ("distance", 0.5, HALF_WAY | {"left": -0.8}),
     ("distance", 1.0, {}),
     ("distance", 2.0, HALF_WAY | {"left": 9.0}),
+    # all of it up to 5 % of the goal's distance, and half of it at half of that
+    ("missed", 1.0, {}),
+    ("missed", 1.0, HALF_WAY | {"left": 0.09}),
+    ("missed", 0.5, HALF_WAY | {"left": -0.04}),
     ("time", 1.0, THERE),
     ("time", 0.25, THERE | {"arrived": 250}),
     ("restless", 0.5, THERE | {"after": 0.8}),

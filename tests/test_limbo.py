@@ -168,11 +168,12 @@ def test_the_deepest_counts_and_a_run_through_the_bar_is_worth_less(luxo: Creatu
 
 
 def test_to_run_through_the_bar_is_better_than_to_stay_before_it(luxo: Creature):
-    """Else nobody would ever learn to get beneath it."""
+    """Else nobody would ever learn to get beneath it. Who is there has missed nothing."""
     task = Limbo(luxo, STEP, HORIZON, luxo.settings.termination)
     weights = signed_weights(LimboConfig(), jnp.int32(1000))
     assert set(weights) == set(task.terms)
-    assert sum(float(w) for w in weights.values()) > 2 * float(weights["distance"])
+    manner = sum(float(w) for name, w in weights.items() if name not in ("distance", "missed"))
+    assert manner > float(weights["distance"])
 
 
 def test_all_goals_lie_beyond_the_bar(luxo: Creature):

@@ -8,7 +8,7 @@ import pytest
 from helpers import small_config
 
 from mjxgait.creature import Creature
-from mjxgait.runs.experiment import build_experiment
+from mjxgait.runs.experiment import build_experiment, starts_of_round
 from mjxgait.tasks.trials import NEVER, Starts, draw_starts
 
 NONE = {
@@ -109,3 +109,21 @@ def test_the_bodies_of_a_run_weigh_what_their_starts_say(stool: Creature):
     # Nothing else tells the starts apart: where the masses count, everybody moves otherwise in each.
     forward = jax.jit(experiment.simulate)(experiment.init().genomes).tally.forward
     assert np.abs(np.diff(forward, axis=1)).max() > 1e-5
+
+
+def test_each_generation_has_other_starts_until_all_have_had_their_turn(stool: Creature):
+    config = small_config(
+        rollout={"starts": 3, "variety": 4, "friction": (0.6, 1.4), "physics": "mjx"},
+        evolution={"survival": "children", "elite": 1},
+    )
+    experiment = build_experiment(stool, config)
+    state = experiment.init()
+
+    def told(generation: int) -> list[float]:
+        latest = dataclasses.replace(state, generation=generation - 1)
+        return np.asarray(starts_of_round(experiment.row, latest).friction).tolist()
+
+    rounds = [told(generation) for generation in range(5)]
+    assert {friction[0] for friction in rounds} == {1.0}
+    assert len({friction for one in rounds[:4] for friction in one[1:]}) == 8
+    assert rounds[4] == rounds[0]

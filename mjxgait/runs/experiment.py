@@ -46,7 +46,7 @@ def prepare_devices() -> None:
 
 @pytree
 class Row:
-    """What tells one evolution run from another in the same compiled program: its traced settings, and its starts [R]."""
+    """What tells one evolution run from another in the same compiled program: its traced settings, and all its starts."""
 
     settings: Config
     starts: Starts
@@ -54,7 +54,7 @@ class Row:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Experiment:
-    """One creature under one config: the pure functions of a run. The starts follow from the seed, the same in every generation."""
+    """One creature under one config: the pure functions of a run. The starts follow from the seed."""
 
     creature: Creature
     config: Config
@@ -68,7 +68,7 @@ class Experiment:
 
     @property
     def starts(self) -> Starts:
-        """The starts [R] on which everybody is judged."""
+        """The starts on which individuals are judged, [R] in each generation."""
         return self.row.starts
 
     @property
@@ -245,6 +245,7 @@ def _generation(
     """One generation of all rows [B]. Row by row but for the simulations, so that a row reads nothing of its neighbours."""
 
     simulator = blueprint.simulator(numbers)
+    one_round = rows.settings.rollout.variety == 1
 
     def propose(pair: tuple[Row, EvolutionState]) -> Proposal:
         row, state = pair
@@ -257,14 +258,26 @@ def _generation(
         return evolution_of(simulator, row.settings).absorb(state, proposal, judged)
 
     proposals = jax.lax.map(propose, (rows, states))
-    judged = Local(simulator).judge(proposals.offspring, rows.starts, rows.settings)
+    starts = rows.starts if one_round else jax.vmap(starts_of_round)(rows, states)
+    judged = Local(simulator).judge(proposals.offspring, starts, rows.settings)
     return jax.lax.map(absorb, (rows, states, proposals, judged))
+
+
+def starts_of_round(row: Row, state: EvolutionState) -> Starts:
+    """The starts [R] of the next generation: the nominal one, and the next of all others in turn."""
+    others = row.settings.rollout.starts - 1
+    first = jnp.maximum(state.generation + 1, 0) * others
+    turn = 1 + (first + jnp.arange(others)) % (row.starts.friction.shape[0] - 1)
+    places = jnp.append(0, turn)
+    return jax.tree.map(lambda leaf: leaf[places], row.starts)
 
 
 def _experiment(blueprint: Plan, config: Config) -> Experiment:
     creature = blueprint.creature.on(config.rollout.ground)
     key = jax.random.fold_in(jax.random.key(config.seed), 1)
-    starts = blueprint.own.task.trials(key, creature, config.rollout)
+    rollout = config.rollout
+    drawn = dataclasses.replace(rollout, starts=1 + (rollout.starts - 1) * rollout.variety)
+    starts = blueprint.own.task.trials(key, creature, drawn)
     return Experiment(creature, config, blueprint, Row(traced(config), blueprint.embodied(starts)))
 
 

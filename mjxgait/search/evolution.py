@@ -61,7 +61,25 @@ class Evolution:
         """The offspring of a generation."""
         key, key_offspring = jax.random.split(state.key)
         offspring, origin = self._offspring(key_offspring, state, self._seeding(state))
-        return Proposal(key, offspring, origin)
+        born = jnp.full(self.config.offspring, state.generation + 1)
+        return self._with_elite(state, Proposal(key, offspring, origin, born))
+
+    def _with_elite(self, state: EvolutionState, proposal: Proposal) -> Proposal:
+        """With the best parents in the first places, to be judged once more."""
+        count = self.config.elite
+        if not count:
+            return proposal
+
+        def kept(leaf: jax.Array, old: jax.Array) -> jax.Array:
+            first = jnp.where(self._seeding(state), leaf[:count], old[:count])
+            return leaf.at[:count].set(first)
+
+        return dataclasses.replace(
+            proposal,
+            offspring=jax.tree.map(kept, proposal.offspring, state.genomes),
+            origin=kept(proposal.origin, state.origin),
+            born=kept(proposal.born, state.born),
+        )
 
     def absorb(
         self, state: EvolutionState, proposal: Proposal, judged: Judged
@@ -169,20 +187,24 @@ class Evolution:
         """The P best of the grown population, without duplicates; in a forced generation what
         was fit enough goes before the old.
         """
-        count, born = self.config.population, jnp.full(self.config.offspring, generation)
+        count = self.config.population
         pool = jax.tree.map(
             lambda a, b: jnp.concatenate([a, b]),
             (state.genomes, state.terms, state.outcome, state.born, state.origin),
-            (proposal.offspring, judged.terms, judged.outcome, born, proposal.origin),
+            (proposal.offspring, judged.terms, judged.outcome, proposal.born, proposal.origin),
         )
         fitness = self.rank(pool[1], generation)
         fresh = jnp.arange(fitness.shape[0]) >= count
-        distinct = first_occurrence(pool[0]) | jnp.logical_not(self.config.remove_duplicates)
+        first = first_occurrence(pool[0])
+        if self.config.elite:  # one that is judged once more is like its old self
+            first = jnp.append(jnp.zeros(count, bool), first_occurrence(proposal.offspring))
+        distinct = first | jnp.logical_not(self.config.remove_duplicates)
         admitted = self._admitted(state, fitness, fresh & distinct)
         lives = distinct & (fresh | chosen(self.config.survival, "best"))
         tier = jnp.where(state.forced & fresh, jnp.where(admitted, 2, 0), jnp.where(lives, 1, 0))
-        # The best is never lost, whatever the tiers say.
-        tier = jnp.where((jnp.arange(fitness.shape[0]) == jnp.argmax(fitness)) & distinct, 3, tier)
+        if not self.config.elite:  # the best is never lost, whatever the tiers say
+            best = jnp.arange(fitness.shape[0]) == jnp.argmax(fitness)
+            tier = jnp.where(best & distinct, 3, tier)
         kept = jnp.lexsort((-fitness, -tier))[:count]
         kept = kept[jnp.argsort(-fitness[kept], stable=True)]
         genomes, terms, outcome, born, origin = jax.tree.map(lambda leaf: leaf[kept], pool)

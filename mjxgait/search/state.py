@@ -82,12 +82,13 @@ class GenerationMetrics:
 class Proposal:
     """What a generation wants judged.
 
-    key: of the next generation. offspring: leaves [M, ...]; origin: [M].
+    key: of the next generation. offspring: leaves [M, ...]; origin, born: [M].
     """
 
     key: jax.Array
     offspring: Any
     origin: jax.Array
+    born: jax.Array
 
 
 def stop_reason(state: EvolutionState, config: EvolutionConfig) -> str | None:

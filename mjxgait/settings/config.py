@@ -52,6 +52,8 @@ class RolloutConfig:
     Attributes:
       seconds: length of an episode.
       starts: R, episodes per individual; the first is nominal, the others are perturbed, the same for all.
+      variety: so many times as many perturbed starts there are in all; each generation takes the
+        next ones. With more than 1 everybody must be judged anew: `evolution.elite`.
       joint_noise, velocity_noise: rad, rad/s; half widths of the uniform perturbation of the start.
       friction: range of the factor on the floor's friction.
       push: sudden change of the trunk's horizontal velocity at a random moment of a perturbed start, in units of sqrt(g * hip height).
@@ -71,6 +73,7 @@ class RolloutConfig:
     __pydantic_config__ = STRICT
     seconds: Annotated[Positive, SHAPE] = 8.0
     starts: Annotated[Count, SHAPE] = 3
+    variety: Annotated[Count, SHAPE] = 1
     joint_noise: NonNegative = 0.1
     velocity_noise: NonNegative = 0.3
     friction: tuple[Positive, Positive] = (0.8, 1.2)
@@ -128,7 +131,8 @@ class EvolutionConfig:
         order; `align` leaves each pose in its place.
       pool: whom parents are drawn from: last generation's survivors, or `growing`, which also holds
         the children born so far (they rank last). survival: of the `best` of parents and children,
-        or of `children` alone, and the best so far. unique_children: a child that equals somebody of the
+        or of `children` alone, and the best so far. elite: so many of the best live on among the
+        children and are judged with them, for survival of children. unique_children: a child that equals somebody of the
         pool or a sibling is drawn anew before it is simulated (mjxgait/search/breeding.py).
       mutation: `redraw` re-draws two joints of one pose, `single` one joint, `pose` a whole pose, `gaussian` moves every joint of one pose
         by sigma, in units of its range, `mixed` is one or the other of the first and the last. `bit` and `byte` read the value of one joint
@@ -155,6 +159,7 @@ class EvolutionConfig:
     pool: Annotated[Literal["parents", "growing"], SHAPE] = "parents"
     unique_children: Annotated[bool, SHAPE] = False
     survival: Literal["best", "children"] = "best"
+    elite: Annotated[Whole, SHAPE] = 0
     mutation: Literal["redraw", "single", "pose", "gaussian", "mixed", "bit", "byte"] = "mixed"
     mutation_rate: Fraction = 0.8
     sigma: Positive = 0.12
@@ -171,6 +176,11 @@ class EvolutionConfig:
             raise ValueError(
                 f"growth = {self.growth} leaves no room for offspring; make it larger than {1 + 1 / self.population:.3g}"
             )
+
+        if self.elite and self.survival == "best":
+            raise ValueError('elite is for survival = "children": of the best all live on anyway')
+        if self.elite >= self.offspring:
+            raise ValueError(f"elite = {self.elite} leaves no room for children")
 
     @property
     def offspring(self) -> int:
@@ -239,3 +249,10 @@ class Config:
     fitness: WalkConfig = dataclasses.field(default_factory=WalkConfig)
     evolution: EvolutionConfig = dataclasses.field(default_factory=EvolutionConfig)
     examination: ExaminationConfig = dataclasses.field(default_factory=ExaminationConfig)
+
+    def __post_init__(self) -> None:
+        if self.rollout.variety > 1 and not self.evolution.elite:
+            raise ValueError(
+                f"rollout.variety = {self.rollout.variety}: who has been judged on other starts "
+                'does not compare; set evolution.survival = "children" and evolution.elite'
+            )

@@ -16,12 +16,13 @@ NEAR = 0.05
 class HopWeights:
     """Weight of each fitness term (mjxgait/tasks/hop/fitness.py says what each measures).
 
-    All are penalties. As long as all but `distance` sum up to less than `distance`, getting nearer
-    is worth its manner.
+    All are penalties. As long as those of style, all but `distance` and `missed`, sum up to less
+    than `distance`, getting nearer is worth its manner.
     """
 
     __pydantic_config__ = STRICT
     distance: Finite = 1.0
+    missed: Finite = 0.3
     time: Finite = 0.1
     restless: Finite = 0.2
     ground: Finite = 0.2
@@ -35,8 +36,7 @@ class HopConfig:
     """What is wanted of the way to a goal.
 
     Attributes:
-      style_ramp: generations over which the style terms (all but distance) grow to their full
-        weight.
+      style_ramp: generations over which the style terms grow to their full weight.
     """
 
     __pydantic_config__ = STRICT

@@ -8,13 +8,14 @@ import jax.numpy as jnp
 import optax
 
 from mjxgait.body import Body
-from mjxgait.settings.hop import HopConfig, HopWeights, TravelConfig
+from mjxgait.settings.hop import NEAR, HopConfig, HopWeights, TravelConfig
 from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.hop.tally import Tally
 
 TERMS = tuple(field.name for field in dataclasses.fields(HopWeights))
 GOAL = "distance"
-STYLE = tuple(name for name in TERMS if name != GOAL)
+MISSED = "missed"
+STYLE = tuple(name for name in TERMS if name not in (GOAL, MISSED))
 """The manner of a way: counted as far as there is one, and ramped in over the generations."""
 
 FARTHEST = 2.0
@@ -37,7 +38,7 @@ def fitness_terms(
     away = jnp.abs(tally.left) / tally.goal
     near = jnp.clip(1.0 - away, 0.0, 1.0)
     style = style_terms(creature, horizon, tally) | dict(more or {})
-    terms = {GOAL: jnp.minimum(away, FARTHEST)}
+    terms = {GOAL: jnp.minimum(away, FARTHEST), MISSED: jnp.minimum(away / NEAR, 1.0)}
     return terms | {name: near * value for name, value in style.items()}
 
 
@@ -63,6 +64,6 @@ def signed_weights(config: HopConfig | TravelConfig, generation: jax.Array) -> d
 
     def weight(name: str) -> jax.Array:
         signed = -jnp.float32(getattr(config.weights, name))
-        return signed if name == GOAL else signed * ramp
+        return signed if name in (GOAL, MISSED) else signed * ramp
 
     return {field.name: weight(field.name) for field in dataclasses.fields(config.weights)}
