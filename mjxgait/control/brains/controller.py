@@ -34,7 +34,6 @@ class Brains:
 
     Settings: ClassVar[type] = BrainConfig
     command: ClassVar[Command] = "torque"
-    every: ClassVar[int] = 1
     grows: ClassVar[bool] = True
 
     @classmethod
@@ -45,7 +44,8 @@ class Brains:
         return cls(step, settings, added)
 
     def __init__(self, step: float, settings: BrainConfig, added: Sequence[str] = ()) -> None:
-        self.step, self.capacity = step, capacity_of(settings)
+        self.every, self.capacity = settings.every, capacity_of(settings)
+        self.pause = step * settings.every
         self.room = NerveRoom(settings.local, settings.central)
         self.reads = ("joint_pos", "contact", *([LIGHT] if LIGHT in added else []))
 
@@ -101,5 +101,5 @@ class Brains:
         light = senses[LIGHT] if LIGHT in self.reads else jnp.zeros((links, 3))
         angles = jnp.concatenate([jnp.zeros(1), senses["joint_pos"]])
         perceived = Perceived(angles, senses["contact"], light)
-        torque, memory = thought(plan, memory, perceived, self.step)
+        torque, memory = thought(plan, memory, perceived, self.pause)
         return torque[1:], memory
