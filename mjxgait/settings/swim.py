@@ -20,10 +20,12 @@ class SwimConfig:
 
     Attributes:
       settle: s from the start that do not count.
-      overlap: m, how deep blocks are in each other of which half the speed counts.
+      overlap: m, how deep blocks are in each other of which half the speed counts. apart:
+        generations until that counts in full: who cannot swim yet has nothing to lose by it.
     """
 
     __pydantic_config__ = STRICT
     settle: NonNegative = 2.0
-    overlap: Positive = 0.1
+    overlap: Positive = 0.05
+    apart: Positive = 50.0
     weights: SwimWeights = dataclasses.field(default_factory=SwimWeights)

@@ -94,7 +94,8 @@ class Swim(PlainTask):
     def weights(self, settings: SwimConfig, generation: jax.Array) -> Mapping[str, jax.Array]:
         """See `Task`."""
         counts = settings.weights
-        return {"speed": jnp.asarray(counts.speed), "overlap": -jnp.asarray(counts.overlap)}
+        share = jnp.minimum(generation / settings.apart, 1.0)
+        return {"speed": jnp.asarray(counts.speed), "overlap": -counts.overlap * share}
 
 
 def _way(tally: Tally) -> jax.Array:
