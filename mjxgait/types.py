@@ -57,6 +57,7 @@ class Sensed:
     geom_pos: [G, 3] m, centres of the watched geoms. geom_low: [G] m, height of their lowest points
     above the ground under them.
     floor: [] m, height of the ground under the trunk; None where it is the plane z = 0.
+    middle: [3] m, of all mass; None of bodies of a model.
     """
 
     joint_pos: jax.Array
@@ -69,6 +70,7 @@ class Sensed:
     geom_pos: jax.Array
     geom_low: jax.Array
     floor: jax.Array | None = None
+    middle: jax.Array | None = None
 
 
 @pytree

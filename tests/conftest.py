@@ -22,7 +22,9 @@ from mjxgait.settings.shipped import data_folder
 
 jax.config.update("jax_num_cpu_devices", 2)
 
-SHIPPED = sorted(path.parent.name for path in data_folder("envs").glob("*/creature.toml"))
+FOLDERS = sorted(path.parent for path in data_folder("envs").glob("*/creature.toml"))
+SHIPPED = [path.name for path in FOLDERS if not load_creature(path).settings.creature.grows]
+"""Those that have a body before they are trained."""
 
 
 @pytest.fixture(scope="module", autouse=True)

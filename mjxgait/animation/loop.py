@@ -8,6 +8,7 @@ import dataclasses
 import mujoco
 import numpy as np
 
+from mjxgait.champion.blocks.material import IN_WATER
 from mjxgait.errors import UserError
 from mjxgait.viewing.walk import Walk
 
@@ -54,6 +55,11 @@ def walk_loop(walk: Walk, rate: int = 30) -> WalkLoop:
       UserError: the walk has no steady stride.
     """
     chosen = _fitting_strides(walk, rate)
+    if chosen is None and walk.champion.task in IN_WATER:
+        raise UserError(
+            f"{walk.creature.name}: a swimmer has no strides to make a loop of; `mjxgait render` "
+            "shows it"
+        )
     if chosen is None:
         why = (
             f"it fell after {walk.fell:.2f} s"

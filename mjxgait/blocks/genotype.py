@@ -10,6 +10,7 @@ import math
 import jax
 import jax.numpy as jnp
 
+from mjxgait.blocks.chance import between, numbered, numbers
 from mjxgait.champion.blocks.material import JOINTS
 from mjxgait.settings.brains import BrainConfig
 from mjxgait.types import pytree
@@ -70,31 +71,40 @@ def random_graph(key: jax.Array, capacity: Capacity, ranges: Ranges) -> Graph:
     """A genotype drawn at random. The first connections of its first nodes make a chain of two to
     four, and of the others one in five is used.
     """
-    keys = iter(jax.random.split(key, 16))
     nodes, connections = capacity.nodes, capacity.connections
-
-    def between(bounds: tuple[float, float], *shape: int) -> jax.Array:
-        return jax.random.uniform(next(keys), shape, minval=bounds[0], maxval=bounds[1])
-
-    def numbered(count: int, *shape: int) -> jax.Array:
-        return jax.random.randint(next(keys), shape, 0, count)
-
-    sizes = jnp.exp(between((math.log(ranges.half[0]), math.log(ranges.half[1])), nodes, 3))
-    length = 1 + numbered(min(3, nodes - 1), 1)[0]
+    each = (nodes, connections)
+    drawn = numbers(
+        key,
+        {
+            "half": (nodes, 3),
+            "joint": (nodes,),
+            "swing": (nodes, 3),
+            "recursion": (nodes,),
+            "target": each,
+            "place": (*each, 3),
+            "turn": (*each, 3),
+            "scale": each,
+            "mirror": each,
+            "terminal": each,
+            "extra": each,
+            "length": (),
+        },
+    )
+    length = 1 + numbered(drawn["length"], min(3, nodes - 1))
     order = jnp.arange(nodes)[:, None]
     chain = (jnp.arange(connections) == 0) & (order < length)
-    extra = jax.random.bernoulli(next(keys), 0.2, (nodes, connections)) & (order <= length)
-    each = (nodes, connections)
+    extra = (drawn["extra"] < 0.2) & (order <= length)
+    sizes = (math.log(ranges.half[0]), math.log(ranges.half[1]))
     return Graph(
-        half=sizes,
-        joint=numbered(len(JOINTS), nodes),
-        swing=between(ranges.swing, nodes, 3),
-        recursion=numbered(ranges.recursion + 1, nodes),
-        target=jnp.where(chain, order + 1, numbered(nodes, *each) % (length + 1)),
+        half=jnp.exp(between(drawn["half"], sizes)),
+        joint=numbered(drawn["joint"], len(JOINTS)),
+        swing=between(drawn["swing"], ranges.swing),
+        recursion=numbered(drawn["recursion"], ranges.recursion + 1),
+        target=jnp.where(chain, order + 1, numbered(drawn["target"], nodes) % (length + 1)),
         used=chain | extra,
-        place=between((-1.0, 1.0), *each, 3),
-        turn=between((-ranges.turn, ranges.turn), *each, 3),
-        scale=between(ranges.scale, *each),
-        mirror=numbered(3, *each),
-        terminal=jax.random.bernoulli(next(keys), 0.1, each),
+        place=between(drawn["place"], (-1.0, 1.0)),
+        turn=between(drawn["turn"], (-ranges.turn, ranges.turn)),
+        scale=between(drawn["scale"], ranges.scale),
+        mirror=numbered(drawn["mirror"], 3),
+        terminal=drawn["terminal"] < 0.1,
     )

@@ -4,9 +4,11 @@ Letters: `N` nodes, `Q` neurons of a node, `M` central ones; 3 inputs each, 3 ef
 """
 
 import dataclasses
+from collections.abc import Mapping
 
 import jax
 
+from mjxgait.blocks.chance import normal, numbered, numbers
 from mjxgait.champion.blocks.material import INPUTS, NEURONS, SENSORS
 from mjxgait.settings.brains import BrainConfig
 from mjxgait.types import pytree
@@ -54,23 +56,26 @@ class Centre:
 
 def random_nerves(key: jax.Array, nodes: int, room: NerveRoom) -> Nerves:
     """Drawn at random: any function, any source; weights are normal."""
-    own, source, weight = jax.random.split(key, 3)
-    kinds, sources, weights = _random_neurons(own, (nodes, room.local), room)
-    effects = jax.random.randint(source, (nodes, 3), 0, room.codes)
-    return Nerves(kinds, sources, weights, effects, jax.random.normal(weight, (nodes, 3)))
+    effects = {"effect_source": (nodes, 3), "effect_weight": (nodes, 3)}
+    drawn = numbers(key, _shapes((nodes, room.local)) | effects)
+    source = numbered(drawn["effect_source"], room.codes)
+    return Nerves(
+        **_neurons(drawn, room), effect_source=source, effect_weight=normal(drawn["effect_weight"])
+    )
 
 
 def random_centre(key: jax.Array, room: NerveRoom) -> Centre:
     """Drawn at random, as `random_nerves`."""
-    return Centre(*_random_neurons(key, (room.central,), room))
+    return Centre(**_neurons(numbers(key, _shapes((room.central,))), room))
 
 
-def _random_neurons(
-    key: jax.Array, shape: tuple[int, ...], room: NerveRoom
-) -> tuple[jax.Array, jax.Array, jax.Array]:
-    kind, source, weight = jax.random.split(key, 3)
-    return (
-        jax.random.randint(kind, shape, 0, len(NEURONS)),
-        jax.random.randint(source, (*shape, INPUTS), 0, room.codes),
-        jax.random.normal(weight, (*shape, INPUTS)),
-    )
+def _shapes(neurons: tuple[int, ...]) -> dict[str, tuple[int, ...]]:
+    return {"kind": neurons, "source": (*neurons, INPUTS), "weight": (*neurons, INPUTS)}
+
+
+def _neurons(drawn: Mapping[str, jax.Array], room: NerveRoom) -> dict[str, jax.Array]:
+    return {
+        "kind": numbered(drawn["kind"], len(NEURONS)),
+        "source": numbered(drawn["source"], room.codes),
+        "weight": normal(drawn["weight"]),
+    }

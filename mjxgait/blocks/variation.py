@@ -9,6 +9,7 @@ import dataclasses
 import jax
 import jax.numpy as jnp
 
+from mjxgait.blocks.chance import normal, numbered, numbers
 from mjxgait.blocks.genotype import Capacity, Graph, Ranges, random_graph
 from mjxgait.blocks.nerves import Centre, NerveRoom, Nerves, random_centre, random_nerves
 from mjxgait.settings.brains import BrainConfig
@@ -70,7 +71,8 @@ class Kin:
     def cross(self, key: jax.Array, mother: Genotype, father: Genotype) -> Genotype:
         """The first nodes of one, the others of the other, up to two points of crossing over."""
         nodes = self.capacity.nodes
-        low, high = jnp.sort(jax.random.randint(key, (2,), 0, nodes + 1))
+        points = numbered(jax.random.uniform(key, (2,)), nodes + 1)
+        low, high = points.min(), points.max()
         order = jnp.arange(nodes)
         return _chosen((order < low) | (order >= high), mother, father)
 
@@ -87,9 +89,8 @@ class Kin:
         kept = graph.used & has_room[graph.target]
         graph = dataclasses.replace(graph, target=place[graph.target], used=kept)
         hung = _chosen(~free, mother, Genotype(graph, nerves, mother.centre))
-        alive = jnp.where(reachable(mother.graph), 0.0, -jnp.inf)
-        choice = jax.random.categorical(key, jnp.repeat(alive, connections))
-        at = choice // connections, choice % connections
+        chance = jax.random.uniform(key, (nodes, connections))
+        at = _one_of(chance, jnp.broadcast_to(~free[:, None], chance.shape))
         graph = hung.graph
         joined = dataclasses.replace(
             graph,
@@ -107,10 +108,18 @@ class Kin:
         fresh = jax.tree.leaves(_without_used(other))
         of_nodes = jax.tree.leaves((varied.graph, varied.nerves))
         chance = self.rates.value / (jnp.sum(alive) * sum(leaf[0].size for leaf in of_nodes))
-        keys = jax.random.split(key, len(leaves))
+        places = range(len(leaves))
+        drawn = numbers(
+            key, {(use, i): leaves[i].shape for i in places for use in ("which", "how")}
+        )
+        bounds = self._bounds(shape)
         moved = [
-            _shifted(k, leaf, new, chance, self.rates.sigma, bounds)
-            for k, leaf, new, bounds in zip(keys, leaves, fresh, self._bounds(shape), strict=True)
+            jnp.where(
+                drawn["which", i] < chance,
+                _shifted(leaves[i], fresh[i], drawn["how", i], self.rates.sigma, bounds[i]),
+                leaves[i],
+            )
+            for i in places
         ]
         found = jax.tree.unflatten(shape, moved)
         return dataclasses.replace(
@@ -141,38 +150,44 @@ def reachable(graph: Graph) -> jax.Array:
     return jax.lax.fori_loop(0, nodes, wider, jnp.arange(nodes) == 0)
 
 
+def _one_of(chance: jax.Array, allowed: jax.Array) -> tuple[jax.Array, jax.Array]:
+    """A place [N, C] that is allowed, all alike; any where none is."""
+    choice = jnp.argmax(jnp.where(allowed, chance, -1.0))
+    return choice // chance.shape[1], choice % chance.shape[1]
+
+
 def _with_new_node(key: jax.Array, genotype: Genotype, other: Genotype, chance: float) -> Genotype:
     """One node that is not connected, drawn anew, and a connection to it."""
-    happens, pick, source = jax.random.split(key, 3)
     alive = reachable(genotype.graph)
     nodes, connections = genotype.graph.target.shape
-    free = jnp.argmax(jax.random.uniform(pick, (nodes,)) * ~alive)
+    drawn = numbers(key, {"happens": (), "node": (nodes,), "slot": (nodes, connections)})
+    free = jnp.argmax(jnp.where(alive, -1.0, drawn["node"]))
     new = _chosen(jnp.arange(nodes) != free, genotype, other)
     # What the new node is connected to is itself new.
     target = new.graph.target.at[free].set(0)
     used = new.graph.used.at[free].set(False)
     spare = alive[:, None] & ~used
-    slot = jnp.argmax(jax.random.uniform(source, (nodes, connections)) * spare)
-    at = slot // connections, slot % connections
+    at = _one_of(drawn["slot"], spare)
     graph = dataclasses.replace(
         new.graph, target=target.at[at].set(free), used=used.at[at].set(True)
     )
     new = dataclasses.replace(new, graph=graph)
-    ok = jax.random.bernoulli(happens, chance) & ~alive.all() & spare.any()
+    ok = (drawn["happens"] < chance) & ~alive.all() & spare.any()
     return jax.tree.map(lambda a, b: jnp.where(ok, a, b), new, genotype)
 
 
 def _reconnected(key: jax.Array, graph: Graph, other: Graph, chance: float) -> Graph:
     """One connection more or less, the new one drawn at random between nodes that are connected."""
-    happens, which, slot, target = jax.random.split(key, 4)
     alive = reachable(graph)
     nodes, connections = graph.target.shape
-    adds = jax.random.bernoulli(which)
+    shapes = {"happens": (), "adds": (), "slot": (nodes, connections), "target": (nodes,)}
+    drawn = numbers(key, shapes)
+    adds = drawn["adds"] < 0.5
     open_slots = alive[:, None] & jnp.where(adds, ~graph.used, graph.used)
-    chosen = jnp.argmax(jax.random.uniform(slot, (nodes, connections)) * open_slots)
-    here = (jnp.arange(nodes * connections) == chosen).reshape(nodes, connections)
-    here = here & open_slots & jax.random.bernoulli(happens, chance)
-    node = jax.random.categorical(target, jnp.where(alive, 0.0, -jnp.inf))
+    chosen = _one_of(drawn["slot"], open_slots)
+    here = jnp.zeros((nodes, connections), bool).at[chosen].set(drawn["happens"] < chance)
+    here = here & open_slots
+    node = jnp.argmax(jnp.where(alive, drawn["target"], -1.0))
     names = ("place", "turn", "scale", "mirror", "terminal")
     fresh = {
         name: jnp.where(
@@ -191,20 +206,13 @@ def _reconnected(key: jax.Array, graph: Graph, other: Graph, chance: float) -> G
 
 
 def _shifted(
-    key: jax.Array,
-    leaf: jax.Array,
-    new: jax.Array,
-    chance: jax.Array,
-    sigma: float,
-    bounds: tuple[float, float],
+    leaf: jax.Array, new: jax.Array, how: jax.Array, sigma: float, bounds: tuple[float, float]
 ) -> jax.Array:
-    which, how = jax.random.split(key)
-    changes = jax.random.bernoulli(which, chance, leaf.shape)
+    """Numbers moved by a normal step, within their bounds; of anything else the new."""
     if not jnp.issubdtype(leaf.dtype, jnp.floating):
-        return jnp.where(changes, new, leaf)
+        return new
     low, high = bounds
-    step = sigma * (high - low) * jax.random.normal(how, leaf.shape)
-    return jnp.where(changes, jnp.clip(leaf + step, low, high), leaf)
+    return jnp.clip(leaf + sigma * (high - low) * normal(how), low, high)
 
 
 def _without_used(genotype: Genotype) -> Genotype:

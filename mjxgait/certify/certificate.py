@@ -125,7 +125,8 @@ def glance(
     whole, halved = (
         record(creature, champion, config.seconds, refine, threads, start) for refine in (1, 2)
     )
-    return Glance(whole, demands.undisturbed(whole, halved, config))
+    found = demands.undisturbed(whole, halved, config)
+    return Glance(whole, (*found, *demands.kept(champion, whole, config)))
 
 
 def rehearse(
@@ -148,13 +149,14 @@ def rehearse(
     disturbed = demands.aimed(
         draws.starts(creature, config, draw, count), config, draw.generator(AIMS)
     )
-    starts = demands.aimed(join(disturbed, draws.pushes(creature, config, draw, count)), config)
+    pushes = (draws.pushes(creature, config, draw, count),) if demands.pushed else ()
+    starts = demands.aimed(join(disturbed, *pushes), config)
     seconds = min(config.seconds, config.pushes.window[1] + config.pushes.ladder_seconds)
     fall = demands.fall(config)
     outcome = simulate(creature, champion, starts, seconds, fall=fall, threads=threads)
     started = demands.succeeded(outcome, starts, config)[:count]
-    pushed = outcome.stayed_up[count:]
-    judged = demands.disturbed(float(started.mean()), float(pushed.mean()), config)
+    pushed = float(outcome.stayed_up[count:].mean()) if demands.pushed else np.nan
+    judged = demands.disturbed(float(started.mean()), pushed, config)
     return min(criterion.margin for criterion in judged)
 
 
@@ -180,31 +182,26 @@ def certify(
     seen = seen or glance(creature, champion, config, threads)
     draw, demands = draws.own(champion, config), demands_of(champion.task)
     disturbed = draws.starts(creature, config, draw, config.starts.count)
-    groups = (
+    groups = [
         nominal_starts(creature, 1),
         demands.aimed(disturbed, config, draw.generator(AIMS)),
-        draws.pushes(creature, config, draw, config.pushes.count),
-        *draws.ladder(creature, config, draw),
-    )
+    ]
+    if demands.pushed:
+        groups += [draws.pushes(creature, config, draw, config.pushes.count)]
+        groups += draws.ladder(creature, config, draw)
     starts = demands.aimed(join(*groups), config)
     outcome = simulate(
         creature, champion, starts, config.seconds, fall=demands.fall(config), threads=threads
     )
     ends = np.cumsum([len(g) for g in groups])[:-1]
-    plain, _, pushed, *harder = (float(up.mean()) for up in np.split(outcome.stayed_up, ends))
+    plain, _, *pushed = (float(up.mean()) for up in np.split(outcome.stayed_up, ends))
     started = float(np.split(demands.succeeded(outcome, starts, config), ends)[1].mean())
-    judged = sorted(
-        (*seen.criteria, *demands.disturbed(started, pushed, config)), key=lambda c: c.number
-    )
-    shares = dict(zip(config.pushes.ladder, harder, strict=True)) | {
-        0.0: plain,
-        config.pushes.speed: pushed,
-    }
-    report = demands.report(seen.whole, config) | {
-        "push_survival": {f"{speed:g}": share for speed, share in sorted(shares.items())},
-        "push_that_fells_half": half_point(shares),
-        "ground": str(creature.terrain),
-    }
+    found = demands.disturbed(started, pushed[0] if pushed else np.nan, config)
+    judged = sorted((*seen.criteria, *found), key=lambda c: c.number)
+    report = demands.report(seen.whole, config) | {"ground": str(creature.terrain)}
+    if pushed:
+        sizes = (0.0, config.pushes.speed, *config.pushes.ladder)
+        report |= _bears(dict(zip(sizes, (plain, *pushed), strict=True)))
     return Certificate(
         creature.name,
         creature.digest,
@@ -230,11 +227,10 @@ def record(
 
     start: how it begins; by default nominal, with the usual goal where the task has one.
     """
-    start = how_simulated(champion.task).aimed(
-        nominal_starts(creature, 1) if start is None else start, CertificateConfig()
-    )
+    task = how_simulated(champion.task)
+    start = task.aimed(nominal_starts(creature, 1) if start is None else start, CertificateConfig())
     outcome = simulate(creature, champion, start, seconds, record=1, refine=refine, threads=threads)
-    return measure(creature, outcome.trajectory, inside=refine == 1, aimed=start)
+    return measure(creature, outcome.trajectory, inside=refine == 1, aimed=start, drag=task.drag)
 
 
 def survival(
@@ -285,6 +281,14 @@ def half_point(shares: dict[float, float]) -> float | None:
         if share0 > 0.5 >= share1:
             return s0 + (share0 - 0.5) / (share0 - share1) * (s1 - s0)
     return 0.0 if steps[0][1] <= 0.5 else None
+
+
+def _bears(shares: dict[float, float]) -> dict[str, Any]:
+    """What the report has of pushes; shares of survivors by speed."""
+    return {
+        "push_survival": {f"{speed:g}": share for speed, share in sorted(shares.items())},
+        "push_that_fells_half": half_point(shares),
+    }
 
 
 def _entry(measure: criteria.Measure) -> dict[str, Any]:

@@ -197,6 +197,31 @@ class TravelConfig(GoalConfig):
 
 
 @dataclasses.dataclass(frozen=True)
+class SwimConfig:
+    """What is demanded of who swims, instead of 1 to 5 and 7.
+
+    Attributes:
+      speed: m/s, least, as the crow flies. straight: least way over path. second_half: its speed
+        over the first half's.
+      arrive: share of the perturbed starts that must be so fast.
+      body_speed: m/s, of the fastest block. overlap: of the smaller block's size, the cube root of
+        its volume, how deep blocks may stand in each other that no joint joins.
+      again: largest relative change of the speed that evolution saw.
+      elsewhere: momentum that is not the water's, as a share of all that was exchanged with it.
+    """
+
+    __pydantic_config__ = STRICT
+    speed: NonNegative = 0.2
+    straight: Fraction = 0.5
+    second_half: Positive = 0.7
+    arrive: Fraction = 0.9
+    body_speed: Positive = 5.0
+    overlap: Positive = 0.05
+    again: Positive = 0.2
+    elsewhere: Positive = 0.05
+
+
+@dataclasses.dataclass(frozen=True)
 class CertificateConfig:
     """The examination.
 
@@ -221,6 +246,7 @@ class CertificateConfig:
     hop: HopConfig = dataclasses.field(default_factory=HopConfig)
     limbo: LimboConfig = dataclasses.field(default_factory=LimboConfig)
     travel: TravelConfig = dataclasses.field(default_factory=TravelConfig)
+    swim: SwimConfig = dataclasses.field(default_factory=SwimConfig)
 
     def __post_init__(self) -> None:
         if self.warmup >= self.seconds:

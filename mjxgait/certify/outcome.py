@@ -10,6 +10,7 @@ from typing import Annotated
 import numpy as np
 import pydantic
 
+from mjxgait.creature import Creature
 from mjxgait.settings.tables import STRICT, NonNegative, Positive
 
 
@@ -52,12 +53,29 @@ class Trajectory:
     phase: np.ndarray
 
 
+def blank_film(creature: Creature, time_step: float, rows: int, steps: int) -> Trajectory:
+    """What nobody has recorded yet: NaN."""
+
+    def blank(*width: int) -> np.ndarray:
+        return np.full((rows, steps, *width), np.nan)
+
+    model, joints = creature.model, len(creature.joints.names)
+    return Trajectory(
+        time_step,
+        qpos=blank(model.nq),
+        qvel=blank(model.nv),
+        torque=blank(joints),
+        target=blank(joints),
+        phase=blank(),
+    )
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class Outcome:
     """What became of the simulations.
 
-    fell: [S] s, infinite for those that stayed up. travel: [S, 2] m along the start's forward and
-    left until the end or the fall.
+    fell: [S] s, infinite for those that stayed up. travel: [S, 3] m along the start's forward and
+    left and upwards until the end or the fall.
     path: [S, T] m forward after each control step; NaN from the fall on, or where nobody looked.
     clearance: [S] m, the least to the bar, `certify.bar.FAR` at most; infinite where there is none.
     """

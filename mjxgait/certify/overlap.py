@@ -27,11 +27,13 @@ class Overlaps:
     depth: np.ndarray
 
 
-def overlaps(creature: Creature, qpos: np.ndarray) -> Overlaps:
-    """Looks at every frame of a motion; qpos: [T, nq]."""
+def overlaps(creature: Creature, qpos: np.ndarray, excused: bool = True) -> Overlaps:
+    """Looks at every frame of a motion; qpos: [T, nq]. excused: whether what is in each other when
+    standing, as somebody has drawn it, counts only beyond that.
+    """
     model = colliding_with_itself(creature)
     data = mujoco.MjData(model)
-    usual = _depths(model, data, creature.stand_qpos)
+    usual = _depths(model, data, creature.stand_qpos) if excused else {}
     found: dict[tuple[int, int], np.ndarray] = {}
     finite = np.isfinite(qpos).all(1)
     for k in np.flatnonzero(finite):

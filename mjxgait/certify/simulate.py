@@ -50,7 +50,7 @@ def simulate(
 
     def run(share: np.ndarray) -> Outcome:
         mine, kept = starts.rows(share), int((share < record).sum())
-        stepping = Stepping(creature, champion, mine, kept, refine, fall, task.onward)
+        stepping = Stepping(creature, champion, mine, kept, refine, fall, task.onward, task.drag)
         return stepping.to_the_end(steps, heading)
 
     with concurrent.futures.ThreadPoolExecutor(len(shares)) as pool:

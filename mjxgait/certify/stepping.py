@@ -14,11 +14,12 @@ from mjxgait.certify.bar import Clearance
 from mjxgait.certify.batch import batch_of
 from mjxgait.certify.drive import Drive
 from mjxgait.certify.layout import Layout, LowestPoint, colliding_geoms, per_foot, start_frame
-from mjxgait.certify.outcome import Fall, Outcome, Trajectory
+from mjxgait.certify.outcome import Fall, Outcome, Trajectory, blank_film
 from mjxgait.certify.starts import Starts
 from mjxgait.certify.state import FOOT_SENSES, State, sense
 from mjxgait.certify.terrain import grounded_model, terrain_of
 from mjxgait.certify.twins import twin_of
+from mjxgait.certify.water import Bath
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 
@@ -57,6 +58,7 @@ class Stepping:
         refine: int,
         fall: Fall,
         onward: Onward,
+        drag: float = 0.0,
     ) -> None:
         self.creature, self.starts, self.fall = creature, starts, fall
         self.record, self.refine = record, refine
@@ -82,7 +84,10 @@ class Stepping:
             bind("qfrc_constraint"),
         )
         self.geom_xpos, self.geom_xmat = bind("geom_xpos"), bind("geom_xmat")
-        self._lift()
+        self.bath = Bath(self.model, self.batch, drag) if drag else None
+        if self.bath is None:
+            self._lift()
+        self.batch.forward(stage=VELOCITY_STAGE)
         self.memory = dict(self.twin.init(len(starts)))
         self.command = np.zeros_like(starts.stiffness)
         feet = creature.feet.watched[: len(creature.feet.foot_of)]
@@ -97,11 +102,11 @@ class Stepping:
         """Steps until the end, leaving out what has fallen and is not recorded."""
         count, time_step = len(self.starts), self.creature.model.opt.timestep
         fell = np.full(count, np.inf)
-        travel, path = np.zeros((count, 2)), np.full((count, steps), np.nan)
+        travel, path = np.zeros((count, 3)), np.full((count, steps), np.nan)
         clearance = np.full(count, np.inf)
         leader, waiting = self._alike()
         running = np.setdiff1d(np.arange(count), waiting)
-        film = self._empty_film(steps)
+        film = blank_film(self.creature, time_step, self.record, steps)
         for k in range(steps):
             if not len(running):
                 break
@@ -160,7 +165,7 @@ class Stepping:
         if self.twin.command == "pose":
             film.target[kept, k] = command[: len(kept)]
         for _ in range(self.refine - 1):
-            self.batch.step(running, stage=VELOCITY_STAGE)
+            self._step(running)
 
     def _physics_step(
         self, running: np.ndarray, k: int, heading: float | None
@@ -179,9 +184,15 @@ class Stepping:
         arrived = np.maximum(k - starts.delay[running], 0) % len(self.sent)
         torque = self.sent[arrived, running]
         self.applied[running[:, None], self.creature.joints.dof_adr] = torque
-        self.batch.step(running, stage=VELOCITY_STAGE)
+        self._step(running)
         self.last_force[running] = self.constraint[running]
         return command, torque
+
+    def _step(self, running: np.ndarray) -> None:
+        """One step of physics, to the new moment and its velocities."""
+        if self.bath:
+            self.bath.press(running)
+        self.batch.step(running, stage=VELOCITY_STAGE)
 
     def _act(self, running: np.ndarray, state: State, heading: float | None) -> np.ndarray:
         """The command [running, J]; the twin's memory moves on."""
@@ -224,6 +235,8 @@ class Stepping:
     def _foot_height(self, running: np.ndarray) -> np.ndarray:
         if not self.sees_feet:
             return np.zeros((len(running), 0))
+        if self.bath:
+            return np.full((len(running), len(self.creature.feet.names)), np.inf)
         low = self.feet.heights(self.geom_xpos[running], self.geom_xmat[running])
         return per_foot(self.creature, low)
 
@@ -239,7 +252,6 @@ class Stepping:
         self.qpos[:, self.layout.root_qpos + 2] += np.maximum(
             usual - self.solid.lowest(self.geom_xpos, self.geom_xmat), 0
         )
-        self.batch.forward(stage=VELOCITY_STAGE)
 
     def _push(self, running: np.ndarray, k: int) -> None:
         pushed = running[self._pushed(running, k)]
@@ -257,7 +269,7 @@ class Stepping:
     def _travel(self, running: np.ndarray) -> np.ndarray:
         start = self.start
         moved = self.xpos[running, self.creature.trunk] - start.place
-        return np.stack([moved @ start.forward, moved @ start.left], 1)
+        return np.stack([moved @ start.forward, moved @ start.left, moved[:, 2]], 1)
 
     def _clearance(self, running: np.ndarray) -> np.ndarray:
         if self.bar is None:
@@ -284,17 +296,3 @@ class Stepping:
         if self.fall.touch:
             fine &= self.forbidden.lowest(self.geom_xpos[running], self.geom_xmat[running]) > 0
         return ~fine
-
-    def _empty_film(self, steps: int) -> Trajectory:
-        def blank(width: int) -> np.ndarray:
-            return np.full((self.record, steps, width), np.nan)
-
-        joints = len(self.creature.joints.dof_adr)
-        return Trajectory(
-            self.creature.model.opt.timestep,
-            qpos=blank(self.model.nq),
-            qvel=blank(self.model.nv),
-            torque=blank(joints),
-            target=blank(joints),
-            phase=np.full((self.record, steps), np.nan),
-        )

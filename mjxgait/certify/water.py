@@ -5,6 +5,7 @@ Written from docs/blocks.md. Letters: `S` simulations, `B` blocks, `Q` points of
 
 import mujoco
 import numpy as np
+from mujoco.batch import Batch
 
 PLACES = np.array([-np.sqrt(0.6), 0.0, np.sqrt(0.6)])
 SHARES = np.array([5.0, 8.0, 5.0]) / 18
@@ -64,3 +65,16 @@ class Water:
         for block, body in enumerate(self.bodies):
             found[:, body] += pushed[:, block]
         return found
+
+
+class Bath:
+    """The water around simulations that are stepped together. drag: N·s/m³."""
+
+    def __init__(self, model: mujoco.MjModel, batch: Batch, drag: float) -> None:
+        self.water, self.force = Water(model, drag), batch.bind("xfrc_applied")
+        names = ("geom_xpos", "geom_xmat", "cvel", "subtree_com", "xipos")
+        self.seen = tuple(batch.bind(name) for name in names)
+
+    def press(self, rows: np.ndarray) -> None:
+        """Lets the water act on some of the simulations, as they move now."""
+        self.force[rows] = self.water.forces(*(array[rows] for array in self.seen))

@@ -9,6 +9,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from mjxgait.champion.blocks.codec import GraphCodec
 from mjxgait.champion.poses import PoseCodec
 from mjxgait.champion.programs import ProgramCodec
 from mjxgait.creature import Creature
@@ -52,6 +53,10 @@ class Codec(Protocol):
         """Shapes that the settings demand of the arrays, as far as they do."""
         ...
 
+    def embodied(self, genome: Genome, settings: Any, task: str, creature: Creature) -> Creature:
+        """The body that the genome grows into; the creature itself where nothing grows."""
+        ...
+
 
 class PlainCodec:
     """Arrays as nested lists under their names: for every kind that has no codec of its own."""
@@ -85,8 +90,16 @@ class PlainCodec:
         """See `Codec`."""
         return {}
 
+    def embodied(self, genome: Genome, settings: Any, task: str, creature: Creature) -> Creature:
+        """See `Codec`."""
+        return creature
 
-CODECS: Mapping[str, Codec] = {"poses": PoseCodec(), "program": ProgramCodec()}
+
+CODECS: Mapping[str, Codec] = {
+    "poses": PoseCodec(),
+    "program": ProgramCodec(),
+    "brain": GraphCodec(),
+}
 """By the name of the controller."""
 
 

@@ -63,3 +63,9 @@ class PoseCodec:
         """See `Codec`."""
         poses = (settings.key_poses, len(creature.joints.names))
         return {"key_poses": poses, "tuning": (len(TUNING),)}
+
+    def embodied(
+        self, genome: Mapping[str, np.ndarray], settings: Any, task: str, creature: Creature
+    ) -> Creature:
+        """See `Codec`."""
+        return creature

@@ -70,3 +70,9 @@ class ProgramCodec:
         """See `Codec`."""
         shape = (len(creature.joints.names), settings.nodes)
         return {"code": shape, "value": shape}
+
+    def embodied(
+        self, genome: Mapping[str, np.ndarray], settings: Any, task: str, creature: Creature
+    ) -> Creature:
+        """See `Codec`."""
+        return creature

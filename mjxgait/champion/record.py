@@ -65,7 +65,8 @@ class Champion:
         Raises:
           UserError: its sizes are those of another creature.
         """
-        return grown(creature, self.sizes)
+        codec = codec_of(self.controller)
+        return grown(codec.embodied(self.genome, self.settings, self.task, creature), self.sizes)
 
     @property
     def fingerprint(self) -> str:
@@ -129,6 +130,7 @@ def write_champion(champion: Champion, creature: Creature, path: Path) -> None:
         "gains": {
             name: {"kp": float(kp), "kd": float(kd), "torque_limit": float(limit)}
             for name, kp, kd, limit in gains
+            if not creature.settings.creature.grows
         },
         "fitness": champion.fitness,
         **({"sizes": dict(champion.sizes)} if champion.sizes else {}),

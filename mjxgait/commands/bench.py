@@ -71,10 +71,19 @@ def bench_command(arguments: Sequence[str]) -> int:
 
 def _folders(names: Sequence[str]) -> list[Path]:
     if "all" in names:
-        return sorted(path.parent for path in data_folder("envs").glob("*/creature.toml"))
+        folders = sorted(path.parent for path in data_folder("envs").glob("*/creature.toml"))
+        return [folder for folder in folders if not _grows(folder)]
     if not names:
         raise UserError("--env names no creature; leave it out for tall_quadruped, or give `all`")
-    return [find_creature(name) for name in dict.fromkeys(names)]
+    folders = [find_creature(name) for name in dict.fromkeys(names)]
+    for folder in folders:
+        if _grows(folder):
+            raise UserError(f"{folder.name}: its body grows, and bench needs one that is there")
+    return folders
+
+
+def _grows(folder: Path) -> bool:
+    return load_creature(folder).settings.creature.grows
 
 
 def _measured(folder: Path, options: BenchOptions) -> dict[str, Any]:

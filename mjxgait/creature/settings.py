@@ -13,7 +13,7 @@ Degrees = tuple[Finite, Finite]
 
 @dataclasses.dataclass(frozen=True)
 class Identity:
-    """The names of the parts."""
+    """The names of the parts. grows: whether it is a seed: what is simulated grows from genomes."""
 
     __pydantic_config__ = STRICT
     name: str
@@ -24,6 +24,7 @@ class Identity:
     ground: tuple[str, ...] = ()
     keyframe: str = "stand"
     body_length: Positive | None = None
+    grows: bool = False
 
 
 @dataclasses.dataclass(frozen=True)

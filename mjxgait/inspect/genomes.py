@@ -6,6 +6,7 @@ from typing import Any, Protocol
 import numpy as np
 from rich.console import Console
 
+from mjxgait.inspect.graphs import GraphView
 from mjxgait.inspect.poses import PoseView, shared, title
 from mjxgait.inspect.programs import ProgramView
 from mjxgait.inspect.snapshot import Snapshot
@@ -76,7 +77,11 @@ class PlainView:
         _print_arrays("champion: from A to B", found["champion_moved"], console)
 
 
-VIEWS: Mapping[str, GenomeView] = {"poses": PoseView(), "program": ProgramView()}
+VIEWS: Mapping[str, GenomeView] = {
+    "poses": PoseView(),
+    "program": ProgramView(),
+    "brain": GraphView(),
+}
 """By the name of the controller."""
 
 

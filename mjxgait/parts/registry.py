@@ -55,9 +55,21 @@ def _programs() -> type:
     return Programs
 
 
+def _brains() -> type:
+    from mjxgait.control.brains.controller import Brains
+
+    return Brains
+
+
+def _swim() -> type:
+    from mjxgait.tasks.swim import Swim
+
+    return Swim
+
+
 SHIPPED: Mapping[str, Mapping[str, Maker]] = {
-    "controller": {"poses": _poses, "program": _programs},
-    "task": {"walk": _walk, "hop": _hop, "limbo": _limbo, "travel": _travel},
+    "controller": {"poses": _poses, "program": _programs, "brain": _brains},
+    "task": {"walk": _walk, "hop": _hop, "limbo": _limbo, "travel": _travel, "swim": _swim},
 }
 """By kind and name; the classes are imported when they are needed."""
 

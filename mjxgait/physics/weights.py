@@ -45,10 +45,26 @@ def inverse_weights(
     Returns:
       [B, 2] 1/kg of shifts and 1/(kg·m²) of turns; [nv] of the degrees of freedom.
     """
-    inverse = jax.scipy.linalg.cho_solve(jax.scipy.linalg.cho_factor(mass), jnp.eye(len(mass)))
+    inverse = _inverse(mass)
     seen = jnp.einsum("bik,kl,bil->bi", jacobian, inverse, jacobian, precision="highest")
     bodies = jnp.stack([seen[:, :3].mean(1), seen[:, 3:].mean(1)], axis=1)
     share = np.zeros(mass.shape, np.float32)
     for group in joints:
         share[np.ix_(group, group)] = 1 / len(group)
     return bodies, jnp.dot(share, jnp.diagonal(inverse), precision="highest")
+
+
+def _inverse(mass: jax.Array) -> jax.Array:
+    """Of a positive definite matrix [n, n], by Gauss and Jordan.
+
+    Not LAPACK's: XLA's CPU calls wait for threads of the pool that they run on, so two devices that
+    invert many matrices at once wait for each other for ever.
+    """
+    size = len(mass)
+
+    def eliminate(k: jax.Array, both: jax.Array) -> jax.Array:
+        row = both[k] / both[k, k]
+        return (both - both[:, k, None] * row).at[k].set(row)
+
+    both = jnp.concatenate([mass, jnp.eye(size, dtype=mass.dtype)], axis=1)
+    return jax.lax.fori_loop(0, size, eliminate, both)[:, size:]

@@ -11,6 +11,7 @@ from jax.sharding import Mesh
 
 from mjxgait.blocks.anatomy import anatomy
 from mjxgait.body import Body, Ends, GivenBody, given_body, given_ends
+from mjxgait.champion.blocks.material import DRAG, FRICTION, GRAVITY, IN_WATER
 from mjxgait.control.bodied import BodiedController
 from mjxgait.control.brains.controller import capacity_of
 from mjxgait.control.drive import Drive
@@ -18,7 +19,8 @@ from mjxgait.control.protocol import Controller
 from mjxgait.creature import Creature
 from mjxgait.creature.settings import Termination
 from mjxgait.parts import make_controller, make_task
-from mjxgait.parts.registry import find, what_ends
+from mjxgait.parts.fit import check_fit
+from mjxgait.parts.registry import what_ends
 from mjxgait.physics import make_plant
 from mjxgait.physics.trees.plant import TreePlant
 from mjxgait.physics.trees.tree import Surroundings
@@ -30,8 +32,8 @@ from mjxgait.tasks.protocol import Task
 from mjxgait.tasks.trials import Starts
 from mjxgait.types import ModelPlant, Plant, pytree
 
-GRAVITY, DRAG, LANES = 9.81, 500.0, 64
-"""m/s²; N·s/m³ of water; simulations per device."""
+LANES = 64
+"""Simulations of blocks per device."""
 
 
 @pytree
@@ -156,9 +158,13 @@ class GrownBlueprint:
         ends = what_ends(self.creature, config.rollout)
         controller = make_controller(body, step, config)
         task = make_task(body, step, ends, config)
-        water = getattr(task, "water", False)
+        wet = config.use.task in IN_WATER
         around = Surroundings(
-            step=step, floor=not water, gravity=0.0 if water else GRAVITY, drag=DRAG * water
+            step=step,
+            friction=FRICTION,
+            floor=not wet,
+            gravity=0.0 if wet else GRAVITY,
+            drag=DRAG if wet else 0.0,
         )
         plant, growth = TreePlant(around), GraphGrowth(capacity)
         return _assembled(body, step, plant, controller, task, config.rollout, LANES, growth)
@@ -197,9 +203,10 @@ def draw_up(creature: Creature, config: Config) -> Plan:
     """The blueprint of a run.
 
     Raises:
-      UserError: the physics does not support the creature's model.
+      UserError: the physics does not support the creature's model, or who takes part does not fit.
     """
-    if getattr(find("controller", config.use.controller), "grows", False):
+    check_fit(creature, config)
+    if creature.settings.creature.grows:
         return GrownBlueprint(creature, config)
     return _of_model(creature, config)
 

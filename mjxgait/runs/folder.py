@@ -8,6 +8,7 @@ from mjxgait.champion import Champion, read_champion
 from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import UserError
 from mjxgait.parts import build_config
+from mjxgait.parts.fit import check_fit
 from mjxgait.settings.config import Config
 from mjxgait.settings.tables import dump_toml, read_toml
 
@@ -19,8 +20,10 @@ def create_run(folder: Path | None, creature: Creature, config: Config) -> Path:
     """Makes the run folder with the exact creature and settings; by default a new one under runs/.
 
     Raises:
-      UserError: the folder holds something already, or cannot be written.
+      UserError: the folder holds something already, or cannot be written; or who takes part does
+        not fit the creature.
     """
+    check_fit(creature, config)
     folder = folder or _new_run_folder(creature.name, config.seed)
     try:
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):

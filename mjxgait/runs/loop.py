@@ -84,8 +84,9 @@ def train(
     if reason is not None and (examined := examined or examiner.best(state)):
         with disk_errors(folder):
             write_champion(examined.champion, creature, folder / CHAMPION)
-            if examined.champion.sizes:
-                keep_body(folder / BODY, examined.champion.embodied(creature))
+            body = examined.champion.embodied(creature)
+            if body is not creature:
+                keep_body(folder / BODY, body)
             (folder / CERTIFICATE).write_text(examined.certificate.to_json(), encoding="utf-8")
         screen.certificate(examined.certificate)
     lines = read_metrics(folder / METRICS)

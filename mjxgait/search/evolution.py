@@ -147,14 +147,16 @@ class Evolution:
 
     def _forced(self, key: jax.Array, state: EvolutionState) -> tuple[Any, jax.Array]:
         config, count = self.config.forced, self.config.offspring
-        key_create, key_parents, *key_mutations = jax.random.split(key, 2 + config.mutations)
+        keys = jax.random.split(key, 2 + config.mutations)
+        key_create, key_parents = keys[0], keys[1]
         newcomers = jnp.round(config.newcomers * count)
         drawn = jax.random.randint(key_parents, (count,), 0, self.config.population)
         mutants = jax.tree.map(lambda leaf: leaf[drawn], state.genomes)
-        for key_mutation in key_mutations:
-            mutants = jax.vmap(self.variation.mutate)(
-                jax.random.split(key_mutation, count), mutants
-            )
+
+        def mutated(mutants: Any, key: jax.Array) -> tuple[Any, None]:
+            return jax.vmap(self.variation.mutate)(jax.random.split(key, count), mutants), None
+
+        mutants, _ = jax.lax.scan(mutated, mutants, keys[2:])
         is_new = jnp.arange(count) < newcomers
         created = self.variation.create(key_create, count)
         return _pick(is_new, created, mutants), jnp.where(

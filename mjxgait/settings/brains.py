@@ -5,6 +5,7 @@ from typing import Annotated
 
 import pydantic
 
+from mjxgait.settings.control import holds
 from mjxgait.settings.tables import SHAPE, STRICT, Fraction, NonNegative, Positive
 
 Room = Annotated[int, pydantic.Field(ge=1), SHAPE]
@@ -18,6 +19,7 @@ class BrainConfig:
       nodes, connections: room of a graph, and of each node. parts, links: room of a body; a part
         needs a link per hinge, and at least one.
       local, central: neurons of each node, and of none.
+      every: control steps from one command to the next; a brain takes two steps of its own for each.
       values: how many values change in a mutation, on average. sigma: by how much, as a share of
         their ranges. connect, grow: chance of a connection more or less, and of a new node.
       crossover, grafting: shares of the offspring with two parents; the others have one.
@@ -30,6 +32,7 @@ class BrainConfig:
     links: Annotated[int, pydantic.Field(ge=2), SHAPE] = 12
     local: Room = 3
     central: Room = 4
+    every: Annotated[int, pydantic.AfterValidator(holds), SHAPE] = 4
     values: NonNegative = 4.0
     sigma: Positive = 0.2
     connect: Fraction = 0.3

@@ -2,7 +2,7 @@
 
 import dataclasses
 
-from mjxgait.settings.tables import STRICT, NonNegative
+from mjxgait.settings.tables import STRICT, NonNegative, Positive
 
 
 @dataclasses.dataclass(frozen=True)
@@ -11,7 +11,7 @@ class SwimWeights:
 
     __pydantic_config__ = STRICT
     speed: NonNegative = 1.0
-    overlap: NonNegative = 0.1
+    overlap: NonNegative = 1.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -20,8 +20,12 @@ class SwimConfig:
 
     Attributes:
       settle: s from the start that do not count.
+      overlap: m, how deep blocks are in each other of which half the speed counts. apart:
+        generations until that counts in full: who cannot swim yet has nothing to lose by it.
     """
 
     __pydantic_config__ = STRICT
     settle: NonNegative = 2.0
+    overlap: Positive = 0.05
+    apart: Positive = 50.0
     weights: SwimWeights = dataclasses.field(default_factory=SwimWeights)

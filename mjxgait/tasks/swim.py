@@ -18,13 +18,14 @@ from mjxgait.types import Sensed, pytree
 
 WILD = 1
 """Why an episode ends early: faster than anything that swims."""
-FASTEST_HINGE, FASTEST = 60.0, 15.0
+FASTEST_HINGE, FASTEST = 20.0, 5.0
 """rad/s, m/s."""
 
 
 @pytree
 class Tally(protocol.Tally):
-    """See `protocol.Tally`. settled, place: [3] m of the trunk when counting began, and now."""
+    """See `protocol.Tally`. settled, place: [3] m of the middle of all mass when counting began, and
+    now: a trunk gets somewhere by bending, the whole does not."""
 
     settled: jax.Array
     place: jax.Array
@@ -34,7 +35,6 @@ class Swim(PlainTask):
     """See `Task`: in water, from rest, without a floor. The way from there is as the crow flies."""
 
     Settings: ClassVar[type] = SwimConfig
-    water: ClassVar[bool] = True
     terms = tuple(field.name for field in dataclasses.fields(SwimWeights))
     outcomes = ("way", "seconds")
 
@@ -74,14 +74,18 @@ class Swim(PlainTask):
         self, tally: Tally, sensed: Sensed, torque: jax.Array, standards: Any, aim: Any
     ) -> Tally:
         """See `Task`."""
-        place = sensed.trunk_pos
+        assert sensed.middle is not None
+        place = sensed.middle
         settled = jnp.where(tally.steps <= standards, place, tally.settled)
         return dataclasses.replace(tally, steps=tally.steps + 1, settled=settled, place=place)
 
     def judge(self, tally: Tally, settings: SwimConfig) -> Mapping[str, jax.Array]:
-        """See `Task`: m/s over the time that counts, whether it lived to its end or not."""
-        counted = jnp.maximum(self.horizon * self.step - settings.settle, self.step)
-        return {"speed": _way(tally) / counted, "overlap": tally.overlap}
+        """See `Task`: m/s over the time that counts, whether it lived to its end or not; and what
+        of it is lost by blocks that stand in each other.
+        """
+        speed = _way(tally) / jnp.maximum(self.horizon * self.step - settings.settle, self.step)
+        lost = tally.overlap / (tally.overlap + settings.overlap)
+        return {"speed": speed, "overlap": speed * lost}
 
     def outcome(self, tally: Tally) -> Mapping[str, jax.Array]:
         """See `Task`: m from where counting began, and s until the end."""
@@ -90,7 +94,8 @@ class Swim(PlainTask):
     def weights(self, settings: SwimConfig, generation: jax.Array) -> Mapping[str, jax.Array]:
         """See `Task`."""
         counts = settings.weights
-        return {"speed": jnp.asarray(counts.speed), "overlap": -jnp.asarray(counts.overlap)}
+        share = jnp.minimum(generation / settings.apart, 1.0)
+        return {"speed": jnp.asarray(counts.speed), "overlap": -counts.overlap * share}
 
 
 def _way(tally: Tally) -> jax.Array:

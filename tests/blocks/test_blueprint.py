@@ -1,18 +1,20 @@
 """A run whose bodies grow is made of the same parts as every other."""
 
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+from mjxgait.champion.blocks.material import DRAG
 from mjxgait.control.brains.controller import Brains
-from mjxgait.creature import Creature
 from mjxgait.errors import UserError
+from mjxgait.library import load_creature
 from mjxgait.parts.registry import add_own
 from mjxgait.parts.settings import build_config
 from mjxgait.physics.trees.tree import Surroundings
-from mjxgait.runs.blueprint import DRAG, draw_up
+from mjxgait.runs.blueprint import draw_up
+from mjxgait.runs.folder import create_run
 from mjxgait.simulation.rollout import Simulator
-from mjxgait.tasks.swim import Swim
 
 
 class Smelling(Brains):
@@ -23,21 +25,45 @@ class Smelling(Brains):
         self.reads = (*self.reads, "contcat")
 
 
-def swimmer(stool: Creature, controller: type) -> Simulator:
-    """The stool lends its time step."""
-    add_own("task", "swim", Swim)
-    add_own("controller", controller.__name__, controller)
-    use = {"controller": controller.__name__, "task": "swim"}
-    return draw_up(stool, build_config({"use": use}, "test")).simulator()
+def swimmer(controller: str) -> Simulator:
+    use = {"controller": controller, "task": "swim"}
+    return draw_up(load_creature("blocks"), build_config({"use": use}, "test")).simulator()
 
 
-def test_a_brain_reads_only_what_there_is_to_sense(stool: Creature):
-    assert swimmer(stool, Brains).controller.reads == ("joint_pos", "contact")
+def test_a_brain_reads_only_what_there_is_to_sense():
+    add_own("controller", "smelling", Smelling)
+    assert swimmer("brain").controller.reads == ("joint_pos", "contact")
     with pytest.raises(UserError, match='there is no sense "contcat"'):
-        swimmer(stool, Smelling)
+        swimmer("smelling")
 
 
-def test_who_swims_has_water_and_neither_ground_nor_weight(stool: Creature):
-    plant: Any = swimmer(stool, Brains).plant
-    step = float(stool.model.opt.timestep)
-    assert plant.around == Surroundings(step=step, floor=False, gravity=0.0, drag=DRAG)
+def test_who_swims_has_water_and_neither_ground_nor_weight():
+    plant: Any = swimmer("brain").plant
+    assert plant.around == Surroundings(step=0.01, floor=False, gravity=0.0, drag=DRAG)
+
+
+@pytest.mark.parametrize(
+    ("env", "given", "said"),
+    [
+        ("tall_quadruped", {"use": {"controller": "brain"}}, "its body is there already"),
+        ("tall_quadruped", {"use": {"task": "swim"}}, "only bodies that grow"),
+        ("blocks", {"use": {"task": "swim"}}, "poses has nothing to move"),
+        ("blocks", {"use": {"controller": "brain"}}, "cannot walk yet, only swim"),
+        (
+            "blocks",
+            {"use": {"controller": "brain", "task": "swim"}, "rollout": {"ground": "bumps:0.05"}},
+            "rollout.ground is for a body that is there",
+        ),
+    ],
+)
+def test_who_does_not_fit_is_refused_in_one_sentence(
+    env: str, given: dict[str, Any], said: str, tmp_path: Path
+):
+    creature, config = load_creature(env), build_config(given, "test")
+    for asked in (
+        lambda: draw_up(creature, config),
+        lambda: create_run(tmp_path, creature, config),
+    ):
+        with pytest.raises(UserError, match=f"{env}: .*{said}"):
+            asked()
+    assert not list(tmp_path.iterdir()), "before anything is written"

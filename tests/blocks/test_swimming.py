@@ -1,42 +1,37 @@
-"""Bodies and brains that evolve together, through the same run as everybody's.
-
-Compiling them takes two minutes: tried where MJXGAIT_TEST_SWIMMERS is set.
-"""
+"""Bodies and brains that evolve together, through the same run as everybody's."""
 
 import dataclasses
-import os
+from pathlib import Path
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from mjxgait.control.brains.controller import Brains
-from mjxgait.creature import Creature
-from mjxgait.parts.registry import add_own
+from mjxgait.certify.afloat import afloat
+from mjxgait.certify.simulate import simulate
+from mjxgait.certify.starts import nominal_starts
+from mjxgait.champion import read_champion, write_champion
+from mjxgait.champion.blocks.material import DRAG
+from mjxgait.library import load_creature
 from mjxgait.parts.settings import build_config
 from mjxgait.runs.experiment import Experiment, build_experiment
-from mjxgait.tasks.swim import FASTEST_HINGE, Swim, Tally
+from mjxgait.tasks.swim import FASTEST_HINGE, Tally
 from mjxgait.types import Sensed
 
-pytestmark = pytest.mark.skipif(
-    not os.environ.get("MJXGAIT_TEST_SWIMMERS"), reason="MJXGAIT_TEST_SWIMMERS is not set"
-)
 TABLE = {
     "use": {"controller": "brain", "task": "swim"},
     "controller": {"nodes": 3, "parts": 4, "links": 4, "local": 2, "central": 1},
     "evolution": {"population": 24},
-    "rollout": {"seconds": 0.4, "starts": 2, "lanes": 16, "joint_noise": 0.1},
+    "rollout": {"seconds": 0.8, "starts": 2, "lanes": 16, "joint_noise": 0.1},
     "fitness": {"settle": 0.1},
 }
 
 
 @pytest.fixture(scope="module")
-def experiment(stool: Creature) -> Experiment:
-    """Any creature lends its name and its time step; nothing else of it is simulated."""
-    add_own("controller", "brain", Brains)
-    add_own("task", "swim", Swim)
-    return build_experiment(stool, build_config(TABLE, "test"))
+def experiment() -> Experiment:
+    """Little room, so that it compiles fast."""
+    return build_experiment(load_creature("blocks"), build_config(TABLE, "test"))
 
 
 @pytest.fixture(scope="module")
@@ -90,7 +85,35 @@ def test_what_is_faster_than_anything_alive_ends(experiment: Experiment):
         trunk_angvel=nothing,
         geom_pos=jnp.zeros((4, 3)),
         geom_low=jnp.zeros(4),
+        middle=nothing,
     )
     assert int(task.ended(calm, ())) == 0
     wild = dataclasses.replace(calm, joint_vel=calm.joint_vel.at[2].set(FASTEST_HINGE + 1))
     assert int(task.ended(wild, ())) == 1
+
+
+def test_the_examiner_sees_them_swim_as_far(experiment: Experiment, evolved):
+    """Body, brain and water, all written twice: in the end everybody is in the same place."""
+    state, _ = evolved
+    tally = experiment.simulate(jax.tree.map(lambda leaf: leaf[:8], state.genomes)).tally
+    mine, ways = np.asarray(tally.place - tally.settled)[:, 0], []
+    for rank in range(8):
+        champion = experiment.champion(state, {}, rank)
+        body = champion.embodied(experiment.creature)
+        film = simulate(body, champion, nominal_starts(body, 1), 0.8, record=1).trajectory
+        middle = afloat(body, film.qpos[0], film.qvel[0], DRAG).middle
+        # It counts from 0.1 s on; the tally has seen what was before the last step.
+        ways.append(middle[-1] - middle[10])
+    lengths = np.linalg.norm(ways, axis=1)
+    assert lengths.max() > 0.02
+    apart = np.linalg.norm(mine - np.array(ways), axis=1)
+    assert np.median(apart / (lengths + 0.01)) < 0.02
+    assert (apart < 0.1 * lengths + 0.002).mean() >= 0.75, "a threshold may be met a tick apart"
+
+
+def test_a_champion_of_theirs_is_a_file(experiment: Experiment, evolved, tmp_path: Path):
+    champion = experiment.champion(evolved[0], {})
+    write_champion(champion, experiment.creature, tmp_path / "champion.json")
+    again = read_champion(tmp_path / "champion.json", experiment.creature)
+    assert again.fingerprint == champion.fingerprint
+    assert again.embodied(experiment.creature).files == champion.embodied(experiment.creature).files

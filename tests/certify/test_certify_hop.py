@@ -207,7 +207,7 @@ def test_the_examiner_and_evolution_mean_the_same_goals():
 class Pointer:
     """A twin whose joints show how far it is to the goal."""
 
-    reads, command = ("goal_distance", "forward"), "pose"
+    reads, command, every = ("goal_distance", "forward"), "pose", 1
 
     def __init__(self, creature: Creature, champion: Champion, step: float) -> None:
         self.stand = creature.joints.stand

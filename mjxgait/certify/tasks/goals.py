@@ -10,6 +10,7 @@ from mjxgait.certify.criteria import Criterion, at_least, at_most, parts, physic
 from mjxgait.certify.measure import Recording
 from mjxgait.certify.outcome import Fall
 from mjxgait.certify.starts import Starts
+from mjxgait.champion import Champion
 
 HIGHEST = 1e3
 """Standing heights: a trunk that hops may be anywhere, as long as no part of it lies."""
@@ -18,6 +19,8 @@ HIGHEST = 1e3
 class GoalDemands(abc.ABC):
     """See `Demands`. It is not asked to bear pushes: in half of a hop nothing can be done."""
 
+    drag: float = 0.0
+    pushed: bool = True
     share: str
     """What the share of criterion 4 does."""
 
@@ -54,6 +57,12 @@ class GoalDemands(abc.ABC):
             physics(whole, config.physics),
             parts(whole, config.parts),
         )
+
+    def kept(
+        self, champion: Champion, whole: Recording, config: CertificateConfig
+    ) -> tuple[Criterion, ...]:
+        """See `Demands`: evolution has promised nothing."""
+        return ()
 
     def onward(self, goal: np.ndarray, first: np.ndarray, way: np.ndarray) -> np.ndarray:
         """See `Demands`: the same."""

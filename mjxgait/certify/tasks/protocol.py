@@ -10,6 +10,7 @@ from mjxgait.certify.criteria import Criterion
 from mjxgait.certify.measure import Recording
 from mjxgait.certify.outcome import Fall, Outcome
 from mjxgait.certify.starts import Starts
+from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 
 
@@ -18,11 +19,21 @@ class Demands(Protocol):
 
     verdict: str
     """What one that passes does."""
+    drag: float
+    """Of the water around it, N·s/m³; 0 without."""
+    pushed: bool
+    """Whether it is tried what pushes do."""
 
     def undisturbed(
         self, whole: Recording, halved: Recording, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
         """What a recording decides that nobody has disturbed; `halved` had half the time step."""
+        ...
+
+    def kept(
+        self, champion: Champion, whole: Recording, config: CertificateConfig
+    ) -> tuple[Criterion, ...]:
+        """Whether what evolution said of a champion holds here."""
         ...
 
     def fall(self, config: CertificateConfig) -> Fall:

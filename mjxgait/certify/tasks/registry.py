@@ -5,6 +5,7 @@ from mjxgait.certify.tasks.limbo import LimboDemands
 from mjxgait.certify.tasks.plain import HasCriteria, PlainDemands
 from mjxgait.certify.tasks.protocol import Demands
 from mjxgait.certify.tasks.staying import StaysUp
+from mjxgait.certify.tasks.swim import SwimDemands
 from mjxgait.certify.tasks.travel import TravelDemands
 from mjxgait.certify.tasks.walk import WalkDemands
 from mjxgait.errors import not_loaded
@@ -14,6 +15,7 @@ _DEMANDS: dict[str, Demands] = {
     "hop": HopDemands(),
     "limbo": LimboDemands(),
     "travel": TravelDemands(),
+    "swim": SwimDemands(),
 }
 
 

@@ -7,13 +7,21 @@ import numpy as np
 from mjxgait.certify import criteria
 from mjxgait.certify.config import CertificateConfig
 from mjxgait.certify.criteria import Criterion
+from mjxgait.certify.measure import Recording
 from mjxgait.certify.outcome import Fall, Outcome
 from mjxgait.certify.starts import Starts
+from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 
 
 class StaysUp:
-    """See `Demands`: criteria 4 and 5 of those that have no goal but to be up in the end."""
+    """See `Demands`: criteria 4 and 5 of those that have no goal but to be up in the end.
+
+    drag, pushed: see `Demands`.
+    """
+
+    drag: float = 0.0
+    pushed: bool = True
 
     def fall(self, config: CertificateConfig) -> Fall:
         """See `Demands`: as criterion 1 has it."""
@@ -28,6 +36,12 @@ class StaysUp:
     def onward(self, goal: np.ndarray, first: np.ndarray, way: np.ndarray) -> np.ndarray:
         """See `Demands`: the same."""
         return goal
+
+    def kept(
+        self, champion: Champion, whole: Recording, config: CertificateConfig
+    ) -> tuple[Criterion, ...]:
+        """See `Demands`: evolution has promised nothing."""
+        return ()
 
     def succeeded(self, outcome: Outcome, starts: Starts, config: CertificateConfig) -> np.ndarray:
         """See `Demands`: those that have stayed up."""

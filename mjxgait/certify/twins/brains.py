@@ -18,7 +18,7 @@ TICKS = 2
 MOST, LOUDEST = 10.0, 100.0
 Neuron = tuple[int, int]
 Values = Any
-"""An array [S]."""
+"""An array [S, ...] of neurons of a kind."""
 
 
 def _following(a: Values, memory: Values, dt: float) -> Values:
@@ -87,11 +87,13 @@ class BrainTwin:
     """See `Twin`.
 
     genome: its arrays by name. parts: grown from it. hinges: of each joint of the model, its part
-    and which of the part's it is. step: s between two commands.
+    and which of the part's it is. step: s of the simulation. every: of them from one command to the
+    next.
+    A wire leads from a column of what is known to a neuron or to a hinge: nothing, the constant 1,
+    the angles of all hinges, contact and light of all parts, the values of all neurons.
     """
 
     command: ClassVar[Command] = "torque"
-    every: ClassVar[int] = 1
     reads: ClassVar[tuple[str, ...]] = ("joint_pos", "contact", "light")
 
     def __init__(
@@ -100,94 +102,104 @@ class BrainTwin:
         parts: Sequence[Part],
         hinges: Sequence[tuple[int, int]],
         step: float,
+        every: int = 1,
     ) -> None:
-        self.genome, self.parts, self.hinges, self.step = genome, parts, tuple(hinges), step
+        self.genome, self.parts, self.hinges = genome, parts, tuple(hinges)
+        self.every, self.pause = every, step * every
         self.local = genome["nerves.kind"].shape[1]
         owned = [(p, q) for p in range(len(parts)) for q in range(self.local)]
-        self.neurons = [*owned, *((CENTRE, q) for q in range(len(genome["centre.kind"])))]
-        self.place = {neuron: i for i, neuron in enumerate(self.neurons)}
+        neurons = [*owned, *((CENTRE, q) for q in range(len(genome["centre.kind"])))]
+        first = 2 + len(hinges) + 4 * len(parts)
+        self.place = {neuron: first + i for i, neuron in enumerate(neurons)}
         self.child: dict[int, int] = {}
         for number, part in enumerate(parts):
             self.child.setdefault(part.parent, number)
+        kinds = [NEURONS[int(self._gene("kind", neuron))] for neuron in neurons]
+        self.alike = {kind: np.flatnonzero(np.array(kinds) == kind) for kind in set(kinds)}
+        wires = [self._wires(neuron) for neuron in neurons]
+        self.column = np.array([[column for column, _ in three] for three in wires])
+        self.weight = np.array([[weight for _, weight in three] for three in wires])
+        pulls = [self._pull(part, hinge) for part, hinge in self.hinges]
+        self.driver = np.array([column for column, _, _ in pulls])
+        self.gain = np.array([gain for _, gain, _ in pulls])
+        self.strength = np.array([strength for _, _, strength in pulls])
 
     def init(self, count: int) -> Memory:
         """See `Twin`."""
-        none = np.zeros((count, len(self.neurons)))
+        none = np.zeros((count, len(self.place)))
         return {"values": none, "memory": none}
 
     def act(self, memory: Memory, senses: Mapping[str, np.ndarray]) -> tuple[np.ndarray, Memory]:
         """See `Twin`."""
-        values, kept, dt = memory["values"], memory["memory"], self.step / TICKS
+        values, kept, dt = memory["values"], memory["memory"], self.pause / TICKS
+        sensed = self._sensed(senses)
         for _ in range(TICKS):
-            fired = [
-                fire(*self._inputs(neuron, values, senses), kept[:, i], dt)
-                for i, neuron in enumerate(self.neurons)
-            ]
-            values, kept = (np.stack([f[k] for f in fired], axis=1) for k in (0, 1))
-        torque = [self._pull(part, hinge, values, senses) for part, hinge in self.hinges]
-        return np.stack(torque, axis=1), {"values": values, "memory": kept}
+            inputs = np.concatenate([sensed, values], axis=1)[:, self.column] * self.weight
+            after, kept_after = np.empty_like(values), np.empty_like(kept)
+            for kind, these in self.alike.items():
+                three = np.moveaxis(inputs[:, these], 2, 0)
+                after[:, these], kept_after[:, these] = fire(kind, three, kept[:, these], dt)
+            values, kept = after, kept_after
+        wanted = self.gain * np.concatenate([sensed, values], axis=1)[:, self.driver]
+        torque = self.strength * np.clip(wanted, -1.0, 1.0)
+        return torque, {"values": values, "memory": kept}
 
     def phase(self, memory: Memory) -> np.ndarray:
         """See `Twin`: it has no cycle."""
         return np.full(len(memory["values"]), np.nan)
 
-    def _inputs(
-        self, neuron: Neuron, values: np.ndarray, senses: Mapping[str, np.ndarray]
-    ) -> tuple[str, list[Values]]:
-        """A neuron's function, and its weighted inputs."""
+    def _sensed(self, senses: Mapping[str, np.ndarray]) -> np.ndarray:
+        """The columns before the neurons'. Where there is no light, nothing is seen."""
+        count = len(senses["joint_pos"])
+        dark = np.zeros((count, len(self.parts), 3))
+        light = senses.get("light", dark).reshape(count, -1)
+        ends = np.tile([0.0, 1.0], (count, 1))
+        return np.concatenate([ends, senses["joint_pos"], senses["contact"], light], axis=1)
+
+    def _gene(self, name: str, neuron: Neuron) -> Any:
         owner, which = neuron
         if owner == CENTRE:
-            kinds, sources, weights = (
-                self.genome[f"centre.{x}"] for x in ("kind", "source", "weight")
-            )
-        else:
-            node = self.parts[owner].node
-            kinds, sources, weights = (
-                self.genome[f"nerves.{x}"][node] for x in ("kind", "source", "weight")
-            )
-        kind, reader = NEURONS[int(kinds[which])], max(owner, 0)
-        found = [self._source(reader, int(code), values, senses) for code in sources[which]]
-        return kind, [w * x for w, x in zip(weights[which], found, strict=True)]
+            return self.genome[f"centre.{name}"][which]
+        return self.genome[f"nerves.{name}"][self.parts[owner].node][which]
 
-    def _source(
-        self, part: int, code: int, values: np.ndarray, senses: Mapping[str, np.ndarray]
-    ) -> Values:
-        """What a part finds behind a source's number."""
+    def _wires(self, neuron: Neuron) -> list[tuple[int, float]]:
+        """Column and weight of a neuron's inputs; the central ones have the root's sources."""
+        sources, weights = self._gene("source", neuron), self._gene("weight", neuron)
+        found = [self._source(max(neuron[0], 0), int(code)) for code in sources]
+        return [(column, sign * w) for (column, sign), w in zip(found, weights, strict=True)]
+
+    def _source(self, part: int, code: int) -> tuple[int, float]:
+        """The column that a part finds behind a source's number, and its sign."""
         if code == 0:
-            return np.ones(len(values))
+            return 1, 1.0
         if code <= SENSORS:
-            return self._sensed(part, code - 1, senses)
+            return self._sensor(part, code - 1)
         code -= 1 + SENSORS
         owners = (part, self.parts[part].parent if part else None, self.child.get(part))
         if code >= 3 * self.local:
-            return values[:, self.place[CENTRE, code - 3 * self.local]]
+            return self.place[CENTRE, code - 3 * self.local], 1.0
         owner = owners[code // self.local]
-        if owner is None:
-            return np.zeros(len(values))
-        return values[:, self.place[owner, code % self.local]]
+        return (0, 1.0) if owner is None else (self.place[owner, code % self.local], 1.0)
 
-    def _sensed(self, part: int, sensor: int, senses: Mapping[str, np.ndarray]) -> Values:
+    def _sensor(self, part: int, sensor: int) -> tuple[int, float]:
         """Three hinges, contact, the light along three axes; seen in a mirror by a mirror image."""
-        own = self.parts[part]
+        own, joints, count = self.parts[part], len(self.hinges), len(self.parts)
         if sensor < 3:
             if (part, sensor) not in self.hinges:
-                return np.zeros(len(senses["joint_pos"]))
-            joint = self.hinges.index((part, sensor))
-            return _sign(own, sensor) * senses["joint_pos"][:, joint]
+                return 0, 1.0
+            return 2 + self.hinges.index((part, sensor)), _sign(own, sensor)
         if sensor == 3:
-            return senses["contact"][:, part]
+            return 2 + joints + part, 1.0
         flip = -1.0 if own.mirrored and sensor == 5 else 1.0
-        return flip * senses["light"][:, part, sensor - 4]
+        return 2 + joints + count + 3 * part + sensor - 4, flip
 
-    def _pull(
-        self, part: int, hinge: int, values: np.ndarray, senses: Mapping[str, np.ndarray]
-    ) -> Values:
-        """[S] N·m of a hinge."""
+    def _pull(self, part: int, hinge: int) -> tuple[int, float, float]:
+        """Column and weight of what drives a hinge, and N·m of it at the most."""
         own = self.parts[part]
         code = int(self.genome["nerves.effect_source"][own.node, hinge])
-        weight = float(self.genome["nerves.effect_weight"][own.node, hinge])
-        wanted = np.clip(weight * self._source(part, code, values, senses), -1.0, 1.0)
-        return own.strength * _sign(own, hinge) * wanted
+        column, sign = self._source(part, code)
+        weight = sign * float(self.genome["nerves.effect_weight"][own.node, hinge])
+        return column, weight, own.strength * _sign(own, hinge)
 
 
 def _sign(part: Part, hinge: int) -> float:

@@ -2,17 +2,28 @@
 
 from collections.abc import Callable
 
+from mjxgait.certify.twins.brains import BrainTwin
 from mjxgait.certify.twins.poses import PoseTwin
 from mjxgait.certify.twins.programs import ProgramTwin
 from mjxgait.certify.twins.protocol import Twin
 from mjxgait.champion import Champion
+from mjxgait.champion.blocks.parts import grow
 from mjxgait.creature import Creature
 from mjxgait.errors import not_loaded
 
 Maker = Callable[[Creature, Champion, float], Twin]
 """From creature, champion and step in s."""
 
-_TWINS: dict[str, Maker] = {"poses": PoseTwin, "program": ProgramTwin}
+
+def _brain(creature: Creature, champion: Champion, step: float) -> Twin:
+    """creature: the champion's own, which has grown. Its hinges are called `part3_0`."""
+    parts = grow(champion.genome, champion.settings.parts, champion.settings.links)
+    names = [name.removeprefix("part").split("_") for name in creature.joints.names]
+    hinges = [(int(part), int(hinge)) for part, hinge in names]
+    return BrainTwin(champion.genome, parts, hinges, step, champion.settings.every)
+
+
+_TWINS: dict[str, Maker] = {"poses": PoseTwin, "program": ProgramTwin, "brain": _brain}
 
 
 def register_twin(controller: str, make: Maker) -> None:

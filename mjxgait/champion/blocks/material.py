@@ -24,3 +24,9 @@ DAMPING = 0.2
 """s: a hinge's damping over its strength; so none turns faster than 5 rad/s by itself."""
 ROTOR = 0.01
 """s: its armature over its damping, so that the smallest blocks can be simulated."""
+GRAVITY, FRICTION = 9.81, 0.9
+"""m/s², and of the ground; there is neither in water."""
+DRAG = 500.0
+"""N·s/m³, what water does to a face per area and normal velocity."""
+IN_WATER = ("swim",)
+"""Tasks that are done there."""

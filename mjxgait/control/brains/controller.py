@@ -1,5 +1,6 @@
 """A controller that grows with the body it moves: blocks and neurons from one graph (Sims 1994)."""
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
@@ -8,12 +9,12 @@ import jax.numpy as jnp
 import numpy as np
 
 from mjxgait.blocks.genotype import Capacity, Ranges
-from mjxgait.blocks.growth import grown
 from mjxgait.blocks.nerves import NerveRoom
 from mjxgait.blocks.phenotype import body_of
 from mjxgait.blocks.variation import Genotype, Kin, Rates
 from mjxgait.blocks.wiring import Brain, wired
 from mjxgait.body import Body
+from mjxgait.champion.blocks.parts import grow
 from mjxgait.control.brains.thought import Mind, Perceived, blank, thought
 from mjxgait.control.protocol import Command, Senses
 from mjxgait.search.variation import Variation
@@ -33,7 +34,6 @@ class Brains:
 
     Settings: ClassVar[type] = BrainConfig
     command: ClassVar[Command] = "torque"
-    every: ClassVar[int] = 1
     grows: ClassVar[bool] = True
 
     @classmethod
@@ -44,7 +44,8 @@ class Brains:
         return cls(step, settings, added)
 
     def __init__(self, step: float, settings: BrainConfig, added: Sequence[str] = ()) -> None:
-        self.step, self.capacity = step, capacity_of(settings)
+        self.every, self.capacity = settings.every, capacity_of(settings)
+        self.pause = step * settings.every
         self.room = NerveRoom(settings.local, settings.central)
         self.reads = ("joint_pos", "contact", *([LIGHT] if LIGHT in added else []))
 
@@ -76,9 +77,14 @@ class Brains:
         return np.concatenate([leaf.reshape(len(leaf), -1) for leaf in leaves], axis=1)
 
     def numbers(self, genomes: Genotype) -> Mapping[str, np.ndarray]:
-        """See `Controller`: of how many parts they are."""
-        parts = jax.vmap(lambda graph: grown(graph, self.capacity))(genomes.graph)
-        return {"parts": np.asarray(parts.exists.sum(axis=1))}
+        """See `Controller`: of how many parts they are, without tracing what no program needs."""
+        names = [field.name for field in dataclasses.fields(genomes.graph)]
+        graph = {f"graph.{name}": np.asarray(getattr(genomes.graph, name)) for name in names}
+        counts = [
+            len(grow({n: a[i] for n, a in graph.items()}, self.capacity.parts, self.capacity.links))
+            for i in range(len(graph["graph.half"]))
+        ]
+        return {"parts": np.array(counts)}
 
     def prepare(self, genome: Genotype, settings: BrainConfig) -> Brain:
         """See `Controller`: the wires of the body that the genome grows into."""
@@ -95,5 +101,5 @@ class Brains:
         light = senses[LIGHT] if LIGHT in self.reads else jnp.zeros((links, 3))
         angles = jnp.concatenate([jnp.zeros(1), senses["joint_pos"]])
         perceived = Perceived(angles, senses["contact"], light)
-        torque, memory = thought(plan, memory, perceived, self.step)
+        torque, memory = thought(plan, memory, perceived, self.pause)
         return torque[1:], memory

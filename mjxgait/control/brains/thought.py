@@ -11,7 +11,7 @@ from mjxgait.control.brains.neurons import fired
 from mjxgait.types import pytree
 
 TICKS = 2
-"""Steps of the brain in one of the simulation (Sims 1994, section 3.2)."""
+"""Steps of the brain for one command (Sims 1994, section 3.2)."""
 
 
 @pytree
@@ -38,7 +38,7 @@ def blank(neurons: int) -> Mind:
 
 
 def thought(brain: Brain, mind: Mind, perceived: Perceived, step: float) -> tuple[jax.Array, Mind]:
-    """Torques [n] N·m of the hinges, and what is kept. step: s.
+    """Torques [n] N·m of the hinges, and what is kept. step: s from one command to the next.
 
     All neurons fire at once, on the values of the tick before.
     """

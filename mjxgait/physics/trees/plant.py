@@ -15,6 +15,7 @@ from mjxgait.physics.fast.plant import turned
 from mjxgait.physics.fast.treematrix import Rows, factor, on_pivot, solve, sparsity
 from mjxgait.physics.trees.dynamics import bias_links, generalised, mass_rows, velocities
 from mjxgait.physics.trees.motion import centres, frames, motions, posture, root_turns
+from mjxgait.physics.trees.overlap import deepest
 from mjxgait.physics.trees.touch import BlockFooting, Touch, lowest_corners, make_constraints
 from mjxgait.physics.trees.tree import FAR, Surroundings, Tree
 from mjxgait.physics.trees.water import drag_links
@@ -53,8 +54,9 @@ class TreePlant:
         return jnp.stack(one_kernel(_solve_damped)(workings.mass, damping, force))
 
     def overlap(self, state: BodyState) -> jax.Array:
-        """See `Plant.overlap`: parts pass through each other."""
-        return jnp.full_like(state.friction, -jnp.inf)
+        """See `Plant.overlap`: in whatever pose, for nobody has drawn these bodies."""
+        tree: Tree = state.parameters
+        return deepest(tree, posture(tree, state.qpos, pinned_by(state.friction)))
 
     def advance(self, state: BodyState, workings: Moment, torque: jax.Array) -> BodyState:
         """See `Plant.advance`."""
@@ -81,7 +83,11 @@ class TreePlant:
             bias=pin(bias + resisted),
             touch=pin(lowest_corners(tree, poses)) if around.floor else None,
         )
-        return _sensed(tree, state, poses, moving, moment.bias), moment
+        sensed = _sensed(tree, state, poses, moving, moment.bias)
+        if not around.floor:
+            nowhere = jnp.full_like(sensed.geom_low, FAR)
+            sensed = dataclasses.replace(sensed, geom_low=nowhere)
+        return sensed, moment
 
     def _advance(self, state: BodyState, moment: Moment, torque: jax.Array) -> BodyState:
         tree: Tree = state.parameters
@@ -110,6 +116,7 @@ def _sensed(
     rot = frames(poses)
     centre = [c + state.qpos[i] for i, c in enumerate(centres(tree, poses))]
     heights = [turn_each(rot, tree.axes[:, k])[2] for k in range(3)]
+    weight = tree.mass / jnp.sum(tree.mass, axis=0)
     reach = total([tree.half[:, k] * jnp.abs(height) for k, height in enumerate(heights)])
     return Sensed(
         joint_pos=state.qpos[7:],
@@ -119,6 +126,7 @@ def _sensed(
         trunk_rot=jnp.stack(poses[0].rot, axis=1),
         trunk_vel=state.qvel[:3],
         trunk_angvel=moving[0, :3],
+        middle=jnp.stack([jnp.sum(weight * c, axis=0) for c in centre]),
         geom_pos=jnp.stack(centre, axis=1),
         geom_low=jnp.where(tree.solid > 0, centre[2] - reach, FAR),
     )

@@ -12,7 +12,7 @@ from mjxgait.physics.fast.treematrix import Sparsity, sparsity
 from mjxgait.types import pytree
 
 FAR = 1e3
-"""m, how high above the ground a block is that there is not."""
+"""m, how high above the ground a block is that there is not, or where there is no ground."""
 
 
 @pytree

@@ -1,0 +1,66 @@
+"""What is seen of a body in water besides: its middle, its momentum, and what pushes it.
+
+Letters: `T` frames.
+"""
+
+import dataclasses
+from collections.abc import Mapping
+
+import mujoco
+import numpy as np
+
+from mjxgait.creature import Creature
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Afloat:
+    """In the world's axes.
+
+    middle: [T, 3] m, of all mass. momentum: [T, 3] N·s. push: [T, 3] N, of the water on the whole.
+    sizes: m by name of the part, the cube root of its volume.
+    """
+
+    middle: np.ndarray
+    momentum: np.ndarray
+    push: np.ndarray
+    sizes: Mapping[str, float]
+
+    def window(self, frames: slice) -> "Afloat":
+        """Some of the frames."""
+        return Afloat(self.middle[frames], self.momentum[frames], self.push[frames], self.sizes)
+
+
+def afloat(creature: Creature, qpos: np.ndarray, qvel: np.ndarray, drag: float) -> Afloat:
+    """Looks at a motion [T, nq], [T, nv]; frames after it blew up are NaN. drag: N·s/m³.
+
+    What the water does is summed block by block: over a face, it is the velocity of the block's
+    middle along the normal that counts (docs/blocks.md); the examiner's simulation sums points.
+    """
+    model, data = creature.model, mujoco.MjData(creature.model)
+    boxes = np.flatnonzero(model.geom_bodyid > 0)
+    middle, momentum, push = (np.full((len(qpos), 3), np.nan) for _ in range(3))
+    velocity = np.zeros(6)
+    for k in np.flatnonzero(np.isfinite(qpos).all(1) & np.isfinite(qvel).all(1)):
+        data.qpos[:], data.qvel[:] = qpos[k], qvel[k]
+        mujoco.mj_fwdPosition(model, data)
+        mujoco.mj_fwdVelocity(model, data)
+        momentum[k] = push[k] = 0.0
+        for box in boxes:
+            kind, mass = mujoco.mjtObj.mjOBJ_GEOM, model.body_mass[model.geom_bodyid[box]]
+            mujoco.mj_objectVelocity(model, data, kind, box, velocity, 0)
+            momentum[k] += mass * velocity[3:]
+            push[k] += _push(model.geom_size[box], data.geom_xmat[box], velocity[3:], drag)
+        middle[k] = data.subtree_com[creature.trunk]
+    sizes = {
+        model.body(model.geom_bodyid[box]).name: float(np.cbrt(8 * model.geom_size[box].prod()))
+        for box in boxes
+    }
+    return Afloat(middle, momentum, push, sizes)
+
+
+def _push(half: np.ndarray, rotation: np.ndarray, velocity: np.ndarray, drag: float) -> np.ndarray:
+    """[3] N on a block whose middle moves so: two faces of each kind, each as large as it is."""
+    normals = rotation.reshape(3, 3)
+    areas = 8 * half[[1, 2, 0]] * half[[2, 0, 1]]
+    pushed: np.ndarray = -drag * normals @ (areas * (velocity @ normals))
+    return pushed

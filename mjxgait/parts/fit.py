@@ -1,0 +1,55 @@
+"""Whether those that take part fit the creature."""
+
+from typing import Any
+
+from mjxgait.champion.blocks.material import IN_WATER
+from mjxgait.creature import Creature
+from mjxgait.errors import UserError
+from mjxgait.ground.spec import FLAT
+from mjxgait.parts.registry import SHIPPED, find
+from mjxgait.settings.config import Config
+
+
+def check_fit(creature: Creature, config: Config) -> None:
+    """Refuses who cannot do with this body what is asked.
+
+    Raises:
+      UserError: says why, and the way out.
+    """
+    controller, task, name = config.use.controller, config.use.task, creature.name
+    kind: Any = find("controller", controller)
+    if not creature.settings.creature.grows:
+        if getattr(kind, "grows", False):
+            raise UserError(
+                f"{name}: its body is there already, and a {controller} grows with its own; take "
+                "--env blocks, or another controller"
+            )
+        if task in IN_WATER:
+            raise UserError(
+                f"{name}: only bodies that grow are simulated in water; take --env blocks, or "
+                "another task"
+            )
+        return
+    if not getattr(kind, "grows", False):
+        raise UserError(
+            f"{name}: its body grows with its brain, so {controller} has nothing to move; leave "
+            "--controller out"
+        )
+    if task in SHIPPED["task"] and task not in IN_WATER:
+        raise UserError(f"{name}: bodies that grow cannot {task} yet, only {', '.join(IN_WATER)}")
+    _check_settings(name, config)
+
+
+def _check_settings(name: str, config: Config) -> None:
+    """Of a body that grows: what needs one that is there."""
+    rollout = config.rollout
+    needs = {
+        "evolution.body": config.evolution.body != 1.0,
+        "rollout.ground": rollout.ground != FLAT,
+        "rollout.masses": rollout.masses != 0.0,
+        "rollout.body": rollout.body != "constants",
+        "rollout.physics": rollout.physics != "auto",
+    }
+    for key, given in needs.items():
+        if given:
+            raise UserError(f"{name}: {key} is for a body that is there; this one grows")

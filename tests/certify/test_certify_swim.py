@@ -1,0 +1,153 @@
+"""What the examiner demands of a swimmer, criterion by criterion, on made-up motions."""
+
+import dataclasses
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from certify_made_up import walk
+
+from mjxgait.certify import CertificateConfig
+from mjxgait.certify.afloat import Afloat, afloat
+from mjxgait.certify.measure import Recording
+from mjxgait.certify.outcome import Outcome, Trajectory
+from mjxgait.certify.tasks.swim import SwimDemands
+from mjxgait.certify.water import Water
+from mjxgait.library import load_creature
+
+CONFIG, DEMANDS = CertificateConfig(), SwimDemands()
+FRAMES, STEP, MASS, SPEED = 2200, 0.01, 10.0, 0.4
+TIMES = np.arange(FRAMES) * STEP
+
+
+def swim(speed: Any = SPEED, aside: Any = 0.0, extra: float = 0.0) -> Recording:
+    """A way at speeds m/s [T], the water pushing as it must, and something else with `extra` N."""
+    velocity = np.zeros((FRAMES, 3))
+    velocity[:, 2], velocity[:, 1] = speed, aside
+    middle = np.cumsum(velocity, axis=0) * STEP
+    momentum = MASS * velocity
+    # It strokes: what it exchanges with the water within a stroke is more than what it keeps.
+    stroke = 5 * np.sin(2 * np.pi * TIMES)[:, None] * [1.0, 0.0, 0.0]
+    momentum += np.cumsum(stroke, axis=0) * STEP - stroke * STEP
+    push = np.diff(momentum, axis=0, append=momentum[-1:]) / STEP - extra * np.array([0, 0, 1.0])
+    made = walk()
+    still = np.zeros((FRAMES, made.joint_vel.shape[1]))
+    return dataclasses.replace(
+        made,
+        time_step=STEP,
+        trunk_pos=middle,
+        joint_pos=still,
+        joint_vel=still,
+        torque=still,
+        body_speed=np.full(FRAMES, 1.0),
+        overlap=np.zeros((FRAMES, 1)),
+        overlap_pairs=(("part1", "part3"),),
+        afloat=Afloat(middle, momentum, push, {"part1": 0.1, "part3": 0.2}),
+    )
+
+
+def failures(whole: Recording, halved: Recording | None = None) -> set[int]:
+    judged = DEMANDS.undisturbed(whole, halved or swim(), CONFIG)
+    assert [c.number for c in judged] == [2, 6, 8, 9, 11]
+    return {c.number for c in judged if not c.passed}
+
+
+def changed(**values: float) -> Recording:
+    """The good way with other values in one frame."""
+    made = swim()
+    arrays = {name: np.array(getattr(made, name)) for name in values}
+    for name, array in arrays.items():
+        array[1000] = values[name]
+    return dataclasses.replace(made, **arrays)
+
+
+def test_a_good_swimmer_passes_whichever_way_it_swims():
+    assert not failures(swim())
+    assert not failures(swim(speed=0.0, aside=SPEED), swim(speed=0.0, aside=SPEED))
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        swim(speed=0.19),
+        swim(speed=0.3 + 1.5 * np.sign(np.sin(2 * np.pi * TIMES))),
+        swim(speed=np.where(TIMES < 12, 0.6, 0.3)),
+    ],
+    ids=["slow", "to and fro", "tired"],
+)
+def test_who_is_slow_or_crooked_or_tires_does_not_swim(bad: Recording):
+    assert 2 in failures(bad, bad)
+
+
+def test_half_the_time_step_must_tell_the_same():
+    assert failures(swim(), swim(speed=SPEED * 1.19)) == set()
+    assert failures(swim(), swim(speed=SPEED * 1.21)) == {6}
+    assert failures(swim(speed=0.21), swim(speed=0.19)) == {6}
+
+
+def test_no_machine_is_as_fast_or_as_strong():
+    limit = swim().dimensions.torque_limit[0]
+    assert failures(changed(joint_vel=19.9)) == set()
+    assert failures(changed(joint_vel=20.1)) == {8}
+    assert failures(changed(body_speed=5.1)) == {8}
+    assert failures(changed(torque=1.01 * limit)) == {8}
+
+
+def test_no_block_is_deep_in_another():
+    """5 % of the smaller's size."""
+    assert failures(changed(overlap=0.0049)) == set()
+    assert failures(changed(overlap=0.0051)) == {9}
+
+
+def test_momentum_that_the_water_did_not_give_is_found():
+    assert failures(swim(extra=0.01)) == set()
+    assert failures(swim(extra=0.3)) == {11}
+
+
+def test_what_evolution_said_must_hold():
+    """Over as many seconds as it saw."""
+    slower = swim(speed=np.where(TIMES < 10, SPEED, 0.1))
+    for told, holds in ((SPEED, True), (1.24 * SPEED, True), (1.3 * SPEED, False)):
+        champion: Any = SimpleNamespace(
+            terms={"speed": told}, origin={"nominal": {"seconds": 10.0}}
+        )
+        (kept,) = DEMANDS.kept(champion, slower, CONFIG)
+        assert (kept.number, kept.passed) == (10, holds), told
+    nobody: Any = SimpleNamespace(terms={}, origin={})
+    assert not DEMANDS.kept(nobody, slower, CONFIG)[0].passed
+
+
+def test_a_start_succeeds_whichever_way_it_leads():
+    path = np.zeros((3, FRAMES))
+    film = Trajectory(STEP, *(np.zeros((0, FRAMES)) for _ in range(5)))
+    travel = np.array([[4.5, 0, 0], [0, 0, -4.5], [0, 0, 4.3]])
+    outcome = Outcome(np.full(3, np.inf), travel, path, np.full(3, np.inf), film)
+    starts: Any = None
+    assert DEMANDS.succeeded(outcome, starts, CONFIG).tolist() == [True, True, False]
+    assert DEMANDS.disturbed(0.89, np.nan, CONFIG)[0].passed is False
+    assert DEMANDS.disturbed(0.91, np.nan, CONFIG)[0].passed is True
+
+
+def test_what_is_seen_afloat_is_what_the_water_does():
+    """Against the points of the examiner's water, on the seed's two blocks in random motion."""
+    import mujoco
+
+    creature = load_creature("blocks")
+    rng = np.random.default_rng(0)
+    qpos = np.tile(creature.stand_qpos, (5, 1)) + rng.uniform(-0.3, 0.3, (5, creature.model.nq))
+    qpos[:, 3:7] /= np.linalg.norm(qpos[:, 3:7], axis=1, keepdims=True)
+    qvel = rng.normal(size=(5, creature.nv))
+    seen = afloat(creature, qpos, qvel, 500.0)
+    data, water = mujoco.MjData(creature.model), Water(creature.model, 500.0)
+    for k in range(5):
+        data.qpos[:], data.qvel[:] = qpos[k], qvel[k]
+        mujoco.mj_forward(creature.model, data)
+        mujoco.mj_subtreeVel(creature.model, data)
+        arrays = (data.geom_xpos, data.geom_xmat, data.cvel, data.subtree_com, data.xipos)
+        force = water.forces(*(array[None] for array in arrays))[0, :, :3].sum(0)
+        np.testing.assert_allclose(seen.push[k], force, rtol=1e-9, atol=1e-9)
+        linear = creature.frame.mass * data.subtree_linvel[creature.trunk]
+        np.testing.assert_allclose(seen.momentum[k], linear, rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(seen.middle[k], data.subtree_com[creature.trunk])
+    assert seen.sizes["part0"] == pytest.approx(np.cbrt(0.3 * 0.2 * 0.1))
