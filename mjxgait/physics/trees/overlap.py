@@ -18,7 +18,7 @@ def deepest(tree: Tree, poses: Sequence[Pose]) -> jax.Array:
     """[L] m of the deepest two, negative where all are apart.
 
     Two blocks are apart where one of their six normals separates them. Where only a line along two
-    edges would, they count as in each other: never too little.
+    edges would, they count as in each other: never less than the least way out.
     """
     rot, centre = frames(poses), centres(tree, poses)
     normals = [turn_each(rot, tree.axes[:, k]) for k in range(3)]

@@ -1,0 +1,77 @@
+"""How deep blocks are in each other, against MuJoCo's own collisions of boxes."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from blocks.made_up import genome_of, one
+
+from mjxgait.blocks.genotype import Capacity, Ranges, random_graph
+from mjxgait.blocks.phenotype import Body, body_of
+from mjxgait.certify.overlap import overlaps
+from mjxgait.champion.blocks.folder import body_files
+from mjxgait.champion.blocks.parts import Part, grow
+from mjxgait.creature.scale import load_files
+from mjxgait.physics.trees.plant import TreePlant
+from mjxgait.physics.trees.tree import Surroundings
+from mjxgait.types import BodyState
+
+CAPACITY, COUNT = Capacity(), 80
+
+
+def ours(bodies: Body, bent: np.ndarray) -> np.ndarray:
+    """[COUNT] m, of angles [COUNT, links]."""
+    tree = jax.tree.map(lambda leaf: jnp.moveaxis(leaf, 0, -1), bodies.tree)
+    root = np.tile([[0.0], [0], [0], [1], [0], [0], [0]], COUNT)
+    still = jnp.zeros((CAPACITY.links + 5, COUNT))
+    qpos = jnp.float32(np.concatenate([root, bent[:, 1:].T]))
+    state = BodyState(qpos, still, still, still, jnp.ones(COUNT), parameters=tree)
+    return np.asarray(jax.jit(TreePlant(Surroundings(floor=False)).overlap)(state))
+
+
+def theirs(body: Body, parts: list[Part], bent: np.ndarray) -> float:
+    """m; angles [links]."""
+    creature = load_files(body_files(parts, "blocks", 0.01, 0.0, None, "in water"))
+    links = [
+        int(np.flatnonzero((body.part == p) & (body.hinge == h) & (body.tree.moves > 0))[0])
+        for p, part in enumerate(parts)
+        for h in range(len(part.hinges))
+    ]
+    qpos = creature.stand_qpos.copy()
+    qpos[7:] = bent[links]
+    return float(overlaps(creature, qpos[None], excused=False).depth.max(initial=0.0))
+
+
+@pytest.fixture(scope="module")
+def depths() -> tuple[np.ndarray, np.ndarray]:
+    """Ours and MuJoCo's, m, of random bodies in random poses that have a hinge and two parts."""
+    keys = jax.random.split(jax.random.key(7), COUNT)
+    make = jax.jit(jax.vmap(lambda key: random_graph(key, CAPACITY, Ranges())))
+    graphs = make(keys)
+    bodies = jax.jit(jax.vmap(lambda graph: body_of(graph, CAPACITY)))(graphs)
+    bent = np.random.default_rng(7).uniform(-0.5, 0.5, (COUNT, CAPACITY.links))
+    bent = bent * np.asarray(bodies.tree.moves)
+    found, expected = ours(bodies, bent), np.full(COUNT, np.nan)
+    for i in range(COUNT):
+        parts = grow(genome_of(one(graphs, i)), CAPACITY.parts, CAPACITY.links)
+        if any(part.hinges for part in parts):
+            expected[i] = theirs(one(bodies, i), parts, bent[i])
+    known = np.isfinite(expected)
+    return found[known], expected[known]
+
+
+def test_no_depth_is_missed(depths: tuple[np.ndarray, np.ndarray]):
+    """MuJoCo tells the deepest corner along its normal, which may be more than the way out."""
+    found, expected = depths
+    assert (expected > 0.01).mean() > 0.2
+    assert (found[expected > 1e-4] > 0).all()
+    assert (np.maximum(found, 0) >= 0.65 * expected - 1e-4).all()
+
+
+def test_most_depths_are_what_they_are(depths: tuple[np.ndarray, np.ndarray]):
+    """Where a line along two edges separates, ours is too large."""
+    found, expected = depths
+    deep = expected > 0.01
+    assert np.median(found[deep] / expected[deep]) < 1.2
+    assert (found < 0).mean() > 0.1
+    assert (found < 0)[expected == 0].mean() > 0.4
