@@ -24,7 +24,7 @@ TABLE = {
     "controller": {"nodes": 3, "parts": 4, "links": 4, "local": 2, "central": 1},
     "evolution": {"population": 24},
     "rollout": {"seconds": 0.8, "starts": 2, "lanes": 16, "joint_noise": 0.1},
-    "fitness": {"settle": 0.1},
+    "fitness": {"settle": 0.1, "weights": {"overlap": 0.0}},
 }
 
 
