@@ -88,6 +88,15 @@ def test_a_brain_thinks_as_its_twin_does():
     assert np.mean(wrong > 1e-2) < 0.03
 
 
+def test_what_a_twin_keeps_of_two_kinds_is_kept_apart():
+    """The examiner writes into what it was given at first."""
+    genotype = KIN.create(jax.random.key(9))
+    _, plain = twin(jax.tree.map(np.asarray, genotype), body_of(genotype.graph, CAPACITY))
+    first = plain.init(2)
+    first["values"][:] = 1.0
+    assert (first["memory"] == 0).all()
+
+
 def twin(genotype: Genotype, body: Body) -> tuple[list[int], BrainTwin]:
     """The links of all hinges, part by part, and the brain that moves them."""
     genome = arrays_of(genotype)

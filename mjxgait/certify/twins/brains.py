@@ -126,8 +126,9 @@ class BrainTwin:
 
     def init(self, count: int) -> Memory:
         """See `Twin`."""
-        none = np.zeros((count, len(self.place)))
-        return {"values": none, "memory": none}
+        shape = (count, len(self.place))
+        # Two arrays: whoever keeps them writes into each.
+        return {"values": np.zeros(shape), "memory": np.zeros(shape)}
 
     def act(self, memory: Memory, senses: Mapping[str, np.ndarray]) -> tuple[np.ndarray, Memory]:
         """See `Twin`."""
