@@ -25,10 +25,11 @@ def step_cost(experiment: Experiment) -> dict[str, float]:
     lane = jax.eval_shape(partial(_lanes, experiment, lanes))
     # The one look under the rollout's bonnet: its loop around the step would hide the step's own
     # cost.
-    compiled = jax.jit(simulator._step).lower(lane).compile().cost_analysis() or {}
+    step = partial(simulator._step, jnp.int32(0))
+    compiled = jax.jit(step).lower(lane).compile().cost_analysis() or {}
     state = sum(leaf.size * leaf.dtype.itemsize for leaf in jax.tree.leaves(lane))
     costs = {
-        "flops_asked": count_flops(simulator._step, lane),
+        "flops_asked": count_flops(step, lane),
         "flops": compiled.get("flops", float("nan")),
         "transcendentals": compiled.get("transcendentals", float("nan")),
         "bytes": compiled.get("bytes accessed", float("nan")),

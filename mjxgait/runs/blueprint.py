@@ -104,8 +104,7 @@ class Blueprint:
         if starts.heaviness is None:
             return starts
         one, heavier = self.plant.parameters, self.plant.heavier
-        # As one program, or each of its hundreds of operations is compiled alone.
-        every = jax.jit(jax.vmap(lambda factors: heavier(one, factors)))
+        every = jax.vmap(lambda factors: heavier(one, factors))
         return dataclasses.replace(starts, numbers=every(starts.heaviness))
 
     def simulator(self, numbers: Numbers | None = None) -> Simulator:

@@ -278,7 +278,10 @@ def _experiment(blueprint: Plan, config: Config) -> Experiment:
     rollout = config.rollout
     drawn = dataclasses.replace(rollout, starts=1 + (rollout.starts - 1) * rollout.variety)
     starts = blueprint.own.task.trials(key, creature, drawn)
-    return Experiment(creature, config, blueprint, Row(traced(config), blueprint.embodied(starts)))
+    if starts.heaviness is not None:
+        # As one program, or each of its hundreds of operations is compiled alone.
+        starts = jax.jit(blueprint.embodied)(starts)
+    return Experiment(creature, config, blueprint, Row(traced(config), starts))
 
 
 def _everywhere(simulator: Simulator) -> NamedSharding:
