@@ -9,6 +9,8 @@ from helpers import small_config
 
 from mjxgait.creature import Creature
 from mjxgait.runs.experiment import build_experiment, starts_of_round
+from mjxgait.settings.control import HOLDS
+from mjxgait.simulation.rollout import CHECK_EVERY
 from mjxgait.tasks.trials import NEVER, Starts, draw_starts
 
 NONE = {
@@ -109,6 +111,11 @@ def test_the_bodies_of_a_run_weigh_what_their_starts_say(stool: Creature):
     # Nothing else tells the starts apart: where the masses count, everybody moves otherwise in each.
     forward = jax.jit(experiment.simulate)(experiment.init().genomes).tally.forward
     assert np.abs(np.diff(forward, axis=1)).max() > 1e-5
+
+
+def test_every_command_that_holds_ends_with_a_round():
+    """Else lanes that take an episode in the middle of a command would begin with another's."""
+    assert all(CHECK_EVERY % steps == 0 for steps in HOLDS)
 
 
 def test_each_generation_has_other_starts_until_all_have_had_their_turn(stool: Creature):

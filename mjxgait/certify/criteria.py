@@ -76,6 +76,12 @@ def at_least(name: str, value: float, threshold: float, best: float | None = Non
     )
 
 
+def steady(first: float, second: float, least: float) -> Measure:
+    """What is done in the second half of a motion, over what is done in the first."""
+    share = second / first if first > 0 else np.nan
+    return at_least("second half / first half", share, least, 1.0)
+
+
 def at_most(name: str, value: float, threshold: float) -> Measure:
     """A measure that should be small, at best zero."""
     return Measure(name, float(value), "<=", threshold, threshold)

@@ -10,12 +10,10 @@ from typing import Any, Protocol
 import numpy as np
 
 from mjxgait.champion.blocks.codec import GraphCodec
+from mjxgait.champion.plain import Genome, PlainCodec
 from mjxgait.champion.poses import PoseCodec
 from mjxgait.champion.programs import ProgramCodec
 from mjxgait.creature import Creature
-from mjxgait.errors import UserError
-
-Genome = Mapping[str, np.ndarray]
 
 
 class Codec(Protocol):
@@ -56,43 +54,6 @@ class Codec(Protocol):
     def embodied(self, genome: Genome, settings: Any, task: str, creature: Creature) -> Creature:
         """The body that the genome grows into; the creature itself where nothing grows."""
         ...
-
-
-class PlainCodec:
-    """Arrays as nested lists under their names: for every kind that has no codec of its own."""
-
-    def settled(self, genome: Genome, creature: Creature) -> dict[str, np.ndarray]:
-        """See `Codec`."""
-        return dict(genome)
-
-    def document(self, genome: Genome, settings: Any, creature: Creature) -> dict[str, Any]:
-        """See `Codec`."""
-        return {name: np.asarray(array, float).tolist() for name, array in genome.items()}
-
-    def genome(self, document: Mapping[str, Any], creature: Creature) -> dict[str, np.ndarray]:
-        """See `Codec`."""
-        return {name: np.array(values, float) for name, values in document.items()}
-
-    def settings(self, table: Mapping[str, Any], where: str) -> Any:
-        """See `Codec`: as it is; whoever knows the controller reads it."""
-        return dict(table)
-
-    def check(self, genome: Genome, creature: Creature) -> None:
-        """See `Codec`."""
-        for name, array in genome.items():
-            if not np.isfinite(array).all():
-                raise UserError(
-                    f"the genome's {name} has numbers that are not finite: this champion cannot "
-                    "move; take one of another generation"
-                )
-
-    def shapes(self, settings: Any, creature: Creature) -> dict[str, tuple[int, ...]]:
-        """See `Codec`."""
-        return {}
-
-    def embodied(self, genome: Genome, settings: Any, task: str, creature: Creature) -> Creature:
-        """See `Codec`."""
-        return creature
 
 
 CODECS: Mapping[str, Codec] = {

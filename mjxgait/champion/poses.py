@@ -5,20 +5,15 @@ from typing import Any
 
 import numpy as np
 
+from mjxgait.champion.plain import PlainCodec
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.settings.control import TUNING, PoseConfig
 from mjxgait.settings.tables import build
 
 
-class PoseCodec:
+class PoseCodec(PlainCodec):
     """Of genomes with `key_poses` [K, J] in rad and `tuning` [E] in the order of `TUNING`."""
-
-    def settled(
-        self, genome: Mapping[str, np.ndarray], creature: Creature
-    ) -> dict[str, np.ndarray]:
-        """See `Codec`."""
-        return dict(genome)
 
     def document(
         self, genome: Mapping[str, np.ndarray], settings: PoseConfig, creature: Creature
@@ -63,9 +58,3 @@ class PoseCodec:
         """See `Codec`."""
         poses = (settings.key_poses, len(creature.joints.names))
         return {"key_poses": poses, "tuning": (len(TUNING),)}
-
-    def embodied(
-        self, genome: Mapping[str, np.ndarray], settings: Any, task: str, creature: Creature
-    ) -> Creature:
-        """See `Codec`."""
-        return creature

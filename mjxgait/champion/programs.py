@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from mjxgait.champion.expressions import ADDED, in_text, nested, terminals, to_arrays, to_text
+from mjxgait.champion.plain import PlainCodec
 from mjxgait.champion.simplify import simplified
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
@@ -13,7 +14,7 @@ from mjxgait.settings.programs import ProgramConfig
 from mjxgait.settings.tables import build
 
 
-class ProgramCodec:
+class ProgramCodec(PlainCodec):
     """Of genomes with `code` and `value` [J, C]; see `Codec`."""
 
     def document(
@@ -70,9 +71,3 @@ class ProgramCodec:
         """See `Codec`."""
         shape = (len(creature.joints.names), settings.nodes)
         return {"code": shape, "value": shape}
-
-    def embodied(
-        self, genome: Mapping[str, np.ndarray], settings: Any, task: str, creature: Creature
-    ) -> Creature:
-        """See `Codec`."""
-        return creature

@@ -13,7 +13,7 @@ from mjxgait.certify.tasks.plain import HasCriteria
 from mjxgait.certify.twins import register_twin
 from mjxgait.errors import UserError, did_you_mean
 from mjxgait.parts.registry import SHIPPED, add_own
-from mjxgait.settings.control import HOLDS
+from mjxgait.settings.control import holds
 
 KINDS = ("controller", "task")
 _LOADED: dict[tuple[str, str], str] = {}
@@ -64,10 +64,11 @@ def load(kind: str, text: str) -> str:
         raise UserError(f"{path}: {name} must inherit from {base.__module__}.{base.__name__}")
     if missing := sorted(getattr(cls, "__abstractmethods__", ())):
         raise UserError(f"{path}: {name} lacks {', '.join(missing)}")
-    if (every := getattr(cls, "every", 1)) not in HOLDS:
-        raise UserError(
-            f"{path}: {name}.every = {every}: must be one of {', '.join(map(str, HOLDS))}"
-        )
+    every = getattr(cls, "every", 1)
+    try:
+        holds(every)
+    except ValueError as error:
+        raise UserError(f"{path}: {name}.every = {every}: {error}") from None
     known = f"{path.name}:{name}"
     add_own(kind, known, cls)
     _LOADED[kind, known] = text

@@ -10,7 +10,7 @@ import numpy as np
 
 from mjxgait.certify.afloat import Afloat
 from mjxgait.certify.config import CertificateConfig, SwimConfig
-from mjxgait.certify.criteria import Criterion, Measure, at_least, at_most, joint_overrun
+from mjxgait.certify.criteria import Criterion, Measure, at_least, at_most, joint_overrun, steady
 from mjxgait.certify.describe import worst_overlap
 from mjxgait.certify.measure import Recording
 from mjxgait.certify.outcome import Fall, Outcome
@@ -113,12 +113,7 @@ def swims_on(window: Recording, config: SwimConfig) -> Criterion:
         (
             at_least("speed (m/s)", speed(window), config.speed),
             at_least("way / path", straight, config.straight, 1.0),
-            at_least(
-                "second half / first half",
-                second / first if first > 0 else np.nan,
-                config.second_half,
-                1.0,
-            ),
+            steady(first, second, config.second_half),
         ),
     )
 

@@ -19,6 +19,7 @@ from mjxgait.certify.criteria import (
     physics,
     ratio,
     speed,
+    steady,
     upright,
 )
 from mjxgait.certify.describe import describe, slip_distance
@@ -96,12 +97,7 @@ def progress(window: Recording, config: ProgressConfig) -> Criterion:
                 config.speed,
             ),
             at_most("drift / distance", ratio(sideways, distance), config.drift),
-            at_least(
-                "second half / first half",
-                second / first if first > 0 else np.nan,
-                config.second_half,
-                1.0,
-            ),
+            steady(first, second, config.second_half),
         ),
     )
 

@@ -15,7 +15,9 @@ from mjxgait.tasks.hop.tally import Tally
 TERMS = tuple(field.name for field in dataclasses.fields(HopWeights))
 GOAL = "distance"
 MISSED = "missed"
-STYLE = tuple(name for name in TERMS if name not in (GOAL, MISSED))
+AIM = (GOAL, MISSED)
+"""What counts from the first generation on."""
+STYLE = tuple(name for name in TERMS if name not in AIM)
 """The manner of a way: counted as far as there is one, and ramped in over the generations."""
 
 FARTHEST = 2.0
@@ -64,6 +66,6 @@ def signed_weights(config: HopConfig | TravelConfig, generation: jax.Array) -> d
 
     def weight(name: str) -> jax.Array:
         signed = -jnp.float32(getattr(config.weights, name))
-        return signed if name in (GOAL, MISSED) else signed * ramp
+        return signed if name in AIM else signed * ramp
 
     return {field.name: weight(field.name) for field in dataclasses.fields(config.weights)}
