@@ -14,8 +14,11 @@ INPUTS = 3
 SENSORS = 7
 """Of a part: the angles of up to three hinges, whether it touches the ground, and the light's
 direction along its own three axes."""
-SMALLEST, LARGEST = 0.015, 0.6
+SMALLEST, LARGEST = 0.02, 0.3
 """m; no half size becomes smaller or larger by scaling."""
+ROOM = 0.01
+"""How deep a block may stand in another that it does not hang on, of the smaller one's size (the
+cube root of its volume), at rest; deeper, it does not grow."""
 DENSITY = 1000.0
 """kg/m³, water's."""
 STRENGTH = 1000.0
