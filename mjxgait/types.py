@@ -58,7 +58,8 @@ class Sensed:
     above the ground under them.
     floor: [] m, height of the ground under the trunk; None where it is the plane z = 0.
     middle: [3] m, of all mass; momentum: [3] kg·m/s of all; washed: [3] N, what the water does to it
-    as a whole, 0 where there is none. None of bodies of a model.
+    as a whole, 0 where there is none; past: [] rad, how far the hinge that is furthest past its range
+    is past it. None of bodies of a model.
     """
 
     joint_pos: jax.Array
@@ -74,6 +75,7 @@ class Sensed:
     middle: jax.Array | None = None
     momentum: jax.Array | None = None
     washed: jax.Array | None = None
+    past: jax.Array | None = None
 
 
 @pytree

@@ -17,9 +17,9 @@ from mjxgait.tasks.trials import NEVER, Starts
 from mjxgait.types import Sensed, pytree
 
 WILD = 1
-"""Why an episode ends early: faster than anything that swims."""
-FASTEST_HINGE, FASTEST = 20.0, 5.0
-"""rad/s, m/s."""
+"""Why an episode ends early: faster than anything that swims, or bent further than it can be."""
+FASTEST_HINGE, FASTEST, FURTHEST = 20.0, 5.0, 0.08
+"""rad/s, m/s, rad past a hinge's range."""
 LITTLE = 1e-6
 """kg·m/s; who exchanged less with the water exchanged nothing."""
 
@@ -88,7 +88,8 @@ class Swim(PlainTask):
         """See `Task`: what nothing alive does is no swimming."""
         speed = jnp.sqrt(jnp.sum(sensed.trunk_vel**2))
         wild = (jnp.max(jnp.abs(sensed.joint_vel)) > FASTEST_HINGE) | (speed > FASTEST)
-        return jnp.where(wild, WILD, FINISHED)
+        assert sensed.past is not None
+        return jnp.where(wild | (sensed.past > FURTHEST), WILD, FINISHED)
 
     def update(
         self, tally: Tally, sensed: Sensed, torque: jax.Array, standards: Any, aim: Any
@@ -135,10 +136,9 @@ class Swim(PlainTask):
     def weights(self, settings: SwimConfig, generation: jax.Array) -> Mapping[str, jax.Array]:
         """See `Task`."""
         counts = settings.weights
-        share = jnp.minimum(generation / settings.apart, 1.0)
         return {
             "speed": jnp.asarray(counts.speed),
-            "overlap": -counts.overlap * share,
+            "overlap": -jnp.asarray(counts.overlap),
             "elsewhere": -jnp.asarray(counts.elsewhere),
         }
 

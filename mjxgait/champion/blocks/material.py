@@ -21,10 +21,10 @@ ROOM = 0.01
 cube root of its volume), at rest; deeper, it does not grow."""
 DENSITY = 1000.0
 """kg/m³, water's."""
-STRENGTH = 1000.0
+STRENGTH = 3000.0
 """N/m: the largest torque of a hinge over the cross-section of what it moves (Sims 1994)."""
-DAMPING = 0.2
-"""s: a hinge's damping over its strength; so none turns faster than 5 rad/s by itself."""
+DAMPING = 0.1
+"""s: a hinge's damping over its strength; so none turns faster than 10 rad/s by itself."""
 ROTOR = 0.01
 """s: its armature over its damping, so that the smallest blocks can be simulated."""
 GRAVITY, FRICTION = 9.81, 0.9

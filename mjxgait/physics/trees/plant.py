@@ -132,6 +132,7 @@ def _sensed(
         trunk_rot=jnp.stack(poses[0].rot, axis=1),
         trunk_vel=state.qvel[:3],
         trunk_angvel=moving[0, :3],
+        past=jnp.max(jnp.abs(state.qpos[7:]) - tree.high[1:], axis=0),
         middle=jnp.stack([jnp.sum(weight * c, axis=0) for c in centre]),
         geom_pos=jnp.stack(centre, axis=1),
         geom_low=jnp.where(tree.solid > 0, centre[2] - reach, FAR),
