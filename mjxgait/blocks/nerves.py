@@ -16,7 +16,7 @@ from mjxgait.types import pytree
 
 CONSTANT, WAVE = 0.3, 0.3
 """Shares of the inputs that are drawn constant, and of the neurons that are drawn as waves. Where all
-are alike, one effector in five hundred is driven by a wave of constant frequency."""
+are alike, one effector in four hundred is driven by a wave of constant frequency."""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -22,7 +22,8 @@ class SwimConfig:
     Attributes:
       settle: s from the start that do not count.
       overlap: how deep blocks are in each other, of the smaller one's size, of which half the speed
-        counts.
+        counts. apart: generations until that counts in full: whoever swims fast learns to keep its
+        blocks apart more easily than the other way round.
       elsewhere: share of its momentum that the water did not give, of which half the speed counts: a
         step of finite length gives some to those that find out how.
     """
@@ -30,5 +31,6 @@ class SwimConfig:
     __pydantic_config__ = STRICT
     settle: NonNegative = 2.0
     overlap: Positive = 0.05
+    apart: Positive = 30.0
     elsewhere: Positive = 0.02
     weights: SwimWeights = dataclasses.field(default_factory=SwimWeights)

@@ -135,10 +135,10 @@ class Swim(PlainTask):
 
     def weights(self, settings: SwimConfig, generation: jax.Array) -> Mapping[str, jax.Array]:
         """See `Task`."""
-        counts = settings.weights
+        counts, share = settings.weights, jnp.minimum(generation / settings.apart, 1.0)
         return {
             "speed": jnp.asarray(counts.speed),
-            "overlap": -jnp.asarray(counts.overlap),
+            "overlap": -counts.overlap * share,
             "elsewhere": -jnp.asarray(counts.elsewhere),
         }
 

@@ -25,7 +25,7 @@ TABLE = {
     "use": {"controller": "brain", "task": "swim"},
     "controller": {"nodes": 3, "parts": 4, "links": 4, "local": 2, "central": 1},
     "evolution": {"population": 24},
-    "rollout": {"seconds": 0.8, "starts": 2, "lanes": 16, "joint_noise": 0.1},
+    "rollout": {"seconds": 1.6, "starts": 2, "lanes": 16, "joint_noise": 0.1},
     "fitness": {"settle": 0.1, "weights": {"overlap": 0.0}},
 }
 
@@ -83,7 +83,7 @@ def test_a_block_alone_does_not_swim(again: EvolutionState):
     """Nothing moves it: its way is nothing."""
     way, seconds = np.moveaxis(again.outcome[20:], -1, 0)
     np.testing.assert_allclose(way, 0, atol=1e-6)
-    np.testing.assert_allclose(seconds, 0.8, rtol=1e-6)
+    np.testing.assert_allclose(seconds, 1.6, rtol=1e-6)
 
 
 CALM = Sensed(
@@ -156,7 +156,7 @@ def test_the_examiner_sees_them_swim_as_far(experiment: Experiment, evolved):
     for rank in range(8):
         champion = experiment.champion(state, {}, rank)
         body = champion.embodied(experiment.creature)
-        film = simulate(body, champion, nominal_starts(body, 1), 0.8, record=1).trajectory
+        film = simulate(body, champion, nominal_starts(body, 1), 1.6, record=1).trajectory
         middle = afloat(body, film.qpos[0], film.qvel[0], DRAG).middle
         # It counts from 0.1 s on; the tally has seen what was before the last step.
         ways.append(np.linalg.norm(middle[-1] - middle[10]))
