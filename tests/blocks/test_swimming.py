@@ -24,9 +24,9 @@ from mjxgait.types import Sensed
 TABLE = {
     "use": {"controller": "brain", "task": "swim"},
     "controller": {"nodes": 3, "parts": 4, "links": 4, "local": 2, "central": 1},
-    "evolution": {"population": 24},
-    "rollout": {"seconds": 1.6, "starts": 2, "lanes": 16, "joint_noise": 0.1},
-    "fitness": {"settle": 0.1, "weights": {"overlap": 0.0}},
+    "evolution": {"population": 60},
+    "rollout": {"seconds": 1.6, "starts": 2, "lanes": 20, "joint_noise": 0.1},
+    "fitness": {"settle": 0.1, "weights": {"overlap": 0.0, "elsewhere": 0.0}},
 }
 
 
@@ -60,12 +60,12 @@ def test_swimmers_get_faster(evolved: tuple[EvolutionState, list[float]]):
 
 @pytest.fixture(scope="module")
 def again(experiment: Experiment, step: Step, evolved) -> EvolutionState:
-    """The best twenty, and four of them without any connection, judged as a first population."""
+    """The best 56, and four of them without any connection, judged as a first population."""
     best = evolved[0].genomes
     alone = dataclasses.replace(
         best, graph=dataclasses.replace(best.graph, used=np.zeros_like(best.graph.used))
     )
-    both = jax.tree.map(lambda a, b: jnp.concatenate([a[:20], b[:4]]), best, alone)
+    both = jax.tree.map(lambda a, b: jnp.concatenate([a[:56], b[:4]]), best, alone)
     state, _ = step(experiment.place(dataclasses.replace(experiment.init(), genomes=both)))
     return jax.device_get(_without_key(state))
 
@@ -76,12 +76,12 @@ def _without_key(state: EvolutionState) -> EvolutionState:
 
 
 def test_who_is_judged_again_swims_the_same(evolved, again: EvolutionState):
-    np.testing.assert_allclose(again.outcome[:20], evolved[0].outcome[:20], rtol=1e-3, atol=1e-6)
+    np.testing.assert_allclose(again.outcome[:56], evolved[0].outcome[:56], rtol=1e-3, atol=1e-6)
 
 
 def test_a_block_alone_does_not_swim(again: EvolutionState):
     """Nothing moves it: its way is nothing."""
-    way, seconds = np.moveaxis(again.outcome[20:], -1, 0)
+    way, seconds = np.moveaxis(again.outcome[56:], -1, 0)
     np.testing.assert_allclose(way, 0, atol=1e-6)
     np.testing.assert_allclose(seconds, 1.6, rtol=1e-6)
 
