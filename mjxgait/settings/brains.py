@@ -35,7 +35,7 @@ class BrainConfig:
     every: Annotated[int, pydantic.AfterValidator(holds), SHAPE] = 4
     values: NonNegative = 8.0
     sigma: Positive = 0.2
-    connect: Fraction = 0.3
-    grow: Fraction = 0.1
+    connect: Fraction = 0.5
+    grow: Fraction = 0.25
     crossover: Fraction = 0.3
     grafting: Fraction = 0.3
