@@ -135,6 +135,22 @@ class PartsConfig:
 
 
 @dataclasses.dataclass(frozen=True)
+class WishesConfig:
+    """10. How far what was asked of a walk may be missed (docs/wishes.md).
+
+    Attributes:
+      speed: over the speed asked for. heading: deg off the heading it was told, mean over a second.
+      height: standing heights. bounce: hip heights.
+    """
+
+    __pydantic_config__ = STRICT
+    speed: Positive = 0.1
+    heading: Positive = 15.0
+    height: Positive = 0.05
+    bounce: Positive = 0.02
+
+
+@dataclasses.dataclass(frozen=True)
 class GoalConfig:
     """What is demanded of who has a goal, instead of 1 to 3 and 7.
 
@@ -243,6 +259,7 @@ class CertificateConfig:
     gait: GaitConfig = dataclasses.field(default_factory=GaitConfig)
     physics: PhysicsConfig = dataclasses.field(default_factory=PhysicsConfig)
     parts: PartsConfig = dataclasses.field(default_factory=PartsConfig)
+    wishes: WishesConfig = dataclasses.field(default_factory=WishesConfig)
     hop: HopConfig = dataclasses.field(default_factory=HopConfig)
     limbo: LimboConfig = dataclasses.field(default_factory=LimboConfig)
     travel: TravelConfig = dataclasses.field(default_factory=TravelConfig)

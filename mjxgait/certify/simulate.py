@@ -37,16 +37,19 @@ def simulate(
       refine: physics steps per control step: the controller stays what it was, its torque is held
         in between.
       fall: when one is down; by default as its task has it.
-      heading: [T] rad, commanded heading at each control step; None walks straight ahead.
+      heading: [T] rad, commanded heading at each control step; None is as its task has it, mostly straight
+        ahead.
       threads: 0 takes the machine's cores. The result does not depend on it.
     """
     threads = threads or cores()
     # Dealt out like cards, so that each thread gets its share of every kind of start.
     shares = [np.arange(i, len(starts), threads) for i in range(min(threads, len(starts)))]
     steps = round(seconds / creature.model.opt.timestep)
-    task = how_simulated(champion.task)
+    task = how_simulated(champion.task, champion.wish)
     fall = fall or task.fall(CertificateConfig())
     starts = task.aimed(starts, CertificateConfig())
+    if heading is None:
+        heading = task.told(steps, creature.model.opt.timestep)
 
     def run(share: np.ndarray) -> Outcome:
         mine, kept = starts.rows(share), int((share < record).sum())

@@ -24,6 +24,14 @@ class Demands(Protocol):
     pushed: bool
     """Whether it is tried what pushes do."""
 
+    def asked(self, wish: Mapping[str, Any]) -> "Demands":
+        """The demands where this was asked besides, by name."""
+        ...
+
+    def told(self, steps: int, time_step: float) -> np.ndarray | None:
+        """[T] rad, the heading that the controller is told at each control step; None if none."""
+        ...
+
     def undisturbed(
         self, whole: Recording, halved: Recording, config: CertificateConfig
     ) -> tuple[Criterion, ...]:

@@ -1,6 +1,7 @@
 """What most tasks have in common in the examination: who is disturbed must stay up."""
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -22,6 +23,14 @@ class StaysUp:
 
     drag: float = 0.0
     pushed: bool = True
+
+    def asked(self, wish: Mapping[str, Any]) -> Any:
+        """See `Demands`: of most tasks nothing more can be asked."""
+        return self
+
+    def told(self, steps: int, time_step: float) -> np.ndarray | None:
+        """See `Demands`: straight ahead."""
+        return None
 
     def fall(self, config: CertificateConfig) -> Fall:
         """See `Demands`: as criterion 1 has it."""

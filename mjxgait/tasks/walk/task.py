@@ -1,14 +1,24 @@
 """Walking as a task: forward, upright, in the manner that the settings ask for."""
 
+import dataclasses
 from typing import Any
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
-from mjxgait.settings.walk import WalkConfig
+from mjxgait.body import Body, Ends
+from mjxgait.creature import Creature
+from mjxgait.creature.settings import Termination
+from mjxgait.senses import sense, trunk_height
+from mjxgait.settings.config import RolloutConfig
+from mjxgait.settings.walk import WalkConfig, WishConfig
 from mjxgait.tasks.plain import PlainTask
+from mjxgait.tasks.trials import Starts, draw_starts
 from mjxgait.tasks.walk.fitness import TERMS, fitness_terms, signed_weights
+from mjxgait.tasks.walk.footfalls import WishTally, stepped, wish_tally
 from mjxgait.tasks.walk.tally import Judge, Tally
+from mjxgait.tasks.walk.wish import wish_weights, wished_terms
 from mjxgait.types import Sensed
 
 
@@ -16,8 +26,24 @@ class Walk(PlainTask):
     """One creature's walk; see `PlainTask`."""
 
     Settings = WalkConfig
-    terms = TERMS
     outcomes = ("forward", "aside", "seconds")
+
+    @classmethod
+    def told(
+        cls, body: Body, step: float, horizon: int, ends: Termination | Ends, settings: WalkConfig
+    ) -> "Walk":
+        """The task with these settings: with a wish more is looked at, without one nothing is."""
+        made = AskedWalk if settings.wish.asked else Walk
+        task = made(body, step, horizon, ends)
+        task.wish = settings.wish
+        return task
+
+    wish = WishConfig()
+
+    @property
+    def terms(self) -> tuple[str, ...]:
+        """See `Task`."""
+        return TERMS
 
     @property
     def _keeper(self) -> Judge:
@@ -27,17 +53,17 @@ class Walk(PlainTask):
         """See `Task`: the clearance [] in m that is wanted of each swing."""
         return jnp.asarray(settings.clearance * self.creature.frame.hip_height, jnp.float32)
 
-    def init(self) -> Tally:
+    def init(self) -> Any:
         """See `Task`."""
         return self._keeper.init()
 
     def update(
-        self, tally: Tally, sensed: Sensed, torque: jax.Array, standards: jax.Array, aim: Any
-    ) -> Tally:
+        self, tally: Any, sensed: Sensed, torque: jax.Array, standards: jax.Array, aim: Any
+    ) -> Any:
         """See `Task`."""
         return self._keeper.update(tally, sensed, torque, standards)
 
-    def judge(self, tally: Tally, settings: WalkConfig) -> dict[str, jax.Array]:
+    def judge(self, tally: Any, settings: WalkConfig) -> dict[str, jax.Array]:
         """See `Task`."""
         return fitness_terms(self.creature, settings, self.step, self.horizon, tally)
 
@@ -52,3 +78,101 @@ class Walk(PlainTask):
     def weights(self, settings: WalkConfig, generation: jax.Array) -> dict[str, jax.Array]:
         """See `Task`."""
         return signed_weights(settings, generation)
+
+
+class AskedWalk(Walk):
+    """A walk of which more is asked: see `settings.walk.WishConfig`.
+
+    Who is told to turn is told a heading that turns, and its way is measured along that: forward
+    and to the left of where it should be looking at each moment.
+    """
+
+    @property
+    def terms(self) -> tuple[str, ...]:
+        """See `Task`."""
+        return (*TERMS, *wish_weights(self.wish))
+
+    @property
+    def _turns(self) -> bool:
+        return self.wish.turn is not None
+
+    def trials(self, key: jax.Array, creature: Creature, settings: RolloutConfig) -> Starts:
+        """See `Task`: everybody's starts, and the turn."""
+        starts = draw_starts(key, creature, settings)
+        if self.wish.turn is None:
+            return starts
+        turn = jnp.full(settings.starts, np.radians(self.wish.turn), jnp.float32)
+        return dataclasses.replace(starts, turn=turn)
+
+    def aim(self, trial: Starts) -> Any:
+        """See `Task`: the commanded heading [] in rad, and by what it grows in a step."""
+        if trial.turn is None:
+            return ()
+        return jnp.zeros(()), trial.turn * self.step
+
+    def onward(self, aim: Any, sensed: Sensed) -> Any:
+        """See `Task`."""
+        return (aim[0] + aim[1], aim[1]) if aim else aim
+
+    def senses(self, aim: Any, sensed: Sensed) -> dict[str, jax.Array]:
+        """See `Task`: who is told where to go knows no line to come back to."""
+        if not aim:
+            return {}
+        heading = sense(self.creature, sensed, jnp.zeros(()), ["heading"])["heading"]
+        return {"heading": _wrapped(heading - aim[0]), "aside": jnp.zeros(())}
+
+    def init(self) -> WishTally:
+        """See `Task`."""
+        return wish_tally(super().init(), len(self.creature.feet.names))
+
+    def update(
+        self, tally: WishTally, sensed: Sensed, torque: jax.Array, standards: jax.Array, aim: Any
+    ) -> WishTally:
+        """See `Task`."""
+        after = self._keeper.update(tally, sensed, torque, standards)
+        place = _place(self.creature, sensed)
+        if aim:
+            after = self._along(tally, after, place, aim[0])
+        height = trunk_height(sensed)
+        own = {field.name: getattr(after, field.name) for field in dataclasses.fields(after)}
+        return WishTally(
+            **own,
+            falls=stepped(tally.falls, tally, after),
+            height=tally.height + height,
+            height_squared=tally.height_squared + height**2,
+            trunk=place,
+        )
+
+    def _along(self, before: WishTally, after: Tally, place: jax.Array, told: jax.Array) -> Tally:
+        """The tally with its way along the heading [] that it was told at each moment."""
+        ahead, left = jnp.cos(told), jnp.sin(told)
+        x, y = place - before.trunk
+        forward = before.forward + x * ahead + y * left
+        half = after.steps <= self.horizon // 2
+        return dataclasses.replace(
+            after,
+            forward=forward,
+            left=before.left - x * left + y * ahead,
+            forward_half=jnp.where(half, forward, before.forward_half),
+            heading=_wrapped(after.heading - told),
+        )
+
+    def judge(self, tally: WishTally, settings: WalkConfig) -> dict[str, jax.Array]:
+        """See `Task`."""
+        return wished_terms(self.creature, settings, self.step, self.horizon, tally)
+
+    def weights(self, settings: WalkConfig, generation: jax.Array) -> dict[str, jax.Array]:
+        """See `Task`."""
+        wished = wish_weights(settings.wish)
+        return super().weights(settings, generation) | {n: -jnp.float32(w) for n, w in wished.items()}
+
+
+def _place(creature: Body, sensed: Sensed) -> jax.Array:
+    """Where the trunk is, [2] m forward and left of the start."""
+    moved = sensed.trunk_pos - creature.frame.stand_pos.astype(np.float32)
+    return jnp.stack([moved @ axis for axis in creature.frame.start_axes])
+
+
+def _wrapped(angle: jax.Array) -> jax.Array:
+    """The same direction [] from -pi to pi."""
+    return jnp.arctan2(jnp.sin(angle), jnp.cos(angle))

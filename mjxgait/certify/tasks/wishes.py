@@ -1,0 +1,107 @@
+"""What is demanded of a walk of which more was asked: a speed, a gait, a turn, a posture.
+
+Letters: `T` frames.
+"""
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from mjxgait.certify.config import CertificateConfig
+from mjxgait.certify.criteria import Criterion, Measure, at_most, speed
+from mjxgait.certify.describe import footfall_phases, gait_name
+from mjxgait.certify.measure import Dimensions, Recording
+from mjxgait.settings.gaits import gait_of
+
+Wish = Mapping[str, Any]
+
+SHORTER = 0.5
+"""Share of an animal's stride length that a walk at a speed asked for must have."""
+HEADING_MEAN = 1.0
+"""s; within a stride the nose swings."""
+
+
+def told_heading(wish: Wish, steps: int, time_step: float) -> np.ndarray | None:
+    """[T] rad, what the controller is told; None where no turn is asked for."""
+    if "turn" not in wish:
+        return None
+    return np.radians(wish["turn"]) * time_step * np.arange(steps)
+
+
+def following(config: CertificateConfig, wish: Wish, size: Dimensions) -> CertificateConfig:
+    """The thresholds with those that depend on the speed as the speed asked for has them.
+
+    The least speed is no more than what the wish bears, and the least stride no more than half of
+    an animal's at that speed, 2.3 (v²/gh)^0.3 hip heights (Alexander 1976): a slow walk has short
+    strides.
+    """
+    if "speed" not in wish:
+        return config
+    asked = wish["speed"]
+    slowest = (1 - config.wishes.speed) * asked / size.body_length
+    stride = SHORTER * 2.3 * (asked**2 / (size.gravity * size.hip_height)) ** 0.3
+    return dataclasses.replace(
+        config,
+        progress=dataclasses.replace(
+            config.progress, speed=float(min(config.progress.speed, slowest))
+        ),
+        gait=dataclasses.replace(
+            config.gait, stride_length=float(min(config.gait.stride_length, stride))
+        ),
+    )
+
+
+def unrolled(recording: Recording, wish: Wish) -> Recording:
+    """The walk as if its told heading had been straight ahead: each step of its way is turned back
+    by the heading that it was told then.
+    """
+    told = told_heading(wish, len(recording.trunk_pos), recording.time_step)
+    if told is None:
+        return recording
+    x, y = np.diff(recording.trunk_pos[:, :2], axis=0, prepend=recording.trunk_pos[:1, :2]).T
+    ahead, left = np.cos(told), np.sin(told)
+    way = np.stack([x * ahead + y * left, y * ahead - x * left, 0 * x], 1).cumsum(0)
+    place = way + recording.trunk_pos * [0, 0, 1]
+    heading = None if recording.heading is None else recording.heading - told
+    return dataclasses.replace(recording, trunk_pos=place, heading=heading)
+
+
+def as_asked(window: Recording, wish: Wish, config: CertificateConfig) -> Criterion:
+    """10. It does what it was asked. window: unrolled, after the warm-up."""
+    limits, found = config.wishes, posture(window)
+    measures: list[Measure] = []
+    if "speed" in wish:
+        off = abs(speed(window) / wish["speed"] - 1)
+        measures.append(at_most(f"off the speed of {wish['speed']:.3g} m/s", off, limits.speed))
+    if "gait" in wish:
+        size, duty = window.dimensions, window.contact.mean(0)
+        labels = gait_of(wish["gait"], len(duty)).labels
+        name = gait_name(size, duty, footfall_phases(window))
+        measures.append(Measure(f"footfalls of a {wish['gait']}", float(name in labels), ">=", 1.0, 0.0))
+    if "turn" in wish:
+        measures.append(at_most("off the heading it was told (deg)", heading_off(window), limits.heading))
+    for name in ("height", "bounce"):
+        if name in wish:
+            off = abs(found[name] - wish[name])
+            measures.append(at_most(f"off the {name} of {wish[name]:.3g}", off, getattr(limits, name)))
+    return Criterion(10, "as asked", tuple(measures))
+
+
+def heading_off(window: Recording) -> float:
+    """deg, farthest from the heading that it was told, mean over a second."""
+    if window.heading is None:
+        return np.nan
+    width = max(round(HEADING_MEAN / window.time_step), 1)
+    mean = np.convolve(window.heading, np.full(width, 1 / width), "valid")
+    return float(np.degrees(np.abs(mean).max()))
+
+
+def posture(window: Recording) -> dict[str, float]:
+    """How it carries its trunk: height in standing heights, bounce in hip heights."""
+    height, size = window.trunk_pos[:, 2], window.dimensions
+    return {
+        "height": float(height.mean() / size.stand_height),
+        "bounce": float(height.std() / size.hip_height),
+    }

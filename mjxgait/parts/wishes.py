@@ -1,0 +1,156 @@
+"""What is asked of a walk in words: names for settings, as one layer of them (docs/wishes.md)."""
+
+import dataclasses
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from mjxgait.creature import Creature
+from mjxgait.errors import UserError, did_you_mean
+from mjxgait.settings.config import Config
+from mjxgait.settings.gaits import AUTO, gait_of
+from mjxgait.settings.shipped import data_folder
+from mjxgait.settings.tables import build, merge, read_toml
+
+SPEED = re.compile(r"(?:fr)?[0-9]*\.?[0-9]+(?:e-?[0-9]+)?(?:bl/s|m/s)?")
+STRIDE_FRACTION = 0.5
+"""Share of an animal's stride in which a pose cycle may be gone through at the fastest."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Wishes:
+    """What a user asks of a walk.
+
+    Attributes:
+      speed: such as 0.4 (m/s), 0.4bl/s (body lengths per second), or fr0.2 (Froude number).
+      gait: walk, amble, trot, pace, canter, bound, gallop, tripod, wave, hop, or auto.
+      turn: deg/s, to the left.
+      style: calm, sneaky, heavy, proud, tired, hurried, or a TOML file of settings.
+    """
+
+    speed: str | None = None
+    gait: str | None = None
+    turn: float | None = None
+    style: str | None = None
+
+    @classmethod
+    def of(cls, given: Mapping[str, Any]) -> "Wishes":
+        """Those that were given, as text or as what they are.
+
+        Raises:
+          UserError: the turn is no number.
+        """
+        try:
+            return cls(
+                speed=None if given["speed"] is None else str(given["speed"]),
+                gait=given["gait"],
+                turn=None if given["turn"] is None else float(given["turn"]),
+                style=None if given["style"] is None else str(given["style"]),
+            )
+        except ValueError:
+            raise UserError(f"--turn {given['turn']}: give degrees per second") from None
+
+
+WISHES = tuple(field.name for field in dataclasses.fields(Wishes))
+
+
+def wished(config: Config, creature: Creature, wishes: Wishes) -> Config:
+    """The settings with what these wishes are names for laid over them.
+
+    Raises:
+      UserError: names the wish that means nothing, or not for this body.
+    """
+    if wishes == Wishes():
+        return config
+    if config.use.task != "walk":
+        raise UserError(
+            f"--speed, --gait, --turn and --style are for walking, and this is to {config.use.task}"
+        )
+    if wishes.style is not None:
+        config = _styled(config, wishes.style)
+    table: dict[str, Any] = {}
+    for layer in (
+        _gait(wishes.gait, creature, config),
+        _speed(wishes.speed, creature),
+        _turn(wishes.turn),
+    ):
+        table = merge(table, layer)
+    if config.use.controller != "poses":
+        table.pop("controller", None)
+    return build(type(config), merge(dataclasses.asdict(config), table), "the wishes")
+
+
+def speed_of(text: str, creature: Creature) -> float:
+    """m/s of a speed in words.
+
+    Raises:
+      UserError: it is none.
+    """
+    plain = text.strip().lower().replace(" ", "")
+    if not SPEED.fullmatch(plain) or (plain.startswith("fr") and plain.endswith("/s")):
+        raise UserError(
+            f"--speed {text}: give m/s, such as 0.4, body lengths per second, 0.4bl/s, or a Froude "
+            "number, fr0.2"
+        )
+    value = float(plain.removeprefix("fr").removesuffix("bl/s").removesuffix("m/s"))
+    if not value > 0:
+        raise UserError(f"--speed {text}: must be more than 0; who is to stand still needs no walk")
+    if plain.startswith("fr"):
+        return float((value * _gravity(creature) * creature.frame.hip_height) ** 0.5)
+    return value * creature.frame.body_length if plain.endswith("bl/s") else value
+
+
+def _speed(text: str | None, creature: Creature) -> dict[str, Any]:
+    """The speed, and a cycle with room for an animal's stride at that speed.
+
+    A cycle moves on by a step at most every control step: ten steps from pose to pose, a fifth of
+    a second for all four, let whoever moves little run through them far too often.
+    """
+    if text is None:
+        return {}
+    speed = round(speed_of(text, creature), 6)
+    hip, step = creature.frame.hip_height, float(creature.model.opt.timestep)
+    # Stride length 2.3 (v²/gh)^0.3 hip heights (Alexander 1976).
+    stride = 2.3 * (speed**2 / (_gravity(creature) * hip)) ** 0.3 * hip
+    poses = 4
+    steps = round(STRIDE_FRACTION * stride / speed / step / poses)
+    return {
+        "fitness": {"wish": {"speed": speed}},
+        "controller": {"interpolation": max(steps, 10)},
+    }
+
+
+def _gait(name: str | None, creature: Creature, config: Config) -> dict[str, Any]:
+    if name is None or name == AUTO:
+        return {}
+    try:
+        gait = gait_of(name, len(creature.feet.names))
+    except ValueError as error:
+        raise UserError(f"--gait {name}: {creature.name}: {error}") from None
+    whole: dict[str, Any] = {"mirror": False, "key_poses": 4}
+    return {"fitness": {"wish": {"gait": name}}} | ({} if gait.twice else {"controller": whole})
+
+
+def _turn(rate: float | None) -> dict[str, Any]:
+    if rate is None:
+        return {}
+    return {"fitness": {"wish": {"turn": rate}}, "controller": {"tuning": {"steer": [0.0, 6.0]}}}
+
+
+def _styled(config: Config, name: str) -> Config:
+    """The settings with a style's laid over them.
+
+    Raises:
+      UserError: there is none of that name and no file, or it holds what is no setting.
+    """
+    folder = data_folder("configs") / "styles"
+    known = [path.stem for path in folder.glob("*.toml")]
+    if name not in known and Path(name).suffix != ".toml":
+        raise UserError(f"--style {name}: {did_you_mean(name, known)}; or give a FILE.toml")
+    path = folder / f"{name}.toml" if name in known else Path(name)
+    return build(type(config), merge(dataclasses.asdict(config), read_toml(path)), str(path))
+
+
+def _gravity(creature: Creature) -> float:
+    return float(-creature.model.opt.gravity[2])
