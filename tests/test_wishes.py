@@ -82,7 +82,7 @@ def walking(way: float = 2.0, **more) -> dict:
 
 
 amount = st.floats(0.0, 1024.0, width=32, allow_subnormal=False)
-everything = st.fixed_dictionaries({name: amount for name in MISSES})
+everything = st.fixed_dictionaries(dict.fromkeys(MISSES, amount))
 
 
 @settings(max_examples=200, deadline=None)

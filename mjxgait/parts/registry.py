@@ -113,9 +113,7 @@ def make_task(body: "Body", step: float, ends: "Termination | Ends", config: Con
     # One whose tally depends on what is asked is told.
     told = getattr(kind, "told", None)
     made: Task = (
-        told(body, step, horizon, ends, config.fitness)
-        if told
-        else kind(body, step, horizon, ends)
+        told(body, step, horizon, ends, config.fitness) if told else kind(body, step, horizon, ends)
     )
     return made
 

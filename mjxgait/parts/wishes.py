@@ -9,13 +9,11 @@ from typing import Any
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError, did_you_mean
 from mjxgait.settings.config import Config
-from mjxgait.settings.gaits import AUTO, gait_of
+from mjxgait.settings.gaits import AUTO, SHORTEST, animal_stride, gait_of
 from mjxgait.settings.shipped import data_folder
 from mjxgait.settings.tables import build, merge, read_toml
 
 SPEED = re.compile(r"(?:fr)?[0-9]*\.?[0-9]+(?:e-?[0-9]+)?(?:bl/s|m/s)?")
-STRIDE_FRACTION = 0.5
-"""Share of an animal's stride in which a pose cycle may be gone through at the fastest."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -102,7 +100,7 @@ def speed_of(text: str, creature: Creature) -> float:
 
 
 def _speed(text: str | None, creature: Creature) -> dict[str, Any]:
-    """The speed, and a cycle with room for an animal's stride at that speed.
+    """The speed, and a cycle that takes as long as the shortest strides there may be at that speed.
 
     A cycle moves on by a step at most every control step: ten steps from pose to pose, a fifth of
     a second for all four, let whoever moves little run through them far too often.
@@ -111,10 +109,8 @@ def _speed(text: str | None, creature: Creature) -> dict[str, Any]:
         return {}
     speed = round(speed_of(text, creature), 6)
     hip, step = creature.frame.hip_height, float(creature.model.opt.timestep)
-    # Stride length 2.3 (v²/gh)^0.3 hip heights (Alexander 1976).
-    stride = 2.3 * (speed**2 / (_gravity(creature) * hip)) ** 0.3 * hip
     poses = 4
-    steps = round(STRIDE_FRACTION * stride / speed / step / poses)
+    steps = round(SHORTEST * animal_stride(speed, hip) / speed / step / poses)
     return {
         "fitness": {"wish": {"speed": speed}},
         "controller": {"interpolation": max(steps, 10)},

@@ -6,6 +6,7 @@ differences between feet count. Letters: `A` ways of one gait, `N` feet.
 
 import dataclasses
 from collections.abc import Sequence
+from typing import Any
 
 from mjxgait.errors import did_you_mean
 
@@ -31,6 +32,24 @@ class Gait:
     labels: tuple[str, ...]
     duty: tuple[float, float] = (0.0, 1.0)
     twice: bool = True
+
+
+GRAVITY = 9.81
+"""m/s², for the strides of animals."""
+SHORTEST = 0.5
+"""Share of an animal's stride length that a walk at a speed asked for must have."""
+
+
+def animal_stride(speed: Any, hip_height: Any) -> Any:
+    """Stride length in m of an animal at a speed in m/s, 2.3 (v²/gh)^0.3 hip heights (Alexander
+    1976); of numbers or arrays.
+    """
+    return 2.3 * (speed**2 / (GRAVITY * hip_height)) ** 0.3 * hip_height
+
+
+def most_strides(speed: Any, hip_height: Any) -> Any:
+    """Hz, at a speed in m/s: those of the shortest strides there may be."""
+    return speed / (SHORTEST * animal_stride(speed, hip_height))
 
 
 _FOUR_BEATS = ((0.25, 0.0, 0.75, 0.5), (0.75, 0.0, 0.25, 0.5))
@@ -118,5 +137,8 @@ def stations_of(places: Sequence[tuple[float, float]]) -> tuple[Station, ...]:
     """
     order = sorted(range(len(places)), key=lambda n: -places[n][1])
     left = set(order[: len(places) // 2])
-    sides = [sorted((n for n in order if (n in left) is side), key=lambda n: -places[n][0]) for side in (True, False)]
+    sides = [
+        sorted((n for n in order if (n in left) is side), key=lambda n: -places[n][0])
+        for side in (True, False)
+    ]
     return tuple((sides[n not in left].index(n), n in left) for n in range(len(places)))

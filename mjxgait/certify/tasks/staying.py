@@ -15,7 +15,19 @@ from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 
 
-class StaysUp:
+class Unasked:
+    """See `Demands`: those of a task of which nothing more can be asked."""
+
+    def asked(self, wish: Mapping[str, Any]) -> Any:
+        """See `Demands`: the same."""
+        return self
+
+    def told(self, steps: int, time_step: float) -> np.ndarray | None:
+        """See `Demands`: straight ahead."""
+        return None
+
+
+class StaysUp(Unasked):
     """See `Demands`: criteria 4 and 5 of those that have no goal but to be up in the end.
 
     drag, pushed: see `Demands`.
@@ -23,14 +35,6 @@ class StaysUp:
 
     drag: float = 0.0
     pushed: bool = True
-
-    def asked(self, wish: Mapping[str, Any]) -> Any:
-        """See `Demands`: of most tasks nothing more can be asked."""
-        return self
-
-    def told(self, steps: int, time_step: float) -> np.ndarray | None:
-        """See `Demands`: straight ahead."""
-        return None
 
     def fall(self, config: CertificateConfig) -> Fall:
         """See `Demands`: as criterion 1 has it."""

@@ -4,7 +4,7 @@ Letters: `T` frames.
 """
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,12 +13,12 @@ from mjxgait.certify.config import CertificateConfig
 from mjxgait.certify.criteria import Criterion, Measure, at_most, speed
 from mjxgait.certify.describe import footfall_phases, gait_name
 from mjxgait.certify.measure import Dimensions, Recording
-from mjxgait.settings.gaits import gait_of
+from mjxgait.settings.gaits import SHORTEST, animal_stride, gait_of
 
 Wish = Mapping[str, Any]
 
-SHORTER = 0.5
-"""Share of an animal's stride length that a walk at a speed asked for must have."""
+ASKED, BOUNDS = "as asked", ("gait", "physics")
+"""Names of criteria: the wishes', and those whose numbers bound what a body can."""
 HEADING_MEAN = 1.0
 """s; within a stride the nose swings."""
 
@@ -34,14 +34,13 @@ def following(config: CertificateConfig, wish: Wish, size: Dimensions) -> Certif
     """The thresholds with those that depend on the speed as the speed asked for has them.
 
     The least speed is no more than what the wish bears, and the least stride no more than half of
-    an animal's at that speed, 2.3 (v²/gh)^0.3 hip heights (Alexander 1976): a slow walk has short
-    strides.
+    an animal's at that speed: a slow walk has short strides.
     """
     if "speed" not in wish:
         return config
     asked = wish["speed"]
     slowest = (1 - config.wishes.speed) * asked / size.body_length
-    stride = SHORTER * 2.3 * (asked**2 / (size.gravity * size.hip_height)) ** 0.3
+    stride = SHORTEST * animal_stride(asked, size.hip_height) / size.hip_height
     return dataclasses.replace(
         config,
         progress=dataclasses.replace(
@@ -79,14 +78,36 @@ def as_asked(window: Recording, wish: Wish, config: CertificateConfig) -> Criter
         size, duty = window.dimensions, window.contact.mean(0)
         labels = gait_of(wish["gait"], len(duty)).labels
         name = gait_name(size, duty, footfall_phases(window))
-        measures.append(Measure(f"footfalls of a {wish['gait']}", float(name in labels), ">=", 1.0, 0.0))
+        measures.append(
+            Measure(f"footfalls of a {wish['gait']}", float(name in labels), ">=", 1.0, 0.0)
+        )
     if "turn" in wish:
-        measures.append(at_most("off the heading it was told (deg)", heading_off(window), limits.heading))
+        measures.append(
+            at_most("off the heading it was told (deg)", heading_off(window), limits.heading)
+        )
     for name in ("height", "bounce"):
         if name in wish:
             off = abs(found[name] - wish[name])
-            measures.append(at_most(f"off the {name} of {wish[name]:.3g}", off, getattr(limits, name)))
-    return Criterion(10, "as asked", tuple(measures))
+            measures.append(
+                at_most(f"off the {name} of {wish[name]:.3g}", off, getattr(limits, name))
+            )
+    return Criterion(10, ASKED, tuple(measures))
+
+
+def in_the_way(criteria: Sequence[Criterion]) -> str | None:
+    """A sentence on the first wish that was missed, and the number that stood in its way: of gait
+    and physics that which is nearest to its limit, or farthest beyond. None where none was missed.
+    """
+    missed = [m for c in criteria if c.name == ASKED for m in c.measures if not m.passed]
+    bounds = [m for c in criteria if c.name in BOUNDS for m in c.measures if m.room]
+    if not missed or not bounds:
+        return None
+    first, nearest = missed[0], min(bounds, key=lambda m: m.margin)
+    return (
+        f"{first.name}: {first.value:.3g}, where {first.threshold:g} may be. In the way stands "
+        f"{nearest.name}: {nearest.value:.3g} where {nearest.sense} {nearest.threshold:.3g} is "
+        "asked."
+    )
 
 
 def heading_off(window: Recording) -> float:

@@ -41,9 +41,8 @@ def fitness_terms(
     Args:
       step: s. horizon: T, steps of a full episode.
     """
-    values = plain_terms(creature, config, step, horizon, tally)
+    values, enough = plain_terms(creature, config, step, horizon, tally)
     length = creature.frame.body_length
-    enough = _enough(config.speed, horizon * step)
     # Style counts as far as there is a walk: a creature that has yet to learn walking must not be punished for trying.
     walked = jnp.where(
         jnp.isfinite(enough), jnp.clip(tally.forward / length / enough, 0.0, 1.0), 1.0
@@ -53,8 +52,10 @@ def fitness_terms(
 
 def plain_terms(
     creature: Body, config: WalkConfig, step: float, horizon: int, tally: Tally
-) -> dict[str, jax.Array]:
-    """The same, style counted in full however little was walked."""
+) -> tuple[dict[str, jax.Array], jax.Array]:
+    """The same, style counted in full however little was walked; and the body lengths [] up to
+    which more is better.
+    """
     lived = jnp.maximum(tally.steps, 1)
     length = creature.frame.body_length
     moved = jnp.maximum(tally.forward, 0.25 * length)
@@ -67,7 +68,7 @@ def plain_terms(
     second_half = tally.forward - tally.forward_half
     crossed = jnp.maximum(tally.overlap / creature.frame.hip_height - TOUCHING, 0.0)
     enough = _enough(config.speed, horizon * step)
-    return {
+    values = {
         "distance": _counted(tally.forward / length, enough),
         "alive": tally.steps / horizon,
         "drift": jnp.abs(tally.left) / length + jnp.abs(jnp.sin(0.5 * tally.heading)),
@@ -89,6 +90,7 @@ def plain_terms(
         "overlap": crossed / (crossed + DEEP),
         "fall": jnp.where(tally.reason == Reason.FINISHED, 0.0, 1.0),
     }
+    return values, enough
 
 
 def _enough(speed: jax.Array | float, seconds: float) -> jax.Array:

@@ -164,7 +164,9 @@ class AskedWalk(Walk):
     def weights(self, settings: WalkConfig, generation: jax.Array) -> dict[str, jax.Array]:
         """See `Task`."""
         wished = wish_weights(settings.wish)
-        return super().weights(settings, generation) | {n: -jnp.float32(w) for n, w in wished.items()}
+        return super().weights(settings, generation) | {
+            n: -jnp.float32(w) for n, w in wished.items()
+        }
 
 
 def _place(creature: Body, sensed: Sensed) -> jax.Array:

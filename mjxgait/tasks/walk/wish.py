@@ -11,8 +11,9 @@ import jax
 import jax.numpy as jnp
 
 from mjxgait.body import Body
+from mjxgait.settings.gaits import most_strides
 from mjxgait.settings.walk import WalkConfig, WishConfig
-from mjxgait.tasks.walk.fitness import REWARDS, STYLE, TERMS, plain_terms
+from mjxgait.tasks.walk.fitness import REWARDS, STYLE, TERMS, plain_terms, stride_limit
 from mjxgait.tasks.walk.footfalls import WishTally, gait_missed
 
 WORTH = 7.2
@@ -33,7 +34,9 @@ def wished_terms(
     wish, seconds = config.wish, horizon * step
     length = creature.frame.body_length
     wanted = wanted_speed(creature, config) * seconds / length
-    values = plain_terms(creature, config, step, horizon, tally) | missed(creature, wish, step, horizon, tally)
+    values, _ = plain_terms(creature, config, step, horizon, tally)
+    values |= missed(creature, wish, step, horizon, tally)
+    values["frequency"] = hasty(creature, config, step, tally)
     # What is wrong per way, not per episode: a slow walk has less of a way.
     longer = WORTH / wanted
     aside = jnp.abs(tally.left) / length
@@ -57,6 +60,17 @@ def wanted_speed(creature: Body, config: WalkConfig) -> jax.Array | float:
     usual = WalkConfig().speed
     lengths = jnp.asarray(config.speed)
     return jnp.where(lengths > 0, lengths, usual) * creature.frame.body_length
+
+
+def hasty(creature: Body, config: WalkConfig, step: float, tally: WishTally) -> jax.Array:
+    """By how much [] the strides are more frequent than they should be, as without a wish; where a
+    speed is asked for, than those by which an animal goes twice as far at least.
+    """
+    rate = jnp.mean(tally.swings) / jnp.maximum(tally.steps, 1) / step
+    most = jnp.asarray(stride_limit(creature.frame.mass))
+    if config.wish.speed is not None:
+        most = jnp.minimum(most, most_strides(config.wish.speed, creature.frame.hip_height))
+    return jnp.maximum(rate / most - config.frequency, 0.0)
 
 
 def missed(
