@@ -263,6 +263,20 @@ def test_who_turns_is_told_a_heading_that_turns(body: Creature):
     assert float(aim[0]) == pytest.approx(np.radians(30.0), rel=1e-4)
 
 
+def test_who_is_steered_goes_straight_once_and_to_both_sides(body: Creature):
+    task = asked(config_of(steer=40.0), body)
+    rollout = dataclasses.replace(small_config().rollout, starts=5)
+    turn = np.degrees(task.trials(jax.random.key(0), body, rollout).turn)
+    assert turn[0] == 0.0
+    assert np.sign(turn[1:]).tolist() == [1.0, -1.0, 1.0, -1.0]
+    assert ((abs(turn[1:]) >= 20.0) & (abs(turn[1:]) <= 40.0)).all()
+
+
+def test_none_can_be_told_to_turn_and_be_steered():
+    with pytest.raises(UserError, match="turn and steer"):
+        config_of(turn=10.0, steer=10.0)
+
+
 @pytest.mark.parametrize(
     ("text", "speed"),
     [("0.4", 0.4), ("0.4m/s", 0.4), ("0.5bl/s", 0.5), (".5 BL/S", 0.5), ("fr0.2", 0.99045)],

@@ -16,6 +16,7 @@ from mjxgait.certify.draws import AIMS
 from mjxgait.certify.measure import Recording, measure
 from mjxgait.certify.simulate import simulate
 from mjxgait.certify.starts import Starts, join, nominal_starts, perturbed_starts
+from mjxgait.certify.steering import told_to_turn
 from mjxgait.certify.tasks import demands_of, how_simulated
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
@@ -157,6 +158,7 @@ def rehearse(
     started = demands.succeeded(outcome, starts, config)[:count]
     pushed = float(outcome.stayed_up[count:].mean()) if demands.pushed else np.nan
     judged = demands.disturbed(float(started.mean()), pushed, config)
+    judged += told_to_turn(creature, champion, config, draw, threads)
     return min(criterion.margin for criterion in judged)
 
 
@@ -197,6 +199,7 @@ def certify(
     plain, _, *pushed = (float(up.mean()) for up in np.split(outcome.stayed_up, ends))
     started = float(np.split(demands.succeeded(outcome, starts, config), ends)[1].mean())
     found = demands.disturbed(started, pushed[0] if pushed else np.nan, config)
+    found += told_to_turn(creature, champion, config, draw, threads)
     judged = sorted((*seen.criteria, *found), key=lambda c: c.number)
     report = demands.report(seen.whole, config) | {"ground": str(creature.terrain)}
     if pushed:

@@ -141,11 +141,17 @@ class WishesConfig:
     Attributes:
       speed: over the speed asked for. heading: deg off the heading it was told, mean over a second.
       height: standing heights. bounce: hip heights.
+      commands: turns that who is to be steered is told, in so many simulations of their own; each
+        from straight on, at a rate that no one knew, to either side.
+      delay: s from a command on until the heading must be the one told. obey: share that must.
     """
 
     __pydantic_config__ = STRICT
     speed: Positive = 0.1
     heading: Positive = 15.0
+    commands: Count = 32
+    delay: NonNegative = 3.0
+    obey: Fraction = 0.9
     height: Positive = 0.05
     bounce: Positive = 0.02
 

@@ -51,10 +51,11 @@ class TrainOptions:
       evolve_body: Short for --evolution.body: 1.25 lets the parts below the trunk become up to a
         quarter larger or a fifth smaller; the run keeps the body that won in body/.
       speed: How fast it should walk: 0.4 (m/s), 0.4bl/s (body lengths per second), or fr0.2 (Froude
-        number). This and the next three are for walking (docs/wishes.md).
+        number). This and the next four are for walking (docs/wishes.md).
       gait: walk, amble, trot, pace, canter, bound, gallop, hop (four feet), walk, tripod, wave (six),
         walk, hop (two), or auto.
       turn: Degrees per second to the left that it should turn while it walks.
+      steer: Degrees per second up to which it should obey when it is told to turn, to either side.
       style: calm, sneaky, heavy, proud, tired, hurried, or a FILE.toml of settings.
       ground: Short for --rollout.ground: flat, slope:0.1, steps:0.05, bumps:0.05, rough:0.05.
       view: Show the best of each generation walking on a page that only this machine can reach.
@@ -74,6 +75,7 @@ class TrainOptions:
     speed: str | None = None
     gait: str | None = None
     turn: float | None = None
+    steer: float | None = None
     style: str | None = None
     ground: str | None = None
     view: bool = False

@@ -24,12 +24,14 @@ class Wishes:
       speed: such as 0.4 (m/s), 0.4bl/s (body lengths per second), or fr0.2 (Froude number).
       gait: walk, amble, trot, pace, canter, bound, gallop, tripod, wave, hop, or auto.
       turn: deg/s, to the left.
+      steer: deg/s, up to which it should obey turns to either side.
       style: calm, sneaky, heavy, proud, tired, hurried, or a TOML file of settings.
     """
 
     speed: str | None = None
     gait: str | None = None
     turn: float | None = None
+    steer: float | None = None
     style: str | None = None
 
     @classmethod
@@ -37,19 +39,21 @@ class Wishes:
         """Those that were given, as text or as what they are.
 
         Raises:
-          UserError: the turn is no number.
+          UserError: a turn is no number.
         """
-        try:
-            return cls(
-                speed=None if given["speed"] is None else str(given["speed"]),
-                gait=given["gait"],
-                turn=None if given["turn"] is None else float(given["turn"]),
-                style=None if given["style"] is None else str(given["style"]),
-            )
-        except ValueError:
-            raise UserError(f"--turn {given['turn']}: give degrees per second") from None
+        values: dict[str, Any] = {name: v for name, v in given.items() if v is not None}
+        for name, value in values.items():
+            if name not in TURNS:
+                values[name] = str(value)
+                continue
+            try:
+                values[name] = float(value)
+            except ValueError:
+                raise UserError(f"--{name} {value}: give degrees per second") from None
+        return cls(**values)
 
 
+TURNS = ("turn", "steer")
 WISHES = tuple(field.name for field in dataclasses.fields(Wishes))
 
 
@@ -63,7 +67,7 @@ def wished(config: Config, creature: Creature, wishes: Wishes) -> Config:
         return config
     if config.use.task != "walk":
         raise UserError(
-            f"--speed, --gait, --turn and --style are for walking, and this is to {config.use.task}"
+            f"--{', --'.join(WISHES)} are for walking, and this is to {config.use.task}"
         )
     if wishes.style is not None:
         config = _styled(config, wishes.style)
@@ -71,7 +75,8 @@ def wished(config: Config, creature: Creature, wishes: Wishes) -> Config:
     for layer in (
         _gait(wishes.gait, creature, config),
         _speed(wishes.speed, creature),
-        _turn(wishes.turn),
+        _turn("turn", wishes.turn),
+        _turn("steer", wishes.steer),
     ):
         table = merge(table, layer)
     if config.use.controller != "poses":
@@ -128,10 +133,10 @@ def _gait(name: str | None, creature: Creature, config: Config) -> dict[str, Any
     return {"fitness": {"wish": {"gait": name}}} | ({} if gait.twice else {"controller": whole})
 
 
-def _turn(rate: float | None) -> dict[str, Any]:
+def _turn(name: str, rate: float | None) -> dict[str, Any]:
     if rate is None:
         return {}
-    return {"fitness": {"wish": {"turn": rate}}, "controller": {"tuning": {"steer": [0.0, 6.0]}}}
+    return {"fitness": {"wish": {name: rate}}, "controller": {"tuning": {"steer": [0.0, 6.0]}}}
 
 
 def _styled(config: Config, name: str) -> Config:

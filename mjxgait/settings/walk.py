@@ -8,7 +8,7 @@ import pydantic
 from mjxgait.settings.gaits import AUTO, check_gait
 from mjxgait.settings.tables import SHAPE, STRICT, Finite, NonNegative, Positive, Whole
 
-WISHES = ("speed", "gait", "turn", "height", "bounce")
+WISHES = ("speed", "gait", "turn", "steer", "height", "bounce")
 GaitText = Annotated[str, pydantic.AfterValidator(check_gait)]
 
 
@@ -56,6 +56,8 @@ class WishConfig:
       speed: m/s, held from both sides.
       gait: a name by its footfalls, or auto.
       turn: deg/s, to the left; the heading that it is told to keep turns so fast.
+      steer: deg/s; in every disturbed trial the heading that it is told to keep turns at a rate of
+        its own, up to this, to the left or to the right; it must obey others too.
       height: of the trunk while walking, in standing heights.
       bounce: of the trunk's height about its mean, in hip heights, root mean square.
     """
@@ -64,9 +66,14 @@ class WishConfig:
     speed: Positive | None = None
     gait: Annotated[GaitText, SHAPE] = AUTO
     turn: Finite | None = None
+    steer: Positive | None = None
     height: Positive | None = None
     bounce: NonNegative | None = None
     weights: WishWeights = dataclasses.field(default_factory=WishWeights)
+
+    def __post_init__(self) -> None:
+        if self.turn is not None and self.steer is not None:
+            raise ValueError("turn and steer: who turns all the time is not steered; give one")
 
     @property
     def asked(self) -> tuple[str, ...]:

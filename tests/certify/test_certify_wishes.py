@@ -4,13 +4,23 @@ import dataclasses
 
 import numpy as np
 import pytest
-from certify_made_up import DOG, walk
+from certify_made_up import DOG, make_champion, walk
 from test_certify_measures import failed
 
 from mjxgait.certify import CertificateConfig
 from mjxgait.certify.measure import Recording
+from mjxgait.certify.outcome import Outcome, Trajectory
+from mjxgait.certify.simulate import simulate
+from mjxgait.certify.starts import nominal_starts
 from mjxgait.certify.tasks import demands_of
-from mjxgait.certify.tasks.wishes import as_asked, following, in_the_way, posture, unrolled
+from mjxgait.certify.tasks.wishes import (
+    as_asked,
+    draw_commands,
+    following,
+    in_the_way,
+    posture,
+    unrolled,
+)
 
 CONFIG = CertificateConfig()
 
@@ -100,3 +110,63 @@ def test_what_is_asked_is_in_the_report():
     told = demands_of("walk", {"speed": 0.8}).report(walk(), CONFIG)
     assert told["asked"] == {"speed": 0.8}
     assert "asked" not in demands_of("walk").report(walk(), CONFIG)
+
+
+STEP = 0.005
+STEPS = 2400
+
+
+def told() -> np.ndarray:
+    return draw_commands(30.0, 32, STEPS, STEP, np.random.default_rng(0))
+
+
+def obeying(late: float = 1.0, off: float = 0.0, falls: int = 0) -> Outcome:
+    """Of simulations that follow what they are told `late` s later, and `off` deg beside it."""
+    commands = told()
+    behind = round(late / STEP)
+    held = np.pad(commands, ((0, 0), (behind, 0)))[:, :STEPS]
+    fell = np.where(np.arange(32) < falls, 8.0, np.inf)
+    astray = held - commands + np.radians(off)
+    astray[fell[:, None] <= STEP * np.arange(STEPS)] = np.nan
+    blank = np.zeros((0, 0))
+    film = Trajectory(STEP, *[blank] * 5)
+    return Outcome(fell, np.zeros((32, 3)), astray, np.full(32, np.inf), film, astray)
+
+
+def test_commands_go_both_ways_after_straight_on():
+    commands = np.degrees(told())
+    assert (commands[:, : round(2.0 / STEP)] == 0).all()
+    rates = (commands[:, -1] - commands[:, -2]) / STEP
+    assert ((abs(rates) >= 15.0) & (abs(rates) <= 30.0)).all()
+    assert (rates > 0).sum() == 16
+    assert len(np.unique(rates)) == 32
+    assert demands_of("walk", {"turn": 30.0}).commands(CONFIG, 9, STEP, None) is None
+
+
+@pytest.mark.parametrize(
+    ("outcome", "passes"),
+    [
+        (obeying(late=0.4), True),
+        (obeying(late=0.4, falls=3), True),
+        (obeying(late=0.4, falls=4), False),
+        (obeying(late=2.0), False),
+        (obeying(late=0.0, off=14.0), True),
+        (obeying(late=0.0, off=16.0), False),
+    ],
+    ids=["soon", "three fall", "four fall", "late", "near", "off"],
+)
+def test_who_is_steered_looks_where_it_is_told(outcome: Outcome, passes: bool):
+    (criterion,) = demands_of("walk", {"steer": 30.0}).obeyed(outcome, told(), CONFIG)
+    assert (criterion.number, criterion.passed) == (11, passes)
+
+
+def test_a_simulation_tells_how_far_it_is_astray(tiny):
+    """Of two that stand, one told to look straight on and one to turn."""
+    commands = np.stack([np.zeros(40), np.linspace(0.0, 0.4, 40)])
+    starts = nominal_starts(tiny, 2)
+    outcome = simulate(tiny, make_champion(tiny), starts, 0.2, heading=commands)
+    assert outcome.astray.shape == (2, 40)
+    assert abs(outcome.astray[0]).max() < 0.02
+    np.testing.assert_allclose(outcome.astray[1], -commands[1], atol=0.02)
+    plain = simulate(tiny, make_champion(tiny), starts, 0.2)
+    assert plain.astray.size == 0

@@ -32,6 +32,18 @@ class Demands(Protocol):
         """[T] rad, the heading that the controller is told at each control step; None if none."""
         ...
 
+    def commands(
+        self, config: CertificateConfig, steps: int, time_step: float, rng: np.random.Generator
+    ) -> np.ndarray | None:
+        """[S, T] rad, headings to tell simulations of their own; None where nobody is steered."""
+        ...
+
+    def obeyed(
+        self, outcome: Outcome, told: np.ndarray, config: CertificateConfig
+    ) -> tuple[Criterion, ...]:
+        """Whether these headings [S, T] were followed."""
+        ...
+
     def undisturbed(
         self, whole: Recording, halved: Recording, config: CertificateConfig
     ) -> tuple[Criterion, ...]:

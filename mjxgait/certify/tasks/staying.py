@@ -26,6 +26,18 @@ class Unasked:
         """See `Demands`: straight ahead."""
         return None
 
+    def commands(
+        self, config: CertificateConfig, steps: int, time_step: float, rng: np.random.Generator
+    ) -> np.ndarray | None:
+        """See `Demands`: none."""
+        return None
+
+    def obeyed(
+        self, outcome: Outcome, told: np.ndarray, config: CertificateConfig
+    ) -> tuple[Criterion, ...]:
+        """See `Demands`: nothing was told."""
+        return ()
+
 
 class StaysUp(Unasked):
     """See `Demands`: criteria 4 and 5 of those that have no goal but to be up in the end.

@@ -24,12 +24,15 @@ from mjxgait.certify.criteria import (
 )
 from mjxgait.certify.describe import describe, slip_distance
 from mjxgait.certify.measure import Recording
+from mjxgait.certify.outcome import Outcome
 from mjxgait.certify.strides import clearances, stride_frequency, stride_starts
 from mjxgait.certify.tasks.staying import StaysUp, to_the_end
 from mjxgait.certify.tasks.wishes import (
     as_asked,
+    draw_commands,
     following,
     posture,
+    steered,
     told_heading,
     unrolled,
 )
@@ -62,6 +65,20 @@ class WalkDemands(StaysUp):
     def told(self, steps: int, time_step: float) -> np.ndarray | None:
         """See `Demands`."""
         return told_heading(self.wish, steps, time_step)
+
+    def commands(
+        self, config: CertificateConfig, steps: int, time_step: float, rng: np.random.Generator
+    ) -> np.ndarray | None:
+        """See `Demands`."""
+        if "steer" not in self.wish:
+            return None
+        return draw_commands(self.wish["steer"], config.wishes.commands, steps, time_step, rng)
+
+    def obeyed(
+        self, outcome: Outcome, told: np.ndarray, config: CertificateConfig
+    ) -> tuple[Criterion, ...]:
+        """See `Demands`: 11."""
+        return (steered(outcome, told, config.wishes),)
 
     def undisturbed(
         self, whole: Recording, halved: Recording, config: CertificateConfig

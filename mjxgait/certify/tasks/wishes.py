@@ -9,25 +9,59 @@ from typing import Any
 
 import numpy as np
 
-from mjxgait.certify.config import CertificateConfig
-from mjxgait.certify.criteria import Criterion, Measure, at_most, speed
+from mjxgait.certify.config import CertificateConfig, WishesConfig
+from mjxgait.certify.criteria import Criterion, Measure, at_least, at_most, speed
 from mjxgait.certify.describe import footfall_phases, gait_name
 from mjxgait.certify.measure import Dimensions, Recording
+from mjxgait.certify.outcome import Outcome
 from mjxgait.settings.gaits import SHORTEST, animal_stride, gait_of
 
 Wish = Mapping[str, Any]
 
 ASKED, BOUNDS = "as asked", ("gait", "physics")
 """Names of criteria: the wishes', and those whose numbers bound what a body can."""
+COMMANDED, TOLD_FOR = (2.0, 4.0), 12.0
+"""s, when a command comes, and for how long one is watched who is steered."""
 HEADING_MEAN = 1.0
 """s; within a stride the nose swings."""
 
 
 def told_heading(wish: Wish, steps: int, time_step: float) -> np.ndarray | None:
     """[T] rad, what the controller is told; None where no turn is asked for."""
-    if "turn" not in wish:
+    if not {"turn", "steer"} & set(wish):
         return None
-    return np.radians(wish["turn"]) * time_step * np.arange(steps)
+    return np.radians(wish.get("turn", 0.0)) * time_step * np.arange(steps)
+
+
+def draw_commands(
+    fastest: float, count: int, steps: int, time_step: float, rng: np.random.Generator
+) -> np.ndarray:
+    """[S, T] rad that are told: straight on for a while, then a turn to the left or to the right in
+    turn, at a rate of its own.
+
+    fastest: deg/s; none is told to turn less than half as fast.
+    """
+    rate = fastest * rng.uniform(0.5, 1.0, count) * np.where(np.arange(count) % 2, -1.0, 1.0)
+    begin = rng.uniform(*COMMANDED, count)
+    since = np.maximum(time_step * np.arange(steps) - begin[:, None], 0.0)
+    told: np.ndarray = np.radians(rate)[:, None] * since
+    return told
+
+
+def steered(outcome: Outcome, told: np.ndarray, limits: WishesConfig) -> Criterion:
+    """11. It obeys: is up in the end and, from a while after each command, looks where it was told.
+
+    told: [S, T] rad.
+    """
+    step = outcome.trajectory.time_step
+    width, begins = max(round(HEADING_MEAN / step), 1), (told != 0).argmax(1)
+    sums = np.cumsum(np.pad(outcome.astray, ((0, 0), (1, 0))), axis=1)
+    off = np.degrees(np.abs(sums[:, width:] - sums[:, :-width]) / width)
+    due = np.arange(off.shape[1]) >= (begins + round(limits.delay / step))[:, None]
+    # NaN, from a fall on, obeys nobody.
+    obeys = outcome.stayed_up & (~due | (off <= limits.heading)).all(1)
+    share = at_least("share that obeys", obeys.mean(), limits.obey, 1.0)
+    return Criterion(11, "steered", (share,))
 
 
 def following(config: CertificateConfig, wish: Wish, size: Dimensions) -> CertificateConfig:
@@ -81,7 +115,7 @@ def as_asked(window: Recording, wish: Wish, config: CertificateConfig) -> Criter
         measures.append(
             Measure(f"footfalls of a {wish['gait']}", float(name in labels), ">=", 1.0, 0.0)
         )
-    if "turn" in wish:
+    if {"turn", "steer"} & set(wish):
         measures.append(
             at_most("off the heading it was told (deg)", heading_off(window), limits.heading)
         )

@@ -92,17 +92,20 @@ class AskedWalk(Walk):
         """See `Task`."""
         return (*TERMS, *wish_weights(self.wish))
 
-    @property
-    def _turns(self) -> bool:
-        return self.wish.turn is not None
-
     def trials(self, key: jax.Array, creature: Creature, settings: RolloutConfig) -> Starts:
-        """See `Task`: everybody's starts, and the turn."""
-        starts = draw_starts(key, creature, settings)
-        if self.wish.turn is None:
+        """See `Task`: everybody's starts, and how they are told to turn: as asked, or the first
+        straight on and the others to the left and to the right in turn, half as fast at least.
+        """
+        starts, count = draw_starts(key, creature, settings), settings.starts
+        if self.wish.turn is not None:
+            rate = jnp.full(count, self.wish.turn)
+        elif self.wish.steer is not None:
+            drawn = jax.random.uniform(jax.random.fold_in(key, 5), (count,), minval=0.5)
+            side = jnp.where(jnp.arange(count) % 2 == 1, 1.0, -1.0).at[0].set(0.0)
+            rate = self.wish.steer * side * drawn
+        else:
             return starts
-        turn = jnp.full(settings.starts, np.radians(self.wish.turn), jnp.float32)
-        return dataclasses.replace(starts, turn=turn)
+        return dataclasses.replace(starts, turn=jnp.radians(rate))
 
     def aim(self, trial: Starts) -> Any:
         """See `Task`: the commanded heading [] in rad, and by what it grows in a step."""
