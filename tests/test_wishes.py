@@ -60,7 +60,7 @@ def config_of(weights: dict | None = None, **wish) -> WalkConfig:
 @pytest.fixture(scope="module")
 def fitness_of(body: Creature):
     """Fitness of one episode by its tally, whatever the settings; compiled once."""
-    task = asked(config_of(gait="trot", height=0.9, bounce=0.02), body)
+    task = asked(config_of(gait="trot", height=0.9, bounce=0.02, sway=6.0), body)
 
     @jax.jit
     def judged(tally, config: WalkConfig) -> jax.Array:
@@ -99,7 +99,7 @@ def test_a_walk_however_bad_beats_none_at_any_weights(
     fitness_of, weights, worth, wishes, spoilt, way, steps, left
 ):
     own = Weights(**(weights | {"distance": worth}))
-    base = config_of(gait="trot", height=0.9, bounce=0.02)
+    base = config_of(gait="trot", height=0.9, bounce=0.02, sway=6.0)
     wish = dataclasses.replace(base.wish, weights=WishWeights(**wishes))
     config = traced_fitness(dataclasses.replace(base, weights=own, wish=wish))
     bad = walking(way, steps=steps, reason=1, left=left) | spoilt
@@ -114,7 +114,7 @@ def traced_fitness(config: WalkConfig) -> WalkConfig:
 
 
 def test_the_speed_is_held_from_both_sides(fitness_of):
-    config = traced_fitness(config_of(gait="trot", height=0.9, bounce=0.02))
+    config = traced_fitness(config_of(gait="trot", height=0.9, bounce=0.02, sway=6.0))
     worth = [fitness_of(walking(way), config) for way in (0.5, 1.0, 1.8, 2.0, 2.2, 3.0, 4.0, 8.0)]
     assert np.argmax(worth) == 3
     assert (np.diff(worth[:4]) > 0).all()
@@ -123,20 +123,20 @@ def test_the_speed_is_held_from_both_sides(fitness_of):
 
 def test_who_lunges_and_falls_is_no_walker(fitness_of):
     """All of the way in an eighth of the time is worth less than half of it on the feet."""
-    config = traced_fitness(config_of(gait="trot", height=0.9, bounce=0.02))
-    lunge = walking(2.0, steps=125, reason=1, forward_half=0.0)
+    config = traced_fitness(config_of(gait="trot", height=0.9, bounce=0.02, sway=6.0))
+    lunge = walking(2.0, steps=125, reason=1, forward_half=2.0, contact=[75.0] * 4)
     assert fitness_of(lunge, config) < fitness_of(walking(1.0), config)
 
 
 @pytest.mark.parametrize("name", MISSES)
 def test_less_of_a_penalty_is_better(fitness_of, name: str):
-    config = traced_fitness(config_of(gait="trot", height=0.9, bounce=0.02))
+    config = traced_fitness(config_of(gait="trot", height=0.9, bounce=0.02, sway=6.0))
     worth = [fitness_of(walking() | {name: value}, config) for value in (200.0, 400.0, 800.0)]
     assert worth[0] > worth[1] > worth[2]
 
 
 def test_posture_is_held_from_both_sides(body: Creature, fitness_of):
-    config = traced_fitness(config_of(gait="trot", height=0.9, bounce=0.02))
+    config = traced_fitness(config_of(gait="trot", height=0.9, bounce=0.02, sway=6.0))
 
     def carried(height: float, bounce: float) -> float:
         mean = height * float(body.frame.stand_height)
@@ -145,6 +145,9 @@ def test_posture_is_held_from_both_sides(body: Creature, fitness_of):
 
     assert carried(0.9, 0.02) > max(carried(0.8, 0.02), carried(1.0, 0.02))
     assert carried(0.9, 0.02) > max(carried(0.9, 0.0), carried(0.9, 0.06))
+    rolls = [walking(roll_squared=1000 * np.radians(deg) ** 2) for deg in (0.0, 6.0, 12.0)]
+    worth = [fitness_of(rolling, config) for rolling in rolls]
+    assert worth[1] > max(worth[0], worth[2])
 
 
 def test_without_a_wish_nothing_is_looked_at(body: Creature):
@@ -270,6 +273,21 @@ def test_who_is_steered_goes_straight_once_and_to_both_sides(body: Creature):
     assert turn[0] == 0.0
     assert np.sign(turn[1:]).tolist() == [1.0, -1.0, 1.0, -1.0]
     assert ((abs(turn[1:]) >= 20.0) & (abs(turn[1:]) <= 40.0)).all()
+
+
+def test_speeds_share_a_program_and_turns_do_not():
+    def shape(**wish) -> object:
+        return jax.tree.structure(traced_fitness(config_of(**wish)))
+
+    assert shape(speed=0.3) == shape(speed=1.3)
+    for one, other in (
+        ({}, {"turn": 10.0}),
+        ({"turn": 10.0}, {"turn": 20.0}),
+        ({"steer": 10.0}, {"steer": 20.0}),
+        ({"gait": "trot"}, {"gait": "pace"}),
+        ({}, {"height": 0.9}),
+    ):
+        assert shape(**one) != shape(**other)
 
 
 def test_none_can_be_told_to_turn_and_be_steered():

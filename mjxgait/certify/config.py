@@ -140,7 +140,7 @@ class WishesConfig:
 
     Attributes:
       speed: over the speed asked for. heading: deg off the heading it was told, mean over a second.
-      height: standing heights. bounce: hip heights.
+      height: standing heights. bounce: hip heights. sway: deg.
       commands: turns that who is to be steered is told, in so many simulations of their own; each
         from straight on, at a rate that no one knew, to either side.
       delay: s from a command on until the heading must be the one told. obey: share that must.
@@ -154,6 +154,7 @@ class WishesConfig:
     obey: Fraction = 0.9
     height: Positive = 0.05
     bounce: Positive = 0.02
+    sway: Positive = 2.0
 
 
 @dataclasses.dataclass(frozen=True)

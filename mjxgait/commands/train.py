@@ -53,7 +53,7 @@ class TrainOptions:
       speed: How fast it should walk: 0.4 (m/s), 0.4bl/s (body lengths per second), or fr0.2 (Froude
         number). This and the next four are for walking (docs/wishes.md).
       gait: walk, amble, trot, pace, canter, bound, gallop, hop (four feet), walk, tripod, wave (six),
-        walk, hop (two), or auto.
+        walk, waddle, hop (two), or auto.
       turn: Degrees per second to the left that it should turn while it walks.
       steer: Degrees per second up to which it should obey when it is told to turn, to either side.
       style: calm, sneaky, heavy, proud, tired, hurried, or a FILE.toml of settings.

@@ -22,7 +22,7 @@ class Wishes:
 
     Attributes:
       speed: such as 0.4 (m/s), 0.4bl/s (body lengths per second), or fr0.2 (Froude number).
-      gait: walk, amble, trot, pace, canter, bound, gallop, tripod, wave, hop, or auto.
+      gait: walk, amble, trot, pace, canter, bound, gallop, tripod, wave, hop, waddle, or auto.
       turn: deg/s, to the left.
       steer: deg/s, up to which it should obey turns to either side.
       style: calm, sneaky, heavy, proud, tired, hurried, or a TOML file of settings.
@@ -130,7 +130,8 @@ def _gait(name: str | None, creature: Creature, config: Config) -> dict[str, Any
     except ValueError as error:
         raise UserError(f"--gait {name}: {creature.name}: {error}") from None
     whole: dict[str, Any] = {"mirror": False, "key_poses": 4}
-    return {"fitness": {"wish": {"gait": name}}} | ({} if gait.twice else {"controller": whole})
+    wish = {"gait": name} | ({} if gait.sway is None else {"sway": gait.sway})
+    return {"fitness": {"wish": wish}} | ({} if gait.twice else {"controller": whole})
 
 
 def _turn(name: str, rate: float | None) -> dict[str, Any]:

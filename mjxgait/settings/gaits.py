@@ -26,12 +26,14 @@ class Gait:
     (`certify.describe.gait_name`).
     twice: whether the left does in the second half of a cycle what the right does in the first, as
     mirrored key poses do; if not, the whole cycle must be evolved.
+    sway: deg of roll, root mean square, that belongs to it.
     """
 
     ways: tuple[tuple[float, ...], ...]
     labels: tuple[str, ...]
     duty: tuple[float, float] = (0.0, 1.0)
     twice: bool = True
+    sway: float | None = None
 
 
 GRAVITY = 9.81
@@ -61,6 +63,7 @@ _WALKS, _RUNS = (0.5, 1.0), (0.0, 0.5)
 GAITS: dict[int, dict[str, Gait]] = {
     2: {
         "walk": Gait(((0.0, 0.5),), ("walk",), _WALKS),
+        "waddle": Gait(((0.0, 0.5),), ("walk",), _WALKS, sway=6.0),
         "hop": Gait(((0.0, 0.0),), ("hop",), twice=False),
     },
     4: {

@@ -8,7 +8,7 @@ import pydantic
 from mjxgait.settings.gaits import AUTO, check_gait
 from mjxgait.settings.tables import SHAPE, STRICT, Finite, NonNegative, Positive, Whole
 
-WISHES = ("speed", "gait", "turn", "steer", "height", "bounce")
+WISHES = ("speed", "gait", "turn", "steer", "height", "bounce", "sway")
 GaitText = Annotated[str, pydantic.AfterValidator(check_gait)]
 
 
@@ -46,6 +46,7 @@ class WishWeights:
     gait: NonNegative = 6.0
     height: NonNegative = 3.0
     bounce: NonNegative = 3.0
+    sway: NonNegative = 3.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -60,15 +61,18 @@ class WishConfig:
         its own, up to this, to the left or to the right; it must obey others too.
       height: of the trunk while walking, in standing heights.
       bounce: of the trunk's height about its mean, in hip heights, root mean square.
+      sway: deg, of the trunk's roll, root mean square.
     """
 
     __pydantic_config__ = STRICT
     speed: Positive | None = None
     gait: Annotated[GaitText, SHAPE] = AUTO
-    turn: Finite | None = None
-    steer: Positive | None = None
+    # The host draws what is told: runs side by side in one program would share the first one's.
+    turn: Annotated[Finite | None, SHAPE] = None
+    steer: Annotated[Positive | None, SHAPE] = None
     height: Positive | None = None
     bounce: NonNegative | None = None
+    sway: NonNegative | None = None
     weights: WishWeights = dataclasses.field(default_factory=WishWeights)
 
     def __post_init__(self) -> None:

@@ -93,7 +93,8 @@ def test_an_unrolled_circle_is_straight():
 def test_posture_is_held_from_both_sides():
     steady = walk()
     found = posture(steady)
-    for name, room in (("height", 0.05), ("bounce", 0.02)):
+    assert found["sway"] == pytest.approx(np.degrees(0.02 / np.sqrt(2)), rel=1e-2)
+    for name, room in (("height", 0.05), ("bounce", 0.02), ("sway", 2.0)):
         for side in (-1, 1):
             assert missed(steady, **{name: found[name] + side * 0.9 * room}) == set()
             assert missed(steady, **{name: found[name] + side * 1.1 * room}) != set()

@@ -119,7 +119,7 @@ def as_asked(window: Recording, wish: Wish, config: CertificateConfig) -> Criter
         measures.append(
             at_most("off the heading it was told (deg)", heading_off(window), limits.heading)
         )
-    for name in ("height", "bounce"):
+    for name in found:
         if name in wish:
             off = abs(found[name] - wish[name])
             measures.append(
@@ -154,9 +154,10 @@ def heading_off(window: Recording) -> float:
 
 
 def posture(window: Recording) -> dict[str, float]:
-    """How it carries its trunk: height in standing heights, bounce in hip heights."""
+    """How it carries its trunk: height in standing heights, bounce in hip heights, sway in deg."""
     height, size = window.trunk_pos[:, 2], window.dimensions
     return {
         "height": float(height.mean() / size.stand_height),
         "bounce": float(height.std() / size.hip_height),
+        "sway": float(np.degrees(np.sqrt((window.roll**2).mean()))),
     }

@@ -96,13 +96,15 @@ def gait_missed(
 class WishTally(Tally):
     """What walking as asked leaves behind, besides what walking does.
 
-    falls: the footfalls. height, height_squared: [] m·steps, m²·steps of the trunk.
+    falls: the footfalls. height, height_squared: [] m·steps, m²·steps of the trunk. roll_squared:
+    [] rad²·steps of its roll.
     trunk: [2] m, where the trunk was, forward and left of the start.
     """
 
     falls: Footfalls
     height: jax.Array
     height_squared: jax.Array
+    roll_squared: jax.Array
     trunk: jax.Array
 
 
@@ -115,5 +117,6 @@ def wish_tally(tally: Tally, feet: int) -> WishTally:
         falls=no_footfalls(feet),
         height=none,
         height_squared=none,
+        roll_squared=none,
         trunk=jnp.zeros(2),
     )

@@ -137,12 +137,14 @@ class AskedWalk(Walk):
         if aim:
             after = self._along(tally, after, place, aim[0])
         height = trunk_height(sensed)
+        roll = sense(self.creature, sensed, jnp.zeros(()), ["roll"])["roll"]
         own = {field.name: getattr(after, field.name) for field in dataclasses.fields(after)}
         return WishTally(
             **own,
             falls=stepped(tally.falls, tally, after),
             height=tally.height + height,
             height_squared=tally.height_squared + height**2,
+            roll_squared=tally.roll_squared + roll**2,
             trunk=place,
         )
 

@@ -23,8 +23,8 @@ STARTING = 0.9
 """Share of the wanted speed's way that counts as all of it: a walk begins with standing."""
 NEAR = 0.25
 """Share of the wanted value that it may be missed by until the penalty is half of what it can be."""
-ROUGH = {"height": 0.05, "bounce": 0.02}
-"""Likewise, in standing heights and hip heights."""
+ROUGH = {"height": 0.05, "bounce": 0.02, "sway": 2.0}
+"""Likewise, in standing heights, hip heights and deg."""
 
 
 def wished_terms(
@@ -92,6 +92,9 @@ def missed(
         variance = jnp.maximum(tally.height_squared / lived - height**2, 1e-12)
         off = jnp.sqrt(variance) / frame.hip_height - wish.bounce
         found["bounce"] = _half_at(ROUGH["bounce"], off)
+    if wish.sway is not None:
+        rolls = jnp.degrees(jnp.sqrt(tally.roll_squared / lived + 1e-12))
+        found["sway"] = _half_at(ROUGH["sway"], rolls - wish.sway)
     return found
 
 
