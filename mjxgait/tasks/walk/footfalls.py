@@ -4,8 +4,6 @@ A phase is the middle of a foot's stance in cycles of the first foot, as the exa
 (`certify.describe.footfall_phases`); a stance is what lies between two swings.
 """
 
-import dataclasses
-
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -90,33 +88,3 @@ def gait_missed(
     beyond = jnp.maximum(low - mean, 0.0) + jnp.maximum(mean - high, 0.0)
     off = off + beyond
     return off / (off + SHARP)
-
-
-@pytree
-class WishTally(Tally):
-    """What walking as asked leaves behind, besides what walking does.
-
-    falls: the footfalls. height, height_squared: [] m·steps, m²·steps of the trunk. roll_squared:
-    [] rad²·steps of its roll.
-    trunk: [2] m, where the trunk was, forward and left of the start.
-    """
-
-    falls: Footfalls
-    height: jax.Array
-    height_squared: jax.Array
-    roll_squared: jax.Array
-    trunk: jax.Array
-
-
-def wish_tally(tally: Tally, feet: int) -> WishTally:
-    """The empty one over an empty tally."""
-    own = {field.name: getattr(tally, field.name) for field in dataclasses.fields(tally)}
-    none = jnp.zeros(())
-    return WishTally(
-        **own,
-        falls=no_footfalls(feet),
-        height=none,
-        height_squared=none,
-        roll_squared=none,
-        trunk=jnp.zeros(2),
-    )

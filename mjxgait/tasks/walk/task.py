@@ -5,20 +5,19 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 
 from mjxgait.body import Body, Ends
 from mjxgait.creature import Creature
 from mjxgait.creature.settings import Termination
-from mjxgait.senses import sense, trunk_height
+from mjxgait.senses import sense
 from mjxgait.settings.config import RolloutConfig
 from mjxgait.settings.walk import WalkConfig, WishConfig
 from mjxgait.tasks.plain import PlainTask
 from mjxgait.tasks.trials import Starts, draw_starts
 from mjxgait.tasks.walk.fitness import TERMS, fitness_terms, signed_weights
-from mjxgait.tasks.walk.footfalls import WishTally, stepped, wish_tally
 from mjxgait.tasks.walk.tally import Judge, Tally
 from mjxgait.tasks.walk.wish import wish_weights, wished_terms
+from mjxgait.tasks.walk.wish_tally import WishTally, along, wish_tally, wish_updated, wrapped
 from mjxgait.types import Sensed
 
 
@@ -26,6 +25,7 @@ class Walk(PlainTask):
     """One creature's walk; see `PlainTask`."""
 
     Settings = WalkConfig
+    terms: tuple[str, ...] = TERMS
     outcomes = ("forward", "aside", "seconds")
 
     @classmethod
@@ -33,17 +33,9 @@ class Walk(PlainTask):
         cls, body: Body, step: float, horizon: int, ends: Termination | Ends, settings: WalkConfig
     ) -> "Walk":
         """The task with these settings: with a wish more is looked at, without one nothing is."""
-        made = AskedWalk if settings.wish.asked else Walk
-        task = made(body, step, horizon, ends)
-        task.wish = settings.wish
-        return task
-
-    wish = WishConfig()
-
-    @property
-    def terms(self) -> tuple[str, ...]:
-        """See `Task`."""
-        return TERMS
+        if settings.wish.asked and cls is Walk:
+            return AskedWalk(body, step, horizon, ends, settings.wish)
+        return cls(body, step, horizon, ends)
 
     @property
     def _keeper(self) -> Judge:
@@ -87,10 +79,12 @@ class AskedWalk(Walk):
     and to the left of where it should be looking at each moment.
     """
 
-    @property
-    def terms(self) -> tuple[str, ...]:
-        """See `Task`."""
-        return (*TERMS, *wish_weights(self.wish))
+    def __init__(
+        self, body: Body, step: float, horizon: int, ends: Termination | Ends, wish: WishConfig
+    ) -> None:
+        super().__init__(body, step, horizon, ends)
+        self.wish = wish
+        self.terms = (*TERMS, *wish_weights(wish))
 
     def trials(self, key: jax.Array, creature: Creature, settings: RolloutConfig) -> Starts:
         """See `Task`: everybody's starts, and how they are told to turn: as asked, or the first
@@ -122,7 +116,7 @@ class AskedWalk(Walk):
         if not aim:
             return {}
         heading = sense(self.creature, sensed, jnp.zeros(()), ["heading"])["heading"]
-        return {"heading": _wrapped(heading - aim[0]), "aside": jnp.zeros(())}
+        return {"heading": wrapped(heading - aim[0]), "aside": jnp.zeros(())}
 
     def init(self) -> WishTally:
         """See `Task`."""
@@ -132,35 +126,9 @@ class AskedWalk(Walk):
         self, tally: WishTally, sensed: Sensed, torque: jax.Array, standards: jax.Array, aim: Any
     ) -> WishTally:
         """See `Task`."""
-        after = self._keeper.update(tally, sensed, torque, standards)
-        place = _place(self.creature, sensed)
-        if aim:
-            after = self._along(tally, after, place, aim[0])
-        height = trunk_height(sensed)
-        roll = sense(self.creature, sensed, jnp.zeros(()), ["roll"])["roll"]
-        own = {field.name: getattr(after, field.name) for field in dataclasses.fields(after)}
-        return WishTally(
-            **own,
-            falls=stepped(tally.falls, tally, after),
-            height=tally.height + height,
-            height_squared=tally.height_squared + height**2,
-            roll_squared=tally.roll_squared + roll**2,
-            trunk=place,
-        )
-
-    def _along(self, before: WishTally, after: Tally, place: jax.Array, told: jax.Array) -> Tally:
-        """The tally with its way along the heading [] that it was told at each moment."""
-        ahead, left = jnp.cos(told), jnp.sin(told)
-        x, y = place - before.trunk
-        forward = before.forward + x * ahead + y * left
-        half = after.steps <= self.horizon // 2
-        return dataclasses.replace(
-            after,
-            forward=forward,
-            left=before.left - x * left + y * ahead,
-            forward_half=jnp.where(half, forward, before.forward_half),
-            heading=_wrapped(after.heading - told),
-        )
+        plain = self._keeper.update(tally, sensed, torque, standards)
+        after = wish_updated(self.creature, tally, plain, sensed)
+        return along(tally, after, aim[0], self.horizon // 2) if aim else after
 
     def judge(self, tally: WishTally, settings: WalkConfig) -> dict[str, jax.Array]:
         """See `Task`."""
@@ -172,14 +140,3 @@ class AskedWalk(Walk):
         return super().weights(settings, generation) | {
             n: -jnp.float32(w) for n, w in wished.items()
         }
-
-
-def _place(creature: Body, sensed: Sensed) -> jax.Array:
-    """Where the trunk is, [2] m forward and left of the start."""
-    moved = sensed.trunk_pos - creature.frame.stand_pos.astype(np.float32)
-    return jnp.stack([moved @ axis for axis in creature.frame.start_axes])
-
-
-def _wrapped(angle: jax.Array) -> jax.Array:
-    """The same direction [] from -pi to pi."""
-    return jnp.arctan2(jnp.sin(angle), jnp.cos(angle))

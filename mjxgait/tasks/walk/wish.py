@@ -14,7 +14,8 @@ from mjxgait.body import Body
 from mjxgait.settings.gaits import most_strides
 from mjxgait.settings.walk import WalkConfig, WishConfig
 from mjxgait.tasks.walk.fitness import REWARDS, STYLE, TERMS, plain_terms, stride_limit
-from mjxgait.tasks.walk.footfalls import WishTally, gait_missed
+from mjxgait.tasks.walk.footfalls import gait_missed
+from mjxgait.tasks.walk.wish_tally import WishTally
 
 WORTH = 7.2
 """What all of the wanted way earns: as many body lengths as without a wish, so that the weights of
