@@ -168,7 +168,7 @@ def footfalls_of(phases: list[float], duty: float, period: int = 160) -> Footfal
 
     def step(carry, now):
         falls, before, steps = carry
-        after = dataclasses.replace(BLANK, steps=steps + 1, swinging=now)
+        after = dataclasses.replace(BLANK, steps=steps + 1, swinging=now, foot_down=1 - now)
         earlier = dataclasses.replace(BLANK, steps=steps, swinging=before)
         return (stepped(falls, earlier, after), now, steps + 1), None
 
@@ -217,6 +217,29 @@ def dog_sizes():
     from certify_made_up import DOG
 
     return DOG
+
+
+def test_a_stance_is_where_it_presses():
+    """Hind feet that come down late, but are low for as long before: their phase is that of their
+    contact.
+    """
+    period, share = 160, 0.6
+    time = np.arange(12 * period) / period
+    phase = time[:, None] - np.array([0.0, 0.5, 0.0, 0.5])
+    swinging = jnp.asarray(phase % 1.0 > share, jnp.float32)
+    late = jnp.asarray([0.0, 0.0, 0.3, 0.3])
+    down = jnp.asarray((phase % 1.0 > late) & (phase % 1.0 <= share), jnp.float32)
+
+    def step(carry, now):
+        falls, before, steps = carry
+        earlier = dataclasses.replace(BLANK, steps=steps, swinging=before)
+        after = dataclasses.replace(BLANK, steps=steps + 1, swinging=now[0], foot_down=now[1])
+        return (stepped(falls, earlier, after), now[0], steps + 1), None
+
+    first = (no_footfalls(4), swinging[0], jnp.int32(0))
+    falls = jax.lax.scan(step, first, (swinging, down))[0][0]
+    phases = np.arctan2(falls.sine, falls.cosine) / (2 * np.pi) % 1.0
+    np.testing.assert_allclose(phases, [0.0, 0.5, 0.15, 0.65], atol=0.01)
 
 
 @pytest.mark.parametrize(("feet", "name", "way"), WAYS)

@@ -1,7 +1,8 @@
 """When the feet stand, against each other: the phases by which a gait has its name.
 
-A phase is the middle of a foot's stance in cycles of the first foot, as the examiner has it
-(`certify.describe.footfall_phases`); a stance is what lies between two swings.
+A phase is the middle of a foot's contact in cycles of the first foot, as the examiner has it
+(`certify.describe.footfall_phases`); a stance is what lies between two swings, for a foot that
+comes down may come off again for a moment.
 """
 
 import jax
@@ -22,12 +23,16 @@ SHARP = 0.1
 class Footfalls:
     """Sums over the stances that have ended, the first of each foot left out. `F` feet.
 
-    began, middle: [F] step, of the stance that goes on or went last, and of the one before it.
+    landed: [F] whether it has come down from a swing yet. pressed, when: [F] steps with contact in
+    the stance that goes on, and their times summed. middle: [F] step, mean of those of the latest
+    stance that has ended.
     period: [] steps between the middles of the first foot's latest two stances; 0 before them.
     cosine, sine: [F] of the phases, summed. stances: [F].
     """
 
-    began: jax.Array
+    landed: jax.Array
+    pressed: jax.Array
+    when: jax.Array
     middle: jax.Array
     period: jax.Array
     cosine: jax.Array
@@ -38,22 +43,26 @@ class Footfalls:
 def no_footfalls(feet: int) -> Footfalls:
     """Before the first step."""
     each = jnp.zeros(feet)
-    return Footfalls(each, each, jnp.zeros(()), each, each, each)
+    return Footfalls(each, each, each, each, jnp.zeros(()), each, each, each)
 
 
 def stepped(falls: Footfalls, before: Tally, after: Tally) -> Footfalls:
     """One step more: the tally before and after it says who has come down, and who has risen."""
     now = after.steps.astype(jnp.float32)
-    landed = (before.swinging > 0) & (after.swinging == 0)
     # A first stance began before the episode did.
-    rose = (before.swinging == 0) & (after.swinging > 0) & (falls.began > 0)
-    middle = jnp.where(rose, 0.5 * (falls.began + now), falls.middle)
+    came = (before.swinging > 0) & (after.swinging == 0)
+    landed = jnp.where(came, 1.0, falls.landed)
+    rose = (before.swinging == 0) & (after.swinging > 0) & (falls.pressed > 0)
+    middle = jnp.where(rose, falls.when / jnp.maximum(falls.pressed, 1.0), falls.middle)
+    on = landed * after.foot_down * (after.swinging == 0)
     passed = jnp.where(falls.middle[0] > 0, middle[0] - falls.middle[0], 0.0)
     period = jnp.where(rose[0], passed, falls.period)
     told = rose & (period > 0)
     angle = 2 * jnp.pi * (middle - middle[0]) / jnp.maximum(period, 1.0)
     return Footfalls(
-        began=jnp.where(landed, now, falls.began),
+        landed=landed,
+        pressed=jnp.where(rose, 0.0, falls.pressed + on),
+        when=jnp.where(rose, 0.0, falls.when + on * now),
         middle=middle,
         period=period,
         cosine=falls.cosine + jnp.where(told, jnp.cos(angle), 0.0),
