@@ -125,14 +125,15 @@ class EvolutionConfig:
       pose_range: share of each joint's pose range, about its middle, in which key poses lie.
       pose_span: deg; width of every hinge's pose range, about its middle in creature.toml, as far as
         the joint's range in creature.xml allows; 0 leaves the ranges of creature.toml.
-      initial: uniform draws or a Latin hypercube, over the middle `initial_spread` of each gene's range. selection: how parents are drawn
+      initial: uniform draws or a Latin hypercube, over the middle `initial_spread` of each gene's range.
+      initial_choice: so many are drawn and judged for each place of the first generation. selection: how parents are drawn
         (mjxgait/search/breeding.py); rivals: of a tournament.
       crossover: share of offspring with two parents, the others have one. crossing: `permute` draws K poses from the parents' 2K in any
         order; `align` leaves each pose in its place.
       pool: whom parents are drawn from: last generation's survivors, or `growing`, which also holds
         the children born so far (they rank last). survival: of the `best` of parents and children,
-        or of `children` alone, and the best so far. elite: so many of the best live on among the
-        children and are judged with them, for survival of children. unique_children: a child that equals somebody of the
+        or of `children` alone, and the best so far. elite: that share of the population, the best, lives
+        on among the children and is judged with them, for survival of children. unique_children: a child that equals somebody of the
         pool or a sibling is drawn anew before it is simulated (mjxgait/search/breeding.py).
       mutation: `redraw` re-draws two joints of one pose, `single` one joint, `pose` a whole pose, `gaussian` moves every joint of one pose
         by sigma, in units of its range, `mixed` is one or the other of the first and the last. `bit` and `byte` read the value of one joint
@@ -152,6 +153,7 @@ class EvolutionConfig:
     pose_span: Annotated[NonNegative, SHAPE] = 0.0
     initial: Literal["uniform", "latin"] = "uniform"
     initial_spread: Fraction = 0.6
+    initial_choice: Count = 1
     selection: Literal["uniform", "rank", "tournament"] = "rank"
     rivals: Annotated[Count, SHAPE] = 2
     crossover: Fraction = 0.7
@@ -159,7 +161,7 @@ class EvolutionConfig:
     pool: Annotated[Literal["parents", "growing"], SHAPE] = "parents"
     unique_children: Annotated[bool, SHAPE] = False
     survival: Literal["best", "children"] = "best"
-    elite: Annotated[Whole, SHAPE] = 0
+    elite: Annotated[Fraction, SHAPE] = 0.0
     mutation: Literal["redraw", "single", "pose", "gaussian", "mixed", "bit", "byte"] = "mixed"
     mutation_rate: Fraction = 0.8
     sigma: Positive = 0.12
@@ -179,13 +181,18 @@ class EvolutionConfig:
 
         if self.elite and self.survival == "best":
             raise ValueError('elite is for survival = "children": of the best all live on anyway')
-        if self.elite >= self.offspring:
+        if self.elites >= self.offspring:
             raise ValueError(f"elite = {self.elite} leaves no room for children")
 
     @property
     def offspring(self) -> int:
         """Individuals evaluated per generation."""
         return round(self.population * (self.growth - 1))
+
+    @property
+    def elites(self) -> int:
+        """Of the best that are judged again in each generation."""
+        return max(round(self.elite * self.population), 1) if self.elite else 0
 
 
 @dataclasses.dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 import dataclasses
 
-from mjxgait.settings.tables import STRICT, Finite, Whole
+from mjxgait.settings.tables import STRICT, Finite, NonNegative, Whole
 
 GOALS = (0.4, 2.0)
 """m ahead of the start: the nearest and the farthest goal."""
@@ -28,6 +28,7 @@ class HopWeights:
     ground: Finite = 0.2
     fall: Finite = 0.2
     neutral: Finite = 0.1
+    fast: Finite = 0.04
     overlap: Finite = 0.1
 
 
@@ -37,10 +38,13 @@ class HopConfig:
 
     Attributes:
       style_ramp: generations over which the style terms grow to their full weight.
+      rest: s without motion after which the rest of an episode is not simulated: whoever senses
+        nothing new does nothing new. 0 simulates all of it.
     """
 
     __pydantic_config__ = STRICT
     style_ramp: Whole = 20
+    rest: NonNegative = 1.25
     weights: HopWeights = dataclasses.field(default_factory=HopWeights)
 
 
@@ -52,6 +56,7 @@ class TravelWeights:
     distance: Finite = 1.0
     ground: Finite = 0.2
     fall: Finite = 0.2
+    fast: Finite = 0.1
     overlap: Finite = 0.1
 
 
@@ -61,4 +66,5 @@ class TravelConfig:
 
     __pydantic_config__ = STRICT
     style_ramp: Whole = 20
+    rest: NonNegative = 1.25
     weights: TravelWeights = dataclasses.field(default_factory=TravelWeights)

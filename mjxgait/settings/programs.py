@@ -49,6 +49,7 @@ class ProgramConfig:
       subtree, point, hoist, constant: how often, relative to each other, a mutation puts a new
         subtree, another function or sense, a subtree in place of the whole, or a moved constant.
       constant_sigma: by how much a constant moves, in units of the range.
+      parsimony: fitness that each node costs.
     """
 
     __pydantic_config__ = STRICT
@@ -71,6 +72,7 @@ class ProgramConfig:
     hoist: NonNegative = 0.5
     constant: Positive = 2.0
     constant_sigma: NonNegative = 0.1
+    parsimony: NonNegative = 0.0
 
     def __post_init__(self) -> None:
         low, high = self.initial_depth
