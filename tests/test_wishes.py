@@ -15,7 +15,7 @@ from mjxgait.certify.describe import gait_name
 from mjxgait.champion import read_champion, write_champion
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
-from mjxgait.parts.wishes import Wishes, speed_of, wished
+from mjxgait.parts.wishes import Wishes, hint, speed_of, wished
 from mjxgait.settings.config import Config
 from mjxgait.settings.gaits import GAITS, gait_of, placed, stations_of
 from mjxgait.settings.traced import traced
@@ -340,6 +340,15 @@ def test_wishes_are_names_for_settings(body: Creature):
     assert not wished(Config(), body, Wishes(gait="bound")).controller.mirror
     assert wished(Config(), body, Wishes()) is not None
     assert wished(Config(), body, Wishes()) == Config()
+
+
+def test_who_sets_a_low_limit_instead_of_a_wish_is_told(body: Creature):
+    def said(**fitness) -> str | None:
+        return hint(small_config(fitness=fitness))
+
+    assert "--speed 0.3bl/s" in said(speed=0.3)
+    assert [said(), said(speed=0.0), said(speed=0.9)] == [None] * 3
+    assert said(speed=0.3, wish={"speed": 0.3}) is None
 
 
 def test_every_style_is_a_table_of_settings(body: Creature):

@@ -14,7 +14,7 @@ from mjxgait.creature.scale import parse_scales
 from mjxgait.errors import INTERRUPTED, UserError
 from mjxgait.library import load_creature
 from mjxgait.parts import resolve_config
-from mjxgait.parts.wishes import WISHES, Wishes, wished
+from mjxgait.parts.wishes import WISHES, Wishes, hint, wished
 from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.folder import (
     METRICS,
@@ -91,6 +91,8 @@ def train_command(arguments: Sequence[str]) -> int:
         shape, args=list(arguments), prog="mjxgait train", default=shape(settings=default)
     )
     config = _settings(options)
+    if said := hint(config):
+        print(said)
     # JAX takes a second to import: only once the options are known to be good.
     from mjxgait.commands.view import following
     from mjxgait.runs import loop

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from mjxgait.certify import CertificateConfig
+from mjxgait.certify.tasks.walk import SPARE
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError, did_you_mean
 from mjxgait.settings.config import Config
@@ -82,6 +84,22 @@ def wished(config: Config, creature: Creature, wishes: Wishes) -> Config:
     if config.use.controller != "poses":
         table.pop("controller", None)
     return build(type(config), merge(dataclasses.asdict(config), table), "the wishes")
+
+
+def hint(config: Config) -> str | None:
+    """A sentence for whoever has set `fitness.speed` below what is called a walk, and so asks for
+    nothing that can be certified: it says up to where faster is better.
+    """
+    if config.use.task != "walk" or config.fitness.wish.speed is not None:
+        return None
+    least = SPARE * CertificateConfig().progress.speed
+    if not 0 < config.fitness.speed < least:
+        return None
+    return (
+        f"fitness.speed = {config.fitness.speed:g} says up to where faster is better, and no walk "
+        f"below {least:g} body lengths/s is looked at; to have it walk so slowly ask with --speed "
+        f"{config.fitness.speed:g}bl/s."
+    )
 
 
 def speed_of(text: str, creature: Creature) -> float:
