@@ -20,6 +20,8 @@ from mjxgait.tasks.walk.wish_tally import WishTally
 WORTH = 7.2
 """What all of the wanted way earns: as many body lengths as without a wish, so that the weights of
 the penalties mean what they mean there."""
+AT_MOST = 0.99
+"""Share of what was earned that all penalties together come near to; the rest is beyond rounding."""
 STARTING = 0.9
 """Share of the wanted speed's way that counts as all of it: a walk begins with standing."""
 NEAR = 0.25
@@ -123,5 +125,6 @@ def _shared(values: dict[str, jax.Array], config: WalkConfig) -> dict[str, jax.A
     costs = [weights[name] * value for name, value in values.items() if name not in REWARDS]
     cost = jnp.maximum(sum(costs, start=jnp.zeros(())), 0.0)
     earned = sum(weights[name] * jnp.maximum(values[name], 0.0) for name in REWARDS)
-    less = earned / jnp.maximum(earned + cost, 1e-9)
+    most = AT_MOST * earned
+    less = most / jnp.maximum(most + cost, 1e-9)
     return {n: value * (1.0 if n in REWARDS else less) for n, value in values.items()}
