@@ -28,7 +28,7 @@ class Champion:
     controller: name of its kind, as in `[use]`. genome: its arrays by name. settings: the
     controller's. task: that it was evolved for. fitness and terms: as evolution scored it.
     origin: where it comes from (generation, seed, versions). sizes: factors of the parts that are
-    not as the creature has them, where bodies evolve.
+    not as the creature has them, where bodies evolve. wish: what was asked of its walk, by name.
     """
 
     creature: str
@@ -42,6 +42,7 @@ class Champion:
     terms: Mapping[str, float]
     origin: Mapping[str, Any]
     sizes: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    wish: Mapping[str, Any] = dataclasses.field(default_factory=dict)
 
     @classmethod
     def of(cls, creature: Creature, config: Config, genome: Genome, **scored: Any) -> "Champion":
@@ -56,6 +57,7 @@ class Champion:
             drive=config.drive,
             task=config.use.task,
             sizes={} if sizes is None else proportions(creature).by_part(sizes),
+            wish=config.fitness.wish.table if hasattr(config.fitness, "wish") else {},
             **scored,
         )
 
@@ -84,6 +86,8 @@ class Champion:
         }
         if self.sizes:
             moves["sizes"] = dict(self.sizes)
+        if self.wish:
+            moves["wish"] = dict(self.wish)
         return hashlib.sha256(json.dumps(moves, sort_keys=True).encode()).hexdigest()[:16]
 
     def check_finite(self, creature: Creature) -> None:
@@ -134,6 +138,7 @@ def write_champion(champion: Champion, creature: Creature, path: Path) -> None:
         },
         "fitness": champion.fitness,
         **({"sizes": dict(champion.sizes)} if champion.sizes else {}),
+        **({"wish": dict(champion.wish)} if champion.wish else {}),
         "terms": dict(champion.terms),
         "origin": dict(champion.origin),
     }
@@ -185,4 +190,5 @@ def _champion(document: Mapping[str, Any], creature: Creature, path: Path) -> Ch
         terms=document["terms"],
         origin=document["origin"],
         sizes={name: float(factor) for name, factor in document.get("sizes", {}).items()},
+        wish=document.get("wish", {}),
     )

@@ -11,6 +11,8 @@ import tyro
 from mjxgait.errors import UserError
 
 MOST_RUNNERS = 12
+SIZE = (640, 360)
+"""Pixels of a video."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -24,7 +26,9 @@ class RenderOptions:
       generations: The best of each of these generations as a race, such as 0,5,20.
       seconds: Length of the walk.
       fps: Pictures per second.
-      size: Width and height in pixels.
+      size: Width and height in pixels, of each picture of a filmstrip; by default 640 360, of a
+        filmstrip 420 300.
+      camera: From where it is seen; by default from the side, a little from the front and above.
       slow: How many times slower than life.
       renderer: painter needs no GPU and no GL library; gl is MuJoCo's own; auto takes gl where it
         works.
@@ -36,7 +40,8 @@ class RenderOptions:
     generations: str | None = None
     seconds: float = 5.0
     fps: int = 25
-    size: tuple[int, int] = (640, 360)
+    size: tuple[int, int] | None = None
+    camera: Literal["side", "front", "top", "three-quarter", "follow"] | None = None
     slow: float = 1.0
     renderer: Literal["auto", "painter", "gl"] = "auto"
 
@@ -59,7 +64,7 @@ def render_command(arguments: Sequence[str]) -> int:
         runners = cast.through_generations(options.run, generations, options.seconds)
     else:
         runners = [cast.champion_of(options.run, options.seconds)]
-    stage = Stage([runner.walk for runner in runners], *options.size)
+    stage = Stage([runner.walk for runner in runners], *(options.size or SIZE), options.camera)
     if options.out.suffix.lower() == ".png":
         _still(runners, stage, options)
     else:
@@ -83,8 +88,8 @@ def _check(options: RenderOptions) -> list[int]:
         ("fps", options.fps, 1, 60),
         ("seconds", options.seconds, 0.1, 600),
         ("slow", options.slow, 0.1, 100),
-        ("size", min(options.size), 64, 4096),
-        ("size", max(options.size), 64, 4096),
+        ("size", min(options.size or SIZE), 64, 4096),
+        ("size", max(options.size or SIZE), 64, 4096),
         ("top", options.top or 1, 1, MOST_RUNNERS),
     ):
         if not low <= value <= high:
@@ -125,10 +130,11 @@ def _backend(stage: Any, options: RenderOptions, wanted: str | None) -> str | No
 def _still(runners: list[Any], stage: Any, options: RenderOptions) -> None:
     """A filmstrip of one walk, or the end of a race."""
     from mjxgait.viewing import video
+    from mjxgait.viewing.filmstrip import SIZE as EACH
     from mjxgait.viewing.filmstrip import filmstrip
 
     if len(runners) == 1:
-        picture = filmstrip(runners[0].walk)
+        picture = filmstrip(runners[0].walk, size=options.size or EACH, view=options.camera)
     else:
         picture = stage.picture(stage.frames - 1)
         video.write_captions(picture, stage, runners, stage.frames - 1)

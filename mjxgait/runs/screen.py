@@ -15,6 +15,7 @@ from rich.table import Table
 
 from mjxgait.certify import Certificate
 from mjxgait.certify.tasks import demands_of
+from mjxgait.certify.tasks.wishes import in_the_way
 from mjxgait.ground.spec import FLAT
 from mjxgait.runs.folder import CHAMPION, CONFIG, CREATURE, METRICS, PLOT
 
@@ -99,6 +100,8 @@ class Screen:
                 f"{other} stands up to {1000 * worst['depth']:.0f} mm deep in {one}, "
                 f"and in it in {worst['share']:.0%} of the frames."
             )
+        if said := in_the_way(certificate.criteria):
+            self.console.print(said)
         self.console.print(
             f"{verdict} (margin {certificate.margin:.2f}). {report['summary']}{where}; "
             f"{certificate.seconds:.0f} s."

@@ -1,8 +1,15 @@
 """Settings of the task of walking."""
 
 import dataclasses
+from typing import Annotated
 
-from mjxgait.settings.tables import STRICT, Finite, NonNegative, Whole
+import pydantic
+
+from mjxgait.settings.gaits import AUTO, check_gait
+from mjxgait.settings.tables import SHAPE, STRICT, Finite, NonNegative, Positive, Whole
+
+WISHES = ("speed", "gait", "turn", "steer", "height", "bounce", "sway")
+GaitText = Annotated[str, pydantic.AfterValidator(check_gait)]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -31,6 +38,62 @@ class Weights:
 
 
 @dataclasses.dataclass(frozen=True)
+class WishWeights:
+    """What missing each wish costs at most (mjxgait/tasks/walk/wish.py)."""
+
+    __pydantic_config__ = STRICT
+    speed: NonNegative = 4.0
+    gait: NonNegative = 6.0
+    height: NonNegative = 3.0
+    bounce: NonNegative = 3.0
+    sway: NonNegative = 3.0
+
+
+@dataclasses.dataclass(frozen=True)
+class WishConfig:
+    """What is asked of a walk besides being one (docs/wishes.md); a key that is not given is free.
+
+    Attributes:
+      speed: m/s, held from both sides.
+      gait: a name by its footfalls, or auto.
+      turn: deg/s, to the left; the heading that it is told to keep turns so fast.
+      steer: deg/s; in every disturbed trial the heading that it is told to keep turns at a rate of
+        its own, up to this, to the left or to the right; it must obey others too.
+      height: of the trunk while walking, in standing heights.
+      bounce: of the trunk's height about its mean, in hip heights, root mean square.
+      sway: deg, of the trunk's roll, root mean square.
+    """
+
+    __pydantic_config__ = STRICT
+    speed: Positive | None = None
+    gait: Annotated[GaitText, SHAPE] = AUTO
+    # The host draws what is told: runs side by side in one program would share the first one's.
+    turn: Annotated[Finite | None, SHAPE] = None
+    steer: Annotated[Positive | None, SHAPE] = None
+    height: Positive | None = None
+    bounce: NonNegative | None = None
+    sway: NonNegative | None = None
+    weights: WishWeights = dataclasses.field(default_factory=WishWeights)
+
+    def __post_init__(self) -> None:
+        if self.turn is not None and self.steer is not None:
+            raise ValueError("turn and steer: who turns all the time is not steered; give one")
+
+    @property
+    def asked(self) -> tuple[str, ...]:
+        """Names of the wishes that there are."""
+        values = {name: getattr(self, name) for name in WISHES}
+        # A value may be traced, which compares with nothing.
+        free = [n for n, v in values.items() if v is None or (isinstance(v, str) and v == AUTO)]
+        return tuple(name for name in WISHES if name not in free)
+
+    @property
+    def table(self) -> dict[str, float | str]:
+        """The wishes that there are, by name."""
+        return {name: getattr(self, name) for name in self.asked}
+
+
+@dataclasses.dataclass(frozen=True)
 class WalkConfig:
     """What is wanted of a gait.
 
@@ -41,6 +104,7 @@ class WalkConfig:
       frequency: share of the highest stride frequency of an animal of this mass up to which a gait is not hasty.
       style_ramp: generations over which the style terms (all but distance, alive, foot_height and
         fall) grow to their full weight.
+      wish: what else is asked: a speed, a gait, a turn, a posture.
     """
 
     __pydantic_config__ = STRICT
@@ -48,4 +112,5 @@ class WalkConfig:
     clearance: NonNegative = 0.12
     frequency: NonNegative = 0.7
     style_ramp: Whole = 0
+    wish: WishConfig = dataclasses.field(default_factory=WishConfig)
     weights: Weights = dataclasses.field(default_factory=Weights)
