@@ -255,7 +255,7 @@ def test_no_mesh_outside_the_model_s_folder_is_read(tmp_path):
         ("link.obj", False),
     ):
         text = QUADRUPED.replace("<asset>", f'<asset><mesh name="s" file="{reference}"/>')
-        text = text.replace('<site name="imu"/>', '<geom type="mesh" mesh="s" mass="0.1"/>')
+        text = text.replace('<site name="imu"/>', '<geom type="mesh" mesh="s" mass="0"/>')
         creature, imported = bring(home, text)
         assert (creature.model.nmesh == 1) == found
         assert told(imported, "not found in the model's folder") != found
@@ -285,7 +285,7 @@ def test_the_command_writes_a_folder_and_check_draws_it(tmp_path, capsys):
 
 def test_every_shipped_creature_can_be_drawn(shipped):
     assert portrait(shipped).size == (1100, 760)
-    assert shipped.name in facts(shipped)[0]
+    assert shipped.name in facts(shipped, standing(shipped))[0]
 
 
 def test_train_takes_a_model_file(tmp_path):
