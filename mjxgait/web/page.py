@@ -18,13 +18,12 @@ from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.runs.folder import CERTIFICATE, METRICS, open_champion, read_metrics
+from mjxgait.viewing.cast import LOOP_SECONDS
 from mjxgait.viewing.curves import draw_fitness
 from mjxgait.viewing.gaitplots import gait_figures
 from mjxgait.viewing.style import Figures, figure
 from mjxgait.viewing.walk import Walk, record_walk
 
-SECONDS = 12.0
-"""Of the walk from which the loop and the curves are taken."""
 RATE = 30
 
 
@@ -35,7 +34,7 @@ def write_page(run: Path, out: Path) -> None:
       UserError: no run, no champion, no steady stride, or the file cannot be written.
     """
     creature, champion = open_champion(run)
-    walk = record_walk(creature, champion, SECONDS)
+    walk = record_walk(creature, champion, LOOP_SECONDS)
     page = build_page(walk, walk_loop(walk, RATE), _sections(run, creature, champion, walk))
     try:
         out.write_text(page, encoding="utf-8")
