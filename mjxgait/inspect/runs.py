@@ -25,7 +25,16 @@ def runs_in(folder: Path) -> list[Path]:
 
 def list_runs(runs: Sequence[Path]) -> list[dict[str, Any]]:
     """What there is to say of each run; one that cannot be read has the reason under `problem`."""
-    kept = ("creature", "generation", "generations", "seed", "fitness", "ended", "written", "verdict")
+    kept = (
+        "creature",
+        "generation",
+        "generations",
+        "seed",
+        "fitness",
+        "ended",
+        "written",
+        "verdict",
+    )
     lines = []
     for run in runs:
         try:

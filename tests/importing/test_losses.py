@@ -36,7 +36,11 @@ def bring(folder: Path, text: str) -> str:
 @pytest.mark.parametrize(
     ("shape", "head", "told"),
     [
-        ('mass="4"', "", '"shell" of body "trunk" has 4 kg, and its mesh "hull.stl" cannot be read'),
+        (
+            'mass="4"',
+            "",
+            '"shell" of body "trunk" has 4 kg, and its mesh "hull.stl" cannot be read',
+        ),
         ("", "", "a mass that only its mesh tells"),
         ('group="3"', '<compiler inertiagrouprange="3 4"/>', "a mass that only its mesh tells"),
     ],
