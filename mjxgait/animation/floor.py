@@ -53,8 +53,8 @@ def add_floor(document: gltf.GLTF2, buffer: Buffer, loop: WalkLoop) -> None:
 def _rung(document: gltf.GLTF2, buffer: Buffer, wide: float, deep: float) -> int:
     """The mesh of one rung; half sizes in m."""
     corners = np.array([[-1, 0, -1], [-1, 0, 1], [1, 0, 1], [1, 0, -1]], np.float32)
-    points = corners * np.float32([wide, 0.0, deep])
-    up = np.tile(np.float32([0.0, 1.0, 0.0]), (4, 1))
+    points = corners * np.array([wide, 0.0, deep], np.float32)
+    up = np.tile(np.array([0.0, 1.0, 0.0], np.float32), (4, 1))
     faces = np.array([0, 1, 2, 0, 2, 3], np.uint16)
     look = gltf.PbrMetallicRoughness(
         baseColorFactor=[*COLOUR], metallicFactor=0.0, roughnessFactor=1.0
