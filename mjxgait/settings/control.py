@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 import pydantic
 
-from mjxgait.settings.tables import SHAPE, STRICT, Count, Interval, Positive
+from mjxgait.settings.tables import SHAPE, STRICT, Count, Finite, Interval, NonNegative, Positive
 
 HOLDS = (1, 2, 4, 8, 16)
 """Control steps from one command to the next that there can be."""
@@ -61,6 +61,9 @@ class PoseConfig:
       interpolation: n, steps between neighbouring poses.
       advance: the target moves on when the pose error is below the threshold, or by the
         clock.
+      around: rad; key poses near which all others lie, pose by pose and joint by joint, as
+        `mjxgait refine` finds them; none leaves the whole pose ranges.
+      within: deg; how far from them.
       tuning: ranges of the controller's own genes.
     """
 
@@ -69,6 +72,8 @@ class PoseConfig:
     mirror: bool = True
     interpolation: Count = 10
     advance: Literal["error", "clock"] = "error"
+    around: tuple[Finite, ...] = ()
+    within: NonNegative = 0.0
     tuning: TuningRanges = dataclasses.field(default_factory=TuningRanges)
 
 
