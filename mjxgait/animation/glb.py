@@ -16,6 +16,7 @@ import pygltflib as gltf  # type: ignore[import-untyped]
 from mjxgait.animation.buffer import Buffer
 from mjxgait.animation.floor import add_floor
 from mjxgait.animation.loop import WalkLoop
+from mjxgait.animation.note import note_of
 from mjxgait.animation.surface import geom_surface
 from mjxgait.errors import UserError
 from mjxgait.viewing.painter import geom_colours, seen_geoms
@@ -78,6 +79,8 @@ def build_glb(loop: WalkLoop, travelling: bool = False, floor: bool = False) -> 
         "frames_per_s": loop.rate,
         "travelling": travelling,
     }
+    # Blender keeps what a node has and forgets what the file has.
+    document.nodes[0].extras = document.extras | note_of(loop)
     buffer.close()
     return b"".join(document.save_to_bytes())
 

@@ -12,6 +12,7 @@ from mjxgait.keys.clip import AngleTrack, Clip
 from mjxgait.keys.cycle import Cycle, find_cycle
 from mjxgait.keys.fit import Fit, fit_poses
 from mjxgait.keys.match import matched
+from mjxgait.keys.own import Own, own_poses
 from mjxgait.keys.read_angles import read_csv, read_json
 from mjxgait.keys.read_bvh import read_bvh
 from mjxgait.keys.read_glb import read_glb
@@ -39,7 +40,8 @@ WAYS = {"z": (0, 0, 1), "-z": (0, 0, -1), "x": (1, 0, 0), "-x": (-1, 0, 0)}
 class Brought:
     """A file's cycle on a creature.
 
-    names: in the file, by the creature's part or joint. track: angles over all the file.
+    names: in the file, by the creature's part or joint. track: angles over all the file. own: what
+    the file says of the key poses that made it, where it is an exported walk.
     """
 
     names: Mapping[str, str]
@@ -47,6 +49,7 @@ class Brought:
     track: Retargeted
     cycle: Cycle
     fit: Fit
+    own: Own | None = None
 
 
 def bring(
@@ -102,10 +105,11 @@ def _bring(
     for line in told_errors(track):
         tell(line)
     cycle = find_cycle(creature, read.times, track.angles, *ends)
-    fit = fit_poses(creature, cycle, tolerance)
-    for line in told_fit(cycle, fit):
+    own = own_poses(creature, read.note, cycle) if isinstance(read, Clip) and read.note else None
+    fit = own.fit if own else fit_poses(creature, cycle, tolerance)
+    for line in told_cycle(cycle) + (told_own(own) if own else told_fit(fit)) + told_clipped(fit):
         tell(line)
-    return Brought(names, read.times, track, cycle, fit)
+    return Brought(names, read.times, track, cycle, fit, own)
 
 
 def _cut(read: Read, ends: tuple[float | None, float | None]) -> Read:
@@ -174,16 +178,33 @@ def told_errors(track: Retargeted) -> list[str]:
     return lines
 
 
-def told_fit(cycle: Cycle, fit: Fit) -> list[str]:
-    """Lines that say which cycle was found and how it was fitted."""
+def told_cycle(cycle: Cycle) -> list[str]:
+    """A line that says which cycle was found."""
     mirrored = "its second half mirrors the first" if cycle.mirrored else "not mirrored"
-    lines = [
+    return [
         f"cycle: {cycle.period:.3f} s from {cycle.begins:.3f} s on, {mirrored}; its ends differ by "
-        f"{np.degrees(cycle.gap):.1f} degrees",
-        f"key poses: {len(fit.key_poses)}, {np.degrees(fit.error):.1f} degrees from it (root mean square)",
+        f"{np.degrees(cycle.gap):.1f} degrees"
     ]
-    lines += [
+
+
+def told_fit(fit: Fit) -> list[str]:
+    """A line that says how the cycle was fitted."""
+    error = np.degrees(fit.error)
+    return [f"key poses: {len(fit.key_poses)}, {error:.1f} degrees from it (root mean square)"]
+
+
+def told_own(own: Own) -> list[str]:
+    """A line that says what was changed in an exported walk."""
+    count, changed = len(own.fit.key_poses), np.degrees(own.changed)
+    return [
+        f"key poses: {count}, those of the walk that was exported, and what was changed since then: "
+        f"{changed:.1f} degrees (root mean square)"
+    ]
+
+
+def told_clipped(fit: Fit) -> list[str]:
+    """A line for each joint that cannot go as far as it should."""
+    return [
         f"  {name}: up to {lost:.0f} degrees beyond its pose range are cut off"
         for name, lost in fit.clipped.items()
     ]
-    return lines

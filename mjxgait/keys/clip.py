@@ -10,9 +10,11 @@ import numpy as np
 
 from mjxgait.errors import UserError
 
-MOST_BYTES = 200_000_000
+MOST_BYTES, MOST_TEXT = 200_000_000, 30_000_000
 MOST_BONES = 1000
 MOST_FRAMES = 100_000
+MOST_TURNS = 1_000_000
+"""Bones times frames."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -21,12 +23,14 @@ class Clip:
 
     names: [B]. parents: [B] place of the parent, -1 for none. times: [F] s, from 0 on.
     turned: [F, B, 3, 3] how far each is turned from where it rests, in the file's world.
+    note: what an exported walk says of itself; else empty.
     """
 
     names: tuple[str, ...]
     parents: tuple[int, ...]
     times: np.ndarray
     turned: np.ndarray
+    note: str = ""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -38,7 +42,7 @@ class AngleTrack:
     angles: np.ndarray
 
 
-def read_bytes(path: Path) -> bytes:
+def read_bytes(path: Path, most: int = MOST_BYTES) -> bytes:
     """The content of a file.
 
     Raises:
@@ -47,10 +51,8 @@ def read_bytes(path: Path) -> bytes:
     try:
         if not path.is_file():
             raise UserError(f"{path}: no such file")
-        if path.stat().st_size > MOST_BYTES:
-            raise UserError(
-                f"{path}: larger than {MOST_BYTES // 1_000_000} MB; export one clip only"
-            )
+        if path.stat().st_size > most:
+            raise UserError(f"{path}: larger than {most // 1_000_000} MB; export one clip only")
         data = path.read_bytes()
     except OSError as error:
         raise UserError(f"{path}: cannot be read ({error.strerror})") from None
@@ -62,7 +64,7 @@ def read_bytes(path: Path) -> bytes:
 def read_text(path: Path) -> str:
     """The content of a text file; see `read_bytes`."""
     try:
-        return read_bytes(path).decode("utf-8-sig")
+        return read_bytes(path, MOST_TEXT).decode("utf-8-sig")
     except UnicodeDecodeError:
         raise UserError(f"{path}: not a text file in UTF-8") from None
 
@@ -77,6 +79,8 @@ def check_size(path: Path, bones: int, frames: int) -> None:
         raise UserError(f"{path}: {bones} bones; more than {MOST_BONES} is not one creature")
     if frames > MOST_FRAMES:
         raise UserError(f"{path}: {frames} frames; export one cycle, at most {MOST_FRAMES}")
+    if bones * frames > MOST_TURNS:
+        raise UserError(f"{path}: {frames} frames of {bones} bones; export one cycle only")
     if frames < 2:
         raise UserError(f"{path}: has no animation: a cycle needs at least two frames")
 

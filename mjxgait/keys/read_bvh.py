@@ -86,7 +86,8 @@ def _motion(path: Path, words: list[str], at: int, width: int) -> tuple[float, n
     rest = words[at + 6 :]
     if not width or len(rest) != frames * width:
         raise UserError(
-            f"{path}: states {frames} frames of {width} numbers and has {len(rest)} numbers; is it cut off?"
+            f"{path}: states {frames} frames of {width} numbers and has {len(rest)} numbers; is it "
+            "cut off?"
         )
     return step, np.array(rest, float).reshape(frames, width)
 

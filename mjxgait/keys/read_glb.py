@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from mjxgait.errors import UserError
 from mjxgait.keys.clip import Clip, check_numbers, check_size, check_times, read_bytes
+from mjxgait.keys.own import NOTE
 
 MAGIC, JSON, BIN = 0x46546C67, 0x4E4F534A, 0x004E4942
 TYPES = {
@@ -65,7 +66,8 @@ def read_glb(path: Path) -> Clip:
         world[:, node] = local[:, node] if above < 0 else world[:, above] @ local[:, node]
         still[node] = rest[node] if above < 0 else still[above] @ rest[node]
     names = tuple(str(node.get("name", f"node {i}")) for i, node in enumerate(nodes))
-    return Clip(names, tuple(parents), times - times[0], world @ still.transpose(0, 2, 1))
+    turned = world @ still.transpose(0, 2, 1)
+    return Clip(names, tuple(parents), times - times[0], turned, _note(nodes))
 
 
 def _chunks(path: Path, data: bytes) -> tuple[dict[str, Any], bytes]:
@@ -108,6 +110,13 @@ def _rest(node: dict[str, Any]) -> np.ndarray:
         columns = np.array(node["matrix"], float).reshape(4, 4).T[:3, :3]
         return Rotation.from_matrix(columns / np.linalg.norm(columns, axis=0)).as_matrix()
     return Rotation.from_quat(np.array(node.get("rotation", [0, 0, 0, 1]), float)).as_matrix()
+
+
+def _note(nodes: list[dict[str, Any]]) -> str:
+    """The text that an exported walk has on one of its nodes."""
+    extras = (node.get("extras") for node in nodes)
+    notes = (extra.get(NOTE) for extra in extras if isinstance(extra, dict))
+    return next((note for note in notes if isinstance(note, str)), "")
 
 
 def _keys(

@@ -2,13 +2,16 @@
 
 import dataclasses
 import json
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.keys.bring import Brought
+from mjxgait.runs.disk import disk_errors
 from mjxgait.settings.config import Config
 from mjxgait.settings.tables import build, merge
 
@@ -18,6 +21,12 @@ FARTHEST = 30.0
 """deg; how far each joint of each key pose may depart where nothing is to be kept."""
 SLOWER = 0.3
 """Share by which the period may change where nothing is to be kept."""
+
+
+def _near(value: float, ends: Sequence[float], share: float) -> list[float]:
+    """The part of a range about a value that lies within a share of its width."""
+    low, high = min(ends[0], value), max(ends[1], value)
+    return [max(low, value - share * (high - low)), min(high, value + share * (high - low))]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -44,7 +53,7 @@ def refining(config: Config, brought: Brought, keep: float) -> Config:
         raise UserError(f"--keep {keep:g}: must lie between 0 and 1")
     poses, period = brought.fit.key_poses, brought.cycle.period
     slack = SLOWER * (1.0 - keep)
-    near = {
+    near: dict[str, Any] = {
         "key_poses": len(poses),
         "mirror": brought.cycle.mirrored,
         "advance": "clock",
@@ -52,6 +61,10 @@ def refining(config: Config, brought: Brought, keep: float) -> Config:
         "within": FARTHEST * (1.0 - keep),
         "tuning": {"period": [period * (1.0 - slack), period * (1.0 + slack)]},
     }
+    if own := brought.own:
+        ranges = dataclasses.asdict(config)["controller"]["tuning"]
+        near["advance"] = own.advance
+        near["tuning"] = {n: _near(own.tuning[n], ranges[n], 1.0 - keep) for n in own.tuning}
     table = merge(dataclasses.asdict(config), {"controller": near})
     return build(type(config), table, "the settings of refine")
 
@@ -65,7 +78,8 @@ def write_original(folder: Path, creature: Creature, source: Path, brought: Brou
         "starts": float(brought.fit.starts),
         "joints": joints,
     }
-    (folder / KEYS).write_text(json.dumps(document) + "\n", encoding="utf-8")
+    with disk_errors(folder):
+        (folder / KEYS).write_text(json.dumps(document) + "\n", encoding="utf-8")
 
 
 def read_original(folder: Path, creature: Creature) -> Original:

@@ -6,6 +6,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
+from viewing.made_up import treading
 
 from mjxgait.animation import WalkLoop, build_glb
 from mjxgait.animation.glb import gltf_axes
@@ -40,7 +41,7 @@ def poses(creature: Creature, angles: np.ndarray) -> np.ndarray:
 
 def glb(creature: Creature, angles: np.ndarray) -> bytes:
     """As `mjxgait export` writes it."""
-    walk = Walk(creature, None, None, np.inf)
+    walk = Walk(creature, treading(creature), None, np.inf)
     return build_glb(WalkLoop(walk, poses(creature, angles), RATE, 1, 0.0, 1.0))
 
 

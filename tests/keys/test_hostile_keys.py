@@ -50,6 +50,29 @@ def bomb(document: dict) -> None:
         accessor["count"] = 10**12
 
 
+def long(data: bytes) -> bytes:
+    """A thousand bones with ten thousand keys each."""
+    document, blob = parts(data)
+    document["nodes"] += [{"name": f"b{i}"} for i in range(900)]
+    count = 10_000
+    times = np.arange(count, dtype=np.float32).tobytes()
+    quats = np.tile(np.float32([0, 0, 0, 1]), count).tobytes()
+    views = len(document["bufferViews"])
+    document["bufferViews"] += [
+        {"buffer": 0, "byteOffset": len(blob), "byteLength": len(times)},
+        {"buffer": 0, "byteOffset": len(blob) + len(times), "byteLength": len(quats)},
+    ]
+    accessors = len(document["accessors"])
+    kind = {"componentType": 5126, "count": count}
+    document["accessors"] += [
+        {"bufferView": views, "type": "SCALAR", **kind},
+        {"bufferView": views + 1, "type": "VEC4", **kind},
+    ]
+    for sampler in document["animations"][0]["samplers"]:
+        sampler.update(input=accessors, output=accessors + 1)
+    return packed(document, blob + times + quats)
+
+
 def rename(document: dict) -> None:
     for i, node in enumerate(document["nodes"]):
         node["name"] = f"Zq{i}"
@@ -70,6 +93,7 @@ GLB = {
         "bones; more than",
     ),
     "a bomb": (lambda d: altered(d, bomb), "frames; export one cycle"),
+    "many bones of many frames": (long, "export one cycle only"),
     "keys that are no numbers": (nan_keys, "is not a finite number"),
     "a circle of bones": (lambda d: altered(d, circle), "its nodes are no tree"),
     "deep": (lambda d: packed({}, b"").replace(b"{}", b"[" * 2), "damaged"),

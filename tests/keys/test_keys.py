@@ -1,17 +1,25 @@
 """What an animator has keyed comes in as it was drawn: names, angles, cycle, key poses."""
 
+import dataclasses
+import json
 from pathlib import Path
 
 import numpy as np
+import pygltflib as gltf
 import pytest
-from keys.made import PERIOD, RATE, bvh, columns, swings, write
+from keys.made import PERIOD, RATE, bvh, columns, poses, swings, write
+from viewing.made_up import treading
 
+from mjxgait.animation import WalkLoop, build_glb, export_glb
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.keys import bring
 from mjxgait.keys.cycle import find_cycle, mirror_image
 from mjxgait.keys.fit import fit_poses
 from mjxgait.keys.match import matched
+from mjxgait.keys.own import NOTE
+from mjxgait.settings.control import TUNING
+from mjxgait.viewing.walk import Walk
 
 LOOSE = np.radians(90.0)
 """Tolerance of tests that are not about key poses."""
@@ -155,3 +163,47 @@ def test_of_a_long_file_the_user_says_which_seconds(stool: Creature, tmp_path: P
         bring(stool, file)
     brought = bring(stool, file, ends=(10 * PERIOD, 11 * PERIOD), tolerance=LOOSE)
     assert (brought.cycle.begins, brought.cycle.period) == pytest.approx((10 * PERIOD, PERIOD))
+
+
+@pytest.fixture
+def exported(stool: Creature) -> WalkLoop:
+    """A walk whose joints follow their targets late and not all the way."""
+    walk = Walk(stool, treading(stool, degrees=12.0), None, np.inf)
+    return WalkLoop(walk, poses(stool, swings(stool)), RATE, 1, 0.0, 1.0)
+
+
+def test_an_exported_walk_comes_back_with_the_key_poses_that_made_it(exported, tmp_path):
+    creature, champion = exported.walk.creature, exported.walk.champion
+    export_glb(exported, tmp_path / "walk.glb")
+    own = bring(creature, tmp_path / "walk.glb", tolerance=LOOSE).own
+    assert own
+    assert np.degrees(own.changed) < 0.1
+    whole = [champion.genome["key_poses"]]
+    whole += [mirror_image(creature, whole[0])] * creature.mirror.symmetric
+    assert worst(own.fit.key_poses, np.concatenate(whole)) < 0.01
+    assert own.tuning == pytest.approx(dict(zip(TUNING, champion.genome["tuning"], strict=True)))
+
+
+def test_what_is_bent_in_the_file_is_bent_in_its_key_poses(exported, tmp_path):
+    """One hip by ten degrees in all frames, as an animator would."""
+    creature, champion = exported.walk.creature, exported.walk.champion
+    bent = exported.qpos.copy()
+    bent[:, creature.joints.qpos[1]] += np.radians(10.0)
+    document = gltf.GLTF2.load_from_bytes(build_glb(exported))
+    edited = gltf.GLTF2.load_from_bytes(build_glb(dataclasses.replace(exported, qpos=bent)))
+    edited.nodes[0].extras = document.nodes[0].extras
+    (tmp_path / "walk.glb").write_bytes(b"".join(edited.save_to_bytes()))
+    own = bring(creature, tmp_path / "walk.glb", tolerance=LOOSE).own
+    assert own
+    moved = np.degrees(own.fit.key_poses[:2] - champion.genome["key_poses"])
+    assert moved[:, 1] == pytest.approx(10.0, abs=0.5)
+    assert np.delete(moved, 1, axis=1) == pytest.approx(0.0, abs=0.5)
+
+
+def test_a_walk_of_another_creature_is_a_cycle_like_any_other(stool, exported, tmp_path):
+    document = gltf.GLTF2.load_from_bytes(build_glb(exported))
+    note = json.loads(document.nodes[0].extras[NOTE])
+    for changed in (note | {"creature": "other"}, note | {"motion": {}}, []):
+        document.nodes[0].extras = {NOTE: json.dumps(changed)}
+        (tmp_path / "walk.glb").write_bytes(b"".join(document.save_to_bytes()))
+        assert bring(stool, tmp_path / "walk.glb", tolerance=LOOSE).own is None
