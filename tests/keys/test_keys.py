@@ -11,7 +11,7 @@ from keys.made import PERIOD, RATE, bvh, columns, poses, swings, write
 from viewing.made_up import treading
 
 from mjxgait.animation import WalkLoop, build_glb, export_glb
-from mjxgait.creature import Creature
+from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import UserError
 from mjxgait.keys import bring
 from mjxgait.keys.cycle import find_cycle, mirror_image
@@ -19,6 +19,7 @@ from mjxgait.keys.fit import fit_poses
 from mjxgait.keys.match import matched
 from mjxgait.keys.own import NOTE
 from mjxgait.settings.control import TUNING
+from mjxgait.settings.shipped import find_creature
 from mjxgait.viewing.walk import Walk
 
 LOOSE = np.radians(90.0)
@@ -48,11 +49,13 @@ def test_every_kind_of_file_tells_the_same(stool: Creature, tmp_path: Path, kind
 
 
 @pytest.mark.parametrize("order", ["XYZ", "YZX", "ZYX"])
-def test_angles_of_a_bvh_file_are_in_the_order_that_it_names(stool, tmp_path, order):
-    angles = swings(stool)
+def test_angles_of_a_bvh_file_are_in_the_order_that_it_names(tmp_path, order):
+    """Of a duck: its hips and ankles turn about several axes, one below the other."""
+    duck = load_creature(find_creature("duck"))
+    angles = swings(duck)[::6]
     file = tmp_path / "walk.bvh"
-    file.write_text(bvh(stool, angles, order))
-    assert worst(bring(stool, file, tolerance=LOOSE).track.angles, angles) < 0.05
+    file.write_text(bvh(duck, angles, order))
+    assert worst(bring(duck, file, tolerance=LOOSE).track.angles, angles) < 0.05
 
 
 def test_degrees_are_said_by_the_column(stool: Creature, tmp_path: Path):
