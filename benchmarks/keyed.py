@@ -117,7 +117,7 @@ def refined(folder: Path, name: str, keep: float) -> dict[str, object]:
         "summary": document["report"]["summary"],
         "poses_deg": round(apart.poses, 1),
         "moved_deg": None if apart.moved is None else round(apart.moved, 1),
-        "period": round(apart.period, 3),
+        "period": None if apart.period is None else round(apart.period, 3),
     }
 
 

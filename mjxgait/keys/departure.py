@@ -9,73 +9,67 @@ import mujoco
 import numpy as np
 
 from mjxgait.creature import Creature
-from mjxgait.keys.cycle import mirror_image
 from mjxgait.keys.refine import Original
-from mjxgait.settings.control import TUNING
 from mjxgait.viewing.walk import Walk
 
 WORTH_TELLING = 0.01
 """m; a foot that moves less far elsewhere is where it was."""
 MOST_LINES = 5
-TILTED = np.radians(1.0)
+TILTED, OUT_OF_TIME = np.radians(1.0), 0.015
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Departure:
-    """poses: deg, root mean square of what the targets differ. moved: the same of the joints as they
-    moved, without the delay with which they follow; None where the walk has no steady stride.
-    period: of the original's. by_joint: deg, of the targets. words: what changed, a sentence each.
+    """poses: deg, root mean square of what the key poses differ from those that they lie near.
+    moved: the same of the joints as they moved against the cycle that was drawn, without the delay
+    with which they follow; period: share of the drawn one. None where there is no steady stride.
+    by_joint: deg, of the key poses. words: what changed, a sentence each.
     """
 
     poses: float
     moved: float | None
-    period: float
+    period: float | None
     by_joint: dict[str, float]
     words: list[str]
 
 
 def departure(original: Original, walk: Walk) -> Departure:
     """Of a champion's walk from the cycle of its run."""
-    creature, count = walk.creature, len(original.angles)
-    drawn = np.roll(original.angles, -round(original.starts * count), axis=0)
-    apart = np.degrees(np.sqrt(np.mean((_targets(walk, count) - drawn) ** 2, axis=0)))
-    period = float(walk.champion.genome["tuning"][TUNING.index("period")]) / original.period
-    moved, words = None, []
+    creature, champion, count = walk.creature, walk.champion, len(original.angles)
+    poses = np.asarray(champion.genome["key_poses"], float)
+    apart = np.degrees(poses - np.reshape(champion.settings.around, poses.shape))
+    by_joint = np.sqrt(np.mean(apart**2, axis=0))
+    moved, period, words = None, None, []
     if (found := walk.steady_strides(1)) is not None:
+        drawn = np.roll(original.angles, -round(original.starts * count), axis=0)
         done = _over_stride(walk, *found, count)
         shifts = [np.roll(done, -s, axis=0) for s in range(count)]
         nearest = min(shifts, key=lambda angles: float(np.mean((angles - drawn) ** 2)))
         moved = float(np.degrees(np.sqrt(np.mean((nearest - drawn) ** 2))))
-        words = _feet_in_words(creature, drawn, nearest)
+        period = (found[1] - found[0]) * walk.time_step / original.period
         pitch = float(np.mean(walk.recording.pitch[slice(*found)]))
-        if abs(pitch) > TILTED:
-            way = "down" if pitch > 0 else "up"
-            words.append(f"the trunk is tilted nose {way} by {np.degrees(abs(pitch)):.0f} degrees")
-    if abs(period - 1.0) > 0.01:
+        words = _feet_in_words(creature, drawn, nearest) + _in_words(pitch, period)
+    named = {n: float(a) for n, a in zip(creature.joints.names, by_joint, strict=True)}
+    return Departure(float(np.sqrt(np.mean(apart**2))), moved, period, named, words)
+
+
+def _in_words(pitch: float, period: float) -> list[str]:
+    """Of the trunk's mean pitch in rad, nose down, and the share of the drawn period."""
+    told = []
+    if abs(pitch) > TILTED:
+        way = "down" if pitch > 0 else "up"
+        told.append(f"the trunk is tilted nose {way} by {np.degrees(abs(pitch)):.0f} degrees")
+    if abs(period - 1.0) > OUT_OF_TIME:
         way = "longer" if period > 1.0 else "shorter"
-        words.append(f"a cycle takes {abs(period - 1.0):.0%} {way}")
-    whole = float(np.sqrt(np.mean(apart**2)))
-    by_joint = {n: float(a) for n, a in zip(creature.joints.names, apart, strict=True)}
-    return Departure(whole, moved, period, by_joint, words)
-
-
-def _targets(walk: Walk, count: int) -> np.ndarray:
-    """[N, J] of the champion's key poses over the cycle, without its reflexes."""
-    poses = np.asarray(walk.champion.genome["key_poses"], float)
-    mirrored = walk.creature.mirror.symmetric and walk.champion.settings.mirror
-    whole = np.concatenate([poses, mirror_image(walk.creature, poses)]) if mirrored else poses
-    return _evenly(np.concatenate([whole, whole[:1]]), np.arange(count) / count * len(whole))
+        told.append(f"a cycle takes {abs(period - 1.0):.0%} {way}")
+    return told
 
 
 def _over_stride(walk: Walk, first: int, last: int, count: int) -> np.ndarray:
     """[N, J] of the joints as they moved over one stride."""
     angles = walk.qpos[:, walk.creature.joints.qpos_adr]
-    return _evenly(angles, np.linspace(first, last, count, endpoint=False))
-
-
-def _evenly(rows: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Rows [n, J] at fractional places."""
-    return np.stack([np.interp(at, np.arange(len(rows)), column) for column in rows.T], 1)
+    at, frames = np.linspace(first, last, count, endpoint=False), np.arange(len(angles))
+    return np.stack([np.interp(at, frames, column) for column in angles.T], 1)
 
 
 def _feet_in_words(creature: Creature, drawn: np.ndarray, done: np.ndarray) -> list[str]:

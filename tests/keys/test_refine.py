@@ -1,5 +1,6 @@
 """A refined cycle stays near the one that was drawn: a run like any other, and what changed in words."""
 
+import dataclasses
 import json
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 from helpers import small_config
 from keys.made import swings, write
+from viewing.made_up import treading
 
 from mjxgait.champion import read_champion
 from mjxgait.cli import main
@@ -15,11 +17,12 @@ from mjxgait.control.poses import PoseTracker
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.keys import Brought, bring
-from mjxgait.keys.departure import _feet_in_words
-from mjxgait.keys.refine import KEYS, read_original, refining
+from mjxgait.keys.departure import _feet_in_words, departure
+from mjxgait.keys.refine import KEYS, Original, read_original, refining
 from mjxgait.parts.fit import check_fit
 from mjxgait.runs.folder import CHAMPION, open_run
 from mjxgait.settings.config import EvolutionConfig
+from mjxgait.viewing.walk import record_walk
 
 SETTINGS = """
 [rollout]
@@ -83,6 +86,29 @@ def test_a_foot_that_reaches_elsewhere_is_told_in_words(stool: Creature):
     assert any("cm further forward" in sentence for sentence in told)
     assert any("cm less far back" in sentence for sentence in told)
     assert _feet_in_words(stool, drawn, drawn) == []
+
+
+def test_the_departure_of_a_walk_is_measured(stool: Creature):
+    """Of one that treads as it was drawn, and of one with a joint five degrees elsewhere."""
+    champion = treading(stool, degrees=12.0)
+    near = np.ravel(champion.genome["key_poses"])
+    drawn = dataclasses.replace(champion.settings, around=tuple(map(float, near)))
+    walk = record_walk(stool, dataclasses.replace(champion, settings=drawn), 4.0)
+    first, last = walk.steady_strides(1)
+    motion = walk.qpos[first:last, stool.joints.qpos_adr]
+    period = len(motion) * walk.time_step
+    found = departure(Original("x", motion, period, 0.0), walk)
+    assert (found.poses, found.period) == (0.0, pytest.approx(1.0, abs=0.02))
+    assert found.moved < 0.1
+    bent = dataclasses.replace(
+        drawn, around=tuple(near + np.radians(5.0) * (np.arange(len(near)) % 4 == 1))
+    )
+    walk = record_walk(stool, dataclasses.replace(champion, settings=bent), 4.0)
+    found = departure(Original("x", motion, 2.0 * period, 0.0), walk)
+    name = stool.joints.names[1]
+    assert found.by_joint == pytest.approx(dict.fromkeys(stool.joints.names, 0.0) | {name: 5.0})
+    assert found.poses == pytest.approx(2.5)
+    assert "a cycle takes 50% shorter" in found.words
 
 
 def said(capsys: pytest.CaptureFixture, *arguments: object, code: int) -> str:
