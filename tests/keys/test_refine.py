@@ -143,3 +143,16 @@ def test_from_a_file_to_a_run_that_can_be_gone_on_with(tmp_path: Path, capsys, s
         read_original(run, creature)
     (run / KEYS).unlink()
     assert "was not made by `mjxgait refine`" in said(capsys, "--resume", run, code=2)
+
+
+def test_where_evolution_looked_is_no_part_of_who_somebody_is(stool: Creature):
+    """Else champions of before these settings would lose their certificates."""
+    champion = treading(stool)
+    before = {
+        k: v
+        for k, v in dataclasses.asdict(champion.settings).items()
+        if k not in ("around", "within")
+    }
+    near = dataclasses.replace(champion.settings, around=(0.1, 0.2), within=3.0)
+    others = [dataclasses.replace(champion, settings=settings) for settings in (before, near)]
+    assert {other.fingerprint for other in others} == {champion.fingerprint}
