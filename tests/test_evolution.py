@@ -152,7 +152,7 @@ def test_of_the_parents_only_the_best_lives_on_if_children_take_their_place():
 def test_the_elite_is_judged_once_more():
     """Whoever lives on does so with the verdict of the latest judge, and nobody else does."""
     never = ForcedConfig(enabled=False)
-    keeping = toy(survival="children", elite=3, forced=never)
+    keeping = toy(survival="children", elite=0.15, forced=never)
     (before, _), settings = run(keeping, 4)[-1], inputs(keeping)[0]
     after, _, births = jax.device_get(advance(settings, Problem(slope=2.0), before))
     poses = births.key_poses
@@ -162,6 +162,34 @@ def test_the_elite_is_judged_once_more():
     lived = {tuple(pose.ravel()) for pose in after.genomes.key_poses[after.born < after.generation]}
     assert lived == {tuple(pose.ravel()) for pose in before.genomes.key_poses[:3]}
     assert set(after.born[after.born < after.generation]) <= set(before.born)
+
+
+def test_what_a_genome_costs_is_taken_from_its_fitness():
+    """Half of the genes cost as much as their squares are worth, so the others decide."""
+    plain = toy(crossover=0.5)
+
+    def price(genomes: Genome) -> jax.Array:
+        return 3.0 * jnp.sum(genomes.key_poses[:, :, 0] > 0, axis=1)
+
+    dear = dataclasses.replace(plain, variation=dataclasses.replace(plain.variation, price=price))
+    state = dear.init(jax.random.key(0), 1, 1, 1)
+    for _ in range(12):
+        state, _ = jax.jit(dear.step)(state)
+        expected = near_zero(state.genomes) - price(state.genomes)
+        np.testing.assert_allclose(state.fitness, expected, rtol=1e-5)
+    assert not np.asarray(price(state.genomes)).any()
+
+
+def test_no_verdict_of_an_earlier_judge_counts():
+    """Parents fill the places for which there are no children; nobody has judged them now."""
+    never = ForcedConfig(enabled=False)
+    keeping = toy(survival="children", elite=0.15, forced=never, growth=1.5)
+    (before, _), settings = run(keeping, 4)[-1], inputs(keeping)[0]
+    harder = jax.device_get(advance(settings, Problem(slope=2.0), before))[0]
+    judged = np.isfinite(harder.fitness)
+    assert judged.tolist() == [True] * 10 + [False] * 10
+    expected = 2 * near_zero(harder.genomes)[:10]
+    np.testing.assert_allclose(harder.fitness[:10], expected, rtol=1e-6)
 
 
 def test_the_population_is_sorted_and_without_duplicates():
@@ -184,6 +212,19 @@ def test_everybody_of_the_initial_population_is_judged_before_generation_zero(gr
     assert int(first.generation) == 0
     assert np.allclose(first.fitness, np.sort(near_zero(created.genomes))[::-1])
     assert (first.origin == Origin.INITIAL).all()
+
+
+@pytest.mark.parametrize("growth", [1.5, 2.0, 3.0])
+def test_the_first_generation_is_the_best_of_as_many_candidates_as_asked_for(growth: float):
+    plain, choosy = toy(growth=growth), toy(growth=growth, initial_choice=4)
+    rounds, first = [], begin(*inputs(choosy), jax.random.key(0))
+    while int(first.generation) < 0:
+        first, _, judged = advance(*inputs(choosy), first)
+        rounds.append(near_zero(judged))
+    candidates = np.sort(np.concatenate(rounds)[:80])[::-1]
+    np.testing.assert_allclose(first.fitness, candidates[:20], rtol=1e-6)
+    np.testing.assert_allclose(near_zero(first.genomes), first.fitness, rtol=1e-6)
+    assert np.median(first.fitness) > np.median(run(plain, 1)[0][0].fitness)
 
 
 def test_an_individual_that_cannot_be_judged_loses_and_poisons_nobody():

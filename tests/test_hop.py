@@ -24,7 +24,7 @@ from mjxgait.settings.shipped import find_creature
 from mjxgait.settings.walk import WalkConfig
 from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.hop.fitness import STYLE, TERMS, fitness_terms, signed_weights
-from mjxgait.tasks.hop.tally import Tally, empty, goal_distance, updated
+from mjxgait.tasks.hop.tally import Tally, empty, goal_distance, rested, updated
 from mjxgait.tasks.hop.task import Hop
 from mjxgait.tasks.trials import Starts, draw_starts
 from mjxgait.types import Sensed
@@ -135,6 +135,36 @@ def test_only_the_last_posture_counts(stool: Creature):
     assert not after(stool, [bent, moment(stool)]).bent.any()
 
 
+def test_the_fastest_joint_of_all_moments_counts(stool: Creature):
+    speeds = [[0.0, 1.0, 0.0, 0.0], [0.0, 0.0, -3.0, 0.0], [2.0, 0.0, 0.0, 0.0]]
+    turning = [moment(stool, joint_vel=jnp.array(speed)) for speed in speeds]
+    assert after(stool, turning).fastest == 3.0
+
+
+MOVING = (
+    {"trunk_vel": [0, 0.01, 0]},
+    {"trunk_angvel": [0, 0, 0.1]},
+    {"joint_vel": [0, -0.1, 0, 0]},
+)
+
+
+@pytest.mark.parametrize("motion", MOVING)
+def test_who_has_not_moved_for_long_enough_is_at_the_end(stool: Creature, motion: dict):
+    moves = moment(stool, **{name: jnp.float32(value) for name, value in motion.items()})
+    rests, touching, never = jnp.float32(3), jnp.bool_(True), jnp.float32(0)
+    still = [moment(stool)] * 3
+    for moments, steps in (
+        ([*still, moves], 4),
+        ([moves, *still], HORIZON),
+        ([*still[:2], moves, *still[:2]], 5),
+    ):
+        tally = after(stool, moments)
+        ended = rested(tally, HORIZON, rests, touching)
+        assert (ended.steps, ended.ground) == (steps, steps - len(moments))
+        assert rested(tally, HORIZON, never, touching).steps == len(moments)
+        assert rested(tally, HORIZON, rests, ~touching).ground == 0
+
+
 # The terms
 
 HALF_WAY = {"steps": 1000, "goal": 1.6, "left": 0.8}
@@ -157,6 +187,10 @@ CASES: list[tuple[str, float, dict]] = [
     ("ground", 0.6, THERE | {"ground": 300.0, "steps": 500}),
     ("fall", 1.0, THERE | {"reason": int(Reason.TIPPED)}),
     ("fall", 0.0, THERE),
+    # 14 of 20 rad/s are allowed
+    ("fast", 0.0, THERE | {"fastest": 13.9}),
+    ("fast", 0.5, THERE | {"fastest": 17.0}),
+    ("fast", 1.0, THERE | {"fastest": 50.0}),
     # half of a pose range of 80 degrees is 0.698 rad
     ("neutral", 0.25, THERE | {"bent": [np.radians(40), 0.0, 0.0, 0.0]}),
     # 0.05 hip heights beyond the 0.005 at which parts only touch

@@ -154,9 +154,9 @@ def test_the_bar_is_sensed(luxo: Creature):
 def test_the_deepest_counts_and_a_run_through_the_bar_is_worth_less(luxo: Creature):
     task = Limbo(luxo, STEP, HORIZON, luxo.settings.termination)
     moments = [sensed(luxo, posed(luxo, ahead)) for ahead in (0.0, 0.5, 1.4)]
-    tally = task.init()
+    tally, standards = task.init(), task.standards(LimboConfig(height=HEIGHT))
     for moment in moments:
-        tally = task.update(tally, moment, jnp.zeros(3), jnp.float32(HEIGHT), jnp.float32(1.4))
+        tally = task.update(tally, moment, jnp.zeros(3), standards, jnp.float32(1.4))
     assert float(tally.bar) == pytest.approx(depth(luxo, posed(luxo, 0.5)))
     terms = task.judge(tally, LimboConfig())
     deep = float(tally.bar) / luxo.frame.hip_height

@@ -65,11 +65,11 @@ def test_the_goal_of_other_tasks_stays(stool: Creature):
 
 def test_what_counts_is_the_way_and_what_is_told_are_the_goals(stool: Creature):
     travel, goal = task(stool), aim(0.5, 0.5)
-    tally = travel.init()
+    tally, standards = travel.init(), travel.standards(TravelConfig())
     assert float(travel.outcome(tally)["way"]) == 0
     for forward in (0.0, 0.3, 0.49, 0.8, 1.01, 1.1):
         sensed = moment(stool, forward)
-        tally = travel.update(tally, sensed, jnp.zeros(4), (), goal)
+        tally = travel.update(tally, sensed, jnp.zeros(4), standards, goal)
         goal = travel.onward(goal, sensed)
     told = travel.outcome(tally)
     assert (float(told["goals"]), float(told["way"])) == (2.0, pytest.approx(1.1, abs=1e-6))

@@ -12,7 +12,9 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
+from mjxgait.search import forced
 from mjxgait.search.breeding import Nursery, parents
+from mjxgait.search.metrics import metrics
 from mjxgait.search.state import EvolutionState, GenerationMetrics, Origin, Proposal
 from mjxgait.search.variation import Variation, first_occurrence
 from mjxgait.settings.config import EvolutionConfig
@@ -66,7 +68,7 @@ class Evolution:
 
     def _with_elite(self, state: EvolutionState, proposal: Proposal) -> Proposal:
         """With the best parents in the first places, to be judged once more."""
-        count = self.config.elite
+        count = self.config.elites
         if not count:
             return proposal
 
@@ -88,19 +90,29 @@ class Evolution:
         seeding = self._seeding(state)
         generation = jnp.where(seeding, jnp.where(self._filled(state), 0, -1), state.generation + 1)
         grown = self._survive(state, proposal, judged, generation)
-        planted = self._plant(state, judged, generation)
+        planted = self._plant(state, proposal, judged, generation)
         state = jax.tree.map(
             lambda a, b: jnp.where(seeding, a, b), _without_key(planted), _without_key(grown)
         )
-        forced = state.forced
-        state = self._decide(dataclasses.replace(state, key=proposal.key, generation=generation))
-        return state, self._metrics(state, judged, forced)
+        was_forced = state.forced
+        state = dataclasses.replace(state, key=proposal.key, generation=generation)
+        state = forced.decided(self.config, state)
+        return state, metrics(self.config, state, judged, was_forced)
+
+    @property
+    def _candidates(self) -> jax.Array:
+        """[] who is judged for the first generation."""
+        return jnp.asarray(self.config.initial_choice * self.config.population)
+
+    def _fitness(self, genomes: Any, terms: jax.Array, generation: jax.Array) -> jax.Array:
+        worth, price = self.rank(terms, generation), self.variation.price
+        return worth if price is None else worth - price(genomes)
 
     def _seeding(self, state: EvolutionState) -> jax.Array:
-        return state.seeded < self.config.population
+        return state.seeded < self._candidates
 
     def _filled(self, state: EvolutionState) -> jax.Array:
-        return state.seeded + self.config.offspring >= self.config.population
+        return state.seeded + self.config.offspring >= self._candidates
 
     def _offspring(
         self, key: jax.Array, state: EvolutionState, seeding: jax.Array
@@ -110,14 +122,17 @@ class Evolution:
         """
         key_children, key_forced = jax.random.split(key)
         places = state.seeded + jnp.arange(self.config.offspring)
-        initial = jax.tree.map(lambda leaf: leaf[places % self.config.population], state.genomes)
+        keys_forced = jax.random.split(key_forced, 2 + self.config.forced.mutations)
+        created = self.variation.create(keys_forced[0], self.config.offspring)
+        known = jax.tree.map(lambda leaf: leaf[places % self.config.population], state.genomes)
+        initial = _pick(places < self.config.population, known, created)
         children, child_origin = self._children(key_children, state)
-        forced, forced_origin = self._forced(key_forced, state)
+        mutants, forced_origin = self._forced(keys_forced[1:], state, created)
 
         def pick(first: jax.Array, second: jax.Array, third: jax.Array) -> jax.Array:
             return jnp.where(seeding, first, jnp.where(state.forced, second, third))
 
-        return jax.tree.map(pick, initial, forced, children), pick(
+        return jax.tree.map(pick, initial, mutants, children), pick(
             jnp.zeros_like(child_origin), forced_origin, child_origin
         )
 
@@ -145,43 +160,51 @@ class Evolution:
         origin = jnp.where(crosses, int(Origin.CROSSOVER), int(Origin.MUTATION))
         return _pick(mutates, mutated, child), origin
 
-    def _forced(self, key: jax.Array, state: EvolutionState) -> tuple[Any, jax.Array]:
+    def _forced(
+        self, keys: jax.Array, state: EvolutionState, created: Any
+    ) -> tuple[Any, jax.Array]:
+        """Newcomers and often mutated ones. keys: [1 + mutations]."""
         config, count = self.config.forced, self.config.offspring
-        keys = jax.random.split(key, 2 + config.mutations)
-        key_create, key_parents = keys[0], keys[1]
         newcomers = jnp.round(config.newcomers * count)
-        drawn = jax.random.randint(key_parents, (count,), 0, self.config.population)
+        drawn = jax.random.randint(keys[0], (count,), 0, self.config.population)
         mutants = jax.tree.map(lambda leaf: leaf[drawn], state.genomes)
 
         def mutated(mutants: Any, key: jax.Array) -> tuple[Any, None]:
             return jax.vmap(self.variation.mutate)(jax.random.split(key, count), mutants), None
 
-        mutants, _ = jax.lax.scan(mutated, mutants, keys[2:])
+        mutants, _ = jax.lax.scan(mutated, mutants, keys[1:])
         is_new = jnp.arange(count) < newcomers
-        created = self.variation.create(key_create, count)
         return _pick(is_new, created, mutants), jnp.where(
             is_new, int(Origin.NEWCOMER), int(Origin.MUTATION)
         )
 
     def _plant(
-        self, state: EvolutionState, judged: Judged, generation: jax.Array
+        self, state: EvolutionState, proposal: Proposal, judged: Judged, generation: jax.Array
     ) -> EvolutionState:
-        """The initial population with the verdict on its next members in their places."""
-        places = state.seeded + jnp.arange(self.config.offspring)
-        terms = state.terms.at[places].set(judged.terms, mode="drop")
-        outcome = state.outcome.at[places].set(judged.outcome, mode="drop")
-        seeded = jnp.minimum(state.seeded + self.config.offspring, self.config.population)
-        known = jnp.arange(self.config.population) < seeded
-        fitness = jnp.where(known, self.rank(terms, jnp.maximum(generation, 0)), -jnp.inf)
-        order = jnp.where(
-            self._filled(state),
-            jnp.argsort(-fitness, stable=True),
-            jnp.arange(self.config.population),
+        """The best P of the judged candidates, then those that nobody has judged yet, in order."""
+        count = self.config.population
+        pool = jax.tree.map(
+            lambda a, b: jnp.concatenate([a, b]),
+            (state.genomes, state.terms, state.outcome),
+            (proposal.offspring, judged.terms, judged.outcome),
         )
-        planted = dataclasses.replace(
-            state, terms=terms, outcome=outcome, fitness=fitness, seeded=seeded
+        seeded = jnp.minimum(state.seeded + self.config.offspring, self._candidates)
+        places, offspring = jnp.arange(count), jnp.arange(self.config.offspring)
+        known = jnp.append(places < state.seeded, state.seeded + offspring < seeded)
+        waiting = jnp.append(places >= seeded, jnp.zeros_like(offspring, bool))
+        worth = self._fitness(pool[0], pool[1], jnp.maximum(generation, 0))
+        fitness = jnp.where(known, worth, -jnp.inf)
+        turn = jnp.where(known, 2, jnp.where(waiting, 1, 0))
+        kept = jnp.lexsort((-fitness, -turn))[:count]
+        genomes, terms, outcome = jax.tree.map(lambda leaf: leaf[kept], pool)
+        return dataclasses.replace(
+            state,
+            genomes=genomes,
+            terms=terms,
+            outcome=outcome,
+            fitness=fitness[kept],
+            seeded=seeded.astype(jnp.int32),
         )
-        return _reordered(planted, order)
 
     def _survive(
         self, state: EvolutionState, proposal: Proposal, judged: Judged, generation: jax.Array
@@ -195,16 +218,18 @@ class Evolution:
             (state.genomes, state.terms, state.outcome, state.born, state.origin),
             (proposal.offspring, judged.terms, judged.outcome, proposal.born, proposal.origin),
         )
-        fitness = self.rank(pool[1], generation)
+        fitness = self._fitness(pool[0], pool[1], generation)
         fresh = jnp.arange(fitness.shape[0]) >= count
         first = first_occurrence(pool[0])
-        if self.config.elite:  # one that is judged once more is like its old self
+        if self.config.elites:  # one that is judged once more is like its old self
             first = jnp.append(jnp.zeros(count, bool), first_occurrence(proposal.offspring))
         distinct = first | jnp.logical_not(self.config.remove_duplicates)
-        admitted = self._admitted(state, fitness, fresh & distinct)
+        admitted = forced.admitted(self.config, state, fitness, fresh & distinct)
+        if self.config.elites:  # nobody has judged the old in this round
+            fitness = jnp.where(fresh, fitness, -jnp.inf)
         lives = distinct & (fresh | chosen(self.config.survival, "best"))
         tier = jnp.where(state.forced & fresh, jnp.where(admitted, 2, 0), jnp.where(lives, 1, 0))
-        if not self.config.elite:  # the best is never lost, whatever the tiers say
+        if not self.config.elites:  # the best is never lost, whatever the tiers say
             best = jnp.arange(fitness.shape[0]) == jnp.argmax(fitness)
             tier = jnp.where(best & distinct, 3, tier)
         kept = jnp.lexsort((-fitness, -tier))[:count]
@@ -222,117 +247,12 @@ class Evolution:
             refreshed=refreshed.astype(jnp.int32),
         )
 
-    def _admitted(
-        self, state: EvolutionState, fitness: jax.Array, candidates: jax.Array
-    ) -> jax.Array:
-        """Which of the candidates [P + M] a forced generation takes in: fit enough, best first,
-        as many as the spell has room for.
-        """
-        old = jnp.sort(fitness[: self.config.population])
-        enough = old[
-            jnp.floor(self.config.forced.accept * jnp.float32(self.config.population - 1)).astype(
-                jnp.int32
-            )
-        ]
-        fit = candidates & (fitness >= enough) & jnp.isfinite(fitness)
-        place = jnp.argsort(jnp.argsort(jnp.where(fit, -fitness, jnp.inf), stable=True))
-        return fit & (place < self._room() - state.refreshed)
-
-    def _room(self) -> jax.Array:
-        return jnp.clip(
-            jnp.round(self.config.forced.refresh * jnp.float32(self.config.population)),
-            1,
-            self.config.population - 1,
-        )
-
-    def _decide(self, state: EvolutionState) -> EvolutionState:
-        """Begins a spell of forced evolution when best and mean have stalled over the window;
-        ends it when it has done its work.
-        """
-        config = self.config.forced
-        best, mean = state.fitness[0], _finite_mean(state.fitness)
-        bests, means = (
-            jnp.append(state.best_history[1:], best),
-            jnp.append(state.mean_history[1:], mean),
-        )
-        age = jnp.where(state.forced, state.spell_age + 1, 0)
-        spent = (jnp.asarray(config.limit) > 0) & (age >= config.limit)
-        ends = state.forced & (spent | (state.refreshed >= self._room()))
-        quiet = jnp.where(state.forced | (state.generation <= 0), 0, state.quiet + 1)
-        stalled = (
-            (quiet >= config.window) & ~_grown(bests, config.gain) & ~_grown(means, config.gain)
-        )
-        begins = stalled & ~state.forced & config.enabled
-        first = ~jnp.isfinite(state.spell_best)
-        pays = first | _grown(jnp.stack([state.spell_best, best]), config.gain)
-        return dataclasses.replace(
-            state,
-            best_history=bests,
-            mean_history=means,
-            quiet=quiet,
-            forced=begins | (state.forced & ~ends),
-            spell_age=jnp.where(begins, 0, age).astype(jnp.int32),
-            refreshed=jnp.where(begins, 0, state.refreshed).astype(jnp.int32),
-            spell_best=jnp.where(begins, best, state.spell_best),
-            barren=jnp.where(begins, jnp.where(pays, 0, state.barren + 1), state.barren).astype(
-                jnp.int32
-            ),
-        )
-
-    def _metrics(
-        self, state: EvolutionState, judged: Judged, forced: jax.Array
-    ) -> GenerationMetrics:
-        quartiles = jnp.percentile(
-            jnp.where(jnp.isfinite(state.fitness), state.fitness, jnp.nan),
-            jnp.array([25, 50, 75]),
-            method="nearest",
-        )
-        spreads = [jnp.mean(jnp.std(leaf, axis=0)) for leaf in jax.tree.leaves(state.genomes)]
-        return GenerationMetrics(
-            generation=state.generation,
-            best=state.fitness[0],
-            mean=_finite_mean(state.fitness),
-            median=quartiles[1],
-            lower_quartile=quartiles[0],
-            upper_quartile=quartiles[2],
-            worst=state.fitness[-1],
-            unique=jnp.sum(first_occurrence(state.genomes)),
-            spread=sum(spreads, jnp.zeros(())) / len(spreads),
-            forced=forced,
-            failures=jnp.sum(judged.failed),
-            episodes=jnp.int32(judged.failed.size),
-            evaluations=jnp.int32(self.config.offspring),
-            sim_steps=judged.sim_steps,
-            computed_steps=judged.computed_steps,
-            best_terms=jnp.mean(state.terms[0], axis=0),
-            best_outcome=jnp.mean(state.outcome[0], axis=0),
-        )
-
-
-def _grown(history: jax.Array, gain: jax.Array | float) -> jax.Array:
-    return history[-1] - history[0] > gain * jnp.maximum(jnp.abs(history[0]), 1.0)
-
-
-def _finite_mean(values: jax.Array) -> jax.Array:
-    finite = jnp.isfinite(values)
-    return jnp.where(
-        jnp.any(finite),
-        jnp.sum(jnp.where(finite, values, 0.0)) / jnp.maximum(jnp.sum(finite), 1),
-        -jnp.inf,
-    )
-
 
 def _pick(condition: jax.Array, yes: Any, no: Any) -> Any:
     """Row by row [M] from one or the other pytree of leaves [M, ...]."""
     return jax.tree.map(
         lambda a, b: jnp.where(condition.reshape(-1, *[1] * (a.ndim - 1)), a, b), yes, no
     )
-
-
-def _reordered(state: EvolutionState, order: jax.Array) -> EvolutionState:
-    names = ("genomes", "terms", "outcome", "fitness", "born", "origin")
-    rows = {name: getattr(state, name) for name in names}
-    return dataclasses.replace(state, **jax.tree.map(lambda leaf: leaf[order], rows))
 
 
 def _without_key(state: EvolutionState) -> EvolutionState:

@@ -32,12 +32,13 @@ class Variation:
     """The operators that evolution calls; it knows a genome only as a pytree.
 
     create: key, count -> genomes [count, ...]. cross: key, genome, genome -> genome. mutate: key,
-    genome -> genome.
+    genome -> genome. price: genomes [N, ...] -> [N], by which fitness is less; None: free.
     """
 
     create: Callable[[jax.Array, int], Any]
     cross: Callable[[jax.Array, Any, Any], Any]
     mutate: Callable[[jax.Array, Any], Any]
+    price: Callable[[Any], jax.Array] | None = None
 
 
 def creation(box: Box, config: EvolutionConfig) -> Callable[[jax.Array, int], Any]:

@@ -144,6 +144,7 @@ class EvolutionConfig:
       initial: uniform draws or a Latin hypercube.
       initial_spread: share of each gene's range, about its middle, in which the first genomes
         lie.
+      initial_choice: so many are drawn and judged for each place of the first generation.
       selection: how parents are drawn: any, by rank, or the best of some rivals.
       rivals: of a tournament.
       crossover: share of offspring with two parents, the others have one.
@@ -155,8 +156,8 @@ class EvolutionConfig:
         before it is simulated.
       survival: of the `best` of parents and children, or of `children` alone, and the best so
         far.
-      elite: so many of the best live on among the children and are judged with them, for
-        survival of children.
+      elite: that share of the population, the best, lives on among the children and is judged
+        with them, for survival of children.
       mutation: `redraw` re-draws two joints of one pose, `single` one joint, `pose` a whole
         pose, `gaussian` moves every joint of one pose by sigma, `mixed` is one or the other
         of the first and the last. `bit` and `byte` read the value of one joint as 8 bits over
@@ -181,6 +182,7 @@ class EvolutionConfig:
     pose_span: Annotated[NonNegative, SHAPE] = 0.0
     initial: Literal["uniform", "latin"] = "uniform"
     initial_spread: Fraction = 0.6
+    initial_choice: Count = 1
     selection: Literal["uniform", "rank", "tournament"] = "rank"
     rivals: Annotated[Count, SHAPE] = 2
     crossover: Fraction = 0.7
@@ -188,7 +190,7 @@ class EvolutionConfig:
     pool: Annotated[Literal["parents", "growing"], SHAPE] = "parents"
     unique_children: Annotated[bool, SHAPE] = False
     survival: Literal["best", "children"] = "best"
-    elite: Annotated[Whole, SHAPE] = 0
+    elite: Annotated[Fraction, SHAPE] = 0.0
     mutation: Literal["redraw", "single", "pose", "gaussian", "mixed", "bit", "byte"] = "mixed"
     mutation_rate: Fraction = 0.8
     sigma: Positive = 0.12
@@ -208,13 +210,18 @@ class EvolutionConfig:
 
         if self.elite and self.survival == "best":
             raise ValueError('elite is for survival = "children": of the best all live on anyway')
-        if self.elite >= self.offspring:
+        if self.elites >= self.offspring:
             raise ValueError(f"elite = {self.elite} leaves no room for children")
 
     @property
     def offspring(self) -> int:
         """Individuals evaluated per generation."""
         return round(self.population * (self.growth - 1))
+
+    @property
+    def elites(self) -> int:
+        """Of the best that are judged again in each generation."""
+        return max(round(self.elite * self.population), 1) if self.elite else 0
 
 
 @dataclasses.dataclass(frozen=True)

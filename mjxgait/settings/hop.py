@@ -2,7 +2,7 @@
 
 import dataclasses
 
-from mjxgait.settings.tables import STRICT, Finite, Whole
+from mjxgait.settings.tables import STRICT, Finite, NonNegative, Whole
 
 GOALS = (0.4, 2.0)
 """m ahead of the start: the nearest and the farthest goal."""
@@ -28,6 +28,7 @@ class HopWeights:
       ground: share of the time on parts that must not touch the floor.
       fall: 1 for an episode that ended with a fall.
       neutral: how far joints are from standing in the end, in halves of their ranges.
+      fast: the fastest that a joint turned: nothing up to 14 rad/s, 1 from 20 on.
       overlap: how deep parts are in each other.
     """
 
@@ -39,6 +40,7 @@ class HopWeights:
     ground: Finite = 0.2
     fall: Finite = 0.2
     neutral: Finite = 0.1
+    fast: Finite = 0.04
     overlap: Finite = 0.1
 
 
@@ -48,11 +50,14 @@ class HopConfig:
 
     Attributes:
       style_ramp: generations over which the style terms grow to their full weight.
+      rest: s without motion after which the rest of an episode is not simulated: whoever senses
+        nothing new does nothing new. 0 simulates all of it.
       weights: what each term counts.
     """
 
     __pydantic_config__ = STRICT
     style_ramp: Whole = 20
+    rest: NonNegative = 1.25
     weights: HopWeights = dataclasses.field(default_factory=HopWeights)
 
 
@@ -64,6 +69,7 @@ class TravelWeights:
       distance: of the way that is left to the nominal goal, below zero beyond it.
       ground: share of the time on parts that must not touch the floor.
       fall: 1 for an episode that ended with a fall.
+      fast: the fastest that a joint turned: nothing up to 14 rad/s, 1 from 20 on.
       overlap: how deep parts are in each other.
     """
 
@@ -71,6 +77,7 @@ class TravelWeights:
     distance: Finite = 1.0
     ground: Finite = 0.2
     fall: Finite = 0.2
+    fast: Finite = 0.1
     overlap: Finite = 0.1
 
 
@@ -80,9 +87,11 @@ class TravelConfig:
 
     Attributes:
       style_ramp: generations over which the style terms grow to their full weight.
+      rest: see `HopConfig`.
       weights: what each term counts.
     """
 
     __pydantic_config__ = STRICT
     style_ramp: Whole = 20
+    rest: NonNegative = 1.25
     weights: TravelWeights = dataclasses.field(default_factory=TravelWeights)

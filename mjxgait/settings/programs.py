@@ -52,6 +52,7 @@ class ProgramConfig:
       hoist: how often a subtree in place of the whole.
       constant: how often a moved constant.
       constant_sigma: by how much a constant moves, in units of the range.
+      parsimony: fitness that each node costs.
     """
 
     __pydantic_config__ = STRICT
@@ -74,6 +75,7 @@ class ProgramConfig:
     hoist: NonNegative = 0.5
     constant: Positive = 2.0
     constant_sigma: NonNegative = 0.1
+    parsimony: NonNegative = 0.0
 
     def __post_init__(self) -> None:
         low, high = self.initial_depth

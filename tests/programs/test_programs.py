@@ -28,7 +28,7 @@ from mjxgait.champion.expressions import (
 from mjxgait.champion.simplify import simplified
 from mjxgait.control.programs.evaluate import evaluate, listed
 from mjxgait.control.programs.grow import Words, half_and_half
-from mjxgait.control.programs.operators import crossed, mutated, spliced
+from mjxgait.control.programs.operators import crossed, mutated, program_variation, spliced
 from mjxgait.control.programs.trees import Trees, depths, subtree_sizes
 from mjxgait.errors import UserError
 from mjxgait.settings.programs import FUNCTIONS, ProgramConfig
@@ -289,6 +289,15 @@ def test_each_mutation_does_its_own():
     assert "(- (* a0 0.5) (ifltz a1 a2 a3))" in point
     assert all(text.count("(") == 3 for text in point)
     assert max(text.count("(") for text in all_of("subtree")) > 3
+
+
+def test_a_node_costs_what_the_settings_say():
+    texts = [["a0", "(+ a0 0.5)"], ["(+ a0 (* a1 a2))", "0.5"]]
+    arrays = [[to_arrays(text, KNOWN, NODES, "x") for text in joints] for joints in texts]
+    code, value = (jnp.array([[pair[i] for pair in joints] for joints in arrays]) for i in (0, 1))
+    dear = program_variation(WORDS, 2, ProgramConfig(nodes=NODES, parsimony=0.25))
+    assert dear.price is not None
+    assert np.asarray(dear.price(Trees(code, value))).tolist() == [1.0, 1.5]
 
 
 @pytest.mark.parametrize(

@@ -46,7 +46,10 @@ def program_variation(words: Words, joints: int, settings: Any) -> Variation:
         joint = jax.random.randint(key_joint, (), 0, joints)
         return _with(genome, joint, mutated(key_mutate, _of(genome, joint), words, settings))
 
-    return Variation(create, cross, mutate)
+    def price(genomes: Trees) -> jax.Array:
+        return jnp.asarray(settings.parsimony * jnp.sum(genomes.code != EMPTY, axis=(1, 2)))
+
+    return Variation(create, cross, mutate, price)
 
 
 def crossed(key: jax.Array, mother: Tree, father: Tree, settings: Any) -> Tree:

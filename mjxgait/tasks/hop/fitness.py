@@ -22,6 +22,8 @@ STYLE = tuple(name for name in TERMS if name not in AIM)
 
 FARTHEST = 2.0
 """Goal distances; who is farther off than that is no worse."""
+FASTEST, FAST = 20.0, 0.7
+"""rad/s that no joint of a machine turns at, and the share of it that costs nothing."""
 TOUCHING, DEEP = 0.005, 0.05
 """Hip heights: parts less deep in each other only touch; an overlap so much deeper counts half."""
 
@@ -54,6 +56,7 @@ def style_terms(creature: Body, horizon: int, tally: Tally) -> dict[str, jax.Arr
         "restless": jnp.minimum(tally.after / tally.goal, 1.0),
         "ground": tally.ground / lived,
         "fall": jnp.where(tally.reason == Reason.FINISHED, 0.0, 1.0),
+        "fast": jnp.clip(tally.fastest / FASTEST - FAST, 0.0, 1.0 - FAST) / (1.0 - FAST),
         "neutral": jnp.minimum(jnp.mean(tally.bent / jnp.maximum(half_range, 1e-6)), 1.0),
         "overlap": crossed / (crossed + DEEP),
     }

@@ -13,6 +13,9 @@ from mjxgait.tasks import protocol
 from mjxgait.tasks.falls import touches
 from mjxgait.types import Sensed, pytree
 
+SLOW, SLOW_TURN = 0.0005, 0.005
+"""m/s and rad/s; who is slower than that stands still."""
+
 
 @pytree
 class Tally(protocol.Tally):
@@ -22,7 +25,8 @@ class Tally(protocol.Tally):
     the goal, negative beyond it. arrived: [] steps until it first was near the goal; as many as an
     episode has if it never was. after: [] m, path of the trunk since then.
     ground: [] steps on which a part touched the floor that must not. bent: [J] rad, how far the
-    joints are from standing, latest.
+    joints are from standing, latest. fastest: [] rad/s, of all joints. still: [] steps since it last
+    moved.
     """
 
     goal: jax.Array
@@ -31,6 +35,15 @@ class Tally(protocol.Tally):
     after: jax.Array
     ground: jax.Array
     bent: jax.Array
+    fastest: jax.Array
+    still: jax.Array
+
+
+@pytree
+class Standards:
+    """rest: [] steps without motion that end an episode; never if 0."""
+
+    rest: jax.Array
 
 
 def empty(creature: Body, horizon: int) -> Tally:
@@ -46,6 +59,8 @@ def empty(creature: Body, horizon: int) -> Tally:
         after=zero,
         ground=zero,
         bent=jnp.zeros(len(creature.joints.names)),
+        fastest=zero,
+        still=none,
     )
 
 
@@ -69,4 +84,24 @@ def updated(creature: Body, step: float, tally: Tally, sensed: Sensed, goal: jax
         after=tally.after + jnp.where(arrived < tally.steps, moved, 0.0),
         ground=tally.ground + touches(creature, sensed),
         bent=jnp.abs(sensed.joint_pos - creature.joints.stand.astype(np.float32)),
+        fastest=jnp.maximum(tally.fastest, jnp.max(jnp.abs(sensed.joint_vel), initial=0.0)),
+        still=jnp.where(moves(sensed), 0, tally.still + 1),
+    )
+
+
+def moves(sensed: Sensed) -> jax.Array:
+    """Whether [] anything moves that one would see."""
+    turning = jnp.append(sensed.joint_vel, sensed.trunk_angvel)
+    return (jnp.max(jnp.abs(sensed.trunk_vel)) > SLOW) | (jnp.max(jnp.abs(turning)) > SLOW_TURN)
+
+
+def rested(tally: Tally, horizon: int, rest: jax.Array, touching: jax.Array) -> Tally:
+    """The tally, at the end of the episode if nothing has moved for `rest` steps [], unless that is 0.
+
+    touching: [] whether a part is on the floor that must not.
+    """
+    over = (rest > 0) & (tally.still >= rest)
+    left = jnp.where(over, horizon - tally.steps, 0)
+    return dataclasses.replace(
+        tally, steps=tally.steps + left, ground=tally.ground + left * touching
     )

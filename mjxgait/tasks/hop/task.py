@@ -9,8 +9,9 @@ import jax.numpy as jnp
 from mjxgait.creature import Creature
 from mjxgait.settings.config import RolloutConfig
 from mjxgait.settings.hop import GOALS, NOMINAL_GOAL, HopConfig
+from mjxgait.tasks.falls import touches
 from mjxgait.tasks.hop.fitness import TERMS, fitness_terms, signed_weights
-from mjxgait.tasks.hop.tally import Tally, empty, goal_distance, updated
+from mjxgait.tasks.hop.tally import Standards, Tally, empty, goal_distance, rested, updated
 from mjxgait.tasks.plain import PlainTask
 from mjxgait.tasks.trials import Starts, draw_starts
 from mjxgait.types import Sensed
@@ -40,8 +41,8 @@ class Hop(PlainTask):
         return jnp.asarray(trial.goal)
 
     def standards(self, settings: Any) -> Any:
-        """See `Task`: nothing."""
-        return ()
+        """See `Task`."""
+        return Standards(jnp.round(settings.rest / self.step))
 
     def senses(self, aim: jax.Array, sensed: Sensed) -> dict[str, jax.Array]:
         """See `Task`."""
@@ -55,7 +56,8 @@ class Hop(PlainTask):
         self, tally: Tally, sensed: Sensed, torque: jax.Array, standards: Any, aim: jax.Array
     ) -> Tally:
         """See `Task`."""
-        return updated(self.creature, self.step, tally, sensed, aim)
+        after = updated(self.creature, self.step, tally, sensed, aim)
+        return rested(after, self.horizon, standards.rest, touches(self.creature, sensed))
 
     def judge(self, tally: Tally, settings: HopConfig) -> dict[str, jax.Array]:
         """See `Task`."""

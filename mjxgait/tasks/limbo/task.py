@@ -29,6 +29,13 @@ class Tally(hop.Tally):
     bar: jax.Array
 
 
+@pytree
+class Standards(hop.Standards):
+    """See `hop.Standards`. height: [] m, of the bar."""
+
+    height: jax.Array
+
+
 class Limbo(Hop):
     """One creature's way to a goal beneath a bar; see `Hop`."""
 
@@ -49,8 +56,9 @@ class Limbo(Hop):
         return super().trials(key, creature, settings)
 
     def standards(self, settings: Any) -> Any:
-        """See `Task`: the height [] of the bar in m."""
-        return jnp.asarray(settings.height, jnp.float32)
+        """See `Task`."""
+        height = jnp.asarray(settings.height, jnp.float32)
+        return Standards(**vars(super().standards(settings)), height=height)
 
     def senses(self, aim: jax.Array, sensed: Sensed) -> dict[str, jax.Array]:
         """See `Task`."""
@@ -65,7 +73,7 @@ class Limbo(Hop):
     ) -> Any:
         """See `Task`."""
         after: Any = super().update(tally, sensed, torque, standards, aim)
-        deepest = jnp.maximum(tally.bar, intrusion(self.creature, sensed, standards))
+        deepest = jnp.maximum(tally.bar, intrusion(self.creature, sensed, standards.height))
         return dataclasses.replace(after, bar=deepest)
 
     def judge(self, tally: Any, settings: Any) -> dict[str, jax.Array]:
