@@ -20,6 +20,9 @@ from mjxgait.settings.tables import build
 SCHEMA = 2
 """Champions of 1 had key poses without saying so, and the drive among the controller's settings."""
 
+SOUGHT = ("around", "within")
+"""Settings that say where evolution looked for the poses, and nothing of how they move."""
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Champion:
@@ -81,7 +84,7 @@ class Champion:
             # As float64, which is what a file gives back: a champion has one fingerprint before it
             # is written and after.
             "genome": {n: np.asarray(array, float).tolist() for n, array in self.genome.items()},
-            "settings": as_table(self.settings),
+            "settings": {k: v for k, v in as_table(self.settings).items() if k not in SOUGHT},
             "drive": as_table(self.drive),
         }
         if self.sizes:

@@ -9,6 +9,7 @@ from typing import Annotated
 
 import tyro
 
+from mjxgait.certify import read_certificate
 from mjxgait.creature import Creature
 from mjxgait.creature.scale import parse_scales
 from mjxgait.errors import INTERRUPTED, UserError
@@ -17,6 +18,7 @@ from mjxgait.parts import resolve_config
 from mjxgait.parts.wishes import WISHES, Wishes, hint, wished
 from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.folder import (
+    CERTIFICATE,
     METRICS,
     PLOT,
     create_run,
@@ -114,12 +116,13 @@ def train_command(arguments: Sequence[str]) -> int:
     else:
         folder = create_run(options.out, creature, config)
     prepare_devices()
+    screen = Screen()
     with following(folder) if options.view else contextlib.nullcontext():
         ended = loop.train(
             folder,
             creature,
             config,
-            Screen(),
+            screen,
             resume=options.resume is not None,
             generation=options.generation,
         )
@@ -127,6 +130,9 @@ def train_command(arguments: Sequence[str]) -> int:
     if ended and options.plots:
         plot_run(folder)
         print(f"plots         {folder / PLOTS}/")
+    if ended:
+        document = read_certificate(folder / CERTIFICATE)
+        screen.next_steps(folder, bool(document and document["passed"]))
     return 0 if ended else INTERRUPTED
 
 

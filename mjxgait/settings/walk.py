@@ -14,7 +14,31 @@ GaitText = Annotated[str, pydantic.AfterValidator(check_gait)]
 
 @dataclasses.dataclass(frozen=True)
 class Weights:
-    """Weight of each fitness term (mjxgait/tasks/walk/fitness.py says what each measures); all but `distance` and `alive` are penalties."""
+    """Weight of each fitness term; all but `distance` and `alive` are penalties.
+
+    mjxgait/tasks/walk/fitness.py says to the letter what each measures.
+
+    Attributes:
+      distance: body lengths walked forward.
+      alive: share of the episode until it fell.
+      drift: way to the side, and turning away.
+      fade: how much less far the second half of the time led than the first.
+      slip: way that the worst foot slides while it carries weight, per way walked.
+      clearance: how far feet stay below the wanted height in their swings.
+      frequency: strides per second beyond what an animal of this mass makes.
+      duty: feet that are on the floor for less than a quarter or more than four fifths of the
+        time.
+      airborne: share of the time with no foot on the floor.
+      foot_height: feet held high without need.
+      tilt: how far the trunk leans, in the mean.
+      wobble: how much the trunk turns to and fro.
+      touch: share of the time on parts that must not touch the floor.
+      energy: work of the joints per weight and way (cost of transport).
+      saturation: share of the joints at their torque limits, in the mean.
+      limits: share of the joints beyond their pose ranges, in the mean.
+      overlap: how deep parts are in each other.
+      fall: 1 for an episode that ended with a fall.
+    """
 
     __pydantic_config__ = STRICT
     distance: Finite = 1.0
@@ -98,12 +122,14 @@ class WalkConfig:
     """What is wanted of a gait.
 
     Attributes:
-      speed: body lengths per second up to which faster is better; beyond it distance counts a fiftieth, so that a gait gets steadier and
-        not faster. 0 sets no limit.
+      speed: body lengths per second up to which faster is better; beyond it distance counts a
+        fiftieth, so that a gait gets steadier and not faster. 0 sets no limit.
       clearance: height in hip heights that each foot should reach in each stride.
-      frequency: share of the highest stride frequency of an animal of this mass up to which a gait is not hasty.
-      style_ramp: generations over which the style terms (all but distance, alive, foot_height and
-        fall) grow to their full weight.
+      frequency: share of the highest stride frequency of an animal of this mass up to which a
+        gait is not hasty.
+      style_ramp: generations over which the style terms (all but distance, alive, foot_height
+        and fall) grow to their full weight.
+      weights: what each term counts.
       wish: what else is asked: a speed, a gait, a turn, a posture.
     """
 
