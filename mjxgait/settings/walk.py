@@ -63,7 +63,15 @@ class Weights:
 
 @dataclasses.dataclass(frozen=True)
 class WishWeights:
-    """What missing each wish costs at most (mjxgait/tasks/walk/wish.py)."""
+    """What missing each wish costs at most (mjxgait/tasks/walk/wish.py).
+
+    Attributes:
+      speed: a speed that is not held.
+      gait: footfalls of another gait.
+      height: a trunk that is too high or too low.
+      bounce: a trunk that goes up and down more, or less.
+      sway: a trunk that rolls more, or less.
+    """
 
     __pydantic_config__ = STRICT
     speed: NonNegative = 4.0
@@ -86,6 +94,7 @@ class WishConfig:
       height: of the trunk while walking, in standing heights.
       bounce: of the trunk's height about its mean, in hip heights, root mean square.
       sway: deg, of the trunk's roll, root mean square.
+      weights: what each wish counts.
     """
 
     __pydantic_config__ = STRICT
