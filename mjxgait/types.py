@@ -57,7 +57,9 @@ class Sensed:
     geom_pos: [G, 3] m, centres of the watched geoms. geom_low: [G] m, height of their lowest points
     above the ground under them.
     floor: [] m, height of the ground under the trunk; None where it is the plane z = 0.
-    middle: [3] m, of all mass; None of bodies of a model.
+    middle: [3] m, of all mass; momentum: [3] kg·m/s of all; washed: [3] N, what the water does to it
+    as a whole, 0 where there is none; past: [] rad, how far the hinge that is furthest past its range
+    is past it. None of bodies of a model.
     """
 
     joint_pos: jax.Array
@@ -71,6 +73,9 @@ class Sensed:
     geom_low: jax.Array
     floor: jax.Array | None = None
     middle: jax.Array | None = None
+    momentum: jax.Array | None = None
+    washed: jax.Array | None = None
+    past: jax.Array | None = None
 
 
 @pytree

@@ -36,7 +36,7 @@ class Ranges:
     half: tuple[float, float] = (0.03, 0.3)
     swing: tuple[float, float] = (0.2, 1.6)
     scale: tuple[float, float] = (0.6, 1.2)
-    turn: float = 1.6
+    turn: float = 0.8
     recursion: int = 3
 
 
@@ -93,7 +93,7 @@ def random_graph(key: jax.Array, capacity: Capacity, ranges: Ranges) -> Graph:
     length = 1 + numbered(drawn["length"], min(3, nodes - 1))
     order = jnp.arange(nodes)[:, None]
     chain = (jnp.arange(connections) == 0) & (order < length)
-    extra = (drawn["extra"] < 0.2) & (order <= length)
+    extra = (drawn["extra"] < 0.35) & (order <= length)
     sizes = (math.log(ranges.half[0]), math.log(ranges.half[1]))
     return Graph(
         half=jnp.exp(between(drawn["half"], sizes)),

@@ -1,7 +1,7 @@
 """From a graph to the parts of a body: breadth first, in the order of the connections.
 
-Letters: see `genotype`. A part that does not fit any more, because parts or links are used up, does
-not grow, and nothing grows on it.
+Letters: see `genotype`. A part that does not fit any more, because parts or links are used up or there
+are other blocks where it would be, does not grow, and nothing grows on it.
 """
 
 import jax
@@ -9,7 +9,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from mjxgait.blocks.genotype import Capacity, Graph
-from mjxgait.champion.blocks.material import AXES, LARGEST, SMALLEST
+from mjxgait.blocks.room import Boxes, inside
+from mjxgait.champion.blocks.material import AXES, LARGEST, ROOM, SMALLEST
 from mjxgait.types import pytree
 
 HINGES = np.array([len(axes) for axes in AXES])
@@ -39,10 +40,11 @@ class Parts:
 
 @pytree
 class _Growing:
-    """parts so far, their number [], links used [], how often each node is on a part's branch [P, N],
-    and the scale [P] of each part."""
+    """parts so far, where their blocks are at rest, their number [], links used [], how often each
+    node is on a part's branch [P, N], and the scale [P] of each part."""
 
     parts: Parts
+    boxes: Boxes
     count: jax.Array
     links: jax.Array
     branch: jax.Array
@@ -58,10 +60,12 @@ def grown(graph: Graph, capacity: Capacity) -> Parts:
         place = growing.parts.node[part], connection
         grows = _grows(graph, capacity, growing, part, place)
         mirror = graph.mirror[place]
+        before, room = growing, jnp.bool_(True)
         for image in (0, 1):
             wanted = grows & ((mirror == image) | (mirror == 2))
-            growing = _with_part(graph, growing, part, place, image, wanted)
-        return growing
+            growing, fits = _with_part(graph, growing, part, place, image, wanted)
+            room = room & fits
+        return jax.tree.map(lambda a, b: jnp.where(room, a, b), growing, before)
 
     growing = jax.lax.fori_loop(0, capacity.parts * connections, step, _seed(graph, capacity))
     return growing.parts
@@ -72,18 +76,21 @@ def _seed(graph: Graph, capacity: Capacity) -> _Growing:
     most = capacity.parts
     one = jnp.arange(most) == 0
     none = jnp.zeros(most, jnp.int32)
+    half = jnp.ones((most, 3)).at[0].set(_size(graph.half[0], jnp.float32(1.0)))
+    axes, nowhere = jnp.tile(jnp.eye(3), (most, 1, 1)), jnp.zeros((most, 3))
     return _Growing(
         Parts(
             exists=one,
             node=none,
             parent=none,
             copies=none,
-            half=jnp.zeros((most, 3)).at[0].set(_size(graph.half[0], jnp.float32(1.0))),
-            place=jnp.zeros((most, 3)),
-            turn=jnp.tile(jnp.eye(3), (most, 1, 1)),
+            half=half * one[:, None],
+            place=nowhere,
+            turn=axes,
             last=none,
             depth=none,
         ),
+        boxes=Boxes(nowhere, half, axes),
         count=jnp.int32(1),
         links=jnp.int32(1),
         branch=jnp.zeros((most, graph.half.shape[0]), jnp.int32).at[0, 0].set(1),
@@ -123,40 +130,60 @@ def _with_part(
     at: Place,
     image: int,
     grows: jax.Array,
-) -> _Growing:
-    """With one more part where it grows. image: 1 for the mirrored copy."""
-    parts, target, times = growing.parts, graph.target[at], growing.branch[part]
+) -> tuple[_Growing, jax.Array]:
+    """With one more part where it grows, and whether [] there was room if it does.
+
+    image: 1 for the mirrored copy.
+    """
+    parts, boxes = growing.parts, growing.boxes
+    target, times = graph.target[at], growing.branch[part]
     needed = _links(graph, target)
     place = jnp.where(grows, growing.count, len(parts.node))  # out of bounds: dropped
     copies = parts.copies[part] ^ image
     scale = growing.scale[part] * graph.scale[at]
     joint, axes = joined(parts.half[part], graph.place[at], graph.turn[at])
+    # A frame is where the part hangs, its block's middle half a block further; the root hangs nowhere.
+    outward = jnp.array([1.0, 0.0, 0.0]) * jnp.where(part > 0, parts.half[part, 0], 0.0)
     flip = jnp.where(copies > 0, jnp.array([1.0, -1.0, 1.0]), 1.0)
+    joint, turn = joint * flip, axes * flip[:, None] * flip
+    box = _hung(boxes, part, _size(graph.half[target], scale), joint, turn)
+    crowded = (inside(box, boxes) > ROOM) & parts.exists & (jnp.arange(len(parts.node)) != part)
 
     def put(array: jax.Array, value: jax.Array) -> jax.Array:
         return array.at[place].set(value, mode="drop")
 
-    return _Growing(
+    grown = _Growing(
         Parts(
             exists=put(parts.exists, jnp.bool_(True)),
             node=put(parts.node, target),
             parent=put(parts.parent, part),
             copies=put(parts.copies, copies),
-            half=put(parts.half, _size(graph.half[target], scale)),
-            place=put(parts.place, joint * flip),
-            turn=put(parts.turn, axes * flip[:, None] * flip),
+            half=put(parts.half, box.half),
+            place=put(parts.place, joint + outward),
+            turn=put(parts.turn, turn),
             last=put(parts.last, growing.links + needed - 1),
             depth=put(parts.depth, times[target]),
         ),
+        boxes=jax.tree.map(put, boxes, box),
         count=growing.count + grows,
         links=growing.links + jnp.where(grows, needed, 0),
         branch=put(growing.branch, times.at[target].add(1)),
         scale=put(growing.scale, scale),
     )
+    return grown, ~(grows & crowded.any())
+
+
+def _hung(
+    boxes: Boxes, part: jax.Array, half: jax.Array, joint: jax.Array, turn: jax.Array
+) -> Boxes:
+    """A child's block at rest; joint: m from the middle of its parent's."""
+    axes = turn @ boxes.axes[part]
+    middle = boxes.middle[part] + joint @ boxes.axes[part] + half[0] * axes[0]
+    return Boxes(middle, half, axes)
 
 
 def joined(half: jax.Array, place: jax.Array, turn: jax.Array) -> tuple[jax.Array, jax.Array]:
-    """Where [3] on a block a child is joined, and the child's axes [3, 3] (rows) there.
+    """Where [3] m from a block's middle a child is joined, and the child's axes [3, 3] (rows) there.
 
     Its first axis leaves the face at a right angle, until it is turned: by `turn[0]` about that
     axis, then about its second and its third.

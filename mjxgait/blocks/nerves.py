@@ -7,11 +7,16 @@ import dataclasses
 from collections.abc import Mapping
 
 import jax
+import jax.numpy as jnp
 
 from mjxgait.blocks.chance import normal, numbered, numbers
 from mjxgait.champion.blocks.material import INPUTS, NEURONS, SENSORS
 from mjxgait.settings.brains import BrainConfig
 from mjxgait.types import pytree
+
+CONSTANT, WAVE = 0.3, 0.3
+"""Shares of the inputs that are drawn constant, and of the neurons that are drawn as waves. Where all
+are alike, one effector in four hundred is driven by a wave of constant frequency."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -69,13 +74,18 @@ def random_centre(key: jax.Array, room: NerveRoom) -> Centre:
     return Centre(**_neurons(numbers(key, _shapes((room.central,))), room))
 
 
+def _favoured(uniform: jax.Array, share: float, one: int, count: int) -> jax.Array:
+    """From [0, 1) to whole numbers: in this share of the cases one of them, else any."""
+    return jnp.where(uniform < share, one, numbered((uniform - share) / (1 - share), count))
+
+
 def _shapes(neurons: tuple[int, ...]) -> dict[str, tuple[int, ...]]:
     return {"kind": neurons, "source": (*neurons, INPUTS), "weight": (*neurons, INPUTS)}
 
 
 def _neurons(drawn: Mapping[str, jax.Array], room: NerveRoom) -> dict[str, jax.Array]:
     return {
-        "kind": numbered(drawn["kind"], len(NEURONS)),
-        "source": numbered(drawn["source"], room.codes),
+        "kind": _favoured(drawn["kind"], WAVE, NEURONS.index("oscillate-wave"), len(NEURONS)),
+        "source": _favoured(drawn["source"], CONSTANT, 0, room.codes),
         "weight": normal(drawn["weight"]),
     }

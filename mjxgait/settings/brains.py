@@ -40,7 +40,7 @@ class BrainConfig:
     local: Room = 3
     central: Room = 4
     every: Annotated[int, pydantic.AfterValidator(holds), SHAPE] = 4
-    values: NonNegative = 4.0
+    values: NonNegative = 8.0
     sigma: Positive = 0.2
     connect: Fraction = 0.3
     grow: Fraction = 0.1

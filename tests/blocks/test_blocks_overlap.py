@@ -20,7 +20,7 @@ CAPACITY, COUNT = Capacity(), 80
 
 
 def ours(bodies: Body, bent: np.ndarray) -> np.ndarray:
-    """[COUNT] m, of angles [COUNT, links]."""
+    """[COUNT] of the smaller block's size, of angles [COUNT, links]."""
     tree = jax.tree.map(lambda leaf: jnp.moveaxis(leaf, 0, -1), bodies.tree)
     root = np.tile([[0.0], [0], [0], [1], [0], [0], [0]], COUNT)
     still = jnp.zeros((CAPACITY.links + 5, COUNT))
@@ -30,26 +30,29 @@ def ours(bodies: Body, bent: np.ndarray) -> np.ndarray:
 
 
 def theirs(body: Body, parts: list[Part], bent: np.ndarray) -> float:
-    """m; angles [links]."""
+    """Of the smaller block's size; angles [links]."""
     creature = load_files(body_files(parts, "blocks", 0.01, 0.0, None, "in water"))
-    links = [
-        int(np.flatnonzero((body.part == p) & (body.hinge == h) & (body.tree.moves > 0))[0])
-        for p, part in enumerate(parts)
-        for h in range(len(part.hinges))
-    ]
     qpos = creature.stand_qpos.copy()
-    qpos[7:] = bent[links]
-    return float(overlaps(creature, qpos[None], excused=False).depth.max(initial=0.0))
+    for part in range(1, len(parts)):
+        for hinge in range(len(parts[part].hinges)):
+            link = np.flatnonzero(
+                (body.part == part) & (body.hinge == hinge) & (body.tree.moves > 0)
+            )
+            qpos[creature.model.joint(f"part{part}_{hinge}").qposadr] = bent[link]
+    found = overlaps(creature, qpos[None], excused=False)
+    sizes = {f"part{number}": part.box.size for number, part in enumerate(parts)}
+    least = np.array([min(sizes[one], sizes[other]) for one, other in found.pairs])
+    return float((found.depth[0] / least).max(initial=0.0))
 
 
 @pytest.fixture(scope="module")
 def depths() -> tuple[np.ndarray, np.ndarray]:
-    """Ours and MuJoCo's, m, of random bodies in random poses that have a hinge and two parts."""
+    """Ours and MuJoCo's, of random bodies in random poses that have a hinge and two parts."""
     keys = jax.random.split(jax.random.key(7), COUNT)
     make = jax.jit(jax.vmap(lambda key: random_graph(key, CAPACITY, Ranges())))
     graphs = make(keys)
     bodies = jax.jit(jax.vmap(lambda graph: body_of(graph, CAPACITY)))(graphs)
-    bent = np.random.default_rng(7).uniform(-0.5, 0.5, (COUNT, CAPACITY.links))
+    bent = np.random.default_rng(7).uniform(-1.6, 1.6, (COUNT, CAPACITY.links))
     bent = bent * np.asarray(bodies.tree.moves)
     found, expected = ours(bodies, bent), np.full(COUNT, np.nan)
     for i in range(COUNT):
@@ -63,7 +66,7 @@ def depths() -> tuple[np.ndarray, np.ndarray]:
 def test_no_depth_is_missed(depths: tuple[np.ndarray, np.ndarray]):
     """MuJoCo tells the deepest corner along its normal, which may be more than the way out."""
     found, expected = depths
-    assert (expected > 0.01).mean() > 0.2
+    assert (expected > 0.01).mean() > 0.15
     assert (found[expected > 1e-4] > 0).all()
     assert (np.maximum(found, 0) >= 0.65 * expected - 1e-4).all()
 

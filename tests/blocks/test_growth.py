@@ -1,10 +1,12 @@
 """Graphs grow into bodies: as a plain list would, within their room, and mirror images are such."""
 
 import dataclasses
+import itertools
 from typing import Any
 
 import jax
 import jax.numpy as jnp
+import mujoco
 import numpy as np
 import pytest
 from blocks.made_up import genome_of, one
@@ -13,8 +15,9 @@ from mjxgait.blocks.genotype import Capacity, Graph, Ranges, random_graph
 from mjxgait.blocks.growth import Parts, grown
 from mjxgait.blocks.phenotype import Body, body_of
 from mjxgait.blocks.variation import Genotype
-from mjxgait.champion.blocks.material import JOINTS
+from mjxgait.champion.blocks.material import JOINTS, ROOM
 from mjxgait.champion.blocks.parts import grow
+from mjxgait.champion.blocks.xml import body_xml
 from mjxgait.runs.growth import GraphGrowth
 from mjxgait.tasks.trials import Starts
 
@@ -83,6 +86,7 @@ def star(
     base = one(draw(1), 0)
     each = (CAPACITY.nodes, CAPACITY.connections)
     node, order = np.indices(each)
+    away = np.where(node[..., None] == 0, [0.2, 1.0, 0.3], [1.0, 0.2, 0.3])
     return dataclasses.replace(
         base,
         half=jnp.full((CAPACITY.nodes, 3), 0.1),
@@ -90,7 +94,7 @@ def star(
         recursion=jnp.full(CAPACITY.nodes, recursion),
         target=jnp.ones(each, int),
         used=jnp.asarray((node < 2) & (order == 0)),
-        place=jnp.tile(jnp.array([0.2, 1.0, 0.3]), (*each, 1)),
+        place=jnp.asarray(away),
         turn=jnp.tile(jnp.array([0.3, 0.4, -0.2]), (*each, 1)),
         scale=jnp.full(each, 0.9),
         mirror=jnp.asarray(np.where(node == 0, mirror, 0)),
@@ -103,6 +107,50 @@ def test_a_node_follows_itself_as_often_as_it_may(recursion: int, parts: int):
     found = grown(star(mirror=0, recursion=recursion, joint="twist"), CAPACITY)
     assert int(found.exists.sum()) == parts
     assert found.depth[:parts].tolist() == [0, 0, *range(1, recursion + 1)]
+
+
+def test_nothing_grows_where_there_is_a_block():
+    """A limb that turns back on itself would end up in the root; a pair that has no room on one
+    side has none."""
+    back = star(mirror=0, recursion=1)
+    back = dataclasses.replace(back, place=back.place.at[1, :, 0].set(-1.0))
+    assert int(grown(back, CAPACITY).exists.sum()) == 2
+    pair = star(mirror=2)
+    close = dataclasses.replace(pair, place=jnp.full_like(pair.place, 0.1).at[..., 0].set(1.0))
+    assert int(grown(close, CAPACITY).exists.sum()) == 1
+    alone = dataclasses.replace(close, mirror=jnp.zeros_like(close.mirror))
+    assert int(grown(alone, CAPACITY).exists.sum()) == 2
+
+
+def test_blocks_are_apart_as_they_grew(graphs: Graph):
+    """In MuJoCo's own geometry: none but parent and child are nearer than they may."""
+    seen = 0
+    for place in range(200):
+        parts = grow(genome_of(one(graphs, place)), CAPACITY.parts, CAPACITY.links)
+        model = mujoco.MjModel.from_xml_string(body_xml(parts, 0.01, 0.0, None))
+        data = mujoco.MjData(model)
+        mujoco.mj_kinematics(model, data)
+        for a, b in itertools.combinations(range(len(parts)), 2):
+            if parts[b].parent == a:
+                continue
+            one_geom, other = (model.geom(f"block{n}").id for n in (a, b))
+            gap = mujoco.mj_geomDistance(model, data, one_geom, other, 1.0, None)
+            size = min(parts[a].box.size, parts[b].box.size)
+            assert gap > -1.5 * ROOM * size
+            seen += 1
+    assert seen > 200
+
+
+def test_a_child_hangs_on_its_parents_surface(graphs: Graph):
+    hanging = 0
+    for place in range(100):
+        parts = grow(genome_of(one(graphs, place)), CAPACITY.parts, CAPACITY.links)
+        for part in parts[1:]:
+            parent = parts[part.parent]
+            reach = np.abs(part.place - parent.middle) / parent.half
+            assert reach.max() == pytest.approx(1.0)
+            hanging += part.parent > 0
+    assert hanging > 50
 
 
 def test_what_is_terminal_grows_at_the_end_only():

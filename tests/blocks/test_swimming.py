@@ -15,16 +15,18 @@ from mjxgait.champion import read_champion, write_champion
 from mjxgait.champion.blocks.material import DRAG
 from mjxgait.library import load_creature
 from mjxgait.parts.settings import build_config
-from mjxgait.runs.experiment import Experiment, build_experiment
-from mjxgait.tasks.swim import FASTEST_HINGE, Tally
+from mjxgait.runs.experiment import Experiment, Step, build_experiment
+from mjxgait.search.state import EvolutionState
+from mjxgait.settings.swim import SwimConfig
+from mjxgait.tasks.swim import FASTEST_HINGE, FURTHEST, Swim
 from mjxgait.types import Sensed
 
 TABLE = {
     "use": {"controller": "brain", "task": "swim"},
     "controller": {"nodes": 3, "parts": 4, "links": 4, "local": 2, "central": 1},
-    "evolution": {"population": 24},
-    "rollout": {"seconds": 0.8, "starts": 2, "lanes": 16, "joint_noise": 0.1},
-    "fitness": {"settle": 0.1, "weights": {"overlap": 0.0}},
+    "evolution": {"population": 60},
+    "rollout": {"seconds": 1.6, "starts": 2, "lanes": 20, "joint_noise": 0.1},
+    "fitness": {"settle": 0.1, "weights": {"overlap": 0.0, "elsewhere": 0.0}},
 }
 
 
@@ -35,16 +37,21 @@ def experiment() -> Experiment:
 
 
 @pytest.fixture(scope="module")
-def evolved(experiment: Experiment):
-    step, state = experiment.compile(), experiment.place(experiment.init())
-    best = []
+def step(experiment: Experiment) -> Step:
+    """The only program that is compiled here."""
+    return experiment.compile()
+
+
+@pytest.fixture(scope="module")
+def evolved(experiment: Experiment, step: Step) -> tuple[EvolutionState, list[float]]:
+    state, best = experiment.place(experiment.init()), []
     for _ in range(5):
         state, metrics = step(state)
         best.append(float(metrics.best))
-    return state, best
+    return jax.device_get(_without_key(state)), best
 
 
-def test_swimmers_get_faster(evolved):
+def test_swimmers_get_faster(evolved: tuple[EvolutionState, list[float]]):
     _, best = evolved
     assert np.isfinite(best).all()
     assert best == sorted(best)
@@ -52,60 +59,110 @@ def test_swimmers_get_faster(evolved):
 
 
 @pytest.fixture(scope="module")
-def again(experiment: Experiment, evolved) -> Tally:
-    """The best eight, and four of them without any connection: leaves [12, 2, ...]."""
-    best = jax.tree.map(lambda leaf: leaf[:8], evolved[0].genomes)
+def again(experiment: Experiment, step: Step, evolved) -> EvolutionState:
+    """The best 56, and four of them without any connection, judged as a first population."""
+    best = evolved[0].genomes
     alone = dataclasses.replace(
-        best, graph=dataclasses.replace(best.graph, used=jnp.zeros_like(best.graph.used))
+        best, graph=dataclasses.replace(best.graph, used=np.zeros_like(best.graph.used))
     )
-    both = jax.tree.map(lambda a, b: jnp.concatenate([a, b[:4]]), best, alone)
-    return jax.tree.map(np.asarray, experiment.simulate(both).tally)
+    both = jax.tree.map(lambda a, b: jnp.concatenate([a[:56], b[:4]]), best, alone)
+    state, _ = step(experiment.place(dataclasses.replace(experiment.init(), genomes=both)))
+    return jax.device_get(_without_key(state))
 
 
-def test_who_is_judged_again_swims_the_same(evolved, again: Tally):
-    way = np.linalg.norm(again.place - again.settled, axis=-1)[:8]
-    np.testing.assert_allclose(way, np.asarray(evolved[0].outcome)[:8, :, 0], rtol=1e-3)
+def _without_key(state: EvolutionState) -> EvolutionState:
+    """Typed keys stay where they are."""
+    return dataclasses.replace(state, key=jnp.zeros(()))
 
 
-def test_a_block_alone_does_not_swim(again: Tally):
+def test_who_is_judged_again_swims_the_same(evolved, again: EvolutionState):
+    np.testing.assert_allclose(again.outcome[:56], evolved[0].outcome[:56], rtol=1e-3, atol=1e-6)
+
+
+def test_a_block_alone_does_not_swim(again: EvolutionState):
     """Nothing moves it: its way is nothing."""
-    np.testing.assert_allclose(again.place[8:], 0, atol=1e-6)
-    assert (again.steps[8:] == 80).all()
+    way, seconds = np.moveaxis(again.outcome[56:], -1, 0)
+    np.testing.assert_allclose(way, 0, atol=1e-6)
+    np.testing.assert_allclose(seconds, 1.6, rtol=1e-6)
 
 
-def test_what_is_faster_than_anything_alive_ends(experiment: Experiment):
-    task, nothing = experiment.simulator.task, jnp.zeros(3)
-    calm = Sensed(
-        joint_pos=jnp.zeros(3),
-        joint_vel=jnp.zeros(3),
-        bias=jnp.zeros(9),
-        trunk_pos=nothing,
-        trunk_rot=jnp.eye(3),
-        trunk_vel=nothing,
-        trunk_angvel=nothing,
-        geom_pos=jnp.zeros((4, 3)),
-        geom_low=jnp.zeros(4),
-        middle=nothing,
-    )
-    assert int(task.ended(calm, ())) == 0
-    wild = dataclasses.replace(calm, joint_vel=calm.joint_vel.at[2].set(FASTEST_HINGE + 1))
-    assert int(task.ended(wild, ())) == 1
+CALM = Sensed(
+    joint_pos=jnp.zeros(3),
+    joint_vel=jnp.zeros(3),
+    bias=jnp.zeros(9),
+    trunk_pos=jnp.zeros(3),
+    trunk_rot=jnp.eye(3),
+    trunk_vel=jnp.zeros(3),
+    trunk_angvel=jnp.zeros(3),
+    geom_pos=jnp.zeros((4, 3)),
+    geom_low=jnp.zeros(4),
+    middle=jnp.zeros(3),
+    momentum=jnp.zeros(3),
+    washed=jnp.zeros(3),
+    past=jnp.float32(0.01),
+)
 
 
-def test_the_examiner_sees_them_swim_as_far(experiment: Experiment, evolved, again: Tally):
-    """Body, brain and water, all written twice: in the end everybody is in the same place."""
+def test_what_is_faster_or_bent_further_than_anything_alive_ends(experiment: Experiment):
+    task = experiment.simulator.task
+    assert int(task.ended(CALM, ())) == 0
+    wild = dataclasses.replace(CALM, joint_vel=CALM.joint_vel.at[2].set(FASTEST_HINGE + 1))
+    bent = dataclasses.replace(CALM, past=jnp.float32(FURTHEST + 0.01))
+    assert [int(task.ended(each, ())) for each in (wild, bent)] == [1, 1]
+
+
+def judged(task: Swim, given: float, overlap: float = 0.0) -> dict[str, float]:
+    """Of one of 2 kg that the water pushes with 3 N along x: `given` is the share of its momentum
+    that is the water's. Counting begins in motion."""
+    settings, step = SwimConfig(settle=0.1), task.step
+    tally, standards = task.init(), task.standards(settings)
+    push, place = 3.0, 0.0
+    for k in range(task.horizon):
+        momentum = 1.0 + push / given * step * k
+        along = jnp.array([1.0, 0.0, 0.0])
+        sensed = dataclasses.replace(
+            CALM, middle=place * along, momentum=momentum * along, washed=push * along
+        )
+        tally = task.update(tally, sensed, jnp.zeros(3), standards, ())
+        place += momentum / 2 * step
+    tally = dataclasses.replace(tally, overlap=jnp.float32(overlap))
+    return {name: float(value) for name, value in task.judge(tally, settings).items()}
+
+
+def test_momentum_that_the_water_did_not_give_costs_speed(experiment: Experiment):
+    task = experiment.simulator.task
+    assert isinstance(task, Swim)
+    clean, doubtful, stolen = (judged(task, share) for share in (1.0, 1 / 1.02, 0.5))
+    assert clean["elsewhere"] == pytest.approx(0, abs=1e-3 * clean["speed"])
+    assert doubtful["elsewhere"] == pytest.approx(0.5 * doubtful["speed"], rel=0.1)
+    assert stolen["elsewhere"] > 0.99 * stolen["speed"] > 0
+    assert clean["overlap"] == 0
+
+
+def test_blocks_in_each_other_cost_speed(experiment: Experiment):
+    task = experiment.simulator.task
+    assert isinstance(task, Swim)
+    touching, deep = judged(task, 1.0, SwimConfig().overlap), judged(task, 1.0, 1.0)
+    assert touching["overlap"] == pytest.approx(touching["speed"] / 2)
+    assert deep["overlap"] > 0.99 * deep["speed"]
+    both = judged(task, 0.5, 1.0)
+    assert both["overlap"] + both["elsewhere"] < both["speed"]
+
+
+def test_the_examiner_sees_them_swim_as_far(experiment: Experiment, evolved):
+    """Body, brain and water, all written twice: in the end everybody is as far from where it was."""
     state, _ = evolved
-    mine, ways = (again.place - again.settled)[:8, 0], []
+    mine, ways = state.outcome[:8, 0, 0], []
     for rank in range(8):
         champion = experiment.champion(state, {}, rank)
         body = champion.embodied(experiment.creature)
-        film = simulate(body, champion, nominal_starts(body, 1), 0.8, record=1).trajectory
+        film = simulate(body, champion, nominal_starts(body, 1), 1.6, record=1).trajectory
         middle = afloat(body, film.qpos[0], film.qvel[0], DRAG).middle
         # It counts from 0.1 s on; the tally has seen what was before the last step.
-        ways.append(middle[-1] - middle[10])
-    lengths = np.linalg.norm(ways, axis=1)
+        ways.append(np.linalg.norm(middle[-1] - middle[10]))
+    lengths = np.array(ways)
     assert lengths.max() > 0.02
-    apart = np.linalg.norm(mine - np.array(ways), axis=1)
+    apart = np.abs(mine - lengths)
     assert np.median(apart / (lengths + 0.01)) < 0.02
     assert (apart < 0.1 * lengths + 0.002).mean() >= 0.75, "a threshold may be met a tick apart"
 

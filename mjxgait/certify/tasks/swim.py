@@ -20,12 +20,6 @@ from mjxgait.champion import Champion
 from mjxgait.champion.blocks.material import DRAG
 from mjxgait.creature import Creature
 
-SPARE = 1.2
-"""How much faster than the certificate's least speed a swimmer should be in evolution before it is
-worth an examination.
-"""
-
-
 class SwimDemands(StaysUp):
     """See `Demands`. In water there is no up and no fall, and nobody who stands to push."""
 
@@ -94,8 +88,9 @@ class SwimDemands(StaysUp):
     def promising(
         self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
     ) -> bool:
-        """See `Demands`: to the end in all its trials, and clearly faster than it must be."""
-        wanted = SPARE * CertificateConfig().swim.speed * seconds
+        """See `Demands`: to the end in all its trials, and clearly faster than it must be: so far in
+        the seconds that count as it must get in all."""
+        wanted = CertificateConfig().swim.speed * seconds
         lived = to_the_end(outcome, seconds, creature)
         return bool(lived.all() and (outcome["way"] >= wanted).all())
 

@@ -14,14 +14,17 @@ INPUTS = 3
 SENSORS = 7
 """Of a part: the angles of up to three hinges, whether it touches the ground, and the light's
 direction along its own three axes."""
-SMALLEST, LARGEST = 0.015, 0.6
+SMALLEST, LARGEST = 0.02, 0.3
 """m; no half size becomes smaller or larger by scaling."""
+ROOM = 0.01
+"""How deep a block may stand in another that it does not hang on, of the smaller one's size (the
+cube root of its volume), at rest; deeper, it does not grow."""
 DENSITY = 1000.0
 """kg/m³, water's."""
-STRENGTH = 1000.0
+STRENGTH = 3000.0
 """N/m: the largest torque of a hinge over the cross-section of what it moves (Sims 1994)."""
-DAMPING = 0.2
-"""s: a hinge's damping over its strength; so none turns faster than 5 rad/s by itself."""
+DAMPING = 0.1
+"""s: a hinge's damping over its strength; so none turns faster than 10 rad/s by itself."""
 ROTOR = 0.01
 """s: its armature over its damping, so that the smallest blocks can be simulated."""
 GRAVITY, FRICTION = 9.81, 0.9

@@ -5,11 +5,13 @@ A genome is its arrays by name, as checkpoints and champions have them: `graph.h
 """
 
 import dataclasses
-from collections.abc import Iterator, Mapping
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from mjxgait.champion.blocks.material import AXES, JOINTS, LARGEST, SMALLEST, STRENGTH
+from mjxgait.champion.blocks.material import AXES, JOINTS, LARGEST, ROOM, SMALLEST, STRENGTH
+from mjxgait.champion.blocks.room import Box, inside
 
 MIRROR = np.diag([1.0, -1.0, 1.0])
 IMAGES = ((False,), (True,), (False, True))
@@ -24,7 +26,7 @@ class Part:
     whether it is the mirror image of what its node describes. half: [3] m. place: [3] m of the joint
     in the parent's frame. axes: [3, 3] the part's own (columns) there, before the joint turns.
     kind: of the joint. swing: [hinges] rad to either side. branch: how often each node is on the way
-    from the root to here. scale: of its node's sizes.
+    from the root to here. scale: of its node's sizes. box: its block at rest.
     """
 
     node: int
@@ -37,6 +39,7 @@ class Part:
     swing: np.ndarray
     branch: Mapping[int, int]
     scale: float
+    box: Box
 
     @property
     def hinges(self) -> tuple[int, ...]:
@@ -47,6 +50,11 @@ class Part:
     def joint(self) -> str:
         """What joins it to its parent."""
         return "none" if self.parent < 0 else JOINTS[self.kind]
+
+    @property
+    def middle(self) -> np.ndarray:
+        """[3] m, of its block, from where it hangs; the root hangs nowhere."""
+        return np.array([0.0 if self.parent < 0 else self.half[0], 0.0, 0.0])
 
     @property
     def strength(self) -> float:
@@ -65,9 +73,20 @@ def grow(genome: Mapping[str, np.ndarray], most_parts: int, most_links: int) -> 
             needed = len(images) * max(len(AXES[int(graph["joint"][node])]), 1)
             if len(parts) + len(images) > most_parts or links + needed > most_links:
                 continue
+            children = [_child(graph, part, number, place, image) for image in images]
+            if _crowded(parts, children, number):
+                continue
             links += needed
-            parts += [_child(graph, part, number, place, image) for image in images]
+            parts += children
     return parts
+
+
+def _crowded(parts: Sequence[Part], children: Sequence[Part], parent: int) -> bool:
+    """Whether one of the children would stand in another block than its parent's."""
+    boxes = [part.box for number, part in enumerate(parts) if number != parent]
+    new = [child.box for child in children]
+    pairs = [*itertools.product(boxes, new), *itertools.combinations(new, 2)]
+    return any(inside(one, other) > ROOM for one, other in pairs)
 
 
 def _growing(graph: Mapping[str, np.ndarray], part: Part) -> Iterator[tuple[int, int]]:
@@ -82,17 +101,19 @@ def _growing(graph: Mapping[str, np.ndarray], part: Part) -> Iterator[tuple[int,
 
 
 def _root(graph: Mapping[str, np.ndarray]) -> Part:
+    half = np.clip(graph["half"][0], SMALLEST, LARGEST)
     return Part(
         node=0,
         parent=-1,
         mirrored=False,
-        half=np.clip(graph["half"][0], SMALLEST, LARGEST),
+        half=half,
         place=np.zeros(3),
         axes=np.eye(3),
         kind=0,
         swing=np.zeros(0),
         branch={0: 1},
         scale=1.0,
+        box=Box(np.zeros(3), half, np.eye(3)),
     )
 
 
@@ -106,22 +127,25 @@ def _child(
     if mirrored:
         place, axes = MIRROR @ place, MIRROR @ axes @ MIRROR
     kind = int(graph["joint"][node])
+    half = np.clip(graph["half"][node] * scale, SMALLEST, LARGEST)
+    on, own = parent.box, parent.box.axes @ axes
     return Part(
         node=node,
         parent=number,
         mirrored=mirrored,
-        half=np.clip(graph["half"][node] * scale, SMALLEST, LARGEST),
-        place=place,
+        half=half,
+        place=place + parent.middle,
         axes=axes,
         kind=kind,
         swing=graph["swing"][node][: len(AXES[kind])],
         branch={**parent.branch, node: parent.branch.get(node, 0) + 1},
         scale=scale,
+        box=Box(on.middle + on.axes @ place + half[0] * own[:, 0], half, own),
     )
 
 
 def joined(half: np.ndarray, place: np.ndarray, turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where [3] on a block a child is joined, and the child's axes [3, 3] (columns) there.
+    """Where [3] m from a block's middle a child is joined, and the child's axes [3, 3] (columns).
 
     A ray from the block's middle along `place`, in half sizes, leaves it there. The first axis
     leaves the face at a right angle, until it is turned about itself, the second and the third.

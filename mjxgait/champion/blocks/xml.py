@@ -74,12 +74,11 @@ def _with_joints_and_block(
             armature=_text((ROTOR * damping,)),
             damping=_text((damping,)),
         )
-    middle = 0.0 if part.parent < 0 else part.half[0]
     block = {
         "name": f"block{number}",
         "type": "box",
         "size": _text(part.half),
-        "pos": _text((middle, 0, 0)),
+        "pos": _text(part.middle),
         "density": f"{DENSITY:g}",
         "contype": "1",
         "conaffinity": "0",

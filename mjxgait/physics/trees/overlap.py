@@ -15,7 +15,9 @@ from mjxgait.physics.trees.tree import FAR, Tree
 
 
 def deepest(tree: Tree, poses: Sequence[Pose]) -> jax.Array:
-    """[L] m of the deepest two, negative where all are apart.
+    """[L] how deep the deepest two are, of the smaller one's size; negative where all are apart.
+
+    A size is the cube root of a volume.
 
     Two blocks are apart where one of their six normals separates them. Where only a line along two
     edges would, they count as in each other: never less than the least way out.
@@ -31,7 +33,9 @@ def deepest(tree: Tree, poses: Sequence[Pose]) -> jax.Array:
         along.append(tree.half[:, None, k] + other - abs(dot(own, apart)))
     depth = jnp.minimum(jnp.minimum(along[0], along[1]), along[2])
     depth = jnp.minimum(depth, jnp.swapaxes(depth, 0, 1))
-    return jnp.max(jnp.where(_counts(tree), depth, -FAR), axis=(0, 1))
+    size = 2 * jnp.cbrt(tree.half[:, 0] * tree.half[:, 1] * tree.half[:, 2])
+    share = depth / jnp.minimum(size[:, None], size[None])
+    return jnp.max(jnp.where(_counts(tree), share, -FAR), axis=(0, 1))
 
 
 def _counts(tree: Tree) -> jax.Array:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import jax
 import jax.numpy as jnp
 
-from mjxgait.physics.fast.dynamics import inertias
+from mjxgait.physics.fast.dynamics import inertias, unpack
 from mjxgait.physics.fast.kernel import one_kernel
 from mjxgait.physics.fast.kinematics import Motion, Pose
 from mjxgait.physics.fast.lanes import pinned_by, total, turn_each
@@ -72,8 +72,10 @@ class TreePlant:
         body = inertias(tree, poses, like, pin)
         moving = velocities(tree, turns, freedom, list(state.qvel), pin)
         force = bias_links(tree, body, freedom, moving, state.qvel, around.gravity, pin)
+        washed = jnp.zeros_like(moving)
         if around.drag:
-            force = force - drag_links(tree, poses, body, moving, around.drag, pin)
+            washed = drag_links(tree, poses, body, moving, around.drag, pin)
+            force = force - washed
         bias = jnp.stack(generalised(tree, turns, freedom, force, pin))
         resisted = jnp.concatenate([jnp.zeros_like(bias[:6]), tree.damping[1:] * state.qvel[6:]])
         moment = Moment(
@@ -83,7 +85,11 @@ class TreePlant:
             bias=pin(bias + resisted),
             touch=pin(lowest_corners(tree, poses)) if around.floor else None,
         )
-        sensed = _sensed(tree, state, poses, moving, moment.bias)
+        sensed = dataclasses.replace(
+            _sensed(tree, state, poses, moving, moment.bias),
+            momentum=jnp.stack([jnp.sum(x, axis=0) for x in body.times(unpack(moving)).shift]),
+            washed=jnp.sum(washed[:, 3:], axis=0),
+        )
         if not around.floor:
             nowhere = jnp.full_like(sensed.geom_low, FAR)
             sensed = dataclasses.replace(sensed, geom_low=nowhere)
@@ -126,6 +132,7 @@ def _sensed(
         trunk_rot=jnp.stack(poses[0].rot, axis=1),
         trunk_vel=state.qvel[:3],
         trunk_angvel=moving[0, :3],
+        past=jnp.max(jnp.abs(state.qpos[7:]) - tree.high[1:], axis=0),
         middle=jnp.stack([jnp.sum(weight * c, axis=0) for c in centre]),
         geom_pos=jnp.stack(centre, axis=1),
         geom_low=jnp.where(tree.solid > 0, centre[2] - reach, FAR),
