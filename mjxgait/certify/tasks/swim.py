@@ -20,6 +20,7 @@ from mjxgait.champion import Champion
 from mjxgait.champion.blocks.material import DRAG
 from mjxgait.creature import Creature
 
+
 class SwimDemands(StaysUp):
     """See `Demands`. In water there is no up and no fall, and nobody who stands to push."""
 
