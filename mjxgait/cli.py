@@ -10,6 +10,7 @@ from mjxgait.errors import INTERRUPTED, UserError, did_you_mean
 
 COMMANDS = {
     "train": "evolve a walk: mjxgait train --env tall_quadruped",
+    "refine": "make a hand-made cycle walk: mjxgait refine --env duck --keys walk.glb",
     "certify": "examine a champion in C MuJoCo: mjxgait certify RUN",
     "inspect": "tell what a run or a checkpoint holds: mjxgait inspect RUN",
     "plot": "draw a run: fitness, footfalls, joints, a filmstrip: mjxgait plot RUN",

@@ -121,6 +121,11 @@ def train(
     controller: str | None = None,
     task: str | None = None,
     scale: Mapping[str, float] | None = None,
+    speed: str | float | None = None,
+    gait: str | None = None,
+    turn: float | None = None,
+    steer: float | None = None,
+    style: Place | None = None,
     seed: int = 0,
     population: int | None = None,
     generations: int | None = None,
@@ -138,6 +143,8 @@ def train(
       controller, task: who moves the creature and what it is to do: a shipped name, or
         FILE.py:CLASS of your own (docs/extending.md).
       scale: factors of the parts' size, such as {"*_shin": 1.2} (docs/creature.md).
+      speed, gait, turn, steer, style: what is asked of a walk (docs/wishes.md): m/s or text such as
+        "0.4bl/s", a name, deg/s to the left, deg/s to either side, a name or a file.
       seed, population, generations: the settings that are changed most often.
       settings: any others, in tables as in a config file: {"rollout": {"seconds": 5.0}}.
       quiet: says nothing on the screen.
@@ -148,6 +155,7 @@ def train(
     from rich.console import Console
 
     from mjxgait.parts import resolve_config
+    from mjxgait.parts.wishes import Wishes, wished
     from mjxgait.runs import loop
     from mjxgait.runs.experiment import prepare_devices
     from mjxgait.runs.screen import Screen
@@ -157,6 +165,8 @@ def train(
     resolved = resolve_config(
         creature.settings.train, creature.name, Path(config) if config else None, use
     )
+    asked = {"speed": speed, "gait": gait, "turn": turn, "steer": steer, "style": style}
+    resolved = wished(resolved, creature, Wishes.of(asked))
     short = {"population": population, "generations": generations}
     evolution = {key: value for key, value in short.items() if value is not None}
     table = merge(dataclasses.asdict(resolved), {"seed": seed, "evolution": evolution})

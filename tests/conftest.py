@@ -12,6 +12,8 @@ os.environ.setdefault(
 os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
 # Compiling is what takes the time in most tests, and in the commands that they start; see `as_shipped`.
 os.environ.setdefault("JAX_DISABLE_MOST_OPTIMIZATIONS", "1")
+# Runs are compared to the bit, and how lanes are dealt to devices decides on the last of them.
+os.environ["JAX_NUM_CPU_DEVICES"] = "2"
 
 import jax
 import pytest
@@ -19,8 +21,6 @@ from helpers import STOOL
 
 from mjxgait.creature import Creature, load_creature
 from mjxgait.settings.shipped import data_folder
-
-jax.config.update("jax_num_cpu_devices", 2)
 
 FOLDERS = sorted(path.parent for path in data_folder("envs").glob("*/creature.toml"))
 SHIPPED = [path.name for path in FOLDERS if not load_creature(path).settings.creature.grows]

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import logging
 import os
 import re
 import subprocess
@@ -244,3 +245,18 @@ def test_a_state_is_a_pytree_that_holds_everything(states: list[EvolutionState])
         "best_history",
     }
     assert all(hasattr(leaf, "dtype") for leaf in jax.tree.leaves(states[0]))
+
+
+@pytest.mark.parametrize(
+    ("file", "level", "shown"),
+    [
+        ("/lib/orbax/checkpoint/checkpoint_manager.py", logging.WARNING, False),
+        ("/lib/orbax/checkpoint/checkpoint_manager.py", logging.ERROR, True),
+        ("/lib/jax/_src/xla_bridge.py", logging.WARNING, True),
+    ],
+)
+def test_advice_on_a_slow_disk_stays_off_the_screen(tmp_path, file, level, shown, caplog):
+    Checkpoints(tmp_path).close()
+    log = logging.getLogger("absl")
+    log.handle(log.makeRecord("absl", level, file, 1466, "Waiting for previous save", (), None))
+    assert ("Waiting" in caplog.text) == shown

@@ -1,14 +1,18 @@
 """Settings: strict keys, checked ranges, layers; a mistake is one sentence that names the place."""
 
 import dataclasses
+import inspect
+import re
+import typing
 from pathlib import Path
 
 import pytest
 
 from mjxgait.errors import UserError
 from mjxgait.parts import resolve_config
-from mjxgait.parts.settings import build_config
-from mjxgait.settings.config import Config
+from mjxgait.parts.registry import SHIPPED
+from mjxgait.parts.settings import build_config, config_class
+from mjxgait.settings.config import Config, UseConfig
 from mjxgait.settings.shipped import data_folder, find_creature
 from mjxgait.settings.tables import build, dump_toml, read_toml
 
@@ -171,3 +175,19 @@ def test_an_unknown_config_names_the_nearest():
 def test_configs_are_immutable():
     with pytest.raises(dataclasses.FrozenInstanceError):
         Config().seed = 3  # type: ignore[misc]
+
+
+def tables_of(cls: type) -> list[type]:
+    """A dataclass of settings and all that it is made of."""
+    hints = typing.get_type_hints(cls)
+    inner = [t for t in hints.values() if dataclasses.is_dataclass(t)]
+    return [cls, *(found for t in inner for found in tables_of(t))]
+
+
+@pytest.mark.parametrize("controller", SHIPPED["controller"])
+@pytest.mark.parametrize("task", SHIPPED["task"])
+def test_every_key_is_explained_under_its_own_name(controller: str, task: str):
+    """`train --help` takes its words from here."""
+    for cls in tables_of(config_class(UseConfig(controller, task))):
+        told = set(re.findall(r"^  (\w+): \S", inspect.getdoc(cls) or "", re.MULTILINE))
+        assert told == {field.name for field in dataclasses.fields(cls)}, cls

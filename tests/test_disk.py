@@ -8,7 +8,7 @@ import pytest
 
 from mjxgait.commands.train import _plot_fitness
 from mjxgait.errors import UserError
-from mjxgait.runs.disk import disk_errors, try_room
+from mjxgait.runs.disk import disk_errors, require_writable, try_room
 
 RUN = Path("runs/a")
 WRAPPED = (
@@ -77,3 +77,19 @@ def test_a_disk_that_is_full_when_the_curve_is_drawn_is_one_sentence(tmp_path: P
     (tmp_path / "metrics.jsonl").write_text("".join(line % i for i in range(3)))
     with pytest.raises(UserError, match=r"fitness\.png: .*No space.* draw it with mjxgait plot"):
         _plot_fitness(tmp_path)
+
+
+def test_whether_a_file_can_be_written_is_known_before_and_leaves_nothing(tmp_path: Path):
+    kept = tmp_path / "kept.txt"
+    kept.write_text("as it was")
+    require_writable(kept)
+    require_writable(tmp_path / "new.txt")
+    assert [file.name for file in tmp_path.iterdir()] == ["kept.txt"]
+    assert kept.read_text() == "as it was"
+    for path, told in (
+        (tmp_path, "cannot be written"),
+        (tmp_path / "no" / "a.txt", "the folder .* does not exist"),
+        (kept / "a.txt", "the folder .* does not exist"),
+    ):
+        with pytest.raises(UserError, match=told):
+            require_writable(path)

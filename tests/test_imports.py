@@ -19,6 +19,7 @@ FLOORS = (
     ("web",),
     ("animation",),
     ("importing",),
+    ("keys",),
     ("viewing",),
     ("inspect",),
     ("runs",),

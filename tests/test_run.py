@@ -255,7 +255,7 @@ def test_a_changed_creature_is_refused(
         (["trian"], 'unknown subcommand "trian"; did you mean "train"?'),
         (
             ["train", "--env", "dragon"],
-            'unknown creature "dragon"; shipped: alien, blocks, crab, duck, luxo, '
+            'unknown creature "dragon"; known: alien, blocks, crab, duck, luxo, '
             "short_quadruped, tall_quadruped",
         ),
         (["train", "--config", "nothing.toml"], "nothing.toml: no such file"),

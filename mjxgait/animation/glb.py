@@ -14,7 +14,9 @@ import numpy as np
 import pygltflib as gltf  # type: ignore[import-untyped]
 
 from mjxgait.animation.buffer import Buffer
+from mjxgait.animation.floor import add_floor
 from mjxgait.animation.loop import WalkLoop
+from mjxgait.animation.note import note_of
 from mjxgait.animation.surface import geom_surface
 from mjxgait.errors import UserError
 from mjxgait.viewing.painter import geom_colours, seen_geoms
@@ -49,10 +51,11 @@ def export_glb(loop: WalkLoop, path: Path, travelling: bool = False) -> None:
         raise UserError(f"{path}: cannot be written ({error.strerror})") from None
 
 
-def build_glb(loop: WalkLoop, travelling: bool = False) -> bytes:
+def build_glb(loop: WalkLoop, travelling: bool = False, floor: bool = False) -> bytes:
     """The bytes of the file.
 
     travelling: the root moves forward at an even speed; otherwise the creature walks in place.
+    floor: rungs pass below it.
     """
     creature = loop.walk.creature
     skeleton = skeleton_of(creature.model, creature.trunk)
@@ -68,12 +71,16 @@ def build_glb(loop: WalkLoop, travelling: bool = False) -> bytes:
     document.nodes.append(gltf.Node(name=name, mesh=0, skin=0))
     document.scenes = [gltf.Scene(name=name, nodes=[0, len(document.nodes) - 1])]
     document.scene = 0
+    if floor:
+        add_floor(document, buffer, loop)
     document.extras = {
         "strides": loop.strides,
         "speed_m_per_s": loop.speed,
         "frames_per_s": loop.rate,
         "travelling": travelling,
     }
+    # Blender keeps what a node has and forgets what the file has.
+    document.nodes[0].extras = document.extras | note_of(loop)
     buffer.close()
     return b"".join(document.save_to_bytes())
 

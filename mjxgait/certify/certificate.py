@@ -16,6 +16,7 @@ from mjxgait.certify.draws import AIMS
 from mjxgait.certify.measure import Recording, measure
 from mjxgait.certify.simulate import simulate
 from mjxgait.certify.starts import Starts, join, nominal_starts, perturbed_starts
+from mjxgait.certify.steering import told_to_turn
 from mjxgait.certify.tasks import demands_of, how_simulated
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
@@ -120,7 +121,7 @@ def glance(
     """
     config = config or CertificateConfig()
     check_body(creature)
-    demands = demands_of(champion.task)
+    demands = demands_of(champion.task, champion.wish)
     start = demands.aimed(nominal_starts(creature, 1), config)
     whole, halved = (
         record(creature, champion, config.seconds, refine, threads, start) for refine in (1, 2)
@@ -145,7 +146,7 @@ def rehearse(
       count: perturbed starts, and as many pushes.
     """
     config = config or CertificateConfig()
-    draw, demands = draws.common(config), demands_of(champion.task)
+    draw, demands = draws.common(config), demands_of(champion.task, champion.wish)
     disturbed = demands.aimed(
         draws.starts(creature, config, draw, count), config, draw.generator(AIMS)
     )
@@ -157,6 +158,7 @@ def rehearse(
     started = demands.succeeded(outcome, starts, config)[:count]
     pushed = float(outcome.stayed_up[count:].mean()) if demands.pushed else np.nan
     judged = demands.disturbed(float(started.mean()), pushed, config)
+    judged += told_to_turn(creature, champion, config, draw, threads)
     return min(criterion.margin for criterion in judged)
 
 
@@ -180,7 +182,7 @@ def certify(
     config = config or CertificateConfig()
     began = time.perf_counter()
     seen = seen or glance(creature, champion, config, threads)
-    draw, demands = draws.own(champion, config), demands_of(champion.task)
+    draw, demands = draws.own(champion, config), demands_of(champion.task, champion.wish)
     disturbed = draws.starts(creature, config, draw, config.starts.count)
     groups = [
         nominal_starts(creature, 1),
@@ -197,6 +199,7 @@ def certify(
     plain, _, *pushed = (float(up.mean()) for up in np.split(outcome.stayed_up, ends))
     started = float(np.split(demands.succeeded(outcome, starts, config), ends)[1].mean())
     found = demands.disturbed(started, pushed[0] if pushed else np.nan, config)
+    found += told_to_turn(creature, champion, config, draw, threads)
     judged = sorted((*seen.criteria, *found), key=lambda c: c.number)
     report = demands.report(seen.whole, config) | {"ground": str(creature.terrain)}
     if pushed:
@@ -227,7 +230,7 @@ def record(
 
     start: how it begins; by default nominal, with the usual goal where the task has one.
     """
-    task = how_simulated(champion.task)
+    task = how_simulated(champion.task, champion.wish)
     start = task.aimed(nominal_starts(creature, 1) if start is None else start, CertificateConfig())
     outcome = simulate(creature, champion, start, seconds, record=1, refine=refine, threads=threads)
     return measure(creature, outcome.trajectory, inside=refine == 1, aimed=start, drag=task.drag)
@@ -260,8 +263,8 @@ def push_ladder(
     Their speeds are in units of sqrt(g * hip height).
     """
     groups = draws.ladder(creature, config, draws.common(config))
-    starts = demands_of(champion.task).aimed(join(*groups), config)
-    fall = demands_of(champion.task).fall(config)
+    starts = demands_of(champion.task, champion.wish).aimed(join(*groups), config)
+    fall = demands_of(champion.task, champion.wish).fall(config)
     outcome = simulate(creature, champion, starts, config.seconds, fall=fall, threads=threads)
     return dict(
         zip(

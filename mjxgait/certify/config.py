@@ -135,6 +135,29 @@ class PartsConfig:
 
 
 @dataclasses.dataclass(frozen=True)
+class WishesConfig:
+    """10. How far what was asked of a walk may be missed (docs/wishes.md).
+
+    Attributes:
+      speed: over the speed asked for. heading: deg off the heading it was told, mean over a second.
+      height: standing heights. bounce: hip heights. sway: deg.
+      commands: turns that who is to be steered is told, in so many simulations of their own; each
+        from straight on, at a rate that no one knew, to either side.
+      delay: s from a command on until the heading must be the one told. obey: share that must.
+    """
+
+    __pydantic_config__ = STRICT
+    speed: Positive = 0.1
+    heading: Positive = 15.0
+    commands: Count = 32
+    delay: NonNegative = 3.0
+    obey: Fraction = 0.9
+    height: Positive = 0.05
+    bounce: Positive = 0.02
+    sway: Positive = 2.0
+
+
+@dataclasses.dataclass(frozen=True)
 class GoalConfig:
     """What is demanded of who has a goal, instead of 1 to 3 and 7.
 
@@ -243,6 +266,7 @@ class CertificateConfig:
     gait: GaitConfig = dataclasses.field(default_factory=GaitConfig)
     physics: PhysicsConfig = dataclasses.field(default_factory=PhysicsConfig)
     parts: PartsConfig = dataclasses.field(default_factory=PartsConfig)
+    wishes: WishesConfig = dataclasses.field(default_factory=WishesConfig)
     hop: HopConfig = dataclasses.field(default_factory=HopConfig)
     limbo: LimboConfig = dataclasses.field(default_factory=LimboConfig)
     travel: TravelConfig = dataclasses.field(default_factory=TravelConfig)

@@ -136,6 +136,8 @@ def _quadruped(places: np.ndarray, duty: np.ndarray, phases: np.ndarray) -> str:
     front_pair, hind_pair = _apart(fl, fr), _apart(hl, hr)
     if max(front_pair, hind_pair) < 0.15:
         return "pronk" if _apart(fl, hl) < 0.15 else "bound"
+    if _three_beats(fl, fr, hl, hr):
+        return "canter"
     if min(front_pair, hind_pair) < 0.35:
         return "gallop" if duty.mean() < 0.5 else "walk"
     # Symmetrical gaits: how far a fore foot follows the hind foot of its side.
@@ -152,6 +154,18 @@ def _quadruped(places: np.ndarray, duty: np.ndarray, phases: np.ndarray) -> str:
     if duty.mean() >= 0.75:
         return "crawl"
     return "walk" if duty.mean() >= 0.5 else "running walk"
+
+
+def _three_beats(fl: float, fr: float, hl: float, hr: float) -> bool:
+    """Whether the feet of one diagonal fall together, the two others apart from them and from
+    each other.
+    """
+    for together, others in (((fl, hr), (fr, hl)), ((fr, hl), (fl, hr))):
+        beats = (together[0], *others)
+        gaps = [_apart(a, b) for a, b in itertools.combinations(beats, 2)]
+        if _apart(*together) < 0.1 and min(gaps) > 0.2:
+            return True
+    return False
 
 
 def _many_legs(places: np.ndarray, duty: np.ndarray, phases: np.ndarray) -> str:

@@ -15,6 +15,8 @@ from mjxgait.creature import Creature
 
 AIMS = 3
 """The purpose of what a task draws: goals."""
+COMMANDS = 4
+"""Of turns that are told."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -24,7 +26,9 @@ class Draw:
     words: tuple[int, ...]
 
     def generator(self, purpose: int) -> np.random.Generator:
-        """A source for each purpose: 0 starts, 1 pushes, 2 the ladder of larger pushes, `AIMS`."""
+        """A source for each purpose: 0 starts, 1 pushes, 2 the ladder of larger pushes, `AIMS`,
+        `COMMANDS`.
+        """
         return np.random.default_rng([*self.words, purpose])
 
 

@@ -57,6 +57,7 @@ class Recording:
     touch: [T] whether a part that is neither foot nor ground contact touches the ground.
     penetration: [T] m, of the deepest contact with the floor.
     body_speed: [T] m/s, of the fastest body's centre of mass.
+    heading: [T] rad of the trunk, left of the start's forward, without jumps.
     goal: m ahead of the start; 0 where the task has none.
     clearance: [T] m to the bar, `bar.FAR` at most; None where the task has none.
     afloat: what else is seen in water; None on land.
@@ -80,6 +81,7 @@ class Recording:
     body_speed: np.ndarray
     overlap_pairs: tuple[tuple[str, str], ...]
     overlap: np.ndarray
+    heading: np.ndarray | None = None
     goal: float = 0.0
     clearance: np.ndarray | None = None
     afloat: Afloat | None = None
@@ -185,6 +187,7 @@ def measure(
         penetration=sight.penetration,
         body_speed=sight.body_speed,
         overlap_pairs=crossed.pairs,
+        heading=np.unwrap(np.arctan2(forward @ start.left, forward @ start.forward)),
         overlap=crossed.depth if inside else np.zeros((len(qpos), 0)),
         goal=0.0 if aimed is None else float(aimed.goal[row]),
         clearance=None if bar is None else sight.clearance,

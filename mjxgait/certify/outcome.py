@@ -77,6 +77,8 @@ class Outcome:
     fell: [S] s, infinite for those that stayed up. travel: [S, 3] m along the start's forward and
     left and upwards until the end or the fall.
     path: [S, T] m forward after each control step; NaN from the fall on, or where nobody looked.
+    astray: [S, T] rad, the heading less the one it was told; NaN from the fall on; empty where
+    nobody was told one.
     clearance: [S] m, the least to the bar, `certify.bar.FAR` at most; infinite where there is none.
     """
 
@@ -85,6 +87,7 @@ class Outcome:
     path: np.ndarray
     clearance: np.ndarray
     trajectory: Trajectory
+    astray: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros((0, 0)))
 
     @property
     def stayed_up(self) -> np.ndarray:

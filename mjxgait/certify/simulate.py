@@ -37,21 +37,25 @@ def simulate(
       refine: physics steps per control step: the controller stays what it was, its torque is held
         in between.
       fall: when one is down; by default as its task has it.
-      heading: [T] rad, commanded heading at each control step; None walks straight ahead.
+      heading: [T] or [S, T] rad, commanded heading at each control step; None is as its task has
+        it, mostly straight ahead.
       threads: 0 takes the machine's cores. The result does not depend on it.
     """
     threads = threads or cores()
     # Dealt out like cards, so that each thread gets its share of every kind of start.
     shares = [np.arange(i, len(starts), threads) for i in range(min(threads, len(starts)))]
     steps = round(seconds / creature.model.opt.timestep)
-    task = how_simulated(champion.task)
+    task = how_simulated(champion.task, champion.wish)
     fall = fall or task.fall(CertificateConfig())
     starts = task.aimed(starts, CertificateConfig())
+    if heading is None:
+        heading = task.told(steps, creature.model.opt.timestep)
+    told = None if heading is None else np.broadcast_to(heading, (len(starts), steps))
 
     def run(share: np.ndarray) -> Outcome:
         mine, kept = starts.rows(share), int((share < record).sum())
         stepping = Stepping(creature, champion, mine, kept, refine, fall, task.onward, task.drag)
-        return stepping.to_the_end(steps, heading)
+        return stepping.to_the_end(steps, None if told is None else told[share])
 
     with concurrent.futures.ThreadPoolExecutor(len(shares)) as pool:
         parts = list(pool.map(run, shares))
@@ -63,6 +67,7 @@ def simulate(
         travel=np.concatenate([p.travel for p in parts])[order],
         path=np.concatenate([p.path for p in parts])[order],
         clearance=np.concatenate([p.clearance for p in parts])[order],
+        astray=np.concatenate([p.astray for p in parts])[order],
         trajectory=Trajectory(
             creature.model.opt.timestep,
             *(np.concatenate([getattr(p.trajectory, f) for p in parts])[kept] for f in fields),

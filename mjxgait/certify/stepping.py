@@ -99,12 +99,16 @@ class Stepping:
         self.sent = np.zeros((int(starts.delay.max()) + 1, *starts.stiffness.shape))
 
     def to_the_end(self, steps: int, heading: np.ndarray | None) -> Outcome:
-        """Steps until the end, leaving out what has fallen and is not recorded."""
+        """Steps until the end, leaving out what has fallen and is not recorded.
+
+        heading: [S, T] rad that each is told; None where nobody is told any.
+        """
         count, time_step = len(self.starts), self.creature.model.opt.timestep
         fell = np.full(count, np.inf)
         travel, path = np.zeros((count, 3)), np.full((count, steps), np.nan)
         clearance = np.full(count, np.inf)
-        leader, waiting = self._alike()
+        astray = np.full((count, 0 if heading is None else steps), np.nan)
+        leader, waiting = self._alike(heading)
         running = np.setdiff1d(np.arange(count), waiting)
         film = blank_film(self.creature, time_step, self.record, steps)
         for k in range(steps):
@@ -114,13 +118,16 @@ class Stepping:
                 released = waiting[self._pushed(waiting, k)]
                 self._follow(released, leader)
                 path[released, :k] = path[leader, :k]
+                astray[released, :k] = astray[leader, :k]
                 clearance[released] = clearance[leader]
                 running, waiting = np.union1d(running, released), np.setdiff1d(waiting, released)
             self._push(running, k)
-            commanded = None if heading is None else float(heading[k])
+            commanded = None if heading is None else heading[running, k]
             self._control_step(running, k, commanded, film)
             travel[running] = self._travel(running)
             path[running, k] = travel[running, 0]
+            if commanded is not None:
+                astray[running, k] = self._astray(running, commanded)
             clearance[running] = np.minimum(clearance[running], self._clearance(running))
             down = running[self._down(running)]
             fell[down] = np.minimum(fell[down], (k + 1) * time_step)
@@ -133,14 +140,17 @@ class Stepping:
                 ]
         fell[waiting], travel[waiting] = fell[leader], travel[leader]
         path[waiting], clearance[waiting] = path[leader], clearance[leader]
-        return Outcome(fell, travel, path, clearance, film)
+        astray[waiting] = astray[leader]
+        return Outcome(fell, travel, path, clearance, film, astray)
 
-    def _alike(self) -> tuple[int, np.ndarray]:
+    def _alike(self, heading: np.ndarray | None) -> tuple[int, np.ndarray]:
         """One simulation that stands for others until they are pushed, and those others.
 
         Nothing tells them apart before, so a quarter of all steps need not be taken.
         """
         alike, goal = np.flatnonzero(self.starts.undisturbed), self.starts.goal
+        if heading is not None and np.ptp(heading, axis=0).any():
+            alike = alike[:0]
         if not len(alike):
             return 0, alike
         alike = alike[goal[alike] == goal[alike[0]]]
@@ -155,7 +165,7 @@ class Stepping:
         self.sent[:, rows] = self.sent[:, [leader]]
 
     def _control_step(
-        self, running: np.ndarray, k: int, heading: float | None, film: Trajectory
+        self, running: np.ndarray, k: int, heading: np.ndarray | None, film: Trajectory
     ) -> None:
         kept = running[running < self.record]
         film.qpos[kept, k], film.qvel[kept, k] = self.qpos[kept], self.qvel[kept]
@@ -168,7 +178,7 @@ class Stepping:
             self._step(running)
 
     def _physics_step(
-        self, running: np.ndarray, k: int, heading: float | None
+        self, running: np.ndarray, k: int, heading: np.ndarray | None
     ) -> tuple[np.ndarray, np.ndarray]:
         """The command, and the torque that acts, [running, J] each."""
         state, starts = self._state(running, k), self.starts
@@ -194,12 +204,12 @@ class Stepping:
             self.bath.press(running)
         self.batch.step(running, stage=VELOCITY_STAGE)
 
-    def _act(self, running: np.ndarray, state: State, heading: float | None) -> np.ndarray:
+    def _act(self, running: np.ndarray, state: State, heading: np.ndarray | None) -> np.ndarray:
         """The command [running, J]; the twin's memory moves on."""
         senses = sense(self.creature, state, self.twin.reads)
         if heading is not None:
             # Told where to go, it does not come back to the line that it left.
-            senses["heading"] = senses["heading"] - heading
+            senses["heading"] = wrapped(senses["heading"] - heading)
             senses["aside"] = np.zeros_like(senses["aside"])
         before = {name: values[running] for name, values in self.memory.items()}
         command, after = self.twin.act(before, senses)
@@ -271,6 +281,12 @@ class Stepping:
         moved = self.xpos[running, self.creature.trunk] - start.place
         return np.stack([moved @ start.forward, moved @ start.left, moved[:, 2]], 1)
 
+    def _astray(self, running: np.ndarray, told: np.ndarray) -> np.ndarray:
+        rot = self.xmat[running, self.creature.trunk].reshape(-1, 3, 3)
+        nose = rot @ self.creature.frame.forward
+        heading = np.arctan2(nose @ self.start.left, nose @ self.start.forward)
+        return wrapped(heading - told)
+
     def _clearance(self, running: np.ndarray) -> np.ndarray:
         if self.bar is None:
             return np.full(len(running), np.inf)
@@ -296,3 +312,9 @@ class Stepping:
         if self.fall.touch:
             fine &= self.forbidden.lowest(self.geom_xpos[running], self.geom_xmat[running]) > 0
         return ~fine
+
+
+def wrapped(angle: np.ndarray) -> np.ndarray:
+    """The same directions in rad from -pi to pi."""
+    turned: np.ndarray = np.remainder(angle + np.pi, 2 * np.pi) - np.pi
+    return turned

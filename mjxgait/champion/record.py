@@ -20,6 +20,9 @@ from mjxgait.settings.tables import build
 SCHEMA = 2
 """Champions of 1 had key poses without saying so, and the drive among the controller's settings."""
 
+SOUGHT = ("around", "within")
+"""Settings that say where evolution looked for the poses, and nothing of how they move."""
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Champion:
@@ -28,7 +31,7 @@ class Champion:
     controller: name of its kind, as in `[use]`. genome: its arrays by name. settings: the
     controller's. task: that it was evolved for. fitness and terms: as evolution scored it.
     origin: where it comes from (generation, seed, versions). sizes: factors of the parts that are
-    not as the creature has them, where bodies evolve.
+    not as the creature has them, where bodies evolve. wish: what was asked of its walk, by name.
     """
 
     creature: str
@@ -42,6 +45,7 @@ class Champion:
     terms: Mapping[str, float]
     origin: Mapping[str, Any]
     sizes: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    wish: Mapping[str, Any] = dataclasses.field(default_factory=dict)
 
     @classmethod
     def of(cls, creature: Creature, config: Config, genome: Genome, **scored: Any) -> "Champion":
@@ -56,6 +60,7 @@ class Champion:
             drive=config.drive,
             task=config.use.task,
             sizes={} if sizes is None else proportions(creature).by_part(sizes),
+            wish=config.fitness.wish.table if hasattr(config.fitness, "wish") else {},
             **scored,
         )
 
@@ -79,11 +84,13 @@ class Champion:
             # As float64, which is what a file gives back: a champion has one fingerprint before it
             # is written and after.
             "genome": {n: np.asarray(array, float).tolist() for n, array in self.genome.items()},
-            "settings": as_table(self.settings),
+            "settings": {k: v for k, v in as_table(self.settings).items() if k not in SOUGHT},
             "drive": as_table(self.drive),
         }
         if self.sizes:
             moves["sizes"] = dict(self.sizes)
+        if self.wish:
+            moves["wish"] = dict(self.wish)
         return hashlib.sha256(json.dumps(moves, sort_keys=True).encode()).hexdigest()[:16]
 
     def check_finite(self, creature: Creature) -> None:
@@ -134,6 +141,7 @@ def write_champion(champion: Champion, creature: Creature, path: Path) -> None:
         },
         "fitness": champion.fitness,
         **({"sizes": dict(champion.sizes)} if champion.sizes else {}),
+        **({"wish": dict(champion.wish)} if champion.wish else {}),
         "terms": dict(champion.terms),
         "origin": dict(champion.origin),
     }
@@ -185,4 +193,5 @@ def _champion(document: Mapping[str, Any], creature: Creature, path: Path) -> Ch
         terms=document["terms"],
         origin=document["origin"],
         sizes={name: float(factor) for name, factor in document.get("sizes", {}).items()},
+        wish=document.get("wish", {}),
     )

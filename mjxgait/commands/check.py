@@ -9,6 +9,7 @@ import tyro
 from mjxgait.creature import load_creature
 from mjxgait.errors import UserError
 from mjxgait.parts import resolve_config
+from mjxgait.runs.disk import require_writable
 from mjxgait.settings.shipped import find_creature
 
 
@@ -27,19 +28,21 @@ class CheckOptions:
 
 
 def check_command(arguments: Sequence[str]) -> int:
-    """Returns the exit code: 0 also for a creature that does not stand, as long as it is valid."""
+    """Returns the exit code: 1 for a creature that is valid but does not stand."""
     options = tyro.cli(CheckOptions, args=list(arguments), prog="mjxgait check")
     folder = Path(options.env)
     creature = load_creature(folder if folder.is_dir() else find_creature(options.env))
     resolve_config(creature.settings.train, creature.name)
-    from mjxgait.importing.portrait import facts, portrait
+    from mjxgait.importing.portrait import facts, portrait, standing
 
     out = options.out or Path(f"{creature.name}-check.png")
     if out.suffix.lower() != ".png":
         raise UserError(f"{out}: the picture is a PNG; name it something.png")
+    require_writable(out)
     from mjxgait.physics import fallback_note
 
-    print("\n".join(facts(creature)))
+    held = standing(creature)
+    print("\n".join(facts(creature, held)))
     if note := fallback_note(creature.evolution_model):
         print(note)
     try:
@@ -47,4 +50,7 @@ def check_command(arguments: Sequence[str]) -> int:
     except OSError as error:
         raise UserError(f"{out}: cannot be written ({error.strerror})") from None
     print(f"wrote {out}")
-    return 0
+    if held.stands:
+        return 0
+    print("It does not stand; correct the keyframe in creature.xml, or kp in creature.toml.")
+    return 1

@@ -32,12 +32,14 @@ def export_command(arguments: Sequence[str]) -> int:
     """Returns the exit code."""
     options = tyro.cli(ExportOptions, args=list(arguments), prog="mjxgait export")
     from mjxgait.animation import export_glb, walk_loop
+    from mjxgait.runs.disk import require_writable
     from mjxgait.viewing.cast import LOOP_SECONDS, champion_of
 
     if options.out.suffix.lower() != ".glb":
         raise UserError(
             f'{options.out}: cannot write "{options.out.suffix}"; end the name with .glb'
         )
+    require_writable(options.out)
     loop = walk_loop(champion_of(options.run, LOOP_SECONDS).walk, options.rate)
     export_glb(loop, options.out, options.travelling)
     size = options.out.stat().st_size / 1024

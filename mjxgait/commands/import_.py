@@ -9,7 +9,7 @@ import tyro
 
 from mjxgait.creature import load_creature
 from mjxgait.errors import UserError
-from mjxgait.importing import ImportChoices, Imported, import_model
+from mjxgait.importing import TOML, WRITTEN, ImportChoices, Imported, import_model
 
 Words = Annotated[tuple[str, ...], tyro.conf.UseAppendAction]
 
@@ -29,6 +29,7 @@ class ImportOptions:
       freeze: Pattern of joints to freeze; may be given several times.
       up: Axis of the file that points up, where the guess is wrong.
       forward: Axis along which it should walk, where the guess is wrong.
+      force: Write over a creature folder that is there already.
     """
 
     model: tyro.conf.Positional[Path]
@@ -39,6 +40,7 @@ class ImportOptions:
     freeze: Words = ()
     up: Literal["x", "y", "z"] | None = None
     forward: Literal["x", "-x", "y", "-y"] | None = None
+    force: bool = False
 
 
 def import_command(arguments: Sequence[str]) -> int:
@@ -52,6 +54,7 @@ def import_command(arguments: Sequence[str]) -> int:
         options.up,
         options.forward,
     )
+    check_folder(options.out, choices.search, options.model, options.force)
     imported = import_model(options.model, choices)
     write_folder(options.out, imported)
     print(imported.notes.text())
@@ -64,16 +67,39 @@ def import_command(arguments: Sequence[str]) -> int:
     return 0
 
 
+def check_folder(folder: Path, read: Sequence[Path], model: Path, force: bool) -> None:
+    """Whether a creature may be written there, before the import takes its time.
+
+    Args:
+      read: folders that the import reads besides the model's own. force: a creature may be lost.
+
+    Raises:
+      UserError: the model or what it needs lies there, or anything that is no creature, or a
+        creature without `force`.
+    """
+    if folder.resolve() in {place.resolve() for place in (model.parent, *read)}:
+        raise UserError(
+            f"{folder}: the import reads from this folder, so it writes nothing there; name another "
+            "with --out"
+        )
+    if not folder.exists():
+        return
+    names = {file.name for file in folder.iterdir()} if folder.is_dir() else {"a file"}
+    if names - {*WRITTEN} or (names and TOML not in names):
+        raise UserError(f"{folder}: holds something else; name another folder with --out")
+    if names and not force:
+        raise UserError(
+            f"{folder}: holds a creature already, maybe edited by hand; name another folder with "
+            "--out, or write over it with --force"
+        )
+
+
 def write_folder(folder: Path, imported: Imported) -> None:
     """Writes the creature folder and loads it once.
 
     Raises:
-      UserError: the folder holds something else, or cannot be written.
+      UserError: it cannot be written.
     """
-    if folder.exists() and (
-        not folder.is_dir() or any(file.name not in imported.files for file in folder.iterdir())
-    ):
-        raise UserError(f"{folder}: holds something else; name another folder with --out")
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for name, text in imported.files.items():

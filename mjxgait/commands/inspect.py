@@ -5,6 +5,7 @@ import json
 import os
 import sys
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ class InspectOptions:
       path: Run folder, one of its checkpoints, or a folder full of runs.
       generation: The checkpoint of this generation instead of the latest.
       individual: Everything about one member of the population; 1 is the best.
+      all: Show the whole population instead of its best ten.
       diff: Two runs or checkpoints to compare.
       json: Print JSON for programs.
     """
@@ -31,6 +33,7 @@ class InspectOptions:
     path: tyro.conf.Positional[Path | None] = None
     generation: int | None = None
     individual: int | None = None
+    all: bool = False
     diff: tuple[Path, Path] | None = None
     json: bool = False
 
@@ -78,4 +81,4 @@ def inspect_command(arguments: Sequence[str]) -> int:
         return tell(
             inspect.individual_facts(snapshot, options.individual), inspect.print_individual
         )
-    return tell(inspect.facts(snapshot), inspect.print_facts)
+    return tell(inspect.facts(snapshot), partial(inspect.print_facts, few=not options.all))

@@ -11,6 +11,10 @@ import tyro
 from mjxgait.errors import UserError
 
 MOST_RUNNERS = 12
+SIZE = (640, 360)
+"""Pixels of a video."""
+SECONDS = 5.0
+"""Of a video."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -22,9 +26,12 @@ class RenderOptions:
       out: File to write: .webp, .gif, .mp4 (extra [video]), or .png for a filmstrip of one stride.
       top: The best N of the latest population as a race.
       generations: The best of each of these generations as a race, such as 0,5,20.
-      seconds: Length of the walk.
+      seconds: Length of the walk; 5 by default, and for a filmstrip as long as its stride takes to
+        be steady.
       fps: Pictures per second.
-      size: Width and height in pixels.
+      size: Width and height in pixels, of each picture of a filmstrip; by default 640 360, of a
+        filmstrip 420 300.
+      camera: From where it is seen; by default from the side, a little from the front and above.
       slow: How many times slower than life.
       renderer: painter needs no GPU and no GL library; gl is MuJoCo's own; auto takes gl where it
         works.
@@ -34,9 +41,10 @@ class RenderOptions:
     out: Path
     top: int | None = None
     generations: str | None = None
-    seconds: float = 5.0
+    seconds: float | None = None
     fps: int = 25
-    size: tuple[int, int] = (640, 360)
+    size: tuple[int, int] | None = None
+    camera: Literal["side", "front", "top", "three-quarter", "follow"] | None = None
     slow: float = 1.0
     renderer: Literal["auto", "painter", "gl"] = "auto"
 
@@ -53,14 +61,17 @@ def render_command(arguments: Sequence[str]) -> int:
 
     generations = _check(options)
     video.require_writer(options.out)
+    races = bool(options.top or generations)
+    still = options.out.suffix.lower() == ".png"
+    seconds = options.seconds or (cast.LOOP_SECONDS if still and not races else SECONDS)
     if options.top:
-        runners = cast.top_of(options.run, options.top, options.seconds)
+        runners = cast.top_of(options.run, options.top, seconds)
     elif generations:
-        runners = cast.through_generations(options.run, generations, options.seconds)
+        runners = cast.through_generations(options.run, generations, seconds)
     else:
-        runners = [cast.champion_of(options.run, options.seconds)]
-    stage = Stage([runner.walk for runner in runners], *options.size)
-    if options.out.suffix.lower() == ".png":
+        runners = [cast.champion_of(options.run, seconds)]
+    stage = Stage([runner.walk for runner in runners], *(options.size or SIZE), options.camera)
+    if still:
         _still(runners, stage, options)
     else:
         backend = _backend(stage, options, wanted)
@@ -81,10 +92,10 @@ def _check(options: RenderOptions) -> list[int]:
     """
     for name, value, low, high in (
         ("fps", options.fps, 1, 60),
-        ("seconds", options.seconds, 0.1, 600),
+        ("seconds", SECONDS if options.seconds is None else options.seconds, 0.1, 600),
         ("slow", options.slow, 0.1, 100),
-        ("size", min(options.size), 64, 4096),
-        ("size", max(options.size), 64, 4096),
+        ("size", min(options.size or SIZE), 64, 4096),
+        ("size", max(options.size or SIZE), 64, 4096),
         ("top", options.top or 1, 1, MOST_RUNNERS),
     ):
         if not low <= value <= high:
@@ -125,10 +136,11 @@ def _backend(stage: Any, options: RenderOptions, wanted: str | None) -> str | No
 def _still(runners: list[Any], stage: Any, options: RenderOptions) -> None:
     """A filmstrip of one walk, or the end of a race."""
     from mjxgait.viewing import video
+    from mjxgait.viewing.filmstrip import SIZE as EACH
     from mjxgait.viewing.filmstrip import filmstrip
 
     if len(runners) == 1:
-        picture = filmstrip(runners[0].walk)
+        picture = filmstrip(runners[0].walk, size=options.size or EACH, view=options.camera)
     else:
         picture = stage.picture(stage.frames - 1)
         video.write_captions(picture, stage, runners, stage.frames - 1)

@@ -30,8 +30,10 @@ def share_command(arguments: Sequence[str]) -> int:
         raise UserError(
             f'{options.out}: cannot write "{options.out.suffix}"; end the name with .html'
         )
+    from mjxgait.runs.disk import require_writable
     from mjxgait.web.page import write_page
 
+    require_writable(options.out)
     write_page(options.run, options.out)
     print(f"{options.out} ({options.out.stat().st_size / 1024:,.0f} KiB)")
     return 0

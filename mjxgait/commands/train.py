@@ -9,13 +9,16 @@ from typing import Annotated
 
 import tyro
 
+from mjxgait.certify import read_certificate
 from mjxgait.creature import Creature
 from mjxgait.creature.scale import parse_scales
 from mjxgait.errors import INTERRUPTED, UserError
 from mjxgait.library import load_creature
 from mjxgait.parts import resolve_config
+from mjxgait.parts.wishes import WISHES, Wishes, hint, wished
 from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.folder import (
+    CERTIFICATE,
     METRICS,
     PLOT,
     create_run,
@@ -49,6 +52,13 @@ class TrainOptions:
       generations: Short for --evolution.generations.
       evolve_body: Short for --evolution.body: 1.25 lets the parts below the trunk become up to a
         quarter larger or a fifth smaller; the run keeps the body that won in body/.
+      speed: How fast it should walk: 0.4 (m/s), 0.4bl/s (body lengths per second), or fr0.2 (Froude
+        number). This and the next four are for walking (docs/wishes.md).
+      gait: walk, amble, trot, pace, canter, bound, gallop, hop (four feet), walk, tripod, wave (six),
+        walk, waddle, hop (two), or auto.
+      turn: Degrees per second to the left that it should turn while it walks.
+      steer: Degrees per second up to which it should obey when it is told to turn, to either side.
+      style: calm, sneaky, heavy, proud, tired, hurried, or a FILE.toml of settings.
       ground: Short for --rollout.ground: flat, slope:0.1, steps:0.05, bumps:0.05, rough:0.05.
       view: Show the best of each generation walking on a page that only this machine can reach.
       plots: Draw all plots of the run when it has ended (`mjxgait plot`).
@@ -64,6 +74,11 @@ class TrainOptions:
     population: int | None = None
     generations: int | None = None
     evolve_body: float | None = None
+    speed: str | None = None
+    gait: str | None = None
+    turn: float | None = None
+    steer: float | None = None
+    style: str | None = None
     ground: str | None = None
     view: bool = False
     plots: bool = True
@@ -78,6 +93,8 @@ def train_command(arguments: Sequence[str]) -> int:
         shape, args=list(arguments), prog="mjxgait train", default=shape(settings=default)
     )
     config = _settings(options)
+    if said := hint(config):
+        print(said)
     # JAX takes a second to import: only once the options are known to be good.
     from mjxgait.commands.view import following
     from mjxgait.runs import loop
@@ -99,12 +116,13 @@ def train_command(arguments: Sequence[str]) -> int:
     else:
         folder = create_run(options.out, creature, config)
     prepare_devices()
+    screen = Screen()
     with following(folder) if options.view else contextlib.nullcontext():
         ended = loop.train(
             folder,
             creature,
             config,
-            Screen(),
+            screen,
             resume=options.resume is not None,
             generation=options.generation,
         )
@@ -112,6 +130,9 @@ def train_command(arguments: Sequence[str]) -> int:
     if ended and options.plots:
         plot_run(folder)
         print(f"plots         {folder / PLOTS}/")
+    if ended:
+        document = read_certificate(folder / CERTIFICATE)
+        screen.next_steps(folder, bool(document and document["passed"]))
     return 0 if ended else INTERRUPTED
 
 
@@ -146,19 +167,28 @@ def _layers(arguments: Sequence[str]) -> tuple[Creature, Config]:
     early = argparse.ArgumentParser(add_help=False, allow_abbrev=False, exit_on_error=False)
     for name in ("--env", "--config", "--resume", "--use.controller", "--use.task"):
         early.add_argument(name, nargs="?")
+    for name in WISHES:
+        early.add_argument(f"--{name}", nargs="?")
     early.add_argument("--scale", nargs="*")
     try:
         given, _ = early.parse_known_args(list(arguments))
     except argparse.ArgumentError as error:
         raise UserError(str(error)) from None
+    asked = {name: getattr(given, name) for name in WISHES}
     if given.resume:
+        if any(asked.values()):
+            raise UserError(
+                f"{given.resume}: a resumed run keeps its settings; what is asked of a walk needs a "
+                "new run"
+            )
         return open_run(Path(given.resume))
     scales = parse_scales(given.scale or ())
     creature = load_creature(given.env or TrainOptions.env, scales, tell=print)
     file = Path(given.config) if given.config else None
     named = {kind: getattr(given, f"use.{kind}") for kind in ("controller", "task")}
     use = {kind: name for kind, name in named.items() if name}
-    return creature, resolve_config(creature.settings.train, creature.name, file, use)
+    config = resolve_config(creature.settings.train, creature.name, file, use)
+    return creature, wished(config, creature, Wishes.of(asked))
 
 
 def _settings(options: TrainOptions) -> Config:

@@ -80,13 +80,35 @@ class PoseTracker:
         def genome(pose: Number, tuning: jax.Array) -> Genome:
             return Genome(jnp.broadcast_to(jnp.asarray(pose, jnp.float32), shape), tuning)
 
-        return genome(self.creature.joints.pose_low, low), genome(
-            self.creature.joints.pose_high, high
+        joints = self.creature.joints
+        lowest, highest = genome(joints.pose_low, low), genome(joints.pose_high, high)
+        if not config.around:
+            return lowest, highest
+        middle, width = self._original(config), jnp.radians(config.within)
+        return (
+            dataclasses.replace(lowest, key_poses=jnp.maximum(lowest.key_poses, middle - width)),
+            dataclasses.replace(highest, key_poses=jnp.minimum(highest.key_poses, middle + width)),
         )
 
+    def _original(self, config: PoseConfig) -> jax.Array:
+        """The key poses [K, J] that the config names, within the pose ranges."""
+        joints, shape = self.creature.joints, (config.key_poses, len(self.creature.joints.names))
+        given = jnp.stack([jnp.float32(angle) for angle in config.around]).reshape(shape)
+        low, high = (edge.astype(np.float32) for edge in (joints.pose_low, joints.pose_high))
+        return jnp.clip(given, low, high)
+
     def variation(self, settings: PoseConfig, evolution: EvolutionConfig) -> Variation:
-        """See `Controller`."""
-        return pose_variation(Box(*self.bounds(settings)), evolution)
+        """See `Controller`; the first that is created has the key poses that the settings name."""
+        usual = pose_variation(Box(*self.bounds(settings)), evolution)
+        if not settings.around:
+            return usual
+
+        def create(key: jax.Array, count: int) -> Genome:
+            made = usual.create(key, count)
+            poses = made.key_poses.at[0].set(self._original(settings))
+            return dataclasses.replace(made, key_poses=poses)
+
+        return dataclasses.replace(usual, create=create)
 
     def genes(self, genomes: Genome, settings: PoseConfig) -> np.ndarray:
         """See `Controller`."""

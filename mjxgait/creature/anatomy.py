@@ -112,12 +112,14 @@ class Feet:
 
     names: one per foot. foot_of: [F] which foot each geom of a foot belongs to. watched: [G] ids of
     geoms whose height is sensed. ground: ids of the other geoms that may touch the floor.
+    stations: of each foot its rank from the front on its side, and whether that is the left.
     """
 
     names: tuple[str, ...] = _static()
     geoms: tuple[int, ...] = _static()
     seen: tuple[int, ...] = _static()
     others: tuple[int, ...] = _static()
+    stations: tuple[tuple[int, bool], ...] = dataclasses.field(default=(), metadata=STATIC)
 
     @property
     def stepping(self) -> tuple[int, ...]:

@@ -16,6 +16,7 @@ from mjxgait.creature.mirrored import mirrored
 from mjxgait.creature.settings import CreatureSettings, JointException
 from mjxgait.creature.world import check_world
 from mjxgait.errors import UserError, did_you_mean
+from mjxgait.settings.gaits import stations_of
 from mjxgait.settings.tables import build, read_toml
 
 NOT_ALONE = re.compile(
@@ -90,7 +91,7 @@ def _assemble(
             balance_pitch=_weights(settings.balance.pitch, names, "balance.pitch"),
             balance_roll=_weights(settings.balance.roll, names, "balance.roll"),
         ),
-        feet=_feet(model, settings),
+        feet=_feet(model, data, settings, trunk, axes),
     )
     _check(creature, data)
     return creature
@@ -220,15 +221,25 @@ def _weights(table: Mapping[str, float], names: list[str], key: str) -> np.ndarr
     return weights
 
 
-def _feet(model: mujoco.MjModel, settings: CreatureSettings) -> Feet:
+def _feet(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    settings: CreatureSettings,
+    trunk: int,
+    axes: np.ndarray,
+) -> Feet:
     bodies, stepping = _foot_bodies(model, settings.creature.feet)
     kind = mujoco.mjtObj.mjOBJ_GEOM
     ground = [_id(model, kind, name, "creature.ground") for name in settings.creature.ground]
+    axes = data.xmat[trunk].reshape(3, 3) @ axes[:2].T
+    own = [[g for g in stepping if model.geom_bodyid[g] == body] for body in bodies]
+    places = [data.geom_xpos[geoms].mean(0) @ axes for geoms in own]
     return Feet(
         names=tuple(model.body(b).name for b in bodies),
         geoms=tuple(bodies.index(int(model.geom_bodyid[g])) for g in stepping),
         seen=(*stepping, *_forbidden(model, stepping, ground)),
         others=tuple(ground),
+        stations=stations_of([(float(ahead), float(left)) for ahead, left in places]),
     )
 
 

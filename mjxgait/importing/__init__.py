@@ -1,5 +1,5 @@
 """From somebody's model file (MJCF or URDF) to a creature folder."""
 
-from mjxgait.importing.convert import ImportChoices, Imported, import_model
+from mjxgait.importing.convert import TOML, WRITTEN, ImportChoices, Imported, import_model
 
-__all__ = ["ImportChoices", "Imported", "import_model"]
+__all__ = ["TOML", "WRITTEN", "ImportChoices", "Imported", "import_model"]

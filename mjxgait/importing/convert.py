@@ -17,7 +17,7 @@ from mjxgait.importing.find import find_anatomy
 from mjxgait.importing.mjcf import clean_mjcf
 from mjxgait.importing.notes import Notes, listed
 from mjxgait.importing.orient import find_forward, find_mirror, is_planar, yaw_to
-from mjxgait.importing.parts import one_line, plain_names, rotation
+from mjxgait.importing.parts import HINGE, one_line, plain_names, rotation
 from mjxgait.importing.root import in_plane
 from mjxgait.importing.same import check_same
 from mjxgait.importing.skeleton import build_bodies
@@ -28,6 +28,9 @@ from mjxgait.importing.urdf import clean_urdf
 from mjxgait.importing.worker import compile_apart, compile_here
 from mjxgait.importing.write_toml import creature_toml
 from mjxgait.importing.write_xml import creature_xml
+
+XML, TOML, README = WRITTEN = ("creature.xml", "creature.toml", "README.md")
+"""The files of a creature folder that an import makes."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -86,7 +89,8 @@ def import_model(path: Path, choices: ImportChoices | None = None) -> Imported:
 
 def _import(path: Path, choices: ImportChoices, notes: Notes) -> Imported:
     source = read_source(path, choices.search, notes)
-    model, changes = (compile_apart if choices.apart else compile_here)(source.tree, source.assets)
+    compiled = compile_apart if choices.apart else compile_here
+    model, changes = compiled(source.tree, source.assets, source.missing)
     for what, why in changes:
         notes.change(what, why)
     _tell_dropped(model, notes)
@@ -103,6 +107,11 @@ def _import(path: Path, choices: ImportChoices, notes: Notes) -> Imported:
     best = standing(
         puppet, offered_poses(puppet, model, anatomy, source, start), mirror, planar, notes
     )
+    if best.held.height < 0:
+        raise UserError(
+            f'"{model.body(anatomy.root).name}" lies on the floor, and all of it that is not a foot '
+            "falls through: this has no legs to walk on"
+        )
     feet = {name for foot in best.feet for name in foot}
     steady_balance(best.drive, best.puppet.names, best.model, best.qpos, feet, best.notes)
     name = plain_names([choices.name or path.stem], ["creature"])[0]
@@ -169,10 +178,18 @@ def _tell_left_out(model: mujoco.MjModel, anatomy: Anatomy, notes: Notes) -> Non
         for g in np.flatnonzero(touchable & (model.geom_bodyid == 0))
         if int(model.geom_type[g]) != mujoco.mjtGeom.mjGEOM_PLANE
     ]
-    names = [f'body "{model.body(b).name}"' for b in others]
+    names = [f'body "{model.body(b).name}" ({_content(model, b)})' for b in others]
     names += [f'geom "{model.geom(g).name or g}"' for g in things]
     if names:
         notes.change(f"left out: {listed(names)}", "a walk is evolved on a flat floor, alone")
+
+
+def _content(model: mujoco.MjModel, top: int) -> str:
+    """Mass and hinges of the tree below a body, in words."""
+    inside = [b for b in range(1, model.nbody) if top in geometry.ancestors(model, b)]
+    hinges = int(np.isin(model.jnt_bodyid[model.jnt_type == HINGE], inside).sum())
+    mass = f"{model.body_subtreemass[top]:.3g} kg"
+    return f"{mass}, {hinges} joints: a creature of its own" if hinges > 1 else mass
 
 
 def _folder(
@@ -215,9 +232,9 @@ def _folder(
         f"# {name}\n\nMade by `mjxgait import` from {origin}.\n\n```text\n{notes.text()}\n```\n"
     )
     files = {
-        "creature.xml": creature_xml(name, puppet.bodies, best.qpos),
-        "creature.toml": toml,
-        "README.md": report,
+        XML: creature_xml(name, puppet.bodies, best.qpos),
+        TOML: toml,
+        README: report,
     }
     return Imported(name, files, notes, best.held.stands)
 

@@ -6,6 +6,7 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 
 from mjxgait.errors import UserError
+from mjxgait.importing.missing import put_stand_in
 from mjxgait.importing.notes import Notes
 from mjxgait.importing.source import (
     MOST_ELEMENTS,
@@ -153,8 +154,7 @@ def _drop_inner(tree: ET.Element, notes: Notes) -> None:
 
 
 def _drop_unreadable(source: Source, places: Places, folders: list[str], notes: Notes) -> None:
-    """Loads meshes; geoms of meshes that cannot be loaded and of height fields go."""
-    gone: set[str] = set()
+    """Loads meshes, small ones in place of what cannot be loaded; geoms of height fields go."""
     for asset in source.tree.findall("asset"):
         for mesh in list(asset.findall("mesh")):
             reference = mesh.attrib.pop("file", None)
@@ -164,16 +164,12 @@ def _drop_unreadable(source: Source, places: Places, folders: list[str], notes: 
             mesh.set("name", name)
             key = load_mesh(source, places, reference, folders, notes)
             if key is None:
-                asset.remove(mesh)
-                gone.add(name)
+                put_stand_in(mesh)
+                source.missing[name] = reference
             else:
                 mesh.set("file", key)
                 mesh.attrib.pop("content_type", None)
     for parent in list(source.tree.iter()):
         for geom in parent.findall("geom"):
-            if (
-                geom.get("mesh") in gone
-                or geom.get("type") in ("hfield", "sdf")
-                or "hfield" in geom.attrib
-            ):
+            if geom.get("type") in ("hfield", "sdf") or "hfield" in geom.attrib:
                 parent.remove(geom)

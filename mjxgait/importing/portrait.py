@@ -51,9 +51,8 @@ def standing(creature: Creature) -> Held:
     )
 
 
-def facts(creature: Creature) -> list[str]:
-    """Lines that tell what was loaded."""
-    held = standing(creature)
+def facts(creature: Creature, held: Held) -> list[str]:
+    """Lines that tell what was loaded and how it stood."""
     state = "stands" if held.stands else "does not stand"
     touched = f', "{held.touched}" touches the floor' if held.touched else ""
     names = creature.joints.names

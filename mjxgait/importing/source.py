@@ -30,6 +30,7 @@ class Source:
     efforts: N·m, largest torque by joint name, where the file says so outside of MuJoCo's elements.
     coupled: joints that follow others.
     poses: standing poses that the file offers outside of keyframes.
+    missing: names of meshes that cannot be had, with the file that each should be in; MJCF only.
     """
 
     tree: ET.Element
@@ -37,6 +38,7 @@ class Source:
     efforts: dict[str, float] = dataclasses.field(default_factory=dict)
     coupled: list[str] = dataclasses.field(default_factory=list)
     poses: list[list[float]] = dataclasses.field(default_factory=list)
+    missing: dict[str, str] = dataclasses.field(default_factory=dict)
 
     @property
     def urdf(self) -> bool:

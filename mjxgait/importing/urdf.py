@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from mjxgait.errors import UserError
+from mjxgait.importing.missing import lost
 from mjxgait.importing.notes import Notes, listed
 from mjxgait.importing.source import Places, Source, load_mesh, numbers
 
@@ -54,8 +55,8 @@ def clean_urdf(source: Source, path: Path, places: Places, notes: Notes) -> None
                 element.set(key, " ".join(map(repr, values)))
                 notes.change(f"an origin's {key} read as {values}", "it has not three numbers")
     for link in robot.findall("link"):
-        _shapes(source, link, places, notes)
         _inertial(link, notes)
+        _shapes(source, link, places, notes)
     for joint in robot.findall("joint"):
         _joint(source, joint, notes)
     if source.coupled:
@@ -81,6 +82,8 @@ def _shapes(source: Source, link: ET.Element, places: Places, notes: Notes) -> N
             reference = mesh.get("filename", "")
             key = load_mesh(source, places, reference, [""], notes)
             if key is None:
+                if kind == "collision" and link.find("inertial") is None:
+                    raise lost("", link.get("name", ""), reference)
                 link.remove(shape)
             else:
                 mesh.set("filename", key)

@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 
 from mjxgait.errors import UserError
+from mjxgait.importing.missing import leave_out, lost, put_stand_in
 
 SECONDS = 60
 MEMORY = 6 * 2**30
@@ -26,14 +27,14 @@ ASSET = re.compile(r"asset[0-9]+\.(?:stl|obj|msh)|(?<=')asset[0-9]+(?=')")
 
 
 def compile_apart(
-    tree: ET.Element, assets: dict[str, bytes]
+    tree: ET.Element, assets: dict[str, bytes], missing: dict[str, str] | None = None
 ) -> tuple[mujoco.MjModel, list[tuple[str, str]]]:
     """`compile_here` in a process of its own, which cannot take this one down.
 
     Raises:
       UserError: it does not compile, or takes too long or too much memory.
     """
-    order = pickle.dumps((ET.tostring(tree), assets))
+    order = pickle.dumps((ET.tostring(tree), assets, missing))
     try:
         done = subprocess.run(
             [sys.executable, "-m", __name__],
@@ -62,32 +63,41 @@ def compile_apart(
 
 
 def compile_here(
-    tree: ET.Element, assets: dict[str, bytes]
+    tree: ET.Element, assets: dict[str, bytes], missing: dict[str, str] | None = None
 ) -> tuple[mujoco.MjModel, list[tuple[str, str]]]:
     """The compiled model, and what had to be left out for it to compile, with the reasons.
+
+    Args:
+      missing: meshes that small ones stand in for, see `leave_out`.
 
     Raises:
       UserError: with MuJoCo's own words.
     """
     changes: list[tuple[str, str]] = []
+    gone = dict(missing or {})
     left_out = list(OPTIONAL)
     for _ in range(MOST_REPAIRS):
         try:
             spec = mujoco.MjSpec.from_string(ET.tostring(tree, encoding="unicode"), assets=assets)
             spec.compiler.fusestatic = False
             spec.compiler.discardvisual = False
+            leave_out(spec, gone)
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # about the file's style
                 return spec.compile(), changes
         except (ValueError, TypeError, RuntimeError, mujoco.FatalError) as error:
             message = " ".join(str(error).split())
-        if not _repair(tree, message, changes, left_out):
+        if not _repair(tree, message, changes, left_out, gone):
             raise UserError(f"MuJoCo cannot read the model: {message[:400]}")
     raise UserError(f"MuJoCo cannot read the model after {MOST_REPAIRS} repairs: {message[:400]}")
 
 
 def _repair(
-    tree: ET.Element, message: str, changes: list[tuple[str, str]], left_out: list[str]
+    tree: ET.Element,
+    message: str,
+    changes: list[tuple[str, str]],
+    left_out: list[str],
+    gone: dict[str, str],
 ) -> bool:
     """Changes the tree so that this message may not come again; False when nothing is left to
     try.
@@ -121,7 +131,7 @@ def _repair(
             )
         )
         return True
-    if (found := ASSET.search(message)) and _drop_mesh(tree, found.group()):
+    if (found := ASSET.search(message)) and _drop_mesh(tree, found.group(), gone):
         changes.append((f"a mesh and its shapes dropped ({found.group()})", message[:160]))
         return True
     if "mesh" in message and (
@@ -146,22 +156,26 @@ def _repair(
     return False
 
 
-def _drop_mesh(tree: ET.Element, key: str) -> bool:
-    """Takes out the meshes of an asset and the shapes that use them; False when there are none."""
+def _drop_mesh(tree: ET.Element, key: str, gone: dict[str, str]) -> bool:
+    """Takes out the meshes of an asset and the shapes that use them; False when there are none.
+
+    gone: meshes that small ones stand in for; those of MJCF become some of these.
+    """
     stem = key.split(".")[0]
-    gone = {m.get("name") for m in tree.iter("mesh") if m.get("file", "").split(".")[0] == stem}
-    hit = False
-    for parent in list(tree.iter()):
-        for child in list(parent):
-            mesh = child.find("geometry/mesh")
-            of_urdf = mesh is not None and mesh.get("filename", "").split(".")[0] == stem
-            of_mjcf = (child.tag == "mesh" and child.get("name") in gone) or (
-                child.tag == "geom" and child.get("mesh") in gone
-            )
-            if of_urdf or of_mjcf:
-                parent.remove(child)
-                hit = True
-    return hit
+    hit = [m for m in tree.iter("mesh") if m.get("file", "").split(".")[0] == stem]
+    for mesh in hit:
+        gone[mesh.get("name", "")] = f"{mesh.get('name')} (it is there, but not as MuJoCo wants it)"
+        put_stand_in(mesh)
+    for link in tree.findall("link"):
+        for shape in list(link):
+            mesh_of = shape.find("geometry/mesh")
+            if mesh_of is None or mesh_of.get("filename", "").split(".")[0] != stem:
+                continue
+            if shape.tag == "collision" and link.find("inertial") is None:
+                raise lost("", link.get("name", ""), stem)
+            link.remove(shape)
+            hit.append(mesh_of)
+    return bool(hit)
 
 
 def _compiler(tree: ET.Element) -> ET.Element:
@@ -181,9 +195,10 @@ def _serve() -> None:
         resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
     except (ImportError, ValueError, OSError):  # not on every system
         pass
-    text, assets = pickle.loads(sys.stdin.buffer.read())  # written by compile_apart
+    # Written by compile_apart.
+    text, assets, missing = pickle.loads(sys.stdin.buffer.read())
     try:
-        model, changes = compile_here(ET.fromstring(text), assets)
+        model, changes = compile_here(ET.fromstring(text), assets, missing)
     except (UserError, MemoryError) as error:
         sys.stdout.buffer.write(
             json.dumps({"error": str(error) or "out of memory while compiling the model"}).encode()

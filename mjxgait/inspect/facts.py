@@ -53,6 +53,7 @@ def facts(snapshot: Snapshot) -> dict[str, Any]:
         "bytes": snapshot.size,
         "versions": dict(snapshot.versions),
         "certificate": certificate(snapshot),
+        "verdict": verdict(snapshot),
         "settings_changed": settings_changed(snapshot),
         "fitness": fitness_summary(snapshot.fitness),
         "history": [
@@ -70,20 +71,45 @@ def certificate(snapshot: Snapshot) -> str:
     """One sentence about the certificate of the run's champion, whatever checkpoint the snapshot
     is of.
     """
-    try:
-        document = read_certificate(snapshot.run / CERTIFICATE)
-        if document is None:
-            return "The champion has not been examined."
-        if reason := outdated(document, read_champion(snapshot.run / CHAMPION, snapshot.creature)):
-            return reason
-    except UserError as error:
-        return str(error)
+    document = _certificate(snapshot)
+    if isinstance(document, str):
+        return document
     failed = " ".join(str(c["number"]) for c in document["criteria"] if not c["passed"])
     return (
         f"The champion fails criteria {failed}."
         if failed
         else f"The champion is certified, margin {document['margin']:.2f}."
     )
+
+
+def verdict(snapshot: Snapshot) -> dict[str, Any] | None:
+    """The certificate of the run's champion in a few values; None where it has none that counts.
+
+    speed: m/s. gait: its name. Both are None for what is no walk.
+    """
+    document = _certificate(snapshot)
+    if isinstance(document, str):
+        return None
+    report = document.get("report", {})
+    return {
+        "certified": document["passed"],
+        "failed": [c["number"] for c in document["criteria"] if not c["passed"]],
+        "margin": document["margin"],
+        "speed": report.get("speed"),
+        "gait": report.get("gait"),
+    }
+
+
+def _certificate(snapshot: Snapshot) -> dict[str, Any] | str:
+    """What the examiner wrote of the run's champion, or why there is nothing that counts."""
+    try:
+        document = read_certificate(snapshot.run / CERTIFICATE)
+        if document is None:
+            return "The champion has not been examined."
+        champion = read_champion(snapshot.run / CHAMPION, snapshot.creature)
+        return outdated(document, champion) or document
+    except UserError as error:
+        return str(error)
 
 
 def settings_changed(snapshot: Snapshot) -> dict[str, dict[str, Any]]:

@@ -25,7 +25,16 @@ def runs_in(folder: Path) -> list[Path]:
 
 def list_runs(runs: Sequence[Path]) -> list[dict[str, Any]]:
     """What there is to say of each run; one that cannot be read has the reason under `problem`."""
-    kept = ("creature", "generation", "generations", "seed", "fitness", "ended", "written")
+    kept = (
+        "creature",
+        "generation",
+        "generations",
+        "seed",
+        "fitness",
+        "ended",
+        "written",
+        "verdict",
+    )
     lines = []
     for run in runs:
         try:
@@ -39,28 +48,43 @@ def list_runs(runs: Sequence[Path]) -> list[dict[str, Any]]:
 def print_runs(lines: Sequence[Mapping[str, Any]], console: Console) -> None:
     """As a table, the problems below it."""
     table = Table(box=None, pad_edge=False)
-    for heading in ("run", "creature", "generation", "best", "mean", "seed", "written", "state"):
-        table.add_column(
-            heading,
-            justify="right" if heading in ("generation", "best", "mean", "seed") else "left",
-        )
+    numbers = ("generation", "best", "seed", "margin", "m/s")
+    for heading in ("run", "creature", *numbers, "gait", "written", "state"):
+        table.add_column(heading, justify="right" if heading in numbers else "left")
     for line in lines:
         name = Path(line["run"]).name
         if line["problem"]:
-            table.add_row(name, *[""] * 6, "cannot be read")
+            table.add_row(name, *[""] * 8, "cannot be read")
             continue
-        fitness = line["fitness"]
+        verdict = line["verdict"] or {}
         table.add_row(
             name,
             line["creature"],
             f"{line['generation']}/{line['generations']}",
-            show(fitness["best"]),
-            show(fitness["mean"]),
+            show(line["fitness"]["best"]),
             str(line["seed"]),
+            _rounded(verdict.get("margin")),
+            _rounded(verdict.get("speed")),
+            verdict.get("gait") or "",
             ago(line["written"]),
-            "finished" if line["ended"] else "not finished",
+            _state(line),
         )
     console.print(table)
     for line in lines:
         if line["problem"]:
             console.print(f"  {line['problem']}")
+
+
+def _rounded(value: float | None) -> str:
+    return "" if value is None else f"{value:.2f}"
+
+
+def _state(line: Mapping[str, Any]) -> str:
+    """What became of a run, in two words or three."""
+    if not line["ended"]:
+        return "not finished"
+    if line["verdict"] is None:
+        return "not examined"
+    if line["verdict"]["certified"]:
+        return "certified"
+    return f"fails {' '.join(map(str, line['verdict']['failed']))}"

@@ -9,17 +9,22 @@ from rich.console import Console
 from mjxgait.inspect.genomes import view_of
 from mjxgait.inspect.tables import print_pairs, show, titled_table
 
+FEW = 10
+"""Individuals that are shown where not all are asked for."""
 BLOCKS = "▁▂▃▄▅▆▇█"
 WIDEST = 60
 """Characters of a sparkline; longer histories are thinned."""
 
 
-def print_facts(facts: Mapping[str, Any], console: Console) -> None:
-    """All about one checkpoint; see `facts`."""
+def print_facts(facts: Mapping[str, Any], console: Console, few: bool = False) -> None:
+    """All about one checkpoint; see `facts`. few: of the population only the best."""
     _print_identity(facts, console)
     _print_settings(facts["settings_changed"], console)
     _print_history(facts, console)
-    _print_population(facts["population"], console)
+    shown = facts["population"][: FEW if few else None]
+    _print_population(shown, console)
+    if left := len(facts["population"]) - len(shown):
+        console.print(f"… and {left} more; --all shows them")
     _print_sizes(facts["champion"], console)
     view_of(facts["controller"]).show(facts["champion"], facts["diversity"], console)
 

@@ -18,6 +18,13 @@ def check_fit(creature: Creature, config: Config) -> None:
     """
     controller, task, name = config.use.controller, config.use.task, creature.name
     kind: Any = find("controller", controller)
+    if around := getattr(config.controller, "around", ()):
+        wanted = config.controller.key_poses * len(creature.joints.names)
+        if len(around) != wanted:
+            raise UserError(
+                f"controller.around has {len(around)} angles; {config.controller.key_poses} key poses "
+                f"of {name} have {wanted}"
+            )
     if not creature.settings.creature.grows:
         if getattr(kind, "grows", False):
             raise UserError(

@@ -109,7 +109,12 @@ def make_controller(body: "Body", step: float, config: Config) -> "Controller":
 def make_task(body: "Body", step: float, ends: "Termination | Ends", config: Config) -> "Task":
     """What the creature is to do. ends: what a fall is."""
     horizon = max(round(config.rollout.seconds / step), 1)
-    made: Task = find("task", config.use.task)(body, step, horizon, ends)
+    kind: Any = find("task", config.use.task)
+    # One whose tally depends on what is asked is told.
+    told = getattr(kind, "told", None)
+    made: Task = (
+        told(body, step, horizon, ends, config.fitness) if told else kind(body, step, horizon, ends)
+    )
     return made
 
 

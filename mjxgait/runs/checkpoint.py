@@ -156,7 +156,7 @@ def _check_shapes(found: Mapping[str, Any], wanted: Mapping[str, Any], where: Pa
 
 
 def _keep_threads_quiet() -> None:
-    """Keeps off the screen what Orbax hands on to the caller anyway."""
+    """Keeps off the screen what Orbax hands on to the caller anyway, and its advice to programmers."""
     log = logging.getLogger("absl")
     if _told_to_the_caller not in log.filters:
         log.addFilter(_told_to_the_caller)
@@ -165,8 +165,12 @@ def _keep_threads_quiet() -> None:
 
 
 def _told_to_the_caller(record: logging.LogRecord) -> bool:
-    """Lets a record pass that is not about an error in one of Orbax's files."""
-    return not (record.exc_info and "orbax" in Path(record.pathname).parts)
+    """Lets a record pass that is no error of Orbax's that is raised too, and no warning of it.
+
+    It warns on slow disks that a write waits for the one before, which no user can do anything with.
+    """
+    warning = record.levelno <= logging.WARNING
+    return "orbax" not in Path(record.pathname).parts or not (record.exc_info or warning)
 
 
 class _WithoutClosedLoops:

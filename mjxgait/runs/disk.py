@@ -40,6 +40,23 @@ def disk_errors(path: Path, safe: str = SAFE, again: str = AGAIN) -> Iterator[No
         raise UserError(f"{path}: cannot be written: {reason}") from error
 
 
+def require_writable(path: Path) -> None:
+    """Says before long work whether a file can be written; leaves nothing behind.
+
+    Raises:
+      UserError: names the file, or the folder that is missing.
+    """
+    if not path.absolute().parent.is_dir():
+        raise UserError(f"{path}: the folder {path.parent} does not exist")
+    there = path.exists()
+    try:
+        path.open("ab").close()
+        if not there:
+            path.unlink()
+    except OSError as error:
+        raise UserError(f"{path}: cannot be written ({error.strerror})") from None
+
+
 def refusal(error: BaseException) -> int | None:
     """The error number with which a disk refused to be written; None for any other error.
 

@@ -2,6 +2,7 @@
 elsewhere.
 """
 
+import shlex
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -15,6 +16,7 @@ from rich.table import Table
 
 from mjxgait.certify import Certificate
 from mjxgait.certify.tasks import demands_of
+from mjxgait.certify.tasks.wishes import in_the_way
 from mjxgait.ground.spec import FLAT
 from mjxgait.runs.folder import CHAMPION, CONFIG, CREATURE, METRICS, PLOT
 
@@ -55,6 +57,10 @@ class Screen:
 
         last: the generation at which the run ends at the latest.
         """
+        if not self._walls:
+            self.say(
+                "best, mean: fitness; alive: the share of the episodes that end without a fall"
+            )
         self._walls = [*self._walls[-4:], line["wall_s"]]
         left = (last - line["generation"]) * sum(self._walls) / len(self._walls)
         best, mean = (
@@ -99,9 +105,14 @@ class Screen:
                 f"{other} stands up to {1000 * worst['depth']:.0f} mm deep in {one}, "
                 f"and in it in {worst['share']:.0%} of the frames."
             )
+        if said := in_the_way(certificate.criteria):
+            self.console.print(said)
         self.console.print(
             f"{verdict} (margin {certificate.margin:.2f}). {report['summary']}{where}; "
             f"{certificate.seconds:.0f} s."
+        )
+        self.console.print(
+            "The margin is that of the tightest measure: 0 just passes, 1 is far from its threshold."
         )
 
     def report(
@@ -117,7 +128,7 @@ class Screen:
         rows = {
             "best fitness": _best(last),
             "outcome": _outcome(last),
-            "champion": str(folder / CHAMPION),
+            "champion": f"{folder / CHAMPION}, the best individual",
             "metrics": f"{folder / METRICS}, {folder / PLOT}",
             "settings": f"{folder / CONFIG}, {folder / CREATURE}/",
         }
@@ -126,6 +137,22 @@ class Screen:
         self.console.print(table)
         if interrupted:
             self.console.print(f"To go on: mjxgait train --resume {folder}")
+
+    def next_steps(self, folder: Path, certified: bool) -> None:
+        """Commands that lead on from a run that has ended."""
+        run = shlex.quote(str(folder))
+        steps = {
+            f"mjxgait render {run} --out walk.webp": "films it",
+            f"mjxgait share {run} --out walk.html": "makes a page to give away",
+            f"mjxgait export {run} --out walk.glb": "writes it for animation tools",
+        }
+        if not certified:
+            steps[f"mjxgait inspect {run}"] = (
+                "tells how evolution went; another --seed may do better"
+            )
+        self.console.print("Next:")
+        for command, what in steps.items():
+            self.console.print(f"  {command}   {what}", markup=False)
 
 
 def _best(last: Mapping[str, Any]) -> str:

@@ -16,13 +16,20 @@ class BrainConfig:
     """Graphs of blocks with nerves (Sims 1994).
 
     Attributes:
-      nodes, connections: room of a graph, and of each node. parts, links: room of a body; a part
-        needs a link per hinge, and at least one.
-      local, central: neurons of each node, and of none.
-      every: control steps from one command to the next; a brain takes two steps of its own for each.
-      values: how many values change in a mutation, on average. sigma: by how much, as a share of
-        their ranges. connect, grow: chance of a connection more or less, and of a new node.
-      crossover, grafting: shares of the offspring with two parents; the others have one.
+      nodes: room of a graph.
+      connections: room of each node.
+      parts: room of a body.
+      links: room of a body; a part needs a link per hinge, and at least one.
+      local: neurons of each node.
+      central: neurons of no node.
+      every: control steps from one command to the next; a brain takes two steps of its own
+        for each.
+      values: how many values change in a mutation, on average.
+      sigma: by how much, as a share of their ranges.
+      connect: chance of a connection more or less.
+      grow: chance of a new node.
+      crossover: share of the offspring of two parents whose nodes are crossed over.
+      grafting: share that has a graft of its second parent; the others have one parent.
     """
 
     __pydantic_config__ = STRICT

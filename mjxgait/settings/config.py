@@ -29,10 +29,11 @@ class TerminationConfig:
     """What ends an episode early; a key that is not given is as creature.toml has it.
 
     Attributes:
-      min_up: cosine of the trunk's tilt below which it has tipped over; -1 never ends an episode.
+      min_up: cosine of the trunk's tilt below which it has tipped over; -1 never ends an
+        episode.
       height: lowest and highest trunk height, in standing heights.
-      touch: whether an episode ends when a part touches the floor that must not. Only then may
-        evolution leave out the contacts of these parts.
+      touch: whether an episode ends when a part touches the floor that must not. Only then
+        may evolution leave out the contacts of these parts.
     """
 
     __pydantic_config__ = STRICT
@@ -51,23 +52,30 @@ class RolloutConfig:
 
     Attributes:
       seconds: length of an episode.
-      starts: R, episodes per individual; the first is nominal, the others are perturbed, the same for all.
-      variety: so many times as many perturbed starts there are in all; each generation takes the
-        next ones. With more than 1 everybody must be judged anew: `evolution.elite`.
-      joint_noise, velocity_noise: rad, rad/s; half widths of the uniform perturbation of the start.
+      starts: R, episodes per individual; the first is nominal, the others are perturbed, the
+        same for all.
+      variety: so many times as many perturbed starts there are in all; each generation takes
+        the next ones. With more than 1 everybody must be judged anew: `evolution.elite`.
+      joint_noise: rad; half width of the uniform perturbation of each joint at a perturbed
+        start.
+      velocity_noise: rad/s; the same for the speeds of the joints.
       friction: range of the factor on the floor's friction.
-      push: sudden change of the trunk's horizontal velocity at a random moment of a perturbed start, in units of sqrt(g * hip height).
-      gains: half width of the uniform change of each joint's kp and kd in a perturbed start, as a share.
-      masses: the same for each part's mass and inertia, which then differ from lane to lane; a step
-        costs a third more (docs/performance.md).
-      terminate: whether an episode ends when the creature falls; if not, its whole body meets the
-        floor. termination: what counts as falling, where it differs from creature.toml.
+      push: sudden change of the trunk's horizontal velocity at a random moment of a perturbed
+        start, in units of sqrt(g * hip height).
+      gains: half width of the uniform change of each joint's kp and kd in a perturbed start,
+        as a share.
+      masses: the same for each part's mass and inertia, which then differ from lane to lane;
+        a step costs a third more (docs/performance.md).
+      terminate: whether an episode ends when the creature falls; if not, its whole body meets
+        the floor.
+      termination: what counts as falling, where it differs from creature.toml.
       worst: share of the worst start in the score; the mean of the starts has the rest.
       physics: the fast step where the model allows it, or plain MJX.
       lanes: simulations in flight per device; 0 lets the program choose.
-      body: its numbers are constants of the compiled program, which is faster, or inputs: then
-        another body of the same make-up needs no compilation.
-      ground: flat, slope:0.1, steps:0.05, bumps:0.05 or rough:0.05, in hip heights (docs/ground.md).
+      body: its numbers are constants of the compiled program, which is faster, or inputs:
+        then another body of the same make-up needs no compilation.
+      ground: flat, slope:0.1, steps:0.05, bumps:0.05 or rough:0.05, in hip heights
+        (docs/ground.md).
     """
 
     __pydantic_config__ = STRICT
@@ -94,13 +102,19 @@ class ForcedConfig:
     """Forced evolution: a spell of rapid mutation and newcomers when growth stalls.
 
     Attributes:
-      window: generations over which best and mean are watched; gain: the relative growth below which both have stalled.
-      newcomers: share of new random genomes among a forced generation's offspring, the others are mutants.
+      enabled: whether there are such spells.
+      window: generations over which best and mean are watched.
+      gain: relative growth below which both have stalled.
+      newcomers: share of new random genomes among a forced generation's offspring, the others
+        are mutants.
       mutations: how many times each mutant is mutated.
-      accept: quantile of the population's fitness that an offspring must reach to be taken in.
-      refresh: share of the population to replace. limit: generations a spell lasts at most; 0 lets
-        it last until the population is refreshed.
-      patience: spells in a row without a better best after which the run stops; 0 never stops it.
+      accept: quantile of the population's fitness that an offspring must reach to be taken
+        in.
+      refresh: share of the population to replace.
+      limit: generations a spell lasts at most; 0 lets it last until the population is
+        refreshed.
+      patience: spells in a row without a better best after which the run stops; 0 never stops
+        it.
     """
 
     __pydantic_config__ = STRICT
@@ -117,31 +131,46 @@ class ForcedConfig:
 
 @dataclasses.dataclass(frozen=True)
 class EvolutionConfig:
-    """The genetic algorithm.
+    """The genetic algorithm; `mjxgait/search/breeding.py` says how parents and children are drawn.
 
     Attributes:
-      population: P. generations: cap on the generations of a run. target: fitness at which a run stops.
+      population: P, individuals that live from one generation to the next.
+      generations: cap on the generations of a run.
+      target: fitness at which a run stops.
       growth: the population grows to this multiple of P, then is culled back to P.
       pose_range: share of each joint's pose range, about its middle, in which key poses lie.
-      pose_span: deg; width of every hinge's pose range, about its middle in creature.toml, as far as
-        the joint's range in creature.xml allows; 0 leaves the ranges of creature.toml.
-      initial: uniform draws or a Latin hypercube, over the middle `initial_spread` of each gene's range.
-      initial_choice: so many are drawn and judged for each place of the first generation. selection: how parents are drawn
-        (mjxgait/search/breeding.py); rivals: of a tournament.
-      crossover: share of offspring with two parents, the others have one. crossing: `permute` draws K poses from the parents' 2K in any
-        order; `align` leaves each pose in its place.
-      pool: whom parents are drawn from: last generation's survivors, or `growing`, which also holds
-        the children born so far (they rank last). survival: of the `best` of parents and children,
-        or of `children` alone, and the best so far. elite: that share of the population, the best, lives
-        on among the children and is judged with them, for survival of children. unique_children: a child that equals somebody of the
-        pool or a sibling is drawn anew before it is simulated (mjxgait/search/breeding.py).
-      mutation: `redraw` re-draws two joints of one pose, `single` one joint, `pose` a whole pose, `gaussian` moves every joint of one pose
-        by sigma, in units of its range, `mixed` is one or the other of the first and the last. `bit` and `byte` read the value of one joint
-        as 8 bits over its range and flip one of them, or re-draw all eight, as classic GAs do. mutation_rate: share of offspring mutated.
-      body: how many times larger or smaller the parts below the trunk may become, each mirrored pair
-        by a gene of its own (docs/creature.md); 1 leaves the body as it is.
-      tuning_rate, tuning_sigma: chance that a tuning gene of a mutated offspring changes, and by how much, in units of its range;
-        likewise a body's.
+      pose_span: deg; width of every hinge's pose range, about its middle in creature.toml, as
+        far as the joint's range in creature.xml allows; 0 leaves the ranges of creature.toml.
+      initial: uniform draws or a Latin hypercube.
+      initial_spread: share of each gene's range, about its middle, in which the first genomes
+        lie.
+      initial_choice: so many are drawn and judged for each place of the first generation.
+      selection: how parents are drawn: any, by rank, or the best of some rivals.
+      rivals: of a tournament.
+      crossover: share of offspring with two parents, the others have one.
+      crossing: `permute` draws K poses from the parents' 2K in any order; `align` leaves each
+        pose in its place.
+      pool: whom parents are drawn from: last generation's survivors, or `growing`, which also
+        holds the children born so far (they rank last).
+      unique_children: a child that equals somebody of the pool or a sibling is drawn anew
+        before it is simulated.
+      survival: of the `best` of parents and children, or of `children` alone, and the best so
+        far.
+      elite: that share of the population, the best, lives on among the children and is judged
+        with them, for survival of children.
+      mutation: `redraw` re-draws two joints of one pose, `single` one joint, `pose` a whole
+        pose, `gaussian` moves every joint of one pose by sigma, `mixed` is one or the other
+        of the first and the last. `bit` and `byte` read the value of one joint as 8 bits over
+        its range and flip one of them, or re-draw all eight, as classic GAs do.
+      mutation_rate: share of offspring mutated.
+      sigma: of the gaussian mutation, in units of the range of each joint.
+      body: how many times larger or smaller the parts below the trunk may become, each
+        mirrored pair by a gene of its own (docs/creature.md); 1 leaves the body as it is.
+      tuning_rate: chance that a tuning gene of a mutated offspring changes; likewise a
+        body's.
+      tuning_sigma: by how much it changes, in units of its range; likewise a body's.
+      remove_duplicates: of individuals with the same genome only one survives.
+      forced: a spell of rapid mutation and newcomers when growth stalls.
     """
 
     __pydantic_config__ = STRICT
@@ -241,8 +270,16 @@ class Config:
 
     Attributes:
       seed: Of all randomness.
-      checkpoint_every: Generations between checkpoints, which is what a killed run loses at most; the latest three stay.
+      checkpoint_every: Generations between checkpoints, which is what a killed run loses at
+        most; the latest three stay.
       keep_every: Checkpoints of generations that are a multiple of this are kept for good.
+      use: Who takes part.
+      controller: What moves the creature.
+      drive: How the joints' motors follow.
+      rollout: How individuals are judged.
+      fitness: What is wanted of them.
+      evolution: The genetic algorithm.
+      examination: Who is examined.
     """
 
     __pydantic_config__ = STRICT

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 import pydantic
 
-from mjxgait.settings.tables import SHAPE, STRICT, Count, Interval, Positive
+from mjxgait.settings.tables import SHAPE, STRICT, Count, Finite, Interval, NonNegative, Positive
 
 HOLDS = (1, 2, 4, 8, 16)
 """Control steps from one command to the next that there can be."""
@@ -24,7 +24,17 @@ def holds(steps: int) -> int:
 
 @dataclasses.dataclass(frozen=True)
 class TuningRanges:
-    """Where the controller's own genes may lie (docs/controller.md); equal ends fix one."""
+    """Where the controller's own genes may lie (docs/controller.md); equal ends fix one.
+
+    Attributes:
+      threshold: rad; pose error, root mean square, below which the target moves on.
+      period: s; of the cycle, where the clock moves the target on.
+      steer: how strongly turning away from the way is answered.
+      pitch: how strongly pitch is answered.
+      pitch_rate: s; how strongly its speed is.
+      roll: how strongly roll is answered.
+      roll_rate: s; how strongly its speed is.
+    """
 
     __pydantic_config__ = STRICT
     threshold: Interval = (0.08, 0.16)
@@ -46,10 +56,15 @@ class PoseConfig:
 
     Attributes:
       key_poses: K, poses of half a cycle (of the whole one for an unsymmetric creature).
-      mirror: whether the other half of a symmetric creature's cycle is the mirror image; else the
-        K poses are the whole cycle.
+      mirror: whether the other half of a symmetric creature's cycle is the mirror image; else
+        the K poses are the whole cycle.
       interpolation: n, steps between neighbouring poses.
-      advance: the target moves on when the pose error is below the threshold, or by the clock.
+      advance: the target moves on when the pose error is below the threshold, or by the
+        clock.
+      around: rad; key poses near which all others lie, pose by pose and joint by joint, as
+        `mjxgait refine` finds them; none leaves the whole pose ranges.
+      within: deg; how far from them.
+      tuning: ranges of the controller's own genes.
     """
 
     __pydantic_config__ = STRICT
@@ -57,6 +72,8 @@ class PoseConfig:
     mirror: bool = True
     interpolation: Count = 10
     advance: Literal["error", "clock"] = "error"
+    around: tuple[Finite, ...] = ()
+    within: NonNegative = 0.0
     tuning: TuningRanges = dataclasses.field(default_factory=TuningRanges)
 
 
@@ -66,9 +83,10 @@ class DriveConfig:
 
     Attributes:
       law: stable PD, or plain PD for comparison.
-      constraint_forces: whether stable PD counts the constraint forces of the previous step, as in
-        DART's tutorial.
-      stiffness, damping: factors on the creature's kp and kd.
+      constraint_forces: whether stable PD counts the constraint forces of the previous step,
+        as in DART's tutorial.
+      stiffness: factor on the creature's kp.
+      damping: factor on the creature's kd.
     """
 
     __pydantic_config__ = STRICT

@@ -14,10 +14,22 @@ NEAR = 0.05
 
 @dataclasses.dataclass(frozen=True)
 class HopWeights:
-    """Weight of each fitness term (mjxgait/tasks/hop/fitness.py says what each measures).
+    """Weight of each fitness term; all are penalties.
 
-    All are penalties. As long as those of style, all but `distance` and `missed`, sum up to less
-    than `distance`, getting nearer is worth its manner.
+    mjxgait/tasks/hop/fitness.py says to the letter what each measures. As long as those of
+    style, all but `distance` and `missed`, sum up to less than `distance`, getting nearer is
+    worth its manner.
+
+    Attributes:
+      distance: goal distances that are left at the end.
+      missed: 1 for who is not within a twentieth of the goal distance.
+      time: share of the time until it arrived.
+      restless: way made after the arrival, in goal distances.
+      ground: share of the time on parts that must not touch the floor.
+      fall: 1 for an episode that ended with a fall.
+      neutral: how far joints are from standing in the end, in halves of their ranges.
+      fast: the fastest that a joint turned: nothing up to 14 rad/s, 1 from 20 on.
+      overlap: how deep parts are in each other.
     """
 
     __pydantic_config__ = STRICT
@@ -40,6 +52,7 @@ class HopConfig:
       style_ramp: generations over which the style terms grow to their full weight.
       rest: s without motion after which the rest of an episode is not simulated: whoever senses
         nothing new does nothing new. 0 simulates all of it.
+      weights: what each term counts.
     """
 
     __pydantic_config__ = STRICT
@@ -50,7 +63,15 @@ class HopConfig:
 
 @dataclasses.dataclass(frozen=True)
 class TravelWeights:
-    """See `HopWeights`; distance: of the way that is left to the nominal goal, below zero beyond it."""
+    """See `HopWeights`.
+
+    Attributes:
+      distance: of the way that is left to the nominal goal, below zero beyond it.
+      ground: share of the time on parts that must not touch the floor.
+      fall: 1 for an episode that ended with a fall.
+      fast: the fastest that a joint turned: nothing up to 14 rad/s, 1 from 20 on.
+      overlap: how deep parts are in each other.
+    """
 
     __pydantic_config__ = STRICT
     distance: Finite = 1.0
@@ -62,7 +83,13 @@ class TravelWeights:
 
 @dataclasses.dataclass(frozen=True)
 class TravelConfig:
-    """What is wanted of the way from goal to goal; see `HopConfig`."""
+    """What is wanted of the way from goal to goal; see `HopConfig`.
+
+    Attributes:
+      style_ramp: generations over which the style terms grow to their full weight.
+      rest: see `HopConfig`.
+      weights: what each term counts.
+    """
 
     __pydantic_config__ = STRICT
     style_ramp: Whole = 20

@@ -42,12 +42,15 @@ class ProgramConfig:
       functions: that an expression may use; besides them constants and senses.
       every: control steps from one evaluation to the next; in between the angles stay.
       senses: patterns of the names of senses that it may use; docs/programs.md lists them.
-      nodes: the most that an expression may have. depth: the most that it may be deep.
+      nodes: the most that an expression may have.
+      depth: the most that it may be deep.
       initial_depth: of the first expressions, half of them full and half grown.
       constants: range of the random constants.
       functions_cross: share of crossing points at functions, where there is one (Koza: 0.9).
-      subtree, point, hoist, constant: how often, relative to each other, a mutation puts a new
-        subtree, another function or sense, a subtree in place of the whole, or a moved constant.
+      subtree: how often, relative to the other three, a mutation puts a new subtree.
+      point: how often another function or sense.
+      hoist: how often a subtree in place of the whole.
+      constant: how often a moved constant.
       constant_sigma: by how much a constant moves, in units of the range.
       parsimony: fitness that each node costs.
     """

@@ -4,7 +4,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Literal
 
-from mjxgait.errors import UserError
+from mjxgait.errors import UserError, did_you_mean
 
 
 def data_folder(kind: Literal["envs", "configs"]) -> Path:
@@ -31,6 +31,14 @@ def find_creature(name: str) -> Path:
     folder = Path(name)
     if (folder / "creature.toml").is_file():
         return folder
+    if folder.is_dir():
+        raise UserError(
+            f"{folder}: no creature folder (it has no creature.toml); `mjxgait import` makes one of a "
+            "model file"
+        )
+    if folder.suffix or len(folder.parts) > 1:
+        raise UserError(f"{folder}: no such file or folder")
     raise UserError(
-        f'unknown creature "{name}"; shipped: {", ".join(known)}; or give the path of a folder with creature.xml and creature.toml'
+        f'unknown creature "{name}"; {did_you_mean(name, known)} '
+        "(`mjxgait envs` lists all; the path of a folder or of a model file will do too)"
     )

@@ -7,7 +7,13 @@ from mjxgait.settings.tables import STRICT, NonNegative, Positive
 
 @dataclasses.dataclass(frozen=True)
 class SwimWeights:
-    """What each term counts; `overlap` and `elsewhere` are penalties."""
+    """What each term counts; `overlap` and `elsewhere` are penalties.
+
+    Attributes:
+      speed: m/s of the way, as far as the blocks are apart.
+      overlap: how deep blocks are in each other.
+      elsewhere: momentum that the water did not give.
+    """
 
     __pydantic_config__ = STRICT
     speed: NonNegative = 1.0
@@ -22,10 +28,12 @@ class SwimConfig:
     Attributes:
       settle: s from the start that do not count.
       overlap: how deep blocks are in each other, of the smaller one's size, of which half the speed
-        counts. apart: generations until that counts in full: whoever swims fast learns to keep its
-        blocks apart more easily than the other way round.
+        counts.
+      apart: generations until that counts in full: whoever swims fast learns to keep its blocks
+        apart more easily than the other way round.
       elsewhere: share of its momentum that the water did not give, of which half the speed counts: a
         step of finite length gives some to those that find out how.
+      weights: what each term counts.
     """
 
     __pydantic_config__ = STRICT

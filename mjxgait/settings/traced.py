@@ -55,6 +55,9 @@ def _traced(config: Any) -> Any:
             values[field.name] = HostOnly(field.name)
         elif role is SHAPE:
             values[field.name] = value
+        elif value is None:
+            # Not asked for: the program has no place for it.
+            values[field.name] = None
         elif role is KIND:
             values[field.name] = value.split(":")[0]
         else:

@@ -27,6 +27,7 @@ class Starts:
     numbers: leaves [R, ...], the bodies that follow from it, as the plant reads them.
     ground: leaves [R, ...], each trial's own; None where it is flat.
     goal: [R] m ahead of the start; None where the task has none.
+    turn: [R] rad/s by which the commanded heading grows; None where nobody is told to turn.
     """
 
     qpos: jax.Array
@@ -40,6 +41,7 @@ class Starts:
     heaviness: jax.Array | None = None
     numbers: Any = None
     goal: jax.Array | None = None
+    turn: jax.Array | None = None
 
 
 def draw_starts(key: jax.Array, creature: Creature, config: RolloutConfig) -> Starts:

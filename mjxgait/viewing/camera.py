@@ -7,6 +7,21 @@ import dataclasses
 import numpy as np
 
 UP = np.array([0.0, 0.0, 1.0])
+VIEWS = {
+    "side": (0.0, 8.0),
+    "front": (75.0, 12.0),
+    "top": (0.0, 80.0),
+    "three-quarter": (45.0, 24.0),
+    "follow": (-68.0, 24.0),
+}
+"""By name: azimuth and elevation in deg. Straight from ahead or from above a floor has no depth to
+measure with."""
+
+
+def view_of(name: str) -> dict[str, float]:
+    """Azimuth and elevation in rad of a view."""
+    azimuth, elevation = VIEWS[name]
+    return {"azimuth": float(np.radians(azimuth)), "elevation": float(np.radians(elevation))}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

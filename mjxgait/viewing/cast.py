@@ -10,7 +10,7 @@ from mjxgait.viewing.video import Runner
 from mjxgait.viewing.walk import Walk, record_walk
 
 LOOP_SECONDS = 12.0
-"""Simulated to find a steady stride."""
+"""Simulated to find a steady stride: whoever shows one shows the same."""
 
 
 def champion_of(run: Path, seconds: float) -> Runner:

@@ -14,13 +14,20 @@ SIZE = (420, 300)
 """Pixels of each picture."""
 
 
-def filmstrip(walk: Walk, pictures: int = PICTURES, size: tuple[int, int] = SIZE) -> Image.Image:
+def filmstrip(
+    walk: Walk,
+    pictures: int = PICTURES,
+    size: tuple[int, int] = SIZE,
+    view: str | None = None,
+) -> Image.Image:
     """One stride in two rows of pictures, each with its part of the stride, its time and the
     feet that carry weight.
+
+    size: pixels of each picture. view: see `Stage`.
     """
     window, _ = gait_window(walk, 1)
     frames = np.round(np.linspace(window.start, window.stop, pictures, endpoint=False)).astype(int)
-    stage = Stage([walk], *size)
+    stage = Stage([walk], *size, view)
     columns = -(-pictures // 2)
     sheet = Image.new("RGB", (columns * (size[0] + 4) - 4, 2 * (size[1] + 4) - 4), "white")
     for i, frame in enumerate(frames):

@@ -13,18 +13,17 @@ from mjxgait.errors import UserError
 from mjxgait.parts import make_task
 from mjxgait.parts.registry import what_ends
 from mjxgait.runs.disk import disk_errors
-from mjxgait.runs.folder import CHAMPION, METRICS, open_champion, open_run, read_metrics
+from mjxgait.runs.folder import CHAMPION, METRICS, open_run, read_metrics
 from mjxgait.settings.config import Config
 from mjxgait.viewing import strobe, trees
+from mjxgait.viewing.cast import LOOP_SECONDS, champion_of
 from mjxgait.viewing.curves import Lines, progress_figures
 from mjxgait.viewing.filmstrip import draw_filmstrip
 from mjxgait.viewing.gaitplots import gait_figures
 from mjxgait.viewing.style import FORMATS, Figures, figure, save
-from mjxgait.viewing.walk import Walk, record_walk
+from mjxgait.viewing.walk import Walk
 
 PLOTS = "plots"
-SECONDS = 10.0
-"""Of the walk that the plots show."""
 
 
 def plot_run(run: Path, out: Path | None = None, formats: Sequence[str] = FORMATS) -> list[Path]:
@@ -41,16 +40,17 @@ def plot_run(run: Path, out: Path | None = None, formats: Sequence[str] = FORMAT
             f"{run}: nothing to plot; the run ended before its first generation was done"
         )
     out = out or run / PLOTS
+    with disk_errors(out, "the run itself is safe", "draw again"):
+        out.mkdir(parents=True, exist_ok=True)
     figures = dict(progress_figures(lines, _weights(creature, config, lines)))
     if (run / CHAMPION).exists():
-        walk = record_walk(*open_champion(run), SECONDS)
+        walk = champion_of(run, LOOP_SECONDS).walk
         figures |= dict(gait_figures(walk)) | {
             "filmstrip": ((12, 4.8), lambda drawing: draw_filmstrip(drawing, walk))
         }
         figures |= {**_of_goals(walk), **_of_programs(walk)}
     files = []
     with disk_errors(out, "the run itself is safe", f"draw it with mjxgait plot {run}"):
-        out.mkdir(parents=True, exist_ok=True)
         for name, (size, compose) in figures.items():
             with figure(size) as drawing:
                 compose(drawing)

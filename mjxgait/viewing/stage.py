@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from PIL import Image
 
-from mjxgait.viewing.camera import Camera
+from mjxgait.viewing.camera import Camera, view_of
 from mjxgait.viewing.painter import COMPASS, Painter
 from mjxgait.viewing.relief import Relief
 from mjxgait.viewing.shapes import Silhouettes
@@ -25,16 +25,20 @@ SMOOTH_SECONDS = 0.6
 class Stage:
     """Walks of one creature in lanes side by side, the first one nearest, seen from the side.
 
-    Frames are control steps.
+    Frames are control steps. view: a name in `camera.VIEWS`; by default a little from the front and
+    from above.
     """
 
-    def __init__(self, walks: Sequence[Walk], width: int, height: int) -> None:
+    def __init__(
+        self, walks: Sequence[Walk], width: int, height: int, view: str | None = None
+    ) -> None:
         self.walks, self.width, self.height = walks, width, height
         self.painter = Painter(walks[0].shown)
         self.origin = walks[0].trunk_pos[0, :2]
         self.forward = walks[0].forward
         self.frames = max(len(walk.qpos) for walk in walks)
-        self.elevation = {} if len(walks) == 1 else {"elevation": RACE_ELEVATION}
+        usual = {} if len(walks) == 1 else {"elevation": float(RACE_ELEVATION)}
+        self.view = usual if view is None else view_of(view)
         self._place_lanes()
         self._choose_view()
 
@@ -57,7 +61,7 @@ class Stage:
             self.origin + way[0] * self.forward + way[1] * self.left[:2], self.middle + way[2]
         )
         return Camera(
-            centre + self.shift, self.forward, self.scale, self.width, self.height, **self.elevation
+            centre + self.shift, self.forward, self.scale, self.width, self.height, **self.view
         )
 
     def behind(self, frame: int, place: int) -> np.ndarray:
@@ -106,7 +110,7 @@ class Stage:
 
     def _choose_view(self) -> None:
         """Scale and height at which all lanes fill the picture well."""
-        flat = Camera(np.append(self.origin, 0.0), self.forward, 1.0, 0, 0, **self.elevation)
+        flat = Camera(np.append(self.origin, 0.0), self.forward, 1.0, 0, 0, **self.view)
         seen = flat.pixels((self.outline[None] + self.lanes[[0, -1], None]).reshape(-1, 3))
         size = np.ptp(seen, axis=0)
         self.scale = float(min(self.width / (ROOM * size[0]), self.height / (ROOM * size[1])))

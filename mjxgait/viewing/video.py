@@ -10,6 +10,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from mjxgait.errors import UserError
+from mjxgait.runs.disk import require_writable
 from mjxgait.viewing.floor import DARK_INK, font
 from mjxgait.viewing.gl import gl_pictures
 from mjxgait.viewing.stage import Stage
@@ -118,10 +119,9 @@ def require_writer(path: Path) -> None:
         raise UserError(
             f'{path}: cannot write "{path.suffix}"; end the name with {", ".join(FORMATS)}'
         )
-    if not path.absolute().parent.is_dir():
-        raise UserError(f"{path}: the folder {path.parent} does not exist")
     if path.suffix.lower() == ".mp4":
         _import_av(path)
+    require_writable(path)
 
 
 def _write_webp(pictures: list[Image.Image], path: Path, fps: int) -> None:

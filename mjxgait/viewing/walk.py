@@ -146,7 +146,7 @@ class Walk:
 
 def record_walk(creature: Creature, champion: Champion, seconds: float) -> Walk:
     """Simulates the champion on the creature's ground, without noise or pushes."""
-    task = how_simulated(champion.task)
+    task = how_simulated(champion.task, champion.wish)
     start = task.aimed(nominal_starts(creature, 1), CertificateConfig())
     outcome = simulate(creature, champion, start, seconds, record=1, threads=1)
     film, fell = outcome.trajectory, float(outcome.fell[0])

@@ -18,14 +18,15 @@ from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.runs.folder import CERTIFICATE, METRICS, open_champion, read_metrics
+from mjxgait.viewing.cast import LOOP_SECONDS
 from mjxgait.viewing.curves import draw_fitness
 from mjxgait.viewing.gaitplots import gait_figures
 from mjxgait.viewing.style import Figures, figure
 from mjxgait.viewing.walk import Walk, record_walk
 
-SECONDS = 12.0
-"""Of the walk from which the loop and the curves are taken."""
 RATE = 30
+FAR = 1.7
+"""Of the camera, in units of the creature's size."""
 
 
 def write_page(run: Path, out: Path) -> None:
@@ -35,7 +36,7 @@ def write_page(run: Path, out: Path) -> None:
       UserError: no run, no champion, no steady stride, or the file cannot be written.
     """
     creature, champion = open_champion(run)
-    walk = record_walk(creature, champion, SECONDS)
+    walk = record_walk(creature, champion, LOOP_SECONDS)
     page = build_page(walk, walk_loop(walk, RATE), _sections(run, creature, champion, walk))
     try:
         out.write_text(page, encoding="utf-8")
@@ -61,7 +62,10 @@ def build_page(walk: Walk, loop: WalkLoop, sections: str) -> str:
     return string.Template((web / "page.html").read_text(encoding="utf-8")).substitute(
         title=html.escape(walk.creature.name.replace("_", " ")),
         lead=html.escape(lead),
-        glb=base64.b64encode(build_glb(loop)).decode("ascii"),
+        glb=base64.b64encode(build_glb(loop, floor=True)).decode("ascii"),
+        target=f"0m {0.6 * walk.creature.frame.stand_pos[2]:.3f}m 0m",
+        far=f"{FAR * walk.creature.model.stat.extent:.3f}m",
+        frames=len(loop.times) - 1,
         viewer=viewer.replace("</script", "<\\/script"),
         sections=sections,
     )
@@ -89,7 +93,8 @@ def _images(figures: Figures, creature: Creature) -> Iterable[str]:
             file = BytesIO()
             drawing.savefig(file, format="svg", metadata={"Date": None})
         data = base64.b64encode(file.getvalue()).decode("ascii")
-        yield f'<img alt="{html.escape(name)} of the {html.escape(creature.name)}" src="data:image/svg+xml;base64,{data}">'
+        alt = f"{html.escape(name)} of the {html.escape(creature.name)}"
+        yield f'<div class="wide"><img alt="{alt}" src="data:image/svg+xml;base64,{data}"></div>'
 
 
 def certificate_table(run: Path, champion: Champion) -> str:
@@ -155,7 +160,7 @@ def _table(heading: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
     head = f"<tr>{''.join(f'<th>{html.escape(h)}</th>' for h in heading)}</tr>" if heading else ""
     body = "".join("<tr>" + "".join(map(cell, row)) + "</tr>" for row in rows)
-    return f"<table>{head}{body}</table>"
+    return f'<div class="wide"><table>{head}{body}</table></div>'
 
 
 def _is_number(text: str) -> bool:

@@ -1,6 +1,8 @@
 """Importing small animals with the faults of real files: repaired, found or refused."""
 
 import os
+import re
+import shutil
 import tomllib
 from pathlib import Path
 
@@ -22,6 +24,7 @@ from mjxgait.importing import ImportChoices, Imported, import_model
 from mjxgait.importing.portrait import facts, portrait, standing
 from mjxgait.importing.write_toml import _quoted
 from mjxgait.settings.layers import resolve_config
+from mjxgait.settings.shipped import find_creature
 
 
 def bring(folder: Path, text: str, kind: str = "xml", **choices) -> tuple[Creature, Imported]:
@@ -255,7 +258,7 @@ def test_no_mesh_outside_the_model_s_folder_is_read(tmp_path):
         ("link.obj", False),
     ):
         text = QUADRUPED.replace("<asset>", f'<asset><mesh name="s" file="{reference}"/>')
-        text = text.replace('<site name="imu"/>', '<geom type="mesh" mesh="s" mass="0.1"/>')
+        text = text.replace('<site name="imu"/>', '<geom type="mesh" mesh="s" mass="0"/>')
         creature, imported = bring(home, text)
         assert (creature.model.nmesh == 1) == found
         assert told(imported, "not found in the model's folder") != found
@@ -285,7 +288,21 @@ def test_the_command_writes_a_folder_and_check_draws_it(tmp_path, capsys):
 
 def test_every_shipped_creature_can_be_drawn(shipped):
     assert portrait(shipped).size == (1100, 760)
-    assert shipped.name in facts(shipped)[0]
+    assert shipped.name in facts(shipped, standing(shipped))[0]
+
+
+def test_check_fails_where_the_creature_does_not_stand(tmp_path, capsys):
+    """The tall quadruped with joints as weak as a puppet's."""
+    folder = tmp_path / "fallen"
+    shutil.copytree(find_creature("tall_quadruped"), folder)
+    text = (folder / "creature.toml").read_text()
+    weak = re.sub(r"(?m)^kp = .*", "kp = 0.01", re.sub(r"(?m)^kd = .*", "kd = 0.001", text))
+    assert weak != text
+    (folder / "creature.toml").write_text(weak)
+    with pytest.raises(SystemExit) as ended:
+        main(["check", str(folder), "--out", str(tmp_path / "look.png")])
+    assert ended.value.code == 1
+    assert "does not stand" in capsys.readouterr().out
 
 
 def test_train_takes_a_model_file(tmp_path):

@@ -4,6 +4,7 @@ one that is not whole.
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -15,7 +16,7 @@ from inspection.made_up import FORCED, LAST, POPULATION
 from mjxgait.certify.certificate import SCHEMA
 from mjxgait.champion import read_champion
 from mjxgait.cli import main
-from mjxgait.inspect import facts, individual_facts, read_snapshot
+from mjxgait.inspect import facts, individual_facts, read_snapshot, text
 from mjxgait.runs.folder import CERTIFICATE, CHAMPION
 
 
@@ -81,6 +82,46 @@ def test_tells_whether_the_certificate_is_the_champions(run):
     assert said().endswith("it was given under other rules than today's.")
     (run / CERTIFICATE).write_text("[]")
     assert "not a certificate" in said()
+
+
+def test_a_folder_of_runs_tells_which_of_them_walk(run, capsys):
+    """By margin, speed and gait of a certificate that counts."""
+    snapshot = read_snapshot(run)
+    fingerprint = read_champion(run / CHAMPION, snapshot.creature).fingerprint
+    report = {"speed": 1.25, "gait": "trot", "summary": "trot, 1.25 m/s"}
+    certificate = {
+        "schema": SCHEMA,
+        "passed": True,
+        "margin": 0.5,
+        "champion": fingerprint,
+        "criteria": [{"number": 7, "passed": True, "measures": []}],
+        "report": report,
+    }
+
+    def told() -> str:
+        code, said = tell(capsys, run.parent)
+        assert code == 0
+        return said
+
+    assert "not examined" in told()
+    (run / CERTIFICATE).write_text(json.dumps(certificate))
+    assert re.search(r"0\.50 +1\.25 +trot .* certified", told())
+    failed = {
+        "passed": False,
+        "margin": -0.25,
+        "criteria": [{"number": 7, "passed": False, "measures": []}],
+    }
+    (run / CERTIFICATE).write_text(json.dumps(certificate | failed))
+    assert re.search(r"-0\.25 +1\.25 +trot .* fails 7", told())
+    (run / CERTIFICATE).write_text(json.dumps(certificate | {"champion": "other"}))
+    assert "not examined" in told()
+
+
+def test_a_few_individuals_are_shown_and_all_of_them_where_asked(finished_run, capsys, monkeypatch):
+    monkeypatch.setattr(text, "FEW", 4)
+    few, every = (tell(capsys, finished_run, *more)[1] for more in ((), ("--all",)))
+    assert f"… and {POPULATION - 4} more; --all shows them" in few
+    assert len(every.splitlines()) - len(few.splitlines()) == POPULATION - 4 - 1
 
 
 def test_contributions_of_the_terms_add_up_to_the_fitness(finished_run):

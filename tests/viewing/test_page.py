@@ -84,6 +84,33 @@ def test_it_can_be_stopped_and_slowed(opened):
     assert tab.inner_text("#play") == "Play"
 
 
+def test_a_moment_can_be_chosen_and_stepped_from(opened):
+    tab, _, _ = opened
+    tab.evaluate("time.value = 5; time.dispatchEvent(new Event('input'))")
+    frame = tab.evaluate("walk.duration / time.max")
+    assert tab.evaluate("walk.paused")
+    assert tab.evaluate("walk.currentTime") == pytest.approx(5 * frame)
+    tab.click('[aria-label="one frame on"]')
+    assert tab.evaluate("walk.currentTime") == pytest.approx(6 * frame)
+    for _ in range(2):
+        tab.click('[aria-label="one frame back"]')
+    assert tab.evaluate("walk.currentTime") == pytest.approx(4 * frame)
+
+
+def test_the_camera_has_places_to_go_to(opened):
+    tab, _, _ = opened
+    for place, turned in (("side", -90), ("front", 0)):
+        tab.click(f'.view:has-text("{place}")')
+        assert tab.evaluate("walk.cameraOrbit").startswith(f"{turned}deg")
+
+
+def test_nothing_is_wider_than_a_phone(browser, page):
+    tab = browser.new_page(viewport={"width": 390, "height": 844})
+    tab.goto(page.as_uri())
+    assert tab.evaluate("document.documentElement.scrollWidth") <= 390
+    tab.close()
+
+
 def test_a_blank_canvas_would_be_noticed(browser, page, tmp_path):
     """The test above can fail."""
     text = page.read_text(encoding="utf-8")

@@ -10,6 +10,7 @@ from viewing.made_up import falling
 from mjxgait.cli import main
 from mjxgait.creature import load_creature
 from mjxgait.settings.shipped import find_creature
+from mjxgait.viewing.camera import VIEWS
 from mjxgait.viewing.stage import Stage, smooth
 from mjxgait.viewing.video import Runner, condition, moving_pictures
 from mjxgait.viewing.walk import record_walk
@@ -114,3 +115,27 @@ def test_the_camera_does_not_shake():
     path = np.column_stack([np.linspace(0, 1, 200), 0.1 * (-1.0) ** np.arange(200)])
     assert smooth(path, 20).shape == path.shape
     assert np.abs(smooth(path, 20)[20:-20, 1]).max() < 0.02
+
+
+@pytest.mark.parametrize("view", VIEWS)
+def test_every_view_has_the_whole_creature_in_the_picture(stool_walk, view: str):
+    stage = Stage([stool_walk], 320, 180, view)
+    pixels = stage.camera(0).pixels(stage.outline)
+    assert (pixels > 0).all()
+    assert (pixels < [320, 180]).all()
+    # And it fills it: half of the width or of the height at least.
+    assert (np.ptp(pixels, axis=0) / [320, 180]).max() > 0.5
+
+
+def test_views_are_from_where_their_names_say(stool_walk):
+    """Which way the creature goes in the picture, and how much one looks down."""
+    ways = {}
+    for view in VIEWS:
+        camera = Stage([stool_walk], 320, 180, view).camera(0)
+        ways[view] = camera.axes @ np.append(camera.forward, 0.0)
+    right = {view: way[0] for view, way in ways.items()}
+    into = {view: way[2] for view, way in ways.items()}
+    assert right["side"] == pytest.approx(1.0)
+    assert right["top"] == pytest.approx(1.0)
+    assert into["front"] < -0.9 < 0.8 < into["follow"]
+    assert -0.8 < into["three-quarter"] < -0.3

@@ -10,13 +10,14 @@ from mjxgait.certify.criteria import Criterion, at_least, at_most, parts, physic
 from mjxgait.certify.measure import Recording
 from mjxgait.certify.outcome import Fall
 from mjxgait.certify.starts import Starts
+from mjxgait.certify.tasks.staying import Unasked
 from mjxgait.champion import Champion
 
 HIGHEST = 1e3
 """Standing heights: a trunk that hops may be anywhere, as long as no part of it lies."""
 
 
-class GoalDemands(abc.ABC):
+class GoalDemands(Unasked, abc.ABC):
     """See `Demands`. It is not asked to bear pushes: in half of a hop nothing can be done."""
 
     drag: float = 0.0

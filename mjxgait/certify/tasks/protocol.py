@@ -24,6 +24,26 @@ class Demands(Protocol):
     pushed: bool
     """Whether it is tried what pushes do."""
 
+    def asked(self, wish: Mapping[str, Any]) -> "Demands":
+        """The demands where this was asked besides, by name."""
+        ...
+
+    def told(self, steps: int, time_step: float) -> np.ndarray | None:
+        """[T] rad, the heading that the controller is told at each control step; None if none."""
+        ...
+
+    def commands(
+        self, config: CertificateConfig, steps: int, time_step: float, rng: np.random.Generator
+    ) -> np.ndarray | None:
+        """[S, T] rad, headings to tell simulations of their own; None where nobody is steered."""
+        ...
+
+    def obeyed(
+        self, outcome: Outcome, told: np.ndarray, config: CertificateConfig
+    ) -> tuple[Criterion, ...]:
+        """Whether these headings [S, T] were followed."""
+        ...
+
     def undisturbed(
         self, whole: Recording, halved: Recording, config: CertificateConfig
     ) -> tuple[Criterion, ...]:

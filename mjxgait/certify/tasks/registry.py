@@ -1,5 +1,8 @@
 """Which task demands what."""
 
+from collections.abc import Mapping
+from typing import Any
+
 from mjxgait.certify.tasks.hop import HopDemands
 from mjxgait.certify.tasks.limbo import LimboDemands
 from mjxgait.certify.tasks.plain import HasCriteria, PlainDemands
@@ -24,17 +27,17 @@ def register_demands(task: str, own: HasCriteria) -> None:
     _DEMANDS[task] = PlainDemands(own)
 
 
-def demands_of(task: str) -> Demands:
-    """Those of a task.
+def demands_of(task: str, wish: Mapping[str, Any] | None = None) -> Demands:
+    """Those of a task, and of what was asked besides.
 
     Raises:
       UserError: it is code of the user's own that was not named.
     """
     if task not in _DEMANDS:
         raise not_loaded("task", task)
-    return _DEMANDS[task]
+    return _DEMANDS[task].asked(wish or {})
 
 
-def how_simulated(task: str) -> Demands | StaysUp:
-    """What a simulation of it must know: goals and falls; of an unknown task the usual."""
-    return _DEMANDS.get(task) or StaysUp()
+def how_simulated(task: str, wish: Mapping[str, Any] | None = None) -> Demands | StaysUp:
+    """What a simulation of it must know: goals, falls, turns; of an unknown task the usual."""
+    return (_DEMANDS.get(task) or StaysUp()).asked(wish or {})

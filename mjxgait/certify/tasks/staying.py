@@ -1,6 +1,7 @@
 """What most tasks have in common in the examination: who is disturbed must stay up."""
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +15,31 @@ from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 
 
-class StaysUp:
+class Unasked:
+    """See `Demands`: those of a task of which nothing more can be asked."""
+
+    def asked(self, wish: Mapping[str, Any]) -> Any:
+        """See `Demands`: the same."""
+        return self
+
+    def told(self, steps: int, time_step: float) -> np.ndarray | None:
+        """See `Demands`: straight ahead."""
+        return None
+
+    def commands(
+        self, config: CertificateConfig, steps: int, time_step: float, rng: np.random.Generator
+    ) -> np.ndarray | None:
+        """See `Demands`: none."""
+        return None
+
+    def obeyed(
+        self, outcome: Outcome, told: np.ndarray, config: CertificateConfig
+    ) -> tuple[Criterion, ...]:
+        """See `Demands`: nothing was told."""
+        return ()
+
+
+class StaysUp(Unasked):
     """See `Demands`: criteria 4 and 5 of those that have no goal but to be up in the end.
 
     drag, pushed: see `Demands`.

@@ -24,8 +24,18 @@ from mjxgait.certify.criteria import (
 )
 from mjxgait.certify.describe import describe, slip_distance
 from mjxgait.certify.measure import Recording
+from mjxgait.certify.outcome import Outcome
 from mjxgait.certify.strides import clearances, stride_frequency, stride_starts
 from mjxgait.certify.tasks.staying import StaysUp, to_the_end
+from mjxgait.certify.tasks.wishes import (
+    as_asked,
+    draw_commands,
+    following,
+    posture,
+    steered,
+    told_heading,
+    unrolled,
+)
 from mjxgait.creature import Creature
 
 SPARE = 1.2
@@ -34,35 +44,76 @@ worth an examination.
 """
 
 
+STARTED = (0.75, 1.15)
+"""Range of the way in evolution over that at the speed asked for, with standing at its beginning,
+that is worth an examination.
+"""
+
+
 class WalkDemands(StaysUp):
     """See `Demands`: steady strides that lead forward, in the manner of an animal."""
 
     verdict = "it walks"
 
+    def __init__(self, wish: Mapping[str, Any] | None = None) -> None:
+        self.wish = dict(wish or {})
+
+    def asked(self, wish: Mapping[str, Any]) -> "WalkDemands":
+        """See `Demands`."""
+        return WalkDemands(wish) if wish else self
+
+    def told(self, steps: int, time_step: float) -> np.ndarray | None:
+        """See `Demands`."""
+        return told_heading(self.wish, steps, time_step)
+
+    def commands(
+        self, config: CertificateConfig, steps: int, time_step: float, rng: np.random.Generator
+    ) -> np.ndarray | None:
+        """See `Demands`."""
+        if "steer" not in self.wish:
+            return None
+        return draw_commands(self.wish["steer"], config.wishes.commands, steps, time_step, rng)
+
+    def obeyed(
+        self, outcome: Outcome, told: np.ndarray, config: CertificateConfig
+    ) -> tuple[Criterion, ...]:
+        """See `Demands`: 11."""
+        return (steered(outcome, told, config.wishes),)
+
     def undisturbed(
         self, whole: Recording, halved: Recording, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
-        """See `Demands`: all but 4 and 5."""
+        """See `Demands`: all but 4 and 5, and 10 where more is asked."""
+        config = following(config, self.wish, whole.dimensions)
+        whole, halved = (unrolled(recording, self.wish) for recording in (whole, halved))
         window = whole.window(config.warmup)
+        wishes = (as_asked(window, self.wish, config),) if self.wish else ()
         return (
             *basic(whole, config),
             half_step(whole, halved, config),
             gait(window, config.gait),
             physics(window, config.physics),
             parts(window, config.parts),
+            *wishes,
         )
 
     def report(self, whole: Recording, config: CertificateConfig) -> dict[str, Any]:
         """See `Demands`."""
-        told = describe(whole.window(config.warmup), config.gait.clearance)
+        window = unrolled(whole, self.wish).window(config.warmup)
+        told = describe(window, config.gait.clearance)
+        if self.wish:
+            told |= {"asked": self.wish, "posture": posture(window)}
         return told | {"summary": f"{told['gait']}, {told['speed']:.2f} m/s"}
 
     def promising(
         self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
     ) -> bool:
         """See `Demands`: up to the end in all its trials, and clearly faster than it must be."""
-        wanted = SPARE * CertificateConfig().progress.speed * seconds * creature.frame.body_length
         lived = to_the_end(outcome, seconds, creature)
+        if "speed" in self.wish:
+            came = outcome["forward"] / seconds / self.wish["speed"]
+            return bool(lived.all() and ((came > STARTED[0]) & (came < STARTED[1])).all())
+        wanted = SPARE * CertificateConfig().progress.speed * seconds * creature.frame.body_length
         return bool(lived.all() and (outcome["forward"] >= wanted).all())
 
 

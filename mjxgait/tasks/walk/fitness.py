@@ -41,6 +41,21 @@ def fitness_terms(
     Args:
       step: s. horizon: T, steps of a full episode.
     """
+    values, enough = plain_terms(creature, config, step, horizon, tally)
+    length = creature.frame.body_length
+    # Style counts as far as there is a walk: a creature that has yet to learn walking must not be punished for trying.
+    walked = jnp.where(
+        jnp.isfinite(enough), jnp.clip(tally.forward / length / enough, 0.0, 1.0), 1.0
+    )
+    return {name: values[name] * (walked if name in STYLE else 1.0) for name in TERMS}
+
+
+def plain_terms(
+    creature: Body, config: WalkConfig, step: float, horizon: int, tally: Tally
+) -> tuple[dict[str, jax.Array], jax.Array]:
+    """The same, style counted in full however little was walked; and the body lengths [] up to
+    which more is better.
+    """
     lived = jnp.maximum(tally.steps, 1)
     length = creature.frame.body_length
     moved = jnp.maximum(tally.forward, 0.25 * length)
@@ -75,11 +90,7 @@ def fitness_terms(
         "overlap": crossed / (crossed + DEEP),
         "fall": jnp.where(tally.reason == Reason.FINISHED, 0.0, 1.0),
     }
-    # Style counts as far as there is a walk: a creature that has yet to learn walking must not be punished for trying.
-    walked = jnp.where(
-        jnp.isfinite(enough), jnp.clip(tally.forward / length / enough, 0.0, 1.0), 1.0
-    )
-    return {name: values[name] * (walked if name in STYLE else 1.0) for name in TERMS}
+    return values, enough
 
 
 def _enough(speed: jax.Array | float, seconds: float) -> jax.Array:

@@ -1,14 +1,23 @@
 """Walking as a task: forward, upright, in the manner that the settings ask for."""
 
+import dataclasses
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 
-from mjxgait.settings.walk import WalkConfig
+from mjxgait.body import Body, Ends
+from mjxgait.creature import Creature
+from mjxgait.creature.settings import Termination
+from mjxgait.senses import sense
+from mjxgait.settings.config import RolloutConfig
+from mjxgait.settings.walk import WalkConfig, WishConfig
 from mjxgait.tasks.plain import PlainTask
+from mjxgait.tasks.trials import Starts, draw_starts
 from mjxgait.tasks.walk.fitness import TERMS, fitness_terms, signed_weights
 from mjxgait.tasks.walk.tally import Judge, Tally
+from mjxgait.tasks.walk.wish import wish_weights, wished_terms
+from mjxgait.tasks.walk.wish_tally import WishTally, along, wish_tally, wish_updated, wrapped
 from mjxgait.types import Sensed
 
 
@@ -16,8 +25,17 @@ class Walk(PlainTask):
     """One creature's walk; see `PlainTask`."""
 
     Settings = WalkConfig
-    terms = TERMS
+    terms: tuple[str, ...] = TERMS
     outcomes = ("forward", "aside", "seconds")
+
+    @classmethod
+    def told(
+        cls, body: Body, step: float, horizon: int, ends: Termination | Ends, settings: WalkConfig
+    ) -> "Walk":
+        """The task with these settings: with a wish more is looked at, without one nothing is."""
+        if settings.wish.asked and cls is Walk:
+            return AskedWalk(body, step, horizon, ends, settings.wish)
+        return cls(body, step, horizon, ends)
 
     @property
     def _keeper(self) -> Judge:
@@ -27,17 +45,17 @@ class Walk(PlainTask):
         """See `Task`: the clearance [] in m that is wanted of each swing."""
         return jnp.asarray(settings.clearance * self.creature.frame.hip_height, jnp.float32)
 
-    def init(self) -> Tally:
+    def init(self) -> Any:
         """See `Task`."""
         return self._keeper.init()
 
     def update(
-        self, tally: Tally, sensed: Sensed, torque: jax.Array, standards: jax.Array, aim: Any
-    ) -> Tally:
+        self, tally: Any, sensed: Sensed, torque: jax.Array, standards: jax.Array, aim: Any
+    ) -> Any:
         """See `Task`."""
         return self._keeper.update(tally, sensed, torque, standards)
 
-    def judge(self, tally: Tally, settings: WalkConfig) -> dict[str, jax.Array]:
+    def judge(self, tally: Any, settings: WalkConfig) -> dict[str, jax.Array]:
         """See `Task`."""
         return fitness_terms(self.creature, settings, self.step, self.horizon, tally)
 
@@ -52,3 +70,73 @@ class Walk(PlainTask):
     def weights(self, settings: WalkConfig, generation: jax.Array) -> dict[str, jax.Array]:
         """See `Task`."""
         return signed_weights(settings, generation)
+
+
+class AskedWalk(Walk):
+    """A walk of which more is asked: see `settings.walk.WishConfig`.
+
+    Who is told to turn is told a heading that turns, and its way is measured along that: forward
+    and to the left of where it should be looking at each moment.
+    """
+
+    def __init__(
+        self, body: Body, step: float, horizon: int, ends: Termination | Ends, wish: WishConfig
+    ) -> None:
+        super().__init__(body, step, horizon, ends)
+        self.wish = wish
+        self.terms = (*TERMS, *wish_weights(wish))
+
+    def trials(self, key: jax.Array, creature: Creature, settings: RolloutConfig) -> Starts:
+        """See `Task`: everybody's starts, and how they are told to turn: as asked, or the first
+        straight on and the others to the left and to the right in turn, half as fast at least.
+        """
+        starts, count = draw_starts(key, creature, settings), settings.starts
+        if self.wish.turn is not None:
+            rate = jnp.full(count, self.wish.turn)
+        elif self.wish.steer is not None:
+            drawn = jax.random.uniform(jax.random.fold_in(key, 5), (count,), minval=0.5)
+            side = jnp.where(jnp.arange(count) % 2 == 1, 1.0, -1.0).at[0].set(0.0)
+            rate = self.wish.steer * side * drawn
+        else:
+            return starts
+        return dataclasses.replace(starts, turn=jnp.radians(rate))
+
+    def aim(self, trial: Starts) -> Any:
+        """See `Task`: the commanded heading [] in rad, and by what it grows in a step."""
+        if trial.turn is None:
+            return ()
+        return jnp.zeros(()), trial.turn * self.step
+
+    def onward(self, aim: Any, sensed: Sensed) -> Any:
+        """See `Task`."""
+        return (aim[0] + aim[1], aim[1]) if aim else aim
+
+    def senses(self, aim: Any, sensed: Sensed) -> dict[str, jax.Array]:
+        """See `Task`: who is told where to go knows no line to come back to."""
+        if not aim:
+            return {}
+        heading = sense(self.creature, sensed, jnp.zeros(()), ["heading"])["heading"]
+        return {"heading": wrapped(heading - aim[0]), "aside": jnp.zeros(())}
+
+    def init(self) -> WishTally:
+        """See `Task`."""
+        return wish_tally(super().init(), len(self.creature.feet.names))
+
+    def update(
+        self, tally: WishTally, sensed: Sensed, torque: jax.Array, standards: jax.Array, aim: Any
+    ) -> WishTally:
+        """See `Task`."""
+        plain = self._keeper.update(tally, sensed, torque, standards)
+        after = wish_updated(self.creature, tally, plain, sensed)
+        return along(tally, after, aim[0], self.horizon // 2) if aim else after
+
+    def judge(self, tally: WishTally, settings: WalkConfig) -> dict[str, jax.Array]:
+        """See `Task`."""
+        return wished_terms(self.creature, settings, self.step, self.horizon, tally)
+
+    def weights(self, settings: WalkConfig, generation: jax.Array) -> dict[str, jax.Array]:
+        """See `Task`."""
+        wished = wish_weights(settings.wish)
+        return super().weights(settings, generation) | {
+            n: -jnp.float32(w) for n, w in wished.items()
+        }

@@ -1,0 +1,88 @@
+"""What comes of what is asked of a walk: `mjxgait train` with speeds and gaits asked for, in new
+processes, one after the other.
+
+    python benchmarks/wishes.py --json wishes.json
+    python benchmarks/wishes.py --env crab --speeds 0.25 1 --gaits --seeds 0 1 --json crab.json
+
+For each creature every speed, then every gait that a body with so many feet has; one row each, with
+the speed in C MuJoCo, the gait's name there, whether the champion is certified, and the wall time.
+"""
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from mjxgait.library import load_creature
+from mjxgait.settings.gaits import GAITS
+
+ENVS = ("tall_quadruped", "short_quadruped", "crab", "duck")
+SPEEDS = ("0.25", "0.5", "1", "1.5")
+GAITS_ASKED = ("walk", "trot", "pace")
+HEADER = ("creature", "asked", "seed", "m/s in C", "gait", "certified", "fails", "gens", "wall s")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--env", nargs="+", default=ENVS)
+    parser.add_argument("--speeds", nargs="*", default=SPEEDS)
+    parser.add_argument("--gaits", nargs="*", default=GAITS_ASKED)
+    parser.add_argument("--seeds", nargs="+", type=int, default=[0])
+    parser.add_argument("--json", type=Path, required=True, help="file for all numbers")
+    options = parser.parse_args()
+    row(HEADER)
+    row(["---"] * len(HEADER))
+    found: list[dict] = []
+    for env in options.env:
+        known = GAITS.get(len(load_creature(env).feet.names), {})
+        asked = [["--speed", speed] for speed in options.speeds]
+        asked += [["--gait", gait] for gait in options.gaits if gait in known]
+        for wish in asked:
+            for seed in options.seeds:
+                found.append(run(env, wish, seed))
+                row([str(value) for value in found[-1].values()])
+                options.json.write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
+
+
+def run(env: str, wish: list[str], seed: int) -> dict:
+    """One run of the command, and what came of it."""
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch) / "run"
+        command = [sys.executable, "-m", "mjxgait", "train", "--env", env, "--seed", str(seed)]
+        command += [*wish, "--out", str(folder), "--no-plots"]
+        began = time.perf_counter()
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL, env=dict(os.environ))
+        seconds = time.perf_counter() - began
+        lines = (folder / "metrics.jsonl").read_text(encoding="utf-8").splitlines()
+        certificate = json.loads((folder / "certificate.json").read_text(encoding="utf-8"))
+    failed = [
+        f"{criterion['number']} {measure['name']}"
+        for criterion in certificate["criteria"]
+        for measure in criterion["measures"]
+        if not measure["passed"]
+    ]
+    return {
+        "creature": env,
+        "asked": " ".join(wish),
+        "seed": seed,
+        "speed": round(certificate["report"]["speed"] or float("nan"), 3),
+        "gait": certificate["report"]["gait"],
+        "certified": certificate["passed"],
+        "fails": "; ".join(failed) or "-",
+        "generations": json.loads(lines[-1])["generation"],
+        "seconds": round(seconds),
+    }
+
+
+def row(cells: tuple[str, ...] | list[str]) -> None:
+    print(f"| {' | '.join(cells)} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()

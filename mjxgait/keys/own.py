@@ -1,0 +1,76 @@
+"""What an exported walk says of the key poses that made it, so that it can come back edited.
+
+A body never is where its targets are: it follows late, and bends under its weight. Of a cycle that
+`mjxgait export` wrote both are known; what was changed in the file since then is added to the
+targets. Letters: `N` samples of a cycle, `K` key poses, `J` joints.
+"""
+
+import dataclasses
+import json
+from collections.abc import Mapping
+
+import numpy as np
+
+from mjxgait.creature import Creature
+from mjxgait.keys.cycle import Cycle, mirror_image
+from mjxgait.keys.fit import Fit
+
+NOTE = "mjxgait"
+"""Name of the property of the root in which the text lies."""
+UNCHANGED = np.radians(0.5)
+"""rad, root mean square; what differs by less was not edited."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Own:
+    """fit: key poses with what was changed. changed: rad, root mean square. advance: how the
+    target moves on. tuning: genes by name.
+    """
+
+    fit: Fit
+    changed: float
+    advance: str
+    tuning: Mapping[str, float]
+
+
+def own_poses(creature: Creature, note: str, cycle: Cycle) -> Own | None:
+    """Of a file that the creature's own walk was exported to; None of every other."""
+    names = creature.joints.names
+    try:
+        document = json.loads(note)
+        if document["creature"] != creature.digest:
+            return None
+        poses = np.array([[pose[n] for n in names] for pose in document["key_poses"]], float)
+        motion = np.array([document["motion"][n] for n in names], float).T
+        tuning = {str(name): float(value) for name, value in document["tuning"].items()}
+        mirrored, advance = bool(document["mirrored"]), str(document["advance"])
+        if not (np.isfinite(poses).all() and np.isfinite(motion).all() and len(motion) > 1):
+            return None
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        return None
+    motion = _resampled(motion, len(cycle.angles))
+    if cycle.mirrored:
+        other = mirror_image(creature, np.roll(motion, -len(motion) // 2, axis=0))
+        motion = 0.5 * (motion + other)
+    shifts = [np.roll(cycle.angles, -s, axis=0) for s in range(len(motion))]
+    shift = int(np.argmin([np.mean((angles - motion) ** 2) for angles in shifts]))
+    change = shifts[shift] - motion
+    changed = float(np.sqrt(np.mean(change**2)))
+    if mirrored and not cycle.mirrored:
+        poses = np.concatenate([poses, mirror_image(creature, poses)])
+    if changed >= UNCHANGED:
+        whole = len(poses) * (2 if cycle.mirrored else 1)
+        places = np.arange(len(poses)) * len(motion) // whole
+        poses = poses + change[places]
+    kept = np.clip(poses, creature.joints.pose_low, creature.joints.pose_high)
+    lost = np.degrees(np.abs(poses - kept).max(0))
+    clipped = {n: float(v) for n, v in zip(names, lost, strict=True) if v > UNCHANGED}
+    starts = shift / len(motion)
+    return Own(Fit(kept, changed, starts, clipped), changed, advance, tuning)
+
+
+def _resampled(motion: np.ndarray, count: int) -> np.ndarray:
+    """[N, J] of samples of a cycle, as many as asked for."""
+    closed = np.concatenate([motion, motion[:1]])
+    at = np.arange(count) / count * len(motion)
+    return np.stack([np.interp(at, np.arange(len(closed)), column) for column in closed.T], 1)

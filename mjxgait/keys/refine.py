@@ -1,0 +1,100 @@
+"""A run that stays near a cycle that somebody has keyed: a run like any other, by its settings."""
+
+import dataclasses
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mjxgait.creature import Creature
+from mjxgait.errors import UserError
+from mjxgait.keys.bring import Brought
+from mjxgait.runs.disk import disk_errors
+from mjxgait.settings.config import Config
+from mjxgait.settings.tables import build, merge
+
+KEYS = "keys.json"
+"""In the run folder: the cycle that the run stays near."""
+FARTHEST = 30.0
+"""deg; how far each joint of each key pose may depart where nothing is to be kept."""
+SLOWER = 0.3
+"""Share by which the period may change where nothing is to be kept."""
+
+
+def _near(value: float, ends: Sequence[float], share: float) -> list[float]:
+    """The part of a range about a value that lies within a share of its width."""
+    low, high = min(ends[0], value), max(ends[1], value)
+    return [max(low, value - share * (high - low)), min(high, value + share * (high - low))]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Original:
+    """What a run remembers of the cycle. angles: [N, J] rad over one cycle; the key poses begin at
+    the share `starts` of it. period: s. source: name of the file.
+    """
+
+    source: str
+    angles: np.ndarray
+    period: float
+    starts: float
+
+
+def refining(config: Config, brought: Brought, keep: float) -> Config:
+    """The settings of a run near a cycle, the clock leading it in the cycle's own time.
+
+    keep: 1 lets only the reflexes (steering, balance) evolve, 0 every joint by `FARTHEST`.
+
+    Raises:
+      UserError: `keep` is no share.
+    """
+    if not 0.0 <= keep <= 1.0:
+        raise UserError(f"--keep {keep:g}: must lie between 0 and 1")
+    poses, period = brought.fit.key_poses, brought.cycle.period
+    slack = SLOWER * (1.0 - keep)
+    near: dict[str, Any] = {
+        "key_poses": len(poses),
+        "mirror": brought.cycle.mirrored,
+        "advance": "clock",
+        "around": [round(float(angle), 6) for angle in poses.ravel()],
+        "within": FARTHEST * (1.0 - keep),
+        "tuning": {"period": [period * (1.0 - slack), period * (1.0 + slack)]},
+    }
+    if own := brought.own:
+        ranges = dataclasses.asdict(config)["controller"]["tuning"]
+        near["advance"] = own.advance
+        near["tuning"] = {n: _near(own.tuning[n], ranges[n], 1.0 - keep) for n in own.tuning}
+    table = merge(dataclasses.asdict(config), {"controller": near})
+    return build(type(config), table, "the settings of refine")
+
+
+def write_original(folder: Path, creature: Creature, source: Path, brought: Brought) -> None:
+    """Keeps the cycle in the run folder."""
+    joints = dict(zip(creature.joints.names, brought.cycle.angles.T.tolist(), strict=True))
+    document = {
+        "source": source.name,
+        "period": brought.cycle.period,
+        "starts": float(brought.fit.starts),
+        "joints": joints,
+    }
+    with disk_errors(folder):
+        (folder / KEYS).write_text(json.dumps(document) + "\n", encoding="utf-8")
+
+
+def read_original(folder: Path, creature: Creature) -> Original:
+    """The cycle that a run stays near.
+
+    Raises:
+      UserError: the run was not made by `refine`, or the file is damaged.
+    """
+    path = folder / KEYS
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+        angles = np.array([document["joints"][name] for name in creature.joints.names], float).T
+        known = {key: float(document[key]) for key in ("period", "starts")}
+        return Original(str(document["source"]), angles, **known)
+    except FileNotFoundError:
+        raise UserError(f"{folder}: was not made by `mjxgait refine` (it has no {KEYS})") from None
+    except (OSError, ValueError, KeyError, TypeError):
+        raise UserError(f"{path}: damaged; it must hold the cycle's angles by joint") from None

@@ -1,0 +1,176 @@
+"""What is asked of a walk in words: names for settings, as one layer of them (docs/wishes.md)."""
+
+import dataclasses
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from mjxgait.certify import CertificateConfig
+from mjxgait.certify.tasks.walk import SPARE
+from mjxgait.creature import Creature
+from mjxgait.errors import UserError, did_you_mean
+from mjxgait.settings.config import Config
+from mjxgait.settings.gaits import AUTO, SHORTEST, animal_stride, gait_of
+from mjxgait.settings.shipped import data_folder
+from mjxgait.settings.tables import build, merge, read_toml
+
+SPEED = re.compile(r"(?:fr)?[0-9]*\.?[0-9]+(?:e-?[0-9]+)?(?:bl/s|m/s)?")
+
+
+@dataclasses.dataclass(frozen=True)
+class Wishes:
+    """What a user asks of a walk.
+
+    Attributes:
+      speed: such as 0.4 (m/s), 0.4bl/s (body lengths per second), or fr0.2 (Froude number).
+      gait: walk, amble, trot, pace, canter, bound, gallop, tripod, wave, hop, waddle, or auto.
+      turn: deg/s, to the left.
+      steer: deg/s, up to which it should obey turns to either side.
+      style: calm, sneaky, heavy, proud, tired, hurried, or a TOML file of settings.
+    """
+
+    speed: str | None = None
+    gait: str | None = None
+    turn: float | None = None
+    steer: float | None = None
+    style: str | None = None
+
+    @classmethod
+    def of(cls, given: Mapping[str, Any]) -> "Wishes":
+        """Those that were given, as text or as what they are.
+
+        Raises:
+          UserError: a turn is no number.
+        """
+        values: dict[str, Any] = {name: v for name, v in given.items() if v is not None}
+        for name, value in values.items():
+            if name not in TURNS:
+                values[name] = str(value)
+                continue
+            try:
+                values[name] = float(value)
+            except ValueError:
+                raise UserError(f"--{name} {value}: give degrees per second") from None
+        return cls(**values)
+
+
+TURNS = ("turn", "steer")
+WISHES = tuple(field.name for field in dataclasses.fields(Wishes))
+
+
+def wished(config: Config, creature: Creature, wishes: Wishes) -> Config:
+    """The settings with what these wishes are names for laid over them.
+
+    Raises:
+      UserError: names the wish that means nothing, or not for this body.
+    """
+    if wishes == Wishes():
+        return config
+    if config.use.task != "walk":
+        raise UserError(
+            f"--{', --'.join(WISHES)} are for walking, and this is to {config.use.task}"
+        )
+    if wishes.style is not None:
+        config = _styled(config, wishes.style)
+    table: dict[str, Any] = {}
+    for layer in (
+        _gait(wishes.gait, creature, config),
+        _speed(wishes.speed, creature),
+        _turn("turn", wishes.turn),
+        _turn("steer", wishes.steer),
+    ):
+        table = merge(table, layer)
+    if config.use.controller != "poses":
+        table.pop("controller", None)
+    return build(type(config), merge(dataclasses.asdict(config), table), "the wishes")
+
+
+def hint(config: Config) -> str | None:
+    """A sentence for whoever has set `fitness.speed` below what is called a walk, and so asks for
+    nothing that can be certified: it says up to where faster is better.
+    """
+    if config.use.task != "walk" or config.fitness.wish.speed is not None:
+        return None
+    least = SPARE * CertificateConfig().progress.speed
+    if not 0 < config.fitness.speed < least:
+        return None
+    return (
+        f"fitness.speed = {config.fitness.speed:g} says up to where faster is better, and no walk "
+        f"below {least:g} body lengths/s is looked at; to have it walk so slowly ask with --speed "
+        f"{config.fitness.speed:g}bl/s."
+    )
+
+
+def speed_of(text: str, creature: Creature) -> float:
+    """m/s of a speed in words.
+
+    Raises:
+      UserError: it is none.
+    """
+    plain = text.strip().lower().replace(" ", "")
+    if not SPEED.fullmatch(plain) or (plain.startswith("fr") and plain.endswith("/s")):
+        raise UserError(
+            f"--speed {text}: give m/s, such as 0.4, body lengths per second, 0.4bl/s, or a Froude "
+            "number, fr0.2"
+        )
+    value = float(plain.removeprefix("fr").removesuffix("bl/s").removesuffix("m/s"))
+    if not value > 0:
+        raise UserError(f"--speed {text}: must be more than 0; who is to stand still needs no walk")
+    if plain.startswith("fr"):
+        return float((value * _gravity(creature) * creature.frame.hip_height) ** 0.5)
+    return value * creature.frame.body_length if plain.endswith("bl/s") else value
+
+
+def _speed(text: str | None, creature: Creature) -> dict[str, Any]:
+    """The speed, and a cycle that takes as long as the shortest strides there may be at that speed.
+
+    A cycle moves on by a step at most every control step: ten steps from pose to pose, a fifth of
+    a second for all four, let whoever moves little run through them far too often.
+    """
+    if text is None:
+        return {}
+    speed = round(speed_of(text, creature), 6)
+    hip, step = creature.frame.hip_height, float(creature.model.opt.timestep)
+    poses = 4
+    steps = round(SHORTEST * animal_stride(speed, hip) / speed / step / poses)
+    return {
+        "fitness": {"wish": {"speed": speed}},
+        "controller": {"interpolation": max(steps, 10)},
+    }
+
+
+def _gait(name: str | None, creature: Creature, config: Config) -> dict[str, Any]:
+    if name is None or name == AUTO:
+        return {}
+    try:
+        gait = gait_of(name, len(creature.feet.names))
+    except ValueError as error:
+        raise UserError(f"--gait {name}: {creature.name}: {error}") from None
+    whole: dict[str, Any] = {"mirror": False, "key_poses": 4}
+    wish = {"gait": name} | ({} if gait.sway is None else {"sway": gait.sway})
+    return {"fitness": {"wish": wish}} | ({} if gait.twice else {"controller": whole})
+
+
+def _turn(name: str, rate: float | None) -> dict[str, Any]:
+    if rate is None:
+        return {}
+    return {"fitness": {"wish": {name: rate}}, "controller": {"tuning": {"steer": [0.0, 6.0]}}}
+
+
+def _styled(config: Config, name: str) -> Config:
+    """The settings with a style's laid over them.
+
+    Raises:
+      UserError: there is none of that name and no file, or it holds what is no setting.
+    """
+    folder = data_folder("configs") / "styles"
+    known = [path.stem for path in folder.glob("*.toml")]
+    if name not in known and Path(name).suffix != ".toml":
+        raise UserError(f"--style {name}: {did_you_mean(name, known)}; or give a FILE.toml")
+    path = folder / f"{name}.toml" if name in known else Path(name)
+    return build(type(config), merge(dataclasses.asdict(config), read_toml(path)), str(path))
+
+
+def _gravity(creature: Creature) -> float:
+    return float(-creature.model.opt.gravity[2])

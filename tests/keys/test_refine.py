@@ -1,0 +1,158 @@
+"""A refined cycle stays near the one that was drawn: a run like any other, and what changed in words."""
+
+import dataclasses
+import json
+from pathlib import Path
+
+import jax
+import numpy as np
+import pytest
+from helpers import small_config
+from keys.made import swings, write
+from viewing.made_up import treading
+
+from mjxgait.champion import read_champion
+from mjxgait.cli import main
+from mjxgait.control.poses import PoseTracker
+from mjxgait.creature import Creature
+from mjxgait.errors import UserError
+from mjxgait.keys import Brought, bring
+from mjxgait.keys.departure import _feet_in_words, departure
+from mjxgait.keys.refine import KEYS, Original, read_original, refining
+from mjxgait.parts.fit import check_fit
+from mjxgait.runs.folder import CHAMPION, open_run
+from mjxgait.settings.config import EvolutionConfig
+from mjxgait.viewing.walk import record_walk
+
+SETTINGS = """
+[rollout]
+seconds = 0.4
+starts = 2
+lanes = 4
+[examination]
+candidates = 0
+"""
+
+
+@pytest.fixture(scope="module")
+def brought(stool: Creature, tmp_path_factory) -> Brought:
+    file = write(tmp_path_factory.mktemp("keys"), "csv", stool, swings(stool))
+    return bring(stool, file, tolerance=np.radians(4.0))
+
+
+@pytest.mark.parametrize(("keep", "within"), [(1.0, 0.0), (0.5, 15.0), (0.0, 30.0)])
+def test_poses_stay_as_near_as_they_are_kept(stool, brought, keep: float, within: float):
+    config = refining(small_config(), brought, keep).controller
+    low, high = PoseTracker(stool, 0.005).bounds(config)
+    drawn = brought.fit.key_poses
+    assert config.key_poses == len(drawn)
+    for edge in (low.key_poses, high.key_poses):
+        assert np.degrees(np.abs(edge - drawn)).max() <= within + 1e-3
+    assert (low.key_poses >= stool.joints.pose_low - 1e-6).all()
+    assert (high.key_poses <= stool.joints.pose_high + 1e-6).all()
+    slower = config.tuning.period[1] / brought.cycle.period
+    assert slower == pytest.approx(1.0 + 0.3 * (1.0 - keep))
+
+
+def test_the_first_that_is_made_is_the_one_that_was_drawn(stool, brought):
+    config = refining(small_config(), brought, 0.5).controller
+    variation = PoseTracker(stool, 0.005).variation(config, EvolutionConfig())
+    made = variation.create(jax.random.key(0), 4)
+    assert made.key_poses[0] == pytest.approx(brought.fit.key_poses, abs=1e-5)
+    assert np.abs(made.key_poses[1] - brought.fit.key_poses).max() > 0.01
+
+
+def test_settings_of_another_creature_are_refused(shipped, brought):
+    config = refining(small_config(), brought, 0.5)
+    if shipped.settings.creature.grows:
+        pytest.skip("it has no poses")
+    with pytest.raises(UserError, match=r"controller\.around has"):
+        check_fit(shipped, config)
+
+
+@pytest.mark.parametrize("keep", [-0.1, 1.5])
+def test_a_share_lies_between_nothing_and_all(brought, keep: float):
+    with pytest.raises(UserError, match="between 0 and 1"):
+        refining(small_config(), brought, keep)
+
+
+def test_a_foot_that_reaches_elsewhere_is_told_in_words(stool: Creature):
+    drawn = swings(stool)
+    done = drawn.copy()
+    done[:, 1] -= 0.3
+    told = _feet_in_words(stool, drawn, done)
+    assert told
+    assert all(stool.feet.names[1] in sentence for sentence in told)
+    assert any("cm further forward" in sentence for sentence in told)
+    assert any("cm less far back" in sentence for sentence in told)
+    assert _feet_in_words(stool, drawn, drawn) == []
+
+
+def test_the_departure_of_a_walk_is_measured(stool: Creature):
+    """Of one that treads as it was drawn, and of one with a joint five degrees elsewhere."""
+    champion = treading(stool, degrees=12.0)
+    near = np.ravel(champion.genome["key_poses"])
+    drawn = dataclasses.replace(champion.settings, around=tuple(map(float, near)))
+    walk = record_walk(stool, dataclasses.replace(champion, settings=drawn), 4.0)
+    first, last = walk.steady_strides(1)
+    motion = walk.qpos[first:last, stool.joints.qpos_adr]
+    period = len(motion) * walk.time_step
+    found = departure(Original("x", motion, period, 0.0), walk)
+    assert (found.poses, found.period) == (0.0, pytest.approx(1.0, abs=0.02))
+    assert found.moved < 0.1
+    bent = dataclasses.replace(
+        drawn, around=tuple(near + np.radians(5.0) * (np.arange(len(near)) % 4 == 1))
+    )
+    walk = record_walk(stool, dataclasses.replace(champion, settings=bent), 4.0)
+    found = departure(Original("x", motion, 2.0 * period, 0.0), walk)
+    name = stool.joints.names[1]
+    assert found.by_joint == pytest.approx(dict.fromkeys(stool.joints.names, 0.0) | {name: 5.0})
+    assert found.poses == pytest.approx(2.5)
+    assert "a cycle takes 50% shorter" in found.words
+
+
+def said(capsys: pytest.CaptureFixture, *arguments: object, code: int) -> str:
+    with pytest.raises(SystemExit) as ended:
+        main(["refine", *map(str, arguments)])
+    text = capsys.readouterr()
+    assert ended.value.code == code, text.err
+    return text.out + text.err
+
+
+def test_from_a_file_to_a_run_that_can_be_gone_on_with(tmp_path: Path, capsys, stool: Creature):
+    from helpers import STOOL
+
+    (tmp_path / "small.toml").write_text(SETTINGS)
+    file, run = write(tmp_path, "bvh", stool, swings(stool)), tmp_path / "run"
+    given = ("--env", STOOL, "--keys", file, "--config", tmp_path / "small.toml", "--keep", 0.8)
+    assert "key poses:" in said(capsys, *given, "--only-show", "--out", run, code=0)
+    assert not run.exists()
+    size = ("--population", 6, "--generations", 2)
+    told = said(capsys, *given, *size, "--out", run, code=0)
+    assert "front_left <- front_left" in told
+    assert "From walk.bvh: key poses" in told
+    assert "mjxgait export" in told
+    creature, config = open_run(run)
+    drawn = np.reshape(config.controller.around, (config.controller.key_poses, -1))
+    champion = read_champion(run / CHAMPION, creature)
+    assert np.degrees(np.abs(champion.genome["key_poses"] - drawn)).max() <= 6.0 + 1e-3
+    assert "From walk.bvh" in said(capsys, "--resume", run, code=0)
+    assert "holds another run" in said(capsys, *given, "--out", run, code=2)
+    (run / KEYS).write_text(json.dumps({"source": "x"}))
+    with pytest.raises(UserError, match="damaged"):
+        read_original(run, creature)
+    (run / KEYS).unlink()
+    assert "was not made by `mjxgait refine`" in said(capsys, "--resume", run, code=2)
+
+
+def test_where_evolution_looked_is_no_part_of_who_somebody_is(stool: Creature):
+    """Else champions of before these settings would lose their certificates."""
+    champion = treading(stool)
+    before = {
+        k: v
+        for k, v in dataclasses.asdict(champion.settings).items()
+        if k not in ("around", "within")
+    }
+    near = dataclasses.replace(champion.settings, around=(0.1, 0.2), within=3.0)
+    others = [dataclasses.replace(champion, settings=settings) for settings in (before, near)]
+    assert {other.fingerprint for other in others} == {champion.fingerprint}
