@@ -222,6 +222,7 @@ def test_the_first_generation_is_the_best_of_as_many_candidates_as_asked_for(gro
         first, _, judged = advance(*inputs(choosy), first)
         rounds.append(near_zero(judged))
     candidates = np.sort(np.concatenate(rounds)[:80])[::-1]
+    assert len(set(candidates.tolist())) == 80
     np.testing.assert_allclose(first.fitness, candidates[:20], rtol=1e-6)
     np.testing.assert_allclose(near_zero(first.genomes), first.fitness, rtol=1e-6)
     assert np.median(first.fitness) > np.median(run(plain, 1)[0][0].fitness)
