@@ -10,9 +10,9 @@ class SwimWeights:
     """What each term counts; `overlap` and `elsewhere` are penalties.
 
     Attributes:
-      speed: m/s of the way, as far as the blocks are apart.
-      overlap: how deep blocks are in each other.
-      elsewhere: momentum that the water did not give.
+      speed: m/s of the way, as the crow flies.
+      overlap: what of the speed is lost by blocks that stand in each other.
+      elsewhere: what of the rest is lost by momentum that the water did not give.
     """
 
     __pydantic_config__ = STRICT
