@@ -85,4 +85,4 @@ def test_an_import_tells_what_it_leaves_out(tmp_path: Path):
     (tmp_path / "scene.xml").write_text(text.replace(FLOOR, BALL + step + FLOOR))
     notes = import_model(tmp_path / "scene.xml", ImportChoices(apart=False)).notes
     told = [change.what for change in notes.changes]
-    assert 'left out: body "ball", geom "step"' in told
+    assert 'left out: body "ball" (2.09 kg), geom "step"' in told
