@@ -182,10 +182,10 @@ class _Body:
         stand = np.array([self.stand[j.qposadr[0]] for j in self.joints])
         left = self.trunk_rot @ self.axes()[1]
         flip = np.eye(3) - 2 * np.outer(left, left)
-        base, base_image = self._parts(stand), self._parts(_mirrored(creature, stand))
+        base, base_image = self._parts(stand), self._parts(creature.mirror.image(stand))
         for _ in range(4):
             pose = stand + free * rng.uniform(-SWING, SWING, len(stand))
-            parts, image = self._parts(pose), self._parts(_mirrored(creature, pose))
+            parts, image = self._parts(pose), self._parts(creature.mirror.image(pose))
             for j, partner in enumerate(creature.mirror.partner):
                 turned = parts[1][partner] @ base[1][partner].T
                 image_turned = image[1][j] @ base_image[1][j].T
@@ -232,11 +232,6 @@ class _Body:
 
     def _body_id(self, name: str) -> int:
         return int(self.model.body(name).id)
-
-
-def _mirrored(creature: Creature, pose: np.ndarray) -> np.ndarray:
-    """[J] the mirror image of a pose, as the creature's map says."""
-    return creature.mirror.sign * pose[creature.mirror.partner]
 
 
 def _show(value: Any) -> str:

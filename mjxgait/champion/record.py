@@ -60,7 +60,7 @@ class Champion:
             drive=config.drive,
             task=config.use.task,
             sizes={} if sizes is None else proportions(creature).by_part(sizes),
-            wish=config.fitness.wish.table if hasattr(config.fitness, "wish") else {},
+            wish=config.wish,
             **scored,
         )
 

@@ -8,12 +8,11 @@ from typing import Annotated, Literal
 import numpy as np
 import tyro
 
-from mjxgait.certify import read_certificate
 from mjxgait.creature import Creature
 from mjxgait.errors import INTERRUPTED, UserError
-from mjxgait.library import load_creature
+from mjxgait.library import Run, load_creature
 from mjxgait.parts import resolve_config
-from mjxgait.runs.folder import CERTIFICATE, create_run, open_run
+from mjxgait.runs.folder import create_run, open_run
 from mjxgait.settings.config import Config
 from mjxgait.settings.tables import build, merge, read_toml
 
@@ -119,8 +118,7 @@ def _run(folder: Path, creature: Creature, config: Config, resume: bool) -> int:
     screen.say(f"From {original.source}: key poses {found.poses:.1f} degrees{moved} (r.m.s.)")
     for sentence in found.words:
         screen.say(f"  {sentence}")
-    document = read_certificate(folder / CERTIFICATE)
-    certified = bool(document and document["passed"])
+    certified = Run(folder).certified
     if not certified:
         screen.say("With less of the original it may walk: a smaller --keep")
     screen.next_steps(folder, certified)

@@ -9,16 +9,14 @@ from typing import Annotated
 
 import tyro
 
-from mjxgait.certify import read_certificate
 from mjxgait.creature import Creature
 from mjxgait.creature.scale import parse_scales
 from mjxgait.errors import INTERRUPTED, UserError
-from mjxgait.library import load_creature
+from mjxgait.library import Run, load_creature
 from mjxgait.parts import resolve_config
 from mjxgait.parts.wishes import WISHES, Wishes, hint, wished
 from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.folder import (
-    CERTIFICATE,
     METRICS,
     PLOT,
     create_run,
@@ -131,8 +129,7 @@ def train_command(arguments: Sequence[str]) -> int:
         plot_run(folder)
         print(f"plots         {folder / PLOTS}/")
     if ended:
-        document = read_certificate(folder / CERTIFICATE)
-        screen.next_steps(folder, bool(document and document["passed"]))
+        screen.next_steps(folder, Run(folder).certified)
     return 0 if ended else INTERRUPTED
 
 

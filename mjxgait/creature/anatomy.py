@@ -95,6 +95,10 @@ class Mirror:
         """Joint [J] on the other side, to index with."""
         return np.array(self.partners, dtype=int)
 
+    def image(self, angles: np.ndarray) -> np.ndarray:
+        """Angles [..., J] of the mirrored creature."""
+        return self.sign * angles[..., self.partner]
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Corrections:

@@ -65,7 +65,7 @@ def find_cycle(
     gap = float(np.sqrt(np.mean((samples[-1] - samples[0]) ** 2)))
     closing = np.linspace(0.0, 1.0, SAMPLES + 1)[:, None] * (samples[-1] - samples[0])
     whole = (samples - closing)[:-1]
-    other = mirror_image(creature, np.roll(whole, -SAMPLES // 2, axis=0))
+    other = creature.mirror.image(np.roll(whole, -SAMPLES // 2, axis=0))
     alike = float(np.sqrt(np.mean((whole - other) ** 2)))
     mirrored = creature.mirror.symmetric and alike < MIRRORED
     if mirrored:
@@ -73,17 +73,16 @@ def find_cycle(
     return Cycle(whole, float(period), float(first), gap, mirrored)
 
 
-def mirror_image(creature: Creature, angles: np.ndarray) -> np.ndarray:
-    """Angles [..., J] of the mirrored creature."""
-    return creature.mirror.sign * angles[..., creature.mirror.partner]
+def interpolated(at: np.ndarray, times: np.ndarray, angles: np.ndarray) -> np.ndarray:
+    """[n, J] at other times [n] than those [F] of the angles [F, J]."""
+    return np.stack([np.interp(at, times, column) for column in angles.T], 1)
 
 
 def _sampled(
     times: np.ndarray, angles: np.ndarray, first: float, period: float, count: int
 ) -> np.ndarray:
     """[count, J] evenly over a period, both ends included."""
-    at = first + np.linspace(0.0, period, count)
-    return np.stack([np.interp(at, times, column) for column in angles.T], 1)
+    return interpolated(first + np.linspace(0.0, period, count), times, angles)
 
 
 def _period(times: np.ndarray, angles: np.ndarray, first: float, last: float) -> float:

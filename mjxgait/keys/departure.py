@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 
 from mjxgait.creature import Creature
+from mjxgait.keys.cycle import interpolated
 from mjxgait.keys.refine import Original
 from mjxgait.viewing.walk import Walk
 
@@ -69,7 +70,7 @@ def _over_stride(walk: Walk, first: int, last: int, count: int) -> np.ndarray:
     """[N, J] of the joints as they moved over one stride."""
     angles = walk.qpos[:, walk.creature.joints.qpos_adr]
     at, frames = np.linspace(first, last, count, endpoint=False), np.arange(len(angles))
-    return np.stack([np.interp(at, frames, column) for column in angles.T], 1)
+    return interpolated(at, frames, angles)
 
 
 def _feet_in_words(creature: Creature, drawn: np.ndarray, done: np.ndarray) -> list[str]:

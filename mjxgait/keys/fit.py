@@ -11,9 +11,11 @@ import numpy as np
 
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
-from mjxgait.keys.cycle import Cycle, mirror_image
+from mjxgait.keys.cycle import Cycle
 
 MOST_POSES = 12
+SEEN = 0.5
+"""deg."""
 TURNS = 4
 """Places between two samples of poses that are tried for the first pose."""
 
@@ -61,11 +63,18 @@ def _fitted(creature: Creature, cycle: Cycle, count: int, starts: float) -> Fit:
     hats = np.maximum(0.0, 1.0 - np.abs((place[:, None] - np.arange(whole) + 1) % whole - 1))
     poses = np.linalg.lstsq(hats, samples, rcond=None)[0]
     if cycle.mirrored:
-        poses = 0.5 * (poses[:count] + mirror_image(creature, poses[count:]))
+        poses = 0.5 * (poses[:count] + creature.mirror.image(poses[count:]))
+    full = np.concatenate([poses, creature.mirror.image(poses)]) if cycle.mirrored else poses
+    error = float(np.sqrt(np.mean((hats @ full - samples) ** 2)))
+    kept, clipped = within_range(creature, poses)
+    return Fit(kept, error, starts, clipped)
+
+
+def within_range(creature: Creature, poses: np.ndarray) -> tuple[np.ndarray, dict[str, float]]:
+    """Key poses [K, J] within the joints' pose ranges, and by joint the deg that it takes away at
+    most, where one would see it.
+    """
     joints = creature.joints
     kept = np.clip(poses, joints.pose_low, joints.pose_high)
     lost = np.degrees(np.abs(poses - kept).max(0))
-    full = np.concatenate([poses, mirror_image(creature, poses)]) if cycle.mirrored else poses
-    error = float(np.sqrt(np.mean((hats @ full - samples) ** 2)))
-    clipped = {n: float(v) for n, v in zip(joints.names, lost, strict=True) if v > 0.5}
-    return Fit(kept, error, starts, clipped)
+    return kept, {n: float(v) for n, v in zip(joints.names, lost, strict=True) if v > SEEN}

@@ -12,8 +12,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from mjxgait.creature import Creature
-from mjxgait.keys.cycle import Cycle, mirror_image
-from mjxgait.keys.fit import Fit
+from mjxgait.keys.cycle import Cycle, interpolated
+from mjxgait.keys.fit import Fit, within_range
 
 NOTE = "mjxgait"
 """Name of the property of the root in which the text lies."""
@@ -50,21 +50,19 @@ def own_poses(creature: Creature, note: str, cycle: Cycle) -> Own | None:
         return None
     motion = _resampled(motion, len(cycle.angles))
     if cycle.mirrored:
-        other = mirror_image(creature, np.roll(motion, -len(motion) // 2, axis=0))
+        other = creature.mirror.image(np.roll(motion, -len(motion) // 2, axis=0))
         motion = 0.5 * (motion + other)
     shifts = [np.roll(cycle.angles, -s, axis=0) for s in range(len(motion))]
     shift = int(np.argmin([np.mean((angles - motion) ** 2) for angles in shifts]))
     change = shifts[shift] - motion
     changed = float(np.sqrt(np.mean(change**2)))
     if mirrored and not cycle.mirrored:
-        poses = np.concatenate([poses, mirror_image(creature, poses)])
+        poses = np.concatenate([poses, creature.mirror.image(poses)])
     if changed >= UNCHANGED:
         whole = len(poses) * (2 if cycle.mirrored else 1)
         places = np.arange(len(poses)) * len(motion) // whole
         poses = poses + change[places]
-    kept = np.clip(poses, creature.joints.pose_low, creature.joints.pose_high)
-    lost = np.degrees(np.abs(poses - kept).max(0))
-    clipped = {n: float(v) for n, v in zip(names, lost, strict=True) if v > UNCHANGED}
+    kept, clipped = within_range(creature, poses)
     starts = shift / len(motion)
     return Own(Fit(kept, changed, starts, clipped), changed, advance, tuning)
 
@@ -73,4 +71,4 @@ def _resampled(motion: np.ndarray, count: int) -> np.ndarray:
     """[N, J] of samples of a cycle, as many as asked for."""
     closed = np.concatenate([motion, motion[:1]])
     at = np.arange(count) / count * len(motion)
-    return np.stack([np.interp(at, np.arange(len(closed)), column) for column in closed.T], 1)
+    return interpolated(at, np.arange(len(closed)), closed)

@@ -140,6 +140,5 @@ def _promising(experiment: Experiment, state: EvolutionState) -> bool:
     """Whether the best individual is worth an examination."""
     config, names = experiment.config, experiment.simulator.task.outcomes
     outcome = dict(zip(names, np.asarray(state.outcome[0]).T, strict=True))
-    wish = config.fitness.wish.table if hasattr(config.fitness, "wish") else {}
-    demands = demands_of(config.use.task, wish)
+    demands = demands_of(config.use.task, config.wish)
     return demands.promising(outcome, config.rollout.seconds, experiment.creature)

@@ -254,9 +254,10 @@ class UseConfig:
     """Who takes part.
 
     Attributes:
-      controller: what moves the creature: poses, program (docs/programs.md), or FILE.py:CLASS of
-        your own (docs/extending.md).
-      task: what the creature is to do: walk, hop, limbo, travel, or FILE.py:CLASS of your own.
+      controller: what moves the creature: poses, program (docs/programs.md), brain
+        (docs/blocks.md), or FILE.py:CLASS of your own (docs/extending.md).
+      task: what the creature is to do: walk, hop, limbo, travel, swim, or FILE.py:CLASS of your
+        own.
     """
 
     __pydantic_config__ = STRICT
@@ -300,3 +301,9 @@ class Config:
                 f"rollout.variety = {self.rollout.variety}: who has been judged on other starts "
                 'does not compare; set evolution.survival = "children" and evolution.elite'
             )
+
+    @property
+    def wish(self) -> dict[str, float | str]:
+        """What is asked of a walk, by name; of who does something else nothing can be."""
+        asked = getattr(self.fitness, "wish", None)
+        return asked.table if asked is not None else {}

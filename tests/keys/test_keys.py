@@ -14,7 +14,7 @@ from mjxgait.animation import WalkLoop, build_glb, export_glb
 from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import UserError
 from mjxgait.keys import bring
-from mjxgait.keys.cycle import find_cycle, mirror_image
+from mjxgait.keys.cycle import find_cycle
 from mjxgait.keys.fit import fit_poses
 from mjxgait.keys.match import matched
 from mjxgait.keys.own import NOTE
@@ -134,7 +134,7 @@ def test_a_mirrored_cycle_is_known_as_one(shipped: Creature, mirrored: bool):
     moves = any(j != p for j, p in enumerate(shipped.mirror.partner))
     if moves and shipped.mirror.symmetric:
         middle = len(cycle.angles) // 2
-        lack = worst(mirror_image(shipped, cycle.angles[:middle]), cycle.angles[middle:])
+        lack = worst(shipped.mirror.image(cycle.angles[:middle]), cycle.angles[middle:])
         assert (lack < 1e-6) == cycle.mirrored
     if not mirrored:
         assert not cycle.mirrored
@@ -182,7 +182,7 @@ def test_an_exported_walk_comes_back_with_the_key_poses_that_made_it(exported, t
     assert own
     assert np.degrees(own.changed) < 0.1
     whole = [champion.genome["key_poses"]]
-    whole += [mirror_image(creature, whole[0])] * creature.mirror.symmetric
+    whole += [creature.mirror.image(whole[0])] * creature.mirror.symmetric
     assert worst(own.fit.key_poses, np.concatenate(whole)) < 0.01
     assert own.tuning == pytest.approx(dict(zip(TUNING, champion.genome["tuning"], strict=True)))
 

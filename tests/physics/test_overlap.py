@@ -28,7 +28,8 @@ from mjxgait.physics.plain import mjx_plant
 from mjxgait.settings.walk import WalkConfig
 from mjxgait.simulation.rollout import CHECK_EVERY, Lane, Simulator
 from mjxgait.tasks.falls import Reason
-from mjxgait.tasks.walk.fitness import DEEP, TOUCHING, fitness_terms
+from mjxgait.tasks.overlap import DEEP, TOUCHING
+from mjxgait.tasks.walk.fitness import fitness_terms
 from mjxgait.tasks.walk.tally import Judge, Tally
 from mjxgait.types import BodyState
 

@@ -11,6 +11,7 @@ from mjxgait.body import Body
 from mjxgait.settings.hop import NEAR, HopConfig, HopWeights, TravelConfig
 from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.hop.tally import Tally
+from mjxgait.tasks.overlap import crossed
 
 TERMS = tuple(field.name for field in dataclasses.fields(HopWeights))
 GOAL = "distance"
@@ -24,8 +25,6 @@ FARTHEST = 2.0
 """Goal distances; who is farther off than that is no worse."""
 FASTEST, FAST = 20.0, 0.7
 """rad/s that no joint of a machine turns at, and the share of it that costs nothing."""
-TOUCHING, DEEP = 0.005, 0.05
-"""Hip heights: parts less deep in each other only touch; an overlap so much deeper counts half."""
 
 
 def fitness_terms(
@@ -50,7 +49,6 @@ def style_terms(creature: Body, horizon: int, tally: Tally) -> dict[str, jax.Arr
     """The manner [] of one episode, however near it got."""
     lived = jnp.maximum(tally.steps, 1)
     half_range = 0.5 * (creature.joints.pose_high - creature.joints.pose_low).astype(jnp.float32)
-    crossed = jnp.maximum(tally.overlap / creature.frame.hip_height - TOUCHING, 0.0)
     return {
         "time": tally.arrived / horizon,
         "restless": jnp.minimum(tally.after / tally.goal, 1.0),
@@ -58,7 +56,7 @@ def style_terms(creature: Body, horizon: int, tally: Tally) -> dict[str, jax.Arr
         "fall": jnp.where(tally.reason == Reason.FINISHED, 0.0, 1.0),
         "fast": jnp.clip(tally.fastest / FASTEST - FAST, 0.0, 1.0 - FAST) / (1.0 - FAST),
         "neutral": jnp.minimum(jnp.mean(tally.bent / jnp.maximum(half_range, 1e-6)), 1.0),
-        "overlap": crossed / (crossed + DEEP),
+        "overlap": crossed(creature, tally.overlap),
     }
 
 

@@ -9,6 +9,7 @@ import optax
 from mjxgait.body import Body
 from mjxgait.settings.walk import WalkConfig, Weights
 from mjxgait.tasks.falls import Reason
+from mjxgait.tasks.overlap import crossed
 from mjxgait.tasks.walk.tally import Tally
 
 TERMS = tuple(field.name for field in dataclasses.fields(Weights))
@@ -18,12 +19,6 @@ STYLE = tuple(name for name in TERMS if name not in (*REWARDS, "foot_height", "f
 
 BEYOND = 0.02
 """What a body length counts that goes beyond the wanted speed."""
-
-TOUCHING = 0.005
-"""Hip heights; parts that are less deep in each other than this only touch."""
-DEEP = 0.05
-"""Hip heights beyond `TOUCHING` at which an overlap counts half: it must not cost more than a walk
-brings."""
 
 
 def stride_limit(mass: float) -> float:
@@ -66,7 +61,6 @@ def plain_terms(
     low_feet = jnp.mean(dragged / jnp.maximum(jnp.maximum(tally.swings, strides), 1.0))
     duty = tally.contact / lived
     second_half = tally.forward - tally.forward_half
-    crossed = jnp.maximum(tally.overlap / creature.frame.hip_height - TOUCHING, 0.0)
     enough = _enough(config.speed, horizon * step)
     values = {
         "distance": _counted(tally.forward / length, enough),
@@ -87,7 +81,7 @@ def plain_terms(
         "energy": tally.work / (creature.frame.mass * 9.81 * moved),
         "saturation": tally.saturation / lived,
         "limits": tally.limits / lived,
-        "overlap": crossed / (crossed + DEEP),
+        "overlap": crossed(creature, tally.overlap),
         "fall": jnp.where(tally.reason == Reason.FINISHED, 0.0, 1.0),
     }
     return values, enough

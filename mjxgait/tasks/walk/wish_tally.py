@@ -4,7 +4,6 @@ import dataclasses
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 
 from mjxgait.body import Body
 from mjxgait.senses import sense, trunk_height
@@ -33,7 +32,7 @@ def wish_tally(tally: Tally, feet: int) -> WishTally:
     """The empty one over an empty tally."""
     none = jnp.zeros(())
     return WishTally(
-        **_fields(tally),
+        **vars(tally),
         falls=no_footfalls(feet),
         height=none,
         height_squared=none,
@@ -45,14 +44,14 @@ def wish_tally(tally: Tally, feet: int) -> WishTally:
 def wish_updated(creature: Body, before: WishTally, after: Tally, sensed: Sensed) -> WishTally:
     """The tally after one step more, of which `after` has what every walk leaves behind."""
     height = trunk_height(sensed)
-    roll = sense(creature, sensed, jnp.zeros(()), ["roll"])["roll"]
+    way = sense(creature, sensed, jnp.zeros(()), ["roll", "forward", "aside"])
     return WishTally(
-        **_fields(after),
+        **vars(after),
         falls=stepped(before.falls, before, after),
         height=before.height + height,
         height_squared=before.height_squared + height**2,
-        roll_squared=before.roll_squared + roll**2,
-        trunk=_place(creature, sensed),
+        roll_squared=before.roll_squared + way["roll"] ** 2,
+        trunk=jnp.stack([way["forward"], way["aside"]]),
     )
 
 
@@ -77,12 +76,3 @@ def along(before: WishTally, after: WishTally, told: jax.Array, half_time: int) 
 def wrapped(angle: jax.Array) -> jax.Array:
     """The same direction [] from -pi to pi."""
     return jnp.arctan2(jnp.sin(angle), jnp.cos(angle))
-
-
-def _place(creature: Body, sensed: Sensed) -> jax.Array:
-    moved = sensed.trunk_pos - creature.frame.stand_pos.astype(np.float32)
-    return jnp.stack([moved @ axis for axis in creature.frame.start_axes])
-
-
-def _fields(tally: Tally) -> dict[str, jax.Array]:
-    return {field.name: getattr(tally, field.name) for field in dataclasses.fields(tally)}
