@@ -17,6 +17,7 @@ def resolve_config(
     file: Path | None = None,
     use: Mapping[str, str] | None = None,
     config_class: Callable[[UseConfig], type[Config]] = lambda use: Config,
+    meant: Callable[[UseConfig], UseConfig] = lambda use: use,
 ) -> Config:
     """The layers, each over the one before: `configs/default.toml`, the creature's `[train]`, the user's file.
 
@@ -26,6 +27,7 @@ def resolve_config(
 
     Args:
       use: who takes part, over what the layers say. config_class: the settings of those.
+      meant: who takes part, by other names than those given.
 
     Raises:
       UserError: names the layer and the key.
@@ -36,11 +38,11 @@ def resolve_config(
     if not standalone:
         given.append((str(default), read_toml(default)))
         given.append((f"{creature_name}/creature.toml: [train]", creature_table))
-    chosen = _chosen([*given, *mine], use or {})
+    chosen = meant(_chosen([*given, *mine], use or {}))
     cls = config_class(chosen)
     table: dict[str, Any] = {}
     for where, layer in [
-        *((w, _without_absent(given_one, chosen)) for w, given_one in given),
+        *((w, _without_absent(given_one, chosen, meant)) for w, given_one in given),
         *mine,
     ]:
         table = merge(table, layer)
@@ -60,15 +62,17 @@ def _chosen(layers: Sequence[tuple[str, Mapping[str, Any]]], use: Mapping[str, s
     return build(UseConfig, merge(table, use), "the options")
 
 
-def _without_absent(layer: Mapping[str, Any], use: UseConfig) -> dict[str, Any]:
+def _without_absent(
+    layer: Mapping[str, Any], use: UseConfig, meant: Callable[[UseConfig], UseConfig]
+) -> dict[str, Any]:
     """A layer without what it says to a controller or a task that takes no part.
 
     It was written for those that it names itself, and else for those of the default.
     """
-    meant = build(UseConfig, layer.get("use", {}), "[use]")
+    written = meant(build(UseConfig, layer.get("use", {}), "[use]"))
     absent = {
-        "controller": use.controller != meant.controller,
-        "fitness": use.task != meant.task,
+        "controller": use.controller != written.controller,
+        "fitness": use.task != written.task,
     }
     return {key: value for key, value in layer.items() if not absent.get(key)}
 

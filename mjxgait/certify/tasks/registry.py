@@ -7,6 +7,7 @@ from mjxgait.certify.tasks.hop import HopDemands
 from mjxgait.certify.tasks.limbo import LimboDemands
 from mjxgait.certify.tasks.plain import HasCriteria, PlainDemands
 from mjxgait.certify.tasks.protocol import Demands
+from mjxgait.certify.tasks.roam import RoamDemands
 from mjxgait.certify.tasks.staying import StaysUp
 from mjxgait.certify.tasks.swim import SwimDemands
 from mjxgait.certify.tasks.travel import TravelDemands
@@ -19,6 +20,7 @@ _DEMANDS: dict[str, Demands] = {
     "limbo": LimboDemands(),
     "travel": TravelDemands(),
     "swim": SwimDemands(),
+    "roam": RoamDemands(),
 }
 
 

@@ -1,0 +1,118 @@
+"""Bodies of blocks that walk, through the same run as everybody's."""
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from blocks.made_up import CALM
+
+from mjxgait.certify.grown import seen_grown
+from mjxgait.certify.simulate import simulate
+from mjxgait.certify.starts import nominal_starts
+from mjxgait.library import load_creature
+from mjxgait.parts.settings import build_config
+from mjxgait.runs.experiment import Experiment, build_experiment
+from mjxgait.search.state import EvolutionState
+from mjxgait.settings.blocks import RoamConfig
+from mjxgait.tasks.blocks.roam import Roam
+
+TABLE = {
+    "use": {"controller": "brain", "task": "roam"},
+    "controller": {"nodes": 3, "parts": 4, "links": 4, "local": 2, "central": 1},
+    "evolution": {"population": 60},
+    "rollout": {"seconds": 1.6, "starts": 2, "lanes": 20, "joint_noise": 0.1},
+    "fitness": {"settle": 0.1, "weights": {"overlap": 0.0, "balance": 0.0}},
+}
+COUNT = 8
+
+
+@pytest.fixture(scope="module")
+def experiment() -> Experiment:
+    """Little room, so that it compiles fast."""
+    return build_experiment(load_creature("blocks"), build_config(TABLE, "test"))
+
+
+@pytest.fixture(scope="module")
+def evolved(experiment: Experiment) -> tuple[EvolutionState, list[float]]:
+    step = experiment.compile()
+    state, best = experiment.place(experiment.init()), []
+    for _ in range(4):
+        state, metrics = step(state)
+        best.append(float(metrics.best))
+    return jax.device_get(dataclasses.replace(state, key=jnp.zeros(()))), best
+
+
+def test_walkers_get_faster(evolved: tuple[EvolutionState, list[float]]):
+    _, best = evolved
+    assert np.isfinite(best).all()
+    assert best == sorted(best)
+    assert best[-1] > best[0] > 0
+
+
+def test_the_examiner_sees_them_get_as_far(experiment: Experiment, evolved):
+    """Body, brain, ground, and where it lies at the start, all written twice."""
+    state, _ = evolved
+    mine, ways = state.outcome[:COUNT, 0, 0], []
+    for rank in range(COUNT):
+        champion = experiment.champion(state, {}, rank)
+        body = champion.embodied(experiment.creature)
+        film = simulate(body, champion, nominal_starts(body, 1), 1.6, record=1).trajectory
+        middle = seen_grown(body, film.qpos[0], film.qvel[0], 0.0).middle[:, :2]
+        # It counts from 0.1 s on; the tally has seen what was before the last step.
+        ways.append(np.linalg.norm(middle[-1] - middle[10]))
+    lengths = np.array(ways)
+    assert lengths.max() > 0.05
+    # A corner that touches a tick earlier leads elsewhere.
+    assert np.median(np.abs(mine - lengths) / lengths) < 0.05
+
+
+def judged(
+    task: Roam, tilt: float = 0.0, sunk: float = 0.0, before: float = 0.0
+) -> dict[str, float]:
+    """Of one that goes on at 1 m/s. tilt: deg at a moment in between; before: before it counts."""
+    settings = RoamConfig(settle=0.5)
+    tally, standards = task.init(), task.standards(settings)
+    for k in range(task.horizon):
+        angle = np.radians({10: before, 100: tilt}.get(k, 0.0))
+        turned = jnp.array(
+            [[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]]
+        )
+        sensed = dataclasses.replace(
+            CALM,
+            middle=jnp.array([0.0, task.step * k, 0.1 * k]),
+            trunk_rot=turned,
+            sunk=jnp.float32({10: before, 100: sunk}.get(k, 0.0)),
+        )
+        tally = task.update(tally, sensed, jnp.zeros(3), standards, ())
+    return {name: float(value) for name, value in task.judge(tally, settings).items()}
+
+
+@pytest.fixture(scope="module")
+def task(experiment: Experiment) -> Roam:
+    found = experiment.simulator.task
+    assert isinstance(found, Roam)
+    return found
+
+
+def test_level_ways_count_from_when_it_has_settled(task: Roam):
+    calm = judged(task, before=90.0)
+    # The last moment is the one before the end.
+    assert calm["speed"] == pytest.approx(1.0, rel=0.02)
+    assert calm["overlap"] == calm["balance"] == pytest.approx(0, abs=1e-6)
+
+
+def test_to_tip_over_costs_speed(task: Roam):
+    leaning, over = (judged(task, tilt=tilt) for tilt in (RoamConfig().tilt, 180.0))
+    assert leaning["balance"] == pytest.approx(leaning["speed"] / 2, rel=1e-3)
+    assert over["balance"] > 0.9 * over["speed"]
+    assert leaning["overlap"] == 0
+
+
+def test_to_sink_into_the_ground_costs_speed(task: Roam):
+    touching, deep = (judged(task, sunk=sunk) for sunk in (RoamConfig().overlap, 1.0))
+    assert touching["overlap"] == pytest.approx(touching["speed"] / 2, rel=1e-3)
+    assert deep["overlap"] > 0.99 * deep["speed"]
+    both = judged(task, tilt=180.0, sunk=1.0)
+    assert both["overlap"] + both["balance"] < both["speed"]
