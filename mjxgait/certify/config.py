@@ -224,18 +224,13 @@ class BlocksConfig:
     """What is demanded of all bodies of blocks, instead of 1 to 5 and 7.
 
     Attributes:
-      speed: m/s, least, as the crow flies. straight: least way over path. second_half: its speed
-        over the first half's.
-      arrive: share of the perturbed starts that must be so fast.
+      arrive: share of the perturbed starts that must do what is demanded.
       body_speed: m/s, of the fastest block. overlap: of the smaller block's size, the cube root of
         its volume, how deep blocks may stand in each other that no joint joins, or in the ground.
-      again: largest relative change of the speed that evolution saw.
+      again: largest relative change of what evolution saw.
     """
 
     __pydantic_config__ = STRICT
-    speed: NonNegative = 0.2
-    straight: Fraction = 0.5
-    second_half: Positive = 0.7
     arrive: Fraction = 0.9
     body_speed: Positive = 5.0
     overlap: Positive = 0.05
@@ -243,7 +238,30 @@ class BlocksConfig:
 
 
 @dataclasses.dataclass(frozen=True)
-class SwimConfig(BlocksConfig):
+class GoingConfig(BlocksConfig):
+    """What is demanded of those that are to get on.
+
+    Attributes:
+      speed: m/s, least, as the crow flies. straight: least way over path. second_half: its speed
+        over the first half's.
+    """
+
+    __pydantic_config__ = STRICT
+    speed: NonNegative = 0.2
+    straight: Fraction = 0.5
+    second_half: Positive = 0.7
+
+
+@dataclasses.dataclass(frozen=True)
+class JumpConfig(BlocksConfig):
+    """What is demanded of who jumps. height: m, least, of the lowest part at the best moment."""
+
+    __pydantic_config__ = STRICT
+    height: NonNegative = 0.1
+
+
+@dataclasses.dataclass(frozen=True)
+class SwimConfig(GoingConfig):
     """What is demanded of who swims.
 
     Attributes:
@@ -255,7 +273,7 @@ class SwimConfig(BlocksConfig):
 
 
 @dataclasses.dataclass(frozen=True)
-class RoamConfig(BlocksConfig):
+class RoamConfig(GoingConfig):
     """What is demanded of blocks that walk.
 
     Attributes:
@@ -295,6 +313,7 @@ class CertificateConfig:
     travel: TravelConfig = dataclasses.field(default_factory=TravelConfig)
     swim: SwimConfig = dataclasses.field(default_factory=SwimConfig)
     roam: RoamConfig = dataclasses.field(default_factory=RoamConfig)
+    jump: JumpConfig = dataclasses.field(default_factory=JumpConfig)
 
     def __post_init__(self) -> None:
         if self.warmup >= self.seconds:

@@ -73,6 +73,12 @@ def _roam() -> type:
     return Roam
 
 
+def _jump() -> type:
+    from mjxgait.tasks.blocks.jump import Jump
+
+    return Jump
+
+
 SHIPPED: Mapping[str, Mapping[str, Maker]] = {
     "controller": {"poses": _poses, "program": _programs, "brain": _brains},
     "task": {
@@ -82,6 +88,7 @@ SHIPPED: Mapping[str, Mapping[str, Maker]] = {
         "travel": _travel,
         "swim": _swim,
         "roam": _roam,
+        "jump": _jump,
     },
 }
 """By kind and name; the classes are imported when they are needed."""

@@ -92,3 +92,34 @@ class RoamConfig(BlocksConfig):
     apart: Positive = 10.0
     tilt: Positive = 45.0
     weights: RoamWeights = dataclasses.field(default_factory=RoamWeights)
+
+
+@dataclasses.dataclass(frozen=True)
+class JumpWeights:
+    """What each term counts; `overlap` is a penalty.
+
+    Attributes:
+      height: m, the greatest height of the lowest part.
+      overlap: what of it is lost by blocks that stand in each other or in the ground.
+    """
+
+    __pydantic_config__ = STRICT
+    height: NonNegative = 1.0
+    overlap: NonNegative = 1.0
+
+
+@dataclasses.dataclass(frozen=True)
+class JumpConfig(BlocksConfig):
+    """The fitness of blocks that jump.
+
+    Attributes:
+      settle: s from the start that do not count.
+      overlap: how deep blocks are in each other or in the ground, of the smaller one's size, of which
+        half the height counts.
+      apart: generations until that counts in full.
+      weights: what each term counts.
+    """
+
+    __pydantic_config__ = STRICT
+    apart: Positive = 10.0
+    weights: JumpWeights = dataclasses.field(default_factory=JumpWeights)

@@ -66,7 +66,11 @@ def test_bodies_that_grow_walk_by_another_task_of_that_name():
         ("tall_quadruped", {"use": {"task": "swim"}}, "only bodies that grow"),
         ("blocks", {"use": {"task": "swim"}}, "poses has nothing to move"),
         ("tall_quadruped", {"use": {"task": "roam"}}, "only bodies that grow roam"),
-        ("blocks", {"use": {"controller": "brain", "task": "hop"}}, "cannot hop, only swim, roam"),
+        (
+            "blocks",
+            {"use": {"controller": "brain", "task": "hop"}},
+            "cannot hop, only swim, roam, jump",
+        ),
         (
             "blocks",
             {"use": {"controller": "brain", "task": "swim"}, "rollout": {"ground": "bumps:0.05"}},

@@ -15,7 +15,8 @@ from mjxgait.library import load_creature
 from mjxgait.parts.settings import build_config
 from mjxgait.runs.experiment import Experiment, build_experiment
 from mjxgait.search.state import EvolutionState
-from mjxgait.settings.blocks import RoamConfig
+from mjxgait.settings.blocks import JumpConfig, RoamConfig
+from mjxgait.tasks.blocks.jump import Jump
 from mjxgait.tasks.blocks.roam import Roam
 
 TABLE = {
@@ -68,6 +69,25 @@ def test_the_examiner_sees_them_get_as_far(experiment: Experiment, evolved):
     assert np.median(np.abs(mine - lengths) / lengths) < 0.05
 
 
+def test_how_high_they_leap_is_watched(experiment: Experiment, evolved):
+    """Frame by frame: of those that are not recorded only the greatest height is kept. On a small
+    moon, where everybody leaps.
+    """
+    highest = []
+    for rank in range(COUNT):
+        champion = dataclasses.replace(experiment.champion(evolved[0], {}, rank), task="jump")
+        body = champion.embodied(experiment.creature)
+        body.model.opt.gravity[2] = -0.5
+        outcome = simulate(body, champion, nominal_starts(body, 2), 4.0, record=1)
+        film = outcome.trajectory
+        low = seen_grown(body, film.qpos[0], film.qvel[0], 0.0).low
+        # What is recorded is before each step.
+        assert outcome.height[0] == pytest.approx(max(low[201:].max(), 0.0), abs=2e-3)
+        assert outcome.height[0] == outcome.height[1]
+        highest.append(outcome.height[0])
+    assert max(highest) > 0
+
+
 def judged(
     task: Roam, tilt: float = 0.0, sunk: float = 0.0, before: float = 0.0
 ) -> dict[str, float]:
@@ -108,6 +128,23 @@ def test_to_tip_over_costs_speed(task: Roam):
     assert leaning["balance"] == pytest.approx(leaning["speed"] / 2, rel=1e-3)
     assert over["balance"] > 0.9 * over["speed"]
     assert leaning["overlap"] == 0
+
+
+def test_to_jump_is_to_have_the_lowest_part_high_once_settled(task: Roam):
+    jumping = Jump(task.creature, task.step, task.horizon, task.ends)
+    settings = JumpConfig(settle=0.5)
+
+    def jumped(sunk: float) -> dict[str, float]:
+        tally, standards = jumping.init(), jumping.standards(settings)
+        for k in range(task.horizon):
+            low = CALM.geom_low.at[:].set(1.0).at[1].set({10: 0.7, 80: 0.3}.get(k, 0.0))
+            deep = jnp.float32(sunk if k == 100 else -1.0)
+            sensed = dataclasses.replace(CALM, geom_low=low, sunk=deep)
+            tally = jumping.update(tally, sensed, jnp.zeros(3), standards, ())
+        return {name: float(value) for name, value in jumping.judge(tally, settings).items()}
+
+    assert jumped(0.0) == pytest.approx({"height": 0.3, "overlap": 0.0})
+    assert jumped(settings.overlap)["overlap"] == pytest.approx(0.15)
 
 
 def test_to_sink_into_the_ground_costs_speed(task: Roam):

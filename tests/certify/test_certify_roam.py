@@ -1,6 +1,7 @@
 """What the examiner demands of blocks that walk, criterion by criterion, on made-up motions."""
 
 import dataclasses
+from types import SimpleNamespace
 from typing import Any
 
 import mujoco
@@ -11,6 +12,7 @@ from certify_made_up import walk
 from mjxgait.certify import CertificateConfig
 from mjxgait.certify.grown import Grown, seen_grown
 from mjxgait.certify.measure import Recording
+from mjxgait.certify.tasks.jump import JumpDemands
 from mjxgait.certify.tasks.roam import RoamDemands
 from mjxgait.creature.geometry import lowest
 from mjxgait.library import load_creature
@@ -48,6 +50,13 @@ def roam(speed: Any = SPEED, rising: float = 0.0, tilt: Any = 0.0, buried: Any =
             sizes={"part0": 0.1},
         ),
     )
+
+
+def jump(height: float, at: float = 10.0) -> Recording:
+    made = roam()
+    assert made.grown
+    low = np.where(np.abs(TIMES - at) < STEP / 2, height, -0.001)
+    return dataclasses.replace(made, grown=dataclasses.replace(made.grown, low=low))
 
 
 def failures(whole: Recording) -> set[int]:
@@ -101,3 +110,18 @@ def test_how_deep_a_block_is_in_the_ground_is_told_in_its_sizes():
     least, most = min(seen.sizes.values()), max(seen.sizes.values())
     assert (seen.buried[:2] >= -seen.low[:2] / most).all()
     assert (seen.buried[:2] <= -seen.low[:2] / least).all()
+
+
+def test_who_is_off_the_ground_once_jumps():
+    def failed(whole: Recording, halved: Recording) -> set[int]:
+        judged = JumpDemands().undisturbed(whole, halved, CONFIG)
+        assert [c.number for c in judged] == [2, 6, 8, 9]
+        return {c.number for c in judged if not c.passed}
+
+    assert not failed(jump(0.11), jump(0.12))
+    assert failed(jump(0.09), jump(0.09)) == {2, 6}
+    assert failed(jump(0.2), jump(0.15)) == {6}
+    assert 2 in failed(jump(0.2, at=1.0), jump(0.2)), "it has to settle first"
+    champion: Any = SimpleNamespace(terms={"height": 0.2}, origin={"nominal": {"seconds": 8.0}})
+    held = [JumpDemands().kept(champion, jump(0.17, at), CONFIG)[0].passed for at in (6.0, 9.0)]
+    assert held == [True, False], "in as many seconds as evolution saw"

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from mjxgait.certify.config import BlocksConfig, CertificateConfig
+from mjxgait.certify.config import BlocksConfig, CertificateConfig, GoingConfig
 from mjxgait.certify.criteria import Criterion, Measure, at_least, at_most, joint_overrun, steady
 from mjxgait.certify.describe import worst_overlap
 from mjxgait.certify.grown import Grown
@@ -20,6 +20,8 @@ from mjxgait.certify.tasks.staying import StaysUp, to_the_end
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 
+UNITS = {"speed": "m/s", "height": "m"}
+
 
 class BlocksDemands(StaysUp, abc.ABC):
     """See `Demands`. No body has a right way up, so none falls, and nobody is pushed."""
@@ -28,27 +30,24 @@ class BlocksDemands(StaysUp, abc.ABC):
     grown = True
     verb: str
     """What one that passes does."""
-    axes = 3
-    """Along how many of the world's axes a way counts: two where heights do not."""
+    promised: str
+    """The term by which evolution said how much it does."""
 
     @abc.abstractmethod
     def wanted(self, config: CertificateConfig) -> BlocksConfig:
         """The thresholds of this task."""
 
     @abc.abstractmethod
-    def alone(self, window: Recording, config: CertificateConfig) -> tuple[Criterion, ...]:
-        """What is demanded of this task alone."""
-
     def second(self, window: Recording, config: CertificateConfig) -> Criterion:
         """Criterion 2: what was to be done."""
-        return gets_on(self.verb, self._middle(window), window.time_step, self.wanted(config))
 
+    @abc.abstractmethod
     def done(self, window: Recording) -> float:
-        """How much was done of what evolution's first term counts, in its unit: m/s."""
-        return flight(self._middle(window), window.time_step)
+        """How much was done of what was promised, in its unit."""
 
-    def _middle(self, window: Recording) -> np.ndarray:
-        return seen(window).middle[:, : self.axes]
+    def alone(self, window: Recording, config: CertificateConfig) -> tuple[Criterion, ...]:
+        """What is demanded of this task alone."""
+        return ()
 
     def fall(self, config: CertificateConfig) -> Fall:
         """See `Demands`: never."""
@@ -79,18 +78,12 @@ class BlocksDemands(StaysUp, abc.ABC):
         self, champion: Champion, whole: Recording, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
         """See `Demands`: 10, as much as evolution said, in as many seconds as it saw."""
-        told = champion.terms.get("speed", np.nan)
+        told = champion.terms.get(self.promised, np.nan)
         seconds = champion.origin.get("nominal", {}).get("seconds", np.inf)
         done = self.done(whole.window(config.warmup, seconds))
         change = abs(done / told - 1) if told > 0 else np.nan
         again = at_most("change", change, self.wanted(config).again)
         return (Criterion(10, "as in evolution", (again,)),)
-
-    def succeeded(self, outcome: Outcome, starts: Starts, config: CertificateConfig) -> np.ndarray:
-        """See `Demands`: those that were fast enough from the start to the end."""
-        seconds = outcome.path.shape[1] * outcome.trajectory.time_step
-        way = np.linalg.norm(outcome.travel[:, : self.axes], axis=1)
-        return outcome.stayed_up & (way >= self.wanted(config).speed * seconds)
 
     def disturbed(
         self, started: float, pushed: float, config: CertificateConfig
@@ -100,28 +93,58 @@ class BlocksDemands(StaysUp, abc.ABC):
         return (Criterion(4, "perturbed starts", (share,)),)
 
     def report(self, whole: Recording, config: CertificateConfig) -> dict[str, Any]:
-        """See `Demands`: how fast it is, and of what."""
+        """See `Demands`: how much it does, and of what it is."""
         window = whole.window(config.warmup)
-        v, parts = self.done(window), len(seen(whole).sizes)
+        done, parts, unit = self.done(window), len(seen(whole).sizes), UNITS[self.promised]
         return {
-            "speed": v,
+            self.promised: done,
             "parts": parts,
             "mass": whole.dimensions.mass,
             "overlap": worst_overlap(window),
-            "summary": f"{parts} blocks, {v:.2f} m/s",
+            "summary": f"{parts} blocks, {done:.2f} {unit}",
         }
+
+
+class GoingDemands(BlocksDemands):
+    """See `BlocksDemands`: to get on, straight, at a speed."""
+
+    promised = "speed"
+    axes = 3
+    """Along how many of the world's axes a way counts: two where heights do not."""
+
+    @abc.abstractmethod
+    def wanted(self, config: CertificateConfig) -> GoingConfig:
+        """See `BlocksDemands`."""
+
+    def second(self, window: Recording, config: CertificateConfig) -> Criterion:
+        """See `BlocksDemands`."""
+        return gets_on(self.verb, self._middle(window), window.time_step, self.wanted(config))
+
+    def done(self, window: Recording) -> float:
+        """See `BlocksDemands`: m/s."""
+        return flight(self._middle(window), window.time_step)
+
+    def succeeded(self, outcome: Outcome, starts: Starts, config: CertificateConfig) -> np.ndarray:
+        """See `Demands`: those that were fast enough from the start to the end."""
+        seconds = outcome.path.shape[1] * outcome.trajectory.time_step
+        way = np.linalg.norm(outcome.travel[:, : self.axes], axis=1)
+        return outcome.stayed_up & (way >= self.wanted(config).speed * seconds)
 
     def promising(
         self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
     ) -> bool:
         """See `Demands`: to the end in all its trials, and clearly faster than it must be: so far in
-        the seconds that count as it must get in all."""
+        the seconds that count as it must get in all.
+        """
         least = self.wanted(CertificateConfig()).speed * seconds
         lived = to_the_end(outcome, seconds, creature)
         return bool(lived.all() and (outcome["way"] >= least).all())
 
+    def _middle(self, window: Recording) -> np.ndarray:
+        return seen(window).middle[:, : self.axes]
 
-def gets_on(name: str, middle: np.ndarray, time_step: float, config: BlocksConfig) -> Criterion:
+
+def gets_on(name: str, middle: np.ndarray, time_step: float, config: GoingConfig) -> Criterion:
     """2. It gets away from where it was, straight, and does not slow down; middle: [T, 2 or 3] m."""
     half = len(middle) // 2
     first, second = (

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from mjxgait.certify.tasks.hop import HopDemands
+from mjxgait.certify.tasks.jump import JumpDemands
 from mjxgait.certify.tasks.limbo import LimboDemands
 from mjxgait.certify.tasks.plain import HasCriteria, PlainDemands
 from mjxgait.certify.tasks.protocol import Demands
@@ -21,6 +22,7 @@ _DEMANDS: dict[str, Demands] = {
     "travel": TravelDemands(),
     "swim": SwimDemands(),
     "roam": RoamDemands(),
+    "jump": JumpDemands(),
 }
 
 

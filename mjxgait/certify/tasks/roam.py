@@ -5,10 +5,10 @@ import numpy as np
 from mjxgait.certify.config import CertificateConfig, RoamConfig
 from mjxgait.certify.criteria import Criterion, at_least
 from mjxgait.certify.measure import Recording
-from mjxgait.certify.tasks.blocks import BlocksDemands
+from mjxgait.certify.tasks.blocks import GoingDemands
 
 
-class RoamDemands(BlocksDemands):
+class RoamDemands(GoingDemands):
     """See `Demands`. Level ways count: who leaps up gets nowhere by that."""
 
     verdict = "it walks"
@@ -16,11 +16,11 @@ class RoamDemands(BlocksDemands):
     axes = 2
 
     def wanted(self, config: CertificateConfig) -> RoamConfig:
-        """See `BlocksDemands`."""
+        """See `GoingDemands`."""
         return config.roam
 
     def alone(self, window: Recording, config: CertificateConfig) -> tuple[Criterion, ...]:
-        """See `BlocksDemands`: 1, the side on which it settled stays up."""
+        """See `GoingDemands`: 1, the side on which it settled stays up."""
         return (balanced(window, config.roam),)
 
 

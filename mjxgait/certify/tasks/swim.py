@@ -5,11 +5,11 @@ import numpy as np
 from mjxgait.certify.config import CertificateConfig, SwimConfig
 from mjxgait.certify.criteria import Criterion, at_most
 from mjxgait.certify.measure import Recording
-from mjxgait.certify.tasks.blocks import BlocksDemands, seen
+from mjxgait.certify.tasks.blocks import GoingDemands, seen
 from mjxgait.champion.blocks.material import DRAG
 
 
-class SwimDemands(BlocksDemands):
+class SwimDemands(GoingDemands):
     """See `Demands`. In water there is no up."""
 
     verdict = "it swims"
@@ -17,11 +17,11 @@ class SwimDemands(BlocksDemands):
     drag = DRAG
 
     def wanted(self, config: CertificateConfig) -> SwimConfig:
-        """See `BlocksDemands`."""
+        """See `GoingDemands`."""
         return config.swim
 
     def alone(self, window: Recording, config: CertificateConfig) -> tuple[Criterion, ...]:
-        """See `BlocksDemands`: 11, what moves it."""
+        """See `GoingDemands`: 11, what moves it."""
         return (by_water(window, config.swim),)
 
 

@@ -31,5 +31,5 @@ GRAVITY, FRICTION = 9.81, 0.9
 """m/s², and of the ground; there is neither in water."""
 DRAG = 500.0
 """N·s/m³, what water does to a face per area and normal velocity."""
-IN_WATER, ON_LAND = ("swim",), ("roam",)
+IN_WATER, ON_LAND = ("swim",), ("roam", "jump")
 """Tasks that are done there."""

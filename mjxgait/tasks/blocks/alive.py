@@ -1,7 +1,7 @@
-"""What all that bodies of blocks are to do has in common: from rest, any way, as nothing alive does not.
+"""What all that bodies of blocks are to do has in common: from rest, any way, as something alive might.
 
-The way counts from a while after the start on, of the middle of all mass: a root gets somewhere by
-bending, the whole does not.
+What they do counts from a while after the start on. A way is that of the middle of all mass: a root
+gets somewhere by bending, the whole does not.
 """
 
 import abc
@@ -39,8 +39,6 @@ class Tally(protocol.Tally):
 class BlocksTask(PlainTask):
     """See `Task`: the creature lies at rest, all but the first with bent joints."""
 
-    outcomes = ("way", "seconds")
-
     def trials(self, key: jax.Array, creature: Creature, settings: RolloutConfig) -> Starts:
         """See `Task`. A root at the origin; whoever grows the body puts it on the ground."""
         count, joints = settings.starts, len(self.creature.joints.names)
@@ -69,6 +67,22 @@ class BlocksTask(PlainTask):
         assert sensed.past is not None
         return jnp.where(wild | (sensed.past > FURTHEST), WILD, FINISHED)
 
+    def weights(self, settings: Any, generation: jax.Array) -> Mapping[str, jax.Array]:
+        """See `Task`: the first term is what is wanted, all others are penalties; what overlap costs
+        counts more and more.
+        """
+        counts = {name: getattr(settings.weights, name) for name in self.terms}
+        share = jnp.minimum(generation / settings.apart, 1.0)
+        counts["overlap"] = counts["overlap"] * share
+        wanted = self.terms[0]
+        return {n: jnp.asarray(c) if n == wanted else -jnp.asarray(c) for n, c in counts.items()}
+
+
+class GoingTask(BlocksTask):
+    """See `Task`: to get as far as possible."""
+
+    outcomes = ("way", "seconds")
+
     @abc.abstractmethod
     def way(self, tally: Any) -> jax.Array:
         """[] m from where counting began."""
@@ -80,16 +94,6 @@ class BlocksTask(PlainTask):
     def outcome(self, tally: Any) -> Mapping[str, jax.Array]:
         """See `Task`: m from where counting began, and s until the end."""
         return {"way": self.way(tally), "seconds": tally.steps * self.step}
-
-    def weights(self, settings: Any, generation: jax.Array) -> Mapping[str, jax.Array]:
-        """See `Task`: the first term is what is wanted, all others are penalties; what overlap costs
-        counts more and more.
-        """
-        counts = {name: getattr(settings.weights, name) for name in self.terms}
-        share = jnp.minimum(generation / settings.apart, 1.0)
-        counts["overlap"] = counts["overlap"] * share
-        wanted = self.terms[0]
-        return {n: jnp.asarray(c) if n == wanted else -jnp.asarray(c) for n, c in counts.items()}
 
 
 def length(vector: jax.Array) -> jax.Array:

@@ -13,7 +13,7 @@ import jax.numpy as jnp
 
 from mjxgait.settings.blocks import RoamConfig, RoamWeights
 from mjxgait.tasks.blocks import alive
-from mjxgait.tasks.blocks.alive import BlocksTask, length, lost
+from mjxgait.tasks.blocks.alive import GoingTask, length, lost
 from mjxgait.types import Sensed, pytree
 
 
@@ -27,7 +27,7 @@ class Tally(alive.Tally):
     upright: jax.Array
 
 
-class Roam(BlocksTask):
+class Roam(GoingTask):
     """See `Task`: on land. The way is as the crow flies, and level."""
 
     Settings: ClassVar[type] = RoamConfig
@@ -58,7 +58,7 @@ class Roam(BlocksTask):
         )
 
     def way(self, tally: Tally) -> jax.Array:
-        """See `BlocksTask`."""
+        """See `GoingTask`."""
         return length((tally.place - tally.settled)[:2])
 
     def judge(self, tally: Tally, settings: RoamConfig) -> Mapping[str, jax.Array]:

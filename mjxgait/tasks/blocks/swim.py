@@ -9,7 +9,7 @@ import jax.numpy as jnp
 
 from mjxgait.settings.blocks import SwimConfig, SwimWeights
 from mjxgait.tasks.blocks import alive
-from mjxgait.tasks.blocks.alive import BlocksTask, length, lost
+from mjxgait.tasks.blocks.alive import GoingTask, length, lost
 from mjxgait.types import Sensed, pytree
 
 LITTLE = 1e-6
@@ -29,7 +29,7 @@ class Tally(alive.Tally):
     lacking: jax.Array
 
 
-class Swim(BlocksTask):
+class Swim(GoingTask):
     """See `Task`: in water, without a floor. The way is as the crow flies."""
 
     Settings: ClassVar[type] = SwimConfig
@@ -79,7 +79,7 @@ class Swim(BlocksTask):
         )
 
     def way(self, tally: Tally) -> jax.Array:
-        """See `BlocksTask`."""
+        """See `GoingTask`."""
         return length(tally.place - tally.settled)
 
     def judge(self, tally: Tally, settings: SwimConfig) -> Mapping[str, jax.Array]:
