@@ -60,7 +60,8 @@ class Sensed:
     middle: [3] m, of all mass; momentum: [3] kg·m/s of all; washed: [3] N, what the water does to it
     as a whole, 0 where there is none; past: [] rad, how far the hinge that is furthest past its range
     is past it; sunk: [] how deep the block that is deepest in the ground is in it, of its size (the
-    cube root of its volume), negative where all are above. None of bodies of a model.
+    cube root of its volume), negative where all are above; geom_rot: [G, 3, 3], rows are the own axes
+    of each watched block in the world, where there is something to see. None of bodies of a model.
     """
 
     joint_pos: jax.Array
@@ -78,6 +79,7 @@ class Sensed:
     washed: jax.Array | None = None
     past: jax.Array | None = None
     sunk: jax.Array | None = None
+    geom_rot: jax.Array | None = None
 
 
 @pytree

@@ -286,6 +286,20 @@ class RoamConfig(GoingConfig):
 
 
 @dataclasses.dataclass(frozen=True)
+class FollowConfig(BlocksConfig):
+    """What is demanded of who follows a light, besides what is of who swims or walks.
+
+    Attributes:
+      speed: m/s, least, by which the light comes nearer.
+      arrive: share of the perturbed starts, each with a light of its own, in which it does.
+    """
+
+    __pydantic_config__ = STRICT
+    speed: NonNegative = 0.1
+    arrive: Fraction = 0.75
+
+
+@dataclasses.dataclass(frozen=True)
 class CertificateConfig:
     """The examination.
 
@@ -314,6 +328,7 @@ class CertificateConfig:
     swim: SwimConfig = dataclasses.field(default_factory=SwimConfig)
     roam: RoamConfig = dataclasses.field(default_factory=RoamConfig)
     jump: JumpConfig = dataclasses.field(default_factory=JumpConfig)
+    follow: FollowConfig = dataclasses.field(default_factory=FollowConfig)
 
     def __post_init__(self) -> None:
         if self.warmup >= self.seconds:

@@ -59,6 +59,7 @@ class Recording:
     body_speed: [T] m/s, of the fastest body's centre of mass.
     heading: [T] rad of the trunk, left of the start's forward, without jumps.
     goal: m ahead of the start; 0 where the task has none.
+    light: [3] m where it is in the world; None where the task has none.
     clearance: [T] m to the bar, `bar.FAR` at most; None where the task has none.
     grown: what else is seen of a body of blocks; None of others.
     overlap_pairs: P names of parts that are ever in each other. overlap: [T, P] m, how deep.
@@ -85,6 +86,7 @@ class Recording:
     goal: float = 0.0
     clearance: np.ndarray | None = None
     grown: Grown | None = None
+    light: np.ndarray | None = None
 
     @property
     def contact(self) -> np.ndarray:
@@ -99,7 +101,7 @@ class Recording:
         arrays = {
             f.name: getattr(self, f.name)[frames]
             for f in dataclasses.fields(self)
-            if isinstance(getattr(self, f.name), np.ndarray)
+            if isinstance(getattr(self, f.name), np.ndarray) and f.name != "light"
         }
         grown = self.grown and self.grown.window(frames)
         return dataclasses.replace(self, **arrays, grown=grown)
@@ -157,6 +159,7 @@ def measure(
     start = start_frame(creature)
     qpos, qvel, torque = trajectory.qpos[row], trajectory.qvel[row], trajectory.torque[row]
     bar = None if aimed is None or np.isinf(aimed.bar[row, 0]) else aimed.bar[row]
+    lit = aimed is not None and aimed.light[row].any()
     sight = _Sight(creature, len(qpos), bar)
     for k in range(len(qpos)):
         if not (np.isfinite(qpos[k]).all() and np.isfinite(qvel[k]).all()):
@@ -191,6 +194,7 @@ def measure(
         overlap=crossed.depth if inside else np.zeros((len(qpos), 0)),
         goal=0.0 if aimed is None else float(aimed.goal[row]),
         clearance=None if bar is None else sight.clearance,
+        light=start.place + aimed.light[row] if aimed is not None and lit else None,
         grown=None if drag is None else seen_grown(creature, qpos, qvel, drag),
     )
 

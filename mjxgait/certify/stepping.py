@@ -104,6 +104,7 @@ class Stepping:
         feet = creature.feet.watched[: len(creature.feet.foot_of)]
         self.feet = LowestPoint(self.model, feet, self.terrain)
         self.sees_feet = any(name in FOOT_SENSES for name in self.twin.reads)
+        self.sees_light = "light" in self.twin.reads
         self.last_force = np.zeros_like(self.qvel)
         self.bar = Clearance(creature) if np.isfinite(starts.bar).any() else None
         # What the controller has sent last, for those whose torques come late.
@@ -251,6 +252,7 @@ class Stepping:
             mass_matrix=self.layout.dense(self.mass[running]),
             bias=self.bias[running] - self.passive[running],
             constraint_force=self.last_force[running],
+            light=self._light(running),
             goal=self.goal[running],
             bar=self.starts.bar[running, 0],
         )
@@ -262,6 +264,18 @@ class Stepping:
             return np.full((len(running), len(self.creature.feet.names)), np.inf)
         low = self.feet.heights(self.geom_xpos[running], self.geom_xmat[running])
         return per_foot(self.creature, low)
+
+    def _light(self, running: np.ndarray) -> np.ndarray:
+        """[running, F, 3], its direction in each foot's own axes."""
+        if not self.sees_light:
+            return np.zeros((len(running), 0, 3))
+        light = self.starts.light[running][:, None]
+        there = self.start.place + light - self.geom_xpos[running][:, self.feet.geoms]
+        there = np.where(light.any(2, keepdims=True), there, 0.0)
+        there /= np.maximum(np.linalg.norm(there, axis=2, keepdims=True), 1e-9)
+        rot = self.geom_xmat[running][:, self.feet.geoms].reshape(*there.shape, 3)
+        seen: np.ndarray = (there[:, :, None] @ rot)[:, :, 0]
+        return seen
 
     def _lift(self) -> None:
         """Raises each start until no part is deeper in the floor than when standing; else joint

@@ -79,6 +79,18 @@ def _jump() -> type:
     return Jump
 
 
+def _follow() -> type:
+    from mjxgait.tasks.blocks.follow import FollowInWater
+
+    return FollowInWater
+
+
+def _follow_on_land() -> type:
+    from mjxgait.tasks.blocks.follow import FollowOnLand
+
+    return FollowOnLand
+
+
 SHIPPED: Mapping[str, Mapping[str, Maker]] = {
     "controller": {"poses": _poses, "program": _programs, "brain": _brains},
     "task": {
@@ -89,6 +101,8 @@ SHIPPED: Mapping[str, Mapping[str, Maker]] = {
         "swim": _swim,
         "roam": _roam,
         "jump": _jump,
+        "follow": _follow,
+        "follow-on-land": _follow_on_land,
     },
 }
 """By kind and name; the classes are imported when they are needed."""

@@ -256,8 +256,8 @@ class UseConfig:
     Attributes:
       controller: what moves the creature: poses, program (docs/programs.md), brain
         (docs/blocks.md), or FILE.py:CLASS of your own (docs/extending.md).
-      task: what the creature is to do: walk, hop, limbo, travel; swim, walk and jump of bodies
-        that grow (docs/roam.md); or FILE.py:CLASS of your own.
+      task: what the creature is to do: walk, hop, limbo, travel; swim, walk, jump, follow and
+        follow-on-land of bodies that grow (docs/blocks.md); or FILE.py:CLASS of your own.
     """
 
     __pydantic_config__ = STRICT

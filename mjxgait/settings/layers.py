@@ -23,7 +23,8 @@ def resolve_config(
 
     A file may begin with `standalone = true`: then nothing but the built-in defaults lies under it.
     Its tables `[creature.NAME]` hold keys for the creature of that name, laid over the rest of it.
-    What the first two say to a controller or a task that takes no part is left out.
+    What the first two say to a controller or a task that takes no part is left out. The creature's
+    tables `[train.task.NAME]` hold keys for the task of that name, laid over the rest of it.
 
     Args:
       use: who takes part, over what the layers say. config_class: the settings of those.
@@ -35,10 +36,15 @@ def resolve_config(
     default = data_folder("configs") / "default.toml"
     standalone, mine = _file_layers(file, creature_name) if file is not None else (False, [])
     given: list[tuple[str, Mapping[str, Any]]] = []
+    general, of_tasks = dict(creature_table), creature_table.get("task", {})
+    general.pop("task", None)
     if not standalone:
         given.append((str(default), read_toml(default)))
-        given.append((f"{creature_name}/creature.toml: [train]", creature_table))
+        given.append((f"{creature_name}/creature.toml: [train]", general))
     chosen = meant(_chosen([*given, *mine], use or {}))
+    if not standalone and chosen.task in of_tasks:
+        where = f"{creature_name}/creature.toml: [train.task.{chosen.task}]"
+        given.append((where, {**of_tasks[chosen.task], "use": dataclasses.asdict(chosen)}))
     cls = config_class(chosen)
     table: dict[str, Any] = {}
     for where, layer in [

@@ -1,6 +1,8 @@
 """Random bodies of blocks, each lane another, against C MuJoCo on the model of each."""
 
 import dataclasses
+from functools import partial
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -16,6 +18,7 @@ from mjxgait.champion.blocks.xml import body_xml
 from mjxgait.creature.geometry import DOWN, geom_reach, lowest
 from mjxgait.physics.trees.plant import TreePlant
 from mjxgait.physics.trees.tree import Surroundings
+from mjxgait.tasks.blocks.follow import Following
 from mjxgait.types import BodyState
 
 CAPACITY, LANES = Capacity(), 96
@@ -201,3 +204,21 @@ def test_who_is_deepest_in_the_ground_is_told_in_its_size(bodies: Body):
         there = tree.solid > 0
         deepest = (-sensed.geom_low[:, lane] / size)[there].max()
         assert sensed.sunk[lane] == pytest.approx(deepest, rel=1e-4, abs=1e-6)
+
+
+def test_the_light_is_seen_in_each_blocks_own_axes(graphs: Graph, bodies: Body):
+    state, place = moments(bodies, 0.3), np.array([3.0, -4.0, 1.0])
+    lit = TreePlant(dataclasses.replace(ON_LAND, lit=True))
+    sensed = jax.jit(lit.forward)(state)[0]
+    nobody: Any = None
+    look = jax.vmap(partial(Following.senses, nobody, jnp.float32(place)), in_axes=-1)
+    seen = np.asarray(jax.jit(look)(sensed)["light"])
+    for lane in range(LANES):
+        body = one(bodies, lane)
+        model, data, _ = in_mujoco(one(graphs, lane), body, state, lane, ON_LAND)
+        mujoco.mj_kinematics(model, data)
+        for part in np.flatnonzero(body.parts.exists):
+            block = model.geom(f"block{part}").id
+            there = data.geom_xmat[block].reshape(3, 3).T @ (place - data.geom_xpos[block])
+            mine = seen[lane, body.parts.last[part]]
+            np.testing.assert_allclose(mine, there / np.linalg.norm(there), atol=1e-5)

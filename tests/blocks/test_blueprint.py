@@ -34,6 +34,7 @@ def simulator(controller: str, task: str = "swim") -> Simulator:
 def test_a_brain_reads_only_what_there_is_to_sense():
     add_own("controller", "smelling", Smelling)
     assert simulator("brain").controller.reads == ("joint_pos", "contact")
+    assert simulator("brain", "follow").controller.reads == ("joint_pos", "contact", "light")
     with pytest.raises(UserError, match='there is no sense "contcat"'):
         simulator("smelling")
 
@@ -59,6 +60,15 @@ def test_bodies_that_grow_walk_by_another_task_of_that_name():
     assert (written.use.task, type(written.fitness)) == ("roam", RoamConfig)
 
 
+def test_a_creature_says_things_to_one_task_only():
+    creature = load_creature("blocks")
+    starts = [
+        resolve_config(creature.settings.train, "blocks", use={"task": task}).rollout.starts
+        for task in ("swim", "follow")
+    ]
+    assert starts == [1, 4]
+
+
 @pytest.mark.parametrize(
     ("env", "given", "said"),
     [
@@ -69,7 +79,7 @@ def test_bodies_that_grow_walk_by_another_task_of_that_name():
         (
             "blocks",
             {"use": {"controller": "brain", "task": "hop"}},
-            "cannot hop, only swim, roam, jump",
+            "cannot hop, only swim, follow, roam",
         ),
         (
             "blocks",

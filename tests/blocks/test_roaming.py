@@ -1,4 +1,4 @@
-"""Bodies of blocks that walk, through the same run as everybody's."""
+"""Bodies of blocks that walk towards a light, through the same run as everybody's."""
 
 import dataclasses
 
@@ -9,18 +9,22 @@ import pytest
 from blocks.made_up import CALM
 
 from mjxgait.certify.grown import seen_grown
+from mjxgait.certify.outcome import Outcome
 from mjxgait.certify.simulate import simulate
 from mjxgait.certify.starts import nominal_starts
+from mjxgait.champion.blocks.material import LIGHT
+from mjxgait.creature import Creature
 from mjxgait.library import load_creature
 from mjxgait.parts.settings import build_config
 from mjxgait.runs.experiment import Experiment, build_experiment
 from mjxgait.search.state import EvolutionState
 from mjxgait.settings.blocks import JumpConfig, RoamConfig
+from mjxgait.tasks.blocks.follow import FollowInWater, FollowOnLand, directions
 from mjxgait.tasks.blocks.jump import Jump
 from mjxgait.tasks.blocks.roam import Roam
 
 TABLE = {
-    "use": {"controller": "brain", "task": "roam"},
+    "use": {"controller": "brain", "task": "follow-on-land"},
     "controller": {"nodes": 3, "parts": 4, "links": 4, "local": 2, "central": 1},
     "evolution": {"population": 60},
     "rollout": {"seconds": 1.6, "starts": 2, "lanes": 20, "joint_noise": 0.1},
@@ -52,21 +56,30 @@ def test_walkers_get_faster(evolved: tuple[EvolutionState, list[float]]):
     assert best[-1] > best[0] > 0
 
 
-def test_the_examiner_sees_them_get_as_far(experiment: Experiment, evolved):
-    """Body, brain, ground, and where it lies at the start, all written twice."""
+def test_the_examiner_sees_them_get_as_near(experiment: Experiment, evolved):
+    """Body, brain, ground, light, and where it lies at the start, all written twice."""
     state, _ = evolved
-    mine, ways = state.outcome[:COUNT, 0, 0], []
+    mine, ways, elsewhere = state.outcome[:COUNT, 0, 0], [], []
     for rank in range(COUNT):
         champion = experiment.champion(state, {}, rank)
         body = champion.embodied(experiment.creature)
-        film = simulate(body, champion, nominal_starts(body, 1), 1.6, record=1).trajectory
-        middle = seen_grown(body, film.qpos[0], film.qvel[0], 0.0).middle[:, :2]
-        # It counts from 0.1 s on; the tally has seen what was before the last step.
-        ways.append(np.linalg.norm(middle[-1] - middle[10]))
+        start = nominal_starts(body, 1)
+        behind = dataclasses.replace(start, light=np.array([[-10.0, 0.0, 0.0]]))
+        ways.append(nearer(body, simulate(body, champion, start, 1.6, record=1)))
+        elsewhere.append(nearer(body, simulate(body, champion, behind, 1.6, record=1)))
     lengths = np.array(ways)
     assert lengths.max() > 0.05
     # A corner that touches a tick earlier leads elsewhere.
     assert np.median(np.abs(mine - lengths) / lengths) < 0.05
+    assert (np.abs(lengths - elsewhere) > 0.02).any(), "some go by the light"
+
+
+def nearer(body: Creature, outcome: Outcome) -> float:
+    """m to what was ahead, from 0.1 s on; the tally has seen what was before the last step."""
+    film = outcome.trajectory
+    middle = seen_grown(body, film.qpos[0], film.qvel[0], 0.0).middle[[10, -1], :2]
+    apart = np.linalg.norm(middle - [LIGHT, 0.0], axis=1)
+    return float(apart[0] - apart[1])
 
 
 def test_how_high_they_leap_is_watched(experiment: Experiment, evolved):
@@ -112,8 +125,8 @@ def judged(
 @pytest.fixture(scope="module")
 def task(experiment: Experiment) -> Roam:
     found = experiment.simulator.task
-    assert isinstance(found, Roam)
-    return found
+    assert isinstance(found, FollowOnLand)
+    return Roam(found.creature, found.step, found.horizon, found.ends)
 
 
 def test_level_ways_count_from_when_it_has_settled(task: Roam):
@@ -153,3 +166,29 @@ def test_to_sink_into_the_ground_costs_speed(task: Roam):
     assert deep["overlap"] > 0.99 * deep["speed"]
     both = judged(task, tilt=180.0, sunk=1.0)
     assert both["overlap"] + both["balance"] < both["speed"]
+
+
+@pytest.mark.parametrize("follower", [FollowInWater, FollowOnLand])
+def test_to_follow_is_to_get_nearer_to_the_light(task: Roam, follower: type):
+    """By 2 m of the 10, of which a step aside is none."""
+    following = follower(task.creature, task.step, task.horizon, task.ends)
+    settings = following.Settings(settle=0.0)
+    for light, way in (([10.0, 0, 0], 2.0), ([-10.0, 0, 0], -2.0), ([0, 10.0, 0], -0.198)):
+        tally, standards = following.init(), following.standards(settings)
+        for k in (0, 1):
+            sensed = dataclasses.replace(CALM, middle=jnp.array([2.0 * k, 0.0, 0.0]))
+            tally = following.update(tally, sensed, jnp.zeros(3), standards, jnp.array(light))
+        assert float(following.way(tally)) == pytest.approx(way, abs=1e-3)
+        judged = following.judge(dataclasses.replace(tally, overlap=jnp.float32(1.0)), settings)
+        assert (judged["overlap"] > 0) == (way > 0), "nothing is gained by blocks in each other"
+
+
+def test_lights_are_all_around():
+    for axes, least in ((2, 1.0), (3, 0.8)):
+        found = directions(6, axes)
+        np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1.0)
+        assert found[0] == pytest.approx([1, 0, 0])
+        between = np.linalg.norm(found[:, None] - found[None], axis=2) + 2 * np.eye(6)
+        assert between.min() >= least - 1e-9
+        assert np.abs(found.mean(0)).max() < 0.15
+    assert not directions(4, 2)[:, 2].any()

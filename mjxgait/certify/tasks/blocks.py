@@ -45,6 +45,10 @@ class BlocksDemands(StaysUp, abc.ABC):
     def done(self, window: Recording) -> float:
         """How much was done of what was promised, in its unit."""
 
+    def promise(self, champion: Champion, seconds: float, config: CertificateConfig) -> float:
+        """How much evolution said it does in a trial of so many seconds."""
+        return champion.terms.get(self.promised, np.nan)
+
     def alone(self, window: Recording, config: CertificateConfig) -> tuple[Criterion, ...]:
         """What is demanded of this task alone."""
         return ()
@@ -78,8 +82,8 @@ class BlocksDemands(StaysUp, abc.ABC):
         self, champion: Champion, whole: Recording, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
         """See `Demands`: 10, as much as evolution said, in as many seconds as it saw."""
-        told = champion.terms.get(self.promised, np.nan)
         seconds = champion.origin.get("nominal", {}).get("seconds", np.inf)
+        told = self.promise(champion, seconds, config)
         done = self.done(whole.window(config.warmup, seconds))
         change = abs(done / told - 1) if told > 0 else np.nan
         again = at_most("change", change, self.wanted(config).again)

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
+from mjxgait.certify.tasks.follow import FollowDemands
 from mjxgait.certify.tasks.hop import HopDemands
 from mjxgait.certify.tasks.jump import JumpDemands
 from mjxgait.certify.tasks.limbo import LimboDemands
@@ -13,6 +14,7 @@ from mjxgait.certify.tasks.staying import StaysUp
 from mjxgait.certify.tasks.swim import SwimDemands
 from mjxgait.certify.tasks.travel import TravelDemands
 from mjxgait.certify.tasks.walk import WalkDemands
+from mjxgait.champion.blocks.material import DRAG
 from mjxgait.errors import not_loaded
 
 _DEMANDS: dict[str, Demands] = {
@@ -23,6 +25,8 @@ _DEMANDS: dict[str, Demands] = {
     "swim": SwimDemands(),
     "roam": RoamDemands(),
     "jump": JumpDemands(),
+    "follow": FollowDemands(DRAG),
+    "follow-on-land": FollowDemands(0.0),
 }
 
 

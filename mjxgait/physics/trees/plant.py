@@ -9,12 +9,12 @@ import jax.numpy as jnp
 from mjxgait.physics.fast.dynamics import inertias, unpack
 from mjxgait.physics.fast.kernel import one_kernel
 from mjxgait.physics.fast.kinematics import Motion, Pose
-from mjxgait.physics.fast.lanes import pinned_by
+from mjxgait.physics.fast.lanes import pinned_by, turn_each
 from mjxgait.physics.fast.newton import Problem, constrained_acceleration
 from mjxgait.physics.fast.plant import turned
 from mjxgait.physics.fast.treematrix import Rows, factor, on_pivot, solve, sparsity
 from mjxgait.physics.trees.dynamics import bias_links, generalised, mass_rows, velocities
-from mjxgait.physics.trees.motion import centres, lows, motions, posture, root_turns
+from mjxgait.physics.trees.motion import centres, frames, lows, motions, posture, root_turns
 from mjxgait.physics.trees.overlap import deepest, sizes
 from mjxgait.physics.trees.touch import BlockFooting, Touch, lowest_corners, make_constraints
 from mjxgait.physics.trees.tree import FAR, Surroundings, Tree
@@ -98,6 +98,10 @@ class TreePlant:
             momentum=jnp.stack([jnp.sum(x, axis=0) for x in body.times(unpack(moving)).shift]),
             washed=jnp.sum(washed[:, 3:], axis=0),
         )
+        if around.lit:
+            rot = frames(poses)
+            own = [jnp.stack(turn_each(rot, tree.axes[:, k]), axis=1) for k in range(3)]
+            sensed = dataclasses.replace(sensed, geom_rot=jnp.stack(own, axis=1))
         if not around.floor:
             nowhere = jnp.full_like(sensed.geom_low, FAR)
             sensed = dataclasses.replace(sensed, geom_low=nowhere)

@@ -4,12 +4,12 @@ What they do counts from a while after the start on. A way is that of the middle
 gets somewhere by bending, the whole does not.
 """
 
-import abc
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from mjxgait.creature import Creature
 from mjxgait.settings.blocks import BlocksConfig
@@ -29,11 +29,12 @@ FASTEST_HINGE, FASTEST, FURTHEST = 20.0, 5.0, 0.08
 @pytree
 class Tally(protocol.Tally):
     """See `protocol.Tally`. settled, place: [3] m of the middle of all mass when counting began, and
-    now.
+    now. light: [3] m where it is; None where there is none.
     """
 
     settled: jax.Array
     place: jax.Array
+    light: jax.Array | None
 
 
 class BlocksTask(PlainTask):
@@ -79,13 +80,30 @@ class BlocksTask(PlainTask):
 
 
 class GoingTask(BlocksTask):
-    """See `Task`: to get as far as possible."""
+    """See `Task`: to get as far as possible.
+
+    axes: along how many of the world's a way counts. dark: the light of an empty tally.
+    """
 
     outcomes = ("way", "seconds")
+    axes: ClassVar[int] = 3
+    dark: ClassVar[np.ndarray | None] = None
 
-    @abc.abstractmethod
     def way(self, tally: Any) -> jax.Array:
-        """[] m from where counting began."""
+        """[] m from where counting began, as the crow flies."""
+        return length((tally.place - tally.settled)[: self.axes])
+
+    def begun(self) -> dict[str, Any]:
+        """What the empty tallies of all of them have."""
+        none, nowhere = jnp.zeros((), jnp.int32), jnp.zeros(3)
+        return {
+            "steps": none,
+            "reason": none,
+            "overlap": jnp.zeros(()),
+            "settled": nowhere,
+            "place": nowhere,
+            "light": None if self.dark is None else jnp.asarray(self.dark),
+        }
 
     def speed(self, tally: Any, settings: BlocksConfig) -> jax.Array:
         """[] m/s over the time that counts, whether it lived to its end or not."""

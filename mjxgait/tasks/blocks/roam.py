@@ -13,7 +13,7 @@ import jax.numpy as jnp
 
 from mjxgait.settings.blocks import RoamConfig, RoamWeights
 from mjxgait.tasks.blocks import alive
-from mjxgait.tasks.blocks.alive import GoingTask, length, lost
+from mjxgait.tasks.blocks.alive import GoingTask, lost
 from mjxgait.types import Sensed, pytree
 
 
@@ -32,11 +32,11 @@ class Roam(GoingTask):
 
     Settings: ClassVar[type] = RoamConfig
     terms = tuple(field.name for field in dataclasses.fields(RoamWeights))
+    axes = 2
 
     def init(self) -> Tally:
         """See `Task`."""
-        none, nothing, nowhere = jnp.zeros((), jnp.int32), jnp.zeros(()), jnp.zeros(3)
-        return Tally(none, none, nothing, nowhere, nowhere, nowhere, jnp.ones(()))
+        return Tally(**self.begun(), upwards=jnp.zeros(3), upright=jnp.ones(()))
 
     def update(
         self, tally: Tally, sensed: Sensed, torque: jax.Array, standards: Any, aim: Any
@@ -57,16 +57,13 @@ class Roam(GoingTask):
             upright=jnp.where(begins, 1.0, jnp.minimum(tally.upright, upright)),
         )
 
-    def way(self, tally: Tally) -> jax.Array:
-        """See `GoingTask`."""
-        return length((tally.place - tally.settled)[:2])
-
     def judge(self, tally: Tally, settings: RoamConfig) -> Mapping[str, jax.Array]:
         """See `Task`: the speed; what of it is lost by blocks that stand in each other or in the
         ground; and of the rest by tipping over.
         """
         speed = self.speed(tally, settings)
+        earned = jnp.maximum(speed, 0.0)
         inside = lost(tally.overlap / settings.overlap)
         tilt = jnp.degrees(jnp.arccos(jnp.clip(tally.upright, -1.0, 1.0)))
         tipped = (1 - inside) * lost(tilt / settings.tilt)
-        return {"speed": speed, "overlap": speed * inside, "balance": speed * tipped}
+        return {"speed": speed, "overlap": earned * inside, "balance": earned * tipped}

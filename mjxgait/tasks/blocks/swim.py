@@ -37,17 +37,9 @@ class Swim(GoingTask):
 
     def init(self) -> Tally:
         """See `Task`."""
-        none, nothing, nowhere = jnp.zeros((), jnp.int32), jnp.zeros(()), jnp.zeros(3)
+        nothing, nowhere = jnp.zeros(()), jnp.zeros(3)
         return Tally(
-            none,
-            none,
-            nothing,
-            nowhere,
-            nowhere,
-            nowhere,
-            nowhere,
-            exchanged=nothing,
-            lacking=nothing,
+            **self.begun(), began=nowhere, given=nowhere, exchanged=nothing, lacking=nothing
         )
 
     def update(
@@ -78,16 +70,13 @@ class Swim(GoingTask):
             lacking=lacking,
         )
 
-    def way(self, tally: Tally) -> jax.Array:
-        """See `GoingTask`."""
-        return length(tally.place - tally.settled)
-
     def judge(self, tally: Tally, settings: SwimConfig) -> Mapping[str, jax.Array]:
         """See `Task`: the speed; what of it is lost by blocks that stand in each other; and of the
         rest by momentum from elsewhere.
         """
         speed = self.speed(tally, settings)
+        earned = jnp.maximum(speed, 0.0)
         inside = lost(tally.overlap / settings.overlap)
         share = tally.lacking / jnp.maximum(tally.exchanged, LITTLE)
         elsewhere = (1 - inside) * lost(share / settings.elsewhere)
-        return {"speed": speed, "overlap": speed * inside, "elsewhere": speed * elsewhere}
+        return {"speed": speed, "overlap": earned * inside, "elsewhere": earned * elsewhere}
