@@ -15,6 +15,7 @@ from mjxgait.physics.trees.tree import Surroundings
 from mjxgait.runs.blueprint import draw_up
 from mjxgait.runs.folder import create_run
 from mjxgait.settings.blocks import RoamConfig
+from mjxgait.settings.brains import BrainConfig
 from mjxgait.simulation.rollout import Simulator
 
 
@@ -58,6 +59,18 @@ def test_bodies_that_grow_walk_by_another_task_of_that_name():
         assert find("task", task).Settings is type(asked.fitness)
     written = build_config({"use": {"controller": "brain", "task": "walk"}}, "test")
     assert (written.use.task, type(written.fitness)) == ("roam", RoamConfig)
+
+
+def test_sims_population_is_his():
+    """300, of which a fifth survives; four in ten children have one parent."""
+    creature = load_creature("blocks")
+    config = resolve_config(creature.settings.train, "blocks", Path("sims"), {"task": "walk"})
+    evolution, controller = config.evolution, config.controller
+    assert evolution.proportional
+    assert (evolution.population + evolution.offspring, evolution.population) == (300, 60)
+    assert evolution.initial_choice * evolution.population == 300
+    assert isinstance(controller, BrainConfig)
+    assert (controller.crossover, controller.grafting) == (0.3, 0.3)
 
 
 def test_a_creature_says_things_to_one_task_only():
