@@ -96,16 +96,18 @@ class RoamConfig(BlocksConfig):
 
 @dataclasses.dataclass(frozen=True)
 class JumpWeights:
-    """What each term counts; `overlap` is a penalty.
+    """What each term counts; `overlap` and `wild` are penalties.
 
     Attributes:
       height: m, the greatest height of the lowest part.
       overlap: what of it is lost by blocks that stand in each other or in the ground.
+      wild: what of the rest is lost by an episode that ends early: its share that was not lived.
     """
 
     __pydantic_config__ = STRICT
     height: NonNegative = 1.0
     overlap: NonNegative = 1.0
+    wild: NonNegative = 1.0
 
 
 @dataclasses.dataclass(frozen=True)

@@ -156,8 +156,10 @@ def test_to_jump_is_to_have_the_lowest_part_high_once_settled(task: Roam):
             tally = jumping.update(tally, sensed, jnp.zeros(3), standards, ())
         return {name: float(value) for name, value in jumping.judge(tally, settings).items()}
 
-    assert jumped(0.0) == pytest.approx({"height": 0.3, "overlap": 0.0})
+    assert jumped(0.0) == pytest.approx({"height": 0.3, "overlap": 0.0, "wild": 0.0})
     assert jumped(settings.overlap)["overlap"] == pytest.approx(0.15)
+    half = dataclasses.replace(jumping.init(), height=0.3, steps=task.horizon // 2)
+    assert float(jumping.judge(half, settings)["wild"]) == pytest.approx(0.15)
 
 
 def test_to_sink_into_the_ground_costs_speed(task: Roam):

@@ -48,9 +48,16 @@ class Jump(BlocksTask):
         )
 
     def judge(self, tally: Tally, settings: JumpConfig) -> Mapping[str, jax.Array]:
-        """See `Task`: m, and what of it is lost by blocks that stand in each other or in the ground."""
+        """See `Task`: m; what of it is lost by blocks that stand in each other or in the ground; and of
+        the rest by an end before the end, for the wildest leap is the last.
+        """
         inside = lost(tally.overlap / settings.overlap)
-        return {"height": tally.height, "overlap": tally.height * inside}
+        wild = (1 - inside) * (1 - tally.steps / self.horizon)
+        return {
+            "height": tally.height,
+            "overlap": tally.height * inside,
+            "wild": tally.height * wild,
+        }
 
     def outcome(self, tally: Tally) -> Mapping[str, jax.Array]:
         """See `Task`: m, and s until the end."""
