@@ -4,14 +4,18 @@ import dataclasses
 
 import jax
 import jax.numpy as jnp
+import mujoco
 import numpy as np
 import pytest
 from blocks.made_up import CALM
 
+from mjxgait.certify.config import CertificateConfig
 from mjxgait.certify.grown import seen_grown
 from mjxgait.certify.outcome import Outcome
 from mjxgait.certify.simulate import simulate
 from mjxgait.certify.starts import nominal_starts
+from mjxgait.certify.stepping import VELOCITY_STAGE, Stepping
+from mjxgait.certify.tasks import demands_of
 from mjxgait.champion.blocks.material import LIGHT
 from mjxgait.creature import Creature
 from mjxgait.library import load_creature
@@ -72,6 +76,26 @@ def test_the_examiner_sees_them_get_as_near(experiment: Experiment, evolved):
     # A corner that touches a tick earlier leads elsewhere.
     assert np.median(np.abs(mine - lengths) / lengths) < 0.05
     assert (np.abs(lengths - elsewhere) > 0.02).any(), "some go by the light"
+
+
+def test_the_examiner_shows_the_light_in_each_blocks_own_axes(experiment: Experiment, evolved):
+    champion = experiment.champion(evolved[0], {})
+    body, light = champion.embodied(experiment.creature), np.array([3.0, -4.0, 1.0])
+    task = demands_of("follow-on-land")
+    start = dataclasses.replace(nominal_starts(body, 2), light=np.stack([light, 0 * light]))
+    stepping = Stepping(body, champion, start, 0, 1, task.fall(CertificateConfig()), task)
+    stepping.qpos[:, 3:7] = [0.5, -0.5, 0.1, 0.7]
+    stepping.batch.forward(stage=VELOCITY_STAGE)
+    seen, dark = stepping._light(np.arange(2))
+    assert not dark.any()
+    data = mujoco.MjData(body.model)
+    data.qpos[:] = stepping.qpos[0]
+    mujoco.mj_kinematics(body.model, data)
+    for part in range(body.model.nbody - 1):
+        block = body.model.geom(f"block{part}").id
+        there = stepping.start.place + light - data.geom_xpos[block]
+        there = data.geom_xmat[block].reshape(3, 3).T @ there
+        np.testing.assert_allclose(seen[part], there / np.linalg.norm(there), atol=1e-9)
 
 
 def nearer(body: Creature, outcome: Outcome) -> float:
