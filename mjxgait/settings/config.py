@@ -66,6 +66,7 @@ class RolloutConfig:
         as a share.
       masses: the same for each part's mass and inertia, which then differ from lane to lane;
         a step costs a third more (docs/performance.md).
+      latency: most control steps by which the torques of a perturbed start come late.
       terminate: whether an episode ends when the creature falls; if not, its whole body meets
         the floor.
       termination: what counts as falling, where it differs from creature.toml.
@@ -88,6 +89,7 @@ class RolloutConfig:
     push: NonNegative = 0.2
     gains: Fraction = 0.1
     masses: Annotated[Fraction, SHAPE] = 0.0
+    latency: Annotated[Whole, SHAPE] = 0
     terminate: Annotated[bool, SHAPE] = True
     termination: TerminationConfig = dataclasses.field(default_factory=TerminationConfig)
     worst: Fraction = 0.5
@@ -241,6 +243,8 @@ class ExaminationConfig:
       attempts: examinations of a run, the one at its end included.
       candidates: so many of the best, different from each other, are looked at in the end, until
         one has enough margin; 0 leaves all examinations out.
+      on_the_way: so many of them are looked at on the way. With few starts in each generation the
+        first is often the luckiest.
       difference: in units of each gene's range, root mean square; what counts as different.
     """
 
@@ -250,6 +254,7 @@ class ExaminationConfig:
     draws: Annotated[Count, HOST] = 32
     attempts: Annotated[Count, HOST] = 3
     candidates: Annotated[Whole, HOST] = 12
+    on_the_way: Annotated[Count, HOST] = 1
     difference: Annotated[NonNegative, HOST] = 0.02
 
 
