@@ -26,6 +26,8 @@ class State:
     foot_height: [S, F] m, lowest point above the floor; empty where nobody asks.
     mass_matrix: [S, nv, nv]. bias: [S, nv], Coriolis and gravity less passive forces.
     constraint_force: [S, nv], of the previous step's solve.
+    light: [S, F, 3] its direction in the own axes of each foot's geom, 0 where there is none; empty
+    where nobody asks.
     goal, bar: [S] m ahead of the start; None where the task has none.
     """
 
@@ -44,6 +46,7 @@ class State:
     constraint_force: np.ndarray
     goal: np.ndarray | None = None
     bar: np.ndarray | None = None
+    light: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros((0, 0, 3)))
 
 
 Sense = Callable[[Creature, State], np.ndarray]
@@ -105,9 +108,10 @@ def _left(state: State, place: np.ndarray | None) -> np.ndarray:
 
 ADDED: Mapping[str, Sense] = {
     "goal_distance": lambda creature, state: _left(state, state.goal),
+    "light": lambda creature, state: state.light,
     "bar_distance": lambda creature, state: _left(state, state.bar),
 }
-"""Those that a shipped task adds (docs/hop.md, docs/limbo.md)."""
+"""Those that a shipped task adds (docs/hop.md, docs/limbo.md, docs/follow.md)."""
 FOOT_SENSES = ("foot_height", "contact")
 """Those for which `foot_height` must be told."""
 

@@ -149,6 +149,7 @@ class EvolutionConfig:
       initial_choice: so many are drawn and judged for each place of the first generation.
       selection: how parents are drawn: any, by rank, or the best of some rivals.
       rivals: of a tournament.
+      proportional: parents are drawn in proportion to their fitness instead.
       crossover: share of offspring with two parents, the others have one.
       crossing: `permute` draws K poses from the parents' 2K in any order; `align` leaves each
         pose in its place.
@@ -187,6 +188,7 @@ class EvolutionConfig:
     initial_choice: Count = 1
     selection: Literal["uniform", "rank", "tournament"] = "rank"
     rivals: Annotated[Count, SHAPE] = 2
+    proportional: Annotated[bool, SHAPE] = False
     crossover: Fraction = 0.7
     crossing: Literal["permute", "align"] = "align"
     pool: Annotated[Literal["parents", "growing"], SHAPE] = "parents"
@@ -210,6 +212,8 @@ class EvolutionConfig:
                 f"growth = {self.growth} leaves no room for offspring; make it larger than {1 + 1 / self.population:.3g}"
             )
 
+        if self.proportional and (self.unique_children or self.pool == "growing"):
+            raise ValueError("proportional is for children that are born all at once")
         if self.elite and self.survival == "best":
             raise ValueError('elite is for survival = "children": of the best all live on anyway')
         if self.elites >= self.offspring:
@@ -261,8 +265,8 @@ class UseConfig:
     Attributes:
       controller: what moves the creature: poses, program (docs/programs.md), brain
         (docs/blocks.md), or FILE.py:CLASS of your own (docs/extending.md).
-      task: what the creature is to do: walk, hop, limbo, travel, swim, or FILE.py:CLASS of your
-        own.
+      task: what the creature is to do: walk, hop, limbo, travel; swim, walk, jump, follow and
+        follow-on-land of bodies that grow (docs/blocks.md); or FILE.py:CLASS of your own.
     """
 
     __pydantic_config__ = STRICT
