@@ -167,7 +167,8 @@ class _Body:
     def check_mirror(self, creature: Creature) -> None:
         """Random poses and their mirror images, part by part: where each is and how it has turned.
 
-        Joints whose partner the file states are only compared with it, and stand still.
+        Joints whose partner the file states are only compared with it, and stand still; what moves
+        with one that is said to be its own partner has no image.
         """
         rng, stated = np.random.default_rng(0), self.table.get("mirror", {}).get("pairs", [])
         for pair in stated:
@@ -187,6 +188,8 @@ class _Body:
             pose = stand + free * rng.uniform(-SWING, SWING, len(stand))
             parts, image = self._parts(pose), self._parts(creature.mirror.image(pose))
             for j, partner in enumerate(creature.mirror.partner):
+                if partner == j and not free[j]:
+                    continue
                 turned = parts[1][partner] @ base[1][partner].T
                 image_turned = image[1][j] @ base_image[1][j].T
                 angle = np.linalg.norm(flip @ turned @ flip - image_turned) / np.sqrt(2)

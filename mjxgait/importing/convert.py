@@ -209,11 +209,7 @@ def _folder(
         "high" if math.isfinite(best.held.up) and best.held.stands else "low",
         "limbs that end lowest",
     )
-    pairs: dict[str, tuple[str, int]] = {}
-    if planar and mirror is not None:  # the geometry alone cannot tell two legs in one place apart
-        pairs = {
-            n: (puppet.names[mirror[0][j]], int(mirror[1][j])) for j, n in enumerate(puppet.names)
-        }
+    pairs = {} if mirror is None else _stated_pairs(puppet, best.q, mirror, planar)
     forward = rotation(puppet.bodies[0].quat).T @ [1.0, 0.0, 0.0]
     length = _stated_length(best)
     toml = creature_toml(
@@ -237,6 +233,24 @@ def _folder(
         README: report,
     }
     return Imported(name, files, notes, best.held.stands)
+
+
+def _stated_pairs(
+    puppet: Puppet, q: np.ndarray, mirror: tuple[np.ndarray, np.ndarray], planar: bool
+) -> dict[str, tuple[str, int]]:
+    """Partner and sign by joint, of those that nobody could tell from the geometry alone.
+
+    Those are joints that are not quite each other's image, and all of a body in a plane, whose legs
+    are in one place.
+    """
+    partner, sign = mirror
+    found, turned = puppet.images(np.array([1.0, 0.0, 0.0]), q, slack=0.5)
+    known = (found == partner) & (turned == sign) & (not planar)
+    return {
+        name: (puppet.names[partner[j]], int(sign[j]))
+        for j, name in enumerate(puppet.names)
+        if not known[j]
+    }
 
 
 def _stated_length(best: Candidate) -> float | None:

@@ -44,6 +44,10 @@ RANGES = {
     "other": 20.0,
 }
 """deg to both sides of the standing angle, by what a joint does."""
+ENDLESS = 6.0
+"""rad, width of a range from which it is none."""
+LEAST_BEND = 3.0
+"""deg that a knee stays away from straight."""
 ROLES = ("stride", "side", "lift")
 
 
@@ -84,6 +88,7 @@ def plan_drive(puppet: Puppet, q: np.ndarray, stance: Stance, planar: bool, note
     # mean "not known".
     torque = np.where(np.isfinite(stated) & (stated > 0.15 * own), np.minimum(stated, 3 * own), own)
     drive = Drive(roles, kp, kd, torque, _ranges(puppet, q, roles))
+    _bend_one_way(puppet, q, drive, notes)
     _add_armature(puppet, drive, inertia, notes)
     reason = f"weight {puppet.mass * GRAVITY:.3g} N times hip height {stance.hip:.3g} m"
     reason += "; more where a joint's own inertia needs it" if (kp == quick).any() else ""
@@ -158,6 +163,39 @@ def _ranges(puppet: Puppet, q: np.ndarray, roles: list[str]) -> np.ndarray:
     low = np.maximum(-half, np.degrees(np.where(np.isfinite(puppet.low), puppet.low, -1e3) - q))
     high = np.minimum(half, np.degrees(np.where(np.isfinite(puppet.high), puppet.high, 1e3) - q))
     return np.stack([np.minimum(low, 0.0), np.maximum(high, 0.0)], 1)
+
+
+def _bend_one_way(puppet: Puppet, q: np.ndarray, drive: Drive, notes: Notes) -> None:
+    """Keeps a knee whose file states no limits on the side to which it is bent in the stance."""
+    sided = []
+    soles = puppet.sole_points(*puppet.pose(q))
+    for f, sole in enumerate(soles):
+        leg = puppet.leg(f)
+        path = np.concatenate([puppet.data.xanchor[[j + 1 for j in leg]], sole.mean(0)[None]])
+        parts = np.diff(path, axis=0)
+        sizes = np.linalg.norm(parts, axis=1)
+        if len(sizes) < 2:
+            continue
+        k = int((sizes[:-1] + sizes[1:]).argmax())
+        knee, axis = leg[k + 1], puppet.data.xaxis[leg[k + 1] + 1]
+        if puppet.high[knee] - puppet.low[knee] < ENDLESS:
+            continue
+        thigh, shank = parts[k], parts[k + 1]
+        straight = np.degrees(np.arctan2(axis @ np.cross(shank, thigh), shank @ thigh))
+        if abs(straight) < LEAST_BEND:
+            continue
+        end = straight - np.sign(straight) * LEAST_BEND
+        low, high = drive.ranges[knee]
+        drive.ranges[knee] = (low, min(high, end)) if straight > 0 else (max(low, end), high)
+        if (drive.ranges[knee] != (low, high)).any():
+            sided.append(puppet.names[knee])
+    if sided:
+        notes.guess(
+            "side of knees",
+            "as they stand",
+            "medium",
+            f"the file has no limits for {listed(sided)}: no further than straight",
+        )
 
 
 def _steering(puppet: Puppet, stance: Stance, drive: Drive, moves: np.ndarray) -> None:
