@@ -114,6 +114,10 @@ class _Body:
             field = f"{'steer' if group == 'steering' else group}_{key}"
             weights = np.array([self.weight(name, group, key) for name in self.names])
             yield f"{group} weight ({key})", (getattr(creature.corrections, field), weights)
+        if stepping := creature.corrections.stepping:
+            for key in ("ahead", "aside"):
+                weights = np.array([self.weight(name, "stepping", key) for name in self.names])
+                yield f"stepping weight ({key})", (getattr(stepping, key), weights)
 
     def axes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Forward, left and up in the trunk's frame, from cross products in the world."""

@@ -44,6 +44,10 @@ RANGES = {
     "other": 20.0,
 }
 """deg to both sides of the standing angle, by what a joint does."""
+STEPPERS = 2
+"""Feet of a body that must step under its fall; with more it stands."""
+WEAKEST = 0.3
+"""m that a joint moves its foot per rad and hip height, to be one that takes the foot somewhere."""
 ENDLESS = 6.0
 """rad, width of a range from which it is none."""
 LEAST_BEND = 3.0
@@ -68,6 +72,8 @@ class Drive:
     stride: dict[str, float] = dataclasses.field(default_factory=dict)
     pitch: dict[str, float] = dataclasses.field(default_factory=dict)
     roll: dict[str, float] = dataclasses.field(default_factory=dict)
+    ahead: dict[str, float] = dataclasses.field(default_factory=dict)
+    aside: dict[str, float] = dataclasses.field(default_factory=dict)
 
 
 def plan_drive(puppet: Puppet, q: np.ndarray, stance: Stance, planar: bool, notes: Notes) -> Drive:
@@ -102,6 +108,8 @@ def plan_drive(puppet: Puppet, q: np.ndarray, stance: Stance, planar: bool, note
     if not planar:
         _steering(puppet, stance, drive, moves)
     _balance(puppet, stance, drive, moves, planar)
+    if len(puppet.feet) <= STEPPERS:
+        _stepping(puppet, stance, drive, moves, planar)
     return drive
 
 
@@ -217,6 +225,20 @@ def _steering(puppet: Puppet, stance: Stance, drive: Drive, moves: np.ndarray) -
         drive.bend[puppet.names[behind[0]]] = 0.5 * float(
             np.sign(puppet.data.xaxis[behind[0] + 1][2])
         )
+
+
+def _stepping(
+    puppet: Puppet, stance: Stance, drive: Drive, moves: np.ndarray, planar: bool
+) -> None:
+    """The highest joints that swing a foot forward, and to the side, take it under the fall."""
+    for f in range(len(puppet.feet)):
+        for role, axis, table in (("stride", 0, drive.ahead), ("side", 1, drive.aside)):
+            if role == "side" and planar:
+                continue
+            way = {j: float(moves[j][axis]) / stance.hip for j in puppet.leg(f)}
+            own = [j for j in way if drive.role[j] == role and abs(way[j]) > WEAKEST]
+            if own:
+                table[puppet.names[own[0]]] = round(1 / way[own[0]], 3)
 
 
 def _balance(puppet: Puppet, stance: Stance, drive: Drive, moves: np.ndarray, planar: bool) -> None:

@@ -92,6 +92,13 @@ def creature_toml(
         f"roll = {_table(drive.roll)}",
         "",
     ]
+    if drive.ahead or drive.aside:
+        lines += [
+            "[stepping]  # low: likewise; two feet and less must step under a fall",
+            f"ahead = {_table(drive.ahead)}",
+            f"aside = {_table(drive.aside)}",
+            "",
+        ]
     lines += [
         "[termination]",
         "min_up = 0.5",
