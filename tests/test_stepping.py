@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 import pytest
 from helpers import STOOL, altered, pose_champion
-from importing.models import BIPED
+from importing.models import BIPED, QUADRUPED
 
 from mjxgait.certify.layout import start_frame
 from mjxgait.certify.state import State
@@ -17,8 +17,11 @@ from mjxgait.control.poses import PoseTracker, stepping
 from mjxgait.creature import Creature, load_creature
 from mjxgait.creature.scale import load_files
 from mjxgait.importing import ImportChoices, import_model
+from mjxgait.parts import resolve_config
 from mjxgait.senses import sense
+from mjxgait.settings.config import Config
 from mjxgait.settings.control import STEPPING, TUNING, PoseConfig, gene_names
+from mjxgait.settings.gaits import stride_limit
 from mjxgait.types import Sensed
 
 STEP = 0.005
@@ -92,6 +95,31 @@ def test_the_importer_gives_the_weights_to_what_takes_a_foot_ahead_and_aside(bip
         small = 0.02
         moved = way(biped, joint, small * table[names.index(joint)])
         assert moved[axis] == pytest.approx(small * hip, rel=0.15)
+
+
+def test_a_biped_is_judged_on_more_starts_and_first_of_all_by_staying_up(biped: Creature):
+    """The import chooses the settings of its class and says so."""
+    usual, own = Config(), resolve_config(biped.settings.train, biped.name)
+    assert own.rollout.starts > usual.rollout.starts
+    assert own.fitness.weights.alive > usual.fitness.weights.alive
+    hertz = own.fitness.frequency * stride_limit(biped.frame.mass)
+    speed = own.fitness.speed * biped.frame.body_length
+    assert speed / hertz == pytest.approx(0.7 * biped.frame.hip_height, rel=0.02)
+    assert "on one foot or two it falls unless it walks" in biped.files["creature.toml"]
+
+
+def test_a_quadruped_and_one_foot_behind_the_other_are_trained_as_usual(tmp_path: Path):
+    bound = BIPED.replace('xyz="0 0.09 0"', 'xyz="0.4 0 0"').replace(
+        'xyz="0 -0.09 0"', 'xyz="-0.4 0 0"'
+    )
+    assert bound != BIPED
+    for kind, text in (("xml", QUADRUPED), ("urdf", bound)):
+        file = tmp_path / f"body.{kind}"
+        file.write_text(text, encoding="utf-8")
+        choices = ImportChoices(apart=False, forward="x")
+        creature = load_files(import_model(file, choices).files)
+        assert not creature.corrections.steps
+        assert "rollout" not in creature.settings.train
 
 
 def test_bodies_without_weights_have_neither_the_genes_nor_the_senses():

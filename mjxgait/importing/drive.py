@@ -44,8 +44,9 @@ RANGES = {
     "other": 20.0,
 }
 """deg to both sides of the standing angle, by what a joint does."""
-STEPPERS = 2
-"""Feet of a body that must step under its fall; with more it stands."""
+STEPPERS, APART = 2, 0.5
+"""Feet of a body that must step under its fall; with more, or so many hip heights one behind the
+other, it stands."""
 WEAKEST = 0.3
 """m that a joint moves its foot per rad and hip height, to be one that takes the foot somewhere."""
 ENDLESS = 6.0
@@ -108,7 +109,7 @@ def plan_drive(puppet: Puppet, q: np.ndarray, stance: Stance, planar: bool, note
     if not planar:
         _steering(puppet, stance, drive, moves)
     _balance(puppet, stance, drive, moves, planar)
-    if len(puppet.feet) <= STEPPERS:
+    if _must_step(puppet, stance):
         _stepping(puppet, stance, drive, moves, planar)
     return drive
 
@@ -225,6 +226,12 @@ def _steering(puppet: Puppet, stance: Stance, drive: Drive, moves: np.ndarray) -
         drive.bend[puppet.names[behind[0]]] = 0.5 * float(
             np.sign(puppet.data.xaxis[behind[0] + 1][2])
         )
+
+
+def _must_step(puppet: Puppet, stance: Stance) -> bool:
+    """Whether it stands on one foot in each step: two, and not one behind the other."""
+    ahead = [puppet.data.xpos[group[0] + 1][0] for group in puppet.feet]
+    return len(puppet.feet) <= STEPPERS and bool(np.ptp(ahead) < APART * stance.hip)
 
 
 def _stepping(
