@@ -17,6 +17,7 @@ from mjxgait.creature import Creature, load_creature
 from mjxgait.runs.experiment import Experiment, build_experiment, evolution_of
 from mjxgait.search.variation import Box, uniform
 from mjxgait.settings.config import Config
+from mjxgait.settings.gaits import stride_limit
 from mjxgait.settings.layers import resolve_config
 from mjxgait.settings.shipped import find_creature
 from mjxgait.simulation.evaluator import Local
@@ -29,7 +30,6 @@ from mjxgait.tasks.walk.fitness import (
     REWARDS,
     TERMS,
     fitness_terms,
-    stride_limit,
 )
 from mjxgait.types import BodyState, Judged, Sensed
 

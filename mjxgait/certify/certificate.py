@@ -59,7 +59,7 @@ class Certificate:
             (
                 f"{c.number} {c.name}",
                 m.name,
-                f"{m.value:.3g}",
+                "none" if np.isnan(m.value) else f"{m.value:.3g}",
                 f"{m.sense} {m.threshold:g}",
                 "pass" if m.passed else "FAIL",
             )

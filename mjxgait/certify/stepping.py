@@ -249,6 +249,7 @@ class Stepping:
             # A free joint's angular velocity is in the body's own frame.
             trunk_angvel=(rot * velocity[:, None, root + 3 : root + 6]).sum(2),
             foot_height=self._foot_height(running),
+            foot_pos=self._foot_pos(running),
             mass_matrix=self.layout.dense(self.mass[running]),
             bias=self.bias[running] - self.passive[running],
             constraint_force=self.last_force[running],
@@ -276,6 +277,15 @@ class Stepping:
         rot = self.geom_xmat[running][:, self.feet.geoms].reshape(*there.shape, 3)
         seen: np.ndarray = (there[:, :, None] @ rot)[:, :, 0]
         return seen
+
+    def _foot_pos(self, running: np.ndarray) -> np.ndarray:
+        if not self.sees_feet:
+            return np.zeros((len(running), 0, 3))
+        feet = self.creature.feet
+        pos = self.geom_xpos[running][:, list(feet.stepping)]
+        return np.stack(
+            [pos[:, feet.foot_of == foot].mean(1) for foot in range(len(feet.names))], 1
+        )
 
     def _lift(self) -> None:
         """Raises each start until no part is deeper in the floor than when standing; else joint

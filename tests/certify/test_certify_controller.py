@@ -11,7 +11,7 @@ from helpers import altered
 from mjxgait.certify.drive import Drive
 from mjxgait.certify.layout import start_frame
 from mjxgait.certify.state import ADDED, SENSES, State, sense
-from mjxgait.certify.twins.poses import PoseTwin, pose_cycle
+from mjxgait.certify.twins.poses import READS, PoseTwin, pose_cycle
 
 STEP = 0.005
 
@@ -51,12 +51,13 @@ def made_up(creature, rot=None, pos=(0.0, 0.0, 0.3035), angvel=(0.0, 0.0, 0.0), 
         mass_matrix=root @ root.swapaxes(1, 2) + np.eye(nv),
         bias=draw(count, nv),
         constraint_force=draw(count, nv),
+        foot_pos=draw(count, 4, 3),
     )
 
 
 def felt(creature, *arguments, **keys):
     """What the controller senses of a made-up state."""
-    return sense(creature, made_up(creature, *arguments, **keys), PoseTwin.reads)
+    return sense(creature, made_up(creature, *arguments, **keys), READS)
 
 
 def twin(creature, *arguments, **keys):
@@ -256,7 +257,7 @@ def askew(tiny):
         trunk_rot=jnp.asarray(rot),
         trunk_vel=jnp.asarray(state.trunk_vel[0]),
         trunk_angvel=jnp.asarray(state.trunk_angvel[0]),
-        geom_pos=jnp.zeros((len(tiny.feet.watched), 3)),
+        geom_pos=jnp.zeros((len(tiny.feet.watched), 3)).at[:4].set(jnp.asarray(state.foot_pos[0])),
         geom_low=jnp.zeros(len(tiny.feet.watched)).at[:4].set(jnp.asarray(state.foot_height[0])),
     )
 
