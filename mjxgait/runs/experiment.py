@@ -184,10 +184,10 @@ class Batch:
 
     def bound(self, program: jax.stages.Compiled) -> Step:
         """The generation of these rows by a program of their shape."""
-        return partial(program, *self._known)
+        return partial(program, *self.known)
 
     def _around(self, evaluator: Evaluator) -> Step:
-        numbers, rows = self._known
+        numbers, rows = self.known
         lowered = self._lowered(propose, rows, self.abstract())
         proposals, starts = lowered.out_info
         wanting = compiled(lowered)
@@ -209,7 +209,7 @@ class Batch:
         return self._lowered(judge, self.rows.settings, starts, genomes)
 
     @cached_property
-    def _known(self) -> tuple[Numbers | None, Row]:
+    def known(self) -> tuple[Numbers | None, Row]:
         """What the programs read of the body and of the rows, on all devices."""
         one = self.experiments[0]
         known: tuple[Numbers | None, Row] = jax.device_put(
