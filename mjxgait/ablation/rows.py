@@ -14,7 +14,6 @@ import jax
 from mjxgait.ablation.plan import Plan, Run
 from mjxgait.champion import write_champion
 from mjxgait.cluster.crew import Crew
-from mjxgait.cluster.here import Here
 from mjxgait.cluster.jobs import Advanced, AdvanceRows, Job
 from mjxgait.cluster.recipe import Recipe
 from mjxgait.creature import Creature
@@ -52,16 +51,16 @@ def run_study(
     creature: Creature,
     plan: Plan,
     tell: Progress,
-    crew: Crew | None = None,
+    crew: Crew,
     stride: int = 1,
 ) -> bool:
     """Runs, or goes on with, all groups; returns whether they came to their end.
 
     Args:
-      crew: who does the work; else this process, one group after the other.
+      crew: who does the work; this process alone does one group after the other.
       stride: generations from one checkpoint of a group to the next.
     """
-    crew, parts = crew or Crew(Here()), groups(plan)
+    parts = groups(plan)
     left = {
         number: _Group(folder, creature, plan, runs, number, stride)
         for number, runs in enumerate(parts)

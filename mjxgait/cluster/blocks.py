@@ -15,27 +15,24 @@ from mjxgait.settings.config import Config
 from mjxgait.tasks.trials import Starts
 from mjxgait.types import Judged
 
-BLOCK = 64
-"""Individuals of a block at most, where nobody says. With them a block's bits are the same, on however many
-machines.
-"""
-
 
 class Blocks:
     """See `Evaluator`: a run's genomes, judged by a crew in blocks of equal size.
+
+    With its size a block's bits are the same, however many machines there are.
 
     Raises:
       UserError: the offspring of a generation cannot be cut into equal blocks of about that size.
     """
 
-    def __init__(self, crew: Crew, creature: Creature, config: Config, most: int = BLOCK) -> None:
+    def __init__(self, crew: Crew, creature: Creature, config: Config) -> None:
         self._crew, self._recipe = crew, Recipe.of(creature, [config])
-        self.size = block_size(config.evolution.offspring, most)
+        self.size = block_size(config.evolution.offspring, config.rollout.block)
 
     def judge(self, genomes: Any, trials: Starts, settings: Config) -> Judged:
         """See `Evaluator`. One row; its settings are in the recipe."""
         genomes, trials = jax.device_get((genomes, trials))
-        return together(self._crew.all(self._work(genomes, trials)))
+        return together(self._crew.all(self._work(genomes, trials)) or ())
 
     def _work(self, genomes: Any, trials: Starts) -> Iterator[tuple[Recipe, Job]]:
         count = jax.tree.leaves(genomes)[0].shape[1]
@@ -54,7 +51,7 @@ def block_size(offspring: int, most: int) -> int:
     if 2 * size < min(most, offspring):
         raise UserError(
             f"{offspring} offspring of a generation cannot be cut into equal blocks of at most {most}; "
-            f"take a --population that {most} divides"
+            "take another --population or --rollout.block"
         )
     return size
 

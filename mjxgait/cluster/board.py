@@ -1,6 +1,8 @@
 """All machines on one screen: a live table in a terminal, one line per arrival and loss elsewhere."""
 
+import contextlib
 from collections import Counter
+from collections.abc import Iterator
 from types import TracebackType
 from typing import Self
 
@@ -8,7 +10,23 @@ from rich.console import Console
 from rich.live import Live
 from rich.table import Table
 
+from mjxgait.cluster.connect import connected
 from mjxgait.cluster.crew import Crew
+from mjxgait.cluster.here import Here
+
+
+@contextlib.contextmanager
+def crew_at(address: str | None, console: Console | None = None) -> Iterator[Crew]:
+    """Those of the cluster at an address, all on the screen; without one this process alone.
+
+    Raises:
+      UserError: see `connected`.
+    """
+    if address is None:
+        yield Crew(Here())
+        return
+    with Board(console) as board, connected(address, board.tell, board.watch) as crew:
+        yield crew
 
 
 class Board:

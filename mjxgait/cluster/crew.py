@@ -85,6 +85,10 @@ def _as_it_is(piece: tuple[Recipe, Job]) -> tuple[Recipe, Job]:
     return piece
 
 
+def _never() -> bool:
+    return False
+
+
 class Crew:
     """Those at hand. tell: called with what a user should know. watch: called with the crew now and then."""
 
@@ -116,13 +120,19 @@ class Crew:
         task = self._open[key] = _Task(key, make)
         (self._waiting.appendleft if first else self._waiting.append)(task)
 
-    def all(self, work: Iterable[tuple[Recipe, Job]]) -> list[Any]:
-        """The results of all of it, in order."""
-        keys = []
+    def all(
+        self, work: Iterable[tuple[Recipe, Job]], stopped: Callable[[], bool] = _never
+    ) -> list[Any] | None:
+        """The results of all of it, in order; None when told to stop."""
+        keys: list[Hashable] = []
+        found: dict[Hashable, Any] = {}
         for piece in work:
             keys.append(object())
             self.submit(keys[-1], partial(_as_it_is, piece))
-        found = dict(self._next() for _ in keys)
+        while len(found) < len(keys):
+            if (done := self.next(stopped)) is None:
+                return None
+            found[done[0]] = done[1]
         return [found[key] for key in keys]
 
     def next(self, stopped: Callable[[], bool]) -> tuple[Hashable, Any] | None:
@@ -136,11 +146,6 @@ class Crew:
                 return self._ready.popleft()
             self._turn()
         return None
-
-    def _next(self) -> tuple[Hashable, Any]:
-        found = self.next(lambda: False)
-        assert found is not None
-        return found
 
     def _turn(self) -> None:
         self.idle += self._hands.arrivals()

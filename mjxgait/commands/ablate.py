@@ -124,14 +124,11 @@ def _run(
 ) -> bool:
     """Whether the study came to its end; here, or on a cluster."""
     from mjxgait.ablation.rows import run_study
+    from mjxgait.cluster.board import crew_at
 
-    if cluster is None:
-        return run_study(folder, creature, plan, screen.generation)
-    from mjxgait.cluster.board import Board
-    from mjxgait.cluster.connect import connected
-
-    with Board() as board, connected(cluster, board.tell, board.watch) as crew:
-        return run_study(folder, creature, plan, screen.part, crew, STRIDE)
+    tell, stride = (screen.part, STRIDE) if cluster else (screen.generation, 1)
+    with crew_at(cluster) as crew:
+        return run_study(folder, creature, plan, tell, crew, stride)
 
 
 class _Progress:
