@@ -7,10 +7,10 @@ from mjxgait.cluster.recipe import Recipe
 
 
 class Here:
-    """See `Hands`."""
+    """See `Hands`. programs: that this process has compiled already."""
 
-    def __init__(self) -> None:
-        self._programs = Programs()
+    def __init__(self, programs: Programs | None = None) -> None:
+        self._programs = programs or Programs()
         self._coming = [Worker(0, "here")]
         self._work: tuple[Worker, Recipe, Job] | None = None
 

@@ -56,10 +56,8 @@ class Machines:
         self._recipes: dict[str, Any] = {}
         self._count, self._looked = 0, 0.0
         self._look_for_nodes()
-        for ref, node in list(self._looking.items()):
-            found = Machine(**ray.get(ref))
-            nodes.require_same(node.name, found)
-            self._welcome(ref, found)
+        for ref in list(self._looking):
+            self._meet(ref, refuse=True)
 
     def arrivals(self) -> list[Worker]:
         """See `Hands`."""
@@ -127,23 +125,22 @@ class Machines:
         ask = ray.remote(nodes.look).options(num_cpus=0, max_retries=0, **_on(node))
         self._looking[ask.remote()] = node
 
-    def _meet(self, ref: Any) -> None:
-        """A machine that has joined later; one of other versions is left alone."""
-        node = self._looking[ref]
+    def _meet(self, ref: Any, refuse: bool = False) -> None:
+        """A machine says what it has; one of other versions is left alone, or refused."""
+        node = self._looking.pop(ref)
         try:
             found = Machine(**ray.get(ref))
-        except RayError as error:
-            self._tell(f"{node.name} cannot be asked what it has ({_why(error)}); it is left alone")
-            del self._looking[ref]
+        except RayError as error:  # it may have gone already
+            self._tell(f"{node.name} does not say what it has ({_why(error)}); it is left alone")
             return
+        if refuse:
+            nodes.require_same(node.name, found)
         if said := nodes.mismatch(node.name, found):
             self._tell(f"{said}; it is left alone")
-            del self._looking[ref]
-            return
-        self._welcome(ref, found)
+        else:
+            self._welcome(node, found)
 
-    def _welcome(self, ref: Any, found: Machine) -> None:
-        node = self._looking.pop(ref)
+    def _welcome(self, node: Node, found: Machine) -> None:
         self._tell(f"{node.name}: {node.cores} core{'s'[: node.cores > 1]}, {found.kind}")
         self._tags[node.id] = found.tag
         if self._kinds and found.tag not in self._kinds:

@@ -4,7 +4,7 @@ import dataclasses
 import hashlib
 import json
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ from typing import Any
 from mjxgait.creature import Creature
 from mjxgait.creature.scale import load_files
 from mjxgait.parts import build_config
-from mjxgait.parts.own import load, loaded
+from mjxgait.parts.own import is_loaded, load, loaded
 from mjxgait.settings.config import Config
 
 
@@ -38,7 +38,7 @@ class Recipe:
     def of(cls, creature: Creature, configs: Sequence[Config]) -> "Recipe":
         """Of runs of one program."""
         tables = tuple(dataclasses.asdict(config) for config in configs)
-        return cls(dict(creature.files), tables, tuple(_own_parts()))
+        return cls(dict(creature.files), tables, tuple(_own_parts(configs)))
 
     @cached_property
     def digest(self) -> str:
@@ -50,6 +50,8 @@ class Recipe:
         """What it was made of; the user's own code is loaded."""
         with tempfile.TemporaryDirectory() as folder:
             for part in self.own:
+                if is_loaded(part.kind, f"{part.file}:{part.cls}"):
+                    continue
                 path = Path(folder) / part.file
                 path.write_text(part.source, encoding="utf-8")
                 load(part.kind, f"{path}:{part.cls}")
@@ -57,10 +59,11 @@ class Recipe:
         return load_files(self.files), configs
 
 
-def _own_parts() -> list[OwnPart]:
-    parts = []
+def _own_parts(configs: Sequence[Config]) -> Iterator[OwnPart]:
+    """Of what has been loaded, who takes part."""
+    used = {name for config in configs for name in (config.use.controller, config.use.task)}
     for kind, text in loaded():
         place, _, cls = text.rpartition(":")
-        source = Path(place).read_text(encoding="utf-8")
-        parts.append(OwnPart(kind, cls, Path(place).name, source))
-    return parts
+        path = Path(place)
+        if f"{path.name}:{cls}" in used:
+            yield OwnPart(kind, cls, path.name, path.read_text(encoding="utf-8"))

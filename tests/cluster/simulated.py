@@ -11,7 +11,11 @@ os.environ["RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER"] = "0"  # else Ray takes the mach
 os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
 
 HERE = "127.0.0.1"
-HASTY = {"health_check_initial_delay_ms": 0, "health_check_period_ms": 200, "health_check_failure_threshold": 5}
+HASTY = {
+    "health_check_initial_delay_ms": 0,
+    "health_check_period_ms": 200,
+    "health_check_failure_threshold": 5,
+}
 """Else it takes 15 s until a machine that is silent is given up."""
 
 
