@@ -99,7 +99,7 @@ class Crew:
         watch: Callable[["Crew"], object] = lambda crew: None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self._hands, self._tell, self._watch, self._clock = hands, tell, watch, clock
+        self.hands, self._tell, self._watch, self._clock = hands, tell, watch, clock
         self._waiting: deque[_Task] = deque()
         self._open: dict[Hashable, _Task] = {}
         self._ready: deque[tuple[Hashable, Any]] = deque()
@@ -148,10 +148,10 @@ class Crew:
         return None
 
     def _turn(self) -> None:
-        self.idle += self._hands.arrivals()
+        self.idle += self.hands.arrivals()
         self._look_around()
         self._hand_out()
-        for report in self._hands.wait(TICK):
+        for report in self.hands.wait(TICK):
             self._take(report)
         self._watch(self)
 
@@ -160,7 +160,7 @@ class Crew:
             task.work = task.work or task.make()
             worker = self.idle.pop()
             self.busy[worker] = _Turn(task, self._clock())
-            self._hands.start(worker, *task.work)
+            self.hands.start(worker, *task.work)
 
     def _late(self) -> _Task | None:
         """The oldest work that one worker alone is late with."""

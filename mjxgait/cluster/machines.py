@@ -55,6 +55,8 @@ class Machines:
         self._kinds: dict[str, str] = {}
         self._recipes: dict[str, Any] = {}
         self._count, self._looked = 0, 0.0
+        self.seconds: dict[str, float] = {}
+        """That the workers of each machine have worked."""
         self._look_for_nodes()
         for ref in list(self._looking):
             self._meet(ref, refuse=True)
@@ -95,7 +97,7 @@ class Machines:
     def _report(self, ref: Any) -> Report:
         worker = self._working.pop(ref)
         try:
-            value, _ = ray.get(ref)
+            value, seconds = ray.get(ref)
         except RayActorError as error:
             self._replace(worker)
             return Report(worker, lost=_why(error))
@@ -105,6 +107,7 @@ class Machines:
         except RayError as error:  # a result that was lost with its machine
             self._replace(worker)
             return Report(worker, lost=_why(error))
+        self.seconds[worker.node] = self.seconds.get(worker.node, 0.0) + seconds
         return Report(worker, value)
 
     def _look_for_nodes(self) -> None:

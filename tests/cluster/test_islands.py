@@ -15,6 +15,7 @@ from mjxgait.cluster.crew import Crew
 from mjxgait.cluster.here import Here
 from mjxgait.cluster.programs import Programs
 from mjxgait.creature import Creature
+from mjxgait.inspect.islands import island_facts
 from mjxgait.runs.folder import create_run, read_metrics
 from mjxgait.runs.screen import Screen
 from mjxgait.runs.stored import stored_generations
@@ -124,6 +125,25 @@ def test_without_exchanges_they_are_runs_of_their_own(
     apart = without_times(folder / "islands/1/metrics.jsonl")
     assert apart[:3] == together[:3]
     assert apart[3:] != together[3:]
+
+
+def test_inspect_tells_each_island_and_what_came_to_it(
+    finished: Path, capsys: pytest.CaptureFixture
+):
+    said = said_by(capsys, "inspect", finished, code=0)
+    assert "how many migrants came to each" in said
+    rows = island_facts(finished, 5)
+    assert [row["arrived"] for row in rows] == [2, 2, 2]
+    assert [row["from"] for row in rows] == [[2], [0], [1]]
+    told, own = (
+        read_metrics(finished / "migrations.jsonl"),
+        read_metrics(finished / "islands/1/metrics.jsonl"),
+    )
+    better = [
+        line["fitness"][0] > own[line["generation"]]["best"] for line in told if line["to"] == 1
+    ]
+    assert rows[1]["ahead"] == sum(better)
+    assert island_facts(finished, 2)[0]["arrived"] == 0
 
 
 def test_a_checkpoint_of_islands_cannot_be_chosen(finished: Path, capsys: pytest.CaptureFixture):
