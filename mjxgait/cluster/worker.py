@@ -43,10 +43,10 @@ class RemoteWorker:
 
 
 @contextlib.contextmanager
-def _turn(name: str) -> Iterator[None]:
+def _turn(name: str, patience: float = -1.0) -> Iterator[None]:
     """Of all workers of a machine one compiles a program; the others then find it in the cache.
 
-    Where nothing can be kept each compiles its own at once.
+    Where nothing can be kept each compiles its own at once. patience: s; waits for ever by default.
     """
     import filelock
     import jax
@@ -58,7 +58,9 @@ def _turn(name: str) -> Iterator[None]:
         folder.mkdir(parents=True, exist_ok=True)
         try_room(folder, 2**20)
         lock = filelock.FileLock(folder / f"{name}.lock")
-        lock.acquire()
+        lock.acquire(timeout=patience)
+    except filelock.Timeout:
+        raise
     except OSError:
         yield
         return
