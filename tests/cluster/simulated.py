@@ -9,7 +9,6 @@ from typing import Any
 
 os.environ["RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER"] = "0"  # else Ray takes the machine's outer address
 os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
-os.environ["RAY_raylet_start_wait_time_s"] = "120"  # where the machine has other things to do
 
 HERE = "127.0.0.1"
 HASTY = {"health_check_period_ms": 1000, "health_check_failure_threshold": 8}
