@@ -8,7 +8,8 @@ import pytest
 from helpers import small_config
 
 from mjxgait.creature import Creature
-from mjxgait.runs.experiment import build_experiment, starts_of_round
+from mjxgait.runs.experiment import build_experiment
+from mjxgait.runs.generation import starts_of_round
 from mjxgait.settings.control import HOLDS
 from mjxgait.simulation.rollout import CHECK_EVERY
 from mjxgait.tasks.trials import NEVER, Starts, draw_starts

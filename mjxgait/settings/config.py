@@ -7,6 +7,7 @@ import pydantic
 
 from mjxgait.ground.spec import FLAT, check_ground
 from mjxgait.settings.control import DriveConfig, PoseConfig
+from mjxgait.settings.islands import IslandsConfig
 from mjxgait.settings.tables import (
     HOST,
     KIND,
@@ -73,6 +74,7 @@ class RolloutConfig:
       worst: share of the worst start in the score; the mean of the starts has the rest.
       physics: the fast step where the model allows it, or plain MJX.
       lanes: simulations in flight per device; 0 lets the program choose.
+      block: individuals that a machine of a cluster judges at once, at most (docs/cluster.md).
       body: its numbers are constants of the compiled program, which is faster, or inputs:
         then another body of the same make-up needs no compilation.
       ground: flat, slope:0.1, steps:0.05, bumps:0.05 or rough:0.05, in hip heights
@@ -95,6 +97,7 @@ class RolloutConfig:
     worst: Fraction = 0.5
     physics: Annotated[Literal["auto", "mjx"], SHAPE] = "auto"
     lanes: Annotated[Whole, SHAPE] = 0
+    block: Annotated[Count, HOST] = 64
     ground: Annotated[GroundText, KIND] = FLAT
     body: Annotated[Literal["constants", "inputs"], SHAPE] = "constants"
 
@@ -174,6 +177,7 @@ class EvolutionConfig:
       tuning_sigma: by how much it changes, in units of its range; likewise a body's.
       remove_duplicates: of individuals with the same genome only one survives.
       forced: a spell of rapid mutation and newcomers when growth stalls.
+      islands: several such populations that exchange their best (docs/cluster.md).
     """
 
     __pydantic_config__ = STRICT
@@ -203,6 +207,7 @@ class EvolutionConfig:
     tuning_sigma: Positive = 0.1
     remove_duplicates: bool = True
     forced: ForcedConfig = dataclasses.field(default_factory=ForcedConfig)
+    islands: IslandsConfig = dataclasses.field(default_factory=IslandsConfig)
 
     def __post_init__(self) -> None:
         if self.population < 2:
