@@ -16,6 +16,7 @@ FLOORS = (
     ("library",),
     ("bench",),
     ("ablation",),
+    ("cluster",),
     ("web",),
     ("animation",),
     ("importing",),

@@ -14,7 +14,8 @@ from helpers import small_config, weight_vector
 
 from mjxgait.control.poses import Genome
 from mjxgait.creature import Creature, load_creature
-from mjxgait.runs.experiment import Experiment, build_experiment, evolution_of
+from mjxgait.runs.experiment import Experiment, build_experiment
+from mjxgait.runs.generation import evolution_of
 from mjxgait.search.variation import Box, uniform
 from mjxgait.settings.config import Config
 from mjxgait.settings.gaits import stride_limit

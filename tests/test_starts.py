@@ -8,7 +8,8 @@ import pytest
 from helpers import small_config
 
 from mjxgait.creature import Creature
-from mjxgait.runs.experiment import build_experiment, starts_of_round
+from mjxgait.runs.experiment import build_experiment
+from mjxgait.runs.generation import starts_of_round
 from mjxgait.settings.control import HOLDS
 from mjxgait.simulation.rollout import CHECK_EVERY
 from mjxgait.tasks.trials import NEVER, Starts, draw_starts
@@ -98,6 +99,13 @@ def test_each_part_has_a_mass_of_its_own_but_in_the_first_start(stool: Creature)
     assert np.all(starts.heaviness[0] == 1.0)
     assert 1.18 < starts.heaviness[1:].max() <= 1.2
     assert 0.8 <= starts.heaviness[1:].min() < 0.82
+
+
+def test_torques_are_up_to_so_many_steps_late_but_in_the_first_start(stool: Creature):
+    assert drawn(stool).delay is None
+    delay = drawn(stool, latency=2).delay
+    assert delay[0] == 0
+    assert set(delay) == {0, 1, 2}
 
 
 def test_the_bodies_of_a_run_weigh_what_their_starts_say(stool: Creature):

@@ -50,6 +50,9 @@ class Study:
         and `certified` are of the first, and each further one has a table of its own.
       paired: whether all variants use the same seeds; else each has its own.
       allow_equal: whether two variants may be equal, as in a test of the method itself.
+      rows: so many runs of one shape are side by side in one program; 0: all of them, which is best on one
+        machine. A cluster hands out so many at a time. With other neighbours the fast step's last
+        bits may differ.
       base: config keys of all variants.
       variant: the first is the base that the others are compared with. grid: dotted config keys and
         their values, instead of variants.
@@ -68,6 +71,7 @@ class Study:
     grounds: tuple[GroundText, ...] = (FLAT,)
     paired: bool = True
     allow_equal: bool = False
+    rows: Whole = 0
     base: dict[str, Any] = dataclasses.field(default_factory=dict)
     variant: tuple[VariantTable, ...] = ()
     grid: dict[str, tuple[Any, ...]] = dataclasses.field(default_factory=dict)

@@ -2,26 +2,26 @@
 lanes.
 """
 
-import dataclasses
+import contextlib
 import json
-import time
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import jax
-import numpy as np
 
 from mjxgait.ablation.plan import Plan, Run
 from mjxgait.champion import write_champion
+from mjxgait.cluster.crew import Crew
+from mjxgait.cluster.jobs import Advanced, AdvanceRows, Job
+from mjxgait.cluster.recipe import Recipe
 from mjxgait.creature import Creature
 from mjxgait.runs.checkpoint import Checkpoints
 from mjxgait.runs.disk import disk_errors
-from mjxgait.runs.experiment import Batch, build_batch
 from mjxgait.runs.folder import METRICS, truncate_metrics
-from mjxgait.runs.loop import interruptible, metrics_line, versions
-from mjxgait.search.state import EvolutionState
+from mjxgait.runs.loop import interruptible
+from mjxgait.runs.packed import Packed
 from mjxgait.settings.traced import traced
 
 GROUPS, CHAMPIONS = "groups", "champions"
@@ -31,11 +31,14 @@ Progress = Callable[[int, int, dict[str, Any]], None]
 
 
 def groups(plan: Plan) -> list[list[Run]]:
-    """The runs that share a program, in the order of the plan."""
+    """The runs that share a program and are side by side in it, in the order of the plan."""
     found: dict[Any, list[Run]] = {}
     for run in plan.runs:
         found.setdefault(jax.tree.structure(traced(run.config)), []).append(run)
-    return list(found.values())
+    most = plan.study.rows or len(plan.runs)
+    return [
+        runs[first : first + most] for runs in found.values() for first in range(0, len(runs), most)
+    ]
 
 
 def champion_path(folder: Path, plan: Plan, run: Run) -> Path:
@@ -43,77 +46,111 @@ def champion_path(folder: Path, plan: Plan, run: Run) -> Path:
     return folder / CHAMPIONS / f"{plan.variants.index(run.variant)}-{run.seed}.json"
 
 
-def run_study(folder: Path, creature: Creature, plan: Plan, tell: Progress) -> bool:
-    """Runs, or goes on with, all groups; returns whether they came to their end."""
+def run_study(
+    folder: Path,
+    creature: Creature,
+    plan: Plan,
+    tell: Progress,
+    crew: Crew,
+    stride: int = 1,
+) -> bool:
+    """Runs, or goes on with, all groups; returns whether they came to their end.
+
+    Args:
+      crew: who does the work; this process alone does one group after the other.
+      stride: generations from one checkpoint of a group to the next.
+    """
     parts = groups(plan)
-    with interruptible() as interrupted:
-        for number, runs in enumerate(parts):
-            if interrupted.is_set():
-                return False
-            if all(champion_path(folder, plan, run).exists() for run in runs):
-                continue
-            _Group(folder, creature, plan, runs, number).evolve(
-                interrupted.is_set, partial(tell, number, len(parts))
-            )
-    return not interrupted.is_set()
+    left = {
+        number: _Group(folder, creature, plan, runs, number, stride)
+        for number, runs in enumerate(parts)
+        if not all(champion_path(folder, plan, run).exists() for run in runs)
+    }
+    with interruptible() as interrupted, contextlib.ExitStack() as at_last:
+        for number, group in left.items():
+            at_last.callback(group.close)
+            crew.submit(number, partial(group.work, partial(tell, number, len(parts))))
+        while left and (done := crew.next(interrupted.is_set)):
+            number, advanced = cast(tuple[int, Advanced], done)
+            group = left[number]
+            group.keep(advanced)
+            tell(number, len(parts), group.news(advanced))
+            if group.generation < group.last:
+                crew.submit(number, group.work, first=True)
+            else:
+                left.pop(number).close()
+    return not left
 
 
 class _Group:
     """The rows of one program, in a folder of their own below the study's."""
 
     def __init__(
-        self, folder: Path, creature: Creature, plan: Plan, runs: list[Run], number: int
+        self,
+        folder: Path,
+        creature: Creature,
+        plan: Plan,
+        runs: list[Run],
+        number: int,
+        stride: int,
     ) -> None:
         self.study, self.creature, self.plan, self.runs = folder, creature, plan, runs
-        self.folder = folder / GROUPS / str(number)
+        self.folder, self.stride = folder / GROUPS / str(number), stride
         self.last = max(run.generations for run in runs)
-        with disk_errors(folder):
+        self.recipe = Recipe.of(creature, [run.config for run in runs])
+        self.state: Packed | None = None
+        self.checkpoints: Checkpoints | None = None
+
+    @property
+    def generation(self) -> int:
+        """That its rows have come to."""
+        return -1 if self.state is None else self.state.generation
+
+    def work(self, tell: Callable[[dict[str, Any]], None] | None = None) -> tuple[Recipe, Job]:
+        """What is to be done next. tell: at its beginning, which is when its folder is made."""
+        if tell:
+            self._begin()
+            tell({"compiling": len(self.runs)})
+        until = min(self.generation + self.stride, self.last)
+        return self.recipe, AdvanceRows(self.state, until)
+
+    def keep(self, advanced: Advanced) -> None:
+        """Puts on disk what has come back: first the log, for a resumed run takes lines out, last the state."""
+        assert self.checkpoints is not None
+        for lines in advanced.lines:
+            self._log(lines)
+        for row, champion in advanced.champions.items():
+            path = champion_path(self.study, self.plan, self.runs[row])
+            with disk_errors(self.study):
+                write_champion(champion, self.creature, path)
+        self.state = advanced.packed
+        self.checkpoints.keep(self.state, self.creature.name, self.creature.digest)
+
+    def news(self, advanced: Advanced) -> dict[str, Any]:
+        """What there is to tell of it."""
+        return {
+            "generation": self.generation,
+            "of": self.last,
+            "generations": len(advanced.lines),
+            "seconds": advanced.seconds,
+            "steps": advanced.steps,
+            "note": advanced.note,
+        }
+
+    def close(self) -> None:
+        """Waits until everything is on disk."""
+        if self.checkpoints is not None:
+            self.checkpoints.close()
+            self.checkpoints = None
+
+    def _begin(self) -> None:
+        with disk_errors(self.study):
             self.folder.mkdir(parents=True, exist_ok=True)
-            (folder / CHAMPIONS).mkdir(exist_ok=True)
-
-    def evolve(self, stopped: Callable[[], bool], tell: Callable[[dict[str, Any]], None]) -> None:
-        """Generation after generation, each on disk before the next begins."""
-        batch = build_batch(self.creature, [run.config for run in self.runs])
-        checkpoints = Checkpoints(self.folder, keep_every=self.last + 1)
-        states = self._begin(batch, checkpoints)
-        tell({"compiling": len(self.runs), "note": batch.experiments[0].plant_note})
-        step = batch.compile()
-        states, task = batch.place(states), batch.experiments[0].simulator.task
-        try:
-            while (generation := int(np.max(states.generation))) < self.last and not stopped():
-                began = time.perf_counter()
-                states, metrics = step(states)
-                metrics = jax.device_get(metrics)
-                now = int(np.max(metrics.generation))
-                if now < 0:
-                    continue
-                lines = [
-                    metrics_line(jax.tree.map(lambda leaf, i=i: leaf[i], metrics), 1.0, task)
-                    for i in range(len(self.runs))
-                ]
-                self._log(lines)
-                self._keep_champions(batch, states, now)
-                checkpoints.save(states, self.creature.name, self.creature.digest)
-                seconds = time.perf_counter() - began
-                tell(
-                    {
-                        "generation": now,
-                        "of": self.last,
-                        "seconds": seconds,
-                        "steps": int(metrics.sim_steps.sum()),
-                        "before": generation,
-                    }
-                )
-        finally:
-            checkpoints.close()
-
-    def _begin(self, batch: Batch, checkpoints: Checkpoints) -> EvolutionState:
-        if not checkpoints.generations():
-            truncate_metrics(self.folder / METRICS, -1)
-            return batch.init()
-        states = checkpoints.restore(batch.abstract(), self.creature.digest)
-        truncate_metrics(self.folder / METRICS, int(np.max(states.generation)))
-        return states
+            (self.study / CHAMPIONS).mkdir(exist_ok=True)
+        self.checkpoints = Checkpoints(self.folder, keep_every=self.last + 1)
+        if self.checkpoints.generations():
+            self.state = self.checkpoints.read(self.creature.digest)
+        truncate_metrics(self.folder / METRICS, self.generation)
 
     def _log(self, lines: list[dict[str, Any]]) -> None:
         """One line per run that has not come to its own end.
@@ -129,15 +166,3 @@ class _Group:
                         if key not in ("wall_s", "steps_per_second")
                     }
                     log.write(json.dumps({"variant": run.variant, "seed": run.seed, **kept}) + "\n")
-
-    def _keep_champions(self, batch: Batch, states: EvolutionState, now: int) -> None:
-        for row, run in enumerate(self.runs):
-            if now == run.generations:
-                state = jax.tree.map(
-                    lambda leaf, i=row: leaf[i], dataclasses.replace(states, key=states.generation)
-                )
-                champion = batch.experiments[row].champion(state, versions())
-                with disk_errors(self.study):
-                    write_champion(
-                        champion, self.creature, champion_path(self.study, self.plan, run)
-                    )

@@ -20,8 +20,9 @@ from mjxgait.runs import loop
 from mjxgait.runs.checkpoint import Checkpoints
 from mjxgait.runs.examination import Examiner
 from mjxgait.runs.exams import Exams
-from mjxgait.runs.experiment import Experiment, evolution_of
+from mjxgait.runs.experiment import Experiment
 from mjxgait.runs.folder import EXAMS
+from mjxgait.runs.generation import evolution_of
 from mjxgait.runs.screen import Screen
 from mjxgait.search.state import EvolutionState, GenerationMetrics
 from mjxgait.types import Judged

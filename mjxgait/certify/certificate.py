@@ -233,7 +233,8 @@ def record(
     task = how_simulated(champion.task, champion.wish)
     start = task.aimed(nominal_starts(creature, 1) if start is None else start, CertificateConfig())
     outcome = simulate(creature, champion, start, seconds, record=1, refine=refine, threads=threads)
-    return measure(creature, outcome.trajectory, inside=refine == 1, aimed=start, drag=task.drag)
+    drag = task.drag if task.grown else None
+    return measure(creature, outcome.trajectory, inside=refine == 1, aimed=start, drag=drag)
 
 
 def survival(

@@ -27,6 +27,8 @@ class State:
     foot_pos: [S, F, 3] m, the middle of each foot; likewise.
     mass_matrix: [S, nv, nv]. bias: [S, nv], Coriolis and gravity less passive forces.
     constraint_force: [S, nv], of the previous step's solve.
+    light: [S, F, 3] its direction in the own axes of each foot's geom, 0 where there is none; empty
+    where nobody asks.
     goal, bar: [S] m ahead of the start; None where the task has none.
     """
 
@@ -45,6 +47,7 @@ class State:
     constraint_force: np.ndarray
     goal: np.ndarray | None = None
     bar: np.ndarray | None = None
+    light: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros((0, 0, 3)))
     foot_pos: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros((0, 0, 3)))
 
 
@@ -124,9 +127,10 @@ def _left(state: State, place: np.ndarray | None) -> np.ndarray:
 
 ADDED: Mapping[str, Sense] = {
     "goal_distance": lambda creature, state: _left(state, state.goal),
+    "light": lambda creature, state: state.light,
     "bar_distance": lambda creature, state: _left(state, state.bar),
 }
-"""Those that a shipped task adds (docs/hop.md, docs/limbo.md)."""
+"""Those that a shipped task adds (docs/hop.md, docs/limbo.md, docs/follow.md)."""
 FOOT_SENSES = ("foot_height", "contact", "foot_place")
 """Those for which `foot_height` and `foot_pos` must be told."""
 

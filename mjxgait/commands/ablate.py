@@ -15,8 +15,10 @@ from mjxgait.settings.shipped import find_creature
 from mjxgait.settings.tables import build, dump_toml, read_toml
 
 STUDY = "study.toml"
-OVER = ("env", "seeds", "first_seed", "generations", "config")
+OVER = ("env", "seeds", "first_seed", "generations", "config", "rows")
 """Options that lie over keys of the study of the same name."""
+ROWS, STRIDE = 4, 5
+"""Of a piece of work on a cluster: runs, and generations."""
 EXPECTED_SPEED = 0.8e6
 """Creature-steps per second of two cores; only for the estimate."""
 
@@ -36,6 +38,9 @@ class AblateOptions:
       generations: Another number of generations; variants that have a number of their own keep
         their share of evaluations.
       config: Another base config: a TOML file, or the name of a shipped one.
+      rows: So many runs side by side in one program, instead of all; on a cluster 4.
+      cluster: Have the runs done by a Ray cluster: HOST:PORT, or auto for the one that this machine is a
+        part of (docs/cluster.md).
       resume: Folder of a study to go on with, as it was.
       hours: Refuse a study that would take longer than this.
       dry_run: Only say what would be run, and how long it would take.
@@ -48,6 +53,8 @@ class AblateOptions:
     first_seed: int | None = None
     generations: int | None = None
     config: str | None = None
+    rows: int | None = None
+    cluster: str | None = None
     resume: Path | None = None
     hours: float = 12.0
     dry_run: bool = False
@@ -75,12 +82,12 @@ def ablate_command(arguments: Sequence[str]) -> int:
             )
         over = {name: getattr(options, name) for name in OVER}
         study = read_study(options.study, over)
+        if options.cluster and not study.rows:
+            study = dataclasses.replace(study, rows=ROWS)
         creature = load_creature(find_creature(study.env))
     plan = make_plan(study, creature, str(options.study or folder / STUDY))
-    from mjxgait.ablation.rows import (
-        groups,
-        run_study,
-    )  # JAX takes a second to import: only once the study is known to be good
+    # JAX takes a second to import: only once the study is known to be good.
+    from mjxgait.ablation.rows import groups
     from mjxgait.runs.experiment import prepare_devices
 
     prepare_devices()
@@ -101,7 +108,7 @@ def ablate_command(arguments: Sequence[str]) -> int:
     if not options.resume:
         _create(folder, study, creature)
     screen = _Progress()
-    if not run_study(folder, creature, plan, screen.generation):
+    if not _run(folder, creature, plan, screen, options.cluster):
         print(f"interrupted; go on with: mjxgait ablate --resume {folder}")
         return INTERRUPTED
     results = measure(folder, plan, screen.measuring)
@@ -112,17 +119,39 @@ def ablate_command(arguments: Sequence[str]) -> int:
     return 0
 
 
+def _run(
+    folder: Path, creature: Creature, plan: Any, screen: "_Progress", cluster: str | None
+) -> bool:
+    """Whether the study came to its end; here, or on a cluster."""
+    from mjxgait.ablation.rows import run_study
+    from mjxgait.cluster.board import crew_at
+
+    tell, stride = (screen.part, STRIDE) if cluster else (screen.generation, 1)
+    with crew_at(cluster) as crew:
+        return run_study(folder, creature, plan, tell, crew, stride)
+
+
 class _Progress:
     """Plain lines; time left from the generations so far."""
+
+    def part(self, group: int, count: int, news: dict[str, Any]) -> None:
+        """Of a study whose programs run at many places at once."""
+        if "compiling" in news:
+            return
+        print(
+            f"rows {group + 1} of {count}: generation {news['generation']} of {news['of']}, "
+            f"{news['steps'] / max(news['seconds'], 1e-9) / 1e6:.2f} M steps/s",
+            flush=True,
+        )
 
     def generation(self, group: int, count: int, news: dict[str, Any]) -> None:
         where = f"program {group + 1} of {count}" if count > 1 else "all runs"
         if "compiling" in news:
-            if news["note"]:
-                print(news["note"], flush=True)
             print(f"{where}: compiling for {news['compiling']} runs side by side", flush=True)
             return
-        left = (news["of"] - news["generation"]) * news["seconds"]
+        if news["note"] and not news["generation"]:
+            print(news["note"], flush=True)
+        left = (news["of"] - news["generation"]) * news["seconds"] / max(news["generations"], 1)
         speed = news["steps"] / news["seconds"] / 1e6
         print(
             f"{where}: generation {news['generation']} of {news['of']}, {speed:.2f} M steps/s, "

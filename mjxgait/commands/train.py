@@ -5,7 +5,7 @@ import contextlib
 import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
@@ -14,6 +14,7 @@ from mjxgait.creature.scale import parse_scales
 from mjxgait.errors import INTERRUPTED, UserError
 from mjxgait.library import Run, load_creature
 from mjxgait.parts import resolve_config
+from mjxgait.parts.registry import meant
 from mjxgait.parts.wishes import WISHES, Wishes, hint, wished
 from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.folder import (
@@ -25,6 +26,9 @@ from mjxgait.runs.folder import (
 )
 from mjxgait.settings.config import Config, ExaminationConfig
 from mjxgait.settings.tables import build, merge
+
+if TYPE_CHECKING:  # JAX takes a second to import
+    from mjxgait.runs.screen import Screen
 
 
 @dataclasses.dataclass(frozen=True)
@@ -57,6 +61,8 @@ class TrainOptions:
       turn: Degrees per second to the left that it should turn while it walks.
       steer: Degrees per second up to which it should obey when it is told to turn, to either side.
       style: calm, sneaky, heavy, proud, tired, hurried, or a FILE.toml of settings.
+      cluster: Have it done by a Ray cluster: HOST:PORT, or auto for the one that this machine is a part
+        of (docs/cluster.md).
       ground: Short for --rollout.ground: flat, slope:0.1, steps:0.05, bumps:0.05, rough:0.05.
       view: Show the best of each generation walking on a page that only this machine can reach.
       plots: Draw all plots of the run when it has ended (`mjxgait plot`).
@@ -77,6 +83,7 @@ class TrainOptions:
     turn: float | None = None
     steer: float | None = None
     style: str | None = None
+    cluster: str | None = None
     ground: str | None = None
     view: bool = False
     plots: bool = True
@@ -95,7 +102,6 @@ def train_command(arguments: Sequence[str]) -> int:
         print(said)
     # JAX takes a second to import: only once the options are known to be good.
     from mjxgait.commands.view import following
-    from mjxgait.runs import loop
     from mjxgait.runs.experiment import prepare_devices
     from mjxgait.runs.screen import Screen
     from mjxgait.viewing.plots import PLOTS, plot_run
@@ -113,17 +119,10 @@ def train_command(arguments: Sequence[str]) -> int:
         folder = options.resume
     else:
         folder = create_run(options.out, creature, config)
-    prepare_devices()
+    prepare_devices(1 if options.cluster else None)
     screen = Screen()
     with following(folder) if options.view else contextlib.nullcontext():
-        ended = loop.train(
-            folder,
-            creature,
-            config,
-            screen,
-            resume=options.resume is not None,
-            generation=options.generation,
-        )
+        ended = _evolve(folder, creature, config, screen, options)
     _plot_fitness(folder)
     if ended and options.plots:
         plot_run(folder)
@@ -131,6 +130,25 @@ def train_command(arguments: Sequence[str]) -> int:
     if ended:
         screen.next_steps(folder, Run(folder).certified)
     return 0 if ended else INTERRUPTED
+
+
+def _evolve(
+    folder: Path, creature: Creature, config: Config, screen: "Screen", options: TrainOptions
+) -> bool:
+    """Whether the run came to its end: one population or several, here or on a cluster."""
+    from mjxgait.cluster import islands
+    from mjxgait.cluster.blocks import Blocks
+    from mjxgait.cluster.board import crew_at
+    from mjxgait.runs import loop
+
+    resume, several = options.resume is not None, config.evolution.islands.count > 1
+    if several and options.generation is not None:
+        raise UserError(f"{folder}: islands go on from their latest checkpoints, not --generation")
+    with crew_at(options.cluster, screen.console) as crew:
+        if several:
+            return islands.train(folder, creature, config, screen, crew, resume)
+        evaluator = Blocks(crew, creature, config) if options.cluster else None
+        return loop.train(folder, creature, config, screen, resume, options.generation, evaluator)
 
 
 def _options_of(config: type[Config]) -> type[TrainOptions]:
@@ -198,6 +216,7 @@ def _settings(options: TrainOptions) -> Config:
         "body": options.evolve_body,
     }
     table = {
+        "use": dataclasses.asdict(meant(options.settings.use)),
         "evolution": {key: value for key, value in short.items() if value is not None},
         "rollout": {} if options.ground is None else {"ground": options.ground},
     }

@@ -16,6 +16,7 @@ from mjxgait.certify import outdated, read_certificate
 from mjxgait.champion import read_champion
 from mjxgait.errors import UserError
 from mjxgait.inspect.genomes import view_of
+from mjxgait.inspect.islands import island_facts
 from mjxgait.inspect.snapshot import Snapshot
 from mjxgait.parts import make_task, resolve_config
 from mjxgait.parts.registry import what_ends
@@ -61,6 +62,7 @@ def facts(snapshot: Snapshot) -> dict[str, Any]:
             for line in snapshot.lines
         ],
         "forced_spells": forced_spells(snapshot.lines),
+        "islands": island_facts(snapshot.run, snapshot.generation),
         "population": population(snapshot),
         "diversity": diversity(snapshot),
         "champion": individual_facts(snapshot, 1),

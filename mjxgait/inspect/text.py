@@ -7,6 +7,7 @@ from typing import Any
 from rich.console import Console
 
 from mjxgait.inspect.genomes import view_of
+from mjxgait.inspect.islands import print_islands
 from mjxgait.inspect.tables import print_pairs, show, titled_table
 
 FEW = 10
@@ -21,6 +22,7 @@ def print_facts(facts: Mapping[str, Any], console: Console, few: bool = False) -
     _print_identity(facts, console)
     _print_settings(facts["settings_changed"], console)
     _print_history(facts, console)
+    print_islands(facts["islands"], console)
     shown = facts["population"][: FEW if few else None]
     _print_population(shown, console)
     if left := len(facts["population"]) - len(shown):

@@ -86,6 +86,11 @@ def loaded() -> tuple[tuple[str, str], ...]:
     return tuple((kind, text) for (kind, _), text in _LOADED.items())
 
 
+def is_loaded(kind: str, known: str) -> bool:
+    """Whether `file.py:CLASS` is known here."""
+    return (kind, known) in _LOADED
+
+
 def load_all(parts: Sequence[tuple[str, str]]) -> None:
     """Loads what another process had `loaded`."""
     for kind, text in parts:

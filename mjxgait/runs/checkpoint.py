@@ -8,16 +8,14 @@ import dataclasses
 import logging
 import sys
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import jax
-import numpy as np
 import orbax.checkpoint as ocp
 
-from mjxgait.errors import UserError
 from mjxgait.runs.disk import disk_errors, try_room
+from mjxgait.runs.packed import Packed, pack
 from mjxgait.runs.stored import (
     FOLDER,
     MANIFEST,
@@ -76,23 +74,21 @@ class Checkpoints:
         Raises:
           UserError: the disk is full or cannot be written, now or in an earlier write.
         """
-        arrays = _by_name(state)
+        self.keep(pack(state), creature, digest)
+
+    def keep(self, packed: Packed, creature: str, digest: str) -> None:
+        """Starts to write a packed state; see `save`."""
+        arrays = dict(packed.arrays)
         manifest = Manifest(
-            SCHEMA,
-            creature,
-            digest,
-            int(np.max(state.generation)),
-            array_hash(arrays),
-            str(jax.random.key_impl(state.key)),
+            SCHEMA, creature, digest, packed.generation, array_hash(arrays), packed.key_impl
         )
         args = ocp.args.Composite(
             state=ocp.args.StandardSave(arrays),
             manifest=ocp.args.JsonSave(dataclasses.asdict(manifest)),
         )
-        size = sum(leaf.nbytes for leaf in arrays.values())
         with disk_errors(self._folder):
             # Told before anything of it is written.
-            try_room(self._folder, 2 * size + OVERHEAD)
+            try_room(self._folder, 2 * packed.size + OVERHEAD)
             self._manager.save(manifest.generation, args=args, force=True)
 
     def close(self) -> None:
@@ -113,46 +109,18 @@ class Checkpoints:
         Raises:
           UserError: no checkpoint, a damaged or foreign one, or one of other settings.
         """
+        packed = self.read(digest, generation)
+        found = self.generations()[-1] if generation is None else generation
+        return packed.state(abstract, str(self._folder / str(found)))
+
+    def read(self, digest: str, generation: int | None = None) -> Packed:
+        """The packed state of a generation, the latest by default, whatever its shapes.
+
+        Raises:
+          UserError: no checkpoint, or a damaged or foreign one.
+        """
         stored = read_stored(self._run, digest, generation)
-        wanted = _by_name(abstract)
-        _check_shapes(stored.arrays, wanted, self._folder / str(stored.manifest.generation))
-        place = jax.local_devices()[0]
-        arrays = [jax.device_put(stored.arrays[name], place) for name in wanted]
-        state = jax.tree.unflatten(jax.tree.structure(abstract), arrays)
-        return dataclasses.replace(
-            state, key=jax.random.wrap_key_data(state.key, impl=stored.manifest.key_impl)
-        )
-
-
-def _by_name(state: EvolutionState) -> dict[str, Any]:
-    """The arrays of a state by dotted name; its typed key as numbers, as files can hold them."""
-    key = state.key
-    plain = (
-        jax.eval_shape(jax.random.key_data, key)
-        if isinstance(key, jax.ShapeDtypeStruct)
-        else jax.random.key_data(key)
-    )
-    leaves, _ = jax.tree_util.tree_flatten_with_path(dataclasses.replace(state, key=plain))
-    return {jax.tree_util.keystr(path, simple=True, separator="."): leaf for path, leaf in leaves}
-
-
-def _check_shapes(found: Mapping[str, Any], wanted: Mapping[str, Any], where: Path) -> None:
-    """Refuses a checkpoint whose arrays are not those that the settings ask for.
-
-    Raises:
-      UserError: names the first array of another name, shape or type.
-    """
-    there, here = (
-        {name: (tuple(leaf.shape), str(np.dtype(leaf.dtype))) for name, leaf in tree.items()}
-        for tree in (found, wanted)
-    )
-    for name in sorted(there.keys() | here.keys()):
-        if there.get(name) != here.get(name):
-            raise UserError(
-                f"{where}: does not fit the settings of this run: {name} is "
-                f"{there.get(name, 'missing')}, the settings ask for {here.get(name, 'nothing')}; "
-                "resume with the settings it was written with"
-            )
+        return Packed(stored.arrays, stored.manifest.key_impl)
 
 
 def _keep_threads_quiet() -> None:

@@ -12,44 +12,35 @@ import numpy as np
 from jax.sharding import NamedSharding, PartitionSpec
 
 from mjxgait.champion import Champion
+from mjxgait.cores import cores
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.runs.blueprint import Numbers, Plan, draw_up
-from mjxgait.search.evolution import Evolution
-from mjxgait.search.state import EvolutionState, GenerationMetrics, Proposal
+from mjxgait.runs.generation import Row, absorb, evolution_of, judge, propose
+from mjxgait.search.state import EvolutionState, GenerationMetrics
 from mjxgait.settings.config import Config
 from mjxgait.settings.traced import traced
-from mjxgait.simulation.evaluator import Local
+from mjxgait.simulation.evaluator import Evaluator
 from mjxgait.simulation.rollout import Episodes, Simulator
-from mjxgait.tasks.score import in_order, score
 from mjxgait.tasks.trials import Starts
-from mjxgait.types import Judged, pytree
 
 Step = Callable[[EvolutionState], tuple[EvolutionState, GenerationMetrics]]
 """A compiled generation."""
 
 
-def prepare_devices() -> None:
-    """One JAX host device per core, and compiled programs kept in the user's cache folder. Call before JAX's first computation."""
+def prepare_devices(devices: int | None = None, kind: str = "") -> None:
+    """One JAX host device per core, and compiled programs kept in the user's cache folder. Call before JAX's first computation.
+
+    Args:
+      devices: another number of them.
+      kind: of machine; its programs lie apart from those of others, for a home folder may be shared.
+    """
     if jax.config.values["jax_num_cpu_devices"] < 0:
-        jax.config.update(
-            "jax_num_cpu_devices",
-            len(os.sched_getaffinity(0))
-            if hasattr(os, "sched_getaffinity")
-            else os.cpu_count() or 1,
-        )
+        jax.config.update("jax_num_cpu_devices", devices or cores())
     if jax.config.values["jax_compilation_cache_dir"] is None:
         cache = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
-        jax.config.update("jax_compilation_cache_dir", os.path.join(cache, "mjxgait", "jax"))
+        jax.config.update("jax_compilation_cache_dir", os.path.join(cache, "mjxgait", "jax", kind))
         jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
-
-
-@pytree
-class Row:
-    """What tells one evolution run from another in the same compiled program: its traced settings, and all its starts."""
-
-    settings: Config
-    starts: Starts
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -76,13 +67,17 @@ class Experiment:
         """What a user should know about the physics; empty if there is nothing to say."""
         return self.simulator.plant.note
 
-    def init(self) -> EvolutionState:
-        """The state of generation -1: a population that nobody has judged."""
+    def init(self, island: int = 0) -> EvolutionState:
+        """The state of generation -1: a population that nobody has judged.
+
+        island: other populations on the same starts are those of other islands; the run's own is 0.
+        """
+        key = jax.random.fold_in(jax.random.key(self.config.seed), 0)
         return _initial(
             self.blueprint,
             self.blueprint.numbers,
             self.row.settings,
-            jax.random.fold_in(jax.random.key(self.config.seed), 0),
+            jax.random.fold_in(key, island) if island else key,
         )
 
     def simulate(self, genomes: Any, starts: Starts | None = None) -> Episodes:
@@ -91,10 +86,10 @@ class Experiment:
         episodes = self.simulator.simulate(*rows)
         return Episodes(_only(episodes.tally), episodes.computed_steps)
 
-    def compile(self) -> Step:
-        """The generation as one compiled program."""
+    def compile(self, evaluator: Evaluator | None = None) -> Step:
+        """The generation as one compiled program, or as two around an evaluator elsewhere."""
         batch = Batch((self,))
-        step = batch.compile()
+        step = batch.compile(evaluator)
 
         def alone(state: EvolutionState) -> tuple[EvolutionState, GenerationMetrics]:
             return _only(step(_lone(state)))
@@ -102,14 +97,17 @@ class Experiment:
         return alone
 
     def candidates(self, state: EvolutionState) -> list[int]:
-        """Ranks of the best individuals that differ from each other, as many as the config asks for; best first."""
+        """Ranks of the best individuals that differ from each other, as many as the config asks for; best first.
+
+        Of equal fitness are those that did the same: programs differ in what changes nothing.
+        """
         rows = self.simulator.controller.genes(state.genomes, self.config.controller)
+        fitness, settings = np.asarray(state.fitness), self.config.examination
         chosen: list[int] = []
-        for rank in np.flatnonzero(np.isfinite(state.fitness)):
+        for rank in np.flatnonzero(np.isfinite(fitness)):
             apart = np.sqrt(np.mean((rows[chosen] - rows[rank]) ** 2, axis=1))
-            if (apart > self.config.examination.difference).all() and len(
-                chosen
-            ) < self.config.examination.candidates:
+            differs = (apart > settings.difference).all() and fitness[rank] not in fitness[chosen]
+            if differs and len(chosen) < settings.candidates:
                 chosen.append(int(rank))
         return chosen
 
@@ -176,18 +174,59 @@ class Batch:
 
     def lower(self) -> jax.stages.Lowered:
         """The program of a generation, the same for all settings of the same shape: what has been compiled once is found again."""
-        blueprint = self.experiments[0].blueprint
-        everywhere = _everywhere(self.experiments[0].simulator)
-        program = jax.jit(
-            partial(_generation, blueprint), in_shardings=everywhere, out_shardings=everywhere
-        )
-        return program.lower(blueprint.numbers, self.rows, self.abstract())
+        return self._lowered(_generation, self.rows, self.abstract())
 
-    def compile(self) -> Step:
-        """A generation of all rows as one compiled program: states and metrics have leaves [B, ...]."""
+    def compile(self, evaluator: Evaluator | None = None) -> Step:
+        """A generation of all rows: states and metrics have leaves [B, ...].
+
+        One compiled program; with an evaluator elsewhere two, and it is asked in between.
+        """
+        if evaluator is None:
+            return self.bound(compiled(self.lower()))
+        return self._around(evaluator)
+
+    def bound(self, program: jax.stages.Compiled) -> Step:
+        """The generation of these rows by a program of their shape."""
+        return partial(program, *self.known)
+
+    def _around(self, evaluator: Evaluator) -> Step:
+        numbers, rows = self.known
+        lowered = self._lowered(propose, rows, self.abstract())
+        proposals, starts = lowered.out_info
+        wanting = compiled(lowered)
+        judged = jax.eval_shape(
+            partial(judge, self.experiments[0].blueprint),
+            *(numbers, rows.settings, starts, proposals.offspring),
+        )
+        absorbing = compiled(self._lowered(absorb, rows, self.abstract(), proposals, judged))
+
+        def step(states: EvolutionState) -> tuple[EvolutionState, GenerationMetrics]:
+            proposals, starts = wanting(numbers, rows, states)
+            judged = evaluator.judge(proposals.offspring, starts, rows.settings)
+            return absorbing(numbers, rows, states, proposals, judged)
+
+        return step
+
+    def lower_judge(self, genomes: Any, starts: Starts) -> jax.stages.Lowered:
+        """The program that judges so many genomes [B, N, ...]; see `generation.judge`."""
+        return self._lowered(judge, self.rows.settings, starts, genomes)
+
+    @cached_property
+    def known(self) -> tuple[Numbers | None, Row]:
+        """What the programs read of the body and of the rows, on all devices."""
         one = self.experiments[0]
-        known = jax.device_put((one.blueprint.numbers, self.rows), _everywhere(one.simulator))
-        return partial(self.lower().compile(compiler_options=_compiler_options()), *known)
+        known: tuple[Numbers | None, Row] = jax.device_put(
+            (one.blueprint.numbers, self.rows), _everywhere(one.simulator)
+        )
+        return known
+
+    def _lowered(self, function: Callable[..., Any], *given: Any) -> jax.stages.Lowered:
+        one = self.experiments[0]
+        everywhere = _everywhere(one.simulator)
+        program = jax.jit(
+            partial(function, one.blueprint), in_shardings=everywhere, out_shardings=everywhere
+        )
+        return program.lower(one.blueprint.numbers, *given)
 
     def place(self, states: EvolutionState) -> EvolutionState:
         """The states on all devices, where the compiled program wants them."""
@@ -203,8 +242,12 @@ def build_experiment(creature: Creature, config: Config) -> Experiment:
     return _experiment(draw_up(creature, config), config)
 
 
-def build_batch(creature: Creature, configs: Sequence[Config]) -> Batch:
+def build_batch(
+    creature: Creature, configs: Sequence[Config], blueprint: Plan | None = None
+) -> Batch:
     """Runs of one creature whose configs differ in nothing that shapes the program.
+
+    blueprint: of this creature under settings of the same shape, where it has been drawn up.
 
     Raises:
       UserError: two configs need different programs, or the physics does not support the creature's model.
@@ -213,20 +256,8 @@ def build_batch(creature: Creature, configs: Sequence[Config]) -> Batch:
         raise UserError(
             "these settings need programs of different shapes: run them in batches of their own"
         )
-    blueprint = draw_up(creature, configs[0])
+    blueprint = blueprint or draw_up(creature, configs[0])
     return Batch(tuple(_experiment(blueprint, config) for config in configs))
-
-
-def evolution_of(simulator: Simulator, settings: Config) -> Evolution:
-    """The genetic algorithm under settings, plain or traced."""
-    task = simulator.task
-
-    def rank(terms: jax.Array, generation: jax.Array) -> jax.Array:
-        weights = in_order(task.weights(settings.fitness, generation), task.terms)
-        return score(terms, weights, settings.rollout.worst)
-
-    variation = simulator.controller.variation(settings.controller, settings.evolution)
-    return Evolution(settings.evolution, variation, rank)
 
 
 @partial(jax.jit, static_argnums=0)
@@ -242,34 +273,10 @@ def _initial(
 def _generation(
     blueprint: Plan, numbers: Numbers | None, rows: Row, states: EvolutionState
 ) -> tuple[EvolutionState, GenerationMetrics]:
-    """One generation of all rows [B]. Row by row but for the simulations, so that a row reads nothing of its neighbours."""
-
-    simulator = blueprint.simulator(numbers)
-    one_round = rows.settings.rollout.variety == 1
-
-    def propose(pair: tuple[Row, EvolutionState]) -> Proposal:
-        row, state = pair
-        return evolution_of(simulator, row.settings).propose(state)
-
-    def absorb(
-        of_row: tuple[Row, EvolutionState, Proposal, Judged],
-    ) -> tuple[EvolutionState, GenerationMetrics]:
-        row, state, proposal, judged = of_row
-        return evolution_of(simulator, row.settings).absorb(state, proposal, judged)
-
-    proposals = jax.lax.map(propose, (rows, states))
-    starts = rows.starts if one_round else jax.vmap(starts_of_round)(rows, states)
-    judged = Local(simulator).judge(proposals.offspring, starts, rows.settings)
-    return jax.lax.map(absorb, (rows, states, proposals, judged))
-
-
-def starts_of_round(row: Row, state: EvolutionState) -> Starts:
-    """The starts [R] of the next generation: the nominal one, and the next of all others in turn."""
-    others = row.settings.rollout.starts - 1
-    first = jnp.maximum(state.generation + 1, 0) * others
-    turn = 1 + (first + jnp.arange(others)) % (row.starts.friction.shape[0] - 1)
-    places = jnp.append(0, turn)
-    return jax.tree.map(lambda leaf: leaf[places], row.starts)
+    """One generation of all rows [B], as one program."""
+    proposals, starts = propose(blueprint, numbers, rows, states)
+    judged = judge(blueprint, numbers, rows.settings, starts, proposals.offspring)
+    return absorb(blueprint, numbers, rows, states, proposals, judged)
 
 
 def _experiment(blueprint: Plan, config: Config) -> Experiment:
@@ -302,6 +309,9 @@ def _stack(trees: Sequence[Any]) -> Any:
     return jax.tree.map(lambda *leaves: jnp.stack(leaves), *trees)
 
 
-def _compiler_options() -> dict[str, str | bool]:
-    """The fast plant gains a third from the widest vectors, which XLA's CPU compiler does not use by itself."""
-    return {"xla_cpu_prefer_vector_width": "512"} if jax.default_backend() == "cpu" else {}
+def compiled(lowered: jax.stages.Lowered) -> jax.stages.Compiled:
+    """The program; the fast plant gains a third from the widest vectors, which XLA's CPU compiler does not use by itself."""
+    options: dict[str, str | bool] = (
+        {"xla_cpu_prefer_vector_width": "512"} if jax.default_backend() == "cpu" else {}
+    )
+    return lowered.compile(compiler_options=options)

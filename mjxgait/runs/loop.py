@@ -36,6 +36,7 @@ from mjxgait.runs.folder import (
 from mjxgait.runs.screen import Screen
 from mjxgait.search.state import EvolutionState, GenerationMetrics, stop_reason
 from mjxgait.settings.config import Config
+from mjxgait.simulation.evaluator import Evaluator
 from mjxgait.tasks.protocol import Task
 
 
@@ -46,11 +47,13 @@ def train(
     screen: Screen,
     resume: bool = False,
     generation: int | None = None,
+    evaluator: Evaluator | None = None,
 ) -> bool:
     """Runs, or goes on with, the evolution in a run folder; returns whether it came to its end.
 
     Args:
       resume: go on from a checkpoint, the latest or that of `generation`.
+      evaluator: who judges, if not this machine.
     """
     experiment = build_experiment(creature, config)
     checkpoints = Checkpoints(folder, config.keep_every)
@@ -70,7 +73,7 @@ def train(
     if experiment.plant_note:
         screen.say(experiment.plant_note)
     with screen.compiling(creature.name, experiment):
-        step = experiment.compile()
+        step = experiment.compile(evaluator)
     began = time.perf_counter()
     examiner = Examiner(experiment, versions(), screen.say, Exams(folder / EXAMS))
     try:
@@ -81,24 +84,31 @@ def train(
     finally:
         screen.close()
         checkpoints.close()
-    if reason is not None and (examined := examined or examiner.best(state)):
-        with disk_errors(folder):
-            write_champion(examined.champion, creature, folder / CHAMPION)
-            body = examined.champion.embodied(creature)
-            if body is not creature:
-                keep_body(folder / BODY, body)
-            (folder / CERTIFICATE).write_text(examined.certificate.to_json(), encoding="utf-8")
-        screen.certificate(examined.certificate)
-    lines = read_metrics(folder / METRICS)
-    if lines:
-        screen.report(
-            folder,
-            reason or "interrupted",
-            lines[-1],
-            time.perf_counter() - began,
-            interrupted=reason is None,
-        )
+    if reason is not None:
+        conclude(folder, creature, screen, examined or examiner.best(state))
+    report(folder, screen, reason, time.perf_counter() - began)
     return reason is not None
+
+
+def conclude(folder: Path, creature: Creature, screen: Screen, examined: Examined | None) -> None:
+    """Leaves the champion of a run that has ended, its body and its certificate."""
+    if examined is None:
+        return
+    with disk_errors(folder):
+        write_champion(examined.champion, creature, folder / CHAMPION)
+        body = examined.champion.embodied(creature)
+        if body is not creature:
+            keep_body(folder / BODY, body)
+        (folder / CERTIFICATE).write_text(examined.certificate.to_json(), encoding="utf-8")
+    screen.certificate(examined.certificate)
+
+
+def report(folder: Path, screen: Screen, reason: str | None, seconds: float) -> None:
+    """Tells how a run went; reason: why it ended, None when the user interrupted it."""
+    if lines := read_metrics(folder / METRICS):
+        screen.report(
+            folder, reason or "interrupted", lines[-1], seconds, interrupted=reason is None
+        )
 
 
 def _evolve(

@@ -1,0 +1,55 @@
+"""What a run on islands holds: how each stands, and what they have exchanged."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from mjxgait.inspect.tables import show, titled_table
+from mjxgait.runs.folder import ISLANDS, METRICS, MIGRATIONS, read_metrics
+
+
+def island_facts(run: Path, last: int) -> list[dict[str, Any]]:
+    """A row per island up to a generation; none where the run has one population.
+
+    arrived: migrants that came to it; ahead: how often they were better than all that it had.
+    """
+    told = [line for line in read_metrics(run / MIGRATIONS) if line["generation"] < last]
+    folders = sorted((run / ISLANDS).glob("*/"), key=lambda folder: int(folder.name))
+    return [row for folder in folders if (row := _row(folder, told, last))]
+
+
+def print_islands(rows: Sequence[Mapping[str, Any]], console: Console) -> None:
+    """As a table."""
+    if not rows:
+        return
+    table = titled_table("islands; how many migrants came to each, and from where", console)
+    for heading in ("island", "best", "mean", "arrived", "ahead", "from"):
+        table.add_column(heading, justify="left" if heading == "from" else "right")
+    for row in rows:
+        where = ", ".join(map(str, row["from"])) or "-"
+        values = (show(row["best"]), show(row["mean"]), str(row["arrived"]), str(row["ahead"]))
+        table.add_row(str(row["island"]), *values, where)
+    console.print(table)
+
+
+def _row(folder: Path, told: Sequence[Mapping[str, Any]], last: int) -> dict[str, Any] | None:
+    lines = [line for line in read_metrics(folder / METRICS) if line["generation"] <= last]
+    if not lines:
+        return None
+    island = int(folder.name)
+    come = [line for line in told if line["to"] == island]
+    best = {line["generation"]: line["best"] for line in lines}
+    return {
+        "island": island,
+        "best": lines[-1]["best"],
+        "mean": lines[-1]["mean"],
+        "arrived": sum(len(line["fitness"]) for line in come),
+        "ahead": sum(_above(line["fitness"][0], best.get(line["generation"])) for line in come),
+        "from": sorted({line["from"] for line in come}),
+    }
+
+
+def _above(arrived: float, own: float | None) -> bool:
+    return own is None or arrived > own

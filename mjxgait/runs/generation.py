@@ -1,0 +1,88 @@
+"""The parts of a generation of evolution runs side by side: propose, judge, absorb.
+
+Row by row but for the simulations, so that a row reads nothing of its neighbours.
+"""
+
+import jax
+import jax.numpy as jnp
+
+from mjxgait.runs.blueprint import Numbers, Plan
+from mjxgait.search.evolution import Evolution
+from mjxgait.search.state import EvolutionState, GenerationMetrics, Proposal
+from mjxgait.settings.config import Config
+from mjxgait.simulation.evaluator import Local
+from mjxgait.simulation.rollout import Simulator
+from mjxgait.tasks.score import in_order, score
+from mjxgait.tasks.trials import Starts
+from mjxgait.types import Judged, pytree
+
+
+@pytree
+class Row:
+    """What tells one evolution run from another in the same compiled program: its traced settings, and all its starts."""
+
+    settings: Config
+    starts: Starts
+
+
+def evolution_of(simulator: Simulator, settings: Config) -> Evolution:
+    """The genetic algorithm under settings, plain or traced."""
+    task = simulator.task
+
+    def rank(terms: jax.Array, generation: jax.Array) -> jax.Array:
+        weights = in_order(task.weights(settings.fitness, generation), task.terms)
+        return score(terms, weights, settings.rollout.worst)
+
+    variation = simulator.controller.variation(settings.controller, settings.evolution)
+    return Evolution(settings.evolution, variation, rank)
+
+
+def propose(
+    blueprint: Plan, numbers: Numbers | None, rows: Row, states: EvolutionState
+) -> tuple[Proposal, Starts]:
+    """What the rows [B] want judged, and on which starts [B, R]."""
+    simulator = blueprint.simulator(numbers)
+
+    def of_row(pair: tuple[Row, EvolutionState]) -> Proposal:
+        row, state = pair
+        return evolution_of(simulator, row.settings).propose(state)
+
+    proposals = jax.lax.map(of_row, (rows, states))
+    one_round = rows.settings.rollout.variety == 1
+    return proposals, rows.starts if one_round else jax.vmap(starts_of_round)(rows, states)
+
+
+def judge(
+    blueprint: Plan, numbers: Numbers | None, settings: Config, starts: Starts, genomes: object
+) -> Judged:
+    """The verdict on genomes [B, N, ...] as this machine gives it."""
+    return Local(blueprint.simulator(numbers)).judge(genomes, starts, settings)
+
+
+def absorb(
+    blueprint: Plan,
+    numbers: Numbers | None,
+    rows: Row,
+    states: EvolutionState,
+    proposals: Proposal,
+    judged: Judged,
+) -> tuple[EvolutionState, GenerationMetrics]:
+    """The rest of the rows' generation."""
+    simulator = blueprint.simulator(numbers)
+
+    def of_row(
+        given: tuple[Row, EvolutionState, Proposal, Judged],
+    ) -> tuple[EvolutionState, GenerationMetrics]:
+        row, state, proposal, judged = given
+        return evolution_of(simulator, row.settings).absorb(state, proposal, judged)
+
+    return jax.lax.map(of_row, (rows, states, proposals, judged))
+
+
+def starts_of_round(row: Row, state: EvolutionState) -> Starts:
+    """The starts [R] of the next generation: the nominal one, and the next of all others in turn."""
+    others = row.settings.rollout.starts - 1
+    first = jnp.maximum(state.generation + 1, 0) * others
+    turn = 1 + (first + jnp.arange(others)) % (row.starts.friction.shape[0] - 1)
+    places = jnp.append(0, turn)
+    return jax.tree.map(lambda leaf: leaf[places], row.starts)

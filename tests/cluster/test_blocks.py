@@ -1,0 +1,63 @@
+"""A generation judged in blocks is the generation judged at once."""
+
+import jax
+import numpy as np
+import pytest
+from helpers import small_config
+
+from mjxgait.cluster.blocks import Blocks, block_size
+from mjxgait.cluster.crew import Crew
+from mjxgait.cluster.here import Here
+from mjxgait.cluster.jobs import AdvanceRows
+from mjxgait.cluster.programs import Programs
+from mjxgait.cluster.recipe import Recipe
+from mjxgait.creature import Creature
+from mjxgait.errors import UserError
+from mjxgait.runs.experiment import build_experiment
+
+CONFIG = small_config(rollout={"block": 3})
+
+
+@pytest.mark.parametrize(
+    ("offspring", "most", "size"), [(256, 64, 64), (250, 64, 50), (64, 100, 64), (6, 4, 3)]
+)
+def test_blocks_are_equal_and_not_too_large(offspring: int, most: int, size: int):
+    assert block_size(offspring, most) == size
+
+
+def test_what_cannot_be_cut_is_refused():
+    with pytest.raises(UserError, match=r"251 offspring.*another --population"):
+        block_size(251, 64)
+
+
+def test_a_generation_by_blocks_is_that_of_one_program(stool: Creature):
+    """Who was judged, in which order, and what it cost; terms to the rounding of another program."""
+    experiment = build_experiment(stool, CONFIG)
+    alone = experiment.compile()
+    spread = experiment.compile(Blocks(Crew(Here()), stool, CONFIG))
+    state = experiment.place(experiment.init())
+    (mine, counts), (theirs, others) = alone(state), spread(state)
+    for one, other in zip(
+        jax.tree.leaves(mine.genomes), jax.tree.leaves(theirs.genomes), strict=True
+    ):
+        assert np.array_equal(one, other)
+    np.testing.assert_allclose(mine.terms, theirs.terms, rtol=1e-4, atol=1e-5)
+    np.testing.assert_allclose(mine.fitness, theirs.fitness, rtol=1e-4, atol=1e-5)
+    for name in ("sim_steps", "episodes", "failures", "evaluations", "generation"):
+        assert getattr(counts, name) == getattr(others, name), name
+    assert (jax.random.key_data(mine.key) == jax.random.key_data(theirs.key)).all()
+
+
+def test_rows_that_are_handed_out_in_parts_go_where_they_would_have_gone(stool: Creature):
+    """Stopped and packed after each generation, or not: the same bits."""
+    recipe, programs = Recipe.of(stool, [CONFIG]), Programs()
+    whole = AdvanceRows(None, 2).do(programs, recipe)
+    state = None
+    for until in range(3):
+        part = AdvanceRows(state, until).do(programs, recipe)
+        state = part.packed
+    assert state is not None
+    for name, array in whole.packed.arrays.items():
+        assert np.array_equal(array, state.arrays[name]), name
+    assert len(whole.lines) == 3
+    assert not whole.champions

@@ -1,0 +1,176 @@
+"""Who gets which work, when hands are lost, late, or come later. The hands and the clock are made up."""
+
+import random
+from typing import Any
+
+import pytest
+
+from mjxgait.cluster.crew import FATAL, LATE, Crew, Report, Worker
+from mjxgait.errors import UserError
+
+
+class Clock:
+    def __init__(self) -> None:
+        self.now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+class Toys:
+    """Hands that take so many seconds for a piece, by worker, and may be lost instead of done.
+
+    A job is a number, its result the number's square. Waiting moves the clock to the next event.
+    """
+
+    def __init__(self, clock: Clock, seconds: list[float], fate: Any = lambda worker: None) -> None:
+        self.clock, self.seconds, self.fate = clock, seconds, fate
+        self.coming = [Worker(i, f"node {i}") for i in range(len(seconds))]
+        self.at_work: dict[Worker, tuple[float, int]] = {}
+        self.begun: list[tuple[int, int]] = []
+
+    def arrivals(self) -> list[Worker]:
+        coming, self.coming = self.coming, []
+        return coming
+
+    def start(self, worker: Worker, recipe: Any, job: Any) -> None:
+        assert worker not in self.at_work
+        self.begun.append((worker.number, job))
+        self.at_work[worker] = self.clock.now + self.seconds[worker.number], job
+
+    def wait(self, seconds: float) -> list[Report]:
+        ends = [end for end, _ in self.at_work.values()]
+        self.clock.now = min([self.clock.now + seconds, *ends])
+        assert self.clock.now < 5000, "this is waited for in vain"
+        done = [worker for worker, (end, _) in self.at_work.items() if end <= self.clock.now]
+        return [self.report(worker, self.at_work.pop(worker)[1]) for worker in done]
+
+    def report(self, worker: Worker, job: int) -> Report:
+        fate = self.fate(worker)
+        if isinstance(fate, Exception):
+            return Report(worker, error=fate)
+        return Report(worker, lost=fate) if fate else Report(worker, job**2)
+
+
+def crew_of(seconds: list[float], **others: Any) -> tuple[Crew, Toys, list[str]]:
+    clock, said = Clock(), []
+    toys = Toys(clock, seconds, **others)
+    return Crew(toys, said.append, clock=clock), toys, said
+
+
+def work(*numbers: int) -> list[Any]:
+    return [(None, number) for number in numbers]
+
+
+def test_results_come_in_the_order_of_the_work_whoever_was_faster():
+    crew, toys, _ = crew_of([3.0, 1.0])
+    assert crew.all(work(1, 2, 3, 4, 5)) == [1, 4, 9, 16, 25]
+    assert len(toys.begun) == 5
+    assert crew.done == {"node 0": 1, "node 1": 4}
+
+
+def test_what_a_lost_worker_had_is_done_by_another():
+    lost = iter(["killed"])
+    crew, toys, said = crew_of([1.0, 1.0], fate=lambda worker: next(lost, None))
+    assert crew.all(work(1, 2, 3)) == [1, 4, 9]
+    assert len(toys.begun) == 4
+    assert said == ["node 1: a worker is lost (killed); its work is done again"]
+
+
+def test_work_that_costs_every_worker_ends_with_a_sentence():
+    crew, toys, _ = crew_of([1.0] * (FATAL + 3), fate=lambda worker: "out of memory")
+    with pytest.raises(UserError, match=f"has cost {FATAL} workers.*out of memory.*smaller"):
+        crew.all(work(7))
+    assert len(toys.begun) == FATAL
+
+
+def test_nobody_waits_long_for_one_that_stands_still():
+    """The bound that docs/cluster.md states: so many medians, and the time that another takes."""
+    crew, toys, _ = crew_of([1.0, 1e9])
+    assert crew.all(work(*range(8))) == [n**2 for n in range(8)]
+    assert [number for number, _ in toys.begun].count(1) == 1
+    assert toys.clock.now <= 7 + LATE + 1.0 + 1.0
+
+
+def test_late_work_is_given_to_one_other_and_not_to_all():
+    crew, toys, _ = crew_of([1.0, 1.0, 1.0, 50.0])
+    crew.all(work(*range(10)))
+    slow = [job for number, job in toys.begun if number == 3]
+    assert [job for _, job in toys.begun].count(slow[0]) == 2
+
+
+def test_what_comes_after_the_first_result_counts_for_nothing():
+    crew, _toys, _ = crew_of([1.0, 20.0])
+    assert crew.all(work(*range(8))) == [n**2 for n in range(8)]
+    assert crew.all(work(*range(40))) == [n**2 for n in range(40)]
+    assert sum(crew.done.values()) == 48
+
+
+def test_who_joins_later_gets_work():
+    crew, toys, _ = crew_of([1.0, 1.0])
+    later = [toys.coming.pop()]
+    toys.report = lambda worker, job: (
+        toys.coming.extend(later),
+        later.clear(),
+        Report(worker, job),
+    )[-1]
+    crew.all(work(*range(6)))
+    assert {number for number, _ in toys.begun} == {0, 1}
+
+
+def test_an_error_of_the_work_is_raised_and_not_repeated():
+    crew, toys, _ = crew_of([1.0], fate=lambda worker: UserError("no such creature"))
+    with pytest.raises(UserError, match="no such creature"):
+        crew.all(work(1))
+    assert len(toys.begun) == 1
+
+
+def test_work_that_goes_on_comes_before_what_has_not_begun():
+    crew, _toys, _ = crew_of([1.0])
+    for number in (1, 2):
+        crew.submit(number, lambda number=number: (None, number))
+    assert crew.next(lambda: False) == (1, 1)
+    crew.submit(1, lambda: (None, 10), first=True)
+    assert [crew.next(lambda: False) for _ in range(2)] == [(1, 100), (2, 4)]
+
+
+def test_work_is_made_when_somebody_is_there_to_do_it():
+    crew, _toys, _ = crew_of([1.0])
+    made = []
+    for number in range(3):
+        crew.submit(number, lambda number=number: (made.append(number), number))
+    crew.next(lambda: False)
+    assert made == [0]
+
+
+def test_told_to_stop_it_stops():
+    crew, _, _ = crew_of([1.0])
+    assert crew.all(work(1), stopped=lambda: True) is None
+
+
+def test_that_nobody_is_there_is_said_once():
+    crew, toys, said = crew_of([])
+    crew.submit(0, lambda: (None, 0))
+    assert crew.next(lambda: toys.clock.now > 500) is None
+    assert said == ["nobody is there to work; waiting for machines to join"]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_whatever_is_lost_every_result_comes_exactly_once(seed: int):
+    """Six hundred pieces, thirty workers of all speeds, every ninth of which is lost with its work."""
+    chance, hired = random.Random(seed), []
+    seconds = [chance.choice([1.0, 1.0, 2.0, 30.0]) for _ in range(30)]
+
+    def fate(worker: Worker) -> str | None:
+        if chance.random() > 0.11:
+            return None
+        hired.append(Worker(worker.number + 30, worker.node))
+        seconds.extend([0.0] * (worker.number + 31 - len(seconds)))
+        seconds[worker.number + 30] = 1.0
+        toys.coming.append(hired[-1])
+        return "killed"
+
+    crew, toys, _ = crew_of(seconds, fate=fate)
+    assert crew.all(work(*range(600))) == [n**2 for n in range(600)]
+    assert len(hired) > 20
+    assert crew.open == 0

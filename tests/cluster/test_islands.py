@@ -1,0 +1,151 @@
+"""Populations that exchange their best, in this process: the same work as on a cluster, one hand."""
+
+import io
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from helpers import said_by, small_config
+from rich.console import Console
+
+from mjxgait.champion import read_champion
+from mjxgait.cluster import islands
+from mjxgait.cluster.crew import Crew
+from mjxgait.cluster.here import Here
+from mjxgait.cluster.programs import Programs
+from mjxgait.creature import Creature
+from mjxgait.inspect.islands import island_facts
+from mjxgait.runs.folder import create_run, read_metrics
+from mjxgait.runs.screen import Screen
+from mjxgait.runs.stored import stored_generations
+
+PROGRAMS = Programs()
+
+
+def config(**of_islands: Any):
+    given = {"count": 3, "every": 2, "migrants": 1} | of_islands
+    return small_config(
+        evolution={"generations": 5, "islands": given}, examination={"candidates": 0}
+    )
+
+
+class Interrupted(Crew):
+    """One that is told to stop after so many pieces of work."""
+
+    left = 4
+
+    def next(self, stopped: Callable[[], bool]) -> Any:
+        self.left -= 1
+        return super().next(lambda: self.left < 0)
+
+
+def run(
+    folder: Path, stool: Creature, settings: Any, kind: type[Crew] = Crew, resume=False
+) -> bool:
+    if not resume:
+        create_run(folder, stool, settings)
+    screen = Screen(Console(file=io.StringIO()))
+    return islands.train(folder, stool, settings, screen, kind(Here(PROGRAMS)), resume)
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory, stool: Creature) -> Path:
+    folder = tmp_path_factory.mktemp("islands") / "run"
+    assert run(folder, stool, config())
+    return folder
+
+
+def without_times(path: Path) -> list[dict]:
+    timed = ("wall_s", "steps_per_second")
+    return [{k: v for k, v in line.items() if k not in timed} for line in read_metrics(path)]
+
+
+def test_the_folder_is_that_of_a_run_and_has_each_islands_own(finished: Path, stool: Creature):
+    lines = read_metrics(finished / "metrics.jsonl")
+    assert [line["generation"] for line in lines] == list(range(6))
+    each = [read_metrics(finished / "islands" / str(i) / "metrics.jsonl") for i in range(3)]
+    for line, *own in zip(lines, *each, strict=True):
+        assert line["best"] == max(one["best"] for one in own)
+        assert line["evaluations"] == sum(one["evaluations"] for one in own)
+    champion = read_champion(finished / "champion.json", stool)
+    assert champion.fitness == pytest.approx(lines[-1]["best"])
+    for i in range(3):
+        assert stored_generations(finished / "islands" / str(i))[-1] == 5
+
+
+def test_islands_begin_apart_on_the_same_starts(finished: Path):
+    first = [read_metrics(finished / f"islands/{i}/metrics.jsonl")[0]["best"] for i in range(3)]
+    assert len(set(first)) == 3
+
+
+def test_the_first_island_begins_as_the_run_without_islands(
+    finished: Path, tmp_path: Path, stool: Creature
+):
+    assert run(tmp_path / "one", stool, config(count=1))
+    one = without_times(tmp_path / "one/islands/0/metrics.jsonl")
+    assert without_times(finished / "islands/0/metrics.jsonl")[:3] == one[:3]
+    assert not read_metrics(tmp_path / "one/migrations.jsonl")
+
+
+def test_each_exchange_is_told(finished: Path):
+    told = read_metrics(finished / "migrations.jsonl")
+    assert [(line["generation"], line["from"], line["to"]) for line in told] == [
+        (generation, (to - 1) % 3, to) for generation in (2, 4) for to in range(3)
+    ]
+    best = [line["best"] for line in read_metrics(finished / "islands/0/metrics.jsonl")]
+    assert told[1]["fitness"] == [pytest.approx(best[2])]
+
+
+def test_what_arrives_is_there_in_the_next_generation(finished: Path):
+    sent = next(line for line in read_metrics(finished / "migrations.jsonl") if line["to"] == 1)
+    after = read_metrics(finished / "islands/1/metrics.jsonl")[3]
+    assert after["best"] >= sent["fitness"][0]
+
+
+def test_stopped_between_exchanges_it_goes_on_to_the_same_champion(
+    finished: Path, tmp_path: Path, stool: Creature
+):
+    folder = tmp_path / "stopped"
+    assert not run(folder, stool, config(), Interrupted)
+    assert stored_generations(folder / "islands/0")[-1] == 2
+    assert run(folder, stool, config(), resume=True)
+    for name in ("metrics.jsonl", "migrations.jsonl", "islands/2/metrics.jsonl"):
+        assert without_times(folder / name) == without_times(finished / name), name
+    assert (folder / "champion.json").read_text() == (finished / "champion.json").read_text()
+
+
+def test_without_exchanges_they_are_runs_of_their_own(
+    finished: Path, tmp_path: Path, stool: Creature
+):
+    folder = tmp_path / "apart"
+    assert run(folder, stool, config(every=0))
+    assert not read_metrics(folder / "migrations.jsonl")
+    together = without_times(finished / "islands/1/metrics.jsonl")
+    apart = without_times(folder / "islands/1/metrics.jsonl")
+    assert apart[:3] == together[:3]
+    assert apart[3:] != together[3:]
+
+
+def test_inspect_tells_each_island_and_what_came_to_it(
+    finished: Path, capsys: pytest.CaptureFixture
+):
+    said = said_by(capsys, "inspect", finished, code=0)
+    assert "how many migrants came to each" in said
+    rows = island_facts(finished, 5)
+    assert [row["arrived"] for row in rows] == [2, 2, 2]
+    assert [row["from"] for row in rows] == [[2], [0], [1]]
+    told, own = (
+        read_metrics(finished / "migrations.jsonl"),
+        read_metrics(finished / "islands/1/metrics.jsonl"),
+    )
+    better = [
+        line["fitness"][0] > own[line["generation"]]["best"] for line in told if line["to"] == 1
+    ]
+    assert rows[1]["ahead"] == sum(better)
+    assert island_facts(finished, 2)[0]["arrived"] == 0
+
+
+def test_a_checkpoint_of_islands_cannot_be_chosen(finished: Path, capsys: pytest.CaptureFixture):
+    said = said_by(capsys, "train", "--resume", finished, "--generation", "2", code=2)
+    assert "latest checkpoints, not --generation" in said

@@ -1,0 +1,98 @@
+"""What islands exchange and what they are together, on states made up by hand."""
+
+import numpy as np
+import pytest
+
+from mjxgait.cluster.migration import exchanged, gathered, together
+from mjxgait.runs.packed import Packed
+from mjxgait.settings.islands import IslandsConfig
+
+
+def island(*fitness: float) -> Packed:
+    """A population whose genomes tell who is who: [fitness, fitness + 100]."""
+    values = np.array(fitness, np.float32)
+    return Packed(
+        {
+            "genomes.poses": np.stack([values, values + 100], axis=1),
+            "terms": values[:, None, None],
+            "outcome": values[:, None, None],
+            "fitness": values,
+            "born": np.arange(len(fitness), dtype=np.int32),
+            "origin": np.zeros(len(fitness), np.int32),
+            "key": np.array([len(fitness), 7], np.uint32),
+            "generation": np.int32(5),
+        },
+        "fry",
+    )
+
+
+THREE = [island(9, 5, 1, 0), island(8, 4, 3, 2), island(7, 6, 5, 4)]
+
+
+def fitness(states: list[Packed]) -> list[list[float]]:
+    return [state.arrays["fitness"].tolist() for state in states]
+
+
+def test_along_a_ring_the_best_go_to_the_next_in_the_place_of_its_worst():
+    went = exchanged(THREE, IslandsConfig(count=3, migrants=2))
+    assert fitness(went) == [[9, 7, 6, 5], [9, 8, 5, 4], [8, 7, 6, 4]]
+
+
+def test_each_brings_all_that_is_its_own_and_nothing_else_changes():
+    for before, after in zip(THREE, exchanged(THREE, IslandsConfig(count=3)), strict=True):
+        assert (
+            after.arrays["genomes.poses"][:, 1].tolist() == (after.arrays["fitness"] + 100).tolist()
+        )
+        assert after.arrays["terms"][:, 0, 0].tolist() == after.arrays["fitness"].tolist()
+        for name in ("key", "generation"):
+            assert (after.arrays[name] == before.arrays[name]).all()
+
+
+def test_among_all_each_gets_the_best_of_every_other_but_half_stays():
+    went = exchanged(THREE, IslandsConfig(count=3, migrants=2, topology="all"))
+    assert fitness(went) == [[9, 8, 7, 5], [9, 8, 7, 4], [9, 8, 7, 6]]
+
+
+def test_who_could_not_be_judged_is_the_worst():
+    went = exchanged([island(1, np.nan), island(3, 2)], IslandsConfig(count=2, migrants=1))
+    assert fitness(went) == [[3, 1], [3, 1]]
+
+
+def test_together_they_are_one_population_of_the_best():
+    best = gathered(THREE)
+    assert best.arrays["fitness"].tolist() == [9, 8, 7, 6]
+    assert best.arrays["genomes.poses"][:, 0].tolist() == [9, 8, 7, 6]
+
+
+def test_all_else_is_that_of_the_island_with_the_best():
+    lowly = island(1, 0)
+    assert (gathered([lowly, THREE[0]]).arrays["key"] == THREE[0].arrays["key"]).all()
+
+
+LINE = dict.fromkeys(("failures", "episodes", "evaluations", "sim_steps", "computed_steps"), 10)
+LINE |= dict.fromkeys(("median", "lower_quartile", "upper_quartile", "spread"), 1.0)
+LINE |= {"generation": 3, "unique": 4, "forced": False, "wall_s": 2.0, "worst": -1.0}
+
+
+def test_their_line_counts_all_and_has_the_best_ones_terms():
+    one = LINE | {"best": 1.0, "mean": 0.0, "term_slip": 0.1}
+    other = LINE | {"best": 2.0, "mean": 1.0, "term_slip": 0.2, "forced": True, "wall_s": 4.0}
+    line = together([one, other])
+    assert (line["best"], line["term_slip"], line["island"]) == (2.0, 0.2, 1)
+    assert (line["mean"], line["sim_steps"], line["forced"]) == (0.5, 20, True)
+    assert (line["wall_s"], line["steps_per_second"]) == (4.0, 5)
+
+
+def test_an_island_where_nobody_could_be_judged_does_not_lead():
+    nobody = LINE | {"best": None, "mean": None, "worst": None}
+    line = together([nobody, LINE | {"best": -3.0, "mean": -4.0}])
+    assert (line["best"], line["mean"], line["worst"], line["island"]) == (-3.0, -4.0, -1.0, 1)
+
+
+@pytest.mark.parametrize(
+    ("count", "topology", "sources"),
+    [(1, "ring", []), (1, "all", []), (3, "ring", [[2], [0], [1]]), (2, "all", [[1], [0]])],
+)
+def test_who_sends_to_whom(count: int, topology: str, sources: list):
+    config = IslandsConfig(count=count, topology=topology)
+    assert [config.sources(i) for i in range(count)] == (sources or [[]])

@@ -1,0 +1,59 @@
+"""What travels: a machine that has nothing but mjxgait can build the same program."""
+
+import pickle
+from pathlib import Path
+
+import pytest
+from helpers import small_config
+
+from mjxgait.cluster.nodes import Machine, mismatch, require_same, this
+from mjxgait.cluster.recipe import OwnPart, Recipe
+from mjxgait.creature import Creature
+from mjxgait.errors import UserError
+from mjxgait.parts.registry import find
+
+OWN = """
+from mjxgait.tasks.plain import PlainTask
+
+class Idle(PlainTask):
+    terms = ("nothing",)
+
+    def judge(self, tally, settings):
+        return {"nothing": 0.0 * tally.steps}
+"""
+
+
+def test_what_arrives_is_what_was_sent(stool: Creature):
+    config = small_config(evolution={"islands": {"count": 3}}, rollout={"ground": "rough:0.03"})
+    recipe = pickle.loads(pickle.dumps(Recipe.of(stool, [config])))
+    creature, (arrived,) = recipe.read()
+    assert arrived == config
+    assert creature.digest == stool.digest
+    assert recipe.digest == Recipe.of(stool, [config]).digest
+
+
+def test_other_settings_are_another_recipe(stool: Creature):
+    one, other = (Recipe.of(stool, [small_config()]) for _ in range(2))
+    assert one.digest == other.digest
+    warmer = small_config(evolution={"mutation_rate": 0.5})
+    assert Recipe.of(stool, [warmer]).digest != one.digest
+
+
+def test_own_code_travels_as_its_text(stool: Creature, tmp_path: Path):
+    part = OwnPart("task", "Idle", "idle_travels.py", OWN)
+    Recipe(dict(stool.files), (), (part,)).read()
+    assert find("task", "idle_travels.py:Idle").__name__ == "Idle"
+
+
+def test_machines_with_the_same_installed_may_work_together():
+    require_same("10.0.0.7", this())
+
+
+@pytest.mark.parametrize("name", ["python", "mjxgait", "jaxlib", "mujoco", "code of mjxgait"])
+def test_another_version_is_one_sentence_with_both(name: str):
+    here = this()
+    there = Machine({**here.versions, name: "0.0.1"}, here.kind, here.tag)
+    with pytest.raises(UserError, match=f"^10.0.0.7 has {name} 0.0.1, this machine has") as said:
+        require_same("10.0.0.7", there)
+    assert here.versions[name] in str(said.value)
+    assert mismatch("10.0.0.7", there) == str(said.value)

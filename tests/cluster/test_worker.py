@@ -1,0 +1,47 @@
+"""A worker's turn to compile: one after the other where there is a cache, all at once where there is none."""
+
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import jax
+import pytest
+
+from mjxgait.cluster.worker import _turn
+
+filelock = pytest.importorskip("filelock", reason='needs "mjxgait[cluster]"')
+
+
+@pytest.fixture
+def cache(tmp_path: Path) -> Iterator[Path]:
+    before = jax.config.values["jax_compilation_cache_dir"]
+    jax.config.update("jax_compilation_cache_dir", str(tmp_path / "cache"))
+    yield tmp_path / "cache"
+    jax.config.update("jax_compilation_cache_dir", before)
+
+
+def another_takes(name: str) -> bool:
+    """Whether somebody else could compile this now."""
+
+    def take() -> bool:
+        try:
+            with _turn(name, patience=0):
+                return True
+        except filelock.Timeout:
+            return False
+
+    with ThreadPoolExecutor(1) as other:
+        return other.submit(take).result()
+
+
+def test_while_one_compiles_a_program_the_others_wait(cache: Path):
+    with _turn("walk"):
+        assert not another_takes("walk")
+        assert another_takes("hop")
+    assert another_takes("walk")
+
+
+def test_where_nothing_can_be_kept_nobody_waits(cache: Path):
+    cache.write_text("in the way")
+    with _turn("walk"):
+        assert another_takes("walk")
