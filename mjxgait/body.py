@@ -10,11 +10,11 @@ import jax
 import jax.numpy as jnp
 
 from mjxgait.creature import Creature
-from mjxgait.creature.anatomy import Corrections, Feet, Frame, Gains, Joints, Mirror
+from mjxgait.creature.anatomy import Corrections, Feet, Frame, Gains, Joints, Mirror, Stepping
 from mjxgait.creature.settings import Termination
 from mjxgait.types import Number, pytree
 
-for part in (Frame, Joints, Gains, Mirror, Corrections, Feet):
+for part in (Frame, Joints, Gains, Mirror, Stepping, Corrections, Feet):
     fields = dataclasses.fields(part)
     static = [field.name for field in fields if field.metadata.get("static")]
     numbers = [field.name for field in fields if field.name not in static]

@@ -12,6 +12,7 @@ COMMANDS = {
     "train": "evolve a walk: mjxgait train --env tall_quadruped",
     "refine": "make a hand-made cycle walk: mjxgait refine --env duck --keys walk.glb",
     "certify": "examine a champion in C MuJoCo: mjxgait certify RUN",
+    "stress": "ask more of a walk: bumps, slopes, pushes, ten minutes: mjxgait stress RUN",
     "inspect": "tell what a run or a checkpoint holds: mjxgait inspect RUN",
     "plot": "draw a run: fitness, footfalls, joints, a filmstrip: mjxgait plot RUN",
     "render": "make a video of a walk or a race: mjxgait render RUN --out walk.webp",

@@ -32,6 +32,25 @@ def _along(creature: Body, sensed: Sensed, axis: int) -> jax.Array:
     ) @ creature.frame.start_axes[axis]
 
 
+def _nose(creature: Body, sensed: Sensed) -> tuple[jax.Array, jax.Array]:
+    """Horizontal unit vectors [3], along the nose and to its left; zero for a nose that points
+    straight up or down.
+    """
+    x, y, _ = sensed.trunk_rot @ creature.frame.forward.astype(np.float32)
+    size = jnp.sqrt(x * x + y * y + 1e-12)
+    none = jnp.zeros_like(x)
+    return jnp.stack([x, y, none]) / size, jnp.stack([-y, x, none]) / size
+
+
+def foot_places(creature: Body, sensed: Sensed) -> jax.Array:
+    """Places [F, 2] in m of the feet, ahead of the trunk and left of it along its nose."""
+    axes = jnp.stack(_nose(creature, sensed), axis=1)
+    middles = jnp.stack(
+        [jnp.mean(sensed.geom_pos[geoms], axis=0) for geoms in foot_geoms(creature)]
+    )
+    return (middles - sensed.trunk_pos) @ axes
+
+
 def _attitude(creature: Body, sensed: Sensed, axis: np.ndarray) -> jax.Array:
     """Sine of the angle of one of the trunk's axes above the horizon."""
     return jnp.clip((sensed.trunk_rot @ axis.astype(np.float32))[2], -1.0, 1.0)
@@ -58,6 +77,10 @@ SENSES: Mapping[str, Sense] = {
     "forward": lambda creature, sensed, time: _along(creature, sensed, 0),
     "aside": lambda creature, sensed, time: _along(creature, sensed, 1),
     "forward_vel": lambda creature, sensed, time: sensed.trunk_vel @ creature.frame.start_axes[0],
+    "nose_vel": lambda creature, sensed, time: jnp.stack(
+        [sensed.trunk_vel @ axis for axis in _nose(creature, sensed)]
+    ),
+    "foot_place": lambda creature, sensed, time: foot_places(creature, sensed),
     "up_vel": lambda creature, sensed, time: sensed.trunk_vel[2],
     "pitch": lambda creature, sensed, time: (
         -jnp.arcsin(_attitude(creature, sensed, creature.frame.forward))

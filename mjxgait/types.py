@@ -59,7 +59,9 @@ class Sensed:
     floor: [] m, height of the ground under the trunk; None where it is the plane z = 0.
     middle: [3] m, of all mass; momentum: [3] kg·m/s of all; washed: [3] N, what the water does to it
     as a whole, 0 where there is none; past: [] rad, how far the hinge that is furthest past its range
-    is past it. None of bodies of a model.
+    is past it; sunk: [] how deep the block that is deepest in the ground is in it, of its size (the
+    cube root of its volume), negative where all are above; geom_rot: [G, 3, 3], rows are the own axes
+    of each watched block in the world, where there is something to see. None of bodies of a model.
     """
 
     joint_pos: jax.Array
@@ -76,6 +78,8 @@ class Sensed:
     momentum: jax.Array | None = None
     washed: jax.Array | None = None
     past: jax.Array | None = None
+    sunk: jax.Array | None = None
+    geom_rot: jax.Array | None = None
 
 
 @pytree

@@ -54,13 +54,17 @@ PUSH_AT = 60
 
 @dataclasses.dataclass(frozen=True)
 class Disturbance:
-    """What is not nominal about a start. push: m/s forward and left. gains: share of kp and kd."""
+    """What is not nominal about a start.
+
+    push: m/s forward and left. gains: share of kp and kd. delay: steps that torques come late.
+    """
 
     friction: float = 1.0
     push: tuple[float, float] = (0.0, 0.0)
     joints: float = 0.0
     spin: float = 0.0
     gains: float = 0.0
+    delay: int = 0
 
 
 DISTURBANCES = {
@@ -71,13 +75,14 @@ DISTURBANCES = {
     "joints displaced": Disturbance(joints=0.08),
     "joints moving": Disturbance(spin=0.8),
     "other gains": Disturbance(gains=0.3),
-    "all at once": Disturbance(0.6, (-0.2, -0.2), 0.05, 0.5, 0.2),
+    "torques two steps late": Disturbance(delay=2),
+    "all at once": Disturbance(0.6, (-0.2, -0.2), 0.05, 0.5, 0.2, 1),
     "knocked over": Disturbance(push=(0.0, 3.0)),
 }
 EPISODES = [(settings, disturbance) for settings in SETTINGS for disturbance in DISTURBANCES]
 FALL = Fall(touch=False)
 """Lenient: where a touch ends an episode there are none to count."""
-LENIENT = {"termination": {"touch": FALL.touch}}
+LENIENT = {"termination": {"touch": FALL.touch}, "latency": 2}
 CONFIGS = [small_config(**tables, rollout=LENIENT) for tables in SETTINGS.values()]
 """One per row of settings."""
 
@@ -113,6 +118,7 @@ def disturbed(creature: Creature) -> examined.Starts:
         stiffness=np.array([1 + row.gains * noise[2] for row in rows]),
         damping=np.array([1 + row.gains * noise[3] for row in rows]),
         friction=np.array([row.friction for row in rows]),
+        delay=np.array([row.delay for row in rows]),
         push=np.array([row.push for row in rows]),
         push_time=np.array([(PUSH_AT + 0.5) * STEP if any(row.push) else np.inf for row in rows]),
     )

@@ -15,7 +15,7 @@ from mjxgait.champion import Champion
 from mjxgait.cli import main
 from mjxgait.creature import Creature
 from mjxgait.settings.config import Config
-from mjxgait.settings.control import TUNING, DriveConfig, PoseConfig
+from mjxgait.settings.control import STEPPING, TUNING, DriveConfig, PoseConfig, gene_names
 from mjxgait.settings.tables import build
 from mjxgait.settings.walk import WalkConfig
 from mjxgait.tasks.score import in_order
@@ -54,7 +54,7 @@ def weight_vector(config: WalkConfig, generation: jax.Array) -> jax.Array:
     return in_order(signed_weights(config, generation), TERMS)
 
 
-STILL = dict.fromkeys(TUNING, 0.0) | {"threshold": 0.12, "period": 0.8}
+STILL = dict.fromkeys((*TUNING, *STEPPING), 0.0) | {"threshold": 0.12, "period": 0.8}
 """A blind cycle: no steering, no balance."""
 
 
@@ -67,13 +67,13 @@ def pose_champion(
     **others: Any,
 ) -> Champion:
     """A champion of key poses [K, J] that nobody evolved; tuning over `STILL`."""
-    genes = STILL | dict(tuning)
+    genes, names = STILL | dict(tuning), gene_names(creature.corrections.steps)
     given: dict[str, Any] = {"fitness": 0.0, "terms": {}, "origin": {}} | others
     return Champion(
         creature=creature.name,
         digest=creature.digest,
         controller="poses",
-        genome={"key_poses": key_poses, "tuning": np.array([genes[name] for name in TUNING])},
+        genome={"key_poses": key_poses, "tuning": np.array([genes[name] for name in names])},
         settings=settings or PoseConfig(key_poses=len(key_poses)),
         drive=drive or DriveConfig(),
         task="walk",

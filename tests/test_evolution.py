@@ -12,7 +12,7 @@ import pytest
 
 from mjxgait.control.pose_variation import pose_variation
 from mjxgait.control.poses import Genome
-from mjxgait.search.breeding import parents
+from mjxgait.search.breeding import parents, proportional_parents
 from mjxgait.search.evolution import Evolution
 from mjxgait.search.state import EvolutionState, GenerationMetrics, Origin, stop_reason
 from mjxgait.search.variation import Box, first_occurrence
@@ -328,6 +328,16 @@ def test_parents_are_two_and_the_better_are_drawn_more_often(selection: str):
     counts = np.bincount(np.asarray(mothers), minlength=10) / 20_000
     expected = np.full(10, 0.1) if selection == "uniform" else (19 - 2 * np.arange(10)) / 100
     assert np.allclose(counts, expected, atol=0.01)
+
+
+def test_parents_may_be_drawn_in_proportion_to_their_fitness():
+    fitness = jnp.array([6.0, 3.0, 1.0, 0.0, -4.0, -jnp.inf])
+    mothers, fathers = proportional_parents(jax.random.key(0), 20_000, fitness)
+    assert (mothers != fathers).all()
+    counts = np.bincount(np.asarray(mothers), minlength=6) / 20_000
+    assert counts == pytest.approx([0.6, 0.3, 0.1, 0, 0, 0], abs=0.01)
+    nobody, _ = proportional_parents(jax.random.key(0), 6_000, jnp.full(6, -1.0))
+    assert np.bincount(np.asarray(nobody), minlength=6) / 6_000 == pytest.approx(1 / 6, abs=0.03)
 
 
 @pytest.mark.parametrize("rivals", [1, 6])

@@ -63,7 +63,10 @@ def state_with(
     best[:, names.index("forward")] = speed * SECONDS * experiment.creature.frame.body_length
     best[:, names.index("seconds")] = [SECONDS, alive * SECONDS]
     return dataclasses.replace(
-        state, generation=jnp.int32(generation), outcome=state.outcome.at[0].set(best)
+        state,
+        generation=jnp.int32(generation),
+        fitness=state.fitness.at[0].set(0.0),
+        outcome=state.outcome.at[0].set(best),
     )
 
 
@@ -185,6 +188,26 @@ def test_who_fails_the_examination_is_not_examined_again_and_the_next_is_the_sec
     examined = examiner(experiment, exams).early(other)
     assert examined is not None
     assert examined.certificate.attempts == 2
+
+
+def test_the_second_is_looked_at_where_the_first_was_only_lucky(experiment, looks, exams):
+    state = state_with(experiment, 3)
+    both = dataclasses.replace(
+        state,
+        fitness=state.fitness.at[1].set(-1.0),
+        outcome=state.outcome.at[1].set(state.outcome[0]),
+    )
+    looks.rehearsals = [-0.1, 0.3]
+    assert examiner(experiment, exams).early(both) is None
+    looks.asked.clear()
+    examined = examiner(experiment, exams, on_the_way=2).early(both)
+    assert examined is not None
+    assert examined.champion.fitness == -1.0
+
+
+def test_who_did_the_same_is_no_other_candidate(experiment):
+    alike = dataclasses.replace(ranked(experiment), fitness=jnp.float32([3, 3, 2, 2, 2, 1]))
+    assert experiment.candidates(alike) == [0, 2, 5]
 
 
 def other_best(state: EvolutionState) -> EvolutionState:

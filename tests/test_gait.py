@@ -13,6 +13,7 @@ from mjxgait.control.poses import (
     PERIOD,
     PITCH,
     PITCH_RATE,
+    READS,
     ROLL,
     ROLL_RATE,
     STEER,
@@ -61,7 +62,7 @@ def sensed(
         geom_pos=jnp.zeros((len(creature.feet.watched), 3)),
         geom_low=jnp.zeros(len(creature.feet.watched)),
     )
-    return sense(creature, moment, jnp.zeros(()), PoseTracker.reads)
+    return sense(creature, moment, jnp.zeros(()), READS)
 
 
 def turned(axis: int, angle: float) -> np.ndarray:

@@ -18,6 +18,7 @@ from mjxgait.runs.experiment import Experiment, build_experiment
 from mjxgait.runs.generation import evolution_of
 from mjxgait.search.variation import Box, uniform
 from mjxgait.settings.config import Config
+from mjxgait.settings.gaits import stride_limit
 from mjxgait.settings.layers import resolve_config
 from mjxgait.settings.shipped import find_creature
 from mjxgait.simulation.evaluator import Local
@@ -30,7 +31,6 @@ from mjxgait.tasks.walk.fitness import (
     REWARDS,
     TERMS,
     fitness_terms,
-    stride_limit,
 )
 from mjxgait.types import BodyState, Judged, Sensed
 

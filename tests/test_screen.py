@@ -6,6 +6,8 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
+from mjxgait.certify import Certificate, CertificateConfig
+from mjxgait.certify.criteria import Criterion, Measure
 from mjxgait.runs.screen import Screen
 
 
@@ -25,6 +27,20 @@ def test_the_report_tells_the_best_or_that_there_is_none(
     screen = Screen(Console(file=out, width=300))
     screen.report(tmp_path, "done", last, 1.0, interrupted=False)
     assert all(words in out.getvalue() for words in said)
+
+
+def test_a_verdict_without_numbers_is_a_sentence():
+    """Of a motion that strides nowhere most measures have no value, and the worst margin is -inf."""
+    out = io.StringIO()
+    screen = Screen(Console(file=out, width=300))
+    periodic = Criterion(3, "periodic", (Measure("variation", float("nan"), "<=", 0.1, 0.1),))
+    report = {"summary": "none, 0.00 m/s", "overlap": None, "obstacle": "never left its place"}
+    config = CertificateConfig()
+    screen.certificate(Certificate("stool", "", "walk", "", (periodic,), report, config, 1.0))
+    told = out.getvalue()
+    assert "Not certified: it never left its place" in told
+    assert "nan" not in told
+    assert "inf" not in told
 
 
 def test_a_run_that_has_ended_tells_what_to_do_next(tmp_path: Path):

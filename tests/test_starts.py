@@ -101,6 +101,13 @@ def test_each_part_has_a_mass_of_its_own_but_in_the_first_start(stool: Creature)
     assert 0.8 <= starts.heaviness[1:].min() < 0.82
 
 
+def test_torques_are_up_to_so_many_steps_late_but_in_the_first_start(stool: Creature):
+    assert drawn(stool).delay is None
+    delay = drawn(stool, latency=2).delay
+    assert delay[0] == 0
+    assert set(delay) == {0, 1, 2}
+
+
 def test_the_bodies_of_a_run_weigh_what_their_starts_say(stool: Creature):
     """All that follows from the masses is reckoned too: `Plant.heavier`, whose own tests compare C."""
     config = small_config(rollout={**NONE, "masses": 0.2, "starts": 3})

@@ -59,7 +59,7 @@ class Certificate:
             (
                 f"{c.number} {c.name}",
                 m.name,
-                f"{m.value:.3g}",
+                "none" if np.isnan(m.value) else f"{m.value:.3g}",
                 f"{m.sense} {m.threshold:g}",
                 "pass" if m.passed else "FAIL",
             )
@@ -233,7 +233,8 @@ def record(
     task = how_simulated(champion.task, champion.wish)
     start = task.aimed(nominal_starts(creature, 1) if start is None else start, CertificateConfig())
     outcome = simulate(creature, champion, start, seconds, record=1, refine=refine, threads=threads)
-    return measure(creature, outcome.trajectory, inside=refine == 1, aimed=start, drag=task.drag)
+    drag = task.drag if task.grown else None
+    return measure(creature, outcome.trajectory, inside=refine == 1, aimed=start, drag=drag)
 
 
 def survival(

@@ -114,6 +114,10 @@ class _Body:
             field = f"{'steer' if group == 'steering' else group}_{key}"
             weights = np.array([self.weight(name, group, key) for name in self.names])
             yield f"{group} weight ({key})", (getattr(creature.corrections, field), weights)
+        if stepping := creature.corrections.stepping:
+            for key in ("ahead", "aside"):
+                weights = np.array([self.weight(name, "stepping", key) for name in self.names])
+                yield f"stepping weight ({key})", (getattr(stepping, key), weights)
 
     def axes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Forward, left and up in the trunk's frame, from cross products in the world."""
@@ -167,7 +171,8 @@ class _Body:
     def check_mirror(self, creature: Creature) -> None:
         """Random poses and their mirror images, part by part: where each is and how it has turned.
 
-        Joints whose partner the file states are only compared with it, and stand still.
+        Joints whose partner the file states are only compared with it, and stand still; what moves
+        with one that is said to be its own partner has no image.
         """
         rng, stated = np.random.default_rng(0), self.table.get("mirror", {}).get("pairs", [])
         for pair in stated:
@@ -187,6 +192,8 @@ class _Body:
             pose = stand + free * rng.uniform(-SWING, SWING, len(stand))
             parts, image = self._parts(pose), self._parts(creature.mirror.image(pose))
             for j, partner in enumerate(creature.mirror.partner):
+                if partner == j and not free[j]:
+                    continue
                 turned = parts[1][partner] @ base[1][partner].T
                 image_turned = image[1][j] @ base_image[1][j].T
                 angle = np.linalg.norm(flip @ turned @ flip - image_turned) / np.sqrt(2)

@@ -8,8 +8,8 @@ import dataclasses
 import mujoco
 import numpy as np
 
-from mjxgait.certify.afloat import Afloat, afloat
 from mjxgait.certify.bar import Clearance
+from mjxgait.certify.grown import Grown, seen_grown
 from mjxgait.certify.layout import LowestPoint, per_foot, start_frame
 from mjxgait.certify.outcome import Trajectory
 from mjxgait.certify.overlap import overlaps
@@ -59,8 +59,9 @@ class Recording:
     body_speed: [T] m/s, of the fastest body's centre of mass.
     heading: [T] rad of the trunk, left of the start's forward, without jumps.
     goal: m ahead of the start; 0 where the task has none.
+    light: [3] m where it is in the world; None where the task has none.
     clearance: [T] m to the bar, `bar.FAR` at most; None where the task has none.
-    afloat: what else is seen in water; None on land.
+    grown: what else is seen of a body of blocks; None of others.
     overlap_pairs: P names of parts that are ever in each other. overlap: [T, P] m, how deep.
     """
 
@@ -84,7 +85,8 @@ class Recording:
     heading: np.ndarray | None = None
     goal: float = 0.0
     clearance: np.ndarray | None = None
-    afloat: Afloat | None = None
+    grown: Grown | None = None
+    light: np.ndarray | None = None
 
     @property
     def contact(self) -> np.ndarray:
@@ -99,10 +101,10 @@ class Recording:
         arrays = {
             f.name: getattr(self, f.name)[frames]
             for f in dataclasses.fields(self)
-            if isinstance(getattr(self, f.name), np.ndarray)
+            if isinstance(getattr(self, f.name), np.ndarray) and f.name != "light"
         }
-        afloat = self.afloat and self.afloat.window(frames)
-        return dataclasses.replace(self, **arrays, afloat=afloat)
+        grown = self.grown and self.grown.window(frames)
+        return dataclasses.replace(self, **arrays, grown=grown)
 
 
 def dimensions(creature: Creature) -> Dimensions:
@@ -140,7 +142,7 @@ def measure(
     row: int = 0,
     inside: bool = True,
     aimed: Starts | None = None,
-    drag: float = 0.0,
+    drag: float | None = None,
 ) -> Recording:
     """Looks at one undisturbed simulation again: every stored frame is given to C MuJoCo, whose
     contacts are then read.
@@ -151,12 +153,13 @@ def measure(
       inside: whether to look for parts in each other, which takes a quarter of the time with
         meshes.
       aimed: how the simulations began, where the task has a goal or a bar.
-      drag: N·s/m³ of the water around it, where it swims. What swims has grown: that parts are in
-        each other is excused in no pose.
+      drag: N·s/m³ of the water around a body of blocks, 0 on land; None for other bodies. Of what
+        has grown it is excused in no pose that parts are in each other.
     """
     start = start_frame(creature)
     qpos, qvel, torque = trajectory.qpos[row], trajectory.qvel[row], trajectory.torque[row]
     bar = None if aimed is None or np.isinf(aimed.bar[row, 0]) else aimed.bar[row]
+    lit = aimed is not None and aimed.light[row].any()
     sight = _Sight(creature, len(qpos), bar)
     for k in range(len(qpos)):
         if not (np.isfinite(qpos[k]).all() and np.isfinite(qvel[k]).all()):
@@ -169,7 +172,7 @@ def measure(
     moved = sight.trunk_pos - start.place * [1, 1, 0]
     ground = terrain_of(creature)
     above = moved[:, 2] - (ground.height(*sight.trunk_pos[:, :2].T) if ground else 0.0)
-    crossed = overlaps(creature, qpos if inside else qpos[:0], excused=not drag)
+    crossed = overlaps(creature, qpos if inside else qpos[:0], excused=drag is None)
     return Recording(
         dimensions=dimensions(creature),
         time_step=trajectory.time_step,
@@ -191,7 +194,8 @@ def measure(
         overlap=crossed.depth if inside else np.zeros((len(qpos), 0)),
         goal=0.0 if aimed is None else float(aimed.goal[row]),
         clearance=None if bar is None else sight.clearance,
-        afloat=afloat(creature, qpos, qvel, drag) if drag else None,
+        light=start.place + aimed.light[row] if aimed is not None and lit else None,
+        grown=None if drag is None else seen_grown(creature, qpos, qvel, drag),
     )
 
 

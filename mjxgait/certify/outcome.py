@@ -79,6 +79,8 @@ class Outcome:
     path: [S, T] m forward after each control step; NaN from the fall on, or where nobody looked.
     astray: [S, T] rad, the heading less the one it was told; NaN from the fall on; empty where
     nobody was told one.
+    height: [S] m, the greatest of the lowest solid part above the ground, once the warm-up is over;
+    0 where nobody watches it.
     clearance: [S] m, the least to the bar, `certify.bar.FAR` at most; infinite where there is none.
     """
 
@@ -88,6 +90,7 @@ class Outcome:
     clearance: np.ndarray
     trajectory: Trajectory
     astray: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros((0, 0)))
+    height: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros(0))
 
     @property
     def stayed_up(self) -> np.ndarray:

@@ -54,7 +54,7 @@ def simulate(
 
     def run(share: np.ndarray) -> Outcome:
         mine, kept = starts.rows(share), int((share < record).sum())
-        stepping = Stepping(creature, champion, mine, kept, refine, fall, task.onward, task.drag)
+        stepping = Stepping(creature, champion, mine, kept, refine, fall, task)
         return stepping.to_the_end(steps, None if told is None else told[share])
 
     with concurrent.futures.ThreadPoolExecutor(len(shares)) as pool:
@@ -68,6 +68,7 @@ def simulate(
         path=np.concatenate([p.path for p in parts])[order],
         clearance=np.concatenate([p.clearance for p in parts])[order],
         astray=np.concatenate([p.astray for p in parts])[order],
+        height=np.concatenate([p.height for p in parts])[order],
         trajectory=Trajectory(
             creature.model.opt.timestep,
             *(np.concatenate([getattr(p.trajectory, f) for p in parts])[kept] for f in fields),

@@ -26,6 +26,7 @@ class Starts:
     end: [S] s, from which nobody looks any more: who is up until then has stayed up.
       Infinite for the end of the simulation.
     goal: [S] m ahead of the start; 0 where the task has none.
+    light: [S, 3] m from where the trunk starts; 0 where there is none.
     bar: [S, 2] m ahead of the start and above the floor, of a bar's lower edge; infinite where the
       task has none.
     """
@@ -43,6 +44,7 @@ class Starts:
     push: np.ndarray
     end: np.ndarray
     goal: np.ndarray
+    light: np.ndarray
     bar: np.ndarray
 
     def __len__(self) -> int:
@@ -90,6 +92,7 @@ def nominal_starts(creature: Creature, count: int) -> Starts:
         push=np.zeros((count, 2)),
         end=np.full(count, np.inf),
         goal=np.zeros(count),
+        light=np.zeros((count, 3)),
         bar=np.full((count, 2), np.inf),
     )
 

@@ -24,8 +24,11 @@ class State:
     trunk_pos: [S, 3] m. trunk_rot: [S, 3, 3], columns are the trunk's axes in the world.
     trunk_vel: [S, 3] m/s, trunk_angvel: [S, 3] rad/s, world frame.
     foot_height: [S, F] m, lowest point above the floor; empty where nobody asks.
+    foot_pos: [S, F, 3] m, the middle of each foot; likewise.
     mass_matrix: [S, nv, nv]. bias: [S, nv], Coriolis and gravity less passive forces.
     constraint_force: [S, nv], of the previous step's solve.
+    light: [S, F, 3] its direction in the own axes of each foot's geom, 0 where there is none; empty
+    where nobody asks.
     goal, bar: [S] m ahead of the start; None where the task has none.
     """
 
@@ -44,6 +47,8 @@ class State:
     constraint_force: np.ndarray
     goal: np.ndarray | None = None
     bar: np.ndarray | None = None
+    light: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros((0, 0, 3)))
+    foot_pos: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros((0, 0, 3)))
 
 
 Sense = Callable[[Creature, State], np.ndarray]
@@ -71,6 +76,13 @@ def _right_down(creature: Creature, state: State) -> np.ndarray:
     return np.arcsin(np.clip((state.trunk_rot @ creature.frame.left)[:, 2], -1, 1))
 
 
+def _nose(creature: Creature, state: State) -> tuple[np.ndarray, np.ndarray]:
+    """[S, 3] horizontal unit vectors along the nose and to its left."""
+    nose = state.trunk_rot @ creature.frame.forward * [1, 1, 0]
+    nose = nose / np.maximum(np.linalg.norm(nose, axis=1, keepdims=True), 1e-6)
+    return nose, np.cross([0.0, 0.0, 1.0], nose)
+
+
 SENSES: Mapping[str, Sense] = {
     "time": lambda creature, state: state.time,
     "beat": lambda creature, state: 2 * np.mod(state.time, 1.0) - 1,
@@ -87,6 +99,16 @@ SENSES: Mapping[str, Sense] = {
     "forward": lambda creature, state: _along(state, state.start.forward),
     "aside": lambda creature, state: _along(state, state.start.left),
     "forward_vel": lambda creature, state: state.trunk_vel @ state.start.forward,
+    "nose_vel": lambda creature, state: np.stack(
+        [(state.trunk_vel * axis).sum(1) for axis in _nose(creature, state)], 1
+    ),
+    "foot_place": lambda creature, state: np.stack(
+        [
+            ((state.foot_pos - state.trunk_pos[:, None]) * axis[:, None]).sum(2)
+            for axis in _nose(creature, state)
+        ],
+        2,
+    ),
     "up_vel": lambda creature, state: state.trunk_vel[:, 2],
     "pitch": _nose_down,
     "roll": _right_down,
@@ -105,11 +127,12 @@ def _left(state: State, place: np.ndarray | None) -> np.ndarray:
 
 ADDED: Mapping[str, Sense] = {
     "goal_distance": lambda creature, state: _left(state, state.goal),
+    "light": lambda creature, state: state.light,
     "bar_distance": lambda creature, state: _left(state, state.bar),
 }
-"""Those that a shipped task adds (docs/hop.md, docs/limbo.md)."""
-FOOT_SENSES = ("foot_height", "contact")
-"""Those for which `foot_height` must be told."""
+"""Those that a shipped task adds (docs/hop.md, docs/limbo.md, docs/follow.md)."""
+FOOT_SENSES = ("foot_height", "contact", "foot_place")
+"""Those for which `foot_height` and `foot_pos` must be told."""
 
 
 def sense(creature: Creature, state: State, names: Collection[str]) -> dict[str, np.ndarray]:

@@ -5,13 +5,14 @@ joints, `nq nv` as in MuJoCo.
 """
 
 import copy
-from collections.abc import Callable
+from typing import Protocol
 
 import mujoco
 import numpy as np
 
 from mjxgait.certify.bar import Clearance
 from mjxgait.certify.batch import batch_of
+from mjxgait.certify.config import CertificateConfig
 from mjxgait.certify.drive import Drive
 from mjxgait.certify.layout import Layout, LowestPoint, colliding_geoms, per_foot, start_frame
 from mjxgait.certify.outcome import Fall, Outcome, Trajectory, blank_film
@@ -25,8 +26,8 @@ from mjxgait.creature import Creature
 
 VELOCITY_STAGE = int(mujoco.mjtStage.mjSTAGE_VEL)
 
-Onward = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
-"""See `tasks.Demands.onward`."""
+WARMUP = CertificateConfig().warmup
+"""s; who leaps before has not settled yet."""
 BLOWN_UP = 1e4
 """m/s or rad/s, from which a simulation is stopped: beyond any walk, and before MuJoCo itself
 complains in a log file.
@@ -46,6 +47,17 @@ def examined_model(creature: Creature, refine: int = 1) -> mujoco.MjModel:
     return model
 
 
+class Around(Protocol):
+    """What a simulation must know of the task; see `tasks.Demands`."""
+
+    drag: float
+    leaps: bool
+
+    def onward(self, goal: np.ndarray, first: np.ndarray, way: np.ndarray) -> np.ndarray:
+        """See `tasks.Demands`."""
+        ...
+
+
 class Stepping:
     """The simulations of one thread, of which the first `record` are recorded."""
 
@@ -57,12 +69,11 @@ class Stepping:
         record: int,
         refine: int,
         fall: Fall,
-        onward: Onward,
-        drag: float = 0.0,
+        task: Around,
     ) -> None:
         self.creature, self.starts, self.fall = creature, starts, fall
         self.record, self.refine = record, refine
-        self.goal, self.onward = starts.goal.copy(), onward
+        self.goal, self.task = starts.goal.copy(), task
         step = float(creature.model.opt.timestep)
         self.twin = twin_of(creature, champion, step)
         self.drive = Drive(creature, champion.drive, self.twin.command, step)
@@ -84,7 +95,7 @@ class Stepping:
             bind("qfrc_constraint"),
         )
         self.geom_xpos, self.geom_xmat = bind("geom_xpos"), bind("geom_xmat")
-        self.bath = Bath(self.model, self.batch, drag) if drag else None
+        self.bath = Bath(self.model, self.batch, task.drag) if task.drag else None
         if self.bath is None:
             self._lift()
         self.batch.forward(stage=VELOCITY_STAGE)
@@ -93,6 +104,7 @@ class Stepping:
         feet = creature.feet.watched[: len(creature.feet.foot_of)]
         self.feet = LowestPoint(self.model, feet, self.terrain)
         self.sees_feet = any(name in FOOT_SENSES for name in self.twin.reads)
+        self.sees_light = "light" in self.twin.reads
         self.last_force = np.zeros_like(self.qvel)
         self.bar = Clearance(creature) if np.isfinite(starts.bar).any() else None
         # What the controller has sent last, for those whose torques come late.
@@ -106,7 +118,7 @@ class Stepping:
         count, time_step = len(self.starts), self.creature.model.opt.timestep
         fell = np.full(count, np.inf)
         travel, path = np.zeros((count, 3)), np.full((count, steps), np.nan)
-        clearance = np.full(count, np.inf)
+        clearance, height = np.full(count, np.inf), np.zeros(count)
         astray = np.full((count, 0 if heading is None else steps), np.nan)
         leader, waiting = self._alike(heading)
         running = np.setdiff1d(np.arange(count), waiting)
@@ -129,6 +141,8 @@ class Stepping:
             if commanded is not None:
                 astray[running, k] = self._astray(running, commanded)
             clearance[running] = np.minimum(clearance[running], self._clearance(running))
+            if self.task.leaps and (k + 1) * time_step > WARMUP:
+                height[running] = np.maximum(height[running], self._height(running))
             down = running[self._down(running)]
             fell[down] = np.minimum(fell[down], (k + 1) * time_step)
             watched = (k + 1) * time_step < self.starts.end[running]
@@ -141,7 +155,7 @@ class Stepping:
         fell[waiting], travel[waiting] = fell[leader], travel[leader]
         path[waiting], clearance[waiting] = path[leader], clearance[leader]
         astray[waiting] = astray[leader]
-        return Outcome(fell, travel, path, clearance, film, astray)
+        return Outcome(fell, travel, path, clearance, film, astray, height)
 
     def _alike(self, heading: np.ndarray | None) -> tuple[int, np.ndarray]:
         """One simulation that stands for others until they are pushed, and those others.
@@ -186,7 +200,7 @@ class Stepping:
             self.command[running] = self._act(running, state, heading)
         command = self.command[running]
         first, way = self.starts.goal[running], self._travel(running)[:, 0]
-        self.goal[running] = self.onward(self.goal[running], first, way)
+        self.goal[running] = self.task.onward(self.goal[running], first, way)
         self.sent[k % len(self.sent), running] = self.drive.torque(
             command, state, starts.stiffness[running], starts.damping[running]
         )
@@ -235,9 +249,11 @@ class Stepping:
             # A free joint's angular velocity is in the body's own frame.
             trunk_angvel=(rot * velocity[:, None, root + 3 : root + 6]).sum(2),
             foot_height=self._foot_height(running),
+            foot_pos=self._foot_pos(running),
             mass_matrix=self.layout.dense(self.mass[running]),
             bias=self.bias[running] - self.passive[running],
             constraint_force=self.last_force[running],
+            light=self._light(running),
             goal=self.goal[running],
             bar=self.starts.bar[running, 0],
         )
@@ -249,6 +265,27 @@ class Stepping:
             return np.full((len(running), len(self.creature.feet.names)), np.inf)
         low = self.feet.heights(self.geom_xpos[running], self.geom_xmat[running])
         return per_foot(self.creature, low)
+
+    def _light(self, running: np.ndarray) -> np.ndarray:
+        """[running, F, 3], its direction in each foot's own axes."""
+        if not self.sees_light:
+            return np.zeros((len(running), 0, 3))
+        light = self.starts.light[running][:, None]
+        there = self.start.place + light - self.geom_xpos[running][:, self.feet.geoms]
+        there = np.where(light.any(2, keepdims=True), there, 0.0)
+        there /= np.maximum(np.linalg.norm(there, axis=2, keepdims=True), 1e-9)
+        rot = self.geom_xmat[running][:, self.feet.geoms].reshape(*there.shape, 3)
+        seen: np.ndarray = (there[:, :, None] @ rot)[:, :, 0]
+        return seen
+
+    def _foot_pos(self, running: np.ndarray) -> np.ndarray:
+        if not self.sees_feet:
+            return np.zeros((len(running), 0, 3))
+        feet = self.creature.feet
+        pos = self.geom_xpos[running][:, list(feet.stepping)]
+        return np.stack(
+            [pos[:, feet.foot_of == foot].mean(1) for foot in range(len(feet.names))], 1
+        )
 
     def _lift(self) -> None:
         """Raises each start until no part is deeper in the floor than when standing; else joint
@@ -292,6 +329,9 @@ class Stepping:
             return np.full(len(running), np.inf)
         bar = self.starts.bar[running]
         return self.bar.of(self.geom_xpos[running], self.geom_xmat[running], bar)
+
+    def _height(self, running: np.ndarray) -> np.ndarray:
+        return self.solid.lowest(self.geom_xpos[running], self.geom_xmat[running])
 
     def _sane(self, running: np.ndarray) -> np.ndarray:
         return (np.abs(self.qvel[running]) < BLOWN_UP).all(1)

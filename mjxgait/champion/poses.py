@@ -8,30 +8,31 @@ import numpy as np
 from mjxgait.champion.plain import PlainCodec
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
-from mjxgait.settings.control import TUNING, PoseConfig
+from mjxgait.settings.control import PoseConfig, gene_names
 from mjxgait.settings.tables import build
 
 
 class PoseCodec(PlainCodec):
-    """Of genomes with `key_poses` [K, J] in rad and `tuning` [E] in the order of `TUNING`."""
+    """Of genomes with `key_poses` [K, J] in rad and `tuning` [E] in the order of `gene_names`."""
 
     def document(
         self, genome: Mapping[str, np.ndarray], settings: PoseConfig, creature: Creature
     ) -> dict[str, Any]:
         """See `Codec`. mirrored: whether the mirror images of the poses follow them."""
+        names = gene_names(creature.corrections.steps)
         return {
             "key_poses": [
                 dict(zip(creature.joints.names, map(float, pose), strict=True))
                 for pose in genome["key_poses"]
             ],
             "mirrored": creature.mirror.symmetric and settings.mirror,
-            "tuning": dict(zip(TUNING, map(float, genome["tuning"]), strict=True)),
+            "tuning": dict(zip(names, map(float, genome["tuning"]), strict=True)),
         }
 
     def genome(self, document: Mapping[str, Any], creature: Creature) -> dict[str, np.ndarray]:
         """See `Codec`."""
         poses = [[pose[name] for name in creature.joints.names] for pose in document["key_poses"]]
-        tuning = [document["tuning"][name] for name in TUNING]
+        tuning = [document["tuning"][name] for name in gene_names(creature.corrections.steps)]
         return {"key_poses": np.array(poses, float), "tuning": np.array(tuning, float)}
 
     def settings(self, table: Mapping[str, Any], where: str) -> PoseConfig:
@@ -47,7 +48,8 @@ class PoseCodec(PlainCodec):
                 f'key pose {k + 1} has {poses[k, j]} rad for joint "{creature.joints.names[j]}": '
                 "this champion cannot move; take one of another generation"
             )
-        for name, value in zip(TUNING, genome["tuning"], strict=True):
+        names = gene_names(creature.corrections.steps)
+        for name, value in zip(names, genome["tuning"], strict=True):
             if not np.isfinite(value):
                 raise UserError(
                     f'the tuning "{name}" is {value}: this champion cannot move; '
@@ -57,4 +59,4 @@ class PoseCodec(PlainCodec):
     def shapes(self, settings: PoseConfig, creature: Creature) -> dict[str, tuple[int, ...]]:
         """See `Codec`."""
         poses = (settings.key_poses, len(creature.joints.names))
-        return {"key_poses": poses, "tuning": (len(TUNING),)}
+        return {"key_poses": poses, "tuning": (len(gene_names(creature.corrections.steps)),)}

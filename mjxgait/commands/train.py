@@ -14,6 +14,7 @@ from mjxgait.creature.scale import parse_scales
 from mjxgait.errors import INTERRUPTED, UserError
 from mjxgait.library import Run, load_creature
 from mjxgait.parts import resolve_config
+from mjxgait.parts.registry import meant
 from mjxgait.parts.wishes import WISHES, Wishes, hint, wished
 from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.folder import (
@@ -215,6 +216,7 @@ def _settings(options: TrainOptions) -> Config:
         "body": options.evolve_body,
     }
     table = {
+        "use": dataclasses.asdict(meant(options.settings.use)),
         "evolution": {key: value for key, value in short.items() if value is not None},
         "rollout": {} if options.ground is None else {"ground": options.ground},
     }

@@ -16,11 +16,17 @@ from mjxgait.control.pose_variation import pose_variation
 from mjxgait.control.protocol import Command, Senses
 from mjxgait.search.variation import Box, Variation, in_ranges
 from mjxgait.settings.config import EvolutionConfig
-from mjxgait.settings.control import TUNING, PoseConfig
+from mjxgait.settings.control import STEPPING, TUNING, PoseConfig
 from mjxgait.settings.traced import chosen
 from mjxgait.types import Number, pytree
 
 THRESHOLD, PERIOD, STEER, PITCH, PITCH_RATE, ROLL, ROLL_RATE = range(len(TUNING))
+READS = ("joint_pos", "heading", "aside", "pitch", "roll", "pitch_rate", "roll_rate")
+STEP_READS = ("foot_height", "foot_place", "nose_vel")
+LIFTED = 0.02
+"""Hip heights from which a foot is wholly in its swing."""
+GRAVITY = 9.81
+"""m/s²; with the hip height it makes speeds comparable between bodies."""
 MAX_CORRECTION = 0.5
 """rad, or relative stride length: the most that one correction may change the target."""
 
@@ -65,15 +71,18 @@ class PoseTracker:
 
     creature: Body
     step: float
-    reads = ("joint_pos", "heading", "aside", "pitch", "roll", "pitch_rate", "roll_rate")
     command: ClassVar[Command] = "pose"
     every: ClassVar[int] = 1
+
+    @property
+    def reads(self) -> tuple[str, ...]:
+        """See `Controller`."""
+        return READS + (STEP_READS if self.creature.corrections.steps else ())
 
     def bounds(self, config: PoseConfig) -> tuple[Genome, Genome]:
         """Lowest and highest genome: key_poses [K, J], tuning [E]."""
         low, high = (
-            jnp.stack([jnp.float32(getattr(config.tuning, name)[end]) for name in TUNING])
-            for end in (0, 1)
+            jnp.stack([jnp.float32(ends[end]) for ends in self._ranges(config)]) for end in (0, 1)
         )
         shape = (config.key_poses, len(self.creature.joints.names))
 
@@ -89,6 +98,13 @@ class PoseTracker:
             dataclasses.replace(lowest, key_poses=jnp.maximum(lowest.key_poses, middle - width)),
             dataclasses.replace(highest, key_poses=jnp.minimum(highest.key_poses, middle + width)),
         )
+
+    def _ranges(self, config: PoseConfig) -> list[tuple[Number, Number]]:
+        """Ends of each gene besides the key poses."""
+        usual = [getattr(config.tuning, name) for name in TUNING]
+        if not self.creature.corrections.steps:
+            return usual
+        return [*usual, *(getattr(config.stepping, name) for name in STEPPING)]
 
     def _original(self, config: PoseConfig) -> jax.Array:
         """The key poses [K, J] that the config names, within the pose ranges."""
@@ -207,7 +223,37 @@ def corrections(creature: Body, tuning: jax.Array, target: jax.Array, senses: Se
             creature.joints.stand,
         )
     )
-    return (target - stand) * steer * stride + steer * bend + pitch * on_pitch + roll * on_roll
+    change = (target - stand) * steer * stride + steer * bend + pitch * on_pitch + roll * on_roll
+    if not creature.corrections.steps:
+        return change
+    return change + stepping(creature, tuning[len(TUNING) :], senses)
+
+
+def stepping(creature: Body, genes: jax.Array, senses: Senses) -> jax.Array:
+    """Change [J] of the target pose by stepping under a fall; genes: [8] in the order of
+    `STEPPING`.
+
+    After SIMBICON (Yin, Loken & van de Panne 2007): the leg that swings goes on for where the trunk
+    is over its support and how fast it goes there, the hip of the leg that stands turns the trunk
+    back.
+    """
+    weights, hip = creature.corrections.stepping, creature.frame.hip_height
+    assert weights is not None
+    step, step_rate, side, side_rate, hold, hold_rate, sway, sway_rate = genes
+    swing = jnp.clip(senses["foot_height"] / (LIFTED * hip), 0.0, 1.0)
+    stance = 1.0 - swing
+    moved = senses["foot_place"] - weights.places.astype(np.float32)
+    share = stance / jnp.maximum(jnp.sum(stance), 1.0)
+    over = -jnp.sum(share[:, None] * moved, axis=0) / hip
+    speed = senses["nose_vel"] / jnp.sqrt(GRAVITY * hip)
+    ahead = _clip(step * over[0] + step_rate * speed[0])
+    aside = _clip(side * over[1] + side_rate * speed[1])
+    pitch = _clip(hold * senses["pitch"] + hold_rate * senses["pitch_rate"])
+    roll = _clip(sway * senses["roll"] + sway_rate * senses["roll_rate"])
+    to_ahead, to_aside = swing * ahead - stance * pitch, swing * aside + stance * roll
+    by_joint = (jnp.stack([feet[leg] for leg in weights.legs]) for feet in (to_ahead, to_aside))
+    ahead_of, aside_of = by_joint
+    return ahead_of * weights.ahead.astype(np.float32) + aside_of * weights.aside.astype(np.float32)
 
 
 def _clip(correction: jax.Array) -> jax.Array:

@@ -101,13 +101,36 @@ class Mirror:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
+class Stepping:
+    """Weights [J], rad per hip height, with which joints take their foot ahead, and to the left.
+
+    places: [F, 2] m ahead of the trunk and left of it, where the feet stand. legs: [J] the foot that
+    each joint moves; of joints without a weight any.
+    """
+
+    ahead: np.ndarray
+    aside: np.ndarray
+    places: np.ndarray
+    legs: tuple[int, ...] = _static()
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
 class Corrections:
-    """Weights [J] with which joints steer and balance (docs/controller.md)."""
+    """Weights [J] with which joints steer and balance (docs/controller.md).
+
+    stepping: with which they step under a fall; None where none does.
+    """
 
     steer_bend: np.ndarray
     steer_stride: np.ndarray
     balance_pitch: np.ndarray
     balance_roll: np.ndarray
+    stepping: Stepping | None = None
+
+    @property
+    def steps(self) -> bool:
+        """Whether any joint steps under a fall."""
+        return self.stepping is not None
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

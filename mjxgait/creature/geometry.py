@@ -125,22 +125,38 @@ def mirror_map(
     Raises:
       UserError: names the joint that has no partner.
     """
-    image = anchors * [1, -1, 1]
-    turned = axes * np.where(slides[:, None], [1.0, -1.0, 1.0], [-1.0, 1.0, -1.0])
-    distance = np.linalg.norm(image[:, None] - anchors[None], axis=-1)
-    parallel = turned @ axes.T
-    fits = (distance < tolerance) & (np.abs(parallel) > 0.99) & (slides[:, None] == slides[None])
-    score = np.where(fits, distance + (1 - np.abs(parallel)), np.inf)
-    partner = score.argmin(axis=1)
+    partner, sign = mirror_images(anchors, axes, slides, tolerance)
     for j, name in enumerate(names):
-        if not fits[j].any():
+        if partner[j] < 0:
             raise UserError(
                 f'joint "{name}" has no mirror partner: no joint has its mirrored anchor and axis; '
                 "say which in [mirror] pairs, or set symmetric = false"
             )
-        if partner[partner[j]] != j:
-            raise UserError(
-                f'joints "{name}" and "{names[partner[j]]}" are not each other\'s mirror image; '
-                "say which are in [mirror] pairs"
-            )
-    return partner, np.sign(parallel[np.arange(len(names)), partner]).astype(int)
+    return partner, sign
+
+
+def mirror_images(
+    anchors: np.ndarray,
+    axes: np.ndarray,
+    slides: np.ndarray,
+    tolerance: float,
+    slack: float = 1.0,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Partner [J] of every joint as `mirror_map` has it, -1 where there is none, and sign [J].
+
+    slack: how far axes may be off, in units of what they usually may.
+    """
+    image = anchors * [1, -1, 1]
+    turned = axes * np.where(slides[:, None], [1.0, -1.0, 1.0], [-1.0, 1.0, -1.0])
+    distance = np.linalg.norm(image[:, None] - anchors[None], axis=-1)
+    parallel = turned @ axes.T
+    fits = (
+        (distance < tolerance)
+        & (np.abs(parallel) > 1 - 0.01 * slack)
+        & (slides[:, None] == slides[None])
+    )
+    score = np.where(fits, distance + (1 - np.abs(parallel)), np.inf)
+    partner, places = score.argmin(axis=1), np.arange(len(anchors))
+    mutual = fits.any(axis=1) & (partner[partner] == places)
+    sign = np.sign(parallel[places, partner]).astype(int)
+    return np.where(mutual, partner, -1), sign

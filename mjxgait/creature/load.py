@@ -14,6 +14,7 @@ from mjxgait.creature.anatomy import Corrections, Feet, Frame, Gains, Joints, Mi
 from mjxgait.creature.creature import FLOOR, HINGE, SLIDE, Creature
 from mjxgait.creature.mirrored import mirrored
 from mjxgait.creature.settings import CreatureSettings, JointException
+from mjxgait.creature.stepping import stepping_of
 from mjxgait.creature.world import check_world
 from mjxgait.errors import UserError, did_you_mean
 from mjxgait.settings.gaits import stations_of
@@ -90,6 +91,15 @@ def _assemble(
             steer_stride=_weights(settings.steering.stride, names, "steering.stride"),
             balance_pitch=_weights(settings.balance.pitch, names, "balance.pitch"),
             balance_roll=_weights(settings.balance.roll, names, "balance.roll"),
+            stepping=stepping_of(
+                model,
+                data,
+                _weights(settings.stepping.ahead, names, "stepping.ahead"),
+                _weights(settings.stepping.aside, names, "stepping.aside"),
+                found,
+                _foot_bodies(model, settings.creature.feet),
+                (trunk, axes[0]),
+            ),
         ),
         feet=_feet(model, data, settings, trunk, axes),
     )

@@ -92,6 +92,17 @@ class Balance:
 
 
 @dataclasses.dataclass(frozen=True)
+class Stepping:
+    """Weights per joint pattern, in rad per hip height, by which joints take their foot ahead, and
+    to the left; of the corrections that step under a fall.
+    """
+
+    __pydantic_config__ = STRICT
+    ahead: dict[Pattern, Finite] = dataclasses.field(default_factory=dict)
+    aside: dict[Pattern, Finite] = dataclasses.field(default_factory=dict)
+
+
+@dataclasses.dataclass(frozen=True)
 class Termination:
     """When an episode has failed: trunk's up axis against the world's, trunk height in standing
     heights, a touch.
@@ -118,5 +129,6 @@ class CreatureSettings:
     mirror: Mirror = dataclasses.field(default_factory=Mirror)
     steering: Steering = dataclasses.field(default_factory=Steering)
     balance: Balance = dataclasses.field(default_factory=Balance)
+    stepping: Stepping = dataclasses.field(default_factory=Stepping)
     termination: Termination = dataclasses.field(default_factory=Termination)
     train: dict[str, Any] = dataclasses.field(default_factory=dict)

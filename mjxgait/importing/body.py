@@ -8,7 +8,6 @@ import mujoco
 import numpy as np
 
 from mjxgait.creature import geometry
-from mjxgait.errors import UserError
 from mjxgait.importing.parts import Body, quaternion, rotation
 from mjxgait.importing.skeleton import foot_tips, tip_points
 from mjxgait.importing.write_xml import compile_own, creature_xml
@@ -101,9 +100,21 @@ class Puppet:
             moves[j] = np.cross(self.data.xaxis[j + 1], at - self.data.xanchor[j + 1])
         return moves
 
-    def mirror(self, forward: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+    def mirror(
+        self, forward: np.ndarray, q: np.ndarray, slack: float = 1.0
+    ) -> tuple[np.ndarray, np.ndarray] | None:
         """Partner and sign [J] under reflection in the vertical plane along forward [3], or None
-        for an unsymmetric body.
+        for an unsymmetric body. slack: see `images`.
+        """
+        partner, sign = self.images(forward, q, slack)
+        return None if (partner < 0).any() else (partner, sign)
+
+    def images(
+        self, forward: np.ndarray, q: np.ndarray, slack: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Partner [J] under that reflection, -1 for a joint that has none, and sign [J].
+
+        slack: how far images may be off, in units of what a creature's folder allows.
         """
         self.pose(q)
         left = np.cross([0.0, 0.0, 1.0], forward)
@@ -113,12 +124,8 @@ class Puppet:
             self.data.xaxis[1:] @ frame.T,
         )
         near = 0.02 * float(np.ptp(self.data.xanchor[1:], axis=0).max() + 0.05)
-        try:
-            return geometry.mirror_map(
-                anchors, axes, np.zeros(len(self.joints), bool), self.names, near
-            )
-        except UserError:
-            return None
+        slides = np.zeros(len(self.joints), bool)
+        return geometry.mirror_images(anchors, axes, slides, slack * near, slack)
 
     def turn(self, matrix: np.ndarray) -> None:
         """Turns the trunk, and everything on it, about the world's origin. matrix: [3, 3]."""

@@ -4,6 +4,7 @@ import dataclasses
 import math
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -14,6 +15,7 @@ from mjxgait.importing.anatomy import Anatomy
 from mjxgait.importing.balance import steady_balance
 from mjxgait.importing.body import Puppet
 from mjxgait.importing.find import find_anatomy
+from mjxgait.importing.manner import manner
 from mjxgait.importing.mjcf import clean_mjcf
 from mjxgait.importing.notes import Notes, listed
 from mjxgait.importing.orient import find_forward, find_mirror, is_planar, yaw_to
@@ -209,13 +211,10 @@ def _folder(
         "high" if math.isfinite(best.held.up) and best.held.stands else "low",
         "limbs that end lowest",
     )
-    pairs: dict[str, tuple[str, int]] = {}
-    if planar and mirror is not None:  # the geometry alone cannot tell two legs in one place apart
-        pairs = {
-            n: (puppet.names[mirror[0][j]], int(mirror[1][j])) for j, n in enumerate(puppet.names)
-        }
+    pairs = {} if mirror is None else _stated_pairs(puppet, best.q, mirror, planar)
     forward = rotation(puppet.bodies[0].quat).T @ [1.0, 0.0, 0.0]
     length = _stated_length(best)
+    train = _train(best, mirror is not None, length)
     toml = creature_toml(
         name,
         origin,
@@ -226,6 +225,7 @@ def _folder(
         best.drive,
         (mirror is not None, pairs),
         length,
+        train,
         notes,
     )
     report = (
@@ -237,6 +237,35 @@ def _folder(
         README: report,
     }
     return Imported(name, files, notes, best.held.stands)
+
+
+def _stated_pairs(
+    puppet: Puppet, q: np.ndarray, mirror: tuple[np.ndarray, np.ndarray], planar: bool
+) -> dict[str, tuple[str, int]]:
+    """Partner and sign by joint, of those that nobody could tell from the geometry alone.
+
+    Those are joints that are not quite each other's image, and all of a body in a plane, whose legs
+    are in one place.
+    """
+    partner, sign = mirror
+    found, turned = puppet.images(np.array([1.0, 0.0, 0.0]), q, slack=0.5)
+    known = (found == partner) & (turned == sign) & (not planar)
+    return {
+        name: (puppet.names[partner[j]], int(sign[j]))
+        for j, name in enumerate(puppet.names)
+        if not known[j]
+    }
+
+
+def _train(best: Candidate, symmetric: bool, stated_length: float | None) -> dict[str, Any]:
+    """The table `[train]`. stated_length: m, that of a body which is shorter than its legs."""
+    model, data = best.model, mujoco.MjData(best.model)
+    data.qpos[:] = best.qpos
+    mujoco.mj_kinematics(model, data)
+    length = stated_length or geometry.body_length(model, data, np.array([1.0, 0.0, 0.0]))
+    hip = stance_of(best.puppet, best.qpos[7:]).hip
+    steps = bool(best.drive.ahead or best.drive.aside)
+    return manner(steps, symmetric, hip, length, best.puppet.mass, best.notes)
 
 
 def _stated_length(best: Candidate) -> float | None:

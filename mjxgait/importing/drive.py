@@ -44,6 +44,15 @@ RANGES = {
     "other": 20.0,
 }
 """deg to both sides of the standing angle, by what a joint does."""
+STEPPERS, APART = 2, 0.5
+"""Feet of a body that must step under its fall; with more, or so many hip heights one behind the
+other, it stands."""
+WEAKEST = 0.3
+"""m that a joint moves its foot per rad and hip height, to be one that takes the foot somewhere."""
+ENDLESS = 6.0
+"""rad, width of a range from which it is none."""
+LEAST_BEND = 3.0
+"""deg that a knee stays away from straight."""
 ROLES = ("stride", "side", "lift")
 
 
@@ -64,6 +73,8 @@ class Drive:
     stride: dict[str, float] = dataclasses.field(default_factory=dict)
     pitch: dict[str, float] = dataclasses.field(default_factory=dict)
     roll: dict[str, float] = dataclasses.field(default_factory=dict)
+    ahead: dict[str, float] = dataclasses.field(default_factory=dict)
+    aside: dict[str, float] = dataclasses.field(default_factory=dict)
 
 
 def plan_drive(puppet: Puppet, q: np.ndarray, stance: Stance, planar: bool, notes: Notes) -> Drive:
@@ -84,6 +95,7 @@ def plan_drive(puppet: Puppet, q: np.ndarray, stance: Stance, planar: bool, note
     # mean "not known".
     torque = np.where(np.isfinite(stated) & (stated > 0.15 * own), np.minimum(stated, 3 * own), own)
     drive = Drive(roles, kp, kd, torque, _ranges(puppet, q, roles))
+    _bend_one_way(puppet, q, drive, notes)
     _add_armature(puppet, drive, inertia, notes)
     reason = f"weight {puppet.mass * GRAVITY:.3g} N times hip height {stance.hip:.3g} m"
     reason += "; more where a joint's own inertia needs it" if (kp == quick).any() else ""
@@ -97,6 +109,8 @@ def plan_drive(puppet: Puppet, q: np.ndarray, stance: Stance, planar: bool, note
     if not planar:
         _steering(puppet, stance, drive, moves)
     _balance(puppet, stance, drive, moves, planar)
+    if _must_step(puppet, stance):
+        _stepping(puppet, stance, drive, moves, planar)
     return drive
 
 
@@ -160,6 +174,39 @@ def _ranges(puppet: Puppet, q: np.ndarray, roles: list[str]) -> np.ndarray:
     return np.stack([np.minimum(low, 0.0), np.maximum(high, 0.0)], 1)
 
 
+def _bend_one_way(puppet: Puppet, q: np.ndarray, drive: Drive, notes: Notes) -> None:
+    """Keeps a knee whose file states no limits on the side to which it is bent in the stance."""
+    sided = []
+    soles = puppet.sole_points(*puppet.pose(q))
+    for f, sole in enumerate(soles):
+        leg = puppet.leg(f)
+        path = np.concatenate([puppet.data.xanchor[[j + 1 for j in leg]], sole.mean(0)[None]])
+        parts = np.diff(path, axis=0)
+        sizes = np.linalg.norm(parts, axis=1)
+        if len(sizes) < 2:
+            continue
+        k = int((sizes[:-1] + sizes[1:]).argmax())
+        knee, axis = leg[k + 1], puppet.data.xaxis[leg[k + 1] + 1]
+        if puppet.high[knee] - puppet.low[knee] < ENDLESS:
+            continue
+        thigh, shank = parts[k], parts[k + 1]
+        straight = np.degrees(np.arctan2(axis @ np.cross(shank, thigh), shank @ thigh))
+        if abs(straight) < LEAST_BEND:
+            continue
+        end = straight - np.sign(straight) * LEAST_BEND
+        low, high = drive.ranges[knee]
+        drive.ranges[knee] = (low, min(high, end)) if straight > 0 else (max(low, end), high)
+        if (drive.ranges[knee] != (low, high)).any():
+            sided.append(puppet.names[knee])
+    if sided:
+        notes.guess(
+            "side of knees",
+            "as they stand",
+            "medium",
+            f"the file has no limits for {listed(sided)}: no further than straight",
+        )
+
+
 def _steering(puppet: Puppet, stance: Stance, drive: Drive, moves: np.ndarray) -> None:
     """Left legs stride longer than right ones; a yaw joint between fore and hind legs bends."""
     for f in range(len(puppet.feet)):
@@ -179,6 +226,26 @@ def _steering(puppet: Puppet, stance: Stance, drive: Drive, moves: np.ndarray) -
         drive.bend[puppet.names[behind[0]]] = 0.5 * float(
             np.sign(puppet.data.xaxis[behind[0] + 1][2])
         )
+
+
+def _must_step(puppet: Puppet, stance: Stance) -> bool:
+    """Whether it stands on one foot in each step: two, and not one behind the other."""
+    ahead = [puppet.data.xpos[group[0] + 1][0] for group in puppet.feet]
+    return len(puppet.feet) <= STEPPERS and bool(np.ptp(ahead) < APART * stance.hip)
+
+
+def _stepping(
+    puppet: Puppet, stance: Stance, drive: Drive, moves: np.ndarray, planar: bool
+) -> None:
+    """The highest joints that swing a foot forward, and to the side, take it under the fall."""
+    for f in range(len(puppet.feet)):
+        for role, axis, table in (("stride", 0, drive.ahead), ("side", 1, drive.aside)):
+            if role == "side" and planar:
+                continue
+            way = {j: float(moves[j][axis]) / stance.hip for j in puppet.leg(f)}
+            own = [j for j in way if drive.role[j] == role and abs(way[j]) > WEAKEST]
+            if own:
+                table[puppet.names[own[0]]] = round(1 / way[own[0]], 3)
 
 
 def _balance(puppet: Puppet, stance: Stance, drive: Drive, moves: np.ndarray, planar: bool) -> None:

@@ -15,6 +15,8 @@ from mjxgait.importing.parts import HINGE, SLIDE
 from mjxgait.importing.root import find_root, tell_root_joints, unit_length, up_axis
 
 MOST_BODIES, MOST_JOINTS = 400, 60
+ENOUGH = 6
+"""Joints that a leg keeps where all legs together have more than can move."""
 
 
 def find_anatomy(
@@ -108,10 +110,47 @@ def _choose_joints(
             "no leg hangs on them, so they have no part in walking (--keep PATTERN keeps some)",
         )
     if len(anatomy.active) > MOST_JOINTS:
+        _freeze_least(model, anatomy, keep, notes)
+    if len(anatomy.active) > MOST_JOINTS:
         raise UserError(
             f"{len(anatomy.active)} joints would move; freeze those that do not matter with "
             f"--freeze (at most {MOST_JOINTS})"
         )
+
+
+def _freeze_least(
+    model: mujoco.MjModel, anatomy: Anatomy, keep: Sequence[str], notes: Notes
+) -> None:
+    """Leaves each leg the joints that swing its end farthest, such as an insect's without those
+    of its toes.
+    """
+    data = mujoco.MjData(model)
+    data.qpos[:] = anatomy.qpos
+    mujoco.mj_kinematics(model, data)
+    kept = set()
+    for foot in anatomy.feet:
+        chain = ancestors(model, foot)
+        leg = [j for j in anatomy.active if int(model.jnt_bodyid[j]) in chain]
+        below = [b for b in anatomy.bodies if foot in ancestors(model, b)]
+        ends = data.xpos[below]
+
+        def reach(joint: int, ends: np.ndarray = ends) -> float:
+            arms = ends - data.xanchor[joint]
+            return float(np.linalg.norm(np.cross(data.xaxis[joint], arms), axis=1).max())
+
+        kept.update(sorted(leg, key=reach, reverse=True)[:ENOUGH])
+    kept.update(
+        j
+        for j in anatomy.active
+        if any(fnmatch.fnmatchcase(model.joint(j).name, pattern) for pattern in keep)
+    )
+    frozen = [model.joint(j).name or f"joint {j}" for j in anatomy.active if j not in kept]
+    notes.change(
+        f"joints {listed(frozen)} frozen",
+        f"of {len(anatomy.active)} joints of the legs those that swing a foot least "
+        "(--keep PATTERN keeps some)",
+    )
+    anatomy.active = [j for j in anatomy.active if j in kept]
 
 
 def _check_loops(model: mujoco.MjModel, anatomy: Anatomy) -> None:

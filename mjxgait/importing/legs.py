@@ -1,6 +1,7 @@
 """Which joints of a compiled model could move, and which of its limbs are legs."""
 
 import fnmatch
+import re
 from collections.abc import Sequence
 
 import mujoco
@@ -14,6 +15,11 @@ from mjxgait.importing.parts import FREE, HINGE, SLIDE
 
 SAME_LEVEL = 0.2
 """Share of the creature's height within which limbs that end near the lowest point are legs."""
+
+NO_LEGS = re.compile(
+    "(?<![a-z])(wing|haltere|antenna|mouth|jaw|mandible|proboscis|rostrum|haustellum|labrum|palp)"
+)
+"""In names of limbs that no animal walks on, however low they hang."""
 
 
 class NoLegs(UserError):
@@ -80,6 +86,7 @@ def find_feet(model: mujoco.MjModel, anatomy: Anatomy, movable: list[int]) -> li
     span = float(np.ptp(anatomy.xpos[anatomy.bodies], axis=0).max())
     height = max(top - floor, 0.1 * span, 1e-6)
     ends = _without_toes(model, anatomy, ends, movers)
+    ends = [b for b in ends if not _named_otherwise(model, b, movers)] or ends
     feet = sorted(
         b
         for b in ends
@@ -99,6 +106,12 @@ def find_feet(model: mujoco.MjModel, anatomy: Anatomy, movable: list[int]) -> li
             "needs legs that step"
         )
     return [b for b in feet if b not in wheels]
+
+
+def _named_otherwise(model: mujoco.MjModel, end: int, movers: set[int]) -> bool:
+    """Whether a limb is called after something that is no leg."""
+    names = [model.body(b).name.lower() for b in ancestors(model, end) if b in movers]
+    return any(NO_LEGS.search(name) for name in names)
 
 
 def _segment(model: mujoco.MjModel, body: int, movers: set[int]) -> int:

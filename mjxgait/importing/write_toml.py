@@ -1,5 +1,8 @@
 """Writes creature.toml: the guesses, each with its confidence beside it."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 import tomli_w
 
@@ -20,6 +23,7 @@ def creature_toml(
     drive: Drive,
     mirror: tuple[bool, dict[str, tuple[str, int]]],
     body_length: float | None,
+    train: Mapping[str, Any],
     notes: Notes,
 ) -> str:
     """The text of creature.toml.
@@ -28,6 +32,7 @@ def creature_toml(
       origin: the model file's name, in one line. forward: [3] in the trunk's frame. feet: names of
         geoms.
       mirror: whether it is symmetric, and stated pairs: joint to partner and sign.
+      train: settings that are not the usual ones.
       body_length: m, None where the loader shall measure it.
     """
     symmetric, pairs = mirror
@@ -92,13 +97,21 @@ def creature_toml(
         f"roll = {_table(drive.roll)}",
         "",
     ]
+    if drive.ahead or drive.aside:
+        lines += [
+            "[stepping]  # low: likewise; two feet and less must step under a fall",
+            f"ahead = {_table(drive.ahead)}",
+            f"aside = {_table(drive.aside)}",
+            "",
+        ]
     lines += [
         "[termination]",
         "min_up = 0.5",
         "height = [0.5, 1.5]",
         "touch = true",
         "",
-        "[train]",
+        f"[train]{remark.get('train', '')}",
+        *(tomli_w.dumps({"train": train}).splitlines() if train else []),
         "",
     ]
     return "\n".join(lines)

@@ -9,7 +9,7 @@ from rich.console import Console
 
 from mjxgait.inspect.snapshot import Snapshot
 from mjxgait.inspect.tables import print_columns, titled_table
-from mjxgait.settings.control import TUNING
+from mjxgait.settings.control import gene_names
 
 
 class PoseView:
@@ -22,7 +22,7 @@ class PoseView:
             creature.joints.names, creature.joints.pose_low, creature.joints.pose_high, strict=True
         )
         return {
-            "tuning": dict(zip(TUNING, map(float, genomes["tuning"][i]), strict=True)),
+            "tuning": _by_gene(snapshot, genomes["tuning"][i]),
             "key_poses_deg": [
                 _by_joint(snapshot, np.degrees(pose)) for pose in genomes["key_poses"][i]
             ],
@@ -39,7 +39,7 @@ class PoseView:
         return {
             "spread_deg": _by_joint(snapshot, spread),
             "spread_of_range": _by_joint(snapshot, spread / np.maximum(room, 1e-9)),
-            "tuning_spread": dict(zip(TUNING, map(float, tuning.std(axis=0)), strict=True)),
+            "tuning_spread": _by_gene(snapshot, tuning.std(axis=0)),
         }
 
     def difference(self, a: Snapshot, b: Snapshot) -> dict[str, Any]:
@@ -49,7 +49,8 @@ class PoseView:
             a.creature.joints.names == b.creature.joints.names
             and mine["key_poses"].shape[1:] == other["key_poses"].shape[1:]
         )
-        pairs = zip(TUNING, mine["tuning"][0], other["tuning"][0], strict=True)
+        # A body that steps under its fall has more genes than one that does not.
+        pairs = zip(_genes(a), mine["tuning"][0], other["tuning"][0], strict=False)
         return {
             "same_individuals": shared(a, b) if comparable else None,
             "champion_moved_deg": _moved(a, b) if comparable else None,
@@ -117,3 +118,11 @@ def _moved(a: Snapshot, b: Snapshot) -> dict[str, list[float]]:
 
 def _by_joint(snapshot: Snapshot, values: Iterable[float]) -> dict[str, float]:
     return dict(zip(snapshot.creature.joints.names, map(float, values), strict=True))
+
+
+def _genes(snapshot: Snapshot) -> tuple[str, ...]:
+    return gene_names(snapshot.creature.corrections.steps)
+
+
+def _by_gene(snapshot: Snapshot, values: np.ndarray) -> dict[str, float]:
+    return dict(zip(_genes(snapshot), map(float, values), strict=True))

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from mjxgait.champion.blocks.material import IN_WATER
+from mjxgait.champion.blocks.material import IN_WATER, ON_LAND
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.ground.spec import FLAT
@@ -31,10 +31,9 @@ def check_fit(creature: Creature, config: Config) -> None:
                 f"{name}: its body is there already, and a {controller} grows with its own; take "
                 "--env blocks, or another controller"
             )
-        if task in IN_WATER:
+        if task in (*IN_WATER, *ON_LAND):
             raise UserError(
-                f"{name}: only bodies that grow are simulated in water; take --env blocks, or "
-                "another task"
+                f"{name}: only bodies that grow {task}; take --env blocks, or another task"
             )
         return
     if not getattr(kind, "grows", False):
@@ -42,8 +41,9 @@ def check_fit(creature: Creature, config: Config) -> None:
             f"{name}: its body grows with its brain, so {controller} has nothing to move; leave "
             "--controller out"
         )
-    if task in SHIPPED["task"] and task not in IN_WATER:
-        raise UserError(f"{name}: bodies that grow cannot {task} yet, only {', '.join(IN_WATER)}")
+    if task in SHIPPED["task"] and task not in (*IN_WATER, *ON_LAND):
+        known = ", ".join((*IN_WATER, *ON_LAND))
+        raise UserError(f"{name}: bodies that grow cannot {task}, only {known}")
     _check_settings(name, config)
 
 

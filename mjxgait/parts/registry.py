@@ -9,7 +9,7 @@ import numpy as np
 from mjxgait.creature import Creature
 from mjxgait.creature.settings import Termination
 from mjxgait.errors import UserError, did_you_mean, not_loaded
-from mjxgait.settings.config import Config, RolloutConfig
+from mjxgait.settings.config import Config, RolloutConfig, UseConfig
 
 if TYPE_CHECKING:  # JAX takes a second to import
     from mjxgait.body import Body, Ends
@@ -62,16 +62,52 @@ def _brains() -> type:
 
 
 def _swim() -> type:
-    from mjxgait.tasks.swim import Swim
+    from mjxgait.tasks.blocks.swim import Swim
 
     return Swim
 
 
+def _roam() -> type:
+    from mjxgait.tasks.blocks.roam import Roam
+
+    return Roam
+
+
+def _jump() -> type:
+    from mjxgait.tasks.blocks.jump import Jump
+
+    return Jump
+
+
+def _follow() -> type:
+    from mjxgait.tasks.blocks.follow import FollowInWater
+
+    return FollowInWater
+
+
+def _follow_on_land() -> type:
+    from mjxgait.tasks.blocks.follow import FollowOnLand
+
+    return FollowOnLand
+
+
 SHIPPED: Mapping[str, Mapping[str, Maker]] = {
     "controller": {"poses": _poses, "program": _programs, "brain": _brains},
-    "task": {"walk": _walk, "hop": _hop, "limbo": _limbo, "travel": _travel, "swim": _swim},
+    "task": {
+        "walk": _walk,
+        "hop": _hop,
+        "limbo": _limbo,
+        "travel": _travel,
+        "swim": _swim,
+        "roam": _roam,
+        "jump": _jump,
+        "follow": _follow,
+        "follow-on-land": _follow_on_land,
+    },
 }
 """By kind and name; the classes are imported when they are needed."""
+OF_BODIES_THAT_GROW = {"walk": "roam"}
+"""What a task of this name is to them: they have no strides."""
 
 _OWN: dict[tuple[str, str], type] = {}
 
@@ -94,6 +130,17 @@ def find(kind: str, name: str) -> type:
     if ":" in name:
         raise not_loaded(kind, name)
     raise UserError(f'there is no {kind} "{name}"; {did_you_mean(name, SHIPPED[kind])}')
+
+
+def meant(use: UseConfig) -> UseConfig:
+    """Who takes part, with the task that its name means to a body that grows.
+
+    Raises:
+      UserError: there is no such controller.
+    """
+    if not getattr(find("controller", use.controller), "grows", False):
+        return use
+    return dataclasses.replace(use, task=OF_BODIES_THAT_GROW.get(use.task, use.task))
 
 
 def make_controller(body: "Body", step: float, config: Config) -> "Controller":

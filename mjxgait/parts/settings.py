@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from mjxgait.parts.registry import find
+from mjxgait.parts.registry import find, meant
 from mjxgait.settings import layers
 from mjxgait.settings.config import Config, UseConfig
 from mjxgait.settings.tables import STRICT, build
@@ -49,8 +49,8 @@ def build_config(table: Mapping[str, Any], where: str) -> Config:
     Raises:
       UserError: names the key; or the code that must be named on the command line.
     """
-    use = build(UseConfig, table.get("use", {}), f"{where}: [use]")
-    return build(config_class(use), table, where)
+    use = meant(build(UseConfig, table.get("use", {}), f"{where}: [use]"))
+    return build(config_class(use), {**table, "use": dataclasses.asdict(use)}, where)
 
 
 def resolve_config(
@@ -60,4 +60,4 @@ def resolve_config(
     use: Mapping[str, str] | None = None,
 ) -> Config:
     """See `layers.resolve_config`."""
-    return layers.resolve_config(creature_table, creature_name, file, use, config_class)
+    return layers.resolve_config(creature_table, creature_name, file, use, config_class, meant)

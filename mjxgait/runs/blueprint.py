@@ -164,6 +164,7 @@ class GrownBlueprint:
             floor=not wet,
             gravity=0.0 if wet else GRAVITY,
             drag=DRAG if wet else 0.0,
+            lit="light" in task.adds,
         )
         plant, growth = TreePlant(around), GraphGrowth(capacity)
         return _assembled(body, step, plant, controller, task, config.rollout, LANES, growth)

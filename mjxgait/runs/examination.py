@@ -54,19 +54,28 @@ class Examiner:
     """Of the champions that did not do on the way, by fingerprint, at most: another look would say the same."""
 
     def early(self, state: EvolutionState) -> Examined | None:
-        """The best individual with its certificate, if it is time to look and it passes.
+        """One of the best with its certificate, if it is time to look and it passes.
 
         Depends on nothing but the state, the settings and the examinations that led here, so that a
         resumed run ends where it would have ended. Looking takes as long as five generations: first
         comes what evolution knows already, then the undisturbed walk, then the draw to choose on.
         The last examination that the settings allow is kept for the end.
         """
-        config, generation = self.experiment.config, int(state.generation)
-        if not due(config.examination, generation) or not _promising(self.experiment, state):
+        settings, generation = self.experiment.config.examination, int(state.generation)
+        if not due(settings, generation):
             return None
+        for rank in self.experiment.candidates(state)[: settings.on_the_way]:
+            if not _promising(self.experiment, state, rank):
+                continue
+            champion = self.experiment.champion(state, self.versions, rank)
+            if examined := self._on_the_way(champion, generation):
+                return examined
+        return None
+
+    def _on_the_way(self, champion: Champion, generation: int) -> Examined | None:
+        """With its certificate, if it passes; nobody is looked at twice."""
+        config, name = self.experiment.config, champion.fingerprint
         wanted = enough(config, generation)
-        champion = self.experiment.champion(state, self.versions)
-        name = champion.fingerprint
         if self._margins.get(name, np.inf) < wanted or self.exams.failed(name, generation):
             return None
         if self.exams.attempt(name, generation) >= config.examination.attempts:
@@ -136,9 +145,9 @@ def due(settings: ExaminationConfig, generation: int) -> bool:
     )
 
 
-def _promising(experiment: Experiment, state: EvolutionState) -> bool:
-    """Whether the best individual is worth an examination."""
+def _promising(experiment: Experiment, state: EvolutionState, rank: int) -> bool:
+    """Whether an individual is worth an examination."""
     config, names = experiment.config, experiment.simulator.task.outcomes
-    outcome = dict(zip(names, np.asarray(state.outcome[0]).T, strict=True))
+    outcome = dict(zip(names, np.asarray(state.outcome[rank]).T, strict=True))
     demands = demands_of(config.use.task, config.wish)
     return demands.promising(outcome, config.rollout.seconds, experiment.creature)

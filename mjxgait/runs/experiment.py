@@ -97,14 +97,17 @@ class Experiment:
         return alone
 
     def candidates(self, state: EvolutionState) -> list[int]:
-        """Ranks of the best individuals that differ from each other, as many as the config asks for; best first."""
+        """Ranks of the best individuals that differ from each other, as many as the config asks for; best first.
+
+        Of equal fitness are those that did the same: programs differ in what changes nothing.
+        """
         rows = self.simulator.controller.genes(state.genomes, self.config.controller)
+        fitness, settings = np.asarray(state.fitness), self.config.examination
         chosen: list[int] = []
-        for rank in np.flatnonzero(np.isfinite(state.fitness)):
+        for rank in np.flatnonzero(np.isfinite(fitness)):
             apart = np.sqrt(np.mean((rows[chosen] - rows[rank]) ** 2, axis=1))
-            if (apart > self.config.examination.difference).all() and len(
-                chosen
-            ) < self.config.examination.candidates:
+            differs = (apart > settings.difference).all() and fitness[rank] not in fitness[chosen]
+            if differs and len(chosen) < settings.candidates:
                 chosen.append(int(rank))
         return chosen
 

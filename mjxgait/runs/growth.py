@@ -13,6 +13,7 @@ from mjxgait.blocks.variation import Genotype
 from mjxgait.control.bodied import Bodied
 from mjxgait.creature import Creature
 from mjxgait.creature.proportions import Proportions, check_sizes, proportions
+from mjxgait.physics.trees.plant import TreePlant
 from mjxgait.settings.config import Config
 from mjxgait.tasks.trials import Starts
 from mjxgait.types import ModelPlant
@@ -32,11 +33,11 @@ class GraphGrowth:
 
     capacity: Capacity
 
-    def body(self, plant: Any, genome: Genotype, start: Starts) -> Starts:
-        """See `Growth`. What has no hinge is not bent."""
+    def body(self, plant: TreePlant, genome: Genotype, start: Starts) -> Starts:
+        """See `Growth`. What has no hinge is not bent, and on land all rest on the ground."""
         tree = body_of(genome.graph, self.capacity).tree
         bent = start.qpos[7:] * tree.moves[1:]
-        qpos = jnp.concatenate([start.qpos[:7], bent])
+        qpos = plant.rested(tree, jnp.concatenate([start.qpos[:7], bent]))
         return dataclasses.replace(start, qpos=qpos, numbers=tree)
 
 

@@ -107,6 +107,10 @@ class Screen:
             )
         if said := in_the_way(certificate.criteria):
             self.console.print(said)
+        # Of a motion that strides nowhere the numbers mean little.
+        if stopped := report.get("obstacle"):
+            self.console.print(f"{verdict}: it {stopped}{where}; {certificate.seconds:.0f} s.")
+            return
         self.console.print(
             f"{verdict} (margin {certificate.margin:.2f}). {report['summary']}{where}; "
             f"{certificate.seconds:.0f} s."

@@ -49,6 +49,23 @@ def parents(
     return mothers, others + (others >= mothers)
 
 
+def proportional_parents(
+    key: jax.Array, count: int, fitness: jax.Array
+) -> tuple[jax.Array, jax.Array]:
+    """The same, each as often as its fitness [P] is to that of the others (Sims 1994).
+
+    Who has none, or less, has no children, but where nobody has any.
+    """
+    key_mother, key_father = jax.random.split(key)
+    share = jnp.where(fitness > 0, fitness, 0.0)
+    share = jnp.where(jnp.any(share > 0), share, 1.0)
+    mothers, fathers = (
+        jax.random.categorical(key, jnp.log(share), shape=(count,))
+        for key in (key_mother, key_father)
+    )
+    return mothers, jnp.where(fathers == mothers, (fathers + 1) % len(fitness), fathers)
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class Nursery:
     """Children of a generation, born in turn. config: plain or traced, but for its shapes."""

@@ -13,7 +13,7 @@ import jax
 import jax.numpy as jnp
 
 from mjxgait.search import forced
-from mjxgait.search.breeding import Nursery, parents
+from mjxgait.search.breeding import Nursery, parents, proportional_parents
 from mjxgait.search.metrics import metrics
 from mjxgait.search.state import EvolutionState, GenerationMetrics, Origin, Proposal
 from mjxgait.search.variation import Variation, first_occurrence
@@ -142,9 +142,12 @@ class Evolution:
             bred, of_two = Nursery(config, self.variation).children(key, state.genomes)
             return bred, jnp.where(of_two, int(Origin.CROSSOVER), int(Origin.MUTATION))
         key_parents, key_cross, key_whether, key_mutate, key_mutated = jax.random.split(key, 5)
-        mothers, fathers = parents(
-            key_parents, count, config.population, config.selection, config.rivals
-        )
+        if config.proportional:
+            mothers, fathers = proportional_parents(key_parents, count, state.fitness)
+        else:
+            mothers, fathers = parents(
+                key_parents, count, config.population, config.selection, config.rivals
+            )
         mother, father = (
             jax.tree.map(lambda leaf, i=i: leaf[i], state.genomes) for i in (mothers, fathers)
         )

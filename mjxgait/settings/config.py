@@ -67,6 +67,7 @@ class RolloutConfig:
         as a share.
       masses: the same for each part's mass and inertia, which then differ from lane to lane;
         a step costs a third more (docs/performance.md).
+      latency: most control steps by which the torques of a perturbed start come late.
       terminate: whether an episode ends when the creature falls; if not, its whole body meets
         the floor.
       termination: what counts as falling, where it differs from creature.toml.
@@ -90,6 +91,7 @@ class RolloutConfig:
     push: NonNegative = 0.2
     gains: Fraction = 0.1
     masses: Annotated[Fraction, SHAPE] = 0.0
+    latency: Annotated[Whole, SHAPE] = 0
     terminate: Annotated[bool, SHAPE] = True
     termination: TerminationConfig = dataclasses.field(default_factory=TerminationConfig)
     worst: Fraction = 0.5
@@ -150,6 +152,7 @@ class EvolutionConfig:
       initial_choice: so many are drawn and judged for each place of the first generation.
       selection: how parents are drawn: any, by rank, or the best of some rivals.
       rivals: of a tournament.
+      proportional: parents are drawn in proportion to their fitness instead.
       crossover: share of offspring with two parents, the others have one.
       crossing: `permute` draws K poses from the parents' 2K in any order; `align` leaves each
         pose in its place.
@@ -189,6 +192,7 @@ class EvolutionConfig:
     initial_choice: Count = 1
     selection: Literal["uniform", "rank", "tournament"] = "rank"
     rivals: Annotated[Count, SHAPE] = 2
+    proportional: Annotated[bool, SHAPE] = False
     crossover: Fraction = 0.7
     crossing: Literal["permute", "align"] = "align"
     pool: Annotated[Literal["parents", "growing"], SHAPE] = "parents"
@@ -213,6 +217,8 @@ class EvolutionConfig:
                 f"growth = {self.growth} leaves no room for offspring; make it larger than {1 + 1 / self.population:.3g}"
             )
 
+        if self.proportional and (self.unique_children or self.pool == "growing"):
+            raise ValueError("proportional is for children that are born all at once")
         if self.elite and self.survival == "best":
             raise ValueError('elite is for survival = "children": of the best all live on anyway')
         if self.elites >= self.offspring:
@@ -242,6 +248,8 @@ class ExaminationConfig:
       attempts: examinations of a run, the one at its end included.
       candidates: so many of the best, different from each other, are looked at in the end, until
         one has enough margin; 0 leaves all examinations out.
+      on_the_way: so many of them are looked at on the way. With few starts in each generation the
+        first is often the luckiest.
       difference: in units of each gene's range, root mean square; what counts as different.
     """
 
@@ -251,6 +259,7 @@ class ExaminationConfig:
     draws: Annotated[Count, HOST] = 32
     attempts: Annotated[Count, HOST] = 3
     candidates: Annotated[Whole, HOST] = 12
+    on_the_way: Annotated[Count, HOST] = 1
     difference: Annotated[NonNegative, HOST] = 0.02
 
 
@@ -261,8 +270,8 @@ class UseConfig:
     Attributes:
       controller: what moves the creature: poses, program (docs/programs.md), brain
         (docs/blocks.md), or FILE.py:CLASS of your own (docs/extending.md).
-      task: what the creature is to do: walk, hop, limbo, travel, swim, or FILE.py:CLASS of your
-        own.
+      task: what the creature is to do: walk, hop, limbo, travel; swim, walk, jump, follow and
+        follow-on-land of bodies that grow (docs/blocks.md); or FILE.py:CLASS of your own.
     """
 
     __pydantic_config__ = STRICT

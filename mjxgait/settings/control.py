@@ -50,6 +50,45 @@ TUNING = tuple(field.name for field in dataclasses.fields(TuningRanges))
 """Names of the tuning genes, in the order in which genomes hold them."""
 
 
+StaticInterval = Annotated[Interval, SHAPE]
+
+
+@dataclasses.dataclass(frozen=True)
+class SteppingRanges:
+    """Where the genes of stepping under the fall may lie, for bodies with weights in `[stepping]`
+    (docs/controller.md); all others have no such genes. Equal ends fix one.
+
+    Attributes:
+      step: how far ahead the swing leg steps, for how far the trunk is ahead of its support.
+      step_rate: likewise, for how fast the trunk goes ahead.
+      side: how far to the side, for how far the trunk is beside its support.
+      side_rate: likewise, for how fast it goes to the side.
+      hold: how strongly the stance leg's hip turns the trunk back that pitches.
+      hold_rate: s; likewise, for how fast it pitches.
+      sway: how strongly the hip turns the trunk back that rolls.
+      sway_rate: s; likewise, for how fast it rolls.
+    """
+
+    __pydantic_config__ = STRICT
+    step: StaticInterval = (0.0, 1.0)
+    step_rate: StaticInterval = (0.0, 1.0)
+    side: StaticInterval = (0.0, 1.0)
+    side_rate: StaticInterval = (0.0, 1.0)
+    hold: StaticInterval = (0.0, 1.0)
+    hold_rate: StaticInterval = (0.0, 0.2)
+    sway: StaticInterval = (0.0, 1.0)
+    sway_rate: StaticInterval = (0.0, 0.2)
+
+
+STEPPING = tuple(field.name for field in dataclasses.fields(SteppingRanges))
+"""Names of those genes; genomes hold them behind the tuning genes."""
+
+
+def gene_names(steps: bool) -> tuple[str, ...]:
+    """Of a genome's tuning, in its order. steps: whether the body steps under its fall."""
+    return TUNING + (STEPPING if steps else ())
+
+
 @dataclasses.dataclass(frozen=True)
 class PoseConfig:
     """The controller of key poses.
@@ -65,6 +104,7 @@ class PoseConfig:
         `mjxgait refine` finds them; none leaves the whole pose ranges.
       within: deg; how far from them.
       tuning: ranges of the controller's own genes.
+      stepping: ranges of the genes of bodies that step under their fall.
     """
 
     __pydantic_config__ = STRICT
@@ -75,6 +115,7 @@ class PoseConfig:
     around: tuple[Finite, ...] = ()
     within: NonNegative = 0.0
     tuning: TuningRanges = dataclasses.field(default_factory=TuningRanges)
+    stepping: SteppingRanges = dataclasses.field(default_factory=SteppingRanges)
 
 
 @dataclasses.dataclass(frozen=True)

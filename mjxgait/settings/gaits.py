@@ -42,6 +42,13 @@ SHORTEST = 0.5
 """Share of an animal's stride length that a walk at a speed asked for must have."""
 
 
+def stride_limit(mass: float) -> float:
+    """Hz; 1.2 times the trot-gallop transition frequency of an animal of this mass in kg,
+    `4.48 m^-0.14` (Heglund, Taylor & McMahon 1974).
+    """
+    return 1.2 * 4.48 * mass**-0.14
+
+
 def animal_stride(speed: Any, hip_height: Any) -> Any:
     """Stride length in m of an animal at a speed in m/s, 2.3 (v²/gh)^0.3 hip heights (Alexander
     1976); of numbers or arrays.

@@ -17,15 +17,18 @@ def resolve_config(
     file: Path | None = None,
     use: Mapping[str, str] | None = None,
     config_class: Callable[[UseConfig], type[Config]] = lambda use: Config,
+    meant: Callable[[UseConfig], UseConfig] = lambda use: use,
 ) -> Config:
     """The layers, each over the one before: `configs/default.toml`, the creature's `[train]`, the user's file.
 
     A file may begin with `standalone = true`: then nothing but the built-in defaults lies under it.
     Its tables `[creature.NAME]` hold keys for the creature of that name, laid over the rest of it.
-    What the first two say to a controller or a task that takes no part is left out.
+    What the first two say to a controller or a task that takes no part is left out. The creature's
+    tables `[train.task.NAME]` hold keys for the task of that name, laid over the rest of it.
 
     Args:
       use: who takes part, over what the layers say. config_class: the settings of those.
+      meant: who takes part, by other names than those given.
 
     Raises:
       UserError: names the layer and the key.
@@ -33,14 +36,19 @@ def resolve_config(
     default = data_folder("configs") / "default.toml"
     standalone, mine = _file_layers(file, creature_name) if file is not None else (False, [])
     given: list[tuple[str, Mapping[str, Any]]] = []
+    general, of_tasks = dict(creature_table), creature_table.get("task", {})
+    general.pop("task", None)
     if not standalone:
         given.append((str(default), read_toml(default)))
-        given.append((f"{creature_name}/creature.toml: [train]", creature_table))
-    chosen = _chosen([*given, *mine], use or {})
+        given.append((f"{creature_name}/creature.toml: [train]", general))
+    chosen = meant(_chosen([*given, *mine], use or {}))
+    if not standalone and chosen.task in of_tasks:
+        where = f"{creature_name}/creature.toml: [train.task.{chosen.task}]"
+        given.append((where, {**of_tasks[chosen.task], "use": dataclasses.asdict(chosen)}))
     cls = config_class(chosen)
     table: dict[str, Any] = {}
     for where, layer in [
-        *((w, _without_absent(given_one, chosen)) for w, given_one in given),
+        *((w, _without_absent(given_one, chosen, meant)) for w, given_one in given),
         *mine,
     ]:
         table = merge(table, layer)
@@ -60,15 +68,17 @@ def _chosen(layers: Sequence[tuple[str, Mapping[str, Any]]], use: Mapping[str, s
     return build(UseConfig, merge(table, use), "the options")
 
 
-def _without_absent(layer: Mapping[str, Any], use: UseConfig) -> dict[str, Any]:
+def _without_absent(
+    layer: Mapping[str, Any], use: UseConfig, meant: Callable[[UseConfig], UseConfig]
+) -> dict[str, Any]:
     """A layer without what it says to a controller or a task that takes no part.
 
     It was written for those that it names itself, and else for those of the default.
     """
-    meant = build(UseConfig, layer.get("use", {}), "[use]")
+    written = meant(build(UseConfig, layer.get("use", {}), "[use]"))
     absent = {
-        "controller": use.controller != meant.controller,
-        "fitness": use.task != meant.task,
+        "controller": use.controller != written.controller,
+        "fitness": use.task != written.task,
     }
     return {key: value for key, value in layer.items() if not absent.get(key)}
 

@@ -38,12 +38,21 @@ class Episodes:
 
 
 @pytree
+class Late:
+    """Torques that are on their way. delay: [] control steps. recent: [D, J], newest first."""
+
+    delay: jax.Array
+    recent: jax.Array
+
+
+@pytree
 class Lane:
     """One simulation in flight.
 
     job: [] place in the device's queue. plan, memory: the controller's. tally, aim, standards: the
     task's. rules: the drive's. push as in `Starts`.
     command: [J] the controller's latest; None where each step has one of its own.
+    late: None where torques always come at once.
     """
 
     job: jax.Array
@@ -57,6 +66,7 @@ class Lane:
     push: jax.Array
     push_step: jax.Array
     command: jax.Array | None = None
+    late: Late | None = None
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -191,7 +201,7 @@ class Simulator:
         here = (row, episode % count) if own is None else (row, individual, episode % count)
         start = jax.tree.map(lambda leaf: leaf[here], starts if own is None else own)
         mine = jax.tree.map(lambda leaf: leaf[row], settings)
-        still = jnp.zeros_like(start.qvel)
+        still, joints = jnp.zeros_like(start.qvel), len(self.creature.joints.names)
         return Lane(
             job=job,
             body=BodyState(
@@ -211,7 +221,10 @@ class Simulator:
             rules=self.drive.rules(mine.drive, start.stiffness, start.damping),
             push=start.push,
             push_step=start.push_step,
-            command=jnp.zeros(len(self.creature.joints.names)) if self._holds else None,
+            command=jnp.zeros(joints) if self._holds else None,
+            late=None
+            if start.delay is None
+            else Late(start.delay, jnp.zeros((mine.rollout.latency, joints))),
         )
 
     @property
@@ -228,12 +241,15 @@ class Simulator:
         sensed, workings = self.plant.forward(body)
         command, memory = self._command(k, lane, sensed)
         torque = self.drive.torque(self.plant, lane.rules, body, sensed, workings, command)
+        late = lane.late
+        if late is not None:
+            torque, late = self._per_lane(_arriving)(late, lane.tally.steps, torque)
         tally = self._per_lane(self._judge)(lane, sensed, torque)
         body = self.plant.advance(body, workings, self._per_lane(self.drive.lift)(torque))
         aim = self._per_lane(self.task.onward)(lane.aim, sensed)
         kept = command if self._holds else None
         return dataclasses.replace(
-            lane, body=body, memory=memory, tally=tally, aim=aim, command=kept
+            lane, body=body, memory=memory, tally=tally, aim=aim, command=kept, late=late
         )
 
     def _command(self, k: jax.Array, lane: Lane, sensed: Sensed) -> tuple[jax.Array, Any]:
@@ -293,3 +309,15 @@ def _choose(condition: jax.Array, yes: Any, no: Any) -> Any:
 def _push(lane: Lane) -> BodyState:
     now = lane.tally.steps == lane.push_step
     return dataclasses.replace(lane.body, qvel=lane.body.qvel + jnp.where(now, lane.push, 0.0))
+
+
+def _arriving(late: Late, step: jax.Array, torque: jax.Array) -> tuple[jax.Array, Late]:
+    """The torques [J] that arrive at a step [], and those on their way with the step's own.
+
+    Before the first has arrived it acts already, as if the body had been held so.
+    """
+    known = jnp.concatenate([torque[None], jnp.where(step == 0, torque, late.recent)])
+    arriving = torque
+    for steps in range(1, len(known)):  # a lookup per lane would be slower
+        arriving = jnp.where(late.delay == steps, known[steps], arriving)
+    return arriving, Late(late.delay, known[:-1])

@@ -27,7 +27,9 @@ class Starts:
     numbers: leaves [R, ...], the bodies that follow from it, as the plant reads them.
     ground: leaves [R, ...], each trial's own; None where it is flat.
     goal: [R] m ahead of the start; None where the task has none.
+    light: [R, 3] m from where the root starts; None where there is none.
     turn: [R] rad/s by which the commanded heading grows; None where nobody is told to turn.
+    delay: [R] control steps by which torques come late; None where they never do.
     """
 
     qpos: jax.Array
@@ -41,7 +43,9 @@ class Starts:
     heaviness: jax.Array | None = None
     numbers: Any = None
     goal: jax.Array | None = None
+    light: jax.Array | None = None
     turn: jax.Array | None = None
+    delay: jax.Array | None = None
 
 
 def draw_starts(key: jax.Array, creature: Creature, config: RolloutConfig) -> Starts:
@@ -85,7 +89,14 @@ def draw_starts(key: jax.Array, creature: Creature, config: RolloutConfig) -> St
         damping=factors(key_damping),
         heaviness=_heaviness(jax.random.fold_in(key, 3), creature, config),
         ground=draw_grounds(jax.random.fold_in(key, 2), creature, config),
+        delay=_delay(jax.random.fold_in(key, 6), config),
     )
+
+
+def _delay(key: jax.Array, config: RolloutConfig) -> jax.Array | None:
+    if not config.latency:
+        return None
+    return jax.random.randint(key, (config.starts,), 0, config.latency + 1).at[0].set(0)
 
 
 def _heaviness(key: jax.Array, creature: Creature, config: RolloutConfig) -> jax.Array | None:

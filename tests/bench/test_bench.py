@@ -20,7 +20,7 @@ from mjxgait.bench.scaling import draw
 from mjxgait.bench.workload import Lap, Workload
 from mjxgait.certify.layout import start_frame
 from mjxgait.certify.state import State, sense
-from mjxgait.certify.twins.poses import PoseTwin
+from mjxgait.certify.twins.poses import READS, PoseTwin
 from mjxgait.commands import bench
 from mjxgait.creature import load_creature
 from mjxgait.errors import UserError
@@ -86,7 +86,7 @@ def test_the_law_is_the_examiners(creature, workload):
         spin,
         *([np.zeros(0)] * 4),
     )
-    senses = sense(creature, state, PoseTwin.reads)
+    senses = sense(creature, state, READS)
     position, genome = np.arange(count) * 7, np.full(count, 1)
     law, examiner = Law(creature, workload), PoseTwin(creature, champion, 0.005)
     target = law.target(genome, position, pos, rot, v)

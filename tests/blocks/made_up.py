@@ -4,9 +4,11 @@ import dataclasses
 from typing import Any
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 
 from mjxgait.blocks.genotype import Graph
+from mjxgait.types import Sensed
 
 
 def one(tree: Any, place: int) -> Any:
@@ -18,3 +20,22 @@ def genome_of(graph: Graph) -> dict[str, np.ndarray]:
     """A graph's arrays as a champion has them."""
     names = [field.name for field in dataclasses.fields(graph)]
     return {f"graph.{name}": np.asarray(getattr(graph, name)) for name in names}
+
+
+CALM = Sensed(
+    joint_pos=jnp.zeros(3),
+    joint_vel=jnp.zeros(3),
+    bias=jnp.zeros(9),
+    trunk_pos=jnp.zeros(3),
+    trunk_rot=jnp.eye(3),
+    trunk_vel=jnp.zeros(3),
+    trunk_angvel=jnp.zeros(3),
+    geom_pos=jnp.zeros((4, 3)),
+    geom_low=jnp.zeros(4),
+    middle=jnp.zeros(3),
+    momentum=jnp.zeros(3),
+    washed=jnp.zeros(3),
+    past=jnp.float32(0.01),
+    sunk=jnp.float32(-1.0),
+)
+"""A moment of one of three hinges and four blocks that does nothing."""

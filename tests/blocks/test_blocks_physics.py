@@ -1,5 +1,9 @@
 """Random bodies of blocks, each lane another, against C MuJoCo on the model of each."""
 
+import dataclasses
+from functools import partial
+from typing import Any
+
 import jax
 import jax.numpy as jnp
 import mujoco
@@ -11,9 +15,10 @@ from mjxgait.blocks.genotype import Capacity, Graph, Ranges, random_graph
 from mjxgait.blocks.phenotype import Body, body_of
 from mjxgait.champion.blocks.parts import grow
 from mjxgait.champion.blocks.xml import body_xml
-from mjxgait.creature.geometry import DOWN, geom_reach
+from mjxgait.creature.geometry import DOWN, geom_reach, lowest
 from mjxgait.physics.trees.plant import TreePlant
 from mjxgait.physics.trees.tree import Surroundings
+from mjxgait.tasks.blocks.follow import Following
 from mjxgait.types import BodyState
 
 CAPACITY, LANES = Capacity(), 96
@@ -34,10 +39,12 @@ def bodies(graphs: Graph) -> Body:
 
 
 def model_of(graph: Graph, around: Surroundings) -> mujoco.MjModel:
-    """In MuJoCo, of parts that were grown without JAX."""
+    """In MuJoCo, of parts that were grown without JAX; here blocks go through each other."""
     parts = grow(genome_of(graph), CAPACITY.parts, CAPACITY.links)
     friction = around.friction if around.floor else None
-    return mujoco.MjModel.from_xml_string(body_xml(parts, around.step, around.gravity, friction))
+    model = mujoco.MjModel.from_xml_string(body_xml(parts, around.step, around.gravity, friction))
+    model.geom_conaffinity[model.geom_bodyid > 0] = 0
+    return model
 
 
 def links_of(body: Body, model: mujoco.MjModel) -> list[int]:
@@ -160,3 +167,58 @@ def test_the_corners_that_touch_are_those_of_c_mujoco(graphs: Graph, bodies: Bod
             touching = sorted(c.dist for c in data.contact if block in (c.geom1, c.geom2))
             mine = np.sort(distance[:, body.parts.last[part], lane])
             np.testing.assert_allclose(mine[mine < 0], touching, atol=1e-5)
+
+
+def test_bodies_rest_on_the_ground(graphs: Graph, bodies: Body):
+    """With straight joints as high as their files have them, and with bent ones too on the lowest
+    corner; in water they stay where they are.
+    """
+    straight = np.zeros((LANES, 7 + CAPACITY.links - 1), np.float32)
+    straight[:, 3] = 1.0
+    bent = np.asarray(moments(bodies, 0.0).qpos).T
+    plant, wet = TreePlant(ON_LAND), TreePlant(IN_WATER)
+    rested = jax.jit(jax.vmap(plant.rested))
+    for qpos in (straight, bent):
+        low = np.asarray(rested(bodies.tree, qpos))
+        np.testing.assert_array_equal(np.delete(low, 2, axis=1), np.delete(qpos, 2, axis=1))
+        state = dataclasses.replace(moments(bodies, 0.0), qpos=jnp.asarray(low.T))
+        sensed = forward(state)[0]
+        np.testing.assert_allclose(np.asarray(sensed.geom_low).min(0), 0.0, atol=1e-6)
+        np.testing.assert_allclose(sensed.sunk, 0.0, atol=1e-4)
+    low = np.asarray(rested(bodies.tree, straight))
+    for lane in range(LANES):
+        model = model_of(one(graphs, lane), ON_LAND)
+        data = mujoco.MjData(model)
+        mujoco.mj_kinematics(model, data)
+        assert low[lane, 2] == pytest.approx(1.0 - lowest(model, data), abs=1e-5)
+    same = jax.tree.map(lambda leaf: leaf[0], bodies.tree)
+    np.testing.assert_array_equal(wet.rested(same, bent[0]), bent[0])
+
+
+def test_who_is_deepest_in_the_ground_is_told_in_its_size(bodies: Body):
+    state = moments(bodies, 0.0)
+    sensed = jax.tree.map(np.asarray, forward(state)[0])
+    for lane in range(LANES):
+        tree = one(bodies, lane).tree
+        size = np.cbrt(8 * tree.half.prod(1))
+        there = tree.solid > 0
+        deepest = (-sensed.geom_low[:, lane] / size)[there].max()
+        assert sensed.sunk[lane] == pytest.approx(deepest, rel=1e-4, abs=1e-6)
+
+
+def test_the_light_is_seen_in_each_blocks_own_axes(graphs: Graph, bodies: Body):
+    state, place = moments(bodies, 0.3), np.array([3.0, -4.0, 1.0])
+    lit = TreePlant(dataclasses.replace(ON_LAND, lit=True))
+    sensed = jax.jit(lit.forward)(state)[0]
+    nobody: Any = None
+    look = jax.vmap(partial(Following.senses, nobody, jnp.float32(place)), in_axes=-1)
+    seen = np.asarray(jax.jit(look)(sensed)["light"])
+    for lane in range(LANES):
+        body = one(bodies, lane)
+        model, data, _ = in_mujoco(one(graphs, lane), body, state, lane, ON_LAND)
+        mujoco.mj_kinematics(model, data)
+        for part in np.flatnonzero(body.parts.exists):
+            block = model.geom(f"block{part}").id
+            there = data.geom_xmat[block].reshape(3, 3).T @ (place - data.geom_xpos[block])
+            mine = seen[lane, body.parts.last[part]]
+            np.testing.assert_allclose(mine, there / np.linalg.norm(there), atol=1e-5)

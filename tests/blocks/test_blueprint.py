@@ -5,15 +5,17 @@ from typing import Any
 
 import pytest
 
-from mjxgait.champion.blocks.material import DRAG
+from mjxgait.champion.blocks.material import DRAG, GRAVITY
 from mjxgait.control.brains.controller import Brains
 from mjxgait.errors import UserError
 from mjxgait.library import load_creature
-from mjxgait.parts.registry import add_own
-from mjxgait.parts.settings import build_config
+from mjxgait.parts.registry import add_own, find
+from mjxgait.parts.settings import build_config, resolve_config
 from mjxgait.physics.trees.tree import Surroundings
 from mjxgait.runs.blueprint import draw_up
 from mjxgait.runs.folder import create_run
+from mjxgait.settings.blocks import RoamConfig
+from mjxgait.settings.brains import BrainConfig
 from mjxgait.simulation.rollout import Simulator
 
 
@@ -25,21 +27,59 @@ class Smelling(Brains):
         self.reads = (*self.reads, "contcat")
 
 
-def swimmer(controller: str) -> Simulator:
-    use = {"controller": controller, "task": "swim"}
+def simulator(controller: str, task: str = "swim") -> Simulator:
+    use = {"controller": controller, "task": task}
     return draw_up(load_creature("blocks"), build_config({"use": use}, "test")).simulator()
 
 
 def test_a_brain_reads_only_what_there_is_to_sense():
     add_own("controller", "smelling", Smelling)
-    assert swimmer("brain").controller.reads == ("joint_pos", "contact")
+    assert simulator("brain").controller.reads == ("joint_pos", "contact")
+    assert simulator("brain", "follow").controller.reads == ("joint_pos", "contact", "light")
     with pytest.raises(UserError, match='there is no sense "contcat"'):
-        swimmer("smelling")
+        simulator("smelling")
 
 
 def test_who_swims_has_water_and_neither_ground_nor_weight():
-    plant: Any = swimmer("brain").plant
+    plant: Any = simulator("brain").plant
     assert plant.around == Surroundings(step=0.01, floor=False, gravity=0.0, drag=DRAG)
+
+
+def test_who_walks_has_ground_and_weight():
+    plant: Any = simulator("brain", "roam").plant
+    assert plant.around == Surroundings(step=0.01, floor=True, gravity=GRAVITY, drag=0.0)
+
+
+def test_bodies_that_grow_walk_by_another_task_of_that_name():
+    """A user asks for a walk; the environment knows which."""
+    for env, task in (("blocks", "roam"), ("tall_quadruped", "walk")):
+        creature = load_creature(env)
+        asked = resolve_config(creature.settings.train, env, use={"task": "walk"})
+        assert asked.use.task == task
+        assert find("task", task).Settings is type(asked.fitness)
+    written = build_config({"use": {"controller": "brain", "task": "walk"}}, "test")
+    assert (written.use.task, type(written.fitness)) == ("roam", RoamConfig)
+
+
+def test_sims_population_is_his():
+    """300, of which a fifth survives; four in ten children have one parent."""
+    creature = load_creature("blocks")
+    config = resolve_config(creature.settings.train, "blocks", Path("sims"), {"task": "walk"})
+    evolution, controller = config.evolution, config.controller
+    assert evolution.proportional
+    assert (evolution.population + evolution.offspring, evolution.population) == (300, 60)
+    assert evolution.initial_choice * evolution.population == 300
+    assert isinstance(controller, BrainConfig)
+    assert (controller.crossover, controller.grafting) == (0.3, 0.3)
+
+
+def test_a_creature_says_things_to_one_task_only():
+    creature = load_creature("blocks")
+    starts = [
+        resolve_config(creature.settings.train, "blocks", use={"task": task}).rollout.starts
+        for task in ("swim", "follow")
+    ]
+    assert starts == [1, 4]
 
 
 @pytest.mark.parametrize(
@@ -48,7 +88,12 @@ def test_who_swims_has_water_and_neither_ground_nor_weight():
         ("tall_quadruped", {"use": {"controller": "brain"}}, "its body is there already"),
         ("tall_quadruped", {"use": {"task": "swim"}}, "only bodies that grow"),
         ("blocks", {"use": {"task": "swim"}}, "poses has nothing to move"),
-        ("blocks", {"use": {"controller": "brain"}}, "cannot walk yet, only swim"),
+        ("tall_quadruped", {"use": {"task": "roam"}}, "only bodies that grow roam"),
+        (
+            "blocks",
+            {"use": {"controller": "brain", "task": "hop"}},
+            "cannot hop, only swim, follow, roam",
+        ),
         (
             "blocks",
             {"use": {"controller": "brain", "task": "swim"}, "rollout": {"ground": "bumps:0.05"}},

@@ -7,6 +7,7 @@ import pytest
 from blocks.made_up import genome_of, one
 
 from mjxgait.blocks.genotype import Capacity, Ranges, random_graph
+from mjxgait.certify.overlap import overlaps
 from mjxgait.champion.blocks.folder import body_files
 from mjxgait.champion.blocks.parts import grow
 from mjxgait.creature.scale import load_files
@@ -43,7 +44,8 @@ def test_grown_bodies_are_creatures(grown_parts: list):
         mujoco.mj_resetDataKeyframe(creature.model, data, 0)
         data.qpos[2] -= 1e-3
         mujoco.mj_forward(creature.model, data)
-        deepest = min(contact.dist for contact in data.contact)
+        floor = creature.model.geom("floor").id
+        deepest = min(contact.dist for contact in data.contact if floor in contact.geom)
         assert deepest == pytest.approx(-1e-3, abs=1e-6), "it rests on its lowest corner"
     assert tried > COUNT / 2
 
@@ -55,5 +57,24 @@ def test_nothing_touches_the_floor_of_a_swimmer(grown_parts: list):
     mujoco.mj_resetDataKeyframe(creature.model, data, 0)
     data.qpos[2] = 0.0
     mujoco.mj_forward(creature.model, data)
-    assert data.ncon == 0
+    assert not (data.contact.geom == creature.model.geom("floor").id).any()
     assert np.all(creature.model.opt.gravity == 0)
+
+
+def test_blocks_of_a_grown_body_collide(grown_parts: list):
+    """All that no joint joins, in whatever pose: MuJoCo itself keeps them apart."""
+    rng, met = np.random.default_rng(0), 0
+    for parts in (p for p in grown_parts if sum(len(part.hinges) for part in p) > 3):
+        creature = load_files(body_files(parts, "grown", 0.01, 9.81, 0.9, "on land"))
+        data = mujoco.MjData(creature.model)
+        data.qpos[:] = creature.stand_qpos
+        data.qpos[2] = 10.0
+        low, high = creature.model.jnt_range[1:].T
+        data.qpos[7:] = rng.uniform(low, high)
+        mujoco.mj_forward(creature.model, data)
+        met += data.ncon
+        found = overlaps(creature, data.qpos[None], excused=False)
+        names = [creature.model.body(b).name for b in creature.model.geom_bodyid]
+        touching = {tuple(sorted(names[g] for g in c.geom)) for c in data.contact}
+        assert {tuple(sorted(pair)) for pair in found.pairs} == touching
+    assert met > 10

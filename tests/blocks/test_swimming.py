@@ -7,8 +7,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from blocks.made_up import CALM
 
-from mjxgait.certify.afloat import afloat
+from mjxgait.certify.grown import seen_grown
 from mjxgait.certify.simulate import simulate
 from mjxgait.certify.starts import nominal_starts
 from mjxgait.champion import read_champion, write_champion
@@ -17,9 +18,9 @@ from mjxgait.library import load_creature
 from mjxgait.parts.settings import build_config
 from mjxgait.runs.experiment import Experiment, Step, build_experiment
 from mjxgait.search.state import EvolutionState
-from mjxgait.settings.swim import SwimConfig
-from mjxgait.tasks.swim import FASTEST_HINGE, FURTHEST, Swim
-from mjxgait.types import Sensed
+from mjxgait.settings.blocks import SwimConfig
+from mjxgait.tasks.blocks.alive import FASTEST_HINGE, FURTHEST
+from mjxgait.tasks.blocks.swim import Swim
 
 TABLE = {
     "use": {"controller": "brain", "task": "swim"},
@@ -86,23 +87,6 @@ def test_a_block_alone_does_not_swim(again: EvolutionState):
     np.testing.assert_allclose(seconds, 1.6, rtol=1e-6)
 
 
-CALM = Sensed(
-    joint_pos=jnp.zeros(3),
-    joint_vel=jnp.zeros(3),
-    bias=jnp.zeros(9),
-    trunk_pos=jnp.zeros(3),
-    trunk_rot=jnp.eye(3),
-    trunk_vel=jnp.zeros(3),
-    trunk_angvel=jnp.zeros(3),
-    geom_pos=jnp.zeros((4, 3)),
-    geom_low=jnp.zeros(4),
-    middle=jnp.zeros(3),
-    momentum=jnp.zeros(3),
-    washed=jnp.zeros(3),
-    past=jnp.float32(0.01),
-)
-
-
 def test_what_is_faster_or_bent_further_than_anything_alive_ends(experiment: Experiment):
     task = experiment.simulator.task
     assert int(task.ended(CALM, ())) == 0
@@ -157,7 +141,7 @@ def test_the_examiner_sees_them_swim_as_far(experiment: Experiment, evolved):
         champion = experiment.champion(state, {}, rank)
         body = champion.embodied(experiment.creature)
         film = simulate(body, champion, nominal_starts(body, 1), 1.6, record=1).trajectory
-        middle = afloat(body, film.qpos[0], film.qvel[0], DRAG).middle
+        middle = seen_grown(body, film.qpos[0], film.qvel[0], DRAG).middle
         # It counts from 0.1 s on; the tally has seen what was before the last step.
         ways.append(np.linalg.norm(middle[-1] - middle[10]))
     lengths = np.array(ways)

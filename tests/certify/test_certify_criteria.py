@@ -9,6 +9,7 @@ from certify_made_up import DOG, walk
 from mjxgait.certify import CertificateConfig, criteria, describe, strides
 from mjxgait.certify.certificate import half_point
 from mjxgait.certify.criteria import Measure
+from mjxgait.certify.obstacle import obstacle
 from mjxgait.certify.tasks import walk as demands
 
 CONFIG = CertificateConfig()
@@ -353,3 +354,21 @@ def test_push_that_fells_half_lies_between_the_pushes_tried():
     assert half_point({0.0: 1.0, 0.1: 1.0, 0.2: 0.75, 0.4: 0.25}) == pytest.approx(0.3)
     assert half_point({0.0: 1.0, 0.8: 0.6}) is None
     assert half_point({0.0: 0.0, 0.1: 0.0}) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("recording", "said"),
+    [
+        (walk, None),
+        (collapser, "fell after 15.0 s"),
+        (lambda: moved(walk(), up=np.where(time_of(walk()) > 0.4, 0.1, 0.4)), "fell in the first"),
+        (lambda: moved(walk(), up=np.full(4400, np.nan)), "fell in the first second, after 0.0 s"),
+        (lambda: walk(speed=0.001), "never left its place: 0.02 m in 22 s"),
+        (lambda: walk(speed=-0.5), "went backwards, 11.0"),
+        (lambda: walk(lift=0.001), "went 17.60 m without a stride"),
+    ],
+    ids=["walks", "falls late", "falls soon", "blows up", "stands", "goes back", "slides"],
+)
+def test_what_is_no_walk_is_told_in_a_sentence(recording, said):
+    found = obstacle(recording(), CONFIG)
+    assert found is None if said is None else found.startswith(said)

@@ -153,8 +153,8 @@ def test_walking_is_asked_to_stay_up_and_nothing_else(tiny: Creature):
         ([0.01, 0.09], [6, 6], True),
         ([0.01, 0.2], [6, 6], False),
         ([0.01, 0.01], [6, 5], False),
-        ([0.01] * 9 + [0.2], [6] * 10, True),
-        ([0.01] * 8 + [0.2] * 2, [6] * 10, False),
+        ([0.01] * 6 + [0.2] * 4, [6] * 10, True),
+        ([0.01] * 5 + [0.2] * 5, [6] * 10, False),
     ],
 )
 def test_who_is_worth_an_examination(tiny: Creature, left: list, seconds: list, worth: bool):

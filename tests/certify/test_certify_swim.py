@@ -9,7 +9,7 @@ import pytest
 from certify_made_up import walk
 
 from mjxgait.certify import CertificateConfig
-from mjxgait.certify.afloat import Afloat, afloat
+from mjxgait.certify.grown import Grown, seen_grown
 from mjxgait.certify.measure import Recording
 from mjxgait.certify.outcome import Outcome, Trajectory
 from mjxgait.certify.tasks.swim import SwimDemands
@@ -43,7 +43,14 @@ def swim(speed: Any = SPEED, aside: Any = 0.0, extra: float = 0.0) -> Recording:
         body_speed=np.full(FRAMES, 1.0),
         overlap=np.zeros((FRAMES, 1)),
         overlap_pairs=(("part1", "part3"),),
-        afloat=Afloat(middle, momentum, push, {"part1": 0.1, "part3": 0.2}),
+        grown=Grown(
+            middle,
+            momentum,
+            push,
+            low=np.zeros(FRAMES),
+            buried=np.zeros(FRAMES),
+            sizes={"part1": 0.1, "part3": 0.2},
+        ),
     )
 
 
@@ -138,7 +145,7 @@ def test_what_is_seen_afloat_is_what_the_water_does():
     qpos = np.tile(creature.stand_qpos, (5, 1)) + rng.uniform(-0.3, 0.3, (5, creature.model.nq))
     qpos[:, 3:7] /= np.linalg.norm(qpos[:, 3:7], axis=1, keepdims=True)
     qvel = rng.normal(size=(5, creature.nv))
-    seen = afloat(creature, qpos, qvel, 500.0)
+    seen = seen_grown(creature, qpos, qvel, 500.0)
     data, water = mujoco.MjData(creature.model), Water(creature.model, 500.0)
     for k in range(5):
         data.qpos[:], data.qvel[:] = qpos[k], qvel[k]

@@ -72,7 +72,8 @@ def starts_of(creature: Creature, films: list[Outcome]) -> Starts:
             "damping": rows.damping,
         }
         floats = {name: jnp.asarray(array, jnp.float32) for name, array in arrays.items()}
-        wanted.append(Starts(**floats, push_step=jnp.int32(at)))
+        whole = {"push_step": jnp.int32(at), "delay": jnp.int32(rows.delay)}
+        wanted.append(Starts(**floats, **whole))
     return jax.tree.map(lambda *leaves: jnp.stack(leaves), *wanted)
 
 

@@ -22,6 +22,8 @@ class GoalDemands(Unasked, abc.ABC):
 
     drag: float = 0.0
     pushed: bool = True
+    grown: bool = False
+    leaps: bool = False
     share: str
     """What the share of criterion 4 does."""
 

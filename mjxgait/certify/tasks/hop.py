@@ -15,6 +15,9 @@ from mjxgait.certify.tasks.goals import GoalDemands
 from mjxgait.certify.tasks.staying import to_the_end
 from mjxgait.creature import Creature
 
+MOST = 0.6
+"""Share of the trials in evolution that make it worth a look."""
+
 
 class HopDemands(GoalDemands):
     """See `Demands`."""
@@ -60,12 +63,13 @@ class HopDemands(GoalDemands):
     def promising(
         self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
     ) -> bool:
-        """See `Demands`: up to the end, and near enough to be near every goal, in as many of its
-        trials as the examiner asks for.
+        """See `Demands`: up to the end, and near enough to be near every goal, in most of its
+        trials. Not in all: an episode is shorter than an examination, and who is slow to a far goal
+        may be there in time.
         """
         demands = self.wanted(CertificateConfig())
         near = outcome["left"] <= demands.near * demands.goals[1]
-        return bool((to_the_end(outcome, seconds, creature) & near).mean() >= demands.arrive)
+        return bool((to_the_end(outcome, seconds, creature) & near).mean() >= MOST)
 
 
 def farthest(left: np.ndarray, goal: np.ndarray, frames: int) -> np.ndarray:

@@ -23,6 +23,10 @@ class Demands(Protocol):
     """Of the water around it, N·s/m³; 0 without."""
     pushed: bool
     """Whether it is tried what pushes do."""
+    grown: bool
+    """Whether it is for bodies of blocks, which have grown."""
+    leaps: bool
+    """Whether it is watched how high they leap."""
 
     def asked(self, wish: Mapping[str, Any]) -> "Demands":
         """The demands where this was asked besides, by name."""

@@ -3,14 +3,18 @@
 from collections.abc import Mapping
 from typing import Any
 
+from mjxgait.certify.tasks.follow import FollowDemands
 from mjxgait.certify.tasks.hop import HopDemands
+from mjxgait.certify.tasks.jump import JumpDemands
 from mjxgait.certify.tasks.limbo import LimboDemands
 from mjxgait.certify.tasks.plain import HasCriteria, PlainDemands
 from mjxgait.certify.tasks.protocol import Demands
+from mjxgait.certify.tasks.roam import RoamDemands
 from mjxgait.certify.tasks.staying import StaysUp
 from mjxgait.certify.tasks.swim import SwimDemands
 from mjxgait.certify.tasks.travel import TravelDemands
 from mjxgait.certify.tasks.walk import WalkDemands
+from mjxgait.champion.blocks.material import DRAG
 from mjxgait.errors import not_loaded
 
 _DEMANDS: dict[str, Demands] = {
@@ -19,6 +23,10 @@ _DEMANDS: dict[str, Demands] = {
     "limbo": LimboDemands(),
     "travel": TravelDemands(),
     "swim": SwimDemands(),
+    "roam": RoamDemands(),
+    "jump": JumpDemands(),
+    "follow": FollowDemands(DRAG),
+    "follow-on-land": FollowDemands(0.0),
 }
 
 

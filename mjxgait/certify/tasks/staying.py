@@ -42,11 +42,13 @@ class Unasked:
 class StaysUp(Unasked):
     """See `Demands`: criteria 4 and 5 of those that have no goal but to be up in the end.
 
-    drag, pushed: see `Demands`.
+    drag, pushed, grown, leaps: see `Demands`.
     """
 
     drag: float = 0.0
     pushed: bool = True
+    grown: bool = False
+    leaps: bool = False
 
     def fall(self, config: CertificateConfig) -> Fall:
         """See `Demands`: as criterion 1 has it."""

@@ -24,6 +24,7 @@ from mjxgait.certify.criteria import (
 )
 from mjxgait.certify.describe import describe, slip_distance
 from mjxgait.certify.measure import Recording
+from mjxgait.certify.obstacle import obstacle
 from mjxgait.certify.outcome import Outcome
 from mjxgait.certify.strides import clearances, stride_frequency, stride_starts
 from mjxgait.certify.tasks.staying import StaysUp, to_the_end
@@ -103,7 +104,8 @@ class WalkDemands(StaysUp):
         told = describe(window, config.gait.clearance)
         if self.wish:
             told |= {"asked": self.wish, "posture": posture(window)}
-        return told | {"summary": f"{told['gait']}, {told['speed']:.2f} m/s"}
+        found = {"obstacle": obstacle(whole, config)}
+        return told | found | {"summary": f"{told['gait']}, {told['speed']:.2f} m/s"}
 
     def promising(
         self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature

@@ -11,19 +11,24 @@ import numpy as np
 from mjxgait.certify.twins.protocol import Command, Memory
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
-from mjxgait.settings.control import TUNING
+from mjxgait.creature.anatomy import Stepping
+from mjxgait.settings.control import gene_names
+
+READS = ("joint_pos", "heading", "aside", "pitch", "roll", "pitch_rate", "roll_rate")
+STEP_READS = ("foot_height", "foot_place", "nose_vel")
 
 
 class PoseTwin:
     """Tracks a champion's pose cycle. Its memory: `position` [S] in the cycle, `steps` [S]."""
 
-    reads = ("joint_pos", "heading", "aside", "pitch", "roll", "pitch_rate", "roll_rate")
     command: ClassVar[Command] = "pose"
     every: ClassVar[int] = 1
 
     def __init__(self, creature: Creature, champion: Champion, step: float) -> None:
         self.creature, self.settings, self.step = creature, champion.settings, step
-        self.tuning = dict(zip(TUNING, map(float, champion.genome["tuning"]), strict=True))
+        names = gene_names(creature.corrections.steps)
+        self.tuning = dict(zip(names, map(float, champion.genome["tuning"]), strict=True))
+        self.reads = READS + (STEP_READS if creature.corrections.steps else ())
         poses = np.asarray(champion.genome["key_poses"], float)
         self.cycle = pose_cycle(poses, creature) if champion.settings.mirror else poses
         self.length = len(self.cycle) * champion.settings.interpolation
@@ -62,7 +67,36 @@ class PoseTwin:
             + pitch * creature.corrections.balance_pitch
             + roll * creature.corrections.balance_roll
         )
+        if creature.corrections.stepping is not None:
+            target = target + self.stepping(creature.corrections.stepping, senses)
         return np.clip(target, creature.joints.low, creature.joints.high)
+
+    def stepping(self, weights: Stepping, senses: Mapping[str, np.ndarray]) -> np.ndarray:
+        """What stepping under a fall changes of the target, [S, J] rad."""
+        gain, hip = self.tuning, self.creature.frame.hip_height
+        swings = np.clip(senses["foot_height"] / (0.02 * hip), 0, 1)
+        stands = 1 - swings
+        carried = np.maximum(stands.sum(1), 1)
+        astray = senses["foot_place"] - weights.places
+        over_ahead, over_left = (-(stands[:, :, None] * astray).sum(1) / carried[:, None] / hip).T
+        fast_ahead, fast_left = senses["nose_vel"].T / np.sqrt(9.81 * hip)
+
+        def clipped(one: np.ndarray, gene: str, other: np.ndarray, rate: str) -> np.ndarray:
+            return np.clip(gain[gene] * one + gain[rate] * other, -0.5, 0.5)[:, None]
+
+        ahead = clipped(over_ahead, "step", fast_ahead, "step_rate")
+        left = clipped(over_left, "side", fast_left, "side_rate")
+        pitch = clipped(senses["pitch"], "hold", senses["pitch_rate"], "hold_rate")
+        roll = clipped(senses["roll"], "sway", senses["roll_rate"], "sway_rate")
+        legs = np.array(weights.legs)
+        by_foot_ahead, by_foot_left = (
+            swings * ahead - stands * pitch,
+            swings * left + stands * roll,
+        )
+        found: np.ndarray = (
+            weights.ahead * by_foot_ahead[:, legs] + weights.aside * by_foot_left[:, legs]
+        )
+        return found
 
     def corrections(
         self, senses: Mapping[str, np.ndarray]

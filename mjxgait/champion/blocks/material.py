@@ -31,5 +31,7 @@ GRAVITY, FRICTION = 9.81, 0.9
 """m/s², and of the ground; there is neither in water."""
 DRAG = 500.0
 """N·s/m³, what water does to a face per area and normal velocity."""
-IN_WATER = ("swim",)
+IN_WATER, ON_LAND = ("swim", "follow"), ("roam", "jump", "follow-on-land")
 """Tasks that are done there."""
+LIGHT = 10.0
+"""m from a follower to its light: too far to be reached."""

@@ -81,7 +81,7 @@ def _with_joints_and_block(
         "pos": _text(part.middle),
         "density": f"{DENSITY:g}",
         "contype": "1",
-        "conaffinity": "0",
+        "conaffinity": "1",
     }
     ET.SubElement(own, "geom", {**block, **sticking})
 

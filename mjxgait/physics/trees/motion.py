@@ -19,7 +19,7 @@ from mjxgait.physics.fast.lanes import (
     turn,
     turn_each,
 )
-from mjxgait.physics.trees.tree import Tree
+from mjxgait.physics.trees.tree import FAR, Tree
 
 
 def posture(tree: Tree, qpos: jax.Array, pin: Pin) -> list[Pose]:
@@ -59,6 +59,15 @@ def centres(tree: Tree, poses: Sequence[Pose]) -> Vector:
     """The middles of all blocks, components [n, L] m from the origin."""
     place = jnp.stack([pose.pos for pose in poses])
     return plus(axes(place), turn_each(frames(poses), tree.com))
+
+
+def lows(tree: Tree, poses: Sequence[Pose]) -> jax.Array:
+    """[n, L] m of each block's lowest point above z = 0; `FAR` of what there is not."""
+    rot = frames(poses)
+    heights = [turn_each(rot, tree.axes[:, k])[2] for k in range(3)]
+    reach = total([tree.half[:, k] * jnp.abs(height) for k, height in enumerate(heights)])
+    middle = centres(tree, poses)[2] + poses[0].origin[2]
+    return jnp.where(tree.solid > 0, middle - reach, FAR)
 
 
 def root_turns(poses: Sequence[Pose]) -> jax.Array:

@@ -33,9 +33,14 @@ def deepest(tree: Tree, poses: Sequence[Pose]) -> jax.Array:
         along.append(tree.half[:, None, k] + other - abs(dot(own, apart)))
     depth = jnp.minimum(jnp.minimum(along[0], along[1]), along[2])
     depth = jnp.minimum(depth, jnp.swapaxes(depth, 0, 1))
-    size = 2 * jnp.cbrt(tree.half[:, 0] * tree.half[:, 1] * tree.half[:, 2])
+    size = sizes(tree)
     share = depth / jnp.minimum(size[:, None], size[None])
     return jnp.max(jnp.where(_counts(tree), share, -FAR), axis=(0, 1))
+
+
+def sizes(tree: Tree) -> jax.Array:
+    """[n, L] m, the cube root of each block's volume."""
+    return 2 * jnp.cbrt(tree.half[:, 0] * tree.half[:, 1] * tree.half[:, 2])
 
 
 def _counts(tree: Tree) -> jax.Array:

@@ -9,13 +9,13 @@ import jax.numpy as jnp
 from mjxgait.physics.fast.dynamics import inertias, unpack
 from mjxgait.physics.fast.kernel import one_kernel
 from mjxgait.physics.fast.kinematics import Motion, Pose
-from mjxgait.physics.fast.lanes import pinned_by, total, turn_each
+from mjxgait.physics.fast.lanes import pinned_by, turn_each
 from mjxgait.physics.fast.newton import Problem, constrained_acceleration
 from mjxgait.physics.fast.plant import turned
 from mjxgait.physics.fast.treematrix import Rows, factor, on_pivot, solve, sparsity
 from mjxgait.physics.trees.dynamics import bias_links, generalised, mass_rows, velocities
-from mjxgait.physics.trees.motion import centres, frames, motions, posture, root_turns
-from mjxgait.physics.trees.overlap import deepest
+from mjxgait.physics.trees.motion import centres, frames, lows, motions, posture, root_turns
+from mjxgait.physics.trees.overlap import deepest, sizes
 from mjxgait.physics.trees.touch import BlockFooting, Touch, lowest_corners, make_constraints
 from mjxgait.physics.trees.tree import FAR, Surroundings, Tree
 from mjxgait.physics.trees.water import drag_links
@@ -58,6 +58,14 @@ class TreePlant:
         tree: Tree = state.parameters
         return deepest(tree, posture(tree, state.qpos, pinned_by(state.friction)))
 
+    def rested(self, tree: Tree, qpos: jax.Array) -> jax.Array:
+        """The start [nq] of one body, arrays without lanes, raised or lowered onto the ground."""
+        if not self.around.floor:
+            return qpos
+        lane = jax.tree.map(lambda leaf: leaf[..., None], tree)
+        poses = posture(lane, qpos[:, None], pinned_by(jnp.ones(1)))
+        return qpos.at[2].add(-jnp.min(lows(lane, poses)))
+
     def advance(self, state: BodyState, workings: Moment, torque: jax.Array) -> BodyState:
         """See `Plant.advance`."""
         after = one_kernel(self._advance)(state, workings, torque)
@@ -90,6 +98,10 @@ class TreePlant:
             momentum=jnp.stack([jnp.sum(x, axis=0) for x in body.times(unpack(moving)).shift]),
             washed=jnp.sum(washed[:, 3:], axis=0),
         )
+        if around.lit:
+            rot = frames(poses)
+            own = [jnp.stack(turn_each(rot, tree.axes[:, k]), axis=1) for k in range(3)]
+            sensed = dataclasses.replace(sensed, geom_rot=jnp.stack(own, axis=1))
         if not around.floor:
             nowhere = jnp.full_like(sensed.geom_low, FAR)
             sensed = dataclasses.replace(sensed, geom_low=nowhere)
@@ -119,11 +131,8 @@ def _sensed(
     tree: Tree, state: BodyState, poses: Sequence[Pose], moving: jax.Array, bias: jax.Array
 ) -> Sensed:
     """The trunk is the root; every block is watched, and what there is not is far up."""
-    rot = frames(poses)
     centre = [c + state.qpos[i] for i, c in enumerate(centres(tree, poses))]
-    heights = [turn_each(rot, tree.axes[:, k])[2] for k in range(3)]
-    weight = tree.mass / jnp.sum(tree.mass, axis=0)
-    reach = total([tree.half[:, k] * jnp.abs(height) for k, height in enumerate(heights)])
+    weight, low = tree.mass / jnp.sum(tree.mass, axis=0), lows(tree, poses)
     return Sensed(
         joint_pos=state.qpos[7:],
         joint_vel=state.qvel[6:],
@@ -135,7 +144,8 @@ def _sensed(
         past=jnp.max(jnp.abs(state.qpos[7:]) - tree.high[1:], axis=0),
         middle=jnp.stack([jnp.sum(weight * c, axis=0) for c in centre]),
         geom_pos=jnp.stack(centre, axis=1),
-        geom_low=jnp.where(tree.solid > 0, centre[2] - reach, FAR),
+        geom_low=low,
+        sunk=jnp.max(-low / sizes(tree), axis=0),
     )
 
 

@@ -62,7 +62,8 @@ class Surroundings:
     """What is the same in all lanes, and constant in the program.
 
     step: s. friction: of the ground. floor: whether there is one, z = 0. gravity: m/s². drag:
-    N·s/m³, the resistance of a face to its normal velocity, per area; 0 without water.
+    N·s/m³, the resistance of a face to its normal velocity, per area; 0 without water. lit: whether
+    there is something to see.
     iterations, line_iterations: of the contact solver.
     """
 
@@ -73,6 +74,7 @@ class Surroundings:
     drag: float = 0.0
     iterations: int = 3
     line_iterations: int = 6
+    lit: bool = False
 
 
 @dataclasses.dataclass(frozen=True)

@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import optax
 
 from mjxgait.body import Body
+from mjxgait.settings.gaits import stride_limit
 from mjxgait.settings.walk import WalkConfig, Weights
 from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.overlap import crossed
@@ -19,11 +20,6 @@ STYLE = tuple(name for name in TERMS if name not in (*REWARDS, "foot_height", "f
 
 BEYOND = 0.02
 """What a body length counts that goes beyond the wanted speed."""
-
-
-def stride_limit(mass: float) -> float:
-    """Hz; 1.2 times the trot-gallop transition frequency of an animal of this mass, `4.48 m^-0.14` (Heglund, Taylor & McMahon 1974)."""
-    return 1.2 * 4.48 * mass**-0.14
 
 
 def fitness_terms(

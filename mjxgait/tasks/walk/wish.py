@@ -11,9 +11,9 @@ import jax
 import jax.numpy as jnp
 
 from mjxgait.body import Body
-from mjxgait.settings.gaits import most_strides
+from mjxgait.settings.gaits import most_strides, stride_limit
 from mjxgait.settings.walk import WalkConfig, WishConfig
-from mjxgait.tasks.walk.fitness import REWARDS, STYLE, TERMS, plain_terms, stride_limit
+from mjxgait.tasks.walk.fitness import REWARDS, STYLE, TERMS, plain_terms
 from mjxgait.tasks.walk.footfalls import gait_missed
 from mjxgait.tasks.walk.wish_tally import WishTally
 

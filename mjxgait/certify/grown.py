@@ -1,4 +1,5 @@
-"""What is seen of a body in water besides: its middle, its momentum, and what pushes it.
+"""What is seen besides of a body of blocks: its middle, its momentum, what pushes it, how deep it is
+in the ground.
 
 Letters: `T` frames.
 """
@@ -13,32 +14,43 @@ from mjxgait.creature import Creature
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Afloat:
+class Grown:
     """In the world's axes.
 
     middle: [T, 3] m, of all mass. momentum: [T, 3] N·s. push: [T, 3] N, of the water on the whole.
-    sizes: m by name of the part, the cube root of its volume.
+    low: [T] m of the lowest point of the lowest block. buried: [T] the most that a block is in the
+    ground, of its size. sizes: m by name of the part, the cube root of its volume.
     """
 
     middle: np.ndarray
     momentum: np.ndarray
     push: np.ndarray
+    low: np.ndarray
+    buried: np.ndarray
     sizes: Mapping[str, float]
 
-    def window(self, frames: slice) -> "Afloat":
+    def window(self, frames: slice) -> "Grown":
         """Some of the frames."""
-        return Afloat(self.middle[frames], self.momentum[frames], self.push[frames], self.sizes)
+        arrays = {
+            f.name: getattr(self, f.name)[frames]
+            for f in dataclasses.fields(self)
+            if f.name != "sizes"
+        }
+        return Grown(**arrays, sizes=self.sizes)
 
 
-def afloat(creature: Creature, qpos: np.ndarray, qvel: np.ndarray, drag: float) -> Afloat:
-    """Looks at a motion [T, nq], [T, nv]; frames after it blew up are NaN. drag: N·s/m³.
+def seen_grown(creature: Creature, qpos: np.ndarray, qvel: np.ndarray, drag: float) -> Grown:
+    """Looks at a motion [T, nq], [T, nv]; frames after it blew up are NaN. drag: N·s/m³ of the water
+    around it; 0 without.
 
     What the water does is summed block by block: over a face, it is the velocity of the block's
     middle along the normal that counts (docs/blocks.md); the examiner's simulation sums points.
     """
     model, data = creature.model, mujoco.MjData(creature.model)
     boxes = np.flatnonzero(model.geom_bodyid > 0)
+    half, size = model.geom_size[boxes], np.cbrt(8 * model.geom_size[boxes].prod(1))
     middle, momentum, push = (np.full((len(qpos), 3), np.nan) for _ in range(3))
+    low, buried = (np.full(len(qpos), np.nan) for _ in range(2))
     velocity = np.zeros(6)
     for k in np.flatnonzero(np.isfinite(qpos).all(1) & np.isfinite(qvel).all(1)):
         data.qpos[:], data.qvel[:] = qpos[k], qvel[k]
@@ -51,11 +63,12 @@ def afloat(creature: Creature, qpos: np.ndarray, qvel: np.ndarray, drag: float) 
             momentum[k] += mass * velocity[3:]
             push[k] += _push(model.geom_size[box], data.geom_xmat[box], velocity[3:], drag)
         middle[k] = data.subtree_com[creature.trunk]
-    sizes = {
-        model.body(model.geom_bodyid[box]).name: float(np.cbrt(8 * model.geom_size[box].prod()))
-        for box in boxes
-    }
-    return Afloat(middle, momentum, push, sizes)
+        reach = (np.abs(data.geom_xmat[boxes, 6:]) * half).sum(1)
+        lows = data.geom_xpos[boxes, 2] - reach
+        low[k], buried[k] = lows.min(), (-lows / size).max()
+    names = [model.body(model.geom_bodyid[box]).name for box in boxes]
+    sizes = dict(zip(names, size.tolist(), strict=True))
+    return Grown(middle, momentum, push, low, np.maximum(buried, 0.0), sizes)
 
 
 def _push(half: np.ndarray, rotation: np.ndarray, velocity: np.ndarray, drag: float) -> np.ndarray:

@@ -1,0 +1,48 @@
+"""What is demanded of blocks that jump: to be off the ground as a whole, as high as evolution said."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from mjxgait.certify.config import CertificateConfig, JumpConfig
+from mjxgait.certify.criteria import Criterion, at_least
+from mjxgait.certify.measure import Recording
+from mjxgait.certify.outcome import Outcome
+from mjxgait.certify.starts import Starts
+from mjxgait.certify.tasks.blocks import BlocksDemands, seen
+from mjxgait.certify.tasks.staying import to_the_end
+from mjxgait.creature import Creature
+
+
+class JumpDemands(BlocksDemands):
+    """See `Demands`. One jump is enough."""
+
+    verdict = "it jumps"
+    verb = "jumps"
+    promised = "height"
+    leaps = True
+
+    def wanted(self, config: CertificateConfig) -> JumpConfig:
+        """See `BlocksDemands`."""
+        return config.jump
+
+    def second(self, window: Recording, config: CertificateConfig) -> Criterion:
+        """See `BlocksDemands`."""
+        height = at_least("height of the lowest part (m)", self.done(window), config.jump.height)
+        return Criterion(2, "jumps", (height,))
+
+    def done(self, window: Recording) -> float:
+        """See `BlocksDemands`: m of its lowest part, at the best moment."""
+        return float(seen(window).low.max())
+
+    def succeeded(self, outcome: Outcome, starts: Starts, config: CertificateConfig) -> np.ndarray:
+        """See `Demands`: those that were high enough once."""
+        return outcome.stayed_up & (outcome.height >= config.jump.height)
+
+    def promising(
+        self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
+    ) -> bool:
+        """See `Demands`: to the end in all its trials, and a quarter higher than it must be."""
+        lived = to_the_end(outcome, seconds, creature)
+        least = 1.25 * CertificateConfig().jump.height
+        return bool(lived.all() and (outcome["height"] >= least).all())

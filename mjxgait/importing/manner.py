@@ -1,0 +1,46 @@
+"""How a body of its class is to be evolved: settings that differ from those of a dog."""
+
+from typing import Any
+
+from mjxgait.importing.notes import Notes
+from mjxgait.settings.config import Config
+from mjxgait.settings.gaits import stride_limit
+from mjxgait.settings.walk import WalkConfig
+
+STARTS, ALIVE = 6, 6.0
+"""Episodes by which a body is judged that steps under its fall, and what it counts to stay up to the end."""
+BRISK = 1.2
+"""Body lengths per second that such a body should walk: slower it has to stand on one foot."""
+STRIDE = 0.7
+"""Hip heights that its strides should be at that speed; the certificate asks for 0.5."""
+
+
+def manner(
+    steps: bool, symmetric: bool, hip: float, length: float, mass: float, notes: Notes
+) -> dict[str, Any]:
+    """The table `[train]` of an imported creature, each reason told.
+
+    Args:
+      steps: whether it must step under its fall. hip: m, its height. length: m, of the body. mass: kg.
+    """
+    table: dict[str, Any] = {}
+    if steps:
+        hertz = BRISK * length / (STRIDE * hip)
+        calm = min(WalkConfig().frequency, hertz / stride_limit(mass))
+        table["rollout"] = {"starts": STARTS}
+        table["fitness"] = {
+            "speed": BRISK,
+            "frequency": round(calm, 2),
+            "weights": {"alive": ALIVE},
+        }
+        notes.guess(
+            "train",
+            f"{STARTS} starts, staying up counts {ALIVE:g}, {BRISK:g} body lengths/s in strides of "
+            f"{STRIDE:g} hip heights",
+            "medium",
+            "on one foot or two it falls unless it walks: more disturbed starts, and first of all "
+            "to stay up",
+        )
+    if not symmetric:
+        table["controller"] = {"key_poses": 2 * Config().controller.key_poses}
+    return table

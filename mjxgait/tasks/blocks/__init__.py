@@ -1,0 +1,1 @@
+"""What bodies that grow are to do."""

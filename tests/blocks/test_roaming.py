@@ -1,0 +1,220 @@
+"""Bodies of blocks that walk towards a light, through the same run as everybody's."""
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+import pytest
+from blocks.made_up import CALM
+
+from mjxgait.certify.config import CertificateConfig
+from mjxgait.certify.grown import seen_grown
+from mjxgait.certify.outcome import Outcome
+from mjxgait.certify.simulate import simulate
+from mjxgait.certify.starts import nominal_starts
+from mjxgait.certify.stepping import VELOCITY_STAGE, Stepping
+from mjxgait.certify.tasks import demands_of
+from mjxgait.champion.blocks.material import LIGHT
+from mjxgait.creature import Creature
+from mjxgait.library import load_creature
+from mjxgait.parts.settings import build_config
+from mjxgait.runs.experiment import Experiment, build_experiment
+from mjxgait.search.state import EvolutionState
+from mjxgait.settings.blocks import JumpConfig, RoamConfig
+from mjxgait.tasks.blocks.follow import FollowInWater, FollowOnLand, directions
+from mjxgait.tasks.blocks.jump import Jump
+from mjxgait.tasks.blocks.roam import Roam
+
+TABLE = {
+    "use": {"controller": "brain", "task": "follow-on-land"},
+    "controller": {"nodes": 3, "parts": 4, "links": 4, "local": 2, "central": 1},
+    "evolution": {"population": 60},
+    "rollout": {"seconds": 1.6, "starts": 2, "lanes": 20, "joint_noise": 0.1},
+    "fitness": {"settle": 0.1, "weights": {"overlap": 0.0, "balance": 0.0}},
+}
+COUNT = 8
+
+
+@pytest.fixture(scope="module")
+def experiment() -> Experiment:
+    """Little room, so that it compiles fast."""
+    return build_experiment(load_creature("blocks"), build_config(TABLE, "test"))
+
+
+@pytest.fixture(scope="module")
+def evolved(experiment: Experiment) -> tuple[EvolutionState, list[float]]:
+    step = experiment.compile()
+    state, best = experiment.place(experiment.init()), []
+    for _ in range(4):
+        state, metrics = step(state)
+        best.append(float(metrics.best))
+    return jax.device_get(dataclasses.replace(state, key=jnp.zeros(()))), best
+
+
+def test_walkers_get_faster(evolved: tuple[EvolutionState, list[float]]):
+    _, best = evolved
+    assert np.isfinite(best).all()
+    assert best == sorted(best)
+    assert best[-1] > best[0] > 0
+
+
+def test_the_examiner_sees_them_get_as_near(experiment: Experiment, evolved):
+    """Body, brain, ground, light, and where it lies at the start, all written twice."""
+    state, _ = evolved
+    mine, ways, elsewhere = state.outcome[:COUNT, 0, 0], [], []
+    for rank in range(COUNT):
+        champion = experiment.champion(state, {}, rank)
+        body = champion.embodied(experiment.creature)
+        start = nominal_starts(body, 1)
+        behind = dataclasses.replace(start, light=np.array([[-10.0, 0.0, 0.0]]))
+        ways.append(nearer(body, simulate(body, champion, start, 1.6, record=1)))
+        elsewhere.append(nearer(body, simulate(body, champion, behind, 1.6, record=1)))
+    lengths = np.array(ways)
+    assert lengths.max() > 0.05
+    # A corner that touches a tick earlier leads elsewhere.
+    assert np.median(np.abs(mine - lengths) / lengths) < 0.05
+    assert (np.abs(lengths - elsewhere) > 0.02).any(), "some go by the light"
+
+
+def test_the_examiner_shows_the_light_in_each_blocks_own_axes(experiment: Experiment, evolved):
+    champion = experiment.champion(evolved[0], {})
+    body, light = champion.embodied(experiment.creature), np.array([3.0, -4.0, 1.0])
+    task = demands_of("follow-on-land")
+    start = dataclasses.replace(nominal_starts(body, 2), light=np.stack([light, 0 * light]))
+    stepping = Stepping(body, champion, start, 0, 1, task.fall(CertificateConfig()), task)
+    stepping.qpos[:, 3:7] = [0.5, -0.5, 0.1, 0.7]
+    stepping.batch.forward(stage=VELOCITY_STAGE)
+    seen, dark = stepping._light(np.arange(2))
+    assert not dark.any()
+    data = mujoco.MjData(body.model)
+    data.qpos[:] = stepping.qpos[0]
+    mujoco.mj_kinematics(body.model, data)
+    for part in range(body.model.nbody - 1):
+        block = body.model.geom(f"block{part}").id
+        there = stepping.start.place + light - data.geom_xpos[block]
+        there = data.geom_xmat[block].reshape(3, 3).T @ there
+        np.testing.assert_allclose(seen[part], there / np.linalg.norm(there), atol=1e-9)
+
+
+def nearer(body: Creature, outcome: Outcome) -> float:
+    """m to what was ahead, from 0.1 s on; the tally has seen what was before the last step."""
+    film = outcome.trajectory
+    middle = seen_grown(body, film.qpos[0], film.qvel[0], 0.0).middle[[10, -1], :2]
+    apart = np.linalg.norm(middle - [LIGHT, 0.0], axis=1)
+    return float(apart[0] - apart[1])
+
+
+def test_how_high_they_leap_is_watched(experiment: Experiment, evolved):
+    """Frame by frame: of those that are not recorded only the greatest height is kept. On a small
+    moon, where everybody leaps.
+    """
+    highest = []
+    for rank in range(COUNT):
+        champion = dataclasses.replace(experiment.champion(evolved[0], {}, rank), task="jump")
+        body = champion.embodied(experiment.creature)
+        body.model.opt.gravity[2] = -0.5
+        outcome = simulate(body, champion, nominal_starts(body, 2), 4.0, record=1)
+        film = outcome.trajectory
+        low = seen_grown(body, film.qpos[0], film.qvel[0], 0.0).low
+        # What is recorded is before each step.
+        assert outcome.height[0] == pytest.approx(max(low[201:].max(), 0.0), abs=2e-3)
+        assert outcome.height[0] == outcome.height[1]
+        highest.append(outcome.height[0])
+    assert max(highest) > 0
+
+
+def judged(
+    task: Roam, tilt: float = 0.0, sunk: float = 0.0, before: float = 0.0
+) -> dict[str, float]:
+    """Of one that goes on at 1 m/s. tilt: deg at a moment in between; before: before it counts."""
+    settings = RoamConfig(settle=0.5)
+    tally, standards = task.init(), task.standards(settings)
+    for k in range(task.horizon):
+        angle = np.radians({10: before, 100: tilt}.get(k, 0.0))
+        turned = jnp.array(
+            [[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]]
+        )
+        sensed = dataclasses.replace(
+            CALM,
+            middle=jnp.array([0.0, task.step * k, 0.1 * k]),
+            trunk_rot=turned,
+            sunk=jnp.float32({10: before, 100: sunk}.get(k, 0.0)),
+        )
+        tally = task.update(tally, sensed, jnp.zeros(3), standards, ())
+    return {name: float(value) for name, value in task.judge(tally, settings).items()}
+
+
+@pytest.fixture(scope="module")
+def task(experiment: Experiment) -> Roam:
+    found = experiment.simulator.task
+    assert isinstance(found, FollowOnLand)
+    return Roam(found.creature, found.step, found.horizon, found.ends)
+
+
+def test_level_ways_count_from_when_it_has_settled(task: Roam):
+    calm = judged(task, before=90.0)
+    # The last moment is the one before the end.
+    assert calm["speed"] == pytest.approx(1.0, rel=0.02)
+    assert calm["overlap"] == calm["balance"] == pytest.approx(0, abs=1e-6)
+
+
+def test_to_tip_over_costs_speed(task: Roam):
+    leaning, over = (judged(task, tilt=tilt) for tilt in (RoamConfig().tilt, 180.0))
+    assert leaning["balance"] == pytest.approx(leaning["speed"] / 2, rel=1e-3)
+    assert over["balance"] > 0.9 * over["speed"]
+    assert leaning["overlap"] == 0
+
+
+def test_to_jump_is_to_have_the_lowest_part_high_once_settled(task: Roam):
+    jumping = Jump(task.creature, task.step, task.horizon, task.ends)
+    settings = JumpConfig(settle=0.5)
+
+    def jumped(sunk: float) -> dict[str, float]:
+        tally, standards = jumping.init(), jumping.standards(settings)
+        for k in range(task.horizon):
+            low = CALM.geom_low.at[:].set(1.0).at[1].set({10: 0.7, 80: 0.3}.get(k, 0.0))
+            deep = jnp.float32(sunk if k == 100 else -1.0)
+            sensed = dataclasses.replace(CALM, geom_low=low, sunk=deep)
+            tally = jumping.update(tally, sensed, jnp.zeros(3), standards, ())
+        return {name: float(value) for name, value in jumping.judge(tally, settings).items()}
+
+    assert jumped(0.0) == pytest.approx({"height": 0.3, "overlap": 0.0, "wild": 0.0})
+    assert jumped(settings.overlap)["overlap"] == pytest.approx(0.15)
+    half = dataclasses.replace(jumping.init(), height=0.3, steps=task.horizon // 2)
+    assert float(jumping.judge(half, settings)["wild"]) == pytest.approx(0.15)
+
+
+def test_to_sink_into_the_ground_costs_speed(task: Roam):
+    touching, deep = (judged(task, sunk=sunk) for sunk in (RoamConfig().overlap, 1.0))
+    assert touching["overlap"] == pytest.approx(touching["speed"] / 2, rel=1e-3)
+    assert deep["overlap"] > 0.99 * deep["speed"]
+    both = judged(task, tilt=180.0, sunk=1.0)
+    assert both["overlap"] + both["balance"] < both["speed"]
+
+
+@pytest.mark.parametrize("follower", [FollowInWater, FollowOnLand])
+def test_to_follow_is_to_get_nearer_to_the_light(task: Roam, follower: type):
+    """By 2 m of the 10, of which a step aside is none."""
+    following = follower(task.creature, task.step, task.horizon, task.ends)
+    settings = following.Settings(settle=0.0)
+    for light, way in (([10.0, 0, 0], 2.0), ([-10.0, 0, 0], -2.0), ([0, 10.0, 0], -0.198)):
+        tally, standards = following.init(), following.standards(settings)
+        for k in (0, 1):
+            sensed = dataclasses.replace(CALM, middle=jnp.array([2.0 * k, 0.0, 0.0]))
+            tally = following.update(tally, sensed, jnp.zeros(3), standards, jnp.array(light))
+        assert float(following.way(tally)) == pytest.approx(way, abs=1e-3)
+        judged = following.judge(dataclasses.replace(tally, overlap=jnp.float32(1.0)), settings)
+        assert (judged["overlap"] > 0) == (way > 0), "nothing is gained by blocks in each other"
+
+
+def test_lights_are_all_around():
+    for axes, least in ((2, 1.0), (3, 0.8)):
+        found = directions(6, axes)
+        np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1.0)
+        assert found[0] == pytest.approx([1, 0, 0])
+        between = np.linalg.norm(found[:, None] - found[None], axis=2) + 2 * np.eye(6)
+        assert between.min() >= least - 1e-9
+        assert np.abs(found.mean(0)).max() < 0.15
+    assert not directions(4, 2)[:, 2].any()

@@ -1,0 +1,127 @@
+"""What the examiner demands of blocks that walk, criterion by criterion, on made-up motions."""
+
+import dataclasses
+from types import SimpleNamespace
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+from certify_made_up import walk
+
+from mjxgait.certify import CertificateConfig
+from mjxgait.certify.grown import Grown, seen_grown
+from mjxgait.certify.measure import Recording
+from mjxgait.certify.tasks.jump import JumpDemands
+from mjxgait.certify.tasks.roam import RoamDemands
+from mjxgait.creature.geometry import lowest
+from mjxgait.library import load_creature
+
+CONFIG, DEMANDS = CertificateConfig(), RoamDemands()
+FRAMES, STEP, SPEED = 2200, 0.01, 0.4
+TIMES = np.arange(FRAMES) * STEP
+
+
+def roam(speed: Any = SPEED, rising: float = 0.0, tilt: Any = 0.0, buried: Any = 0.0) -> Recording:
+    """A way at speeds m/s [T]; tilt: [T] rad of the root about its left."""
+    velocity = np.zeros((FRAMES, 3))
+    velocity[:, 1], velocity[:, 2] = speed, rising
+    middle, still = np.cumsum(velocity, axis=0) * STEP, np.zeros((FRAMES, 4))
+    made, none = walk(), np.zeros((FRAMES, 3))
+    tilted = np.broadcast_to(tilt, FRAMES)
+    return dataclasses.replace(
+        made,
+        time_step=STEP,
+        trunk_up=np.cos(tilted),
+        pitch=tilted,
+        roll=np.zeros(FRAMES),
+        joint_pos=still,
+        joint_vel=still,
+        torque=still,
+        body_speed=np.full(FRAMES, 1.0),
+        overlap=np.zeros((FRAMES, 0)),
+        overlap_pairs=(),
+        grown=Grown(
+            middle,
+            momentum=none,
+            push=none,
+            low=np.zeros(FRAMES),
+            buried=np.broadcast_to(buried, FRAMES),
+            sizes={"part0": 0.1},
+        ),
+    )
+
+
+def jump(height: float, at: float = 10.0) -> Recording:
+    made = roam()
+    assert made.grown
+    low = np.where(np.abs(TIMES - at) < STEP / 2, height, -0.001)
+    return dataclasses.replace(made, grown=dataclasses.replace(made.grown, low=low))
+
+
+def failures(whole: Recording) -> set[int]:
+    judged = DEMANDS.undisturbed(whole, whole, CONFIG)
+    assert sorted(c.number for c in judged) == [1, 2, 6, 8, 9]
+    return {c.number for c in judged if not c.passed}
+
+
+def test_who_gets_on_walks():
+    assert not failures(roam())
+    assert failures(roam(speed=0.19)) == {2, 6}
+    assert failures(roam(speed=np.where(TIMES < 12, 0.6, 0.3))) == {2, 6}
+
+
+def test_height_is_no_way():
+    assert failures(roam(speed=0.1, rising=1.0)) == {2, 6}
+
+
+def test_it_stays_on_the_side_on_which_it_settled_whichever_that_is():
+    """60° from there are the most."""
+    for settled in (0.0, 1.3):
+        for tilt, over in ((1.0, False), (1.1, True)):
+            tipping = np.where(TIMES < 2.5, settled, settled + tilt * np.sin(TIMES))
+            assert (1 in failures(roam(tilt=tipping))) is over, (settled, tilt)
+    falling = np.where(TIMES < 1.0, 0.0, 1.5)
+    assert not failures(roam(tilt=falling)), "before it has settled it may fall as it likes"
+
+
+def test_no_block_is_in_the_ground():
+    """5 % of its size, after it has settled."""
+    moment = np.abs(TIMES - 10) < STEP / 2
+    assert failures(roam(buried=np.where(moment, 0.049, 0.0))) == set()
+    assert failures(roam(buried=np.where(moment, 0.051, 0.0))) == {9}
+    assert failures(roam(buried=np.where(TIMES < 1.9, 0.3, 0.0))) == set()
+
+
+def test_how_deep_a_block_is_in_the_ground_is_told_in_its_sizes():
+    creature = load_creature("blocks")
+    rng, model = np.random.default_rng(0), creature.model
+    qpos = np.tile(creature.stand_qpos, (4, 1))
+    qpos[:, 3:7] = rng.normal(size=(4, 4))
+    qpos[:, 3:7] /= np.linalg.norm(qpos[:, 3:7], axis=1, keepdims=True)
+    qpos[:, 2] = [-1.0, 0.0, 0.05, 3.0]
+    seen = seen_grown(creature, qpos, np.zeros((4, model.nv)), 0.0)
+    data = mujoco.MjData(model)
+    for k in range(4):
+        data.qpos[:] = qpos[k]
+        mujoco.mj_kinematics(model, data)
+        assert seen.low[k] == pytest.approx(lowest(model, data))
+    assert seen.buried[3] == 0
+    least, most = min(seen.sizes.values()), max(seen.sizes.values())
+    assert (seen.buried[:2] >= -seen.low[:2] / most).all()
+    assert (seen.buried[:2] <= -seen.low[:2] / least).all()
+
+
+def test_who_is_off_the_ground_once_jumps():
+    def failed(whole: Recording, halved: Recording) -> set[int]:
+        judged = JumpDemands().undisturbed(whole, halved, CONFIG)
+        assert [c.number for c in judged] == [2, 6, 8, 9]
+        return {c.number for c in judged if not c.passed}
+
+    assert not failed(jump(0.11), jump(0.12))
+    assert failed(jump(0.09), jump(0.09)) == {2, 6}
+    assert failed(jump(0.2), jump(0.15)) == {6}
+    assert 2 in failed(jump(0.2, at=1.0), jump(0.2)), "it has to settle first"
+    champion: Any = SimpleNamespace(terms={"height": 0.2}, origin={"nominal": {"seconds": 8.0}})
+    held = [JumpDemands().kept(champion, jump(0.17, at), CONFIG)[0].passed for at in (6.0, 9.0)]
+    assert held == [True, False], "in as many seconds as evolution saw"

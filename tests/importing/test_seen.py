@@ -1,0 +1,184 @@
+"""What a person sees in a body, an import sees too: its front, its sides, what is no leg."""
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from importing.models import BIPED, QUADRUPED
+
+from mjxgait.certify.check_body import check_body
+from mjxgait.commands.import_ import write_folder
+from mjxgait.creature import Creature, load_creature
+from mjxgait.importing import ImportChoices, Imported, import_model
+from mjxgait.importing.orient import _named_front
+
+
+def bring(folder: Path, text: str, kind: str = "xml") -> tuple[Creature, Imported]:
+    file = folder / f"model.{kind}"
+    file.write_text(text, encoding="utf-8")
+    imported = import_model(file, ImportChoices(apart=False))
+    write_folder(folder / "mine", imported)
+    return load_creature(folder / "mine"), imported
+
+
+def front(creature: Creature) -> np.ndarray:
+    """Forward axis [3] in the file's world: bodies here are written in their standing pose."""
+    return creature.frame.forward
+
+
+def limb(name: str, at: tuple[float, float], joints: str, end: str = "") -> str:
+    """A leg of two capsules straight down; joints: of its thigh."""
+    return (
+        f'<body name="{name}" pos="{at[0]} {at[1]} 0">{joints}'
+        f'<geom type="capsule" fromto="0 0 0 0 0 -.15" size=".02"/>'
+        f'<body name="{name}_shin" pos="0 0 -.15">{end}'
+        f'<geom type="capsule" fromto="0 0 0 0 0 -.15" size=".02"/></body></body>'
+    )
+
+
+def animal(legs: str, joints: str = "") -> str:
+    return (
+        '<mujoco><compiler angle="degree"/><worldbody><body name="trunk" pos="0 0 .35"><freejoint/>'
+        f'<geom type="box" size=".15 .15 .05"/>{joints}{legs}</body></worldbody></mujoco>'
+    )
+
+
+CORNERS = {"FL": (-0.1, 0.15), "FR": (0.1, 0.15), "BL": (-0.1, -0.15), "BR": (0.1, -0.15)}
+
+
+@pytest.mark.parametrize(("axis", "forward"), [("1 0 0", [0, 1, 0]), ("0 1 0", [1, 0, 0])])
+def test_forward_is_where_the_hinges_swing_the_feet(tmp_path, axis, forward):
+    """Both sides are alike along x and along y; legs that swing along y walk along y."""
+    legs = "".join(
+        limb(
+            name,
+            at,
+            f'<joint name="{name}_hip" axis="{axis}" range="-60 60"/>',
+            f'<joint name="{name}_knee" axis="{axis}" range="-70 70"/>',
+        )
+        for name, at in CORNERS.items()
+    )
+    creature, imported = bring(tmp_path, animal(legs))
+    np.testing.assert_allclose(np.abs(front(creature)), forward, atol=1e-6)
+    if axis == "1 0 0":  # and of its two ends the one with FL and FR is the front
+        assert front(creature)[1] > 0
+    assert "times as far along" in imported.notes.text()
+
+
+@pytest.mark.parametrize(
+    ("name", "side"),
+    [("FL_hip", 1), ("br", -1), ("front_leg", 1), ("hind", -1), ("flesh", 0), ("thigh_rl", -1)],
+)
+def test_corners_are_read_as_whole_words(name, side):
+    assert _named_front(name) == side
+
+
+def test_a_leg_without_a_foot_walks_the_way_its_knee_points(tmp_path):
+    """The file's knees bend backward from a front along -x, as those of gym's humanoid from x."""
+    legs = "".join(
+        limb(
+            name,
+            (0, y),
+            f'<joint axis="0 1 0" name="{name}_hip" range="-60 60"/>'
+            f'<joint axis="1 0 0" name="{name}_roll" range="-30 30"/>',
+            f'<joint axis="0 -1 0" name="{name}_knee" range="10 120"/>',
+        )
+        for name, y in (("left", 0.1), ("right", -0.1))
+    )
+    creature, imported = bring(tmp_path, animal(legs))
+    assert front(creature)[0] == pytest.approx(-1)
+    assert "knees point that way" in imported.notes.text()
+
+
+def test_an_ankle_without_an_exact_image_is_paired_and_told(tmp_path):
+    hinge = BIPED[BIPED.index('<joint name="right_ankle"') :]
+    hinge = hinge[: hinge.index("</joint>")]
+    askew = BIPED.replace(hinge, hinge.replace('axis xyz="0 1 0"', 'axis xyz="0.5 0.87 0"'))
+    creature, imported = bring(tmp_path, askew, "urdf")
+    names = creature.joints.names
+    left = names.index("left_ankle")
+    assert creature.mirror.symmetric
+    assert names[creature.mirror.partner[left]] == "right_ankle"
+    assert creature.mirror.sign[left] == 1
+    assert "left_ankle, right_ankle are paired by their names" in imported.notes.text()
+    assert [p.joint for p in creature.settings.mirror.pairs] == ["left_ankle", "right_ankle"]
+    check_body(creature)
+
+
+def test_an_ankle_that_only_one_leg_has_keeps_its_angle_in_both_halves(tmp_path):
+    """Half of the cycle is the other's mirror image, but for the ankle."""
+    start = BIPED.index('<joint name="right_ankle"')
+    welded = BIPED[:start] + BIPED[start:].replace('type="revolute"', 'type="fixed"', 1)
+    creature, imported = bring(tmp_path, welded, "urdf")
+    left = creature.joints.names.index("left_ankle")
+    assert creature.mirror.symmetric
+    assert creature.mirror.partner[left] == left
+    assert creature.mirror.sign[left] == 1
+    assert "left_ankle has no partner" in imported.notes.text()
+    check_body(creature)
+
+
+SEGMENTS = 9
+
+
+def insect() -> str:
+    """Six legs of eleven hinges, a mouth that hangs to the floor, and a head that swings."""
+    legs = ""
+    for i, x in enumerate((-0.2, 0, 0.2)):
+        for side, y in (("left", 0.1), ("right", -0.1)):
+            name = f"T{i}_{side}"
+            toes = "".join(
+                f'<body name="{name}_toe{k}" pos="0 0 -.01"><joint name="{name}_toe{k}" '
+                'axis="0 1 0" range="-20 20"/><geom type="sphere" size=".006"/>'
+                for k in range(SEGMENTS)
+            )
+            legs += (
+                f'<body name="{name}" pos="{x} {y} 0"><joint name="{name}_hip" axis="0 1 0" '
+                'range="-60 60"/><geom type="capsule" fromto="0 0 0 0 0 -.15" size=".02"/>'
+                f'<body name="{name}_shin" pos="0 0 -.15"><joint name="{name}_knee" axis="0 1 0" '
+                'range="-70 70"/><geom type="capsule" fromto="0 0 0 0 0 -.15" size=".02"/>'
+                f'<body name="{name}_foot" pos="0 0 -.15">{toes}{"</body>" * SEGMENTS}'
+                "</body></body></body>"
+            )
+    mouth = (
+        '<body name="proboscis" pos=".3 0 0"><joint name="proboscis" axis="0 1 0" range="-40 40"/>'
+        '<geom type="capsule" fromto="0 0 0 0 0 -.35" size=".01"/></body>'
+    )
+    return animal(legs + mouth)
+
+
+def test_an_insect_walks_on_its_legs_and_keeps_the_joints_that_swing_them(tmp_path):
+    creature, imported = bring(tmp_path, insect())
+    assert len(creature.feet.names) == 6
+    names = creature.joints.names
+    assert "proboscis" not in names
+    assert len(names) == 36
+    for leg in ("T0_left", "T2_right"):
+        assert {f"{leg}_hip", f"{leg}_knee"} <= set(names)
+        assert f"{leg}_toe{SEGMENTS - 1}" not in names
+    assert "of 66 joints of the legs those that swing a foot least" in imported.notes.text()
+
+
+def test_a_swing_is_no_wing(tmp_path):
+    creature, _ = bring(tmp_path, QUADRUPED.replace("fl_shin", "swing_fl"))
+    assert len(creature.feet.names) == 4
+
+
+def test_a_knee_without_limits_bends_to_the_side_it_stands_on(tmp_path):
+    """The knees of the file are a little bent; without limits they could bend through."""
+    limits = '_knee" type="hinge" axis="0 1 0" range="-70 70"/>'
+    assert limits in QUADRUPED
+    unlimited = QUADRUPED.replace(limits, '_knee" type="hinge" axis="0 1 0"/>')
+    creature, imported = bring(tmp_path, unlimited)
+    assert "the file has no limits for" in imported.notes.text()
+    joints, data = creature.joints, mujoco.MjData(creature.model)
+    knee = joints.names.index("fl_knee")
+    for target in (joints.pose_low[knee], joints.pose_high[knee]):
+        data.qpos[:] = creature.stand_qpos
+        data.qpos[joints.qpos_adr[knee]] = target
+        mujoco.mj_kinematics(creature.model, data)
+        thigh, shin = creature.model.body("fl_thigh").id, creature.model.body("fl_shin").id
+        above = data.xpos[shin] - data.xpos[thigh]
+        below = data.geom_xpos[creature.feet.stepping[0]] - data.xpos[shin]
+        assert np.cross(above, below)[1] > 0

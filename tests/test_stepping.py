@@ -1,0 +1,248 @@
+"""Stepping under a fall: what a body on two feet does that one on four need not."""
+
+from pathlib import Path
+
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+import pytest
+from helpers import STOOL, altered, pose_champion
+from importing.models import BIPED, QUADRUPED
+
+from mjxgait.certify.layout import start_frame
+from mjxgait.certify.state import State
+from mjxgait.certify.state import sense as examiner_sense
+from mjxgait.certify.twins.poses import PoseTwin
+from mjxgait.control.poses import PoseTracker, stepping
+from mjxgait.creature import Creature, load_creature
+from mjxgait.creature.scale import load_files
+from mjxgait.importing import ImportChoices, import_model
+from mjxgait.parts import resolve_config
+from mjxgait.senses import sense
+from mjxgait.settings.config import Config
+from mjxgait.settings.control import STEPPING, TUNING, PoseConfig, gene_names
+from mjxgait.settings.gaits import stride_limit
+from mjxgait.types import Sensed
+
+STEP = 0.005
+ANKLES = 0.05
+"""m, how high feet are in a swing here: wholly off the floor."""
+
+
+@pytest.fixture(scope="module")
+def biped(tmp_path_factory: pytest.TempPathFactory) -> Creature:
+    """Left and right hips roll, then pitch; knees and ankles follow."""
+    file = tmp_path_factory.mktemp("biped") / "biped.urdf"
+    file.write_text(BIPED, encoding="utf-8")
+    return load_files(import_model(file, ImportChoices(apart=False)).files)
+
+
+def seen(creature: Creature, lifted: int | None = None, **changed: np.ndarray) -> Sensed:
+    """The standing creature, one foot in the air, and what else is said of it."""
+    data = mujoco.MjData(creature.model)
+    data.qpos[:] = creature.stand_qpos
+    mujoco.mj_kinematics(creature.model, data)
+    low = np.zeros(len(creature.feet.watched))
+    if lifted is not None:
+        low[: len(creature.feet.foot_of)][creature.feet.foot_of == lifted] = ANKLES
+    values = {
+        "joint_pos": creature.joints.stand,
+        "joint_vel": np.zeros(len(creature.joints.names)),
+        "bias": np.zeros(creature.model.nv),
+        "trunk_pos": creature.frame.stand_pos,
+        "trunk_rot": creature.frame.stand_rot,
+        "trunk_vel": np.zeros(3),
+        "trunk_angvel": np.zeros(3),
+        "geom_pos": data.geom_xpos[creature.feet.watched],
+        "geom_low": low,
+    }
+    return Sensed(**{k: jnp.asarray(v, jnp.float32) for k, v in (values | changed).items()})
+
+
+def change(creature: Creature, moment: Sensed, **genes: float) -> dict[str, float]:
+    """By joint, rad that stepping adds to the target; only what is not zero."""
+    values = jnp.array([genes.get(name, 0.0) for name in STEPPING])
+    felt = sense(creature, moment, jnp.zeros(()), PoseTracker(creature, STEP).reads)
+    found = np.asarray(stepping(creature, values, felt))
+    pairs = zip(creature.joints.names, found, strict=True)
+    return {name: float(value) for name, value in pairs if abs(value) > 1e-6}
+
+
+def way(creature: Creature, joint: str, angle: float) -> np.ndarray:
+    """[3] m that the left foot moves when a joint turns from the standing pose."""
+    data, places = mujoco.MjData(creature.model), []
+    for turned in (0.0, angle):
+        data.qpos[:] = creature.stand_qpos
+        data.qpos[creature.joints.qpos_adr[creature.joints.names.index(joint)]] += turned
+        mujoco.mj_kinematics(creature.model, data)
+        places.append(data.geom_xpos[creature.feet.watched[0]].copy())
+    return places[1] - places[0]
+
+
+def test_the_importer_gives_the_weights_to_what_takes_a_foot_ahead_and_aside(biped: Creature):
+    """A rad per hip height: of one rad a leg swings its foot about one hip height."""
+    weights = biped.corrections.stepping
+    assert weights is not None
+    names, hip = biped.joints.names, biped.frame.hip_height
+    ahead = {names[j] for j in np.flatnonzero(weights.ahead)}
+    aside = {names[j] for j in np.flatnonzero(weights.aside)}
+    assert ahead == {"left_hip_pitch", "right_hip_pitch"}
+    assert aside == {"left_hip_roll", "right_hip_roll"}
+    for table, joint, axis in (
+        (weights.ahead, "left_hip_pitch", 0),
+        (weights.aside, "left_hip_roll", 1),
+    ):
+        small = 0.02
+        moved = way(biped, joint, small * table[names.index(joint)])
+        assert moved[axis] == pytest.approx(small * hip, rel=0.15)
+
+
+def test_a_biped_is_judged_on_more_starts_and_first_of_all_by_staying_up(biped: Creature):
+    """The import chooses the settings of its class and says so."""
+    usual, own = Config(), resolve_config(biped.settings.train, biped.name)
+    assert own.rollout.starts > usual.rollout.starts
+    assert own.fitness.weights.alive > usual.fitness.weights.alive
+    hertz = own.fitness.frequency * stride_limit(biped.frame.mass)
+    speed = own.fitness.speed * biped.frame.body_length
+    assert speed / hertz == pytest.approx(0.7 * biped.frame.hip_height, rel=0.02)
+    assert "on one foot or two it falls unless it walks" in biped.files["creature.toml"]
+
+
+def test_a_quadruped_and_one_foot_behind_the_other_are_trained_as_usual(tmp_path: Path):
+    bound = BIPED.replace('xyz="0 0.09 0"', 'xyz="0.4 0 0"').replace(
+        'xyz="0 -0.09 0"', 'xyz="-0.4 0 0"'
+    )
+    assert bound != BIPED
+    for kind, text in (("xml", QUADRUPED), ("urdf", bound)):
+        file = tmp_path / f"body.{kind}"
+        file.write_text(text, encoding="utf-8")
+        choices = ImportChoices(apart=False, forward="x")
+        creature = load_files(import_model(file, choices).files)
+        assert not creature.corrections.steps
+        assert "rollout" not in creature.settings.train
+
+
+def test_bodies_without_weights_have_neither_the_genes_nor_the_senses():
+    stool = load_creature(STOOL)
+    control = PoseTracker(stool, STEP)
+    assert control.bounds(PoseConfig())[0].tuning.shape == (len(TUNING),)
+    assert "foot_place" not in control.reads
+    assert gene_names(steps=False) == TUNING
+
+
+@pytest.mark.parametrize(
+    ("genes", "push", "joint"),
+    [
+        ({"step_rate": 0.2}, [1.0, 0, 0], "hip_pitch"),
+        ({"side_rate": 0.2}, [0, 1.0, 0], "hip_roll"),
+    ],
+    ids=["ahead", "aside"],
+)
+def test_the_leg_that_swings_steps_to_where_the_trunk_goes(biped, genes, push, joint):
+    """And only that leg: the foot on the floor stays where it is."""
+    found = change(biped, seen(biped, lifted=0, trunk_vel=np.array(push)), **genes)
+    assert list(found) == [f"left_{joint}"]
+    speed = 1.0 / np.sqrt(9.81 * biped.frame.hip_height)
+    moved = way(biped, f"left_{joint}", 0.1 * found[f"left_{joint}"]) @ push
+    assert moved == pytest.approx(0.1 * 0.2 * speed * biped.frame.hip_height, rel=0.15)
+    assert not change(biped, seen(biped, lifted=None, trunk_vel=np.array(push)), **genes)
+
+
+def test_it_steps_farther_the_farther_the_trunk_is_over_its_support(biped):
+    """The trunk is 5 cm ahead of where it stands over the right foot."""
+    ahead = np.add(biped.frame.stand_pos, [0.05, 0, 0])
+    found = change(biped, seen(biped, lifted=0, trunk_pos=ahead), step=1.0)
+    assert list(found) == ["left_hip_pitch"]
+    assert way(biped, "left_hip_pitch", found["left_hip_pitch"])[0] == pytest.approx(0.05, rel=0.2)
+    assert not change(biped, seen(biped, lifted=0), step=1.0, side=1.0)
+
+
+@pytest.mark.parametrize(
+    ("axis", "genes", "joint", "away"),
+    [
+        ([0, 1.0, 0], {"hold_rate": 0.1}, "hip_pitch", [-1, 0, 0]),
+        ([1.0, 0, 0], {"sway_rate": 0.1}, "hip_roll", [0, 1, 0]),
+    ],
+    ids=["nose goes down", "right side goes down"],
+)
+def test_the_hip_that_stands_turns_the_trunk_back(biped, axis, genes, joint, away):
+    """Its leg goes back under a nose that goes down, so that the trunk, on that leg, comes up."""
+    found = change(biped, seen(biped, lifted=1, trunk_angvel=np.array(axis)), **genes)
+    assert list(found) == [f"left_{joint}"]
+    assert way(biped, f"left_{joint}", found[f"left_{joint}"]) @ away > 0
+
+
+def test_no_step_is_larger_than_a_correction_may_be(biped):
+    fast = seen(biped, lifted=0, trunk_vel=np.array([50.0, 0, 0]))
+    weights = biped.corrections.stepping
+    most = 0.5 * np.abs(weights.ahead).max()
+    found = change(biped, fast, step_rate=1.0)
+    assert abs(found["left_hip_pitch"]) == pytest.approx(most, rel=1e-5)
+
+
+def test_the_examiner_steps_as_evolution_does(biped):
+    """Two implementations, on moments of all kinds: feet up and down, tipped, turned and fast."""
+    rng = np.random.default_rng(0)
+    reads = PoseTracker(biped, STEP).reads
+    genes = {name: float(rng.uniform(0, 1)) for name in STEPPING}
+    creature = altered(biped, joints={"low": np.full(8, -9.0), "high": np.full(8, 9.0)})
+    values = dict.fromkeys(TUNING, 0.0) | {"threshold": 0.1, "period": 0.8} | genes
+    champion = pose_champion(creature, np.stack([biped.joints.stand] * 2), values)
+    twin = PoseTwin(creature, champion, STEP)
+    assert set(twin.reads) == set(reads)
+    for _ in range(6):
+        turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        turn *= np.sign(np.linalg.det(turn))
+        rot = turn if rng.random() < 0.3 else np.eye(3)
+        moment = seen(
+            creature,
+            int(rng.integers(2)),
+            trunk_rot=rot,
+            trunk_pos=creature.frame.stand_pos + rng.normal(0, 0.05, 3),
+            trunk_vel=rng.normal(0, 0.7, 3),
+            trunk_angvel=rng.normal(0, 0.7, 3),
+        )
+        felt = sense(creature, moment, jnp.zeros(()), reads)
+        ours = stepping(creature, jnp.array([genes[name] for name in STEPPING]), felt)
+        state = as_examined(creature, moment)
+        theirs = twin.target(np.zeros(1, int), examiner_sense(creature, state, twin.reads))
+        np.testing.assert_allclose(np.asarray(ours), theirs[0] - creature.joints.stand, atol=2e-5)
+
+
+def as_examined(creature: Creature, moment: Sensed) -> State:
+    feet, foot_of = creature.feet, creature.feet.foot_of
+    low, pos = np.asarray(moment.geom_low), np.asarray(moment.geom_pos, float)
+    places = [np.flatnonzero(foot_of == f) for f in range(len(feet.names))]
+    return State(
+        start=start_frame(creature),
+        ground=None,
+        time=np.zeros(1),
+        joint_pos=np.asarray(moment.joint_pos)[None],
+        velocity=np.zeros((1, creature.model.nv)),
+        trunk_pos=np.asarray(moment.trunk_pos, float)[None],
+        trunk_rot=np.asarray(moment.trunk_rot, float)[None],
+        trunk_vel=np.asarray(moment.trunk_vel, float)[None],
+        trunk_angvel=np.asarray(moment.trunk_angvel, float)[None],
+        foot_height=np.array([[low[place].min() for place in places]]),
+        foot_pos=np.array([[pos[place].mean(0) for place in places]]),
+        mass_matrix=np.zeros((1, 0, 0)),
+        bias=np.zeros((1, 0)),
+        constraint_force=np.zeros((1, 0)),
+    )
+
+
+def test_a_joint_that_moves_no_foot_cannot_step(tmp_path: Path):
+    from mjxgait.errors import UserError
+
+    folder = tmp_path / "duck"
+    folder.mkdir()
+    shipped = Path(__file__).parents[1] / "envs" / "duck"
+    for file in ("creature.xml", "creature.toml"):
+        (folder / file).write_text((shipped / file).read_text(encoding="utf-8"), encoding="utf-8")
+    toml = folder / "creature.toml"
+    toml.write_text(
+        toml.read_text(encoding="utf-8") + "\n[stepping]\nahead = { neck_pitch = 1.0 }\n",
+        encoding="utf-8",
+    )
+    with pytest.raises(UserError, match='"neck_pitch" moves 0 feet'):
+        load_creature(folder)
