@@ -101,6 +101,7 @@ def test_a_biped_is_judged_on_more_starts_and_first_of_all_by_staying_up(biped: 
     """The import chooses the settings of its class and says so."""
     usual, own = Config(), resolve_config(biped.settings.train, biped.name)
     assert own.rollout.starts > usual.rollout.starts
+    assert own.rollout.latency == 1
     assert own.fitness.weights.alive > usual.fitness.weights.alive
     hertz = own.fitness.frequency * stride_limit(biped.frame.mass)
     speed = own.fitness.speed * biped.frame.body_length

@@ -9,6 +9,9 @@ from mjxgait.settings.walk import WalkConfig
 
 STARTS, ALIVE = 6, 6.0
 """Episodes by which a body is judged that steps under its fall, and what it counts to stay up to the end."""
+LATE, HASTY = 1, 8.0
+"""Control steps by which torques may come late, which is what fells such a body first in its
+examination; and what it costs to be hasty, twice the usual."""
 BRISK = 1.2
 """Body lengths per second that such a body should walk: slower it has to stand on one foot."""
 STRIDE = 0.7
@@ -27,15 +30,15 @@ def manner(
     if steps:
         hertz = BRISK * length / (STRIDE * hip)
         calm = min(WalkConfig().frequency, hertz / stride_limit(mass))
-        table["rollout"] = {"starts": STARTS}
+        table["rollout"] = {"starts": STARTS, "latency": LATE}
         table["fitness"] = {
             "speed": BRISK,
             "frequency": round(calm, 2),
-            "weights": {"alive": ALIVE},
+            "weights": {"alive": ALIVE, "frequency": HASTY},
         }
         notes.guess(
             "train",
-            f"{STARTS} starts, staying up counts {ALIVE:g}, {BRISK:g} body lengths/s in strides of "
+            f"{STARTS} starts with torques up to {LATE} step late, staying up counts {ALIVE:g}, {BRISK:g} body lengths/s in strides of "
             f"{STRIDE:g} hip heights",
             "medium",
             "on one foot or two it falls unless it walks: more disturbed starts, and first of all "
