@@ -187,7 +187,8 @@ def tables_of(cls: type) -> list[type]:
 @pytest.mark.parametrize("controller", SHIPPED["controller"])
 @pytest.mark.parametrize("task", SHIPPED["task"])
 def test_every_key_is_explained_under_its_own_name(controller: str, task: str):
-    """`train --help` takes its words from here."""
+    """`train --help` takes its words from here; what a class inherits its base explains."""
     for cls in tables_of(config_class(UseConfig(controller, task))):
-        told = set(re.findall(r"^  (\w+): \S", inspect.getdoc(cls) or "", re.MULTILINE))
+        words = "\n".join(inspect.cleandoc(base.__doc__ or "") for base in cls.__mro__)
+        told = set(re.findall(r"^  (\w+): \S", words, re.MULTILINE))
         assert told == {field.name for field in dataclasses.fields(cls)}, cls

@@ -96,3 +96,22 @@ class Outcome:
     def stayed_up(self) -> np.ndarray:
         """[S] whether never down."""
         return np.isinf(self.fell)
+
+    def copy(self, leader: int, rows: np.ndarray) -> None:
+        """Says of some simulations what it says of one that they have been alike to."""
+        own = (self.fell, self.travel, self.path, self.clearance, self.astray, self.height)
+        for values in own:
+            values[rows] = values[leader]
+
+
+def blank_outcome(count: int, steps: int, told: bool, film: Trajectory) -> Outcome:
+    """Of S simulations that have not begun. told: whether they are told a heading."""
+    return Outcome(
+        fell=np.full(count, np.inf),
+        travel=np.zeros((count, 3)),
+        path=np.full((count, steps), np.nan),
+        clearance=np.full(count, np.inf),
+        trajectory=film,
+        astray=np.full((count, steps if told else 0), np.nan),
+        height=np.zeros(count),
+    )

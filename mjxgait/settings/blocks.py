@@ -44,10 +44,6 @@ class SwimConfig(BlocksConfig):
     """The fitness of swimmers.
 
     Attributes:
-      settle: s from the start that do not count.
-      overlap: how deep blocks are in each other, of the smaller one's size, of which
-        half the speed counts.
-      apart: generations until that counts in full.
       elsewhere: share of its momentum that the water did not give, of which half the speed counts: a
         step of finite length gives some to those that find out how.
       weights: what each term counts.
@@ -79,10 +75,6 @@ class RoamConfig(BlocksConfig):
     """The fitness of blocks that walk.
 
     Attributes:
-      settle: s from the start that do not count.
-      overlap: how deep blocks are in each other or in the ground, of the smaller one's size, of which
-        half the speed counts.
-      apart: generations until that counts in full.
       tilt: deg, the farthest that the root has tipped from how it lay when it had settled, of which
         half the speed counts.
       weights: what each term counts.
@@ -115,10 +107,6 @@ class JumpConfig(BlocksConfig):
     """The fitness of blocks that jump.
 
     Attributes:
-      settle: s from the start that do not count.
-      overlap: how deep blocks are in each other or in the ground, of the smaller one's size, of which
-        half the height counts.
-      apart: generations until that counts in full.
       weights: what each term counts.
     """
 

@@ -45,19 +45,29 @@ class HopWeights:
 
 
 @dataclasses.dataclass(frozen=True)
-class HopConfig:
-    """What is wanted of the way to a goal.
+class GoalConfig:
+    """What is wanted of every way to a goal.
 
     Attributes:
       style_ramp: generations over which the style terms grow to their full weight.
       rest: s without motion after which the rest of an episode is not simulated: whoever senses
         nothing new does nothing new. 0 simulates all of it.
-      weights: what each term counts.
     """
 
     __pydantic_config__ = STRICT
     style_ramp: Whole = 20
     rest: NonNegative = 1.25
+
+
+@dataclasses.dataclass(frozen=True)
+class HopConfig(GoalConfig):
+    """What is wanted of the way to one goal.
+
+    Attributes:
+      weights: what each term counts.
+    """
+
+    __pydantic_config__ = STRICT
     weights: HopWeights = dataclasses.field(default_factory=HopWeights)
 
 
@@ -82,16 +92,12 @@ class TravelWeights:
 
 
 @dataclasses.dataclass(frozen=True)
-class TravelConfig:
-    """What is wanted of the way from goal to goal; see `HopConfig`.
+class TravelConfig(GoalConfig):
+    """What is wanted of the way from goal to goal.
 
     Attributes:
-      style_ramp: generations over which the style terms grow to their full weight.
-      rest: see `HopConfig`.
       weights: what each term counts.
     """
 
     __pydantic_config__ = STRICT
-    style_ramp: Whole = 20
-    rest: NonNegative = 1.25
     weights: TravelWeights = dataclasses.field(default_factory=TravelWeights)

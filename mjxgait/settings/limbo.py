@@ -20,15 +20,6 @@ class LimboWeights(HopWeights):
     """See `HopWeights`.
 
     Attributes:
-      distance: goal distances that are left at the end.
-      missed: 1 for who is not within a twentieth of the goal distance.
-      time: share of the time until it arrived.
-      restless: way made after the arrival, in goal distances.
-      ground: share of the time on parts that must not touch the floor.
-      fall: 1 for an episode that ended with a fall.
-      neutral: how far joints are from standing in the end, in halves of their ranges.
-      fast: the fastest that a joint turned: nothing up to 14 rad/s, 1 from 20 on.
-      overlap: how deep parts are in each other.
       bar: how deep it was in the place of the bar and of all above it.
     """
 
@@ -43,8 +34,6 @@ class LimboConfig(HopConfig):
 
     Attributes:
       height: m, of the bar's lower edge above the floor.
-      style_ramp: see `HopConfig`.
-      rest: see `HopConfig`.
       weights: what each term counts.
     """
 

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import jax
 import jax.numpy as jnp
+import optax
 
 
 def in_order(named: Mapping[str, jax.Array], names: Sequence[str]) -> jax.Array:
@@ -19,3 +20,11 @@ def score(terms: jax.Array, weights: jax.Array, worst: jax.Array | float) -> jax
     trials = jnp.sum(terms * weights, axis=-1)
     value = worst * jnp.min(trials, axis=-1) + (1 - worst) * jnp.mean(trials, axis=-1)
     return jnp.where(jnp.isfinite(value), value, -jnp.inf)
+
+
+def ramped(generations: jax.Array | int, generation: jax.Array) -> jax.Array:
+    """From 0 to 1, what of its full weight counts in a generation [] if that grows over so many; all of
+    it at once if over none.
+    """
+    grown = optax.linear_schedule(0.0, 1.0, 1)(generation / jnp.maximum(generations, 1))
+    return jnp.where(jnp.asarray(generations) > 0, grown, 1.0)

@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 from blocks.made_up import CALM
 
+from mjxgait.certify.bodies import VELOCITY_STAGE
 from mjxgait.certify.config import CertificateConfig
 from mjxgait.certify.grown import seen_grown
 from mjxgait.certify.outcome import Outcome
 from mjxgait.certify.simulate import simulate
 from mjxgait.certify.starts import nominal_starts
-from mjxgait.certify.stepping import VELOCITY_STAGE, Stepping
+from mjxgait.certify.stepping import Stepping
 from mjxgait.certify.tasks import demands_of
 from mjxgait.champion.blocks.material import LIGHT
 from mjxgait.creature import Creature
@@ -83,17 +84,17 @@ def test_the_examiner_shows_the_light_in_each_blocks_own_axes(experiment: Experi
     body, light = champion.embodied(experiment.creature), np.array([3.0, -4.0, 1.0])
     task = demands_of("follow-on-land")
     start = dataclasses.replace(nominal_starts(body, 2), light=np.stack([light, 0 * light]))
-    stepping = Stepping(body, champion, start, 0, 1, task.fall(CertificateConfig()), task)
-    stepping.qpos[:, 3:7] = [0.5, -0.5, 0.1, 0.7]
-    stepping.batch.forward(stage=VELOCITY_STAGE)
-    seen, dark = stepping._light(np.arange(2))
+    bodies = Stepping(body, champion, start, 0, 1, task.fall(CertificateConfig()), task).bodies
+    bodies.qpos[:, 3:7] = [0.5, -0.5, 0.1, 0.7]
+    bodies.batch.forward(stage=VELOCITY_STAGE)
+    seen, dark = bodies.light(np.arange(2))
     assert not dark.any()
     data = mujoco.MjData(body.model)
-    data.qpos[:] = stepping.qpos[0]
+    data.qpos[:] = bodies.qpos[0]
     mujoco.mj_kinematics(body.model, data)
     for part in range(body.model.nbody - 1):
         block = body.model.geom(f"block{part}").id
-        there = stepping.start.place + light - data.geom_xpos[block]
+        there = bodies.start.place + light - data.geom_xpos[block]
         there = data.geom_xmat[block].reshape(3, 3).T @ there
         np.testing.assert_allclose(seen[part], there / np.linalg.norm(there), atol=1e-9)
 

@@ -32,6 +32,8 @@ class BlocksDemands(StaysUp, abc.ABC):
     """What one that passes does."""
     promised: str
     """The term by which evolution said how much it does."""
+    evidence = "way"
+    """The outcome of a trial in evolution that shows how much it does."""
 
     @abc.abstractmethod
     def wanted(self, config: CertificateConfig) -> BlocksConfig:
@@ -48,6 +50,20 @@ class BlocksDemands(StaysUp, abc.ABC):
     def promise(self, champion: Champion, seconds: float, config: CertificateConfig) -> float:
         """How much evolution said it does in a trial of so many seconds."""
         return champion.terms.get(self.promised, np.nan)
+
+    @abc.abstractmethod
+    def enough(self, seconds: float, config: CertificateConfig) -> float:
+        """What `evidence` must be at least in a trial of so many seconds to be clearly more than is
+        demanded.
+        """
+
+    def promising(
+        self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
+    ) -> bool:
+        """See `Demands`: to the end in all its trials, and clearly more than is demanded."""
+        lived = to_the_end(outcome, seconds, creature)
+        enough = outcome[self.evidence] >= self.enough(seconds, CertificateConfig())
+        return bool(lived.all() and enough.all())
 
     def alone(self, window: Recording, config: CertificateConfig) -> tuple[Criterion, ...]:
         """What is demanded of this task alone."""
@@ -134,15 +150,9 @@ class GoingDemands(BlocksDemands):
         way = np.linalg.norm(outcome.travel[:, : self.axes], axis=1)
         return outcome.stayed_up & (way >= self.wanted(config).speed * seconds)
 
-    def promising(
-        self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
-    ) -> bool:
-        """See `Demands`: to the end in all its trials, and clearly faster than it must be: so far in
-        the seconds that count as it must get in all.
-        """
-        least = self.wanted(CertificateConfig()).speed * seconds
-        lived = to_the_end(outcome, seconds, creature)
-        return bool(lived.all() and (outcome["way"] >= least).all())
+    def enough(self, seconds: float, config: CertificateConfig) -> float:
+        """See `BlocksDemands`: m in the seconds that count, as far as it must get in all."""
+        return self.wanted(config).speed * seconds
 
     def _middle(self, window: Recording) -> np.ndarray:
         return seen(window).middle[:, : self.axes]

@@ -1,7 +1,6 @@
 """What is demanded of followers: to get nearer to lights that nobody has seen."""
 
 import dataclasses
-from collections.abc import Mapping
 
 import numpy as np
 
@@ -12,11 +11,9 @@ from mjxgait.certify.outcome import Outcome
 from mjxgait.certify.starts import Starts
 from mjxgait.certify.tasks.blocks import BlocksDemands, seen
 from mjxgait.certify.tasks.roam import balanced
-from mjxgait.certify.tasks.staying import to_the_end
 from mjxgait.certify.tasks.swim import by_water
 from mjxgait.champion import Champion
 from mjxgait.champion.blocks.material import LIGHT
-from mjxgait.creature import Creature
 
 
 class FollowDemands(BlocksDemands):
@@ -78,12 +75,6 @@ class FollowDemands(BlocksDemands):
         )
         return outcome.stayed_up & (nearer >= config.follow.speed * seconds)
 
-    def promising(
-        self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
-    ) -> bool:
-        """See `Demands`: to the end in all its trials, and nearer to every light by more than it must
-        be.
-        """
-        least = CertificateConfig().follow.speed * seconds
-        lived = to_the_end(outcome, seconds, creature)
-        return bool(lived.all() and (outcome["way"] >= least).all())
+    def enough(self, seconds: float, config: CertificateConfig) -> float:
+        """See `BlocksDemands`: m in the seconds that count, as much nearer as it must get in all."""
+        return config.follow.speed * seconds

@@ -4,6 +4,7 @@ What they do counts from a while after the start on. A way is that of the middle
 gets somewhere by bending, the whole does not.
 """
 
+import dataclasses
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
@@ -104,6 +105,18 @@ class GoingTask(BlocksTask):
             "place": nowhere,
             "light": None if self.dark is None else jnp.asarray(self.dark),
         }
+
+    def update(
+        self, tally: Any, sensed: Sensed, torque: jax.Array, standards: Any, aim: Any
+    ) -> Any:
+        """See `Task`: where it is, and where it was when counting began."""
+        assert sensed.middle is not None
+        return dataclasses.replace(
+            tally,
+            steps=tally.steps + 1,
+            settled=jnp.where(tally.steps <= standards, sensed.middle, tally.settled),
+            place=sensed.middle,
+        )
 
     def speed(self, tally: Any, settings: BlocksConfig) -> jax.Array:
         """[] m/s over the time that counts, whether it lived to its end or not."""

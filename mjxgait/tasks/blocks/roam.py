@@ -42,17 +42,13 @@ class Roam(GoingTask):
         self, tally: Tally, sensed: Sensed, torque: jax.Array, standards: Any, aim: Any
     ) -> Tally:
         """See `Task`."""
-        assert sensed.middle is not None
         assert sensed.sunk is not None
         begins = tally.steps <= standards
         upwards = jnp.where(begins, sensed.trunk_rot[2], tally.upwards)
         upright = jnp.sum(sensed.trunk_rot[2] * upwards)
         return dataclasses.replace(
-            tally,
-            steps=tally.steps + 1,
+            super().update(tally, sensed, torque, standards, aim),
             overlap=jnp.where(begins, tally.overlap, jnp.maximum(tally.overlap, sensed.sunk)),
-            settled=jnp.where(begins, sensed.middle, tally.settled),
-            place=sensed.middle,
             upwards=upwards,
             upright=jnp.where(begins, 1.0, jnp.minimum(tally.upright, upright)),
         )

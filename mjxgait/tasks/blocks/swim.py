@@ -46,7 +46,6 @@ class Swim(GoingTask):
         self, tally: Tally, sensed: Sensed, torque: jax.Array, standards: Any, aim: Any
     ) -> Tally:
         """See `Task`."""
-        assert sensed.middle is not None
         assert sensed.momentum is not None
         assert sensed.washed is not None
         begins, momentum, push = (
@@ -60,10 +59,7 @@ class Swim(GoingTask):
             begins, 0.0, jnp.maximum(tally.lacking, length(momentum - began - given))
         )
         return dataclasses.replace(
-            tally,
-            steps=tally.steps + 1,
-            settled=jnp.where(begins, sensed.middle, tally.settled),
-            place=sensed.middle,
+            super().update(tally, sensed, torque, standards, aim),
             began=began,
             given=given + push,
             exchanged=jnp.where(begins, 0.0, tally.exchanged) + length(push),

@@ -5,13 +5,13 @@ from collections.abc import Mapping
 
 import jax
 import jax.numpy as jnp
-import optax
 
 from mjxgait.body import Body
 from mjxgait.settings.hop import NEAR, HopConfig, HopWeights, TravelConfig
 from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.hop.tally import Tally
 from mjxgait.tasks.overlap import crossed
+from mjxgait.tasks.score import ramped
 
 TERMS = tuple(field.name for field in dataclasses.fields(HopWeights))
 GOAL = "distance"
@@ -62,8 +62,7 @@ def style_terms(creature: Body, horizon: int, tally: Tally) -> dict[str, jax.Arr
 
 def signed_weights(config: HopConfig | TravelConfig, generation: jax.Array) -> dict[str, jax.Array]:
     """Signed weight [] of each term at a generation []: all negative, style terms ramped in."""
-    grown = optax.linear_schedule(0.0, 1.0, 1)(generation / jnp.maximum(config.style_ramp, 1))
-    ramp = jnp.where(jnp.asarray(config.style_ramp) > 0, grown, 1.0)
+    ramp = ramped(config.style_ramp, generation)
 
     def weight(name: str) -> jax.Array:
         signed = -jnp.float32(getattr(config.weights, name))

@@ -4,13 +4,13 @@ import dataclasses
 
 import jax
 import jax.numpy as jnp
-import optax
 
 from mjxgait.body import Body
 from mjxgait.settings.gaits import stride_limit
 from mjxgait.settings.walk import WalkConfig, Weights
 from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.overlap import crossed
+from mjxgait.tasks.score import ramped
 from mjxgait.tasks.walk.tally import Tally
 
 TERMS = tuple(field.name for field in dataclasses.fields(Weights))
@@ -95,8 +95,7 @@ def _counted(distance: jax.Array, enough: jax.Array) -> jax.Array:
 
 def signed_weights(config: WalkConfig, generation: jax.Array) -> dict[str, jax.Array]:
     """Signed weight [] of each term at a generation []: penalties negative, style terms ramped in."""
-    grown = optax.linear_schedule(0.0, 1.0, 1)(generation / jnp.maximum(config.style_ramp, 1))
-    ramp = jnp.where(jnp.asarray(config.style_ramp) > 0, grown, 1.0)
+    ramp = ramped(config.style_ramp, generation)
 
     def weight(name: str) -> jax.Array:
         signed = jnp.float32(getattr(config.weights, name) * (1 if name in REWARDS else -1))
