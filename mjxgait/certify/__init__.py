@@ -13,7 +13,7 @@ from mjxgait.certify.certificate import (
 )
 from mjxgait.certify.config import CertificateConfig
 from mjxgait.certify.criteria import Criterion, Measure
-from mjxgait.certify.standing import outdated, read_certificate
+from mjxgait.certify.standing import outdated, read_certificate, read_stress
 
 __all__ = [
     "Certificate",
@@ -27,6 +27,7 @@ __all__ = [
     "outdated",
     "push_ladder",
     "read_certificate",
+    "read_stress",
     "record",
     "rehearse",
     "survival",

@@ -1,4 +1,6 @@
-"""Reads a `certificate.json` back and tells whether it is of the champion that lies beside it."""
+"""Reads a `certificate.json` and a `stress.json` back and tells whether they are of the champion that
+lies beside them.
+"""
 
 import json
 from pathlib import Path
@@ -15,19 +17,34 @@ def read_certificate(path: Path) -> dict[str, Any] | None:
     Raises:
       UserError: it is not a certificate.
     """
+    return _read(path, "criteria", {"number", "passed", "measures"}, "certify")
+
+
+def read_stress(path: Path, champion: Champion) -> dict[str, Any] | None:
+    """What `Stress.document` says of this champion; None when there is no file, or it is of another
+    one.
+
+    Raises:
+      UserError: it is no such file.
+    """
+    document = _read(path, "trials", {"name", "share", "passed"}, "stress")
+    return document if document and document.get("champion") == champion.fingerprint else None
+
+
+def _read(path: Path, parts: str, keys: set[str], command: str) -> dict[str, Any] | None:
+    """A document with a verdict and a list of parts with these keys. command: that writes it."""
     if not path.exists():
         return None
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
+        document: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
         whole = isinstance(document["passed"], bool) and all(
-            {"number", "passed", "measures"} <= set(c) for c in document["criteria"]
+            keys <= set(part) for part in document[parts]
         )
     except (OSError, ValueError, KeyError, TypeError):
         whole = False
     if not whole:
-        raise UserError(
-            f"{path}: not a certificate; `mjxgait certify {path.parent}` writes it anew"
-        )
+        name = "a certificate" if command == "certify" else "what `mjxgait stress` writes"
+        raise UserError(f"{path}: not {name}; `mjxgait {command} {path.parent}` writes it anew")
     return document
 
 

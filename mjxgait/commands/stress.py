@@ -8,8 +8,6 @@ from typing import Annotated
 
 import tyro
 
-STRESS = "stress.json"
-
 
 @dataclasses.dataclass(frozen=True)
 class StressOptions:
@@ -33,7 +31,7 @@ def stress_command(arguments: Sequence[str]) -> int:
     from mjxgait.certify.stress import StressConfig, stress
     from mjxgait.errors import UserError
     from mjxgait.runs.disk import disk_errors
-    from mjxgait.runs.folder import open_champion
+    from mjxgait.runs.folder import STRESS, open_champion
     from mjxgait.viewing.stressplot import draw_stress
     from mjxgait.viewing.style import figure, save
 

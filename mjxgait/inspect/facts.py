@@ -12,7 +12,7 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
-from mjxgait.certify import outdated, read_certificate
+from mjxgait.certify import outdated, read_certificate, read_stress
 from mjxgait.champion import read_champion
 from mjxgait.errors import UserError
 from mjxgait.inspect.genomes import view_of
@@ -20,7 +20,7 @@ from mjxgait.inspect.islands import island_facts
 from mjxgait.inspect.snapshot import Snapshot
 from mjxgait.parts import make_task, resolve_config
 from mjxgait.parts.registry import what_ends
-from mjxgait.runs.folder import CERTIFICATE, CHAMPION
+from mjxgait.runs.folder import CERTIFICATE, CHAMPION, STRESS
 from mjxgait.search.state import Origin
 from mjxgait.tasks.protocol import Task
 
@@ -77,17 +77,27 @@ def certificate(snapshot: Snapshot) -> str:
     if isinstance(document, str):
         return document
     failed = " ".join(str(c["number"]) for c in document["criteria"] if not c["passed"])
-    return (
-        f"The champion fails criteria {failed}."
-        if failed
-        else f"The champion is certified, margin {document['margin']:.2f}."
-    )
+    if failed:
+        return f"The champion fails criteria {failed}."
+    return f"The champion is certified, margin {document['margin']:.2f}.{_anywhere(snapshot)}"
+
+
+def _anywhere(snapshot: Snapshot) -> str:
+    """A sentence about the second level, where somebody has asked for it."""
+    document = _stress(snapshot)
+    if document is None:
+        return ""
+    if document["passed"]:
+        return " It walks anywhere."
+    short = [f"{t['name']} {t['share']:.0%}" for t in document["trials"] if not t["passed"]]
+    return f" It does not walk anywhere: {', '.join(short)}."
 
 
 def verdict(snapshot: Snapshot) -> dict[str, Any] | None:
     """The certificate of the run's champion in a few values; None where it has none that counts.
 
-    speed: m/s. gait: its name. Both are None for what is no walk.
+    speed: m/s. gait: its name. Both are None for what is no walk. anywhere: whether it walks there
+    too; None where nobody has tried.
     """
     document = _certificate(snapshot)
     if isinstance(document, str):
@@ -96,6 +106,7 @@ def verdict(snapshot: Snapshot) -> dict[str, Any] | None:
     return {
         "certified": document["passed"],
         "failed": [c["number"] for c in document["criteria"] if not c["passed"]],
+        "anywhere": None if (stress := _stress(snapshot)) is None else stress["passed"],
         "margin": document["margin"],
         "speed": report.get("speed"),
         "gait": report.get("gait"),
@@ -112,6 +123,15 @@ def _certificate(snapshot: Snapshot) -> dict[str, Any] | str:
         return outdated(document, champion) or document
     except UserError as error:
         return str(error)
+
+
+def _stress(snapshot: Snapshot) -> dict[str, Any] | None:
+    """What is known of the champion's second level; None where that is nothing."""
+    try:
+        champion = read_champion(snapshot.run / CHAMPION, snapshot.creature)
+        return read_stress(snapshot.run / STRESS, champion)
+    except UserError:
+        return None
 
 
 def settings_changed(snapshot: Snapshot) -> dict[str, dict[str, Any]]:

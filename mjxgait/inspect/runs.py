@@ -86,5 +86,5 @@ def _state(line: Mapping[str, Any]) -> str:
     if line["verdict"] is None:
         return "not examined"
     if line["verdict"]["certified"]:
-        return "certified"
+        return "anywhere" if line["verdict"]["anywhere"] else "certified"
     return f"fails {' '.join(map(str, line['verdict']['failed']))}"

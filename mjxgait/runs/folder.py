@@ -13,7 +13,8 @@ from mjxgait.settings.config import Config
 from mjxgait.settings.tables import dump_toml, read_toml
 
 CONFIG, CREATURE, METRICS, CHAMPION = "config.toml", "creature", "metrics.jsonl", "champion.json"
-CERTIFICATE, EXAMS, PLOT, BODY = "certificate.json", "exams.jsonl", "fitness.png", "body"
+CERTIFICATE, STRESS, EXAMS = "certificate.json", "stress.json", "exams.jsonl"
+PLOT, BODY = "fitness.png", "body"
 ISLANDS, MIGRATIONS = "islands", "migrations.jsonl"
 
 

@@ -13,11 +13,11 @@ from pathlib import Path
 from typing import Any
 
 from mjxgait.animation import WalkLoop, build_glb, walk_loop
-from mjxgait.certify import outdated, read_certificate
+from mjxgait.certify import outdated, read_certificate, read_stress
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
-from mjxgait.runs.folder import CERTIFICATE, METRICS, open_champion, read_metrics
+from mjxgait.runs.folder import CERTIFICATE, METRICS, STRESS, open_champion, read_metrics
 from mjxgait.viewing.cast import LOOP_SECONDS
 from mjxgait.viewing.curves import draw_fitness
 from mjxgait.viewing.gaitplots import gait_figures
@@ -121,9 +121,21 @@ def certificate_table(run: Path, champion: Champion) -> str:
         raise UserError(
             f"{run / CERTIFICATE}: not a certificate; `mjxgait certify {run}` writes it anew"
         ) from None
-    return f"<p>{verdict}</p>" + _table(
-        ("criterion", "measure", "value", "wanted", "verdict"), rows
-    )
+    table = _table(("criterion", "measure", "value", "wanted", "verdict"), rows)
+    return f"<p>{verdict}</p>{table}{_anywhere(run, champion)}"
+
+
+def _anywhere(run: Path, champion: Champion) -> str:
+    """The trials of the second level as a table; nothing where nobody has asked for it."""
+    document = read_stress(run / STRESS, champion)
+    if document is None:
+        return ""
+    verdict = "It walks anywhere." if document["passed"] else "It does not walk anywhere."
+    rows = [
+        [t["name"], f"{t['share']:.0%}", "pass" if t["passed"] else "fails"]
+        for t in document["trials"]
+    ]
+    return f"<p>{verdict}</p>" + _table(("asked for more", "of the starts", "verdict"), rows)
 
 
 def _origin(creature: Creature, champion: Champion) -> str:

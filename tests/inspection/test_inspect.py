@@ -14,10 +14,11 @@ import pytest
 from inspection.made_up import FORCED, LAST, POPULATION
 
 from mjxgait.certify.certificate import SCHEMA
+from mjxgait.certify.stress import Stress, StressConfig, Trial
 from mjxgait.champion import read_champion
 from mjxgait.cli import main
 from mjxgait.inspect import facts, individual_facts, read_snapshot, text
-from mjxgait.runs.folder import CERTIFICATE, CHAMPION
+from mjxgait.runs.folder import CERTIFICATE, CHAMPION, STRESS
 
 
 def tell(capsys, *arguments):
@@ -82,6 +83,36 @@ def test_tells_whether_the_certificate_is_the_champions(run):
     assert said().endswith("it was given under other rules than today's.")
     (run / CERTIFICATE).write_text("[]")
     assert "not a certificate" in said()
+
+
+def test_tells_whether_the_champion_walks_anywhere(run):
+    """Of trials of this champion, and with the names of those that it fails."""
+    snapshot = read_snapshot(run)
+    fingerprint = read_champion(run / CHAMPION, snapshot.creature).fingerprint
+    certificate = {
+        "schema": SCHEMA,
+        "passed": True,
+        "margin": 0.5,
+        "champion": fingerprint,
+        "criteria": [],
+    }
+    (run / CERTIFICATE).write_text(json.dumps(certificate))
+    trials = [Trial("bumps of 5%", 0.95, True), Trial("friction 0.4", 0.25, False)]
+
+    def told(found: Stress) -> tuple[str, bool | None]:
+        (run / STRESS).write_text(json.dumps(found.document()))
+        known = facts(read_snapshot(run))
+        return known["certificate"], known["verdict"]["anywhere"]
+
+    said, anywhere = told(Stress(fingerprint, tuple(trials), StressConfig()))
+    assert said.endswith("It does not walk anywhere: friction 0.4 25%.")
+    assert anywhere is False
+    said, anywhere = told(Stress(fingerprint, tuple(trials[:1]), StressConfig()))
+    assert said.endswith("It walks anywhere.")
+    assert anywhere is True
+    said, anywhere = told(Stress("another", tuple(trials), StressConfig()))
+    assert "anywhere" not in said
+    assert anywhere is None
 
 
 def test_a_folder_of_runs_tells_which_of_them_walk(run, capsys):

@@ -4,6 +4,7 @@ The browser tests need Chromium (apt: chromium) and the Python package playwrigh
 """
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -11,9 +12,10 @@ from viewing.browser import canvas, drawn, is_blank, watched_tab
 from viewing.made_up import treading, write_run
 
 from mjxgait.certify.certificate import SCHEMA
+from mjxgait.certify.stress import Stress, StressConfig, Trial
 from mjxgait.cli import main
 from mjxgait.errors import UserError
-from mjxgait.runs.folder import CERTIFICATE
+from mjxgait.runs.folder import CERTIFICATE, STRESS
 from mjxgait.web.page import certificate_table
 
 CERTIFIED = {
@@ -148,6 +150,22 @@ def test_the_certificate_is_shown_as_long_as_it_is_this_champions(stool, tmp_pat
     assert "outdated" in certificate_table(run, champion)
     (run / CERTIFICATE).write_text("[]")
     with pytest.raises(UserError, match="not a certificate"):
+        certificate_table(run, champion)
+
+
+def test_what_a_champion_bears_beyond_it_is_shown_beside_it(stool, tmp_path):
+    champion = treading(stool)
+    run = write_run(tmp_path / "run", stool, champion)
+    (run / CERTIFICATE).write_text(json.dumps(CERTIFIED | {"champion": champion.fingerprint}))
+    assert "anywhere" not in certificate_table(run, champion)
+    trials = (Trial("bumps of 5%", 0.95, True), Trial("friction 0.4", 0.25, False))
+    found = Stress(champion.fingerprint, trials, StressConfig())
+    (run / STRESS).write_text(json.dumps(found.document()))
+    table = certificate_table(run, champion)
+    assert "It does not walk anywhere." in table
+    assert re.search(r"friction 0.4.*25%.*fails", table)
+    (run / STRESS).write_text("{}")
+    with pytest.raises(UserError, match="mjxgait stress"):
         certificate_table(run, champion)
 
 
