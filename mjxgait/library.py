@@ -126,6 +126,7 @@ def train(
     turn: float | None = None,
     steer: float | None = None,
     style: Place | None = None,
+    certificate: str | None = None,
     seed: int = 0,
     population: int | None = None,
     generations: int | None = None,
@@ -145,6 +146,7 @@ def train(
       scale: factors of the parts' size, such as {"*_shin": 1.2} (docs/creature.md).
       speed, gait, turn, steer, style: what is asked of a walk (docs/wishes.md): m/s or text such as
         "0.4bl/s", a name, deg/s to the left, deg/s to either side, a name or a file.
+      certificate: walks, or anywhere (docs/certificate.md).
       seed, population, generations: the settings that are changed most often.
       settings: any others, in tables as in a config file: {"rollout": {"seconds": 5.0}}.
       quiet: says nothing on the screen.
@@ -165,7 +167,14 @@ def train(
     resolved = resolve_config(
         creature.settings.train, creature.name, Path(config) if config else None, use
     )
-    asked = {"speed": speed, "gait": gait, "turn": turn, "steer": steer, "style": style}
+    asked = {
+        "speed": speed,
+        "gait": gait,
+        "turn": turn,
+        "steer": steer,
+        "style": style,
+        "certificate": certificate,
+    }
     resolved = wished(resolved, creature, Wishes.of(asked))
     short = {"population": population, "generations": generations}
     evolution = {key: value for key, value in short.items() if value is not None}

@@ -15,6 +15,7 @@ from helpers import STOOL, small_config
 from rich.console import Console
 
 from mjxgait.certify import Certificate, CertificateConfig, Criterion, Measure
+from mjxgait.certify.stress import Stress, StressConfig, Trial
 from mjxgait.creature import load_creature
 from mjxgait.inspect.snapshot import read_snapshot
 from mjxgait.runs import examination, loop
@@ -112,7 +113,7 @@ def test_it_looks_every_few_generations_and_not_at_the_first():
     assert not any(due(ExaminationConfig(candidates=0), g) for g in range(20))
 
 
-def examiner(experiment: Experiment, exams: Exams, **settings: float) -> Examiner:
+def examiner(experiment: Experiment, exams: Exams, **settings: float | str) -> Examiner:
     """One of a run with other settings of the examination."""
     examination = dataclasses.replace(experiment.config.examination, **settings)
     config = dataclasses.replace(experiment.config, examination=examination)
@@ -208,6 +209,47 @@ def test_the_second_is_looked_at_where_the_first_was_only_lucky(experiment, look
 def test_who_did_the_same_is_no_other_candidate(experiment):
     alike = dataclasses.replace(ranked(experiment), fitness=jnp.float32([3, 3, 2, 2, 2, 1]))
     assert experiment.candidates(alike) == [0, 2, 5]
+
+
+class Asked:
+    """What the second level will say, and how hastily it was asked."""
+
+    def __init__(self, *shares: float) -> None:
+        self.shares, self.hasty = list(shares), list[bool]()
+
+    def __call__(self, *_: object, hasty: bool) -> Stress:
+        self.hasty.append(hasty)
+        share = self.shares.pop(0)
+        return Stress("", (Trial("friction 0.4", share, share >= 0.9),), StressConfig())
+
+
+def test_who_is_to_walk_anywhere_goes_on_until_it_does(
+    experiment, looks, exams, monkeypatch: pytest.MonkeyPatch
+):
+    """The certificate alone ends no run then; who fails it is not asked for more."""
+    asked = Asked(0.5, 0.95)
+    monkeypatch.setattr(examination, "stress", asked)
+    anywhere = {"level": "anywhere", "attempts": 4}
+    state = state_with(experiment, 3)
+    assert examiner(experiment, exams, **anywhere).early(state) is None
+    examined = examiner(experiment, exams, **anywhere).early(other_best(state))
+    assert examined is not None
+    assert examined.passed
+    assert examined.beyond is not None
+    looks.certificates = [-0.1]
+    assert not examiner(experiment, exams, **anywhere).best(ranked(experiment)).passed
+    assert asked.hasty == [True, True]
+
+
+def test_in_the_end_all_of_the_second_level_is_asked(
+    experiment, looks, exams, monkeypatch: pytest.MonkeyPatch
+):
+    asked = Asked(0.5)
+    monkeypatch.setattr(examination, "stress", asked)
+    examined = examiner(experiment, exams, level="anywhere").best(ranked(experiment))
+    assert examined.certificate.passed
+    assert not examined.passed
+    assert asked.hasty == [False]
 
 
 def other_best(state: EvolutionState) -> EvolutionState:

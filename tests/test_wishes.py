@@ -12,11 +12,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mjxgait.certify.describe import gait_name
+from mjxgait.certify.stress import StressConfig
 from mjxgait.champion import read_champion, write_champion
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
+from mjxgait.parts.fit import check_fit
 from mjxgait.parts.wishes import Wishes, hint, speed_of, wished
-from mjxgait.settings.config import Config
+from mjxgait.settings.config import Config, UseConfig
 from mjxgait.settings.gaits import GAITS, gait_of, placed, stations_of
 from mjxgait.settings.traced import traced
 from mjxgait.settings.walk import WalkConfig, Weights, WishWeights
@@ -366,9 +368,23 @@ def test_every_style_is_a_table_of_settings(body: Creature):
         assert wished(Config(), body, Wishes(style=name)) != Config()
 
 
+def test_to_walk_anywhere_is_learnt_on_all_that_it_is_asked_for(body: Creature):
+    assert wished(Config(), body, Wishes(certificate="walks")) == Config()
+    config = wished(Config(), body, Wishes(certificate="anywhere"))
+    asked, rollout = StressConfig(), config.rollout
+    assert config.examination.level == "anywhere"
+    assert rollout.slope >= asked.slope
+    assert rollout.rough >= asked.bumps
+    assert rollout.friction[0] <= asked.friction
+    assert rollout.push >= asked.push
+    with pytest.raises(UserError, match="only who is to walk"):
+        check_fit(body, dataclasses.replace(config, use=UseConfig("program", "hop")))
+
+
 @pytest.mark.parametrize(
     ("wishes", "says"),
     [
+        (Wishes(certificate="anywere"), 'did you mean "anywhere"'),
         (Wishes(gait="tripod"), "a body with 4 feet has no tripod"),
         (Wishes(gait="tort"), "no tort"),
         (Wishes(style="calmm"), 'did you mean "calm"'),

@@ -67,6 +67,14 @@ class Stress:
         """Whether it walks anywhere."""
         return all(trial.passed for trial in self.trials)
 
+    def rows(self) -> list[str]:
+        """A line for each trial, and one for the whole."""
+        lines = [
+            f"{t.name:24} {t.share:>4.0%}  {'pass' if t.passed else 'FAIL'}" for t in self.trials
+        ]
+        verdict = "It walks anywhere." if self.passed else "It does not walk anywhere yet."
+        return [*lines, verdict]
+
     def document(self) -> dict[str, Any]:
         """What `stress.json` holds."""
         return {"schema": 1, "passed": self.passed} | dataclasses.asdict(self)
@@ -78,11 +86,13 @@ def stress(
     config: StressConfig | None = None,
     tell: Callable[[str], object] = lambda name: None,
     threads: int = 0,
+    hasty: bool = False,
 ) -> Stress:
     """Asks a champion that walks for more than the certificate does, one thing at a time.
 
     Args:
       tell: called with the name of each trial before it is tried.
+      hasty: nothing more is tried after the first that it fails; the longest is the last.
 
     Raises:
       UserError: its task is another one than walking.
@@ -95,6 +105,8 @@ def stress(
         done = [_done(creature, outcome) for outcome in tried()]
         share = float(np.concatenate(done).mean())
         found.append(Trial(name, share, share >= config.share))
+        if hasty and not found[-1].passed:
+            break
     return Stress(champion.fingerprint, tuple(found), config)
 
 

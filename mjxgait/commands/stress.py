@@ -41,9 +41,7 @@ def stress_command(arguments: Sequence[str]) -> int:
     found = stress(
         creature, champion, StressConfig(starts=options.starts), lambda name: print(f"{name}…")
     )
-    for trial in found.trials:
-        print(f"{trial.name:24} {trial.share:>4.0%}  {'pass' if trial.passed else 'FAIL'}")
-    print("It walks anywhere." if found.passed else "It does not walk anywhere yet.")
+    print("\n".join(found.rows()))
     picture = options.run / "stress"
     with disk_errors(options.run), figure((7.0, 3.6)) as drawing:
         text = json.dumps(found.document(), indent=2) + "\n"

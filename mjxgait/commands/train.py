@@ -61,6 +61,8 @@ class TrainOptions:
       turn: Degrees per second to the left that it should turn while it walks.
       steer: Degrees per second up to which it should obey when it is told to turn, to either side.
       style: calm, sneaky, heavy, proud, tired, hurried, or a FILE.toml of settings.
+      certificate: walks, or anywhere: then it learns on uneven ground, and goes on until it bears what
+        `mjxgait stress` asks (docs/certificate.md).
       cluster: Have it done by a Ray cluster: HOST:PORT, or auto for the one that this machine is a part
         of (docs/cluster.md).
       ground: Short for --rollout.ground: flat, slope:0.1, steps:0.05, bumps:0.05, rough:0.05.
@@ -83,6 +85,7 @@ class TrainOptions:
     turn: float | None = None
     steer: float | None = None
     style: str | None = None
+    certificate: str | None = None
     cluster: str | None = None
     ground: str | None = None
     view: bool = False

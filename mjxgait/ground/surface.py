@@ -111,6 +111,20 @@ class Waves:
         )
 
 
+@pytree
+class Together:
+    """One on another: the sum of their heights."""
+
+    slope: Slope
+    waves: Waves
+
+    def rise(self, ahead: Any, left: Any, level: Any) -> tuple[Any, Any, Any]:
+        """See `Relief`."""
+        height, by_ahead, by_left = self.slope.rise(ahead, left, level)
+        more, more_ahead, more_left = self.waves.rise(ahead, left, level)
+        return height + more, by_ahead + more_ahead, by_left + more_left
+
+
 def _full(ahead: Any, left: Any, level: Any) -> tuple[Any, Any, Any]:
     """0 within `level` of the start, 1 from twice as far on; and its changes per metre."""
     width = 3 * level * level
@@ -137,6 +151,20 @@ def lay_ground(spec: GroundSpec, place: Place, draws: Any) -> Ground | None:
         relief = Steps(jnp.float32(size * hip), jnp.float32(TREAD * hip), jnp.float32(draws[0, 1]))
     else:
         relief = _waves(spec, hip, jnp.asarray(draws))
+    return _laid(place, relief)
+
+
+def lay_uneven(place: Place, slope: Any, rough: float, draws: Any) -> Ground:
+    """Rough ground on a slope to any side.
+
+    slope: [2] rise per metre ahead and to the left. rough: hip heights, the most that it rises and
+    falls besides. draws: see `lay_ground`.
+    """
+    waves = _waves(GroundSpec("rough", rough), place.hip_height, jnp.asarray(draws))
+    return _laid(place, Together(Slope(*jnp.float32(slope)), waves))
+
+
+def _laid(place: Place, relief: Relief) -> Ground:
     return Ground(
         jnp.asarray(place.start[:2], jnp.float32),
         jnp.asarray(place.forward[:2], jnp.float32),

@@ -18,6 +18,11 @@ def check_fit(creature: Creature, config: Config) -> None:
     """
     controller, task, name = config.use.controller, config.use.task, creature.name
     kind: Any = find("controller", controller)
+    if config.examination.level != "walks" and task != "walk":
+        raise UserError(
+            f"examination.level = {config.examination.level}: only who is to walk can walk there, and "
+            f"this is to {task}"
+        )
     if around := getattr(config.controller, "around", ()):
         wanted = config.controller.key_poses * len(creature.joints.names)
         if len(around) != wanted:
@@ -53,6 +58,7 @@ def _check_settings(name: str, config: Config) -> None:
     needs = {
         "evolution.body": config.evolution.body != 1.0,
         "rollout.ground": rollout.ground != FLAT,
+        "rollout.slope or rollout.rough": rollout.uneven,
         "rollout.masses": rollout.masses != 0.0,
         "rollout.body": rollout.body != "constants",
         "rollout.physics": rollout.physics != "auto",

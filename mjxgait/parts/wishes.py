@@ -28,6 +28,8 @@ class Wishes:
       turn: deg/s, to the left.
       steer: deg/s, up to which it should obey turns to either side.
       style: calm, sneaky, heavy, proud, tired, hurried, or a TOML file of settings.
+      certificate: walks, or anywhere: then it learns on uneven ground and under more disturbances,
+        and goes on until it bears what `mjxgait stress` asks.
     """
 
     speed: str | None = None
@@ -35,6 +37,7 @@ class Wishes:
     turn: float | None = None
     steer: float | None = None
     style: str | None = None
+    certificate: str | None = None
 
     @classmethod
     def of(cls, given: Mapping[str, Any]) -> "Wishes":
@@ -56,6 +59,7 @@ class Wishes:
 
 
 TURNS = ("turn", "steer")
+LEVELS = ("walks", "anywhere")
 WISHES = tuple(field.name for field in dataclasses.fields(Wishes))
 
 
@@ -73,6 +77,8 @@ def wished(config: Config, creature: Creature, wishes: Wishes) -> Config:
         )
     if wishes.style is not None:
         config = _styled(config, wishes.style)
+    if wishes.certificate is not None:
+        config = _demanded(config, wishes.certificate)
     table: dict[str, Any] = {}
     for layer in (
         _gait(wishes.gait, creature, config),
@@ -169,6 +175,20 @@ def _styled(config: Config, name: str) -> Config:
     if name not in known and Path(name).suffix != ".toml":
         raise UserError(f"--style {name}: {did_you_mean(name, known)}; or give a FILE.toml")
     path = folder / f"{name}.toml" if name in known else Path(name)
+    return build(type(config), merge(dataclasses.asdict(config), read_toml(path)), str(path))
+
+
+def _demanded(config: Config, level: str) -> Config:
+    """The settings with those laid over them by which a level of the certificate is reached.
+
+    Raises:
+      UserError: there is no such level.
+    """
+    if level not in LEVELS:
+        raise UserError(f"--certificate {level}: {did_you_mean(level, LEVELS)}")
+    if level == "walks":
+        return config
+    path = data_folder("configs") / f"{level}.toml"
     return build(type(config), merge(dataclasses.asdict(config), read_toml(path)), str(path))
 
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 import numpy as np
 
 from mjxgait.certify import Certificate, Glance, certify, glance, rehearse
+from mjxgait.certify.stress import Stress, stress
 from mjxgait.certify.tasks import demands_of
 from mjxgait.champion import Champion
 from mjxgait.runs.disk import disk_errors
@@ -17,10 +18,18 @@ from mjxgait.settings.config import Config, ExaminationConfig
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Examined:
-    """A champion and what the examiner says of it."""
+    """A champion and what the examiner says of it; beyond: of the second level, where that is asked
+    for and it has the first.
+    """
 
     certificate: Certificate
     champion: Champion
+    beyond: Stress | None = None
+
+    @property
+    def passed(self) -> bool:
+        """Whether it has what was asked for."""
+        return self.certificate.passed and (self.beyond is None or self.beyond.passed)
 
 
 def why_ended(generation: int, margin: float) -> str:
@@ -81,7 +90,7 @@ class Examiner:
         if self.exams.attempt(name, generation) >= config.examination.attempts:
             return None
         seen = self._look(champion, wanted)
-        if seen.margin >= wanted and (examined := self._examine(seen)).certificate.passed:
+        if seen.margin >= wanted and (examined := self._examine(seen, hasty=True)).passed:
             return examined
         self._margins[name] = seen.margin
         return None
@@ -115,7 +124,7 @@ class Examiner:
             margin = min(margin, rehearse(creature, champion, count))
         return Seen(champion, seen, margin)
 
-    def _examine(self, seen: Seen) -> Examined:
+    def _examine(self, seen: Seen, hasty: bool = False) -> Examined:
         name, generation = seen.champion.fingerprint, int(seen.champion.origin["generation"])
         attempt = self.exams.attempt(name, generation)
         self.tell(
@@ -123,9 +132,15 @@ class Examiner:
         )
         body = seen.champion.embodied(self.experiment.creature)
         certificate = certify(body, seen.champion, seen=seen.glance, attempts=attempt)
+        beyond = None
+        if certificate.passed and self.experiment.config.examination.level == "anywhere":
+            self.tell("It walks; does it walk anywhere?")
+            beyond = stress(body, seen.champion, hasty=hasty)
+            self.tell("\n".join(beyond.rows()))
+        examined = Examined(certificate, seen.champion, beyond)
         with disk_errors(self.exams.path.parent):
-            self.exams.add(name, generation, certificate.passed)
-        return Examined(certificate, seen.champion)
+            self.exams.add(name, generation, examined.passed)
+        return examined
 
 
 def enough(config: Config, generation: int) -> float:

@@ -29,6 +29,7 @@ from mjxgait.runs.folder import (
     CHAMPION,
     EXAMS,
     METRICS,
+    STRESS,
     keep_body,
     read_metrics,
     truncate_metrics,
@@ -100,6 +101,9 @@ def conclude(folder: Path, creature: Creature, screen: Screen, examined: Examine
         if body is not creature:
             keep_body(folder / BODY, body)
         (folder / CERTIFICATE).write_text(examined.certificate.to_json(), encoding="utf-8")
+        if examined.beyond:
+            text = json.dumps(examined.beyond.document(), indent=2) + "\n"
+            (folder / STRESS).write_text(text, encoding="utf-8")
     screen.certificate(examined.certificate)
 
 

@@ -68,6 +68,9 @@ class RolloutConfig:
       masses: the same for each part's mass and inertia, which then differ from lane to lane;
         a step costs a third more (docs/performance.md).
       latency: most control steps by which the torques of a perturbed start come late.
+      slope: deg; the ground of a perturbed start slopes by so much at most, to any side. Not with a
+        `ground`, which all starts have.
+      rough: hip heights; that ground rises and falls by so much besides.
       terminate: whether an episode ends when the creature falls; if not, its whole body meets
         the floor.
       termination: what counts as falling, where it differs from creature.toml.
@@ -92,6 +95,8 @@ class RolloutConfig:
     gains: Fraction = 0.1
     masses: Annotated[Fraction, SHAPE] = 0.0
     latency: Annotated[Whole, SHAPE] = 0
+    slope: Annotated[float, pydantic.Field(ge=0, le=45), SHAPE] = 0.0
+    rough: Annotated[float, pydantic.Field(ge=0, le=0.5), SHAPE] = 0.0
     terminate: Annotated[bool, SHAPE] = True
     termination: TerminationConfig = dataclasses.field(default_factory=TerminationConfig)
     worst: Fraction = 0.5
@@ -100,6 +105,17 @@ class RolloutConfig:
     block: Annotated[Count, HOST] = 64
     ground: Annotated[GroundText, KIND] = FLAT
     body: Annotated[Literal["constants", "inputs"], SHAPE] = "constants"
+
+    def __post_init__(self) -> None:
+        if self.uneven and self.ground != FLAT:
+            raise ValueError(
+                f"ground = {self.ground}: all starts have it; slope and rough are for a flat one"
+            )
+
+    @property
+    def uneven(self) -> bool:
+        """Whether perturbed starts have uneven ground of their own."""
+        return bool(self.slope or self.rough)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -251,6 +267,8 @@ class ExaminationConfig:
       on_the_way: so many of them are looked at on the way. With few starts in each generation the
         first is often the luckiest.
       difference: in units of each gene's range, root mean square; what counts as different.
+      level: what ends a run early: one that walks by the certificate, or that walks anywhere
+        (docs/certificate.md).
     """
 
     __pydantic_config__ = STRICT
@@ -261,6 +279,7 @@ class ExaminationConfig:
     candidates: Annotated[Whole, HOST] = 12
     on_the_way: Annotated[Count, HOST] = 1
     difference: Annotated[NonNegative, HOST] = 0.02
+    level: Annotated[Literal["walks", "anywhere"], HOST] = "walks"
 
 
 @dataclasses.dataclass(frozen=True)

@@ -8,8 +8,8 @@ import numpy as np
 
 from mjxgait.creature import Creature
 from mjxgait.creature.frame import horizontal_freedoms, start_place
-from mjxgait.ground.spec import parse_ground
-from mjxgait.ground.surface import DRAWS, Ground, lay_ground, named_draws
+from mjxgait.ground.spec import Place, parse_ground
+from mjxgait.ground.surface import DRAWS, Ground, lay_ground, lay_uneven, named_draws
 from mjxgait.settings.config import RolloutConfig
 from mjxgait.types import pytree
 
@@ -25,7 +25,7 @@ class Starts:
     stiffness, damping: [R, J] factors on the joints' kp and kd.
     heaviness: [R, nbody - 1] factors on the parts' masses and inertias; None where all are 1.
     numbers: leaves [R, ...], the bodies that follow from it, as the plant reads them.
-    ground: leaves [R, ...], each trial's own; None where it is flat.
+    ground: leaves [R, ...], each trial's own; None where all are flat.
     goal: [R] m ahead of the start; None where the task has none.
     light: [R, 3] m from where the root starts; None where there is none.
     turn: [R] rad/s by which the commanded heading grows; None where nobody is told to turn.
@@ -111,11 +111,30 @@ def _heaviness(key: jax.Array, creature: Creature, config: RolloutConfig) -> jax
 
 def draw_grounds(key: jax.Array, creature: Creature, config: RolloutConfig) -> Ground | None:
     """Leaves [R, ...]: the nominal start has the ground that the config names, the others others
-    of its kind; None where it is flat.
+    of its kind, or uneven ones of their own; None where all are flat.
     """
     spec, place = parse_ground(config.ground), start_place(creature)
-    if spec.flat:
+    if spec.flat and not config.uneven:
         return None
     draws = jax.random.uniform(key, (config.starts, DRAWS, 2)).at[0].set(named_draws(spec.seed))
-    grounds = [lay_ground(spec, place, each) for each in draws]
-    return jax.tree.map(lambda *leaves: jnp.stack(leaves), *grounds)
+    if spec.flat:
+        return _stacked(_uneven(jax.random.fold_in(key, 1), place, config, draws))
+    return _stacked([lay_ground(spec, place, each) for each in draws])
+
+
+def _stacked(grounds: list[Ground | None]) -> Ground:
+    stacked: Ground = jax.tree.map(lambda *leaves: jnp.stack(leaves), *grounds)
+    return stacked
+
+
+def _uneven(
+    key: jax.Array, place: Place, config: RolloutConfig, draws: jax.Array
+) -> list[Ground | None]:
+    """Level for the nominal start; slopes to all sides, any up to the steepest, for the others."""
+    steep, side = jax.random.uniform(key, (2, config.starts))
+    rise, turn = np.tan(np.radians(config.slope)) * steep, 2 * jnp.pi * side
+    slopes = rise[:, None] * jnp.stack([jnp.cos(turn), jnp.sin(turn)], axis=1)
+    return [
+        lay_uneven(place, slopes[i] if i else (0.0, 0.0), config.rough if i else 0.0, draws[i])
+        for i in range(config.starts)
+    ]

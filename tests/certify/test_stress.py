@@ -36,6 +36,12 @@ def test_who_stands_does_not_walk_anywhere(tiny):
     assert not found.passed
 
 
+def test_in_haste_nothing_is_tried_after_the_first_failure(tiny):
+    found = stress(tiny, make_champion(tiny), SHORT, hasty=True)
+    assert [trial.name for trial in found.trials] == NAMES[:1]
+    assert not found.passed
+
+
 def test_each_trial_is_one_change_from_the_same_starts(tiny, trotter, monkeypatch):
     """Only what a trial is called after differs from the plain one, ten minutes in its length."""
     seen = []

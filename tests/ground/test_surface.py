@@ -11,7 +11,15 @@ from helpers import small_config
 from mjxgait.certify.terrain import terrain_of
 from mjxgait.creature import Creature
 from mjxgait.creature.frame import start_place
-from mjxgait.ground.surface import Ground, contact, height, lay_ground, named_draws, normal
+from mjxgait.ground.surface import (
+    Ground,
+    contact,
+    height,
+    lay_ground,
+    lay_uneven,
+    named_draws,
+    normal,
+)
 from mjxgait.tasks.trials import draw_starts
 
 TEXTS = (
@@ -48,6 +56,36 @@ def test_the_examiner_has_the_same_ground_of_its_own(stool: Creature, text: str)
     ours = np.asarray(height(laid(stool, text), x, y))
     assert np.ptp(ours) > 0.01
     np.testing.assert_allclose(ours, theirs.height(x, y), atol=2e-5)
+
+
+def test_uneven_ground_is_rough_ground_on_slopes(stool: Creature):
+    """Each with the heights that the named ground of its kind has."""
+    x, y = places(stool, 10.0)
+    draws = named_draws(0)
+    for slope, text in (((-0.2, 0.0), "slope:0.2:down"), ((0.0, 0.2), "slope:0.2:across")):
+        both = height(lay_uneven(start_place(stool), slope, 0.1, draws), x, y)
+        parts = [height(laid(stool, each), x, y) for each in (text, "rough:0.1")]
+        np.testing.assert_allclose(both, sum(parts), atol=1e-5)
+
+
+def test_perturbed_starts_have_uneven_ground_of_their_own(stool: Creature):
+    """The nominal one has none, whatever the others have: no two the same, none too steep."""
+    config = dataclasses.replace(small_config().rollout, starts=6, slope=10.0)
+    ground = draw_starts(jax.random.key(0), stool, config).ground
+    assert ground is not None
+    far = 20 * stool.frame.body_length * jnp.array([[1.0, -1.0, 0.0, 0.0], [0.0, 0.0, 1.0, -1.0]])
+    x, y = far + stool.frame.stand_pos[:2, None]
+    heights = np.asarray(jax.vmap(lambda each: height(each, x, y))(ground))
+    assert not heights[0].any()
+    assert (np.abs(heights[1:]).max(1) > 0).all()
+    steepest = np.tan(np.radians(10.0)) * 20 * stool.frame.body_length
+    assert np.abs(heights).max() <= 1.05 * steepest
+    assert len(np.unique(heights[1:, 0].round(4))) == 5
+    rough = dataclasses.replace(config, slope=0.0, rough=0.1)
+    ground = draw_starts(jax.random.key(0), stool, rough).ground
+    heights = np.asarray(jax.vmap(lambda each: height(each, x, y))(ground))
+    assert not heights[0].any()
+    assert 0 < np.abs(heights).max() <= 0.1 * stool.frame.hip_height
 
 
 @pytest.mark.parametrize("text", TEXTS)
