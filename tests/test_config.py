@@ -45,6 +45,7 @@ def test_a_config_survives_its_own_file(tmp_path: Path):
         ({"evolution": {"population": 1}}, "population must be at least 2"),
         ({"evolution": {"growth": 1.0}}, "growth = 1.0 leaves no room for offspring"),
         ({"evolution": {"elite": 0.1}}, 'elite is for survival = "children"'),
+        ({"evolution": {"remember": True}}, "remember is for an elite"),
         ({"rollout": {"slope": 5.0, "ground": "rough:0.1"}}, "slope and rough are for a flat one"),
         ({"evolution": {"elite": 1.0, "survival": "children"}}, "leaves no room for children"),
         ({"rollout": {"variety": 2}}, "rollout.variety = 2: who has been judged on other starts"),

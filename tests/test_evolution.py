@@ -164,6 +164,27 @@ def test_the_elite_is_judged_once_more():
     assert set(after.born[after.born < after.generation]) <= set(before.born)
 
 
+def test_an_elite_that_remembers_is_worth_the_mean_of_its_rounds():
+    """Children have had one round; in the mean every round counts the same."""
+    never = ForcedConfig(enabled=False)
+    keeping = toy(survival="children", elite=0.15, remember=True, forced=never)
+    settings, before = inputs(keeping)[0], run(keeping, 4)[-1][0]
+    for slope in (2.0, 6.0):
+        known = dict(zip(map(bytes, before.genomes.key_poses[:3]), range(3), strict=True))
+        after, _, _ = jax.device_get(advance(settings, Problem(slope=slope), before))
+        for place, poses in enumerate(map(bytes, after.genomes.key_poses)):
+            fresh, rounds = slope * float(near_zero(after.genomes)[place]), 1.0
+            wanted = fresh
+            if poses in known:
+                earlier = before.rounds[known[poses]]
+                rounds = earlier + 1
+                wanted = (earlier * before.fitness[known[poses]] + fresh) / rounds
+            assert after.rounds[place] == rounds
+            assert after.fitness[place] == pytest.approx(wanted, rel=1e-5)
+        before = after
+    assert before.rounds.max() > 1
+
+
 def test_what_a_genome_costs_is_taken_from_its_fitness():
     """Half of the genes cost as much as their squares are worth, so the others decide."""
     plain = toy(crossover=0.5)

@@ -121,3 +121,13 @@ def test_the_score_is_the_weighted_sum_of_each_start():
     assert float(score(terms, weights, 0.0)) == pytest.approx((0.0 + 5.5) / 2)
     assert float(score(terms, weights, 0.25)) == pytest.approx(0.75 * 2.75)
     assert np.isneginf(score(terms.at[0, 0].set(jnp.nan), weights, 0.5))
+
+
+def test_who_was_lucky_on_few_starts_is_not_believed():
+    """The more its starts differ, and the fewer they are, the less its mean is worth."""
+    weights, even, uneven = jnp.ones(1), jnp.array([[2.0], [2.0]]), jnp.array([[1.0], [3.0]])
+    often = jnp.tile(uneven, (2, 1))
+    plain = [float(score(each, weights, 0.0)) for each in (even, uneven, often)]
+    wary = [float(score(each, weights, 0.0, caution=2.0)) for each in (even, uneven, often)]
+    assert plain == [2.0, 2.0, 2.0]
+    assert wary == pytest.approx([2.0, 2.0 - 2 / np.sqrt(2), 2.0 - 2 / np.sqrt(4)])

@@ -8,7 +8,7 @@ import numpy as np
 from mjxgait.runs.packed import Packed
 from mjxgait.settings.islands import IslandsConfig
 
-OF_EACH = ("terms", "outcome", "fitness", "born", "origin")
+OF_EACH = ("terms", "outcome", "fitness", "born", "origin", "rounds")
 """Arrays [P, ...] of a state, beside those of the genomes."""
 SUMS = ("failures", "episodes", "evaluations", "sim_steps", "computed_steps", "unique")
 MEANS = ("mean", "median", "lower_quartile", "upper_quartile", "spread")

@@ -31,7 +31,7 @@ def evolution_of(simulator: Simulator, settings: Config) -> Evolution:
 
     def rank(terms: jax.Array, generation: jax.Array) -> jax.Array:
         weights = in_order(task.weights(settings.fitness, generation), task.terms)
-        return score(terms, weights, settings.rollout.worst)
+        return score(terms, weights, settings.rollout.worst, settings.rollout.caution)
 
     variation = simulator.controller.variation(settings.controller, settings.evolution)
     return Evolution(settings.evolution, variation, rank)

@@ -57,6 +57,7 @@ class Evolution:
             refreshed=integer,
             spell_best=jnp.float32(-jnp.inf),
             barren=integer,
+            rounds=jnp.ones(count) if self.config.remember else None,
         )
 
     def propose(self, state: EvolutionState) -> Proposal:
@@ -88,8 +89,9 @@ class Evolution:
     ) -> tuple[EvolutionState, GenerationMetrics]:
         """The rest of a generation: survival, and the decision whether the next one is forced."""
         seeding = self._seeding(state)
+        recalled, rounds = self._recalled(state, judged)
         generation = jnp.where(seeding, jnp.where(self._filled(state), 0, -1), state.generation + 1)
-        grown = self._survive(state, proposal, judged, generation)
+        grown = self._survive(state, proposal, recalled, rounds, generation)
         planted = self._plant(state, proposal, judged, generation)
         state = jax.tree.map(
             lambda a, b: jnp.where(seeding, a, b), _without_key(planted), _without_key(grown)
@@ -98,6 +100,18 @@ class Evolution:
         state = dataclasses.replace(state, key=proposal.key, generation=generation)
         state = forced.decided(self.config, state)
         return state, metrics(self.config, state, judged, was_forced)
+
+    def _recalled(self, state: EvolutionState, judged: Judged) -> tuple[Judged, jax.Array | None]:
+        """The verdict, in which those that are judged once more have the mean of all their rounds; and
+        how many [M] these are.
+        """
+        if state.rounds is None:
+            return judged, None
+        count = self.config.elites
+        rounds = jnp.ones(self.config.offspring).at[:count].add(state.rounds[:count])
+        share = (1 / rounds[:count])[:, None, None]
+        mean = share * judged.terms[:count] + (1 - share) * state.terms[:count]
+        return dataclasses.replace(judged, terms=judged.terms.at[:count].set(mean)), rounds
 
     @property
     def _candidates(self) -> jax.Array:
@@ -210,7 +224,12 @@ class Evolution:
         )
 
     def _survive(
-        self, state: EvolutionState, proposal: Proposal, judged: Judged, generation: jax.Array
+        self,
+        state: EvolutionState,
+        proposal: Proposal,
+        judged: Judged,
+        rounds: jax.Array | None,
+        generation: jax.Array,
     ) -> EvolutionState:
         """The P best of the grown population, without duplicates; in a forced generation what
         was fit enough goes before the old.
@@ -218,8 +237,15 @@ class Evolution:
         count = self.config.population
         pool = jax.tree.map(
             lambda a, b: jnp.concatenate([a, b]),
-            (state.genomes, state.terms, state.outcome, state.born, state.origin),
-            (proposal.offspring, judged.terms, judged.outcome, proposal.born, proposal.origin),
+            (state.genomes, state.terms, state.outcome, state.born, state.origin, state.rounds),
+            (
+                proposal.offspring,
+                judged.terms,
+                judged.outcome,
+                proposal.born,
+                proposal.origin,
+                rounds,
+            ),
         )
         fitness = self._fitness(pool[0], pool[1], generation)
         fresh = jnp.arange(fitness.shape[0]) >= count
@@ -237,7 +263,7 @@ class Evolution:
             tier = jnp.where(best & distinct, 3, tier)
         kept = jnp.lexsort((-fitness, -tier))[:count]
         kept = kept[jnp.argsort(-fitness[kept], stable=True)]
-        genomes, terms, outcome, born, origin = jax.tree.map(lambda leaf: leaf[kept], pool)
+        genomes, terms, outcome, born, origin, rounds = jax.tree.map(lambda leaf: leaf[kept], pool)
         refreshed = state.refreshed + jnp.where(state.forced, jnp.sum(admitted), 0)
         return dataclasses.replace(
             state,
@@ -247,6 +273,7 @@ class Evolution:
             born=born,
             origin=origin,
             fitness=fitness[kept],
+            rounds=rounds,
             refreshed=refreshed.astype(jnp.int32),
         )
 

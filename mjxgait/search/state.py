@@ -29,6 +29,7 @@ class EvolutionState:
     forced: [] whether the next generation is forced. spell_age, refreshed: [] of the current spell.
     spell_best: [] best fitness when the last spell began. barren: [] spells in a row that began
     without a better best than the one before.
+    rounds: [P] of which `terms` is the mean; None where nobody's earlier rounds count.
     """
 
     genomes: Any
@@ -48,6 +49,7 @@ class EvolutionState:
     refreshed: jax.Array
     spell_best: jax.Array
     barren: jax.Array
+    rounds: jax.Array | None = None
 
 
 @pytree

@@ -75,6 +75,8 @@ class RolloutConfig:
         the floor.
       termination: what counts as falling, where it differs from creature.toml.
       worst: share of the worst start in the score; the mean of the starts has the rest.
+      caution: standard errors of its starts' mean by which the score is less: who was lucky on few
+        is not believed as one that did well on many.
       physics: the fast step where the model allows it, or plain MJX.
       lanes: simulations in flight per device; 0 lets the program choose.
       block: individuals that a machine of a cluster judges at once, at most (docs/cluster.md).
@@ -100,6 +102,7 @@ class RolloutConfig:
     terminate: Annotated[bool, SHAPE] = True
     termination: TerminationConfig = dataclasses.field(default_factory=TerminationConfig)
     worst: Fraction = 0.5
+    caution: Annotated[NonNegative, SHAPE] = 0.0
     physics: Annotated[Literal["auto", "mjx"], SHAPE] = "auto"
     lanes: Annotated[Whole, SHAPE] = 0
     block: Annotated[Count, HOST] = 64
@@ -180,6 +183,8 @@ class EvolutionConfig:
         far.
       elite: that share of the population, the best, lives on among the children and is judged
         with them, for survival of children.
+      remember: whether their earlier rounds count as well: the mean of all rounds is what those
+        are worth that are judged once more.
       mutation: `redraw` re-draws two joints of one pose, `single` one joint, `pose` a whole
         pose, `gaussian` moves every joint of one pose by sigma, `mixed` is one or the other
         of the first and the last. `bit` and `byte` read the value of one joint as 8 bits over
@@ -215,6 +220,7 @@ class EvolutionConfig:
     unique_children: Annotated[bool, SHAPE] = False
     survival: Literal["best", "children"] = "best"
     elite: Annotated[Fraction, SHAPE] = 0.0
+    remember: Annotated[bool, SHAPE] = False
     mutation: Literal["redraw", "single", "pose", "gaussian", "mixed", "bit", "byte"] = "mixed"
     mutation_rate: Fraction = 0.8
     sigma: Positive = 0.12
@@ -237,6 +243,8 @@ class EvolutionConfig:
             raise ValueError("proportional is for children that are born all at once")
         if self.elite and self.survival == "best":
             raise ValueError('elite is for survival = "children": of the best all live on anyway')
+        if self.remember and not self.elite:
+            raise ValueError("remember is for an elite: nobody else is judged more than once")
         if self.elites >= self.offspring:
             raise ValueError(f"elite = {self.elite} leaves no room for children")
 

@@ -1,5 +1,6 @@
 """From the terms of several trials to one number: higher is better."""
 
+import math
 from collections.abc import Mapping, Sequence
 
 import jax
@@ -12,13 +13,18 @@ def in_order(named: Mapping[str, jax.Array], names: Sequence[str]) -> jax.Array:
     return jnp.stack([jnp.asarray(named[name], jnp.float32) for name in names])
 
 
-def score(terms: jax.Array, weights: jax.Array, worst: jax.Array | float) -> jax.Array:
+def score(
+    terms: jax.Array, weights: jax.Array, worst: jax.Array | float, caution: float = 0.0
+) -> jax.Array:
     """Fitness [...] of terms [..., R, F] under weights [F]; what is not finite scores -inf.
 
-    A mix of the worst trial and the mean of the trials.
+    A mix of the worst trial and the mean of the trials, less as many of the mean's standard errors as
+    `caution` says.
     """
     trials = jnp.sum(terms * weights, axis=-1)
     value = worst * jnp.min(trials, axis=-1) + (1 - worst) * jnp.mean(trials, axis=-1)
+    if caution:
+        value = value - caution * jnp.std(trials, axis=-1) / math.sqrt(trials.shape[-1])
     return jnp.where(jnp.isfinite(value), value, -jnp.inf)
 
 
