@@ -14,7 +14,7 @@ from mjxgait.settings.tables import dump_toml, read_toml
 
 CONFIG, CREATURE, METRICS, CHAMPION = "config.toml", "creature", "metrics.jsonl", "champion.json"
 CERTIFICATE, EXAMS, PLOT, BODY = "certificate.json", "exams.jsonl", "fitness.png", "body"
-ISLANDS, MIGRATIONS = "islands", "migrations.jsonl"
+ISLANDS, MIGRATIONS, PLOTS = "islands", "migrations.jsonl", "plots"
 
 
 def create_run(folder: Path | None, creature: Creature, config: Config) -> Path:
