@@ -231,6 +231,18 @@ def test_ctrl_c_finishes_the_generation_saves_and_says_how_to_go_on(
     assert (folder / "checkpoints" / str(last)).is_dir()
 
 
+def test_what_comes_next_is_said_before_plots_are_drawn_which_may_be_interrupted(
+    tmp_path: Path, capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
+):
+    def interrupted(run: Path):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("mjxgait.commands.train._evolve", lambda *_: True)
+    monkeypatch.setattr("mjxgait.viewing.plots.plot_run", interrupted)
+    said = said_by(capsys, "train", "--env", STOOL, "--out", tmp_path / "run", code=130)
+    assert said.index("Next:") < said.index("Drawing") < said.index("mjxgait plot")
+
+
 def test_a_folder_with_another_run_is_left_alone(
     finished: tuple[Path, str], capsys: pytest.CaptureFixture
 ):

@@ -3,6 +3,7 @@
 import argparse
 import contextlib
 import dataclasses
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -20,6 +21,7 @@ from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.folder import (
     METRICS,
     PLOT,
+    PLOTS,
     create_run,
     open_run,
     read_metrics,
@@ -107,7 +109,6 @@ def train_command(arguments: Sequence[str]) -> int:
     from mjxgait.commands.view import following
     from mjxgait.runs.experiment import prepare_devices
     from mjxgait.runs.screen import Screen
-    from mjxgait.viewing.plots import PLOTS, plot_run
 
     if options.resume:
         if options.scale:
@@ -126,13 +127,10 @@ def train_command(arguments: Sequence[str]) -> int:
     screen = Screen()
     with following(folder) if options.view else contextlib.nullcontext():
         ended = _evolve(folder, creature, config, screen, options)
-    _plot_fitness(folder)
-    if ended and options.plots:
-        plot_run(folder)
-        print(f"plots         {folder / PLOTS}/")
     if ended:
         screen.next_steps(folder, Run(folder).certified)
-    return 0 if ended else INTERRUPTED
+    drawn = _draw(folder, screen, all_plots=ended and options.plots)
+    return 0 if ended and drawn else INTERRUPTED
 
 
 def _evolve(
@@ -167,8 +165,27 @@ def _options_of(config: type[Config]) -> type[TrainOptions]:
     )
 
 
+def _draw(folder: Path, screen: "Screen", all_plots: bool) -> bool:
+    """Draws the run after all that it has to say is on the screen; returns whether nobody
+    interrupted it.
+    """
+    try:
+        _plot_fitness(folder)
+        if all_plots:
+            screen.say(
+                f"Drawing {folder / PLOTS}/; the run is done and safe, Ctrl-C leaves it here."
+            )
+            from mjxgait.viewing.plots import plot_run
+
+            plot_run(folder)
+    except KeyboardInterrupt:
+        screen.say(f"Not all is drawn; mjxgait plot {shlex.quote(str(folder))} draws it.")
+        return False
+    return True
+
+
 def _plot_fitness(folder: Path) -> None:
-    """After the result is on the screen: matplotlib is slow to import."""
+    """The curve that every run has; matplotlib is slow to import."""
     if lines := read_metrics(folder / METRICS):
         from mjxgait.viewing.curves import plot_fitness
 

@@ -12,7 +12,6 @@ from mjxgait.errors import UserError
 from mjxgait.physics.fast import UnsupportedModel, fast_plant
 from mjxgait.physics.fast.support import check_supported
 from mjxgait.physics.layout import OtherTopology, sense_layout
-from mjxgait.physics.plain import mjx_plant
 from mjxgait.types import ModelPlant
 
 SLOWER = "15 to 30"
@@ -39,6 +38,9 @@ def make_plant(
             return fast_plant(model, layout, crossings, roomy), 64
         except UnsupportedModel as reason:
             note = _cost(reason)
+    # MJX and the geometry package that it wants take half a second to import.
+    from mjxgait.physics.plain import mjx_plant
+
     try:
         return mjx_plant(model, layout, crossings, note), 16
     except NotImplementedError as error:

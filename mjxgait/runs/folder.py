@@ -14,7 +14,7 @@ from mjxgait.settings.tables import dump_toml, read_toml
 
 CONFIG, CREATURE, METRICS, CHAMPION = "config.toml", "creature", "metrics.jsonl", "champion.json"
 CERTIFICATE, STRESS, EXAMS = "certificate.json", "stress.json", "exams.jsonl"
-PLOT, BODY = "fitness.png", "body"
+PLOT, PLOTS, BODY = "fitness.png", "plots", "body"
 ISLANDS, MIGRATIONS = "islands", "migrations.jsonl"
 
 

@@ -13,7 +13,7 @@ from mjxgait.errors import UserError
 from mjxgait.parts import make_task
 from mjxgait.parts.registry import what_ends
 from mjxgait.runs.disk import disk_errors
-from mjxgait.runs.folder import CHAMPION, METRICS, open_run, read_metrics
+from mjxgait.runs.folder import CHAMPION, METRICS, PLOTS, open_run, read_metrics
 from mjxgait.settings.config import Config
 from mjxgait.viewing import strobe, trees
 from mjxgait.viewing.cast import LOOP_SECONDS, champion_of
@@ -22,8 +22,6 @@ from mjxgait.viewing.filmstrip import draw_filmstrip
 from mjxgait.viewing.gaitplots import gait_figures
 from mjxgait.viewing.style import FORMATS, Figures, figure, save
 from mjxgait.viewing.walk import Walk
-
-PLOTS = "plots"
 
 
 def plot_run(run: Path, out: Path | None = None, formats: Sequence[str] = FORMATS) -> list[Path]:
