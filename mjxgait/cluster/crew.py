@@ -5,7 +5,7 @@ Nothing here knows what the work is or where the hands are.
 
 import dataclasses
 import time
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Hashable, Iterable
 from functools import partial
 from statistics import median
@@ -167,11 +167,12 @@ class Crew:
         if len(self._took) < FEW:
             return None
         limit = self._clock() - LATE * median(self._took)
-        at_work = [turn.task for turn in self.busy.values()]
-        for turn in sorted(self.busy.values(), key=lambda turn: turn.began):
-            task = turn.task
-            if turn.began < limit and task.key in self._open and at_work.count(task) == 1:
-                return task
+        hands = Counter(turn.task for turn in self.busy.values())
+        for turn in self.busy.values():  # in the order in which they began
+            if turn.began >= limit:
+                return None
+            if turn.task.key in self._open and hands[turn.task] == 1:
+                return turn.task
         return None
 
     def _take(self, report: Report) -> None:

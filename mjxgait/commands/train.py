@@ -5,7 +5,7 @@ import contextlib
 import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import tyro
 
@@ -26,9 +26,6 @@ from mjxgait.runs.folder import (
 )
 from mjxgait.settings.config import Config, ExaminationConfig
 from mjxgait.settings.tables import build, merge
-
-if TYPE_CHECKING:  # JAX takes a second to import
-    from mjxgait.runs.screen import Screen
 
 
 @dataclasses.dataclass(frozen=True)
@@ -101,6 +98,7 @@ def train_command(arguments: Sequence[str]) -> int:
     if said := hint(config):
         print(said)
     # JAX takes a second to import: only once the options are known to be good.
+    from mjxgait.cluster.evolve import evolve
     from mjxgait.commands.view import following
     from mjxgait.runs.experiment import prepare_devices
     from mjxgait.runs.screen import Screen
@@ -122,7 +120,10 @@ def train_command(arguments: Sequence[str]) -> int:
     prepare_devices(1 if options.cluster else None)
     screen = Screen()
     with following(folder) if options.view else contextlib.nullcontext():
-        ended = _evolve(folder, creature, config, screen, options)
+        resumed = options.resume is not None
+        ended = evolve(
+            folder, creature, config, screen, resumed, options.generation, options.cluster
+        )
     _plot_fitness(folder)
     if ended and options.plots:
         plot_run(folder)
@@ -130,25 +131,6 @@ def train_command(arguments: Sequence[str]) -> int:
     if ended:
         screen.next_steps(folder, Run(folder).certified)
     return 0 if ended else INTERRUPTED
-
-
-def _evolve(
-    folder: Path, creature: Creature, config: Config, screen: "Screen", options: TrainOptions
-) -> bool:
-    """Whether the run came to its end: one population or several, here or on a cluster."""
-    from mjxgait.cluster import islands
-    from mjxgait.cluster.blocks import Blocks
-    from mjxgait.cluster.board import crew_at
-    from mjxgait.runs import loop
-
-    resume, several = options.resume is not None, config.evolution.islands.count > 1
-    if several and options.generation is not None:
-        raise UserError(f"{folder}: islands go on from their latest checkpoints, not --generation")
-    with crew_at(options.cluster, screen.console) as crew:
-        if several:
-            return islands.train(folder, creature, config, screen, crew, resume)
-        evaluator = Blocks(crew, creature, config) if options.cluster else None
-        return loop.train(folder, creature, config, screen, resume, options.generation, evaluator)
 
 
 def _options_of(config: type[Config]) -> type[TrainOptions]:
