@@ -5,7 +5,7 @@ Nothing here knows what the work is or where the hands are.
 
 import dataclasses
 import time
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Callable, Hashable, Iterable
 from functools import partial
 from statistics import median
@@ -167,13 +167,15 @@ class Crew:
         if len(self._took) < FEW:
             return None
         limit = self._clock() - LATE * median(self._took)
-        hands = Counter(turn.task for turn in self.busy.values())
         for turn in self.busy.values():  # in the order in which they began
             if turn.began >= limit:
                 return None
-            if turn.task.key in self._open and hands[turn.task] == 1:
+            if turn.task.key in self._open and not self._shared(turn.task):
                 return turn.task
         return None
+
+    def _shared(self, task: _Task) -> bool:
+        return sum(turn.task is task for turn in self.busy.values()) > 1
 
     def _take(self, report: Report) -> None:
         turn, worker = self.busy.pop(report.worker), report.worker
