@@ -75,5 +75,5 @@ def table(crew: Crew) -> Table:
     for node in sorted(there.keys() | crew.done.keys()):
         counts = (there[node], busy[node], crew.done.get(node, 0))
         shown.add_row(node, *map(str, counts))
-    shown.caption = f"{crew.open} pieces of work left"
+    shown.caption = f"pieces of work left: {crew.open}"
     return shown
