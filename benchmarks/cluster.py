@@ -1,14 +1,16 @@
-"""What a cluster of Ray costs and what it bears, on simulated machines of one core each on this one.
+"""What a cluster of Ray costs, on simulated machines of one core each on this one.
 
-    python benchmarks/cluster.py rows       # efficiency of a study's rows, two machines against one
-    python benchmarks/cluster.py blocks     # the same of one population, and ms per generation over blocks
-    python benchmarks/cluster.py calls      # ms per call and calls per second with work that does nothing
-    python benchmarks/cluster.py faults     # twenty random kills in a study and in a run on islands
-    python benchmarks/cluster.py paper FILE # 100 and 10,000 cores, reckoned from what was measured
+    python benchmarks/cluster.py rows blocks overhead calls --json FILE
 
-Needs mjxgait[cluster] and two idle cores for `rows` and `blocks`: each machine is bound to a core.
-Efficiency is the wall time with one machine over twice that with two, compilation not counted.
-`--env`, `--seconds`, `--population`, `--generations` make it smaller; `--json FILE` keeps everything.
+- rows: efficiency of a study's rows, two machines against one
+- blocks: the same of one population
+- overhead: ms per generation beside the simulation, over the size of blocks
+- calls: what handing out, taking in and putting on disk cost
+
+Needs mjxgait[cluster] and two idle cores: each machine is bound to a core. One machine and two take
+turns; efficiency is the median over laps of the wall time with one over twice that with two,
+compilation not counted. The file keeps everything, and what it has of an earlier call; `cluster_paper.py`
+reckons with it.
 """
 
 import argparse
@@ -16,11 +18,10 @@ import contextlib
 import dataclasses
 import json
 import os
-import random
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -28,10 +29,8 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "cluster"))
 
 import jax
-import psutil
 from simulated import Machines, machines
 
-from mjxgait.cluster import islands
 from mjxgait.cluster.blocks import Blocks
 from mjxgait.cluster.connect import connected
 from mjxgait.cluster.crew import Crew
@@ -40,22 +39,26 @@ from mjxgait.cluster.recipe import Recipe
 from mjxgait.creature import Creature
 from mjxgait.library import load_creature
 from mjxgait.parts import resolve_config
+from mjxgait.runs.checkpoint import Checkpoints
 from mjxgait.runs.experiment import build_experiment, prepare_devices
-from mjxgait.runs.folder import CHAMPION, create_run
-from mjxgait.runs.screen import Screen
+from mjxgait.runs.packed import pack
 from mjxgait.settings.config import Config
 from mjxgait.settings.tables import build, merge
 
-BLOCKS = (64, 256, 1024, 4096)
+SIZES = (64, 256, 1024, 4096)
+"""Of blocks, of one population of the largest."""
+RUNS = 8
 
 
 @dataclasses.dataclass(frozen=True)
 class Nothing:
-    """Work that brings back what it was given. size: bytes."""
+    """Work that brings back what it was given, after so long."""
 
-    data: bytes
+    data: bytes = b""
+    seconds: float = 0.0
 
     def do(self, programs: Any, recipe: Any) -> bytes:
+        time.sleep(self.seconds)
         return self.data
 
 
@@ -63,38 +66,172 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("what", choices=("rows", "blocks", "calls", "faults", "paper"))
-    parser.add_argument("measured", nargs="*", type=Path)
+    stages = {"rows": rows, "blocks": blocks, "overhead": overhead, "calls": calls}
+    parser.add_argument("what", nargs="+", choices=stages)
     parser.add_argument("--env", default="tall_quadruped")
-    parser.add_argument("--seconds", type=float, default=4.0)
-    parser.add_argument("--population", type=int, default=128)
-    parser.add_argument("--generations", type=int, default=5)
-    parser.add_argument("--kills", type=int, default=20)
-    parser.add_argument("--json", type=Path)
+    parser.add_argument("--seconds", type=float, default=4.0, help="of an episode")
+    parser.add_argument("--generations", type=int, default=4)
+    parser.add_argument("--laps", type=int, default=3)
+    parser.add_argument("--json", type=Path, required=True)
     options = parser.parse_args()
-    if options.what == "paper":
-        found = paper(options.measured)
-    else:
-        prepare_devices(1)
-        found = {"rows": rows, "blocks": blocks, "calls": calls, "faults": faults}[options.what](
-            options
-        )
-    found |= {"load": os.getloadavg()[0], "cores": os.cpu_count()}
-    print(json.dumps(found, indent=2))
-    if options.json:
-        options.json.write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
+    found = json.loads(options.json.read_text()) if options.json.exists() else {}
+    prepare_devices(1)
+    with bound(2) as made, connected(made.address, say) as crew:
+        for name in options.what:
+            load = [round(os.getloadavg()[0], 1)]
+            gather(crew, 2)
+            found[name] = stages[name](crew, options)
+            load.append(round(os.getloadavg()[0], 1))
+            found[name] |= {"cores": os.cpu_count(), "load before and after": load}
+            print(name, json.dumps(found[name], indent=2, ensure_ascii=False), flush=True)
+            options.json.write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
 
 
-def subject(options: argparse.Namespace, **evolution: Any) -> tuple[Creature, Config]:
+def subject(
+    options: argparse.Namespace, population: int, **rollout: Any
+) -> tuple[Creature, Config]:
     creature = load_creature(options.env)
     config = resolve_config(creature.settings.train, creature.name)
     table = {
-        "rollout": {"seconds": options.seconds},
-        "evolution": {"population": options.population, "generations": options.generations}
-        | evolution,
+        "rollout": {"seconds": options.seconds} | rollout,
+        "evolution": {"population": population},
         "examination": {"candidates": 0},
     }
     return creature, build(type(config), merge(dataclasses.asdict(config), table), "the benchmark")
+
+
+def rows(crew: Crew, options: argparse.Namespace) -> dict[str, Any]:
+    """Eight runs as pieces of work of one row each."""
+    creature, config = subject(options, 128)
+    recipes = [
+        Recipe.of(creature, [dataclasses.replace(config, seed=seed)]) for seed in range(RUNS)
+    ]
+
+    def work(until: int = options.generations) -> None:
+        crew.all((recipe, AdvanceRows(None, until)) for recipe in recipes)
+
+    for machine in (0, 1):
+        with one_of(crew, machine):
+            work(0)  # each compiles and builds all of it
+    found = in_turns(crew, work, options.laps)
+    return found | {"runs": RUNS, "generations": options.generations}
+
+
+def blocks(crew: Crew, options: argparse.Namespace) -> dict[str, Any]:
+    """Generations of one population, in eight blocks."""
+    creature, config = subject(options, 512)
+    experiment = build_experiment(creature, config)
+    step = experiment.compile(Blocks(crew, creature, config))
+    begun = experiment.place(experiment.init())
+    for machine in (0, 1):
+        with one_of(crew, machine):
+            begun, _ = step(begun)
+
+    def work() -> None:
+        state = begun
+        for _ in range(options.generations):
+            state, _ = step(state)
+        jax.block_until_ready(state)
+
+    count, worked = sum(crew.done.values()), work_of(crew)
+    found = in_turns(crew, work, options.laps)
+    pieces = sum(crew.done.values()) - count
+    return found | {
+        "blocks per generation": 8,
+        "generations": options.generations,
+        "s per block": round((work_of(crew) - worked) / pieces, 4),
+    }
+
+
+def overhead(crew: Crew, options: argparse.Namespace) -> dict[str, Any]:
+    """With one machine and the shortest of episodes: the wall time in which it does not work."""
+    found: dict[str, Any] = {"population": SIZES[-1]}
+    for size in SIZES:
+        creature, config = subject(options, SIZES[-1], seconds=0.05, block=size)
+        judged = Timed(Blocks(crew, creature, config))
+        experiment = build_experiment(creature, config)
+        step = experiment.compile(judged)
+        state = experiment.place(experiment.init())
+        beside, rest = [], []
+        with one_of(crew, 0):
+            for _ in range(6):
+                began, worked, judged.seconds = time.perf_counter(), work_of(crew), 0.0
+                state, _ = jax.block_until_ready(step(state))
+                wall = time.perf_counter() - began
+                beside.append(judged.seconds - (work_of(crew) - worked))
+                rest.append(wall - judged.seconds)
+        found[f"blocks of {size}"] = {
+            "ms beside the blocks": round(1000 * median(beside[1:]), 1),
+            "ms per block": round(1000 * median(beside[1:]) * size / SIZES[-1], 2),
+            "ms of the generation's own programs": round(1000 * median(rest[1:]), 1),
+        }
+    return found
+
+
+def calls(crew: Crew, options: argparse.Namespace) -> dict[str, Any]:
+    """With work that does nothing, hundreds of pieces at once; and what this process spends on it."""
+    recipe, found = Recipe({}, ()), dict[str, Any]()
+    for size in (100, 10_000, 1_000_000):
+        count = 400
+        began, spent = time.perf_counter(), time.process_time()
+        crew.all((recipe, Nothing(bytes(size))) for _ in range(count))
+        found[f"pieces per second, {size} bytes"] = round(count / (time.perf_counter() - began))
+        spent = 1000 * (time.process_time() - spent) / count
+        found[f"ms of this process per piece, {size} bytes"] = round(spent, 3)
+    with one_of(crew, 0):
+        began = time.perf_counter()
+        crew.all((recipe, Nothing()) for _ in range(200))
+        found["ms there and back"] = round(1000 * (time.perf_counter() - began) / 200, 2)
+    creature, config = subject(options, 128)
+    state = build_experiment(creature, config).init()
+    people = len(state.fitness)
+    found["bytes per genome"] = (
+        sum(leaf.nbytes for leaf in jax.tree.leaves(state.genomes)) // people
+    )
+    found["bytes per verdict"] = (state.terms.nbytes + state.outcome.nbytes) // people
+    found["ms to put a row's state on disk"] = storing(creature, state)
+    return found | {"µs per piece under way and look": looking(crew)}  # leaves a worker busy
+
+
+def looking(crew: Crew) -> float:
+    """Of one `ray.wait` over a thousand results that are not there yet."""
+    import ray  # `simulated` has things to say to it before
+
+    actor, _ = next(iter(crew.hands._actors.values()))
+    recipe = ray.put(Recipe({}, ()))
+    refs = [actor.do.remote(recipe, Nothing(seconds=0.02)) for _ in range(1000)]
+    began, count = time.perf_counter(), 50
+    for _ in range(count):
+        ray.wait(refs[500:], num_returns=500, timeout=0)
+    return round(1e6 * (time.perf_counter() - began) / count / 500, 2)
+
+
+def storing(creature: Creature, state: Any) -> float:
+    with tempfile.TemporaryDirectory() as scratch:
+        store = Checkpoints(Path(scratch))
+        began = time.perf_counter()
+        for generation in range(20):
+            store.keep(
+                pack(dataclasses.replace(state, generation=jax.numpy.int32(generation))),
+                creature.name,
+                creature.digest,
+            )
+        store.close()
+        return round(1000 * (time.perf_counter() - began) / 20, 1)
+
+
+class Timed:
+    """See `Evaluator`: another one, and how long it took."""
+
+    def __init__(self, evaluator: Any) -> None:
+        self._evaluator, self.seconds = evaluator, 0.0
+
+    def judge(self, genomes: Any, trials: Any, settings: Any) -> Any:
+        jax.block_until_ready(genomes)
+        began = time.perf_counter()
+        found = self._evaluator.judge(genomes, trials, settings)
+        self.seconds += time.perf_counter() - began
+        return found
 
 
 @contextlib.contextmanager
@@ -114,143 +251,37 @@ def bound(count: int) -> Iterator[Machines]:
         os.sched_setaffinity(0, before)
 
 
-def rows(options: argparse.Namespace) -> dict[str, Any]:
-    """Eight runs as pieces of work of one row each."""
-    creature, config = subject(options)
-    recipes = [Recipe.of(creature, [dataclasses.replace(config, seed=seed)]) for seed in range(8)]
-
-    def seconds(crew: Crew, count: int) -> float:
-        gather(crew, count)
-        # Everybody compiles, and evolves from the same: what is timed is the rest.
-        crew.all((recipes[0], AdvanceRows(None, 0)) for _ in range(2 * count))
-        began = time.perf_counter()
-        crew.all((recipe, AdvanceRows(None, options.generations)) for recipe in recipes)
-        return time.perf_counter() - began
-
-    return efficiency(seconds) | {"runs": len(recipes), "generations": options.generations}
+@contextlib.contextmanager
+def one_of(crew: Crew, machine: int) -> Iterator[None]:
+    """One of two machines does everything."""
+    gather(crew, 2)
+    crew.idle.sort(key=lambda worker: worker.number)
+    resting = crew.idle.pop(1 - machine)
+    yield
+    crew.idle.append(resting)
+    gather(crew, 2)
 
 
-def blocks(options: argparse.Namespace) -> dict[str, Any]:
-    """One population, and what a generation costs beside the simulation, over its size."""
-    creature, config = subject(options)
-    found: dict[str, Any] = {}
-
-    def seconds(crew: Crew, count: int) -> float:
-        gather(crew, count)
-        return timed_generations(crew, creature, config, options.generations)[0]
-
-    found |= efficiency(seconds)
-    found["ms beside the blocks"] = {}
-    for population in BLOCKS:
-        small = dataclasses.replace(
-            config,
-            rollout=dataclasses.replace(config.rollout, seconds=0.05, block=population),
-            evolution=dataclasses.replace(config.evolution, population=population),
-        )
-        with bound(1) as made, connected(made.address, say) as crew:
-            gather(crew, 1)
-            _, beside = timed_generations(crew, creature, small, 5)
-            found["ms beside the blocks"][population] = round(1000 * beside, 2)
-    return found
+def in_turns(crew: Crew, work: Callable[[], None], laps: int) -> dict[str, Any]:
+    walls: dict[str, list[float]] = {"one": [], "two": []}
+    for lap in range(laps):
+        with one_of(crew, lap % 2):
+            walls["one"].append(timed(work))
+        walls["two"].append(timed(work))
+        say(f"one machine {walls['one'][-1]:.2f} s, two {walls['two'][-1]:.2f} s")
+    each = [one / two / 2 for one, two in zip(walls["one"], walls["two"], strict=True)]
+    return {"wall_s": walls, "efficiency": round(median(each), 3), "of each lap": each}
 
 
-def timed_generations(
-    crew: Crew, creature: Creature, config: Config, count: int
-) -> tuple[float, float]:
-    """Wall time of so many generations, the first left out; and of one, the time that no worker worked."""
-    experiment = build_experiment(creature, config)
-    step = experiment.compile(Blocks(crew, creature, config))
-    state, walls, works = experiment.place(experiment.init()), [], []
-    for _ in range(count + 1):
-        began, worked = time.perf_counter(), sum(crew.hands.seconds.values())
-        state, _ = jax.block_until_ready(step(state))
-        walls.append(time.perf_counter() - began)
-        works.append(sum(crew.hands.seconds.values()) - worked)
-    beside = [wall - work for wall, work in zip(walls, works, strict=True)]
-    return sum(walls[1:]), median(beside[1:])
+def timed(work: Callable[[], None]) -> float:
+    began = time.perf_counter()
+    work()
+    return time.perf_counter() - began
 
 
-def efficiency(seconds: Any) -> dict[str, Any]:
-    """Of two machines against one."""
-    walls = {}
-    for count in (1, 2):
-        with bound(count) as made, connected(made.address, say) as crew:
-            walls[count] = seconds(crew, count)
-            say(f"{count} of one core: {walls[count]:.1f} s")
-    return {"wall_s": walls, "efficiency": round(walls[1] / walls[2] / 2, 3)}
-
-
-def calls(options: argparse.Namespace) -> dict[str, Any]:
-    """With work that does nothing, hundreds of pieces at once."""
-    recipe = Recipe({}, ())
-    found: dict[str, Any] = {}
-    with bound(2) as made, connected(made.address, say) as crew:
-        gather(crew, 2)
-        for size in (100, 10_000, 1_000_000):
-            began, count = time.perf_counter(), 400
-            crew.all((recipe, Nothing(bytes(size))) for _ in range(count))
-            found[f"pieces per second, {size} bytes"] = round(count / (time.perf_counter() - began))
-    creature, config = subject(options)
-    state = build_experiment(creature, config).init()
-    genes = sum(leaf.nbytes for leaf in jax.tree.leaves(state.genomes)) / options.population
-    verdict = (state.terms.nbytes + state.outcome.nbytes) / options.population
-    return found | {"bytes per genome": round(genes), "bytes per verdict": round(verdict)}
-
-
-def faults(options: argparse.Namespace) -> dict[str, Any]:
-    """A run on islands whose workers and machines are killed at random ends as one that nobody touched."""
-    creature, config = subject(options, islands={"count": 4, "every": 1})
-    chance, champions, losses = random.Random(0), [], []
-    with machines(2) as made, tempfile.TemporaryDirectory() as scratch:
-        spare, killed = [made.add()], 0
-        for name, kills in (("quiet", 0), ("shaken", options.kills)):
-            folder, said = Path(scratch) / name, []
-            create_run(folder, creature, config)
-            due = time.monotonic() + 10
-
-            def harm(crew: Crew, kills: int = kills) -> None:
-                nonlocal due, killed
-                if killed >= kills or time.monotonic() < due:
-                    return
-                due, killed = time.monotonic() + chance.uniform(1, 8), killed + 1
-                if chance.random() < 0.3:
-                    made.kill(spare.pop())
-                    spare.append(made.add())
-                elif found := workers():
-                    chance.choice(found).kill()
-
-            with connected(made.address, said.append, harm) as crew:
-                islands.train(folder, creature, config, Screen(), crew, resume=False)
-            champions.append((folder / CHAMPION).read_text())
-            losses.append(sum("is lost" in line for line in said))
-    return {"kills": killed, "work lost": losses, "same champion": champions[0] == champions[1]}
-
-
-def paper(files: list[Path]) -> dict[str, Any]:
-    """From what `rows` and `calls` measured."""
-    known: dict[str, Any] = {}
-    for file in files:
-        known |= json.loads(file.read_text())
-    run_s = known["wall_s"]["1"] / known["runs"]
-    rate = known["pieces per second, 10000 bytes"]
-    each = known["bytes per genome"] + known["bytes per verdict"]
-    found: dict[str, Any] = {}
-    for cores in (100, 10_000):
-        work, hand = 10_000 * run_s / cores, 10_000 / rate
-        blocks_of = 1_000_000 / 64
-        found[f"{cores} cores"] = {
-            "study of 10,000 runs, hours": round(max(work, hand) / 3600, 2),
-            "population of a million: s to hand out and collect its blocks": round(
-                blocks_of / rate, 1
-            ),
-            "MB through this machine per generation": round(1e6 * each / 1e6),
-        }
-    return found
-
-
-def workers() -> list[psutil.Process]:
-    found = psutil.process_iter(["cmdline"])
-    return [p for p in found if (p.info["cmdline"] or [""])[0].startswith("ray::RemoteWorker")]
+def work_of(crew: Crew) -> float:
+    """Seconds that all workers have worked."""
+    return float(sum(crew.hands.seconds.values()))
 
 
 def gather(crew: Crew, count: int) -> None:

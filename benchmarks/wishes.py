@@ -6,6 +6,7 @@ processes, one after the other.
 
 For each creature every speed, then every gait that a body with so many feet has; one row each, with
 the speed in C MuJoCo, the gait's name there, whether the champion is certified, and the wall time.
+Options after `--` go to `train`, such as `-- --cluster HOST:PORT`.
 """
 
 import argparse
@@ -35,6 +36,7 @@ def main() -> None:
     parser.add_argument("--gaits", nargs="*", default=GAITS_ASKED)
     parser.add_argument("--seeds", nargs="+", type=int, default=[0])
     parser.add_argument("--json", type=Path, required=True, help="file for all numbers")
+    parser.add_argument("more", nargs="*", help="options of train, after --")
     options = parser.parse_args()
     row(HEADER)
     row(["---"] * len(HEADER))
@@ -45,17 +47,17 @@ def main() -> None:
         asked += [["--gait", gait] for gait in options.gaits if gait in known]
         for wish in asked:
             for seed in options.seeds:
-                found.append(run(env, wish, seed))
+                found.append(run(env, wish, seed, options.more))
                 row([str(value) for value in found[-1].values()])
                 options.json.write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
 
 
-def run(env: str, wish: list[str], seed: int) -> dict:
+def run(env: str, wish: list[str], seed: int, more: list[str]) -> dict:
     """One run of the command, and what came of it."""
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch) / "run"
         command = [sys.executable, "-m", "mjxgait", "train", "--env", env, "--seed", str(seed)]
-        command += [*wish, "--out", str(folder), "--no-plots"]
+        command += [*wish, "--out", str(folder), "--no-plots", *more]
         began = time.perf_counter()
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL, env=dict(os.environ))
         seconds = time.perf_counter() - began

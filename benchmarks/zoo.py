@@ -4,7 +4,8 @@ says of the champions.
     python benchmarks/zoo.py --env tall_quadruped short_quadruped --seeds 0 1 2 3 4 \\
         --config default --out runs/zoo
 
-A run that is there already is not repeated. Columns: whether the champion is certified ("outdated"
+A run that is there already is not repeated. Options after `--` go to `train`, such as
+`-- --cluster HOST:PORT`. Columns: whether the champion is certified ("outdated"
 when the certificate is another champion's, or does not say whose) and the margin of its worst
 criterion; which criteria fail; speed over the certificate's 20 s; body lengths per second from the
 nominal start over evolution's own episode, in the simulation that evolved it and in C MuJoCo; share
@@ -53,17 +54,21 @@ def main() -> None:
         "--candidates", type=int, default=12, help="how many of the best are looked at in the end"
     )
     parser.add_argument("--out", type=Path, default=Path("runs/zoo"))
+    parser.add_argument("more", nargs="*", help="options of train, after --")
     options = parser.parse_args()
+    more = ["--examination.candidates", str(options.candidates), *options.more]
+    if options.config:
+        more += ["--config", options.config]
     print(*HEADER, sep=" | ")
     for name in options.env:
         for seed in options.seeds:
             folder = options.out / f"{name}-{seed}"
-            wall = train(folder, name, seed, options.config, options.candidates)
+            wall = train(folder, name, seed, more)
             print(*row(folder, seed, wall), sep=" | ", flush=True)
 
 
-def train(folder: Path, name: str, seed: int, config: str | None, candidates: int) -> float:
-    """Wall time of the run in s; the one noted beside it when it is there already."""
+def train(folder: Path, name: str, seed: int, more: list[str]) -> float:
+    """Wall time of the run in s; the one noted beside it when it is there already. more: options."""
     note = folder.with_suffix(".wall")
     if not note.exists():
         command = [
@@ -79,13 +84,8 @@ def train(folder: Path, name: str, seed: int, config: str | None, candidates: in
             str(folder),
             "--no-plots",
         ]
-        command += ["--examination.candidates", str(candidates)]
         began = time.perf_counter()
-        subprocess.run(
-            command + (["--config", config] if config else []),
-            check=True,
-            stdout=subprocess.DEVNULL,
-        )
+        subprocess.run([*command, *more], check=True, stdout=subprocess.DEVNULL)
         note.write_text(str(time.perf_counter() - began))
     return float(note.read_text())
 

@@ -156,9 +156,9 @@ def train(
     """
     from rich.console import Console
 
+    from mjxgait.cluster.evolve import evolve
     from mjxgait.parts import resolve_config
     from mjxgait.parts.wishes import Wishes, wished
-    from mjxgait.runs import loop
     from mjxgait.runs.experiment import prepare_devices
     from mjxgait.runs.screen import Screen
 
@@ -183,7 +183,7 @@ def train(
     folder = create_run(Path(out) if out else None, creature, chosen)
     prepare_devices()
     screen = Screen(Console(quiet=True)) if quiet else Screen()
-    loop.train(folder, creature, chosen, screen)
+    evolve(folder, creature, chosen, screen)
     return Run(folder)
 
 

@@ -215,7 +215,10 @@ def _lay(config: Config, table: Mapping[str, Any], where: str) -> Config:
         raise UserError(
             f"{where}: seeds and generations are the study's own keys, not settings of a variant"
         )
-    return build(type(config), merge(dataclasses.asdict(config), table), where)
+    laid = build(type(config), merge(dataclasses.asdict(config), table), where)
+    if laid.evolution.islands.count > 1:
+        raise UserError(f"{where}: a run of a study is one population; leave evolution.islands out")
+    return laid
 
 
 def _grid(study: Study, where: str) -> list[VariantTable]:

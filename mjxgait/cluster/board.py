@@ -1,6 +1,7 @@
 """All machines on one screen: a live table in a terminal, one line per arrival and loss elsewhere."""
 
 import contextlib
+import time
 from collections import Counter
 from collections.abc import Iterator
 from types import TracebackType
@@ -13,6 +14,9 @@ from rich.table import Table
 from mjxgait.cluster.connect import connected
 from mjxgait.cluster.crew import Crew
 from mjxgait.cluster.here import Here
+
+A_SECOND = 4
+"""Looks at the crew; with thousands of workers one takes as long as handing out work."""
 
 
 @contextlib.contextmanager
@@ -34,7 +38,8 @@ class Board:
 
     def __init__(self, console: Console | None = None) -> None:
         self.console = console or Console(highlight=False, soft_wrap=True)
-        self._live = Live(console=self.console, transient=True, refresh_per_second=4)
+        self._live = Live(console=self.console, transient=True, refresh_per_second=A_SECOND)
+        self._shown = 0.0
 
     def __enter__(self) -> Self:
         if self.console.is_terminal:
@@ -55,7 +60,8 @@ class Board:
 
     def watch(self, crew: Crew) -> None:
         """Shows how things stand."""
-        if self.console.is_terminal:
+        if self.console.is_terminal and time.monotonic() - self._shown > 1 / A_SECOND:
+            self._shown = time.monotonic()
             self._live.update(table(crew))
 
 
@@ -69,5 +75,5 @@ def table(crew: Crew) -> Table:
     for node in sorted(there.keys() | crew.done.keys()):
         counts = (there[node], busy[node], crew.done.get(node, 0))
         shown.add_row(node, *map(str, counts))
-    shown.caption = f"{crew.open} pieces of work left"
+    shown.caption = f"pieces of work left: {crew.open}"
     return shown

@@ -167,12 +167,15 @@ class Crew:
         if len(self._took) < FEW:
             return None
         limit = self._clock() - LATE * median(self._took)
-        at_work = [turn.task for turn in self.busy.values()]
-        for turn in sorted(self.busy.values(), key=lambda turn: turn.began):
-            task = turn.task
-            if turn.began < limit and task.key in self._open and at_work.count(task) == 1:
-                return task
+        for turn in self.busy.values():  # in the order in which they began
+            if turn.began >= limit:
+                return None
+            if turn.task.key in self._open and not self._shared(turn.task):
+                return turn.task
         return None
+
+    def _shared(self, task: _Task) -> bool:
+        return sum(turn.task is task for turn in self.busy.values()) > 1
 
     def _take(self, report: Report) -> None:
         turn, worker = self.busy.pop(report.worker), report.worker

@@ -7,6 +7,7 @@ to the crew, and a new worker is started where the machine still lives.
 import dataclasses
 import sys
 import time
+from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
@@ -28,7 +29,7 @@ EVERY = 1.0
 
 @dataclasses.dataclass(frozen=True)
 class Node:
-    """A machine of the cluster. name: its address, with a number where several have the same."""
+    """A machine of the cluster. name: its address, with a number if one of that address was there before."""
 
     id: str
     name: str
@@ -51,6 +52,7 @@ class Machines:
         self._working: dict[Any, Worker] = {}
         self._actors: dict[Worker, tuple[Any, Node]] = {}
         self._nodes: dict[str, Node] = {}
+        self._met: Counter[str] = Counter()
         self._tags: dict[str, str] = {}
         self._kinds: dict[str, str] = {}
         self._recipes: dict[str, Any] = {}
@@ -122,8 +124,8 @@ class Machines:
 
     def _look_at(self, row: dict[str, Any], cores: int) -> None:
         address = row["NodeManagerAddress"]
-        same = sum(known.name.partition(" ")[0] == address for known in self._nodes.values())
-        name = f"{address} ({same + 1})" if same else address
+        self._met[address] += 1
+        name = address if self._met[address] == 1 else f"{address} ({self._met[address]})"
         node = self._nodes[row["NodeID"]] = Node(row["NodeID"], name, cores)
         ask = ray.remote(nodes.look).options(num_cpus=0, max_retries=0, **_on(node))
         self._looking[ask.remote()] = node

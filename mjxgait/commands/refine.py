@@ -101,9 +101,9 @@ def _settings(options: RefineOptions, creature: Creature) -> Config:
 
 def _run(folder: Path, creature: Creature, config: Config, resume: bool) -> int:
     """Evolves near the cycle, has the champion examined, and tells how far it departs."""
+    from mjxgait.cluster.evolve import evolve
     from mjxgait.keys.departure import departure
     from mjxgait.keys.refine import read_original
-    from mjxgait.runs import loop
     from mjxgait.runs.experiment import prepare_devices
     from mjxgait.runs.screen import Screen
     from mjxgait.viewing.cast import LOOP_SECONDS, champion_of
@@ -111,7 +111,7 @@ def _run(folder: Path, creature: Creature, config: Config, resume: bool) -> int:
     original = read_original(folder, creature)
     prepare_devices()
     screen = Screen()
-    if not loop.train(folder, creature, config, screen, resume=resume):
+    if not evolve(folder, creature, config, screen, resume):
         return INTERRUPTED
     found = departure(original, champion_of(folder, LOOP_SECONDS).walk)
     moved = "" if found.moved is None else f", as moved {found.moved:.1f}"

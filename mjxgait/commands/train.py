@@ -106,6 +106,7 @@ def train_command(arguments: Sequence[str]) -> int:
     if said := hint(config):
         print(said)
     # JAX takes a second to import: only once the options are known to be good.
+    from mjxgait.cluster.evolve import evolve
     from mjxgait.commands.view import following
     from mjxgait.runs.experiment import prepare_devices
     from mjxgait.runs.screen import Screen
@@ -126,30 +127,14 @@ def train_command(arguments: Sequence[str]) -> int:
     prepare_devices(1 if options.cluster else None)
     screen = Screen()
     with following(folder) if options.view else contextlib.nullcontext():
-        ended = _evolve(folder, creature, config, screen, options)
+        resumed = options.resume is not None
+        ended = evolve(
+            folder, creature, config, screen, resumed, options.generation, options.cluster
+        )
     if ended:
         screen.next_steps(folder, Run(folder).certified)
     drawn = _draw(folder, screen, all_plots=ended and options.plots)
     return 0 if ended and drawn else INTERRUPTED
-
-
-def _evolve(
-    folder: Path, creature: Creature, config: Config, screen: "Screen", options: TrainOptions
-) -> bool:
-    """Whether the run came to its end: one population or several, here or on a cluster."""
-    from mjxgait.cluster import islands
-    from mjxgait.cluster.blocks import Blocks
-    from mjxgait.cluster.board import crew_at
-    from mjxgait.runs import loop
-
-    resume, several = options.resume is not None, config.evolution.islands.count > 1
-    if several and options.generation is not None:
-        raise UserError(f"{folder}: islands go on from their latest checkpoints, not --generation")
-    with crew_at(options.cluster, screen.console) as crew:
-        if several:
-            return islands.train(folder, creature, config, screen, crew, resume)
-        evaluator = Blocks(crew, creature, config) if options.cluster else None
-        return loop.train(folder, creature, config, screen, resume, options.generation, evaluator)
 
 
 def _options_of(config: type[Config]) -> type[TrainOptions]:

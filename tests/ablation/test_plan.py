@@ -121,6 +121,10 @@ def test_values_share_a_program_and_shapes_need_one_each(stool: Creature):
             {"variant": [TWO[0], {"name": "x", "settings": {"seed": 3}}]},
             ["seeds and generations are the study's own keys"],
         ),
+        (
+            {"base": {"evolution": {"islands": {"count": 4}}}},
+            ["[base]", "one population; leave evolution.islands out"],
+        ),
         ({"base": {"rollout": {"start": 3}}}, ["[base]", "start"]),
         ({"measure": "beauty"}, ["measure", "beauty"]),
         ({"measure": "generations"}, ["threshold"]),

@@ -6,9 +6,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from helpers import said_by, small_config
+from helpers import STOOL, said_by, small_config
 from rich.console import Console
 
+import mjxgait
 from mjxgait.champion import read_champion
 from mjxgait.cluster import islands
 from mjxgait.cluster.crew import Crew
@@ -144,6 +145,16 @@ def test_inspect_tells_each_island_and_what_came_to_it(
     ]
     assert rows[1]["ahead"] == sum(better)
     assert island_facts(finished, 2)[0]["arrived"] == 0
+
+
+def test_they_are_run_from_python_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    ran = []
+    monkeypatch.setattr(
+        islands, "train", lambda folder, creature, config, *others: ran.append(config)
+    )
+    given = {"evolution": {"islands": {"count": 3}}}
+    mjxgait.train(STOOL, out=tmp_path / "run", settings=given, quiet=True)
+    assert [config.evolution.islands.count for config in ran] == [3]
 
 
 def test_a_checkpoint_of_islands_cannot_be_chosen(finished: Path, capsys: pytest.CaptureFixture):

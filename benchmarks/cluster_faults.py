@@ -1,0 +1,191 @@
+"""What a cluster of Ray bears, on simulated machines of one core each on this one.
+
+    python benchmarks/cluster_faults.py study    # random kills of workers, machines and the command
+    python benchmarks/cluster_faults.py islands  # the same in a run on four islands
+    python benchmarks/cluster_faults.py disk     # a machine whose disk is full (mounts one: needs root)
+
+One run that nobody touches, then others until there were `--kills` kills; a killed command is called
+again with `--resume`. All must end the same, and no champion that was written may be written again.
+"""
+
+import argparse
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "cluster"))
+
+import psutil
+from simulated import machines
+
+from mjxgait.runs.folder import read_metrics
+
+STOOL = Path(__file__).parents[1] / "tests" / "data" / "stool"
+STUDY = f"""question = "Who is killed?"
+env = "{STOOL}"
+seeds = 4
+generations = 60
+rows = 1
+base = {{ evolution = {{ population = 6 }}, rollout = {{ seconds = 0.4, starts = 2, lanes = 4 }} }}
+
+[[variant]]
+name = "base"
+
+[[variant]]
+name = "slow"
+settings = {{ evolution = {{ mutation_rate = 0.1 }} }}
+"""
+ISLANDS = f"""--env {STOOL} --population 6 --generations 60 --evolution.islands.count 4
+--evolution.islands.every 2 --rollout.seconds 0.4 --rollout.starts 2 --rollout.lanes 4
+--examination.candidates 0 --no-plots""".split()
+TIMES = ("wall_s", "steps_per_second")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("what", choices=("study", "islands", "disk"))
+    parser.add_argument("--kills", type=int, default=20)
+    parser.add_argument("--seed", type=int, default=0)
+    options = parser.parse_args()
+    # Who dies does not depend on how fast the programs are.
+    os.environ.setdefault("JAX_DISABLE_MOST_OPTIMIZATIONS", "1")
+    with tempfile.TemporaryDirectory() as scratch:
+        found = (
+            disk(Path(scratch))
+            if options.what == "disk"
+            else kills(Path(scratch), options.what, options.kills, random.Random(options.seed))
+        )
+    print(json.dumps(found, indent=2))
+
+
+def kills(scratch: Path, what: str, count: int, chance: random.Random) -> dict[str, Any]:
+    with machines(2) as made:
+        spare, killed, ends = [made.add()], Counter[str](), Counter[str]()
+        again: list[str] = []
+        quiet = Command(what, scratch / "quiet", made.address)
+        quiet.wait()
+        while killed.total() < count:
+            folder = scratch / str(ends.total())
+            command = Command(what, folder, made.address)
+            while command.runs_for(chance.uniform(1, 6)) and killed.total() < count:
+                kind = chance.choices(("worker", "machine", "command"), (5, 3, 2))[0]
+                if kind == "command":
+                    written = stamps(folder)
+                    command = command.killed_and_resumed()
+                    again += [name for name in written if stamps(folder)[name] != written[name]]
+                elif kind == "machine":
+                    made.kill(spare.pop())
+                    spare.append(made.add())
+                elif found := workers():
+                    chance.choice(found).kill()
+                else:
+                    continue
+                killed[kind] += 1
+                say(f"{killed.total()} of {count}: {kind}")
+            command.wait()
+            ends["same" if results(folder) == results(scratch / "quiet") else "other"] += 1
+    return {"killed": killed, "ended as the quiet one": ends, "written again": again}
+
+
+class Command:
+    """`mjxgait` as a process; what it says goes into a file beside the folder."""
+
+    def __init__(self, what: str, folder: Path, address: str, resume: bool = False) -> None:
+        self.what, self.folder, self.address = what, folder, address
+        name = "ablate" if what == "study" else "train"
+        given = ["--resume", folder] if resume else ["--out", folder]
+        if what == "study" and not resume:
+            (study := folder.with_suffix(".toml")).write_text(STUDY)
+            given = [study, *given]
+        elif not resume:
+            given = [*ISLANDS, *given]
+        self.log = folder.with_suffix(".log")
+        with self.log.open("a") as log:
+            self.process = subprocess.Popen(
+                [sys.executable, "-m", "mjxgait", name, *map(str, given), "--cluster", address],
+                stdout=log,
+                stderr=subprocess.STDOUT,
+            )
+
+    def runs_for(self, seconds: float) -> bool:
+        """Whether it does so."""
+        try:
+            self.process.wait(seconds)
+        except subprocess.TimeoutExpired:
+            return True
+        return False
+
+    def wait(self) -> None:
+        if code := self.process.wait(timeout=400):
+            raise SystemExit(f"ended with {code}:\n{self.log.read_text()[-3000:]}")
+
+    def killed_and_resumed(self) -> "Command":
+        self.process.send_signal(signal.SIGKILL)
+        self.process.wait()
+        begun = (self.folder / "creature").exists()
+        return Command(self.what, self.folder, self.address, resume=begun)
+
+
+def results(folder: Path) -> dict[str, Any]:
+    """All that a study or a run on islands leaves, but the time that it took."""
+    champions = [*folder.glob("champions/*.json"), *folder.glob("champion.json")]
+    logs = [*folder.glob("groups/*/metrics.jsonl"), *folder.glob("islands/*/metrics.jsonl")]
+    found: dict[str, Any] = {str(path.relative_to(folder)): path.read_text() for path in champions}
+    for path in (*logs, *folder.glob("*.jsonl")):
+        lines = read_metrics(path)
+        found[str(path.relative_to(folder))] = [
+            {key: value for key, value in line.items() if key not in TIMES} for line in lines
+        ]
+    return found
+
+
+def stamps(folder: Path) -> dict[str, int]:
+    """When each champion of a study that has ended was written."""
+    return {path.name: path.stat().st_mtime_ns for path in folder.glob("champions/*.json")}
+
+
+def disk(scratch: Path) -> dict[str, Any]:
+    """The same study with a machine that can keep nothing in its cache folder."""
+    os.environ.pop("JAX_COMPILATION_CACHE_DIR", None)  # it would come before the user's own
+    full = scratch / "full"
+    full.mkdir()
+    mounted = ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(full)]
+    subprocess.run(mounted, check=True)
+    try:
+        with machines(1) as made:
+            Command("study", scratch / "quiet", made.address).wait()
+            (full / "filler").write_bytes(bytes(60 * 2**10))
+            made.add(env_vars={"XDG_CACHE_HOME": str(full)})
+            began = time.monotonic()
+            command = Command("study", scratch / "full-run", made.address)
+            command.wait()
+            return {
+                "same": results(scratch / "quiet") == results(scratch / "full-run"),
+                "said": [s for s in command.log.read_text().splitlines() if "cluster:" in s],
+                "s": round(time.monotonic() - began, 1),
+            }
+    finally:
+        subprocess.run(["umount", "-l", str(full)], check=True)
+
+
+def workers() -> list[psutil.Process]:
+    found = psutil.process_iter(["cmdline"])
+    return [p for p in found if (p.info["cmdline"] or [""])[0].startswith("ray::RemoteWorker")]
+
+
+def say(line: str) -> None:
+    print(line, file=sys.stderr, flush=True)
+
+
+if __name__ == "__main__":
+    main()

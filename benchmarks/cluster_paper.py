@@ -1,0 +1,174 @@
+"""A large cluster on paper: the crew as it is, hands and a clock that are made up from measured costs.
+
+    python benchmarks/cluster_paper.py FILE          # that `cluster.py rows blocks calls` wrote
+    python benchmarks/cluster_paper.py FILE --check  # the same reckoning against Ray, tiny fake work
+
+What is counted: the seconds of a piece of work; what handing out and taking in cost this machine, one
+after the other, by their number and their bytes; a look at all that is under way at every turn; and
+putting on disk what has come back. Not counted: Ray's own limits in numbers of machines and actors,
+the networks of real buildings, compilation.
+"""
+
+import argparse
+import dataclasses
+import heapq
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+from cluster import Nothing, gather, say
+from simulated import machines
+
+from mjxgait.cluster.connect import connected
+from mjxgait.cluster.crew import Crew, Report, Worker
+from mjxgait.cluster.recipe import Recipe
+from mjxgait.commands.ablate import ROWS, STRIDE
+
+RUNS, PEOPLE, BLOCK = 10_000, 1_000_000, 64
+MB = 1e6
+
+
+@dataclasses.dataclass(frozen=True)
+class Costs:
+    """Seconds of this machine per piece of work, per byte, per look at a piece under way; latency: of one piece."""
+
+    piece: float
+    byte: float
+    look: float
+    latency: float
+
+    @classmethod
+    def of(cls, calls: dict[str, Any]) -> "Costs":
+        """As `cluster.py calls` found them."""
+        spent = [calls[f"ms of this process per piece, {n} bytes"] / 1e3 for n in (100, 1_000_000)]
+        # What is sent comes back.
+        return cls(
+            piece=spent[0],
+            byte=max(spent[1] - spent[0], 0.0) / 2e6,
+            look=calls["µs per piece under way and look"] / 1e6,
+            latency=calls["ms there and back"] / 1e3,
+        )
+
+
+@dataclasses.dataclass(frozen=True)
+class Piece:
+    """Work on paper: how long it takes and what travels, there and back; disk: s to keep the result."""
+
+    seconds: float
+    size: int
+    disk: float = 0.0
+
+
+class Paper:
+    """See `Hands`. Its clock is the crew's; whatever this machine does itself moves it on."""
+
+    def __init__(self, workers: int, costs: Costs) -> None:
+        self.now, self.costs = 0.0, costs
+        self._coming = [Worker(number, "paper") for number in range(workers)]
+        self._ends: list[tuple[float, int, Worker, Piece]] = []
+        self.worked = 0.0
+
+    def arrivals(self) -> list[Worker]:
+        coming, self._coming = self._coming, []
+        return coming
+
+    def start(self, worker: Worker, recipe: Any, job: Any) -> None:
+        self.now += self.costs.piece + self.costs.byte * job.size
+        self.worked += job.seconds
+        end = self.now + self.costs.latency + job.seconds
+        heapq.heappush(self._ends, (end, worker.number, worker, job))
+
+    def wait(self, seconds: float) -> list[Report]:
+        self.now += self.costs.look * len(self._ends)
+        first = self._ends[0][0] if self._ends else self.now + seconds
+        self.now = max(self.now, min(first, self.now + seconds))
+        done = []
+        while self._ends and self._ends[0][0] <= self.now:
+            _, _, worker, job = heapq.heappop(self._ends)
+            done.append(Report(worker, job))
+        self.now += sum(report.value.disk for report in done)
+        return done
+
+
+def on_paper(
+    workers: int, costs: Costs, piece: Piece, count: int, in_a_row: int = 1
+) -> tuple[float, float]:
+    """Seconds for so many times so many pieces of which each follows on the one before; share of the workers' time that they work."""
+    hands = Paper(workers, costs)
+    crew = Crew(hands, clock=lambda: hands.now)
+    left = dict.fromkeys(range(count), in_a_row)
+    for key in left:
+        crew.submit(key, lambda: (None, piece))
+    while left:
+        key, _ = crew.next(bool)
+        left[key] -= 1
+        if left[key]:
+            crew.submit(key, lambda: (None, piece), first=True)
+        else:
+            del left[key]
+    return hands.now, count * in_a_row * piece.seconds / (workers * hands.now)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("file", type=Path)
+    parser.add_argument("--check", action="store_true")
+    options = parser.parse_args()
+    known = json.loads(options.file.read_text())
+    costs = Costs.of(known["calls"])
+    say(str(costs))
+    print(json.dumps(checked(costs) if options.check else reckoned(known, costs), indent=2))
+
+
+def reckoned(known: dict[str, Any], costs: Costs) -> dict[str, Any]:
+    rows, calls, blocks = known["rows"], known["calls"], known["blocks"]
+    of_one = min(rows["wall_s"]["one"]) / rows["runs"] / (rows["generations"] + 1)
+    state = 128 * (calls["bytes per genome"] + calls["bytes per verdict"])
+    disk, last = calls["ms to put a row's state on disk"] / 1e3, 30
+    each = BLOCK * (calls["bytes per genome"] + calls["bytes per verdict"]) // 2
+    found: dict[str, Any] = {"s per generation of a run": round(of_one, 3)}
+    for cores in (100, 10_000):
+        for rows_of, stride in ((ROWS, STRIDE), (1, STRIDE), (1, last)):
+            piece = Piece(rows_of * stride * of_one, rows_of * state, disk)
+            wall, used = on_paper(cores, costs, piece, RUNS // rows_of, last // stride)
+            found[
+                f"{cores} cores: {RUNS} runs of {last} generations, "
+                f"{rows_of} runs and {stride} generations a piece"
+            ] = told(wall, used)
+        for block in (BLOCK, 1024):
+            piece = Piece(blocks["s per block"] * block / BLOCK, each * block // BLOCK)
+            wall, used = on_paper(cores, costs, piece, -(-PEOPLE // block))
+            found[f"{cores} cores: one generation of a million, blocks of {block}"] = told(
+                wall, used
+            )
+    return found
+
+
+def told(wall: float, used: float) -> str:
+    return f"{wall:.0f} s, cores at work {used:.0%}"
+
+
+def checked(costs: Costs) -> dict[str, Any]:
+    """Sixteen workers that sleep: they share two cores, so the pieces must be tiny only in what they compute."""
+    workers, count, found = 16, 400, {}
+    with machines(1) as made:
+        made.add(cores=workers - 1)
+        with connected(made.address, say) as crew:
+            gather(crew, workers)
+            recipe = Recipe({}, ())
+            for seconds in (0.02, 0.1, 0.3):
+                began = time.perf_counter()
+                crew.all((recipe, Nothing(bytes(1000), seconds)) for _ in range(count))
+                wall = time.perf_counter() - began
+                paper, _ = on_paper(workers, costs, Piece(seconds, 1000), count)
+                found[f"{count} pieces of {seconds} s"] = (
+                    f"{wall:.2f} s, on paper {paper:.2f} s ({paper / wall - 1:+.0%})"
+                )
+    return found | {"workers": workers}
+
+
+if __name__ == "__main__":
+    main()

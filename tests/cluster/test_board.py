@@ -1,0 +1,50 @@
+"""What is seen of the machines of a cluster."""
+
+import io
+
+import pytest
+from rich.console import Console
+
+from mjxgait.cluster.board import Board, table
+from mjxgait.cluster.crew import Crew, Worker
+from mjxgait.cluster.here import Here
+
+
+@pytest.fixture
+def crew() -> Crew:
+    """Two workers of one machine, one at work; one of another, idle; a third machine has left."""
+    made = Crew(Here())
+    one, other, third = Worker(0, "10.0.0.5"), Worker(1, "10.0.0.5"), Worker(2, "10.0.0.7")
+    made.submit("work", lambda: (None, None))
+    made.busy = {one: None}
+    made.idle = [other, third]
+    made.done = {"10.0.0.5": 12, "10.0.0.6": 3}
+    return made
+
+
+def shown(crew: Crew, terminal: bool) -> str:
+    out = io.StringIO()
+    console = Console(file=out, force_terminal=terminal, width=80, highlight=False)
+    with Board(console) as board:
+        board.tell("10.0.0.6 has left")
+        board.watch(crew)
+    return out.getvalue()
+
+
+def test_a_row_per_machine(crew: Crew):
+    out = io.StringIO()
+    Console(file=out, width=80).print(table(crew))
+    head, *rows, caption = [line.split() for line in out.getvalue().splitlines()]
+    assert head == ["machine", "workers", "at", "work", "done"]
+    assert rows == [
+        ["10.0.0.5", "2", "1", "12"],
+        ["10.0.0.6", "0", "0", "3"],
+        ["10.0.0.7", "1", "0", "0"],
+    ]
+    assert " ".join(caption) == "pieces of work left: 1"
+
+
+def test_in_a_terminal_it_is_a_table_and_elsewhere_lines(crew: Crew):
+    assert "cluster: 10.0.0.6 has left" in shown(crew, terminal=True)
+    assert "at work" in shown(crew, terminal=True)
+    assert shown(crew, terminal=False) == "cluster: 10.0.0.6 has left\n"
