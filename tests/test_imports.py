@@ -34,7 +34,7 @@ FLOORS = (
     ("body",),
     ("creature",),
     ("settings",),
-    ("ground",),
+    ("ground", "clips"),
     ("types", "cores"),
     ("errors",),
 )

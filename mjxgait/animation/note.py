@@ -6,7 +6,7 @@ import numpy as np
 
 from mjxgait.animation.loop import WalkLoop
 from mjxgait.champion.codecs import codec_of
-from mjxgait.keys.own import NOTE
+from mjxgait.clips.clip import NOTE
 
 SAMPLES = 60
 """Of a cycle's motion."""

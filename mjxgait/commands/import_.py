@@ -16,7 +16,8 @@ Words = Annotated[tuple[str, ...], tyro.conf.UseAppendAction]
 
 @dataclasses.dataclass(frozen=True)
 class ImportOptions:
-    """Make a creature folder from a model file (MJCF or URDF), and tell every change and guess.
+    """Make a creature folder from a model file (MJCF or URDF) or from a character's skeleton (BVH, or a
+    skinned GLB), and tell every change and guess.
 
     Attributes:
       model: The file.
@@ -29,6 +30,7 @@ class ImportOptions:
       freeze: Pattern of joints to freeze; may be given several times.
       up: Axis of the file that points up, where the guess is wrong.
       forward: Axis along which it should walk, where the guess is wrong.
+      height: Metres that a skeleton is tall at rest, where the guess of its unit is wrong.
       force: Write over a creature folder that is there already.
     """
 
@@ -40,6 +42,7 @@ class ImportOptions:
     freeze: Words = ()
     up: Literal["x", "y", "z"] | None = None
     forward: Literal["x", "-x", "y", "-y"] | None = None
+    height: float | None = None
     force: bool = False
 
 
@@ -53,6 +56,7 @@ def import_command(arguments: Sequence[str]) -> int:
         options.freeze,
         options.up,
         options.forward,
+        options.height,
     )
     check_folder(options.out, choices.search, options.model, options.force)
     imported = import_model(options.model, choices)

@@ -9,6 +9,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from mjxgait.clips.clip import ELSEWHERE
 from mjxgait.creature import geometry
 from mjxgait.errors import UserError
 from mjxgait.importing.anatomy import Anatomy
@@ -20,6 +21,7 @@ from mjxgait.importing.mjcf import clean_mjcf
 from mjxgait.importing.notes import Notes, listed
 from mjxgait.importing.orient import find_forward, find_mirror, is_planar, yaw_to
 from mjxgait.importing.parts import HINGE, one_line, plain_names, rotation
+from mjxgait.importing.rigged import RIGS, UP, model_of
 from mjxgait.importing.root import in_plane
 from mjxgait.importing.same import check_same
 from mjxgait.importing.skeleton import build_bodies
@@ -39,7 +41,7 @@ XML, TOML, README = WRITTEN = ("creature.xml", "creature.toml", "README.md")
 class ImportChoices:
     """What the user says about a model.
 
-    keep, freeze: patterns of joint names. apart: whether to compile in a process of its own.
+    keep, freeze: patterns of joint names. height: m, of a skeleton at rest. apart: whether to compile in a process of its own.
     """
 
     name: str | None = None
@@ -48,6 +50,7 @@ class ImportChoices:
     freeze: tuple[str, ...] = ()
     up: str | None = None
     forward: str | None = None
+    height: float | None = None
     apart: bool = True
 
 
@@ -65,7 +68,7 @@ class Imported:
 
 
 def import_model(path: Path, choices: ImportChoices | None = None) -> Imported:
-    """A creature from somebody's MJCF or URDF file.
+    """A creature from somebody's MJCF or URDF file, or from a skeleton (BVH, skinned GLB).
 
     Raises:
       UserError: it cannot be read, or is nothing that could walk; names the element and the way
@@ -90,13 +93,16 @@ def import_model(path: Path, choices: ImportChoices | None = None) -> Imported:
 
 
 def _import(path: Path, choices: ImportChoices, notes: Notes) -> Imported:
-    source = read_source(path, choices.search, notes)
+    source = _read(path, choices, notes)
     compiled = compile_apart if choices.apart else compile_here
     model, changes = compiled(source.tree, source.assets, source.missing)
     for what, why in changes:
         notes.change(what, why)
     _tell_dropped(model, notes)
-    anatomy = find_anatomy(model, source.coupled, choices.keep, choices.freeze, choices.up, notes)
+    up = choices.up or source.up
+    anatomy = find_anatomy(model, source.coupled, choices.keep, choices.freeze, up, notes)
+    if source.up and not choices.up:
+        notes.guess("up", source.up, "high", "the convention of BVH and glTF")
     _tell_left_out(model, anatomy, notes)
     bodies = build_bodies(model, anatomy, source.efforts, notes)
     puppet = Puppet(
@@ -119,6 +125,20 @@ def _import(path: Path, choices: ImportChoices, notes: Notes) -> Imported:
     name = plain_names([choices.name or path.stem], ["creature"])[0]
     check_same(model, anatomy, best.puppet, best.model)
     return _folder(name, one_line(path.name), best, mirror, planar)
+
+
+def _read(path: Path, choices: ImportChoices, notes: Notes) -> Source:
+    """The tree of a model file, or the one that a skeleton is given."""
+    kind = path.suffix.lower()
+    if kind in ELSEWHERE:
+        raise UserError(f'{path}: cannot read "{kind}"; {ELSEWHERE[kind]}')
+    if kind not in RIGS:
+        if choices.height is not None:
+            raise UserError(
+                f"--height is for skeletons ({', '.join(RIGS)}); {path} has its lengths"
+            )
+        return read_source(path, choices.search, notes)
+    return Source(model_of(path, choices.up, choices.height, notes), up=UP)
 
 
 def read_source(path: Path, search: Sequence[Path], notes: Notes) -> Source:

@@ -31,6 +31,7 @@ class Source:
     coupled: joints that follow others.
     poses: standing poses that the file offers outside of keyframes.
     missing: names of meshes that cannot be had, with the file that each should be in; MJCF only.
+    up: axis that points up where the format says so.
     """
 
     tree: ET.Element
@@ -39,6 +40,7 @@ class Source:
     coupled: list[str] = dataclasses.field(default_factory=list)
     poses: list[list[float]] = dataclasses.field(default_factory=list)
     missing: dict[str, str] = dataclasses.field(default_factory=dict)
+    up: str | None = None
 
     @property
     def urdf(self) -> bool:

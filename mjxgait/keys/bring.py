@@ -6,16 +6,16 @@ from pathlib import Path
 
 import numpy as np
 
+from mjxgait.clips.clip import ELSEWHERE, AngleTrack, Clip
+from mjxgait.clips.read_angles import read_csv, read_json
+from mjxgait.clips.read_bvh import read_bvh
+from mjxgait.clips.read_glb import read_glb
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
-from mjxgait.keys.clip import AngleTrack, Clip
 from mjxgait.keys.cycle import Cycle, find_cycle
 from mjxgait.keys.fit import Fit, fit_poses
 from mjxgait.keys.match import matched
 from mjxgait.keys.own import Own, own_poses
-from mjxgait.keys.read_angles import read_csv, read_json
-from mjxgait.keys.read_bvh import read_bvh
-from mjxgait.keys.read_glb import read_glb
 from mjxgait.keys.retarget import Retargeted, movers, retarget
 
 READERS: Mapping[str, Callable[[Path], Clip | AngleTrack]] = {
@@ -23,11 +23,6 @@ READERS: Mapping[str, Callable[[Path], Clip | AngleTrack]] = {
     ".bvh": read_bvh,
     ".csv": read_csv,
     ".json": read_json,
-}
-ELSEWHERE = {
-    ".gltf": "export as glTF binary (.glb), which is one file",
-    ".fbx": "open it in Blender and export as glTF binary (.glb)",
-    ".blend": "export as glTF binary (.glb)",
 }
 Read = Clip | AngleTrack
 MOST_FRAMES = 1500

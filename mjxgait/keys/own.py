@@ -15,8 +15,6 @@ from mjxgait.creature import Creature
 from mjxgait.keys.cycle import Cycle, interpolated
 from mjxgait.keys.fit import Fit, within_range
 
-NOTE = "mjxgait"
-"""Name of the property of the root in which the text lies."""
 UNCHANGED = np.radians(0.5)
 """rad, root mean square; what differs by less was not edited."""
 

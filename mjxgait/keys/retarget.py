@@ -12,10 +12,10 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
+from mjxgait.clips.clip import Clip
 from mjxgait.creature import Creature
 from mjxgait.creature.geometry import ancestors
 from mjxgait.errors import UserError
-from mjxgait.keys.clip import Clip
 
 ENDLESS = 4 * np.pi
 """rad; range of a hinge that has none."""

@@ -11,13 +11,13 @@ from keys.made import PERIOD, RATE, bvh, columns, poses, swings, write
 from viewing.made_up import treading
 
 from mjxgait.animation import WalkLoop, build_glb, export_glb
+from mjxgait.clips.clip import NOTE
 from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import UserError
 from mjxgait.keys import bring
 from mjxgait.keys.cycle import find_cycle
 from mjxgait.keys.fit import fit_poses
 from mjxgait.keys.match import matched
-from mjxgait.keys.own import NOTE
 from mjxgait.settings.control import TUNING
 from mjxgait.settings.shipped import find_creature
 from mjxgait.viewing.walk import Walk

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
+from mjxgait.clips.clip import AngleTrack, check_numbers, check_size, check_times, read_text
 from mjxgait.errors import UserError
-from mjxgait.keys.clip import AngleTrack, check_numbers, check_size, check_times, read_text
 
 DEGREES, OURS = "_deg", "pos_"
 

@@ -10,6 +10,14 @@ import numpy as np
 
 from mjxgait.errors import UserError
 
+NOTE = "mjxgait"
+"""Name of the property of a node in which an exported walk says what made it."""
+ELSEWHERE = {
+    ".gltf": "export as glTF binary (.glb), which is one file",
+    ".fbx": "open it in Blender and export as glTF binary (.glb)",
+    ".blend": "export as glTF binary (.glb)",
+}
+"""What is not read, and the way round."""
 MOST_BYTES, MOST_TEXT = 200_000_000, 30_000_000
 MOST_BONES = 1000
 MOST_FRAMES = 100_000

@@ -1,0 +1,206 @@
+"""Where a skeleton at rest can bend: a guess by where its bones lie.
+
+A limb swings and spreads where it begins, and bends in one direction below; a spine bends in one
+place. Axes are those of the file; angles are deg from rest.
+"""
+
+import dataclasses
+import itertools
+from functools import cached_property
+
+import numpy as np
+
+from mjxgait.clips.rig import Rig
+from mjxgait.importing.notes import Confidence
+
+MIDDLE = 0.02
+"""Share of the skeleton's span within which a bone begins in the middle."""
+SHORT = 0.04
+"""Share of the height below which a bone does not bend on its own."""
+BENT = np.radians(8.0)
+SWING, SPREAD, SPINE, ANKLE, LOOSE = 60.0, 30.0, 25.0, 45.0, 45.0
+FOLD, STRETCH = 75.0, 3.0
+"""deg that a knee bends further from where it rests; that it stays from being straight."""
+KNEE = (5.0, 110.0)
+"""deg that a knee which rests straight bends the wrong way, and the right one."""
+FOOT = 0.3
+"""Share of its length that a foot points forward."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Hinge:
+    """name: pitch, roll or yaw. axis: [3]. low, high: deg."""
+
+    name: str
+    axis: np.ndarray
+    low: float
+    high: float
+    confidence: Confidence
+    reason: str
+
+
+class Plan:
+    """A skeleton in metres and what its limbs are. up: number of the axis that points up."""
+
+    def __init__(self, up: int, rig: Rig) -> None:
+        self.up, self.rig = up, rig
+        spots = np.concatenate([rig.places, *rig.ends])
+        self.span = float(np.ptp(spots, axis=0).max())
+        self.height = float(np.ptp(np.concatenate([spots, *rig.skins])[:, up])) or self.span
+        level = [(up + 2) % 3, (up + 1) % 3]  # with Y up the side is X, as is usual, if both are
+        self.side = min(level, key=self._unlike)
+        self.ahead = next(axis for axis in level if axis != self.side)
+
+    def _unlike(self, axis: int) -> float:
+        """m, how far the joints are from their images across an axis, at most."""
+        places = self.rig.places - self.rig.places[0]
+        images = places * np.where(np.arange(3) == axis, -1.0, 1.0)
+        return float(np.linalg.norm(places[:, None] - images, axis=2).min(1).max())
+
+    def in_middle(self, bone: int) -> bool:
+        """Whether a bone begins between left and right."""
+        apart = self.rig.places[bone, self.side] - self.rig.places[0, self.side]
+        return abs(float(apart)) < MIDDLE * self.span
+
+    def carries(self, bone: int) -> bool:
+        """Whether it is the root, or in the middle with limbs below it."""
+        return bone == 0 or (self.in_middle(bone) and self._limbs_below[bone])
+
+    @cached_property
+    def _limbs_below(self) -> list[bool]:
+        found = [not self.in_middle(b) for b in range(len(self.rig.names))]
+        for bone in reversed(range(1, len(found))):
+            found[self.rig.parents[bone]] |= found[bone]
+        return found
+
+    @cached_property
+    def half_width(self) -> float:
+        """m, mean distance from the middle at which limbs begin."""
+        rig = self.rig
+        firsts = [b for b in range(len(rig.names)) if self.begins_limb(b)]
+        apart = np.abs(rig.places[firsts, self.side] - rig.places[0, self.side])
+        return float(apart.mean()) if firsts else 0.0
+
+    def begins_limb(self, bone: int) -> bool:
+        """Whether a limb leaves the trunk there."""
+        parent = self.rig.parents[bone]
+        return not self.in_middle(bone) and (parent < 0 or self.in_middle(parent))
+
+    def segments(self, bone: int) -> list[tuple[np.ndarray, np.ndarray]]:
+        """From where a bone begins to where it ends, [3] each, those within the trunk left out."""
+        rig, start = self.rig, self.rig.places[bone]
+        below = rig.children(bone)
+        if self.in_middle(bone):
+            below = [b for b in below if not self.begins_limb(b)] or below
+        ends = [*rig.places[below], *rig.ends[bone]]
+        if not ends and len(rig.skins[bone]):
+            ends = [start + 1.8 * (rig.skins[bone].mean(0) - start)]
+        return [(start, end) for end in ends if np.linalg.norm(end - start) > 1e-4 * self.span]
+
+    def way(self, bone: int) -> np.ndarray:
+        """[3] m from where a bone begins to its farthest end; zeros where it has none."""
+        ways = [end - start for start, end in self.segments(bone)]
+        return max(ways, key=lambda way: float(way @ way), default=np.zeros(3))
+
+    def limb(self, first: int) -> list[int]:
+        """A limb's bones from its first one down, along the longest."""
+        chain = [first]
+        while below := self.rig.children(chain[-1]):
+            chain.append(max(below, key=lambda b: float(self.way(b) @ self.way(b))))
+        return chain
+
+    def moves(self, bone: int) -> bool:
+        """Whether it is long enough to bend on its own."""
+        return bool(np.linalg.norm(self.way(bone)) > SHORT * self.height)
+
+
+def hinges_of(plan: Plan) -> list[list[Hinge]]:
+    """Of each bone, the root's none."""
+    found: list[list[Hinge]] = [[] for _ in plan.rig.names]
+    for bone in range(1, len(found)):
+        if plan.begins_limb(bone):
+            _limb(plan, bone, found)
+        elif plan.in_middle(bone) and not plan.carries(bone) and plan.moves(bone):
+            found[bone] = _spine(plan, "it may nod and turn")
+    for bone in plan.rig.children(0):
+        chain = _spine_below(plan, bone)
+        if chain:
+            found[chain[(len(chain) - 1) // 2]] = _spine(plan, "the trunk bends in one place")
+    return found
+
+
+def _spine_below(plan: Plan, bone: int) -> list[int]:
+    """Bones of the trunk from one on down that are long enough to bend."""
+    chain: list[int] = []
+    following = [bone]
+    while following and plan.carries(following[0]):
+        chain.append(following[0])
+        following = [b for b in plan.rig.children(following[0]) if plan.carries(b)]
+    return [b for b in chain if plan.moves(b)]
+
+
+def _limb(plan: Plan, first: int, found: list[list[Hinge]]) -> None:
+    """Fills in the hinges of a limb, its side branches rigid."""
+    chain = [bone for bone in plan.limb(first) if plan.moves(bone)]
+    if not chain:
+        return
+    end = plan.rig.places[chain[-1]] + plan.way(chain[-1])
+    along = np.abs(end - plan.rig.places[first])
+    vertical = int(along.argmax()) == plan.up
+    found[chain[0]] = _hip(plan, int(along.argmax()))
+    for above, bone in itertools.pairwise(chain):
+        last = bone == chain[-1]
+        found[bone] = [_knee(plan, above, bone, last, vertical, _toes(plan, chain[-1]))]
+
+
+def _hip(plan: Plan, along: int) -> list[Hinge]:
+    """Two hinges about the axes along which the limb does not lie; the wider one is the stride."""
+    swings = plan.up if along == plan.side else plan.side
+    other = next(axis for axis in (plan.ahead, plan.up, plan.side) if axis not in (along, swings))
+    reason = "a limb swings and spreads where it begins"
+    return [
+        Hinge(_name(plan, swings), np.eye(3)[swings], -SWING, SWING, "medium", reason),
+        Hinge(_name(plan, other), np.eye(3)[other], -SPREAD, SPREAD, "medium", reason),
+    ]
+
+
+def _knee(plan: Plan, above: int, bone: int, last: bool, vertical: bool, toes: float) -> Hinge:
+    """The hinge between two bones of a limb: about the axis across the plane in which they lie."""
+    one, other = plan.way(above), plan.way(bone)
+    across = np.cross(one, other)
+    size = float(np.linalg.norm(one) * np.linalg.norm(other))
+    if float(np.linalg.norm(across)) > np.sin(BENT) * size:
+        number = int(np.abs(across).argmax())
+        axis = np.eye(3)[number]
+        bend = float(np.degrees(np.arctan2(axis @ across, one @ other)))
+        straight = -bend + np.sign(bend) * STRETCH
+        fold = np.sign(bend) * (ANKLE if last else FOLD)
+        low, high = sorted((float(np.clip(straight, -FOLD, FOLD)), float(fold)))
+        reason = "across the plane in which it rests bent, no further than straight"
+        return Hinge(_name(plan, number), axis, low, high, "medium", reason)
+    number = plan.side if vertical else plan.ahead
+    axis = np.eye(3)[number]
+    if last or not vertical or not toes:
+        return Hinge(_name(plan, number), axis, -LOOSE, LOOSE, "low", "it rests straight")
+    back = -np.sign(float(np.cross(axis, other)[plan.ahead]) * toes)
+    low, high = sorted((-back * KNEE[0], back * KNEE[1]))
+    reason = "it rests straight; taken for a knee, which folds away from the toes"
+    return Hinge(_name(plan, number), axis, low, high, "low", reason)
+
+
+def _toes(plan: Plan, foot: int) -> float:
+    """Where a foot points along the way: 1, -1, or 0 where it does not."""
+    way = plan.way(foot)
+    share = float(way[plan.ahead]) / max(float(np.linalg.norm(way)), 1e-9)
+    return float(np.sign(share)) if abs(share) > FOOT else 0.0
+
+
+def _spine(plan: Plan, reason: str) -> list[Hinge]:
+    return [
+        Hinge(_name(plan, axis), np.eye(3)[axis], -SPINE, SPINE, "low", reason)
+        for axis in (plan.side, plan.up)
+    ]
+
+
+def _name(plan: Plan, axis: int) -> str:
+    return {plan.side: "pitch", plan.ahead: "roll", plan.up: "yaw"}[axis]
