@@ -18,6 +18,7 @@ COMMANDS = {
     "render": "make a video of a walk or a race: mjxgait render RUN --out walk.webp",
     "export": "write a walk as an animation file: mjxgait export RUN --out walk.glb",
     "share": "write one offline page of a walk in 3D: mjxgait share RUN --out walk.html",
+    "repertoire": "evolve a grid of walks that blend, for games: mjxgait repertoire --env duck",
     "view": "watch a run as it learns on a local page: mjxgait view RUN",
     "import": "make a creature folder from a model file: mjxgait import robot.urdf --out envs/mine",
     "check": "validate a creature folder and draw it: mjxgait check envs/mine",
@@ -62,7 +63,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if not given or given[0] in ("-h", "--help"):
         print(
             USAGE.format(
-                commands="\n".join(f"  {name:8} {what}" for name, what in COMMANDS.items())
+                commands="\n".join(f"  {name:10} {what}" for name, what in COMMANDS.items())
             )
         )
         sys.exit(0 if given else 2)

@@ -7,6 +7,9 @@ import signal
 from collections.abc import Callable, Iterator
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from pathlib import Path
+
+from mjxgait.errors import UserError
 
 SINGLE_THREADED = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 """One process per core leaves no core for the threads of a linear algebra library."""
@@ -57,6 +60,21 @@ def process_per_core(
             for child in multiprocessing.active_children():
                 child.kill()
             raise
+
+
+@contextmanager
+def survivable(folder: Path, again: str) -> Iterator[None]:
+    """Says what to do where somebody, such as a system out of memory, killed a process of ours.
+
+    again: the command that goes on.
+    """
+    try:
+        yield
+    except BrokenProcessPool:
+        raise UserError(
+            f"{folder}: a process that examined champions was killed from outside, perhaps for "
+            f"want of memory; what was examined before is kept: go on with {again}"
+        ) from None
 
 
 def _start(pool: concurrent.futures.Executor, count: int) -> None:

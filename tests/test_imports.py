@@ -15,7 +15,7 @@ FLOORS = (
     ("commands",),
     ("library",),
     ("bench",),
-    ("ablation",),
+    ("ablation", "repertoire"),
     ("cluster",),
     ("web",),
     ("animation",),

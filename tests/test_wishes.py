@@ -18,6 +18,7 @@ from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.parts.fit import check_fit
 from mjxgait.parts.wishes import Wishes, hint, speed_of, wished
+from mjxgait.runs.experiment import build_batch
 from mjxgait.settings.config import Config, UseConfig
 from mjxgait.settings.gaits import GAITS, gait_of, placed, stations_of
 from mjxgait.settings.traced import traced
@@ -310,19 +311,26 @@ def test_who_is_steered_goes_straight_once_and_to_both_sides(body: Creature):
     assert ((abs(turn[1:]) >= 20.0) & (abs(turn[1:]) <= 40.0)).all()
 
 
-def test_speeds_share_a_program_and_turns_do_not():
+def test_speeds_and_turns_share_a_program_and_gaits_do_not():
     def shape(**wish) -> object:
         return jax.tree.structure(traced_fitness(config_of(**wish)))
 
     assert shape(speed=0.3) == shape(speed=1.3)
+    assert shape(turn=10.0) == shape(turn=-20.0)
+    assert shape(steer=10.0) == shape(steer=20.0)
     for one, other in (
         ({}, {"turn": 10.0}),
-        ({"turn": 10.0}, {"turn": 20.0}),
-        ({"steer": 10.0}, {"steer": 20.0}),
+        ({"turn": 10.0}, {"steer": 10.0}),
         ({"gait": "trot"}, {"gait": "pace"}),
         ({}, {"height": 0.9}),
     ):
         assert shape(**one) != shape(**other)
+
+
+def test_rows_of_one_program_are_told_to_turn_each_at_its_own_rate(stool: Creature):
+    configs = [small_config(fitness={"wish": {"speed": SPEED, "turn": t}}) for t in (10.0, -30.0)]
+    for one, rate in zip(build_batch(stool, configs).experiments, (10.0, -30.0), strict=True):
+        np.testing.assert_allclose(np.degrees(one.starts.turn), rate, rtol=1e-6)
 
 
 def test_none_can_be_told_to_turn_and_be_steered():

@@ -2,13 +2,11 @@
 alike whatever they evolved for.
 """
 
-import contextlib
 import dataclasses
 import functools
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures.process import BrokenProcessPool
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -21,9 +19,8 @@ from mjxgait.certify import certify
 from mjxgait.certify.simulate import simulate
 from mjxgait.certify.starts import join, nominal_starts, perturbed_starts
 from mjxgait.champion import Champion, read_champion
-from mjxgait.cores import process_per_core
+from mjxgait.cores import process_per_core, survivable
 from mjxgait.creature import Creature, load_creature
-from mjxgait.errors import UserError
 from mjxgait.parts.own import load_all, loaded
 from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.folder import CREATURE, METRICS, read_metrics
@@ -98,7 +95,8 @@ def measure(folder: Path, plan: Plan, tell: Callable[[int, int], None]) -> list[
     if missing:
         tell(0, len(missing))
     prepare = partial(load_all, loaded())
-    with _survivable(folder), process_per_core(len(missing), prepare) as pool:
+    again = f"mjxgait ablate --resume {folder}"
+    with survivable(folder, again), process_per_core(len(missing), prepare) as pool:
         found = pool.map(
             partial(_judge, folder / CREATURE, plan.study.grounds, plan.study.certify),
             [champion_path(folder, plan, run) for run in missing],
@@ -111,19 +109,6 @@ def measure(folder: Path, plan: Plan, tell: Callable[[int, int], None]) -> list[
                 log.write(json.dumps(dataclasses.asdict(result)) + "\n")
             tell(number, len(missing))
     return [known[run.variant, run.seed] for run in plan.runs]
-
-
-@contextlib.contextmanager
-def _survivable(folder: Path) -> Iterator[None]:
-    """Says what to do where somebody, such as a system out of memory, killed a process of ours."""
-    try:
-        yield
-    except BrokenProcessPool:
-        raise UserError(
-            f"{folder}: a process that examined champions was killed from outside, perhaps for "
-            "want of memory; what was examined before is kept: go on with "
-            f"mjxgait ablate --resume {folder}"
-        ) from None
 
 
 def _measured(folder: Path) -> list[dict[str, Any]]:

@@ -1,6 +1,17 @@
 """A walk as an animation file that other programs open."""
 
-from mjxgait.animation.glb import build_glb, export_glb
+from mjxgait.animation.glb import build_clips, build_glb, export_glb
 from mjxgait.animation.loop import RATES, WalkLoop, walk_loop, walk_take
+from mjxgait.animation.phase import standing_still, stride_in_phase
 
-__all__ = ["RATES", "WalkLoop", "build_glb", "export_glb", "walk_loop", "walk_take"]
+__all__ = [
+    "RATES",
+    "WalkLoop",
+    "build_clips",
+    "build_glb",
+    "export_glb",
+    "standing_still",
+    "stride_in_phase",
+    "walk_loop",
+    "walk_take",
+]

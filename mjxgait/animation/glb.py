@@ -5,8 +5,7 @@ glTF is Y-up with +Z forward and +X left, quaternions are (x, y, z, w), colours 
 key frames, `B` joints of the skin (the root on the floor, then the bodies), `V` vertices.
 """
 
-import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import mujoco
@@ -17,6 +16,13 @@ from mjxgait.animation.buffer import Buffer
 from mjxgait.animation.floor import add_floor
 from mjxgait.animation.loop import WalkLoop
 from mjxgait.animation.note import note_of
+from mjxgait.animation.skeleton import (
+    Skeleton,
+    gltf_axes,
+    local_poses,
+    skeleton_of,
+    world_poses,
+)
 from mjxgait.animation.surface import geom_surface
 from mjxgait.errors import UserError
 from mjxgait.viewing.painter import geom_colours, seen_geoms
@@ -24,19 +30,6 @@ from mjxgait.viewing.painter import geom_colours, seen_geoms
 STILL = 1e-6
 """m or unit quaternion; what moves less is not animated."""
 ROUGHNESS = 0.75
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Skeleton:
-    """The joints of the skin in glTF's axes.
-
-    names: [B]. parent: [B] place of the parent, -1 for the root. bodies: [B] MuJoCo's body, 0 (the
-    world) for the root.
-    """
-
-    names: tuple[str, ...]
-    parent: tuple[int, ...]
-    bodies: tuple[int, ...]
 
 
 def export_glb(loop: WalkLoop, path: Path, travelling: bool = False) -> None:
@@ -57,20 +50,7 @@ def build_glb(loop: WalkLoop, travelling: bool = False, floor: bool = False) -> 
     travelling: the root moves forward at an even speed; otherwise the creature walks in place.
     floor: rungs pass below it.
     """
-    creature = loop.walk.creature
-    skeleton = skeleton_of(creature.model, creature.trunk)
-    axes = gltf_axes(loop.walk.forward)
-    document = gltf.GLTF2(asset=gltf.Asset(version="2.0", generator="mjxgait"))
-    buffer = Buffer(document)
-    rest_pos, rest_quat = local_poses(creature.model, skeleton, _standing(loop)[None], axes)
-    _add_joints(document, skeleton, rest_pos[0], rest_quat[0])
-    _add_mesh(document, buffer, creature.model, skeleton, axes, _standing(loop))
-    _add_skin(document, buffer, creature.model, skeleton, axes, _standing(loop))
-    _add_animation(document, buffer, loop, skeleton, axes, travelling)
-    name = creature.name
-    document.nodes.append(gltf.Node(name=name, mesh=0, skin=0))
-    document.scenes = [gltf.Scene(name=name, nodes=[0, len(document.nodes) - 1])]
-    document.scene = 0
+    document, buffer = _scene({"walk": loop}, travelling)
     if floor:
         add_floor(document, buffer, loop)
     document.extras = {
@@ -85,67 +65,34 @@ def build_glb(loop: WalkLoop, travelling: bool = False, floor: bool = False) -> 
     return b"".join(document.save_to_bytes())
 
 
-def skeleton_of(model: mujoco.MjModel, trunk: int) -> Skeleton:
-    """The bodies of the tree that begins at the trunk, below a root that stays on the floor."""
-    bodies = [
-        0,
-        *(b for b in range(1, model.nbody) if model.body_rootid[b] == model.body_rootid[trunk]),
-    ]
-    parents = (-1, *(bodies.index(int(model.body_parentid[b])) for b in bodies[1:]))
-    return Skeleton(
-        ("root", *(model.body(b).name or f"body_{b}" for b in bodies[1:])), parents, tuple(bodies)
-    )
+def build_clips(loops: Mapping[str, WalkLoop], travelling: bool = False) -> bytes:
+    """The bytes of a file with an animation for each of several loops of one creature, by name.
 
-
-def gltf_axes(forward: np.ndarray) -> np.ndarray:
-    """[3, 3] that turns MuJoCo's world into glTF's: left to +X, up to +Y, forward [2] to +Z."""
-    way = np.append(forward, 0.0)
-    return np.stack([np.cross([0.0, 0.0, 1.0], way), [0.0, 0.0, 1.0], way])
-
-
-def local_poses(
-    model: mujoco.MjModel, skeleton: Skeleton, qpos: np.ndarray, axes: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Each joint against its parent: positions [F, B, 3] m and quaternions [F, B, 4] (x, y, z,
-    w), in glTF's axes.
+    All move the same joints, so that programs may blend them.
     """
-    pos, rot = _world_poses(model, skeleton, qpos, axes)
-    local_pos, quat = pos.copy(), np.zeros((*pos.shape[:2], 4))
-    for b, parent in enumerate(skeleton.parent):
-        turned = rot[:, b]
-        if parent >= 0:
-            back = rot[:, parent].transpose(0, 2, 1)
-            local_pos[:, b] = (back @ (pos[:, b] - pos[:, parent])[..., None])[..., 0]
-            turned = back @ turned
-        quat[:, b] = _quaternions(turned)
-    return local_pos, quat
+    document, buffer = _scene(loops, travelling)
+    buffer.close()
+    return b"".join(document.save_to_bytes())
 
 
-def _world_poses(
-    model: mujoco.MjModel, skeleton: Skeleton, qpos: np.ndarray, axes: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    data = mujoco.MjData(model)
-    pos, rot = [], []
-    for row in qpos:
-        data.qpos[:] = row
-        mujoco.mj_kinematics(model, data)
-        pos.append(data.xpos[list(skeleton.bodies)] @ axes.T)
-        rot.append(axes @ data.xmat[list(skeleton.bodies)].reshape(-1, 3, 3) @ axes.T)
-    return np.array(pos), np.array(rot)
-
-
-def _quaternions(rotations: np.ndarray) -> np.ndarray:
-    """[F, 4] (x, y, z, w) of rotations [F, 3, 3], neighbours on the same side of the sphere so
-    that they can be interpolated.
-    """
-    quats = np.zeros((len(rotations), 4))
-    for i, rotation in enumerate(rotations):
-        quat = np.zeros(4)
-        mujoco.mju_mat2Quat(quat, np.ascontiguousarray(rotation).ravel())
-        quats[i] = np.roll(quat, -1)
-        if i and quats[i] @ quats[i - 1] < 0:
-            quats[i] *= -1
-    return quats
+def _scene(loops: Mapping[str, WalkLoop], travelling: bool) -> tuple[gltf.GLTF2, Buffer]:
+    """The creature with its skin, and the animations."""
+    loop = next(iter(loops.values()))
+    creature = loop.walk.creature
+    skeleton = skeleton_of(creature.model, creature.trunk)
+    axes = gltf_axes(loop.walk.forward)
+    document = gltf.GLTF2(asset=gltf.Asset(version="2.0", generator="mjxgait"))
+    buffer = Buffer(document)
+    rest_pos, rest_quat = local_poses(creature.model, skeleton, _standing(loop)[None], axes)
+    _add_joints(document, skeleton, rest_pos[0], rest_quat[0])
+    _add_mesh(document, buffer, creature.model, skeleton, axes, _standing(loop))
+    _add_skin(document, buffer, creature.model, skeleton, axes, _standing(loop))
+    _add_animations(document, buffer, loops, skeleton, axes, travelling)
+    name = creature.name
+    document.nodes.append(gltf.Node(name=name, mesh=0, skin=0))
+    document.scenes = [gltf.Scene(name=name, nodes=[0, len(document.nodes) - 1])]
+    document.scene = 0
+    return document, buffer
 
 
 def _standing(loop: WalkLoop) -> np.ndarray:
@@ -252,7 +199,7 @@ def _add_skin(
     axes: np.ndarray,
     stand: np.ndarray,
 ) -> None:
-    pos, rot = _world_poses(model, skeleton, stand[None], axes)
+    pos, rot = world_poses(model, skeleton, stand[None], axes)
     inverse = np.zeros((len(skeleton.names), 4, 4))
     inverse[:, :3, :3] = rot[0].transpose(0, 2, 1)
     inverse[:, :3, 3] = -(inverse[:, :3, :3] @ pos[0][..., None])[..., 0]
@@ -269,32 +216,53 @@ def _add_skin(
     )
 
 
-def _add_animation(
+def _add_animations(
     document: gltf.GLTF2,
     buffer: Buffer,
-    loop: WalkLoop,
+    loops: Mapping[str, WalkLoop],
     skeleton: Skeleton,
     axes: np.ndarray,
     travelling: bool,
 ) -> None:
+    """One for each loop, all of the joints that move in any of them."""
+    rest = [(node.translation, node.rotation) for node in document.nodes]
+    tracks = {name: _tracks(loop, skeleton, axes, travelling) for name, loop in loops.items()}
+    moving = [
+        (b, i)
+        for b, still in enumerate(rest)
+        for i in (0, 1)
+        if any(np.abs(track[i][:, b] - still[i]).max() > STILL for track in tracks.values())
+    ]
+    for name, loop in loops.items():
+        animation = gltf.Animation(name=name)
+        times = buffer.add(loop.times.astype(np.float32), bounds=True)
+        for b, i in moving:
+            target = gltf.AnimationChannelTarget(node=b, path=("translation", "rotation")[i])
+            animation.channels.append(
+                gltf.AnimationChannel(sampler=len(animation.samplers), target=target)
+            )
+            output = buffer.add(tracks[name][i][:, b].astype(np.float32))
+            animation.samplers.append(
+                gltf.AnimationSampler(input=times, output=output, interpolation="LINEAR")
+            )
+        document.animations.append(animation)
+
+
+def _tracks(
+    loop: WalkLoop, skeleton: Skeleton, axes: np.ndarray, travelling: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """See `local_poses`; travelling: the root moves on evenly, in a circle where the walk turns."""
     pos, quat = local_poses(loop.walk.creature.model, skeleton, loop.qpos, axes)
     if travelling:
-        pos[:, 0] = np.linspace(0, 1, len(pos))[:, None] * [0.0, 0.0, loop.advance]
-    animation = gltf.Animation(name="walk")
-    times = buffer.add(loop.times.astype(np.float32), bounds=True)
-    rest = document.nodes
-    for b in range(len(skeleton.names)):
-        for path, values, usual in (
-            ("translation", pos[:, b], rest[b].translation),
-            ("rotation", quat[:, b], rest[b].rotation),
-        ):
-            if np.abs(values - usual).max() > STILL:
-                target = gltf.AnimationChannelTarget(node=b, path=path)
-                animation.channels.append(
-                    gltf.AnimationChannel(sampler=len(animation.samplers), target=target)
-                )
-                output = buffer.add(values.astype(np.float32))
-                animation.samplers.append(
-                    gltf.AnimationSampler(input=times, output=output, interpolation="LINEAR")
-                )
-    document.animations.append(animation)
+        share = np.linspace(0, 1, len(pos))
+        turned = share * loop.turned
+        # Chords of the circle: sin(a / 2) / (a / 2) as long as the way along it.
+        chord = share * loop.advance * np.sinc(turned / (2 * np.pi))
+        pos[:, 0] = chord[:, None] * _upright(np.sin(turned / 2), np.cos(turned / 2))
+        quat[:, 0, 1], quat[:, 0, 3] = np.sin(turned / 2), np.cos(turned / 2)
+    return pos, quat
+
+
+def _upright(left: np.ndarray, ahead: np.ndarray) -> np.ndarray:
+    """Horizontal vectors [F, 3] in glTF's axes."""
+    return np.stack([left, np.zeros_like(left), ahead], 1)

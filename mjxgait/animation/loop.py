@@ -27,7 +27,8 @@ class WalkLoop:
     walk: they were taken from. qpos: [F, nq], in a loop the last equal to the first. rate:
     frames/s. strides: in the loop; 0 if it is none.
     advance: m that the creature moves forward in one loop; the travelling walk adds it evenly.
-    stretched: duration over the recorded one.
+    stretched: duration over the recorded one. frames: first and last recorded one. turned: rad to
+    the left in one loop, likewise; in place the creature looks ahead all the time.
     """
 
     walk: Walk
@@ -36,6 +37,8 @@ class WalkLoop:
     strides: int
     advance: float
     stretched: float
+    frames: tuple[int, int]
+    turned: float = 0.0
 
     @property
     def times(self) -> np.ndarray:
@@ -48,13 +51,15 @@ class WalkLoop:
         return float(self.advance / self.times[-1])
 
 
-def walk_loop(walk: Walk, rate: int = 30) -> WalkLoop:
+def walk_loop(walk: Walk, rate: int = 30, most: int = MOST_STRIDES) -> WalkLoop:
     """The steadiest strides of a walk as a loop of whole frames.
+
+    most: strides; with one the frames may be off the recorded times by half of one.
 
     Raises:
       UserError: the walk has no steady stride.
     """
-    chosen = _fitting_strides(walk, rate)
+    chosen = _fitting_strides(walk, rate, most)
     if chosen is None and walk.champion.task in IN_WATER:
         raise UserError(
             f"{walk.creature.name}: a swimmer has no strides to make a loop of; `mjxgait render` "
@@ -74,6 +79,10 @@ def walk_loop(walk: Walk, rate: int = 30) -> WalkLoop:
     share = np.linspace(0.0, 1.0, count + 1)
     model = walk.creature.model
     qpos = np.array([_between(model, walk.qpos, first + s * (last - first)) for s in share])
+    seconds = (last - first) * walk.time_step
+    rate_of_turn = np.radians(walk.champion.wish.get("turn", 0.0))
+    if rate_of_turn:
+        qpos = _straightened(walk, qpos, first * walk.time_step + share * seconds, rate_of_turn)
     gap = _difference(model, qpos[-1], qpos[0])
     root = int(model.jnt_dofadr[model.body_jntadr[walk.creature.trunk]])
     advance = float(-gap[root : root + 2] @ walk.forward)
@@ -85,9 +94,8 @@ def walk_loop(walk: Walk, rate: int = 30) -> WalkLoop:
     below = walk.ground_heights(walk.qpos[first:last, place : place + 2])
     qpos[:, place + 2] -= below.mean() - 0.5 * (below[-1] - below[0])
     qpos[:, place : place + 2] -= qpos[:-1, place : place + 2].mean(0)
-    return WalkLoop(
-        walk, qpos, rate, strides, advance, count / rate / ((last - first) * walk.time_step)
-    )
+    stretched, turned = count / rate / seconds, float(rate_of_turn * seconds)
+    return WalkLoop(walk, qpos, rate, strides, advance, stretched, (first, last), turned)
 
 
 def walk_take(walk: Walk, rate: int = 30) -> WalkLoop:
@@ -102,15 +110,42 @@ def walk_take(walk: Walk, rate: int = 30) -> WalkLoop:
     qpos[:, place : place + 2] -= (1 - share) * qpos[0, place : place + 2] + share * qpos[
         -1, place : place + 2
     ]
-    return WalkLoop(walk, qpos, rate, 0, advance, 1.0)
+    return WalkLoop(walk, qpos, rate, 0, advance, 1.0, (0, len(walk.qpos) - 1))
 
 
-def _fitting_strides(walk: Walk, rate: int) -> tuple[int, int, int, int] | None:
+def _straightened(walk: Walk, qpos: np.ndarray, times: np.ndarray, rate: float) -> np.ndarray:
+    """The way [F, nq] of who turns evenly as if it led straight ahead.
+
+    times: [F] s since the start. rate: rad/s to the left. Each step is turned back by the heading
+    of its moment, and the whole so that it leads forward.
+    """
+    body = walk.creature.model.body_jntadr[walk.creature.trunk]
+    place, straight = int(walk.creature.model.jnt_qposadr[body]), qpos.copy()
+    headings, steps = rate * times, np.diff(qpos[:, place : place + 2], axis=0)
+    middles = (headings[1:] + headings[:-1]) / 2
+    way = np.cumsum(np.array([_turned(s, -a) for s, a in zip(steps, middles, strict=True)]), axis=0)
+    along = np.arctan2(way[-1] @ _turned(walk.forward, np.pi / 2), way[-1] @ walk.forward)
+    ahead = np.array([_turned(step, -along) for step in way])
+    straight[1:, place : place + 2] = straight[0, place : place + 2] + ahead
+    for row, heading in zip(straight, headings + along, strict=True):
+        about = np.array([np.cos(heading / 2), 0.0, 0.0, -np.sin(heading / 2)])
+        mujoco.mju_mulQuat(row[place + 3 : place + 7], about, row[place + 3 : place + 7].copy())
+    return straight
+
+
+def _turned(vector: np.ndarray, angle: float) -> np.ndarray:
+    """A vector [2] turned to the left by rad."""
+    c, s = np.cos(angle), np.sin(angle)
+    turned: np.ndarray = np.array([[c, -s], [s, c]]) @ vector
+    return turned
+
+
+def _fitting_strides(walk: Walk, rate: int, most: int) -> tuple[int, int, int, int] | None:
     """First and last recorded frame, number of strides, and of key frames; the fewest strides
     that fit the frames well.
     """
     found = []
-    for strides in range(1, MOST_STRIDES + 1):
+    for strides in range(1, most + 1):
         if (ends := walk.steady_strides(strides)) is None:
             break
         seconds = (ends[1] - ends[0]) * walk.time_step

@@ -49,22 +49,31 @@ class Advanced:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class AdvanceRows:
-    """Runs side by side, from a state or from the beginning, until a generation."""
+    """Runs side by side, from a state or from the beginning, until a generation.
+
+    planted: arrays [B, P, ...] of the genomes by name, to begin with instead of random ones.
+    """
 
     state: Packed | None
     until: int
+    planted: Mapping[str, np.ndarray] | None = None
 
     def do(self, programs: Programs, recipe: Recipe) -> Advanced:
         """See `Job`."""
         batch = programs.batch(recipe)
-        begun = self.state and self.state.state(batch.abstract(), "a state of these runs")
-        way = _Way(programs.step(recipe), batch, begun or batch.init(), self.until)
+        way = _Way(programs.step(recipe), batch, self._begun(batch), self.until)
         champions: dict[int, Champion] = {}
         for _ in way:
             for row, experiment in enumerate(batch.experiments):
                 if way.generation == experiment.config.evolution.generations:
                     champions[row] = experiment.champion(_row(way.states, row), versions())
         return way.advanced(pack(way.states), champions=champions)
+
+    def _begun(self, batch: Batch) -> EvolutionState:
+        if self.state is None and self.planted is None:
+            return batch.init()
+        begun = self.state or pack(batch.init()).with_arrays(self.planted or {})
+        return begun.state(batch.abstract(), "a state of these runs")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

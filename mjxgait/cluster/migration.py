@@ -29,7 +29,7 @@ def gathered(states: Sequence[Packed]) -> Packed:
     leader = int(np.nanargmax([_comparable(state.arrays["fitness"])[0] for state in states]))
     size = len(states[leader].arrays["fitness"])
     found = [_individuals(state.arrays) for state in states]
-    return _with(states[leader], _sorted(_joined(found), size))
+    return states[leader].with_arrays(_sorted(_joined(found), size))
 
 
 def together(lines: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -54,7 +54,7 @@ def _taken_in(state: Packed, migrants: Sequence[Mapping[str, np.ndarray]]) -> Pa
     size = len(state.arrays["fitness"])
     come = _sorted(_joined(migrants), size // 2)
     stay = _first(_individuals(state.arrays), size - len(come["fitness"]))
-    return _with(state, _sorted(_joined([stay, come]), size))
+    return state.with_arrays(_sorted(_joined([stay, come]), size))
 
 
 def _individuals(arrays: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -81,7 +81,3 @@ def _sorted(arrays: Mapping[str, np.ndarray], count: int) -> dict[str, np.ndarra
 
 def _comparable(fitness: np.ndarray) -> np.ndarray:
     return np.where(np.isnan(fitness), -np.inf, fitness)
-
-
-def _with(state: Packed, arrays: Mapping[str, np.ndarray]) -> Packed:
-    return Packed({**state.arrays, **arrays}, state.key_impl)

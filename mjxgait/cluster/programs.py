@@ -62,8 +62,8 @@ class Programs:
         creature, configs = recipe.read()
         one = (creature.digest, jax.tree.structure(traced(configs[0])))
         plan = self._plans.find(one, lambda: draw_up(creature, configs[0]))
-        batch, shape = build_batch(creature, configs, plan), (one, len(configs))
-        return shape, batch
+        batch = build_batch(creature, configs, plan, recipe.sources)
+        return (one, len(configs), max(map(len, recipe.sources), default=0)), batch
 
     def _program(
         self, key: Hashable, lower: Callable[[], jax.stages.Lowered]

@@ -28,17 +28,24 @@ class OwnPart:
 
 @dataclasses.dataclass(frozen=True)
 class Recipe:
-    """The creature's files by name, the runs' settings as tables, and the user's own code."""
+    """The creature's files by name, the runs' settings as tables, and the user's own code.
+
+    sources: see `build_batch`.
+    """
 
     files: Mapping[str, str]
     tables: tuple[Mapping[str, Any], ...]
     own: tuple[OwnPart, ...] = ()
+    sources: tuple[tuple[int, ...], ...] = ()
 
     @classmethod
-    def of(cls, creature: Creature, configs: Sequence[Config]) -> "Recipe":
+    def of(
+        cls, creature: Creature, configs: Sequence[Config], sources: Sequence[Sequence[int]] = ()
+    ) -> "Recipe":
         """Of runs of one program."""
         tables = tuple(dataclasses.asdict(config) for config in configs)
-        return cls(dict(creature.files), tables, tuple(_own_parts(configs)))
+        known = tuple(map(tuple, sources))
+        return cls(dict(creature.files), tables, tuple(_own_parts(configs)), known)
 
     @cached_property
     def digest(self) -> str:

@@ -15,6 +15,8 @@ from mjxgait.champion import Champion
 from mjxgait.cores import cores
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
+from mjxgait.parts import make_task
+from mjxgait.parts.registry import what_ends
 from mjxgait.runs.blueprint import Numbers, Plan, draw_up
 from mjxgait.runs.generation import Row, absorb, evolution_of, judge, propose
 from mjxgait.search.state import EvolutionState, GenerationMetrics
@@ -243,11 +245,16 @@ def build_experiment(creature: Creature, config: Config) -> Experiment:
 
 
 def build_batch(
-    creature: Creature, configs: Sequence[Config], blueprint: Plan | None = None
+    creature: Creature,
+    configs: Sequence[Config],
+    blueprint: Plan | None = None,
+    sources: Sequence[Sequence[int]] = (),
 ) -> Batch:
     """Runs of one creature whose configs differ in nothing that shapes the program.
 
-    blueprint: of this creature under settings of the same shape, where it has been drawn up.
+    Args:
+      blueprint: of this creature under settings of the same shape, where it has been drawn up.
+      sources: for each run the others whose best are judged among its children; by default nobody's.
 
     Raises:
       UserError: two configs need different programs, or the physics does not support the creature's model.
@@ -257,7 +264,13 @@ def build_batch(
             "these settings need programs of different shapes: run them in batches of their own"
         )
     blueprint = blueprint or draw_up(creature, configs[0])
-    return Batch(tuple(_experiment(blueprint, config) for config in configs))
+    experiments = [_experiment(blueprint, config) for config in configs]
+    if any(sources):
+        experiments = [
+            dataclasses.replace(one, row=dataclasses.replace(one.row, sources=jnp.int32(rows)))
+            for one, rows in zip(experiments, _filled_up(sources), strict=True)
+        ]
+    return Batch(tuple(experiments))
 
 
 @partial(jax.jit, static_argnums=0)
@@ -268,6 +281,12 @@ def _initial(
     simulator = blueprint.simulator(numbers)
     task, trials = simulator.task, settings.rollout.starts
     return evolution_of(simulator, settings).init(key, trials, len(task.terms), len(task.outcomes))
+
+
+def _filled_up(sources: Sequence[Sequence[int]]) -> list[list[int]]:
+    """All as long as the longest; a row's own number stands for nobody."""
+    most = max(map(len, sources))
+    return [[*rows, *[own] * (most - len(rows))] for own, rows in enumerate(sources)]
 
 
 def _generation(
@@ -284,7 +303,10 @@ def _experiment(blueprint: Plan, config: Config) -> Experiment:
     key = jax.random.fold_in(jax.random.key(config.seed), 1)
     rollout = config.rollout
     drawn = dataclasses.replace(rollout, starts=1 + (rollout.starts - 1) * rollout.variety)
-    starts = blueprint.own.task.trials(key, creature, drawn)
+    # Each run's own task: what is told in a trial is not the same for all rows of a program.
+    step, ends = float(creature.model.opt.timestep), what_ends(creature, rollout)
+    task = make_task(blueprint.own.creature, step, ends, config)
+    starts = task.trials(key, creature, drawn)
     if starts.heaviness is not None:
         # As one program, or each of its hundreds of operations is compiled alone.
         starts = jax.jit(blueprint.embodied)(starts)

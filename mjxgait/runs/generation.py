@@ -1,7 +1,10 @@
 """The parts of a generation of evolution runs side by side: propose, judge, absorb.
 
-Row by row but for the simulations, so that a row reads nothing of its neighbours.
+Row by row but for the simulations, so that a row reads nothing of its neighbours, unless it is told
+to have theirs judged among its own.
 """
+
+import dataclasses
 
 import jax
 import jax.numpy as jnp
@@ -16,13 +19,21 @@ from mjxgait.tasks.score import in_order, score
 from mjxgait.tasks.trials import Starts
 from mjxgait.types import Judged, pytree
 
+SENT = 4
+"""Of the best of a row, those that it sends to others, one in each generation in turn."""
+
 
 @pytree
 class Row:
-    """What tells one evolution run from another in the same compiled program: its traced settings, and all its starts."""
+    """What tells one evolution run from another in the same compiled program: its traced settings, and all its starts.
+
+    sources: [S] rows whose best are judged among its children; its own number stands for nobody.
+    None where rows know nothing of each other.
+    """
 
     settings: Config
     starts: Starts
+    sources: jax.Array | None = None
 
 
 def evolution_of(simulator: Simulator, settings: Config) -> Evolution:
@@ -48,8 +59,32 @@ def propose(
         return evolution_of(simulator, row.settings).propose(state)
 
     proposals = jax.lax.map(of_row, (rows, states))
+    if rows.sources is not None:
+        proposals = with_guests(rows.sources, states, proposals)
     one_round = rows.settings.rollout.variety == 1
     return proposals, rows.starts if one_round else jax.vmap(starts_of_round)(rows, states)
+
+
+def with_guests(sources: jax.Array, states: EvolutionState, proposals: Proposal) -> Proposal:
+    """The proposals [B] with one of the best of each source [B, S] in the place of a last child.
+
+    Rows differ in what they ask for, so a guest is judged anew. Nobody comes before the rows have
+    been judged themselves.
+    """
+    count, own = sources.shape[1], jnp.arange(len(sources))[:, None]
+    judged = states.generation[:, None] >= 0
+    comes, rank = (sources != own) & judged, states.generation[:, None] % SENT
+
+    def seated(children: jax.Array, best: jax.Array) -> jax.Array:
+        guests, last = best[sources, rank % best.shape[1]], children[:, -count:]
+        who = comes.reshape(*comes.shape, *[1] * (guests.ndim - 2))
+        return children.at[:, -count:].set(jnp.where(who, guests, last))
+
+    return dataclasses.replace(
+        proposals,
+        offspring=jax.tree.map(seated, proposals.offspring, states.genomes),
+        origin=seated(proposals.origin, states.origin),
+    )
 
 
 def judge(

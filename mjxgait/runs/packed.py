@@ -1,7 +1,7 @@
 """An evolution state as named arrays of NumPy: as files hold it and as it travels to other machines."""
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import jax
@@ -31,6 +31,14 @@ class Packed:
         """Bytes of the arrays."""
         return sum(array.nbytes for array in self.arrays.values())
 
+    def with_arrays(self, arrays: Mapping[str, np.ndarray]) -> "Packed":
+        """The same with other arrays under these names."""
+        return Packed({**self.arrays, **arrays}, self.key_impl)
+
+    def row(self, number: int) -> "Packed":
+        """One run's state, of several side by side."""
+        return Packed({name: array[number] for name, array in self.arrays.items()}, self.key_impl)
+
     def state(self, abstract: EvolutionState, where: str) -> EvolutionState:
         """The state on the first of this machine's devices.
 
@@ -48,6 +56,13 @@ class Packed:
         state = jax.tree.unflatten(jax.tree.structure(abstract), arrays)
         key = jax.random.wrap_key_data(state.key, impl=self.key_impl)
         return dataclasses.replace(state, key=key)
+
+
+def side_by_side(rows: Sequence[Packed]) -> Packed:
+    """The states of several runs as one, the other way round than `Packed.row`."""
+    first = rows[0]
+    arrays = {name: np.stack([row.arrays[name] for row in rows]) for name in first.arrays}
+    return Packed(arrays, first.key_impl)
 
 
 def pack(state: EvolutionState) -> Packed:

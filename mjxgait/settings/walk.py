@@ -100,9 +100,8 @@ class WishConfig:
     __pydantic_config__ = STRICT
     speed: Positive | None = None
     gait: Annotated[GaitText, SHAPE] = AUTO
-    # The host draws what is told: runs side by side in one program would share the first one's.
-    turn: Annotated[Finite | None, SHAPE] = None
-    steer: Annotated[Positive | None, SHAPE] = None
+    turn: Finite | None = None
+    steer: Positive | None = None
     height: Positive | None = None
     bounce: NonNegative | None = None
     sway: NonNegative | None = None

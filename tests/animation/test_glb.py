@@ -13,7 +13,7 @@ import pytest
 from viewing.made_up import treading
 
 from mjxgait.animation import RATES, build_glb, walk_loop
-from mjxgait.animation.glb import gltf_axes
+from mjxgait.animation.skeleton import gltf_axes
 from mjxgait.animation.surface import geom_surface
 from mjxgait.cli import main
 from mjxgait.errors import UserError

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from viewing.made_up import treading
 
 from mjxgait.animation import WalkLoop, build_glb
-from mjxgait.animation.glb import gltf_axes
+from mjxgait.animation.skeleton import gltf_axes
 from mjxgait.creature import Creature
 from mjxgait.viewing.walk import Walk
 

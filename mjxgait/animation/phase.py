@@ -1,0 +1,41 @@
+"""Loops that begin at the same moment of a stride, so that programs may blend them."""
+
+import dataclasses
+
+import numpy as np
+
+from mjxgait.animation.loop import WalkLoop, walk_loop
+from mjxgait.certify.strides import SWING, footfalls
+from mjxgait.creature import Creature
+from mjxgait.viewing.walk import Walk
+
+
+def stride_in_phase(walk: Walk, rate: int) -> WalkLoop:
+    """One stride of a walk as a loop that begins where the creature's first foot comes down.
+
+    Where that foot never leaves the floor the loop begins with the controller's cycle.
+
+    Raises:
+      UserError: the walk has no steady stride.
+    """
+    loop = walk_loop(walk, rate, most=1)
+    first, last = loop.frames
+    recording, count = walk.recording, len(loop.qpos) - 1
+    threshold = SWING * recording.dimensions.hip_height
+    falls = footfalls(recording.foot_height[:, 0], threshold)
+    within = falls[(falls >= first) & (falls < last)]
+    if not len(within):
+        return loop
+    at = round((within[0] - first) / (last - first) * count)
+    turned = np.roll(loop.qpos[:-1], -at, axis=0)
+    return dataclasses.replace(loop, qpos=np.concatenate([turned, turned[:1]]))
+
+
+def standing_still(like: WalkLoop) -> WalkLoop:
+    """A second of the standing pose: a pose and no motion that anybody has simulated."""
+    creature: Creature = like.walk.creature
+    stand = creature.stand_qpos.copy()
+    place = int(creature.model.jnt_qposadr[creature.model.body_jntadr[creature.trunk]])
+    stand[place : place + 2] = 0.0
+    qpos = np.tile(stand, (like.rate + 1, 1))
+    return dataclasses.replace(like, qpos=qpos, strides=0, advance=0.0, stretched=1.0, turned=0.0)

@@ -1,0 +1,87 @@
+"""The joints of a skin, and where they are in a pose, in glTF's axes.
+
+glTF is Y-up with +Z forward and +X left, quaternions are (x, y, z, w). Letters: `F` key frames, `B`
+joints of the skin (the root on the floor, then the bodies).
+"""
+
+import dataclasses
+
+import mujoco
+import numpy as np
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Skeleton:
+    """The joints of the skin in glTF's axes.
+
+    names: [B]. parent: [B] place of the parent, -1 for the root. bodies: [B] MuJoCo's body, 0 (the
+    world) for the root.
+    """
+
+    names: tuple[str, ...]
+    parent: tuple[int, ...]
+    bodies: tuple[int, ...]
+
+
+def skeleton_of(model: mujoco.MjModel, trunk: int) -> Skeleton:
+    """The bodies of the tree that begins at the trunk, below a root that stays on the floor."""
+    bodies = [
+        0,
+        *(b for b in range(1, model.nbody) if model.body_rootid[b] == model.body_rootid[trunk]),
+    ]
+    parents = (-1, *(bodies.index(int(model.body_parentid[b])) for b in bodies[1:]))
+    return Skeleton(
+        ("root", *(model.body(b).name or f"body_{b}" for b in bodies[1:])), parents, tuple(bodies)
+    )
+
+
+def gltf_axes(forward: np.ndarray) -> np.ndarray:
+    """[3, 3] that turns MuJoCo's world into glTF's: left to +X, up to +Y, forward [2] to +Z."""
+    way = np.append(forward, 0.0)
+    return np.stack([np.cross([0.0, 0.0, 1.0], way), [0.0, 0.0, 1.0], way])
+
+
+def local_poses(
+    model: mujoco.MjModel, skeleton: Skeleton, qpos: np.ndarray, axes: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Each joint against its parent: positions [F, B, 3] m and quaternions [F, B, 4] (x, y, z,
+    w), in glTF's axes.
+    """
+    pos, rot = world_poses(model, skeleton, qpos, axes)
+    local_pos, quat = pos.copy(), np.zeros((*pos.shape[:2], 4))
+    for b, parent in enumerate(skeleton.parent):
+        turned = rot[:, b]
+        if parent >= 0:
+            back = rot[:, parent].transpose(0, 2, 1)
+            local_pos[:, b] = (back @ (pos[:, b] - pos[:, parent])[..., None])[..., 0]
+            turned = back @ turned
+        quat[:, b] = _quaternions(turned)
+    return local_pos, quat
+
+
+def world_poses(
+    model: mujoco.MjModel, skeleton: Skeleton, qpos: np.ndarray, axes: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Each joint in the world: positions [F, B, 3] m and rotations [F, B, 3, 3], in glTF's axes."""
+    data = mujoco.MjData(model)
+    pos, rot = [], []
+    for row in qpos:
+        data.qpos[:] = row
+        mujoco.mj_kinematics(model, data)
+        pos.append(data.xpos[list(skeleton.bodies)] @ axes.T)
+        rot.append(axes @ data.xmat[list(skeleton.bodies)].reshape(-1, 3, 3) @ axes.T)
+    return np.array(pos), np.array(rot)
+
+
+def _quaternions(rotations: np.ndarray) -> np.ndarray:
+    """[F, 4] (x, y, z, w) of rotations [F, 3, 3], neighbours on the same side of the sphere so
+    that they can be interpolated.
+    """
+    quats = np.zeros((len(rotations), 4))
+    for i, rotation in enumerate(rotations):
+        quat = np.zeros(4)
+        mujoco.mju_mat2Quat(quat, np.ascontiguousarray(rotation).ravel())
+        quats[i] = np.roll(quat, -1)
+        if i and quats[i] @ quats[i - 1] < 0:
+            quats[i] *= -1
+    return quats

@@ -1,0 +1,198 @@
+"""`mjxgait repertoire`: a grid of walks that blend."""
+
+import dataclasses
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+import tyro
+from rich.console import Console
+
+from mjxgait.creature import Creature
+from mjxgait.errors import INTERRUPTED, UserError
+from mjxgait.library import load_creature
+from mjxgait.parts import resolve_config
+from mjxgait.parts.wishes import Wishes, speed_of, wished
+from mjxgait.repertoire.grid import GRID, Grid
+from mjxgait.runs.disk import disk_errors
+from mjxgait.runs.folder import create_run, open_run
+from mjxgait.settings.config import Config
+from mjxgait.settings.tables import build, merge
+
+MAP, CLIPS, TABLE = "map.png", "repertoire.glb", "repertoire.json"
+OF_FILES = ("rate", "travelling", "blends", "cluster")
+"""Options that decide nothing about the walks."""
+
+
+@dataclasses.dataclass(frozen=True)
+class RepertoireOptions:
+    """Evolve a grid of walks, speeds by turns, side by side and each seeded from its neighbours;
+    examine each; write all that are certified as clips of one GLB, in phase, with a table of where
+    they belong in a blend space (docs/repertoire.md).
+
+    Attributes:
+      env: Name of a shipped creature, path of a creature folder, or a model file (MJCF or URDF).
+      speeds: How fast: 0.4 (m/s), 0.4bl/s (body lengths per second), or fr0.2 (Froude number).
+      turns: Degrees per second, each to either side; straight on is always among them.
+      gait: Of all walks; see `mjxgait train --help`.
+      style: Of all walks: calm, sneaky, heavy, proud, tired, hurried, or a FILE.toml of settings.
+      config: TOML file with settings, or the name of a shipped config; one of your own takes the
+        place of configs/repertoire.toml.
+      out: Folder for the repertoire; by default runs/repertoire-CREATURE. Each walk in it is a run
+        folder.
+      resume: Folder of a repertoire to go on with, as it was.
+      population: Of each walk.
+      generations: Of each walk, straight on and turning.
+      seed: Of all randomness.
+      rate: Key frames per second of the clips.
+      travelling: The clips move their root; otherwise the creature walks in place.
+      blends: Try what lies half way between neighbours in C MuJoCo too.
+      cluster: Have it evolved by a Ray cluster: HOST:PORT, or auto (docs/cluster.md).
+    """
+
+    env: str = "tall_quadruped"
+    speeds: tuple[str, ...] = ("0.3bl/s", "0.5bl/s", "0.7bl/s", "0.9bl/s", "1.1bl/s")
+    turns: tuple[float, ...] = (10.0, 20.0)
+    gait: str | None = None
+    style: str | None = None
+    config: str = "repertoire"
+    out: Path | None = None
+    resume: Path | None = None
+    population: int | None = None
+    generations: int | None = None
+    seed: int | None = None
+    rate: Literal[24, 30, 60] = 60
+    travelling: bool = False
+    blends: bool = True
+    cluster: str | None = None
+
+
+def repertoire_command(arguments: Sequence[str]) -> int:
+    """Returns the exit code."""
+    options = tyro.cli(RepertoireOptions, args=list(arguments), prog="mjxgait repertoire")
+    folder, creature, grid = _resumed(options) if options.resume else begun(options)
+    # JAX takes a second to import: only once the options are known to be good.
+    from mjxgait.cluster.board import crew_at
+    from mjxgait.repertoire.evolve import evolve
+    from mjxgait.repertoire.examine import examine
+    from mjxgait.runs.experiment import prepare_devices
+    from mjxgait.runs.loop import interruptible
+
+    prepare_devices(1 if options.cluster else None)
+    console, began = Console(highlight=False, soft_wrap=True), time.perf_counter()
+    screen = _Screen(console)
+    with interruptible() as interrupted, crew_at(options.cluster, console) as crew:
+        told = interrupted.is_set
+        ended = evolve(folder, creature, grid, crew, screen.evolved, told)
+        ended = ended and examine(folder, grid, screen.examined, told)
+    if not ended:
+        console.print(f"interrupted; go on with: mjxgait repertoire --resume {folder}")
+        return INTERRUPTED
+    _leave(folder, creature, grid, options, screen)
+    console.print(
+        f"{time.perf_counter() - began:.0f} s; each walk is a run: mjxgait inspect {folder}"
+    )
+    return 0
+
+
+def begun(options: RepertoireOptions) -> tuple[Path, Creature, Grid]:
+    """Makes the folder, with a run folder for each cell.
+
+    Raises:
+      UserError: the options mean nothing, or the folder holds something already.
+    """
+    from mjxgait.repertoire.cells import check, settings_of
+
+    creature = load_creature(options.env, tell=print)
+    grid = Grid.of([speed_of(text, creature) for text in options.speeds], options.turns)
+    base = _settings(options, creature)
+    check(base)
+    folder = options.out or Path("runs") / f"repertoire-{creature.name}"
+    configs = {cell: settings_of(cell, creature, base) for cell in grid.cells}
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise UserError(
+            f"{folder}: holds something already; name another folder with --out, or go on with "
+            f"--resume {folder}"
+        )
+    with disk_errors(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+    for cell, config in configs.items():
+        create_run(folder / cell.name, creature, config)
+    with disk_errors(folder):
+        (folder / GRID).write_text(grid.text, encoding="utf-8")
+    return folder, open_run(folder / grid.cells[0].name)[0], grid
+
+
+def _resumed(options: RepertoireOptions) -> tuple[Path, Creature, Grid]:
+    folder = options.resume
+    assert folder is not None
+    grid, plain = Grid.read(folder), RepertoireOptions()
+    free = {name: getattr(plain, name) for name in ("resume", *OF_FILES)}
+    if dataclasses.replace(options, **free) != plain:
+        raise UserError(
+            f"{folder}: a resumed repertoire keeps its walks and their settings; only "
+            f"--{', --'.join(OF_FILES)} may be given"
+        )
+    return folder, open_run(folder / grid.cells[0].name)[0], grid
+
+
+def _settings(options: RepertoireOptions, creature: Creature) -> Config:
+    """What all walks share."""
+    config = resolve_config(creature.settings.train, creature.name, Path(options.config))
+    config = wished(config, creature, Wishes(gait=options.gait, style=options.style))
+    short = {"population": options.population, "generations": options.generations}
+    table: dict[str, Any] = {"evolution": {k: v for k, v in short.items() if v is not None}}
+    table |= {} if options.seed is None else {"seed": options.seed}
+    return build(type(config), merge(dataclasses.asdict(config), table), "the options")
+
+
+def _leave(
+    folder: Path, creature: Creature, grid: Grid, options: RepertoireOptions, screen: "_Screen"
+) -> None:
+    """The map, and the clips where there are any."""
+    from mjxgait.repertoire.blends import blends
+    from mjxgait.repertoire.clips import clips_of, write_clips
+    from mjxgait.repertoire.found import draw_map, found_in, table
+    from mjxgait.viewing.style import figure
+
+    found, console = found_in(folder, grid), screen.console
+    console.print(table(found))
+    size = (2.4 + 1.3 * (2 * len(grid.turns) + 1), 1.6 + 0.9 * len(grid.speeds))
+    with disk_errors(folder / MAP), figure(size) as drawing:
+        draw_map(drawing, creature.name, grid, found)
+        drawing.savefig(folder / MAP)
+    walks = sum(one.certified for one in found)
+    console.print(f"{walks} of {len(found)} walks are certified: {folder / MAP}")
+    between = blends(folder, creature, grid, found, screen.blended) if options.blends else []
+    if between:
+        walking = sum(blend.walks for blend in between)
+        console.print(f"half way between neighbours {walking} of {len(between)} walk")
+    if loops := clips_of(folder, found, options.rate):
+        write_clips(folder / CLIPS, folder / TABLE, loops, found, between, options.travelling)
+        console.print(f"{len(loops)} clips: {folder / CLIPS}, their places: {folder / TABLE}")
+
+
+class _Screen:
+    """Plain lines."""
+
+    def __init__(self, console: Console) -> None:
+        self.console = console
+
+    def evolved(self, name: str, generation: int, last: int, done: Any) -> None:
+        if done is None:
+            self.console.print(f"{name}: compiling")
+            return
+        left = (last - generation) * done.seconds / max(len(done.lines), 1)
+        alive = [1 - line["failures"] / max(line["episodes"], 1) for line in done.lines[-1]]
+        self.console.print(
+            f"{name}: generation {generation} of {last}, {len(alive)} walks side by side, "
+            f"{sum(alive) / len(alive):.0%} of their episodes without a fall, "
+            f"{done.steps / done.seconds / 1e6:.2f} M steps/s, {left:.0f} s left"
+        )
+
+    def examined(self, count: int, of: int) -> None:
+        self.console.print(f"examined in C MuJoCo: {count} of {of}")
+
+    def blended(self, count: int, of: int) -> None:
+        self.console.print(f"half way between neighbours, in C MuJoCo: {count} of {of}")

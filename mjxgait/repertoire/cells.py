@@ -1,0 +1,88 @@
+"""What a cell of the grid is as a run: its settings, and its genomes made of others'."""
+
+import dataclasses
+from collections.abc import Mapping
+
+import numpy as np
+
+from mjxgait.creature import Creature
+from mjxgait.errors import UserError
+from mjxgait.parts.wishes import Wishes, wished
+from mjxgait.repertoire.grid import Cell
+from mjxgait.runs.packed import Packed
+from mjxgait.settings.config import Config
+
+POSES = "genomes.key_poses"
+GENOMES = (POSES, "genomes.tuning")
+
+
+def check(config: Config) -> None:
+    """Refuses what no repertoire can be made of.
+
+    Raises:
+      UserError: another task or controller, or a body that evolves.
+    """
+    if (config.use.task, config.use.controller) != ("walk", "poses"):
+        raise UserError(
+            f"a repertoire is of walks by key poses, and this is to {config.use.task} by "
+            f"{config.use.controller}"
+        )
+    if config.evolution.body != 1:
+        raise UserError("evolution.body: the clips of a repertoire are of one body; leave it at 1")
+    if config.fitness.wish.asked and {"speed", "turn", "steer"} & set(config.fitness.wish.asked):
+        raise UserError("fitness.wish: the grid asks for speeds and turns; leave these out")
+
+
+def has_mirror(creature: Creature) -> bool:
+    """Whether a turn to the right is the mirror image of one to the left."""
+    return creature.mirror.symmetric
+
+
+def settings_of(cell: Cell, creature: Creature, base: Config) -> Config:
+    """The settings of a cell's run. Who turns does not do the same to both sides, so all its cycle
+    is of its own poses.
+    """
+    wishes = Wishes(speed=f"{cell.speed:.6f}", turn=cell.turn or None)
+    config = wished(base, creature, wishes)
+    controller = config.controller
+    if cell.turn and _halved(creature, config):
+        controller = dataclasses.replace(
+            controller, mirror=False, key_poses=2 * controller.key_poses
+        )
+    forced = dataclasses.replace(config.evolution.forced, patience=0)
+    # All rows of a program go on together.
+    evolution = dataclasses.replace(config.evolution, target=None, forced=forced)
+    return dataclasses.replace(config, controller=controller, evolution=evolution)
+
+
+def seeds(straight: Packed, creature: Creature, config: Config) -> dict[str, np.ndarray]:
+    """The population of who walks straight on, as that of who turns. config: of the former."""
+    found = {name: straight.arrays[name] for name in GENOMES}
+    if _halved(creature, config):
+        poses = found[POSES]
+        found[POSES] = np.concatenate([poses, mirrored(poses, creature)], axis=-2)
+    return found
+
+
+def mirror_image(state: Packed, creature: Creature) -> Packed:
+    """A population in a mirror: what turned to the left turns to the right."""
+    return state.with_arrays({POSES: mirrored(state.arrays[POSES], creature)})
+
+
+def mirrored(poses: np.ndarray, creature: Creature) -> np.ndarray:
+    """Poses [..., J], left and right exchanged."""
+    sign = creature.mirror.sign.astype(poses.dtype)
+    swapped: np.ndarray = sign * poses[..., creature.mirror.partner]
+    return swapped
+
+
+def planted(
+    cells: list[Cell], straight: Mapping[float, Packed], creature: Creature, config: Config
+) -> dict[str, np.ndarray]:
+    """What turning cells begin with, [B, P, ...]: who walks straight on at their speed."""
+    rows = [seeds(straight[cell.speed], creature, config) for cell in cells]
+    return {name: np.stack([row[name] for row in rows]) for name in GENOMES}
+
+
+def _halved(creature: Creature, config: Config) -> bool:
+    return creature.mirror.symmetric and config.controller.mirror

@@ -1,0 +1,59 @@
+"""Who of a repertoire walks: one of the best few of each cell with its certificate."""
+
+import concurrent.futures
+import io
+from collections.abc import Callable
+from pathlib import Path
+
+import jax
+from rich.console import Console
+
+from mjxgait.cores import process_per_core, survivable
+from mjxgait.repertoire.grid import Grid
+from mjxgait.runs.checkpoint import Checkpoints
+from mjxgait.runs.examination import Examiner
+from mjxgait.runs.exams import Exams
+from mjxgait.runs.experiment import build_experiment, prepare_devices
+from mjxgait.runs.folder import CERTIFICATE, EXAMS, open_run
+from mjxgait.runs.loop import conclude, versions
+from mjxgait.runs.screen import Screen
+
+
+def examine(
+    folder: Path, grid: Grid, tell: Callable[[int, int], object], stopped: Callable[[], bool]
+) -> bool:
+    """Leaves champion and certificate in the folder of each cell that has none, one cell per core;
+    whether all have.
+
+    tell: called with how many are done, and of how many.
+
+    Raises:
+      UserError: a process was killed from outside, or the folder cannot be written.
+    """
+    places = [folder / cell.name for cell in grid.cells]
+    left = [place for place in places if not (place / CERTIFICATE).is_file()]
+    if not left:
+        return True
+    again = f"mjxgait repertoire --resume {folder}"
+    with survivable(folder, again), process_per_core(len(left), prepare_devices) as pool:
+        work = [pool.submit(_examine, place) for place in left]
+        for number, done in enumerate(concurrent.futures.as_completed(work), 1):
+            done.result()
+            tell(number, len(left))
+            if stopped():
+                pool.shutdown(cancel_futures=True)
+                return number == len(left)
+    return True
+
+
+def _examine(folder: Path) -> None:
+    """In a process of its own: all that is sent is the folder of a run."""
+    creature, config = open_run(folder)
+    experiment, store = build_experiment(creature, config), Checkpoints(folder, config.keep_every)
+    try:
+        state = store.restore(jax.eval_shape(experiment.init), creature.digest)
+    finally:
+        store.close()
+    quiet = Screen(Console(file=io.StringIO()))
+    examiner = Examiner(experiment, versions(), quiet.say, Exams(folder / EXAMS))
+    conclude(folder, creature, quiet, examiner.best(state))

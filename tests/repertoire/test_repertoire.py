@@ -1,0 +1,250 @@
+"""A repertoire of the smallest creature, from the first generation to the files for a game engine.
+
+Who evolves it are made-up hands, so that no program is compiled; `test_guests.py` looks at the rows.
+"""
+
+import dataclasses
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pygltflib as gltf
+import pytest
+from helpers import STOOL, said_by
+from viewing.made_up import metrics_line, treading
+
+from mjxgait.certify import Certificate, CertificateConfig, Criterion, Measure
+from mjxgait.champion import write_champion
+from mjxgait.cluster.crew import Crew, Report, Worker
+from mjxgait.cluster.jobs import Advanced, AdvanceRows
+from mjxgait.cluster.programs import Programs
+from mjxgait.cluster.recipe import Recipe
+from mjxgait.commands.repertoire import RepertoireOptions, begun
+from mjxgait.creature import Creature
+from mjxgait.repertoire.blends import half_way
+from mjxgait.repertoire.cells import POSES, mirrored
+from mjxgait.repertoire.evolve import evolve
+from mjxgait.repertoire.grid import Cell, Grid
+from mjxgait.runs.folder import CERTIFICATE, CHAMPION, METRICS, read_metrics
+from mjxgait.runs.packed import pack
+from mjxgait.runs.stored import read_stored, stored_generations
+
+SMALL = """
+checkpoint_every = 1
+[rollout]
+seconds = 0.4
+starts = 2
+lanes = 4
+[examination]
+candidates = 0
+"""
+GENERATIONS = 2
+PROGRAMS = Programs()
+CERTIFIED = (Cell(0.2, 0.0), Cell(0.2, 10.0))
+
+
+class Pretend:
+    """Hands that evolve nobody: each generation bends all poses a little."""
+
+    def __init__(self) -> None:
+        self._coming, self._work = [Worker(0, "here")], None
+
+    def arrivals(self) -> list[Worker]:
+        coming, self._coming = self._coming, []
+        return coming
+
+    def start(self, worker: Worker, recipe: Recipe, job: Any) -> None:
+        self._work = worker, recipe, job
+
+    def wait(self, seconds: float) -> list[Report]:
+        if self._work is None:
+            return []
+        (worker, recipe, job), self._work = self._work, None
+        return [Report(worker, pretended(recipe, job))]
+
+
+def pretended(recipe: Recipe, job: AdvanceRows) -> Advanced:
+    batch = PROGRAMS.batch(recipe)
+    before = job.state or pack(batch.init()).with_arrays(job.planted or {})
+    rows = len(batch.experiments)
+    new = {
+        "generation": np.full(rows, job.until, np.int32),
+        "fitness": np.ones_like(before.arrays["fitness"]),
+        POSES: before.arrays[POSES] + np.float32(0.01),
+    }
+    begun = -1 if job.state is None else job.state.generation
+    lines = [[metrics_line(g)] * rows for g in range(begun + 1, job.until + 1)]
+    return Advanced(before.with_arrays(new), lines, "", 1.0, 1)
+
+
+class Interrupted(Crew):
+    """One that is told to stop after so many pieces of work."""
+
+    left = 3
+
+    def next(self, stopped: Callable[[], bool]) -> Any:
+        self.left -= 1
+        return super().next(lambda: self.left < 0)
+
+
+def begin(folder: Path) -> tuple[Path, Creature, Grid]:
+    settings = folder.with_suffix(".toml")
+    settings.write_text(SMALL)
+    return begun(
+        RepertoireOptions(
+            env=str(STOOL),
+            speeds=("0.2", "0.4"),
+            turns=(10.0,),
+            config=str(settings),
+            out=folder,
+            population=6,
+            generations=GENERATIONS,
+        )
+    )
+
+
+def run(folder: Path, creature: Creature, grid: Grid, kind: type[Crew] = Crew) -> bool:
+    crew = kind(Pretend())
+    return evolve(folder, creature, grid, crew, lambda *told: None, lambda: False)
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Creature, Grid]:
+    made = begin(tmp_path_factory.mktemp("repertoire") / "set")
+    assert run(*made)
+    return made
+
+
+def poses_of(folder: Path, cell: Cell, creature: Creature) -> np.ndarray:
+    return read_stored(folder / cell.name, creature.digest).arrays[POSES]
+
+
+def test_each_walk_is_a_run_of_its_own(finished, capsys: pytest.CaptureFixture):
+    folder, _, grid = finished
+    said = said_by(capsys, "inspect", folder, code=0)
+    for cell in grid.cells:
+        assert cell.name in said
+        lines = read_metrics(folder / cell.name / METRICS)
+        assert [line["generation"] for line in lines] == [0, 1, 2]
+        assert stored_generations(folder / cell.name)[-1] == GENERATIONS
+
+
+def test_walks_to_the_right_are_the_mirror_images_of_those_to_the_left(finished):
+    folder, creature, grid = finished
+    for speed in grid.speeds:
+        left, right = (poses_of(folder, Cell(speed, turn), creature) for turn in (10.0, -10.0))
+        np.testing.assert_array_equal(mirrored(left, creature), right)
+
+
+def test_who_turns_begins_with_the_poses_of_who_walks_straight_on(finished):
+    """Bent by the generations since then, which the checkpoint comes after."""
+    folder, creature, grid = finished
+    for speed in grid.speeds:
+        straight, left = (poses_of(folder, Cell(speed, turn), creature) for turn in (0.0, 10.0))
+        whole = np.concatenate([straight, mirrored(straight, creature)], axis=1)
+        np.testing.assert_allclose(left, whole + 0.02, atol=1e-6)
+
+
+def test_stopped_on_the_way_it_goes_on_to_the_same_walks(finished, tmp_path: Path):
+    """Stopped after the first generation of those that turn."""
+    folder, creature, grid = finished
+    again, _, _ = begin(tmp_path / "again")
+    assert not run(again, creature, grid, Interrupted)
+    assert stored_generations(again / Cell(0.2, 10.0).name)[-1] == 1
+    assert run(again, creature, grid)
+    for cell in grid.cells:
+        np.testing.assert_array_equal(
+            poses_of(folder, cell, creature), poses_of(again, cell, creature)
+        )
+
+
+def certificate(creature: Creature, passed: bool) -> str:
+    measure = Measure("speed", 0.6 if passed else 0.4, ">=", 0.5, 1.0)
+    report = {"speed": 0.21, "duty_factor": {"a": 0.5, "b": 0.7}, "gait": "trot", "summary": ""}
+    criteria = (Criterion(2, "progress", (measure,)),)
+    config = CertificateConfig()
+    return Certificate(
+        creature.name, creature.digest, "walk", "", criteria, report, config, 1.0
+    ).to_json()
+
+
+@pytest.fixture(scope="module")
+def examined(finished) -> Path:
+    """The folder as an examination that two walks passed would leave it."""
+    folder, creature, grid = finished
+    champion = treading(creature, degrees=35.0)
+    for cell in grid.cells:
+        wish = {"speed": cell.speed} | ({"turn": cell.turn} if cell.turn else {})
+        place = folder / cell.name
+        write_champion(dataclasses.replace(champion, wish=wish), creature, place / CHAMPION)
+        (place / CERTIFICATE).write_text(certificate(creature, cell in CERTIFIED))
+    return folder
+
+
+def test_what_is_certified_becomes_clips_with_their_places(
+    examined: Path, capsys: pytest.CaptureFixture
+):
+    folder = examined
+    said = said_by(capsys, "repertoire", "--resume", folder, "--no-blends", code=0)
+    assert "2 of 6 walks are certified" in said
+    table = json.loads((folder / "repertoire.json").read_text())
+    names = [cell.name for cell in CERTIFIED]
+    document = gltf.GLTF2.load_from_bytes((folder / table["file"]).read_bytes())
+    assert [animation.name for animation in document.animations] == ["idle", *names]
+    idle, straight, turning = table["clips"]
+    assert (idle["speed"], idle["turn"], idle["certified"]) == (0, 0, False)
+    assert straight["asked"] == {"speed": 0.2, "turn": 0.0}
+    assert (straight["turn"], turning["turn"]) == (0.0, pytest.approx(10.0, rel=0.02))
+    assert turning["duration"] == pytest.approx(0.5, abs=1 / 60)
+    assert turning["duty_factor"] == pytest.approx(0.6)
+    assert [place["fails"] for place in table["not_certified"]] == [["progress"]] * 4
+    assert (folder / "map.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_half_way_is_the_mean_of_two_controllers(stool: Creature):
+    one = dataclasses.replace(treading(stool), wish={"speed": 0.2})
+    cycle = np.concatenate([one.genome["key_poses"], mirrored(one.genome["key_poses"], stool)])
+    other = dataclasses.replace(
+        one,
+        genome={"key_poses": cycle + 0.2, "tuning": one.genome["tuning"] + 1.0},
+        settings=dataclasses.replace(
+            one.settings, mirror=False, key_poses=4, interpolation=one.settings.interpolation + 4
+        ),
+        wish={"speed": 0.4, "turn": 10.0},
+    )
+    between = half_way(one, other, stool)
+    np.testing.assert_allclose(between.genome["key_poses"], cycle + 0.1)
+    np.testing.assert_allclose(between.genome["tuning"], one.genome["tuning"] + 0.5)
+    assert between.settings.interpolation == one.settings.interpolation + 2
+    assert (between.settings.mirror, between.settings.key_poses) == (False, 4)
+    assert between.wish == {"speed": pytest.approx(0.3), "turn": 5.0}
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (["--env", "luxo"], "a repertoire is of walks by key poses"),
+        (["--env", STOOL, "--speeds", "fast"], "--speed fast: give m/s"),
+        (["--env", STOOL, "--speeds", "0.5", "--turns", "-5"], "each is for both sides"),
+        (["--resume", STOOL], "not the folder of a repertoire"),
+    ],
+)
+def test_bad_input_gets_one_sentence(given, said: str, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    heard = said_by(capsys, "repertoire", *given, code=2)
+    assert said in heard
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_resumed_repertoire_keeps_its_walks(finished, capsys: pytest.CaptureFixture):
+    said = said_by(capsys, "repertoire", "--resume", finished[0], "--turns", "30", code=2)
+    assert "keeps its walks and their settings" in said
+
+
+def test_nothing_is_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture):
+    (tmp_path / "mine.txt").write_text("mine")
+    said = said_by(capsys, "repertoire", "--env", STOOL, "--out", tmp_path, code=2)
+    assert "holds something already" in said
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
