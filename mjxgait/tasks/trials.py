@@ -130,8 +130,12 @@ def _stacked(grounds: list[Ground | None]) -> Ground:
 def _uneven(
     key: jax.Array, place: Place, config: RolloutConfig, draws: jax.Array
 ) -> list[Ground | None]:
-    """Level for the nominal start; slopes to all sides, any up to the steepest, for the others."""
-    steep, side = jax.random.uniform(key, (2, config.starts))
+    """Level for the nominal start; for the others slopes spread evenly to all sides, from any first
+    one on, more of them steep than not: evenly over the disc of all that may be.
+    """
+    others = max(config.starts - 1, 1)
+    side = (jnp.arange(config.starts) + jax.random.uniform(key)) / others
+    steep = jnp.sqrt(jax.random.uniform(jax.random.fold_in(key, 1), (config.starts,)))
     rise, turn = np.tan(np.radians(config.slope)) * steep, 2 * jnp.pi * side
     slopes = rise[:, None] * jnp.stack([jnp.cos(turn), jnp.sin(turn)], axis=1)
     return [
