@@ -193,9 +193,9 @@ def test_what_a_genome_costs_is_taken_from_its_fitness():
         return 3.0 * jnp.sum(genomes.key_poses[:, :, 0] > 0, axis=1)
 
     dear = dataclasses.replace(plain, variation=dataclasses.replace(plain.variation, price=price))
-    state = dear.init(jax.random.key(0), 1, 1, 1)
+    state, step = dear.init(jax.random.key(0), 1, 1, 1), jax.jit(dear.step)
     for _ in range(12):
-        state, _ = jax.jit(dear.step)(state)
+        state, _ = step(state)
         expected = near_zero(state.genomes) - price(state.genomes)
         np.testing.assert_allclose(state.fitness, expected, rtol=1e-5)
     assert not np.asarray(price(state.genomes)).any()

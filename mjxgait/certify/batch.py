@@ -18,6 +18,7 @@ def batch_of(creature: Creature, model: mujoco.MjModel, starts: Starts) -> Batch
     # The impedance and not the time constant, which is as short as the time step allows already.
     impedance = batch.expand("geom_solimp")[:, :, :2]
     impedance /= impedance + starts.floor[:, None, None] * (1 - impedance)
+    batch.expand("opt.timestep")[:] /= starts.refine
     batch.set_const()
     batch.reset(stage=int(mujoco.mjtStage.mjSTAGE_NONE))
     qpos = batch.bind("qpos")

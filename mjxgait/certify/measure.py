@@ -165,6 +165,7 @@ def measure(
         if not (np.isfinite(qpos[k]).all() and np.isfinite(qvel[k]).all()):
             break
         sight.look(k, qpos[k], qvel[k], torque[k])
+    sight.finish()
     forward, left, up = (
         sight.trunk_rot @ axis
         for axis in (creature.frame.forward, creature.frame.left, creature.frame.up)
@@ -221,6 +222,13 @@ class _Sight:
         )
         self.bar, self.over = bar, None if bar is None else Clearance(creature)
         self.clearance = np.full(frames, np.nan)
+        # What is reckoned at the end, of all frames at once.
+        model, self.seen = self.model, 0
+        self.geom_xpos, self.geom_xmat = (
+            np.empty((frames, model.ngeom, 3)),
+            np.empty((frames, model.ngeom, 9)),
+        )
+        self.spun, self.arm = np.empty((frames, model.nbody, 6)), np.empty((frames, model.nbody, 3))
         self.touch, self.penetration, self.body_speed = (
             np.ones(frames, bool),
             np.full(frames, np.nan),
@@ -236,15 +244,21 @@ class _Sight:
             data.xpos[creature.trunk],
             data.xmat[creature.trunk].reshape(3, 3),
         )
-        heights = self.reach.heights(data.geom_xpos[None], data.geom_xmat[None])
-        self.foot_height[k] = per_foot(creature, heights)[0]
-        self.body_speed[k] = np.linalg.norm(
-            _velocity(data, data.xipos, np.arange(self.model.nbody))[1:], axis=1
-        ).max()
+        self.geom_xpos[k], self.geom_xmat[k] = data.geom_xpos, data.geom_xmat
+        self.spun[k] = data.cvel
+        self.arm[k] = data.xipos - data.subtree_com[self.model.body_rootid]
         self._contacts(k)
+        self.seen = k + 1
+
+    def finish(self) -> None:
+        """What follows from the poses of all frames that were looked at."""
+        seen = slice(self.seen)
+        poses = self.geom_xpos[seen], self.geom_xmat[seen]
+        self.foot_height[seen] = per_foot(self.creature, self.reach.heights(*poses))
+        speed = np.linalg.norm(_moving(self.spun[seen], self.arm[seen])[:, 1:], axis=2)
+        self.body_speed[seen] = speed.max(1)
         if self.bar is not None and self.over is not None:
-            poses = data.geom_xpos[None], data.geom_xmat[None]
-            self.clearance[k] = self.over.of(*poses, self.bar[None])[0]
+            self.clearance[seen] = self.over.of(*poses, self.bar[None])
 
     def _contacts(self, k: int) -> None:
         data, contact = self.data, self.data.contact
@@ -255,7 +269,9 @@ class _Sight:
         geom = contact.geom[on_floor].sum(1) - self.floor
         self.penetration[k] = max(0.0, -contact.dist[on_floor].min())
         self.touch[k] = (~self.may_touch[geom]).any()
-        velocity = _velocity(data, contact.pos[on_floor], self.model.geom_bodyid[geom])
+        body = self.model.geom_bodyid[geom]
+        arm = contact.pos[on_floor] - data.subtree_com[self.model.body_rootid[body]]
+        velocity = _moving(data.cvel[body], arm)
         first, second = np.moveaxis(contact.frame[on_floor].reshape(-1, 3, 3)[:, 1:], 1, 0)
         slip = np.hypot((velocity * first).sum(1), (velocity * second).sum(1))
         force = np.zeros(6)
@@ -270,12 +286,11 @@ class _Sight:
         self.foot_slip[k, carrying] /= self.foot_force[k, carrying]
 
 
-def _velocity(data: mujoco.MjData, points: np.ndarray, body: np.ndarray) -> np.ndarray:
-    """World velocities [P, 3] of the material points [P, 3] of bodies [P]; `cvel` is that at the
-    tree's centre of mass.
+def _moving(spun: np.ndarray, arm: np.ndarray) -> np.ndarray:
+    """World velocities [..., 3] of material points at arms [..., 3] m from their tree's centre of
+    mass, where the spatial velocities `cvel` [..., 6] are.
     """
-    spin, slide = data.cvel[body, :3], data.cvel[body, 3:]
-    arm = points - data.subtree_com[data.model.body_rootid[body]]
+    spin, slide = spun[..., :3], spun[..., 3:]
     # np.cross takes five times as long for so few points.
-    turn = spin[:, [1, 2, 0]] * arm[:, [2, 0, 1]] - spin[:, [2, 0, 1]] * arm[:, [1, 2, 0]]
+    turn = spin[..., [1, 2, 0]] * arm[..., [2, 0, 1]] - spin[..., [2, 0, 1]] * arm[..., [1, 2, 0]]
     return slide + turn

@@ -24,7 +24,6 @@ def simulate(
     seconds: float,
     *,
     record: int = 0,
-    refine: int = 1,
     heading: np.ndarray | None = None,
     fall: Fall | None = None,
     threads: int = 0,
@@ -34,8 +33,6 @@ def simulate(
     Args:
       record: R, how many of the first simulations to record; these run to the end even after a
         fall, the others stop there.
-      refine: physics steps per control step: the controller stays what it was, its torque is held
-        in between.
       fall: when one is down; by default as its task has it.
       heading: [T] or [S, T] rad, commanded heading at each control step; None is as its task has
         it, mostly straight ahead.
@@ -54,7 +51,7 @@ def simulate(
 
     def run(share: np.ndarray) -> Outcome:
         mine, kept = starts.rows(share), int((share < record).sum())
-        stepping = Stepping(creature, champion, mine, kept, refine, fall, task)
+        stepping = Stepping(creature, champion, mine, kept, fall, task)
         return stepping.to_the_end(steps, None if told is None else told[share])
 
     with concurrent.futures.ThreadPoolExecutor(len(shares)) as pool:

@@ -29,6 +29,8 @@ class Starts:
     light: [S, 3] m from where the trunk starts; 0 where there is none.
     bar: [S, 2] m ahead of the start and above the floor, of a bar's lower edge; infinite where the
       task has none.
+    refine: [S] physics steps per control step: the controller stays what it was, its torque is held
+      in between.
     """
 
     joint_offset: np.ndarray
@@ -46,6 +48,7 @@ class Starts:
     goal: np.ndarray
     light: np.ndarray
     bar: np.ndarray
+    refine: np.ndarray
 
     def __len__(self) -> int:
         return len(self.friction)
@@ -54,7 +57,7 @@ class Starts:
     def undisturbed(self) -> np.ndarray:
         """[S] whether nothing disturbs them until they are pushed."""
         plain = {"friction": 1, "mass": 1, "stiffness": 1, "damping": 1, "floor": 1}
-        plain |= {"joint_offset": 0, "joint_velocity": 0, "delay": 0, "slope": 0}
+        plain |= {"joint_offset": 0, "joint_velocity": 0, "delay": 0, "slope": 0, "refine": 1}
         same = [getattr(self, name) == value for name, value in plain.items()]
         return np.all([s.reshape(len(self), -1).all(1) for s in same], axis=0)
 
@@ -94,6 +97,7 @@ def nominal_starts(creature: Creature, count: int) -> Starts:
         goal=np.zeros(count),
         light=np.zeros((count, 3)),
         bar=np.full((count, 2), np.inf),
+        refine=np.ones(count, dtype=int),
     )
 
 

@@ -32,14 +32,11 @@ WARMUP = CertificateConfig().warmup
 """s; who leaps before has not settled yet."""
 
 
-def examined_model(creature: Creature, refine: int = 1) -> mujoco.MjModel:
-    """The creature's own body on its ground, with a converged contact solver, and its time step
-    divided by `refine`.
-    """
+def examined_model(creature: Creature) -> mujoco.MjModel:
+    """The creature's own body on its ground, with a converged contact solver."""
     model = copy.copy(grounded_model(creature))
     model.opt.iterations, model.opt.ls_iterations = 100, 50
     model.opt.tolerance = 1e-8
-    model.opt.timestep = creature.model.opt.timestep / refine
     # A simulation that blows up must not be put back on its feet in silence.
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     return model
@@ -65,21 +62,20 @@ class Stepping:
         champion: Champion,
         starts: Starts,
         record: int,
-        refine: int,
         fall: Fall,
         task: Around,
     ) -> None:
         self.creature, self.starts, self.fall = creature, starts, fall
-        self.record, self.refine = record, refine
-        self.goal, self.task = starts.goal.copy(), task
+        self.record, self.goal, self.task = record, starts.goal.copy(), task
         step = float(creature.model.opt.timestep)
         self.twin = twin_of(creature, champion, step)
         self.drive = Drive(creature, champion.drive, self.twin.command, step)
-        model = examined_model(creature, refine)
+        model = examined_model(creature)
         self.bodies = Bodies(creature, model, starts, self.twin.reads, task.drag)
         self.memory = dict(self.twin.init(len(starts)))
         self.command = np.zeros_like(starts.stiffness)
         self.bar = Clearance(creature) if np.isfinite(starts.bar).any() else None
+        self.finest = int(starts.refine.max())
         # What the controller has sent last, for those whose torques come late.
         self.sent = np.zeros((int(starts.delay.max()) + 1, *starts.stiffness.shape))
 
@@ -168,8 +164,8 @@ class Stepping:
         film.torque[kept, k] = torque[: len(kept)]
         if self.twin.command == "pose":
             film.target[kept, k] = command[: len(kept)]
-        for _ in range(self.refine - 1):
-            self.bodies.step(running)
+        for taken in range(1, self.finest):
+            self.bodies.step(running[self.starts.refine[running] > taken])
 
     def _physics_step(
         self, running: np.ndarray, k: int, heading: np.ndarray | None

@@ -157,9 +157,7 @@ def _draw(folder: Path, screen: "Screen", all_plots: bool) -> bool:
     try:
         _plot_fitness(folder)
         if all_plots:
-            screen.say(
-                f"Drawing {folder / PLOTS}/; the run is done and safe, Ctrl-C leaves it here."
-            )
+            screen.say(f"Drawing {folder / PLOTS}/; the run itself is done and safe.")
             from mjxgait.viewing.plots import plot_run
 
             plot_run(folder)

@@ -9,6 +9,7 @@ import signal
 import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -22,7 +23,7 @@ from mjxgait.runs.checkpoint import Checkpoints
 from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.examination import Examined, Examiner, why_ended
 from mjxgait.runs.exams import Exams
-from mjxgait.runs.experiment import Step, build_experiment
+from mjxgait.runs.experiment import Experiment, Step, build_experiment
 from mjxgait.runs.folder import (
     BODY,
     CERTIFICATE,
@@ -60,11 +61,11 @@ def train(
     checkpoints = Checkpoints(folder, config.keep_every)
     # A run that was killed before its first checkpoint begins anew: it will do what it would have
     # done.
+    restored, begun = None, -1
     if resume and (checkpoints.generations() or generation is not None):
-        state = checkpoints.restore(jax.eval_shape(experiment.init), creature.digest, generation)
-        begun = int(state.generation)
-    else:
-        state, begun = experiment.init(), -1
+        abstract = jax.eval_shape(experiment.init)
+        restored = checkpoints.restore(abstract, creature.digest, generation)
+        begun = int(restored.generation)
     # First the checkpoints: a kill in between leaves lines too many, never a log with a gap.
     if later := checkpoints.drop_after(begun):
         names = ", ".join(map(str, later))
@@ -74,7 +75,7 @@ def train(
     if experiment.plant_note:
         screen.say(experiment.plant_note)
     with screen.compiling(creature.name, experiment):
-        step = experiment.compile(evaluator)
+        step, state = _compiled(experiment, evaluator, restored)
     began = time.perf_counter()
     examiner = Examiner(experiment, versions(), screen.say, Exams(folder / EXAMS))
     try:
@@ -89,6 +90,21 @@ def train(
         conclude(folder, creature, screen, examined or examiner.best(state))
     report(folder, screen, reason, time.perf_counter() - began)
     return reason is not None
+
+
+def _compiled(
+    experiment: Experiment, evaluator: Evaluator | None, restored: EvolutionState | None
+) -> tuple[Step, EvolutionState]:
+    """The program of a generation, and the state to begin with, which is the restored one if any.
+
+    The first state has a program of its own, which is compiled meanwhile: the compiler's first
+    seconds on the large one need one core.
+    """
+    if restored is not None:
+        return experiment.compile(evaluator), restored
+    with ThreadPoolExecutor(1) as aside:
+        first = aside.submit(experiment.init)
+        return experiment.compile(evaluator), first.result()
 
 
 def conclude(folder: Path, creature: Creature, screen: Screen, examined: Examined | None) -> None:

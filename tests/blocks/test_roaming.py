@@ -84,7 +84,7 @@ def test_the_examiner_shows_the_light_in_each_blocks_own_axes(experiment: Experi
     body, light = champion.embodied(experiment.creature), np.array([3.0, -4.0, 1.0])
     task = demands_of("follow-on-land")
     start = dataclasses.replace(nominal_starts(body, 2), light=np.stack([light, 0 * light]))
-    bodies = Stepping(body, champion, start, 0, 1, task.fall(CertificateConfig()), task).bodies
+    bodies = Stepping(body, champion, start, 0, task.fall(CertificateConfig()), task).bodies
     bodies.qpos[:, 3:7] = [0.5, -0.5, 0.1, 0.7]
     bodies.batch.forward(stage=VELOCITY_STAGE)
     seen, dark = bodies.light(np.arange(2))

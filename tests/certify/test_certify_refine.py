@@ -1,12 +1,23 @@
 """Finer physics steps between the same control steps."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 from mjxgait.certify import record
+from mjxgait.certify.batch import batch_of
+from mjxgait.certify.certificate import recordings
+from mjxgait.certify.starts import Starts, nominal_starts
 from mjxgait.certify.stepping import examined_model
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
+
+
+def refined(creature: Creature, *refine: int) -> Starts:
+    """Nominal starts, each with so many physics steps to a control step."""
+    start = nominal_starts(creature, len(refine))
+    return dataclasses.replace(start, refine=np.array(refine))
 
 
 @pytest.mark.parametrize("refine", [1, 2, 4])
@@ -14,12 +25,20 @@ def test_a_control_step_lasts_as_long_however_fine_the_physics(
     tiny: Creature, trotter: Champion, refine: int
 ):
     """Joints come as far from frame to frame as their speed says."""
-    walk = record(tiny, trotter, 1.0, refine=refine)
+    walk = record(tiny, trotter, 1.0, refined(tiny, refine))
     way, speed = np.diff(walk.joint_pos, axis=0).ravel(), walk.joint_vel[1:].ravel()
     assert walk.time_step == 0.005
     assert way @ speed / (speed @ speed) == pytest.approx(0.005, rel=0.1)
 
 
 def test_the_step_is_divided(tiny: Creature):
-    assert examined_model(tiny).opt.timestep == 0.005
-    assert examined_model(tiny, 2).opt.timestep == 0.0025
+    batch = batch_of(tiny, examined_model(tiny), refined(tiny, 1, 2))
+    assert batch.expand("opt.timestep").tolist() == [0.005, 0.0025]
+
+
+def test_side_by_side_each_walks_as_it_does_alone(tiny: Creature, trotter: Champion):
+    together = recordings(tiny, trotter, 1.0, refined(tiny, 1, 2))
+    for refine, walk in zip((1, 2), together, strict=True):
+        alone = record(tiny, trotter, 1.0, refined(tiny, refine))
+        np.testing.assert_array_equal(walk.joint_pos, alone.joint_pos)
+    assert not np.array_equal(*(walk.joint_pos for walk in together))
