@@ -17,7 +17,7 @@ from ray.exceptions import RayActorError, RayError, RayTaskError
 from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
 from mjxgait.cluster import nodes
-from mjxgait.cluster.crew import FATAL, Report, Worker
+from mjxgait.cluster.crew import Report, Worker
 from mjxgait.cluster.jobs import Job
 from mjxgait.cluster.nodes import Machine
 from mjxgait.cluster.recipe import Recipe
@@ -25,6 +25,8 @@ from mjxgait.cluster.worker import RemoteWorker
 
 EVERY = 1.0
 """Seconds between two looks at who has joined."""
+HOPELESS = 5
+"""Workers in a row that a machine may lose before they can begin."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -54,7 +56,6 @@ class Machines:
         self._nodes: dict[str, Node] = {}
         self._met: Counter[str] = Counter()
         self._stillborn: Counter[str] = Counter()
-        """Workers in a row that were lost before they could begin, by machine."""
         self._tags: dict[str, str] = {}
         self._kinds: dict[str, str] = {}
         self._recipes: dict[str, Any] = {}
@@ -175,7 +176,7 @@ class Machines:
         except RayError:
             _, node = self._actors[worker]
             self._stillborn[node.id] += 1
-            if node.id in self._nodes and self._stillborn[node.id] < FATAL:
+            if node.id in self._nodes and self._stillborn[node.id] < HOPELESS:
                 self._replace(worker)
             else:
                 del self._actors[worker]
