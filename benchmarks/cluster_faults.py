@@ -23,8 +23,7 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "cluster"))
 
-import psutil
-from simulated import machines
+from simulated import machines, workers
 
 from mjxgait.runs.folder import read_metrics
 
@@ -183,11 +182,6 @@ def disk(scratch: Path) -> dict[str, Any]:
             }
     finally:
         subprocess.run(["umount", "-l", str(full)], check=True)
-
-
-def workers() -> list[psutil.Process]:
-    found = psutil.process_iter(["cmdline"])
-    return [p for p in found if (p.info["cmdline"] or [""])[0].startswith("ray::RemoteWorker")]
 
 
 def say(line: str) -> None:
