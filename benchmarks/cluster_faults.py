@@ -2,7 +2,7 @@
 
     python benchmarks/cluster_faults.py study    # random kills of workers, machines and the command
     python benchmarks/cluster_faults.py islands  # the same in a run on four islands
-    python benchmarks/cluster_faults.py disk     # a machine whose disk is full (mounts one: needs root)
+    python benchmarks/cluster_faults.py disk     # machines whose disk is full (mounts one: needs root)
 
 One run that nobody touches, then others until there were `--kills` kills; a killed command is called
 again with `--resume`. All must end the same, and no champion that was written may be written again.
@@ -23,8 +23,7 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "cluster"))
 
-import psutil
-from simulated import machines
+from simulated import machines, workers
 
 from mjxgait.runs.folder import read_metrics
 
@@ -71,7 +70,7 @@ def main() -> None:
 def kills(scratch: Path, what: str, count: int, chance: random.Random) -> dict[str, Any]:
     with machines(2) as made:
         spare, killed, ends = [made.add()], Counter[str](), Counter[str]()
-        again: list[str] = []
+        again, chatter = list[str](), 0
         quiet = Command(what, scratch / "quiet", made.address)
         quiet.wait()
         while killed.total() < count:
@@ -93,8 +92,14 @@ def kills(scratch: Path, what: str, count: int, chance: random.Random) -> dict[s
                 killed[kind] += 1
                 say(f"{killed.total()} of {count}: {kind}")
             command.wait()
+            chatter += command.log.read_text().count("raylet")
             ends["same" if results(folder) == results(scratch / "quiet") else "other"] += 1
-    return {"killed": killed, "ended as the quiet one": ends, "written again": again}
+    return {
+        "killed": killed,
+        "ended as the quiet one": ends,
+        "written again": again,
+        "words of Ray": chatter,
+    }
 
 
 class Command:
@@ -155,7 +160,7 @@ def stamps(folder: Path) -> dict[str, int]:
 
 
 def disk(scratch: Path) -> dict[str, Any]:
-    """The same study with a machine that can keep nothing in its cache folder."""
+    """The same study with a machine that can keep no program, and one without room for a creature's files."""
     os.environ.pop("JAX_COMPILATION_CACHE_DIR", None)  # it would come before the user's own
     full = scratch / "full"
     full.mkdir()
@@ -166,6 +171,7 @@ def disk(scratch: Path) -> dict[str, Any]:
             Command("study", scratch / "quiet", made.address).wait()
             (full / "filler").write_bytes(bytes(60 * 2**10))
             made.add(env_vars={"XDG_CACHE_HOME": str(full)})
+            made.add(env_vars={"TMPDIR": str(full)})
             began = time.monotonic()
             command = Command("study", scratch / "full-run", made.address)
             command.wait()
@@ -176,11 +182,6 @@ def disk(scratch: Path) -> dict[str, Any]:
             }
     finally:
         subprocess.run(["umount", "-l", str(full)], check=True)
-
-
-def workers() -> list[psutil.Process]:
-    found = psutil.process_iter(["cmdline"])
-    return [p for p in found if (p.info["cmdline"] or [""])[0].startswith("ray::RemoteWorker")]
 
 
 def say(line: str) -> None:

@@ -15,8 +15,9 @@ LOOPBACK = ("127.0.0.1", "localhost")
 AUTO = "auto"
 NEVER_LEAVE_LOOPBACK = {"RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0"}
 """Read as Ray is imported. Without it Ray takes this machine's outer address for 127.0.0.1."""
-QUIET = {"RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0"}
-"""Ray announces here what it will do in a later version."""
+QUIET = {"RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0", "RAY_DEDUP_LOGS_SKIP_REGEX": "."}
+"""Read as Ray is imported. Else it announces what it will do in a later version, and explains every
+lost worker in a paragraph."""
 PATIENCE = 5.0
 """Seconds for the head to answer."""
 

@@ -25,6 +25,8 @@ from mjxgait.cluster.worker import RemoteWorker
 
 EVERY = 1.0
 """Seconds between two looks at who has joined."""
+HOPELESS = 5
+"""Workers in a row that a machine may lose before they can begin."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -53,6 +55,7 @@ class Machines:
         self._actors: dict[Worker, tuple[Any, Node]] = {}
         self._nodes: dict[str, Node] = {}
         self._met: Counter[str] = Counter()
+        self._stillborn: Counter[str] = Counter()
         self._tags: dict[str, str] = {}
         self._kinds: dict[str, str] = {}
         self._recipes: dict[str, Any] = {}
@@ -69,16 +72,7 @@ class Machines:
             self._look_for_nodes()
         for ref in _ready(self._looking):
             self._meet(ref)
-        come = []
-        for ref in _ready(self._coming):
-            worker = self._coming.pop(ref)
-            try:
-                ray.get(ref)
-            except RayError:  # its machine has gone meanwhile
-                del self._actors[worker]
-                continue
-            come.append(worker)
-        return come
+        return [worker for ref in _ready(self._coming) if (worker := self._begun(ref))]
 
     def start(self, worker: Worker, recipe: Recipe, job: Job) -> None:
         """See `Hands`. A recipe goes to each machine once."""
@@ -105,6 +99,9 @@ class Machines:
             return Report(worker, lost=_why(error))
         except RayTaskError as error:
             cause = error.cause
+            if isinstance(cause, OSError):  # its machine's trouble: a full disk, too many files
+                ray.kill(self._actors.pop(worker)[0])
+                return Report(worker, lost=str(cause))
             return Report(worker, error=cause if isinstance(cause, Exception) else error)
         except RayError as error:  # a result that was lost with its machine
             self._replace(worker)
@@ -166,6 +163,26 @@ class Machines:
         worker, self._count = Worker(self._count, node.name), self._count + 1
         self._actors[worker] = actor, node
         self._coming[actor.ready.remote()] = worker
+
+    def _begun(self, ref: Any) -> Worker | None:
+        """The worker, once it can work; who cannot is left alone, and who was killed meanwhile is replaced."""
+        worker = self._coming.pop(ref)
+        try:
+            ray.get(ref)
+        except RayTaskError as error:
+            ray.kill(self._actors.pop(worker)[0])
+            self._tell(f"{worker.node}: a worker cannot begin ({error.cause}); it is left alone")
+            return None
+        except RayError:
+            _, node = self._actors[worker]
+            self._stillborn[node.id] += 1
+            if node.id in self._nodes and self._stillborn[node.id] < HOPELESS:
+                self._replace(worker)
+            else:
+                del self._actors[worker]
+            return None
+        self._stillborn[self._actors[worker][1].id] = 0
+        return worker
 
     def _replace(self, worker: Worker) -> None:
         actor, node = self._actors.pop(worker)

@@ -25,6 +25,13 @@ class OwnPart:
     file: str
     source: str
 
+    def load(self) -> None:
+        """Makes it known to this process."""
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / self.file
+            path.write_text(self.source, encoding="utf-8")
+            load(self.kind, f"{path}:{self.cls}")
+
 
 @dataclasses.dataclass(frozen=True)
 class Recipe:
@@ -55,13 +62,9 @@ class Recipe:
 
     def read(self) -> tuple[Creature, list[Config]]:
         """What it was made of; the user's own code is loaded."""
-        with tempfile.TemporaryDirectory() as folder:
-            for part in self.own:
-                if is_loaded(part.kind, f"{part.file}:{part.cls}"):
-                    continue
-                path = Path(folder) / part.file
-                path.write_text(part.source, encoding="utf-8")
-                load(part.kind, f"{path}:{part.cls}")
+        for part in self.own:
+            if not is_loaded(part.kind, f"{part.file}:{part.cls}"):
+                part.load()
         configs = [build_config(table, "the settings that were sent") for table in self.tables]
         return load_files(self.files), configs
 

@@ -6,6 +6,7 @@ process has been told of its core.
 
 import contextlib
 import os
+import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,6 +19,9 @@ ENVIRONMENT = {
     "JAX_NUM_CPU_DEVICES": "1",
     "JAX_PLATFORMS": "cpu",
 }
+
+ROOM = 2**20
+"""Bytes that a creature's files or a lock may take."""
 
 
 class RemoteWorker:
@@ -32,7 +36,14 @@ class RemoteWorker:
         self._programs = Programs(_turn)
 
     def ready(self) -> int:
-        """Its process, once it can work."""
+        """Its process, once it can work.
+
+        Raises:
+          OSError: there is no room for a creature's files.
+        """
+        from mjxgait.runs.disk import try_room
+
+        try_room(Path(tempfile.gettempdir()), ROOM)
         return os.getpid()
 
     def do(self, recipe: Any, job: Any) -> tuple[Any, float]:
@@ -56,7 +67,7 @@ def _turn(name: str, patience: float = -1.0) -> Iterator[None]:
     folder = Path(jax.config.values["jax_compilation_cache_dir"])
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        try_room(folder, 2**20)
+        try_room(folder, ROOM)
         lock = filelock.FileLock(folder / f"{name}.lock")
         lock.acquire(timeout=patience)
     except filelock.Timeout:

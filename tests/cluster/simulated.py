@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import psutil
+
 os.environ["RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER"] = "0"  # else Ray takes the machine's outer address
 os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
 
@@ -43,6 +45,16 @@ class Machines:
     def kill(self, node: Any) -> None:
         """Without a word, as when a plug is pulled."""
         self.cluster.remove_node(node, allow_graceful=False)
+
+
+def workers() -> list[psutil.Process]:
+    """Those of mjxgait on the machines that this process has started."""
+    found = []
+    for process in psutil.Process().children(recursive=True):
+        with contextlib.suppress(psutil.Error):
+            if (process.cmdline() or [""])[0].startswith("ray::RemoteWorker"):
+                found.append(process)
+    return found
 
 
 @contextlib.contextmanager

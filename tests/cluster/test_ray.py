@@ -10,9 +10,9 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import psutil
 import pytest
 from helpers import STOOL
+from simulated import workers
 
 from mjxgait.ablation.plan import Plan, Study, VariantTable, make_plan
 from mjxgait.ablation.rows import run_study
@@ -89,15 +89,6 @@ def alone(
     study(folder, stool, plan, simulated.address)
     found = results(folder)
     assert len(found) == 4 + 4
-    return found
-
-
-def workers() -> list[psutil.Process]:
-    found = []
-    for process in psutil.process_iter(["cmdline"]):
-        line = process.info["cmdline"] or [""]
-        if line[0].startswith("ray::RemoteWorker"):
-            found.append(process)
     return found
 
 
