@@ -9,8 +9,9 @@
 
 Needs mjxgait[cluster] and two idle cores: each machine is bound to a core. One machine and two take
 turns; efficiency is the median over laps of the wall time with one over twice that with two,
-compilation not counted. The file keeps everything, and what it has of an earlier call; `cluster_paper.py`
-reckons with it.
+compilation not counted. On a machine that is busy otherwise it says nothing; there the workers'
+processor time with one over that with two tells how much they hinder each other. The file keeps
+everything, and what it has of an earlier call; `cluster_paper.py` reckons with it.
 """
 
 import argparse
@@ -21,7 +22,7 @@ import os
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -34,7 +35,7 @@ from simulated import Machines, machines
 from mjxgait.cluster.blocks import Blocks
 from mjxgait.cluster.connect import connected
 from mjxgait.cluster.crew import Crew
-from mjxgait.cluster.jobs import AdvanceRows
+from mjxgait.cluster.jobs import AdvanceRows, Job
 from mjxgait.cluster.recipe import Recipe
 from mjxgait.creature import Creature
 from mjxgait.library import load_creature
@@ -60,6 +61,29 @@ class Nothing:
     def do(self, programs: Any, recipe: Any) -> bytes:
         time.sleep(self.seconds)
         return self.data
+
+
+@dataclasses.dataclass(frozen=True)
+class Clocked:
+    """Other work, and the processor time that it took."""
+
+    job: Job
+
+    def do(self, programs: Any, recipe: Any) -> tuple[Any, float]:
+        began = time.process_time()
+        return self.job.do(programs, recipe), time.process_time() - began
+
+
+class Clock:
+    """A crew that has clocked work done; processor: s of it in all."""
+
+    def __init__(self, crew: Crew) -> None:
+        self.crew, self.processor = crew, 0.0
+
+    def all(self, work: Iterable[tuple[Recipe, Job]]) -> list[Any]:
+        found = self.crew.all((recipe, Clocked(job)) for recipe, job in work)
+        self.processor += sum(seconds for _, seconds in found)
+        return [result for result, _ in found]
 
 
 def main() -> None:
@@ -107,13 +131,15 @@ def rows(crew: Crew, options: argparse.Namespace) -> dict[str, Any]:
         Recipe.of(creature, [dataclasses.replace(config, seed=seed)]) for seed in range(RUNS)
     ]
 
+    clock = Clock(crew)
+
     def work(until: int = options.generations) -> None:
-        crew.all((recipe, AdvanceRows(None, until)) for recipe in recipes)
+        clock.all((recipe, AdvanceRows(None, until)) for recipe in recipes)
 
     for machine in (0, 1):
         with one_of(crew, machine):
             work(0)  # each compiles and builds all of it
-    found = in_turns(crew, work, options.laps)
+    found = in_turns(clock, work, options.laps)
     return found | {"runs": RUNS, "generations": options.generations}
 
 
@@ -121,7 +147,8 @@ def blocks(crew: Crew, options: argparse.Namespace) -> dict[str, Any]:
     """Generations of one population, in eight blocks."""
     creature, config = subject(options, 512)
     experiment = build_experiment(creature, config)
-    step = experiment.compile(Blocks(crew, creature, config))
+    clock = Clock(crew)
+    step = experiment.compile(Blocks(clock, creature, config))
     begun = experiment.place(experiment.init())
     for machine in (0, 1):
         with one_of(crew, machine):
@@ -133,13 +160,13 @@ def blocks(crew: Crew, options: argparse.Namespace) -> dict[str, Any]:
             state, _ = step(state)
         jax.block_until_ready(state)
 
-    count, worked = sum(crew.done.values()), work_of(crew)
-    found = in_turns(crew, work, options.laps)
-    pieces = sum(crew.done.values()) - count
+    before, spent = sum(crew.done.values()), clock.processor
+    found = in_turns(clock, work, options.laps)
+    pieces = sum(crew.done.values()) - before
     return found | {
         "blocks per generation": 8,
         "generations": options.generations,
-        "s per block": round((work_of(crew) - worked) / pieces, 4),
+        "s of a processor per block": round((clock.processor - spent) / pieces, 4),
     }
 
 
@@ -262,21 +289,31 @@ def one_of(crew: Crew, machine: int) -> Iterator[None]:
     gather(crew, 2)
 
 
-def in_turns(crew: Crew, work: Callable[[], None], laps: int) -> dict[str, Any]:
+def in_turns(clock: Clock, work: Callable[[], None], laps: int) -> dict[str, Any]:
     walls: dict[str, list[float]] = {"one": [], "two": []}
-    for lap in range(laps):
-        with one_of(crew, lap % 2):
-            walls["one"].append(timed(work))
-        walls["two"].append(timed(work))
-        say(f"one machine {walls['one'][-1]:.2f} s, two {walls['two'][-1]:.2f} s")
-    each = [one / two / 2 for one, two in zip(walls["one"], walls["two"], strict=True)]
-    return {"wall_s": walls, "efficiency": round(median(each), 3), "of each lap": each}
+    spent: dict[str, list[float]] = {"one": [], "two": []}
 
+    def lap(machines: str) -> None:
+        began, before = time.perf_counter(), clock.processor
+        work()
+        walls[machines].append(round(time.perf_counter() - began, 3))
+        spent[machines].append(round(clock.processor - before, 3))
+        say(f"{machines}: {walls[machines][-1]} s, of processors {spent[machines][-1]} s")
 
-def timed(work: Callable[[], None]) -> float:
-    began = time.perf_counter()
-    work()
-    return time.perf_counter() - began
+    for number in range(laps):
+        with one_of(clock.crew, number % 2):
+            lap("one")
+        lap("two")
+    ratio = {
+        name: [one / two for one, two in zip(times["one"], times["two"], strict=True)]
+        for name, times in (("wall", walls), ("processor", spent))
+    }
+    return {
+        "wall_s": walls,
+        "processor_s": spent,
+        "efficiency": round(median(ratio["wall"]) / 2, 3),
+        "processor time, one over two": round(median(ratio["processor"]), 3),
+    }
 
 
 def work_of(crew: Crew) -> float:

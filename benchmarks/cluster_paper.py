@@ -15,6 +15,7 @@ import heapq
 import json
 import time
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 from cluster import Nothing, gather, say
@@ -125,7 +126,7 @@ def main() -> None:
 
 def reckoned(known: dict[str, Any], costs: Costs) -> dict[str, Any]:
     rows, calls, blocks = known["rows"], known["calls"], known["blocks"]
-    of_one = min(rows["wall_s"]["one"]) / rows["runs"] / (rows["generations"] + 1)
+    of_one = median(rows["processor_s"]["one"]) / rows["runs"] / (rows["generations"] + 1)
     state = 128 * (calls["bytes per genome"] + calls["bytes per verdict"])
     disk, last = calls["ms to put a row's state on disk"] / 1e3, 30
     each = BLOCK * (calls["bytes per genome"] + calls["bytes per verdict"]) // 2
@@ -139,7 +140,9 @@ def reckoned(known: dict[str, Any], costs: Costs) -> dict[str, Any]:
                 f"{rows_of} runs and {stride} generations a piece"
             ] = told(wall, used)
         for block in (BLOCK, 1024):
-            piece = Piece(blocks["s per block"] * block / BLOCK, each * block // BLOCK)
+            piece = Piece(
+                blocks["s of a processor per block"] * block / BLOCK, each * block // BLOCK
+            )
             wall, used = on_paper(cores, costs, piece, -(-PEOPLE // block))
             found[f"{cores} cores: one generation of a million, blocks of {block}"] = told(
                 wall, used

@@ -73,6 +73,8 @@ class _Task:
     make: Make
     work: tuple[Recipe, Job] | None = None
     losses: int = 0
+    workers: int = 0
+    """That are at it."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -159,6 +161,7 @@ class Crew:
         while self.idle and (task := self._waiting.popleft() if self._waiting else self._late()):
             task.work = task.work or task.make()
             worker = self.idle.pop()
+            task.workers += 1
             self.busy[worker] = _Turn(task, self._clock())
             self.hands.start(worker, *task.work)
 
@@ -170,16 +173,14 @@ class Crew:
         for turn in self.busy.values():  # in the order in which they began
             if turn.began >= limit:
                 return None
-            if turn.task.key in self._open and not self._shared(turn.task):
+            if turn.task.key in self._open and turn.task.workers == 1:
                 return turn.task
         return None
-
-    def _shared(self, task: _Task) -> bool:
-        return sum(turn.task is task for turn in self.busy.values()) > 1
 
     def _take(self, report: Report) -> None:
         turn, worker = self.busy.pop(report.worker), report.worker
         task = turn.task
+        task.workers -= 1
         if report.lost is None:
             self.idle.append(worker)
         if self._open.get(task.key) is not task:
@@ -202,7 +203,7 @@ class Crew:
                 f"one piece of work has cost {FATAL} workers, the last on {worker.node} ({why}); "
                 "it may need more memory than they have: make it smaller, and go on with --resume"
             )
-        if task not in (turn.task for turn in self.busy.values()):
+        if not task.workers:
             self._waiting.appendleft(task)
 
     def _look_around(self) -> None:

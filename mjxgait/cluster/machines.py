@@ -203,4 +203,4 @@ def _ready(refs: dict[Any, Any]) -> list[Any]:
 
 def _why(error: Exception) -> str:
     lines = str(error).strip().splitlines()
-    return lines[0][:120] if lines else type(error).__name__
+    return lines[0].partition(". ")[0][:120] if lines else type(error).__name__
