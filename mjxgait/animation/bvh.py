@@ -1,4 +1,4 @@
-"""A walk as a BVH file: a skeleton that rests as the creature stands, and each bone's angles.
+"""A walk as a BVH file: a skeleton that rests as the creature does, and each bone's angles.
 
 BVH has Y up; here forward is +Z, left +X, lengths are m. Letters: `F` key frames.
 """
@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mjxgait.animation.loop import WalkLoop
-from mjxgait.animation.skeleton import STILL, gltf_axes, skeleton_of, standing, travel, world_poses
+from mjxgait.animation.skeleton import STILL, gltf_axes, resting, skeleton_of, travel, world_poses
 from mjxgait.animation.surface import geom_surface
 from mjxgait.errors import UserError
 
@@ -34,7 +34,7 @@ def export_bvh(loop: WalkLoop, path: Path, travelling: bool = False) -> None:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Bone:
-    """name, place of the parent (0 for none), and offset [3] m from it as the creature stands.
+    """name, place of the parent (0 for none), and offset [3] m from it as the creature rests.
     channels: names of the columns [F, n]. end: [3] m from where it begins to its farthest point.
     """
 
@@ -61,9 +61,9 @@ def build_bvh(loop: WalkLoop, travelling: bool = False) -> str:
 
 def _bones(loop: WalkLoop, travelling: bool) -> dict[int, Bone]:
     """By place in the skeleton, the trunk's being 1."""
-    model, stand = loop.walk.creature.model, standing(loop)
+    model, rest_qpos = loop.walk.creature.model, resting(loop)
     skeleton, axes = skeleton_of(model, loop.walk.creature.trunk), gltf_axes(loop.walk.forward)
-    rest, rest_rot = (each[0] for each in world_poses(model, skeleton, stand[None], axes))
+    rest, rest_rot = (each[0] for each in world_poses(model, skeleton, rest_qpos[None], axes))
     pos, rot = world_poses(model, skeleton, loop.qpos, axes)
     if travelling:
         gone, heading = travel(loop)
@@ -80,7 +80,7 @@ def _bones(loop: WalkLoop, travelling: bool) -> dict[int, Bone]:
         moves = i == 1 or bool(np.abs(place - offset).max() > STILL)
         channels = [f"{a}position" for a in "XYZ"] * moves + [f"{a}rotation" for a in ORDER]
         columns = np.concatenate([place] * moves + [_angles(back @ turned[:, i])], 1)
-        end = axes @ _farthest(model, skeleton.bodies[i], stand)
+        end = axes @ _farthest(model, skeleton.bodies[i], rest_qpos)
         bones[i] = Bone(skeleton.names[i], parent, offset, channels, columns, end)
     return bones
 
@@ -107,10 +107,10 @@ def _angles(rotations: np.ndarray) -> np.ndarray:
     return np.unwrap(angles, period=360.0, axis=0)
 
 
-def _farthest(model: mujoco.MjModel, body: int, stand: np.ndarray) -> np.ndarray:
-    """[3] m in the world from a body's origin to its farthest point in the standing pose."""
+def _farthest(model: mujoco.MjModel, body: int, qpos: np.ndarray) -> np.ndarray:
+    """[3] m in the world from a body's origin to its farthest point in the rest pose."""
     data = mujoco.MjData(model)
-    data.qpos[:] = stand
+    data.qpos[:] = qpos
     mujoco.mj_kinematics(model, data)
     points = [np.zeros((1, 3))]
     for geom in np.flatnonzero(model.geom_bodyid == body):

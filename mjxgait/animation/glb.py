@@ -21,8 +21,8 @@ from mjxgait.animation.skeleton import (
     Skeleton,
     gltf_axes,
     local_poses,
+    resting,
     skeleton_of,
-    standing,
     travel,
     world_poses,
 )
@@ -84,10 +84,10 @@ def _scene(loops: Mapping[str, WalkLoop], travelling: bool) -> tuple[gltf.GLTF2,
     axes = gltf_axes(loop.walk.forward)
     document = gltf.GLTF2(asset=gltf.Asset(version="2.0", generator="mjxgait"))
     buffer = Buffer(document)
-    rest_pos, rest_quat = local_poses(creature.model, skeleton, standing(loop)[None], axes)
+    rest_pos, rest_quat = local_poses(creature.model, skeleton, resting(loop)[None], axes)
     _add_joints(document, skeleton, rest_pos[0], rest_quat[0])
-    _add_mesh(document, buffer, creature.model, skeleton, axes, standing(loop))
-    _add_skin(document, buffer, creature.model, skeleton, axes, standing(loop))
+    _add_mesh(document, buffer, creature.model, skeleton, axes, resting(loop))
+    _add_skin(document, buffer, creature.model, skeleton, axes, resting(loop))
     _add_animations(document, buffer, loops, skeleton, axes, travelling)
     name = creature.name
     document.nodes.append(gltf.Node(name=name, mesh=0, skin=0))
@@ -115,7 +115,7 @@ def _add_mesh(
     axes: np.ndarray,
     stand: np.ndarray,
 ) -> None:
-    """One primitive and material per colour, in the standing pose."""
+    """One primitive and material per colour, in the rest pose."""
     data = mujoco.MjData(model)
     data.qpos[:] = stand
     mujoco.mj_kinematics(model, data)

@@ -78,10 +78,10 @@ def world_poses(
     return np.array(pos), np.array(rot)
 
 
-def standing(loop: WalkLoop) -> np.ndarray:
-    """The standing pose [nq] above the origin."""
+def resting(loop: WalkLoop) -> np.ndarray:
+    """The rest pose [nq] above the origin."""
     creature = loop.walk.creature
-    qpos = creature.stand_qpos.copy()
+    qpos = creature.rest_qpos.copy()
     place = int(creature.model.jnt_qposadr[creature.model.body_jntadr[creature.trunk]])
     qpos[place : place + 2] = 0.0
     return qpos
