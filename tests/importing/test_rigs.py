@@ -161,6 +161,18 @@ def test_a_knee_that_rests_bent_never_bends_the_other_way(tmp_path: Path):
         assert abs(knee.low if way > 0 else knee.high) < 75.0
 
 
+def test_a_body_on_two_feet_has_heels(tmp_path: Path):
+    file = tmp_path / "human.bvh"
+    file.write_text(bvh(HUMAN))
+    plan = Plan(1, rig_of_bvh(file))
+    foot = plan.rig.names.index("LFoot")
+    ((heel, toe),) = plan.sole(foot, 1.0)
+    assert heel == pytest.approx([10.0, 3.0, -4.0])
+    assert toe == pytest.approx([10.0, 3.0, 16.0])
+    file.write_text(bvh(DOG))
+    assert Plan(1, rig_of_bvh(file)).feet == []
+
+
 def test_limbs_that_lie_sideways_swing_about_the_upright_axis(tmp_path: Path):
     found = hinges(tmp_path, SPIDER)
     assert [hinge.name for hinge in found["L1Thigh"]] == ["yaw", "roll"]
