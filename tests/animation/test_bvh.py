@@ -1,5 +1,7 @@
 """The exported BVH: the same motion as MuJoCo's for whoever reads the format."""
 
+import dataclasses
+
 import mujoco
 import numpy as np
 import pytest
@@ -60,6 +62,15 @@ def test_the_trunk_goes_as_far_as_the_walk_or_stays(loop: WalkLoop, tmp_path):
     gone = np.linspace(0.0, loop.advance, len(here))
     assert here[-1] == pytest.approx(here[0], abs=1e-5)
     assert there - here == pytest.approx(gone[:, None] * [0.0, 0.0, 1.0], abs=1e-5)
+
+
+def test_who_turns_goes_along_a_circle(loop: WalkLoop, tmp_path):
+    """A quarter of one to the left: as far to the side as ahead, and looking there."""
+    turning = dataclasses.replace(loop, turned=np.pi / 2)
+    here, there = (columns(written(turning, tmp_path, t))[:, :3] for t in (False, True))
+    radius = loop.advance / (np.pi / 2)
+    end = [here[-1][2] + radius, here[-1][1], radius - here[-1][0]]
+    assert there[-1] == pytest.approx(end, abs=1e-5)
 
 
 def test_no_angle_jumps_by_a_turn(loop: WalkLoop, tmp_path):
