@@ -16,11 +16,9 @@ import numpy as np
 
 from mjxgait.certify import read_certificate
 from mjxgait.creature import Creature, load_creature
-from mjxgait.keys.departure import departure
-from mjxgait.keys.refine import read_original
+from mjxgait.keys.departure import departure_of
 from mjxgait.runs.folder import CERTIFICATE
 from mjxgait.settings.shipped import find_creature
-from mjxgait.viewing.cast import LOOP_SECONDS, champion_of
 
 RATE = 24
 """Frames/s, as films are drawn."""
@@ -109,8 +107,7 @@ def refined(folder: Path, name: str, keep: float) -> dict[str, object]:
     document = read_certificate(run / CERTIFICATE)
     if done.returncode or document is None:
         return found | {"certified": False}
-    runner = champion_of(run, LOOP_SECONDS)
-    apart = departure(read_original(run, runner.walk.creature), runner.walk)
+    apart = departure_of(run)
     return found | {
         "certified": document["passed"],
         "failed": [c["number"] for c in document["criteria"] if not c["passed"]],

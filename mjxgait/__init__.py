@@ -7,6 +7,8 @@ You give it a body; it gives you a walk that physics agrees with, examined in a 
     run = mjxgait.train("tall_quadruped", seed=0, out="runs/x", generations=20)
     run.certified, run.certificate["margin"], run.champion.genome["key_poses"]
 
+    mjxgait.refine("duck", "walk.glb", keep=0.7).departure.words   # a hand-made cycle, made to walk
+
     mjxgait.walk(run)                     # columns for pandas: joints, feet, trunk over time
     mjxgait.examine(run)                  # the certificate again, criterion by criterion
     mjxgait.open("runs/x").metrics()      # fitness over generations
@@ -18,10 +20,10 @@ On the command line: `mjxgait --help`.
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from mjxgait.library import Run, examine, load_creature, open, train, walk
+    from mjxgait.library import Run, examine, load_creature, open, refine, train, walk
 
 __version__ = "0.1.0"
-__all__ = ["Run", "examine", "load_creature", "open", "train", "walk"]
+__all__ = ["Run", "examine", "load_creature", "open", "refine", "train", "walk"]
 
 
 def __getattr__(name: str) -> Any:

@@ -10,7 +10,7 @@ mjxgait.walk(run)["trunk_z"]
 import dataclasses
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -34,6 +34,9 @@ from mjxgait.runs.folder import (
 from mjxgait.settings.config import Config
 from mjxgait.settings.shipped import find_creature
 from mjxgait.settings.tables import build, merge, read_toml
+
+if TYPE_CHECKING:  # it leads to all that draws
+    from mjxgait.keys.departure import Departure
 
 Place = str | Path
 
@@ -78,6 +81,17 @@ class Run:
         """Whether its champion has passed every criterion."""
         document = self.certificate
         return bool(document and document["passed"])
+
+    @property
+    def departure(self) -> "Departure":
+        """How far the champion is from the cycle that the run stays near, in numbers and in words.
+
+        Raises:
+          UserError: the run was not made by `refine`, or has no champion.
+        """
+        from mjxgait.keys.departure import departure_of
+
+        return departure_of(self.folder)
 
     def metrics(self) -> dict[str, np.ndarray]:
         """Each number of `metrics.jsonl` over generations [G], NaN where there was none."""
@@ -154,13 +168,8 @@ def train(
     Raises:
       UserError: one sentence that says what is wrong with what was given.
     """
-    from rich.console import Console
-
-    from mjxgait.cluster.evolve import evolve
     from mjxgait.parts import resolve_config
     from mjxgait.parts.wishes import Wishes, wished
-    from mjxgait.runs.experiment import prepare_devices
-    from mjxgait.runs.screen import Screen
 
     use = _use(controller=controller, task=task)
     creature = load_creature(env, scale)
@@ -181,9 +190,69 @@ def train(
     table = merge(dataclasses.asdict(resolved), {"seed": seed, "evolution": evolution})
     chosen = build(type(resolved), merge(table, settings or {}), "the settings given to train")
     folder = create_run(Path(out) if out else None, creature, chosen)
+    return _evolved(folder, creature, chosen, quiet)
+
+
+def refine(
+    env: Place,
+    keys: Place,
+    *,
+    out: Place | None = None,
+    keep: float = 0.5,
+    names: Mapping[str, str] | Place | None = None,
+    begin: float | None = None,
+    end: float | None = None,
+    tolerance: float = 3.0,
+    forward: str = "z",
+    config: Place | None = None,
+    seed: int = 0,
+    population: int | None = None,
+    generations: int | None = None,
+    settings: Mapping[str, Any] | None = None,
+    quiet: bool = False,
+) -> Run:
+    """Makes a hand-made or captured cycle walk, and returns the run (docs/refine.md).
+
+    It is what `mjxgait refine` does; `Run.departure` says what physics changed.
+
+    Args:
+      env: as for `train`. keys: file with the cycle: GLB, BVH, CSV or JSON. out: as for `train`.
+      keep: 1 leaves the poses as they are, 0 lets each joint depart by 30 degrees and the period by
+        30 %.
+      names: name in the file by part (of a CSV or JSON: joint), or a TOML file of these, where the
+        guess is wrong.
+      begin, end: s, of the cycle in the file. tolerance: degrees, root mean square, within which key
+        poses reproduce it. forward: z, -z, x or -x, where the file's creature looks, Y being up.
+      config, seed, population, generations, settings, quiet: as for `train`.
+
+    Raises:
+      UserError: one sentence that says what is wrong with what was given, or with the file.
+    """
+    from mjxgait.keys import bring
+    from mjxgait.keys import refine as near
+
+    creature, source = load_creature(env), Path(keys)
+    base = near.base_settings(
+        creature, Path(config) if config else None, seed, population, generations, settings
+    )
+    table = read_toml(Path(names)) if isinstance(names, str | Path) else names
+    tell: Callable[[str], object] = (lambda said: None) if quiet else print
+    brought = bring(creature, source, table, (begin, end), np.radians(tolerance), forward, tell)
+    chosen = near.refining(base, brought, keep)
+    folder = near.begin(Path(out) if out else None, creature, chosen, source, brought)
+    return _evolved(folder, creature, chosen, quiet)
+
+
+def _evolved(folder: Path, creature: Creature, config: Config, quiet: bool) -> Run:
+    """The run in a new folder, evolved and examined."""
+    from rich.console import Console
+
+    from mjxgait.cluster.evolve import evolve
+    from mjxgait.runs.experiment import prepare_devices
+    from mjxgait.runs.screen import Screen
+
     prepare_devices()
-    screen = Screen(Console(quiet=True)) if quiet else Screen()
-    evolve(folder, creature, chosen, screen)
+    evolve(folder, creature, config, Screen(Console(quiet=True)) if quiet else Screen())
     return Run(folder)
 
 

@@ -82,10 +82,12 @@ def test_nothing_is_overwritten(run: mjxgait.Run):
         (lambda: mjxgait.train(STOOL, settings={"rolout": {}}), 'did you mean "rollout"'),
         (lambda: mjxgait.train(STOOL, population=1), "population must be at least 2"),
         (lambda: mjxgait.train(STOOL, controller="my.py:Spin"), "no such file"),
+        (lambda: mjxgait.refine(STOOL, "no.glb"), "no such file"),
+        (lambda: mjxgait.refine(STOOL, "no.fbx"), "Blender"),
         (lambda: mjxgait.open("nowhere"), "not a run folder"),
         (lambda: mjxgait.walk("nowhere"), "not a run folder"),
     ],
-    ids=["creature", "key", "range", "controller", "folder", "walk"],
+    ids=["creature", "key", "range", "controller", "keys", "kind", "folder", "walk"],
 )
 def test_a_mistake_is_one_sentence(call, words: str, tmp_path: Path, monkeypatch):
     monkeypatch.chdir(tmp_path)

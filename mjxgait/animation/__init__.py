@@ -1,5 +1,6 @@
 """A walk as an animation file that other programs open."""
 
+from mjxgait.animation.bvh import build_bvh, export_bvh
 from mjxgait.animation.glb import build_clips, build_glb, export_glb
 from mjxgait.animation.loop import RATES, WalkLoop, walk_loop, walk_take
 from mjxgait.animation.phase import standing_still, stride_in_phase
@@ -7,8 +8,10 @@ from mjxgait.animation.phase import standing_still, stride_in_phase
 __all__ = [
     "RATES",
     "WalkLoop",
+    "build_bvh",
     "build_clips",
     "build_glb",
+    "export_bvh",
     "export_glb",
     "standing_still",
     "stride_in_phase",

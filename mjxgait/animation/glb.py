@@ -17,18 +17,19 @@ from mjxgait.animation.floor import add_floor
 from mjxgait.animation.loop import WalkLoop
 from mjxgait.animation.note import note_of
 from mjxgait.animation.skeleton import (
+    STILL,
     Skeleton,
     gltf_axes,
     local_poses,
+    resting,
     skeleton_of,
+    travel,
     world_poses,
 )
 from mjxgait.animation.surface import geom_surface
 from mjxgait.errors import UserError
 from mjxgait.viewing.painter import geom_colours, seen_geoms
 
-STILL = 1e-6
-"""m or unit quaternion; what moves less is not animated."""
 ROUGHNESS = 0.75
 
 
@@ -83,25 +84,16 @@ def _scene(loops: Mapping[str, WalkLoop], travelling: bool) -> tuple[gltf.GLTF2,
     axes = gltf_axes(loop.walk.forward)
     document = gltf.GLTF2(asset=gltf.Asset(version="2.0", generator="mjxgait"))
     buffer = Buffer(document)
-    rest_pos, rest_quat = local_poses(creature.model, skeleton, _standing(loop)[None], axes)
+    rest_pos, rest_quat = local_poses(creature.model, skeleton, resting(loop)[None], axes)
     _add_joints(document, skeleton, rest_pos[0], rest_quat[0])
-    _add_mesh(document, buffer, creature.model, skeleton, axes, _standing(loop))
-    _add_skin(document, buffer, creature.model, skeleton, axes, _standing(loop))
+    _add_mesh(document, buffer, creature.model, skeleton, axes, resting(loop))
+    _add_skin(document, buffer, creature.model, skeleton, axes, resting(loop))
     _add_animations(document, buffer, loops, skeleton, axes, travelling)
     name = creature.name
     document.nodes.append(gltf.Node(name=name, mesh=0, skin=0))
     document.scenes = [gltf.Scene(name=name, nodes=[0, len(document.nodes) - 1])]
     document.scene = 0
     return document, buffer
-
-
-def _standing(loop: WalkLoop) -> np.ndarray:
-    """The standing pose [nq] above the origin."""
-    creature = loop.walk.creature
-    qpos = creature.stand_qpos.copy()
-    place = int(creature.model.jnt_qposadr[creature.model.body_jntadr[creature.trunk]])
-    qpos[place : place + 2] = 0.0
-    return qpos
 
 
 def _add_joints(
@@ -123,7 +115,7 @@ def _add_mesh(
     axes: np.ndarray,
     stand: np.ndarray,
 ) -> None:
-    """One primitive and material per colour, in the standing pose."""
+    """One primitive and material per colour, in the rest pose."""
     data = mujoco.MjData(model)
     data.qpos[:] = stand
     mujoco.mj_kinematics(model, data)
@@ -254,15 +246,6 @@ def _tracks(
     """See `local_poses`; travelling: the root moves on evenly, in a circle where the walk turns."""
     pos, quat = local_poses(loop.walk.creature.model, skeleton, loop.qpos, axes)
     if travelling:
-        share = np.linspace(0, 1, len(pos))
-        turned = share * loop.turned
-        # Chords of the circle: sin(a / 2) / (a / 2) as long as the way along it.
-        chord = share * loop.advance * np.sinc(turned / (2 * np.pi))
-        pos[:, 0] = chord[:, None] * _upright(np.sin(turned / 2), np.cos(turned / 2))
+        pos[:, 0], turned = travel(loop)
         quat[:, 0, 1], quat[:, 0, 3] = np.sin(turned / 2), np.cos(turned / 2)
     return pos, quat
-
-
-def _upright(left: np.ndarray, ahead: np.ndarray) -> np.ndarray:
-    """Horizontal vectors [F, 3] in glTF's axes."""
-    return np.stack([left, np.zeros_like(left), ahead], 1)

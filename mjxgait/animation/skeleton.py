@@ -1,4 +1,4 @@
-"""The joints of a skin, and where they are in a pose, in glTF's axes.
+"""The bones of a creature, and where they are in a pose, in glTF's axes, which are BVH's too.
 
 glTF is Y-up with +Z forward and +X left, quaternions are (x, y, z, w). Letters: `F` key frames, `B`
 joints of the skin (the root on the floor, then the bodies).
@@ -8,6 +8,11 @@ import dataclasses
 
 import mujoco
 import numpy as np
+
+from mjxgait.animation.loop import WalkLoop
+
+STILL = 1e-6
+"""m or unit quaternion; what moves less is not animated."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -71,6 +76,27 @@ def world_poses(
         pos.append(data.xpos[list(skeleton.bodies)] @ axes.T)
         rot.append(axes @ data.xmat[list(skeleton.bodies)].reshape(-1, 3, 3) @ axes.T)
     return np.array(pos), np.array(rot)
+
+
+def resting(loop: WalkLoop) -> np.ndarray:
+    """The rest pose [nq] above the origin."""
+    creature = loop.walk.creature
+    qpos = creature.rest_qpos.copy()
+    place = int(creature.model.jnt_qposadr[creature.model.body_jntadr[creature.trunk]])
+    qpos[place : place + 2] = 0.0
+    return qpos
+
+
+def travel(loop: WalkLoop) -> tuple[np.ndarray, np.ndarray]:
+    """How the root moves on evenly: [F, 3] m, and [F] rad to the left, in a circle where the walk
+    turns.
+    """
+    share = np.linspace(0, 1, len(loop.qpos))
+    turned = share * loop.turned
+    # Chords of the circle: sin(a / 2) / (a / 2) as long as the way along it.
+    chord = share * loop.advance * np.sinc(turned / (2 * np.pi))
+    ahead = np.stack([np.sin(turned / 2), np.zeros_like(turned), np.cos(turned / 2)], 1)
+    return chord[:, None] * ahead, turned
 
 
 def _quaternions(rotations: np.ndarray) -> np.ndarray:

@@ -12,12 +12,12 @@ from mjxgait.errors import UserError
 
 @dataclasses.dataclass(frozen=True)
 class ExportOptions:
-    """Write the champion's walk as a GLB: one skin with animated joints, a loop without a seam.
+    """Write the champion's walk as a loop without a seam: as a GLB with a skin, or as a BVH skeleton.
     Units m, Y up, forward +Z.
 
     Attributes:
       run: Run folder.
-      out: File to write, ending with .glb.
+      out: File to write, ending with .glb or .bvh.
       rate: Key frames per second.
       travelling: The root moves forward; otherwise the creature walks in place.
     """
@@ -31,17 +31,18 @@ class ExportOptions:
 def export_command(arguments: Sequence[str]) -> int:
     """Returns the exit code."""
     options = tyro.cli(ExportOptions, args=list(arguments), prog="mjxgait export")
-    from mjxgait.animation import export_glb, walk_loop
+    from mjxgait.animation import export_bvh, export_glb, walk_loop
     from mjxgait.runs.disk import require_writable
     from mjxgait.viewing.cast import LOOP_SECONDS, champion_of
 
-    if options.out.suffix.lower() != ".glb":
+    writers = {".glb": export_glb, ".bvh": export_bvh}
+    if (kind := options.out.suffix.lower()) not in writers:
         raise UserError(
-            f'{options.out}: cannot write "{options.out.suffix}"; end the name with .glb'
+            f'{options.out}: cannot write "{options.out.suffix}"; end the name with .glb or .bvh'
         )
     require_writable(options.out)
     loop = walk_loop(champion_of(options.run, LOOP_SECONDS).walk, options.rate)
-    export_glb(loop, options.out, options.travelling)
+    writers[kind](loop, options.out, options.travelling)
     size = options.out.stat().st_size / 1024
     strides = "1 stride" if loop.strides == 1 else f"{loop.strides} strides"
     print(

@@ -8,13 +8,10 @@ from typing import Annotated, Literal
 import numpy as np
 import tyro
 
-from mjxgait.creature import Creature
 from mjxgait.errors import INTERRUPTED, UserError
 from mjxgait.library import Run, load_creature
-from mjxgait.parts import resolve_config
-from mjxgait.runs.folder import create_run, open_run
-from mjxgait.settings.config import Config
-from mjxgait.settings.tables import build, merge, read_toml
+from mjxgait.runs.folder import new_run_folder, open_run
+from mjxgait.settings.tables import read_toml
 
 
 @dataclasses.dataclass(frozen=True)
@@ -26,7 +23,7 @@ class RefineOptions:
       keys: The cycle: .glb, .bvh, or .csv or .json of joint angles (docs/refine.md).
       out: Folder for the run; by default a new one under runs/.
       keep: How much to keep: 1 leaves the poses as they are, 0 lets every joint depart by 30 degrees
-        and the period by 30 %.
+        and the period by 30 %. Several make a run each, below --out, and a picture of all.
       names: TOML file with the name in the file of each part (of a CSV or JSON: joint), where the
         guess is wrong.
       begin: Second at which the cycle begins.
@@ -38,13 +35,13 @@ class RefineOptions:
       seed: Of all randomness.
       population: Individuals of a generation.
       generations: At most.
-      resume: Run folder of a refine to go on with.
+      resume: Run folder of a refine to go on with, or the folder of several.
     """
 
     env: str = "tall_quadruped"
     keys: Path | None = None
     out: Path | None = None
-    keep: float = 0.5
+    keep: tuple[float, ...] = (0.5,)
     names: Path | None = None
     begin: Annotated[float | None, tyro.conf.arg(name="from")] = None
     end: Annotated[float | None, tyro.conf.arg(name="to")] = None
@@ -61,16 +58,18 @@ class RefineOptions:
 def refine_command(arguments: Sequence[str]) -> int:
     """Returns the exit code."""
     options = tyro.cli(RefineOptions, args=list(arguments), prog="mjxgait refine")
+    from mjxgait.keys import bring, front
+    from mjxgait.keys.refine import base_settings, begin, refining
+
     if options.resume:
-        creature, config = open_run(options.resume)
-        return _run(options.resume, creature, config, resume=True)
+        runs = front.runs_in(options.resume)
+        return _front(options.resume, runs) if runs else _run(options.resume, resume=True)
     if options.keys is None:
         raise UserError("name the file with the cycle: mjxgait refine --env duck --keys walk.glb")
-    from mjxgait.keys import bring
-    from mjxgait.keys.refine import refining, write_original
-
     creature = load_creature(options.env)
-    base = _settings(options, creature)
+    base = base_settings(
+        creature, options.config, options.seed, options.population, options.generations
+    )
     brought = bring(
         creature,
         options.keys,
@@ -80,40 +79,47 @@ def refine_command(arguments: Sequence[str]) -> int:
         options.forward,
         print,
     )
-    config = refining(base, brought, options.keep)
+    configs = [refining(base, brought, keep) for keep in options.keep]
     if options.only_show:
         return 0
-    folder = create_run(options.out, creature, config)
-    write_original(folder, creature, options.keys, brought)
-    return _run(folder, creature, config, resume=False)
+    if len(configs) == 1:
+        folder = begin(options.out, creature, configs[0], options.keys, brought)
+        return _run(folder, resume=False)
+    out = options.out or new_run_folder(creature.name, options.seed)
+    front.check_front(out, options.keep)
+    for keep, config in zip(options.keep, configs, strict=True):
+        begin(front.folder_of(out, keep), creature, config, options.keys, brought)
+    return _front(out, front.runs_in(out))
 
 
-def _settings(options: RefineOptions, creature: Creature) -> Config:
-    """The settings of a training with key poses, before the cycle is known."""
-    config = resolve_config(creature.settings.train, creature.name, options.config)
-    if config.use.controller != "poses":
-        raise UserError("refine is for the controller of key poses; leave use.controller out")
-    short = {"population": options.population, "generations": options.generations}
-    evolution = {key: value for key, value in short.items() if value is not None}
-    table = merge(dataclasses.asdict(config), {"seed": options.seed, "evolution": evolution})
-    return build(type(config), table, "the options")
+def _front(out: Path, runs: Sequence[Path]) -> int:
+    """Ends all runs of a front, the most faithful first, and draws them."""
+    from mjxgait.keys import front
+
+    for run in runs:
+        print(f"{run}:")
+        if not front.finished(run) and _run(run, resume=True) == INTERRUPTED:
+            print(f"To go on: mjxgait refine --resume {out}")
+            return INTERRUPTED
+    print(f"Side by side: {front.draw(out)}")
+    return 0
 
 
-def _run(folder: Path, creature: Creature, config: Config, resume: bool) -> int:
+def _run(folder: Path, resume: bool) -> int:
     """Evolves near the cycle, has the champion examined, and tells how far it departs."""
     from mjxgait.cluster.evolve import evolve
-    from mjxgait.keys.departure import departure
+    from mjxgait.keys.departure import departure_of
     from mjxgait.keys.refine import read_original
     from mjxgait.runs.experiment import prepare_devices
     from mjxgait.runs.screen import Screen
-    from mjxgait.viewing.cast import LOOP_SECONDS, champion_of
 
+    creature, config = open_run(folder)
     original = read_original(folder, creature)
     prepare_devices()
     screen = Screen()
     if not evolve(folder, creature, config, screen, resume):
         return INTERRUPTED
-    found = departure(original, champion_of(folder, LOOP_SECONDS).walk)
+    found = departure_of(folder)
     moved = "" if found.moved is None else f", as moved {found.moved:.1f}"
     screen.say(f"From {original.source}: key poses {found.poses:.1f} degrees{moved} (r.m.s.)")
     for sentence in found.words:

@@ -14,6 +14,8 @@ from mjxgait.ground.spec import LEVEL, GroundSpec, parse_ground
 HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
 SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)
 FLOOR = "floor"
+REST = "rest"
+"""Name of the keyframe in which an animator's skeleton rests, where it is not the standing pose."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -53,6 +55,12 @@ class Creature:
         """Hash of the files that define the body; the README does not count."""
         text = "\0".join(f"{name}\0{self.files[name]}" for name in sorted(self.files))
         return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+    @property
+    def rest_qpos(self) -> np.ndarray:
+        """[nq], the pose in which the bones of files with its motion rest."""
+        key = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_KEY, REST)
+        return self.stand_qpos if key < 0 else np.array(self.model.key_qpos[key])
 
     @property
     def evolution_model(self) -> mujoco.MjModel:

@@ -110,6 +110,7 @@ def _import(path: Path, choices: ImportChoices, notes: Notes) -> Imported:
     )
     start = first_pose(puppet, model, anatomy)
     puppet.turn(yaw_to(find_forward(puppet, start, choices.forward, notes)))
+    rest = puppet.qpos(np.zeros(len(puppet.joints))) if source.up else None
     planar = is_planar(puppet, start) is not None
     mirror = find_mirror(puppet, start, planar, notes)
     best = standing(
@@ -124,7 +125,9 @@ def _import(path: Path, choices: ImportChoices, notes: Notes) -> Imported:
     steady_balance(best.drive, best.puppet.names, best.model, best.qpos, feet, best.notes)
     name = plain_names([choices.name or path.stem], ["creature"])[0]
     check_same(model, anatomy, best.puppet, best.model)
-    return _folder(name, one_line(path.name), best, mirror, planar)
+    if rest is not None:
+        rest[:3] = best.qpos[:3]
+    return _folder(name, one_line(path.name), best, mirror, planar, rest)
 
 
 def _read(path: Path, choices: ImportChoices, notes: Notes) -> Source:
@@ -220,7 +223,9 @@ def _folder(
     best: Candidate,
     mirror: tuple[np.ndarray, np.ndarray] | None,
     planar: bool,
+    rest: np.ndarray | None,
 ) -> Imported:
+    """rest: [nq] the pose in which a skeleton rests, None of other models."""
     puppet, notes = best.puppet, best.notes
     feet = [geom for foot in best.feet for geom in foot]
     trunk = puppet.bodies[0].name
@@ -252,7 +257,7 @@ def _folder(
         f"# {name}\n\nMade by `mjxgait import` from {origin}.\n\n```text\n{notes.text()}\n```\n"
     )
     files = {
-        XML: creature_xml(name, puppet.bodies, best.qpos),
+        XML: creature_xml(name, puppet.bodies, best.qpos, rest),
         TOML: toml,
         README: report,
     }

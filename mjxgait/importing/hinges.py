@@ -23,8 +23,9 @@ FOLD, STRETCH = 75.0, 3.0
 """deg that a knee bends further from where it rests; that it stays from being straight."""
 KNEE = (5.0, 110.0)
 """deg that a knee which rests straight bends the wrong way, and the right one."""
-FOOT = 0.3
-"""Share of its length that a foot points forward."""
+FOOT, ANKLE_HIGH, HEEL = 0.3, 0.1, 0.25
+"""Share of its length that a foot points forward; of the height below which an ankle lies; of a foot's
+length that its heel is behind the ankle."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -109,6 +110,41 @@ class Plan:
             chain.append(max(below, key=lambda b: float(self.way(b) @ self.way(b))))
         return chain
 
+    @cached_property
+    def feet(self) -> list[int]:
+        """Bones below the ankles of a body on two feet, which needs heels to stand; else none."""
+        rig, floor = self.rig, self.floor
+        found = []
+        for first in (b for b in range(len(rig.names)) if self.begins_limb(b)):
+            for bone in self.limb(first):
+                low = rig.places[bone, self.up] - floor < ANKLE_HIGH * self.height
+                if low and toes(self, bone):
+                    found.append(bone)
+                    break
+        return found if len(found) == 2 else []
+
+    @cached_property
+    def floor(self) -> float:
+        """m, of the lowest place."""
+        return float(np.concatenate([self.rig.places, *self.rig.ends])[:, self.up].min())
+
+    def capsules(self, bone: int, radius: float) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Ends [3], [3] of a bone's capsules; toes have none of their own where there is a sole."""
+        above = self.rig.parents[bone]
+        while above >= 0 and above not in self.feet:
+            above = self.rig.parents[above]
+        return [] if above >= 0 else [*self.segments(bone), *self.sole(bone, radius)]
+
+    def sole(self, bone: int, radius: float) -> list[tuple[np.ndarray, np.ndarray]]:
+        """From heel to toe on the floor, of the bone below an ankle; nothing of any other."""
+        if bone not in self.feet:
+            return []
+        last = self.limb(bone)[-1]
+        heel, toe = self.rig.places[bone].copy(), self.rig.places[last] + self.way(last)
+        heel[self.ahead] -= HEEL * (toe - heel)[self.ahead]
+        heel[self.up] = toe[self.up] = self.floor + radius
+        return [(heel, toe)]
+
     def moves(self, bone: int) -> bool:
         """Whether it is long enough to bend on its own."""
         return bool(np.linalg.norm(self.way(bone)) > SHORT * self.height)
@@ -141,7 +177,9 @@ def _spine_below(plan: Plan, bone: int) -> list[int]:
 
 def _limb(plan: Plan, first: int, found: list[list[Hinge]]) -> None:
     """Fills in the hinges of a limb, its side branches rigid."""
-    chain = [bone for bone in plan.limb(first) if plan.moves(bone)]
+    chain = plan.limb(first)
+    below = next((i for i, bone in enumerate(chain) if bone in plan.feet), len(chain))
+    chain = [bone for bone in chain[: below + 1] if plan.moves(bone)]
     if not chain:
         return
     end = plan.rig.places[chain[-1]] + plan.way(chain[-1])
@@ -150,7 +188,7 @@ def _limb(plan: Plan, first: int, found: list[list[Hinge]]) -> None:
     found[chain[0]] = _hip(plan, int(along.argmax()))
     for above, bone in itertools.pairwise(chain):
         last = bone == chain[-1]
-        found[bone] = [_knee(plan, above, bone, last, vertical, _toes(plan, chain[-1]))]
+        found[bone] = [_knee(plan, above, bone, last, vertical, toes(plan, chain[-1]))]
 
 
 def _hip(plan: Plan, along: int) -> list[Hinge]:
@@ -164,7 +202,7 @@ def _hip(plan: Plan, along: int) -> list[Hinge]:
     ]
 
 
-def _knee(plan: Plan, above: int, bone: int, last: bool, vertical: bool, toes: float) -> Hinge:
+def _knee(plan: Plan, above: int, bone: int, last: bool, vertical: bool, forward: float) -> Hinge:
     """The hinge between two bones of a limb: about the axis across the plane in which they lie."""
     one, other = plan.way(above), plan.way(bone)
     across = np.cross(one, other)
@@ -180,15 +218,15 @@ def _knee(plan: Plan, above: int, bone: int, last: bool, vertical: bool, toes: f
         return Hinge(_name(plan, number), axis, low, high, "medium", reason)
     number = plan.side if vertical else plan.ahead
     axis = np.eye(3)[number]
-    if last or not vertical or not toes:
+    if last or not vertical or not forward:
         return Hinge(_name(plan, number), axis, -LOOSE, LOOSE, "low", "it rests straight")
-    back = -np.sign(float(np.cross(axis, other)[plan.ahead]) * toes)
+    back = -np.sign(float(np.cross(axis, other)[plan.ahead]) * forward)
     low, high = sorted((-back * KNEE[0], back * KNEE[1]))
     reason = "it rests straight; taken for a knee, which folds away from the toes"
     return Hinge(_name(plan, number), axis, low, high, "low", reason)
 
 
-def _toes(plan: Plan, foot: int) -> float:
+def toes(plan: Plan, foot: int) -> float:
     """Where a foot points along the way: 1, -1, or 0 where it does not."""
     way = plan.way(foot)
     share = float(way[plan.ahead]) / max(float(np.linalg.norm(way)), 1e-9)

@@ -136,7 +136,8 @@ def _radius(plan: Plan, bone: int) -> float:
         away = np.min([_distances(rig.skins[bone], a, b) for a, b in segments], axis=0)
         return float(np.clip(np.median(away), THIN * plan.height, 0.3 * plan.height))
     least = THIN * plan.height
-    if plan.carries(bone):
+    sideways = int(np.abs(plan.way(bone)).argmax()) == plan.side  # as collar bones are
+    if plan.carries(bone) and not sideways:
         return max(TRUNK * plan.half_width, least)
     share, most = (SLIM, 0.5) if plan.in_middle(bone) else (THICK, 1.0)
     return max(min(share * length, most * TRUNK * plan.half_width or np.inf), least)
@@ -174,7 +175,7 @@ def _written(
                 axis=_text(hinge.axis),
                 range=f"{hinge.low:g} {hinge.high:g}",
             )
-        for start, end in plan.segments(bone):
+        for start, end in plan.capsules(bone, radii[bone]):
             ends = _text(np.concatenate([start, end]) - np.tile(rig.places[bone], 2))
             size, density = f"{radii[bone]:.6g}", f"{DENSITY:g}"
             shape = {"type": "capsule", "fromto": ends, "size": size, "density": density}
@@ -207,6 +208,9 @@ def _tell(plan: Plan, hinges: list[list[Hinge]], names: list[str], notes: Notes)
             alike.setdefault((turns, own[0].confidence, own[0].reason), []).append(name)
     for (turns, confidence, reason), those in alike.items():
         notes.guess(f"hinges of {listed(those)}", f"{turns} deg", confidence, reason)
+    if plan.feet:
+        feet = listed([names[bone] for bone in plan.feet])
+        notes.guess(f"soles of {feet}", "from heel to toe", "medium", "it stands on two feet")
     if rigid := [name for name, own in zip(names[1:], hinges[1:], strict=True) if not own]:
         notes.guess("rigid", listed(rigid), "medium", "too short to matter, or within the trunk")
 

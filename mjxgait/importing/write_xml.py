@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
+from mjxgait.creature.creature import REST
 from mjxgait.errors import UserError
 from mjxgait.importing.parts import GEOM, Body, Shape
 
@@ -39,8 +40,10 @@ FLOOR = """
 """
 
 
-def creature_xml(name: str, bodies: list[Body], stand: np.ndarray | None) -> str:
-    """The text of creature.xml. stand: [nq] the keyframe, None for none yet."""
+def creature_xml(
+    name: str, bodies: list[Body], stand: np.ndarray | None, rest: np.ndarray | None = None
+) -> str:
+    """The text of creature.xml. stand, rest: [nq] the keyframes of these names, None for none."""
     root = ET.fromstring(f"<mujoco>{HEAD}<asset/><worldbody>{FLOOR}</worldbody></mujoco>")
     root.set("model", name)
     asset, world = root.find("asset"), root.find("worldbody")
@@ -53,8 +56,12 @@ def creature_xml(name: str, bodies: list[Body], stand: np.ndarray | None) -> str
         for i, shape in enumerate(body.shapes):
             if shape.solid or shape.seen:
                 _shape(elements[-1], asset, shape, f"{body.name}_mesh_{i}")
+    keyframes = {"stand": stand, REST: rest}
     if stand is not None:
-        ET.SubElement(ET.SubElement(root, "keyframe"), "key", name="stand", qpos=_text(stand))
+        section = ET.SubElement(root, "keyframe")
+        for key, qpos in keyframes.items():
+            if qpos is not None:
+                ET.SubElement(section, "key", name=key, qpos=_text(qpos))
     ET.indent(root)
     return ET.tostring(root, encoding="unicode") + "\n"
 

@@ -130,6 +130,8 @@ def _cut(read: Read, ends: tuple[float | None, float | None]) -> Read:
 
 def _axes(creature: Creature, way: str) -> np.ndarray:
     """[3, 3] from the creature's world to the file's."""
+    if way not in WAYS:
+        raise UserError(f'forward = "{way}": must be one of {", ".join(WAYS)}')
     forward, left = creature.frame.start_axes
     own = np.stack([left, [0.0, 0.0, 1.0], forward])
     ahead = np.array(WAYS[way], float)

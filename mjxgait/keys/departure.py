@@ -4,13 +4,16 @@ Letters: `N` samples of a cycle, `J` joints, `F` feet.
 """
 
 import dataclasses
+from pathlib import Path
 
 import mujoco
 import numpy as np
 
 from mjxgait.creature import Creature
 from mjxgait.keys.cycle import interpolated
-from mjxgait.keys.refine import Original
+from mjxgait.keys.refine import Original, read_original
+from mjxgait.runs.folder import open_run
+from mjxgait.viewing.cast import LOOP_SECONDS, champion_of
 from mjxgait.viewing.walk import Walk
 
 WORTH_TELLING = 0.01
@@ -32,6 +35,16 @@ class Departure:
     period: float | None
     by_joint: dict[str, float]
     words: list[str]
+
+
+def departure_of(folder: Path) -> Departure:
+    """Of the champion of a run that `mjxgait refine` has made.
+
+    Raises:
+      UserError: it was not made by it, or has no champion.
+    """
+    original = read_original(folder, open_run(folder)[0])
+    return departure(original, champion_of(folder, LOOP_SECONDS).walk)
 
 
 def departure(original: Original, walk: Walk) -> Departure:

@@ -2,7 +2,7 @@
 
 import dataclasses
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,9 @@ import numpy as np
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.keys.bring import Brought
+from mjxgait.parts import resolve_config
 from mjxgait.runs.disk import disk_errors
+from mjxgait.runs.folder import create_run
 from mjxgait.settings.config import Config
 from mjxgait.settings.tables import build, merge
 
@@ -39,6 +41,31 @@ class Original:
     angles: np.ndarray
     period: float
     starts: float
+
+
+def base_settings(
+    creature: Creature,
+    config: Path | None,
+    seed: int,
+    population: int | None = None,
+    generations: int | None = None,
+    others: Mapping[str, Any] | None = None,
+) -> Config:
+    """The settings of a training with key poses, before the cycle is known.
+
+    config, seed, population, generations: what the user says. others: tables as in a config file.
+
+    Raises:
+      UserError: they are wrong, or for another controller.
+    """
+    resolved = resolve_config(creature.settings.train, creature.name, config)
+    short = {"population": population, "generations": generations}
+    evolution = {key: value for key, value in short.items() if value is not None}
+    table = merge(dataclasses.asdict(resolved), {"seed": seed, "evolution": evolution})
+    chosen = build(type(resolved), merge(table, others or {}), "the options")
+    if chosen.use.controller != "poses":
+        raise UserError("refine is for the controller of key poses; leave use.controller out")
+    return chosen
 
 
 def refining(config: Config, brought: Brought, keep: float) -> Config:
@@ -69,8 +96,11 @@ def refining(config: Config, brought: Brought, keep: float) -> Config:
     return build(type(config), table, "the settings of refine")
 
 
-def write_original(folder: Path, creature: Creature, source: Path, brought: Brought) -> None:
-    """Keeps the cycle in the run folder."""
+def begin(
+    out: Path | None, creature: Creature, config: Config, source: Path, brought: Brought
+) -> Path:
+    """A new run folder that keeps the cycle which it stays near; see `create_run`."""
+    folder = create_run(out, creature, config)
     joints = dict(zip(creature.joints.names, brought.cycle.angles.T.tolist(), strict=True))
     document = {
         "source": source.name,
@@ -80,6 +110,7 @@ def write_original(folder: Path, creature: Creature, source: Path, brought: Brou
     }
     with disk_errors(folder):
         (folder / KEYS).write_text(json.dumps(document) + "\n", encoding="utf-8")
+    return folder
 
 
 def read_original(folder: Path, creature: Creature) -> Original:

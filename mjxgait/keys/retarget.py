@@ -1,7 +1,7 @@
 """From turned bones to the angles of a creature's hinges: least squares within their ranges.
 
-Letters: `F` frames, `J` actuated joints. A bone at rest stands for a part in the standing pose; what
-both are turned from there is the same, each seen from the next matched part above it.
+Letters: `F` frames, `J` actuated joints. A bone at rest stands for a part in the creature's rest pose;
+what both are turned from there is the same, each seen from the next matched part above it.
 """
 
 import dataclasses
@@ -69,7 +69,7 @@ def retarget(
             f"none of its bones is like a part of {creature.name}: {', '.join(movers(creature))}; "
             "name them in a table with --names"
         )
-    stand = _world(creature)
+    rest = _world(creature)
     turned = {
         body: axes.T @ clip.turned[:, bone] @ axes
         for body, bone in {creature.trunk: _trunk_bone(clip, parts, creature), **parts}.items()
@@ -79,7 +79,7 @@ def retarget(
     for segment in segments:
         top, end = segment.top, segment.bodies[-1]
         relative = turned[top].transpose(0, 2, 1) @ turned[end]
-        wanted = stand[top].T @ relative @ stand[end]
+        wanted = rest[top].T @ relative @ rest[end]
         angles[:, segment.joints], missed = _solved(creature, segment, wanted)
         errors |= {creature.joints.names[j]: missed for j in segment.joints}
     return Retargeted(angles, errors)
@@ -124,9 +124,9 @@ def _trunk_bone(clip: Clip, parts: Mapping[int, int], creature: Creature) -> int
 
 
 def _world(creature: Creature) -> dict[int, np.ndarray]:
-    """World rotation [3, 3] of each body in the standing pose."""
+    """World rotation [3, 3] of each body in the rest pose."""
     data = mujoco.MjData(creature.model)
-    data.qpos[:] = creature.stand_qpos
+    data.qpos[:] = creature.rest_qpos
     mujoco.mj_kinematics(creature.model, data)
     return {b: data.xmat[b].reshape(3, 3).copy() for b in range(creature.model.nbody)}
 

@@ -26,7 +26,7 @@ def create_run(folder: Path | None, creature: Creature, config: Config) -> Path:
         not fit the creature.
     """
     check_fit(creature, config)
-    folder = folder or _new_run_folder(creature.name, config.seed)
+    folder = folder or new_run_folder(creature.name, config.seed)
     try:
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             holds = "another run" if (folder / CONFIG).exists() else "something else"
@@ -48,7 +48,7 @@ def keep_body(folder: Path, creature: Creature) -> None:
         (folder / name).write_text(text, encoding="utf-8")
 
 
-def _new_run_folder(creature: str, seed: int) -> Path:
+def new_run_folder(creature: str, seed: int) -> Path:
     """The first folder under runs/ that is not there yet."""
     names = (
         f"{creature}-seed{seed}{suffix}" for suffix in ("", *(f"-{i}" for i in range(2, 10_000)))

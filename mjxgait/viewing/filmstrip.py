@@ -19,17 +19,18 @@ def filmstrip(
     pictures: int = PICTURES,
     size: tuple[int, int] = SIZE,
     view: str | None = None,
+    rows: int = 2,
 ) -> Image.Image:
-    """One stride in two rows of pictures, each with its part of the stride, its time and the
-    feet that carry weight.
+    """One stride in rows of pictures, each with its part of the stride, its time and the feet that
+    carry weight.
 
     size: pixels of each picture. view: see `Stage`.
     """
     window, _ = gait_window(walk, 1)
     frames = np.round(np.linspace(window.start, window.stop, pictures, endpoint=False)).astype(int)
     stage = Stage([walk], *size, view)
-    columns = -(-pictures // 2)
-    sheet = Image.new("RGB", (columns * (size[0] + 4) - 4, 2 * (size[1] + 4) - 4), "white")
+    columns = -(-pictures // rows)
+    sheet = Image.new("RGB", (columns * (size[0] + 4) - 4, rows * (size[1] + 4) - 4), "white")
     for i, frame in enumerate(frames):
         picture = stage.picture(int(frame))
         share = (frame - window.start) / (window.stop - window.start)

@@ -38,11 +38,15 @@ DOG: dict[str, Bone] = {
 }
 
 
-def bvh(bones: Mapping[str, Bone] = DOG, prefix: str = "") -> str:
-    """A skeleton that stays at rest for two frames."""
+def bvh(
+    bones: Mapping[str, Bone] = DOG, prefix: str = "", turned: Mapping[str, float] | None = None
+) -> str:
+    """A skeleton of two frames: at rest, and with bones turned about X by so many degrees."""
+    order: list[str] = []
 
     def branch(name: str, above: tuple[float, float, float], depth: int) -> list[str]:
         _, place, end = bones[name]
+        order.append(name)
         kind = "JOINT" if depth else "ROOT"
         moved = "Xposition Yposition Zposition "
         count, head = (6, moved) if not depth else (3, "")
@@ -59,9 +63,13 @@ def bvh(bones: Mapping[str, Bone] = DOG, prefix: str = "") -> str:
         return [*lines, "}"]
 
     root = next(name for name, bone in bones.items() if not bone[0])
-    rest = " ".join(["0"] * (3 + 3 * len(bones)))
-    motion = ["MOTION", "Frames: 2", "Frame Time: 0.033333", rest, rest]
-    return "\n".join(["HIERARCHY", *branch(root, (0.0, 0.0, 0.0), 0), *motion])
+    hierarchy = branch(root, (0.0, 0.0, 0.0), 0)
+    rows = [
+        " ".join(["0 0 0", *(f"0 {angles.get(name, 0.0):g} 0" for name in order)])
+        for angles in ({}, turned or {})
+    ]
+    motion = ["MOTION", "Frames: 2", "Frame Time: 0.033333", *rows]
+    return "\n".join(["HIERARCHY", *hierarchy, *motion])
 
 
 def _between(one: tuple[float, float, float], other: tuple[float, float, float]) -> str:

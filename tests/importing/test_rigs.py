@@ -1,6 +1,7 @@
 """A character without a body: of its skeleton, as BVH or as a skinned GLB, a creature is made."""
 
 import contextlib
+import re
 import struct
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 from importing.rigs import DOG, Bone, bvh, glb, stated_longer
 
-from mjxgait.clips.read_bvh import rig_of_bvh
+from mjxgait.clips.read_bvh import read_bvh, rig_of_bvh
 from mjxgait.commands.import_ import import_command
 from mjxgait.creature import Creature
 from mjxgait.creature.scale import load_files
@@ -19,6 +20,7 @@ from mjxgait.importing import ImportChoices, Imported, import_model
 from mjxgait.importing.hinges import Hinge, Plan, hinges_of
 from mjxgait.importing.notes import Notes
 from mjxgait.importing.rigged import model_of
+from mjxgait.keys.retarget import retarget
 
 FEET = ["LeftHand", "RightHand", "LeftHindPaw", "RightHindPaw"]
 SPIDER: dict[str, Bone] = {"Trunk": ("", (0, 10, 0), (0, 10, 8))} | {
@@ -77,6 +79,23 @@ def test_its_joints_are_where_its_bones_begin(creature: Creature):
         at = (data.body(name).xpos - data.xpos[creature.trunk]) @ trunk
         axes = np.stack([creature.frame.left, creature.frame.up, creature.frame.forward])
         assert axes @ at == pytest.approx([x, y, z], abs=1e-4), name
+
+
+def test_its_own_cycles_count_from_where_its_bones_rest(dog: Imported, tmp_path: Path):
+    """Wherever it stands: here with its knees bent."""
+    xml = dog.files["creature.xml"]
+    stand = load_files(dog.files)
+    qpos = stand.stand_qpos.copy()
+    knee = stand.joints.names.index("LeftShin_pitch")
+    qpos[stand.joints.qpos_adr[[knee, stand.mirror.partner[knee]]]] += 0.2
+    bent = re.sub(r'(name="stand" qpos=)"[^"]*"', rf'\1"{" ".join(map(str, qpos))}"', xml)
+    creature = load_files({**dog.files, "creature.xml": bent})
+    file = tmp_path / "walk.bvh"
+    file.write_text(bvh(turned={"LeftShin": 20.0}))
+    clip = read_bvh(file)
+    names = {name: name for name in ("Hips", "LeftThigh", "LeftShin")}
+    found = retarget(creature, clip, names, np.roll(np.eye(3), -1, axis=0))
+    assert np.degrees(found.angles[:, knee]) == pytest.approx([0.0, 20.0], abs=0.1)
 
 
 def test_legs_swing_and_spread_at_the_trunk_and_bend_below(creature: Creature):
@@ -140,6 +159,18 @@ def test_a_knee_that_rests_bent_never_bends_the_other_way(tmp_path: Path):
         (knee,) = found[name]
         assert way * (knee.high if way > 0 else knee.low) > way * -knee.low / 2
         assert abs(knee.low if way > 0 else knee.high) < 75.0
+
+
+def test_a_body_on_two_feet_has_heels(tmp_path: Path):
+    file = tmp_path / "human.bvh"
+    file.write_text(bvh(HUMAN))
+    plan = Plan(1, rig_of_bvh(file))
+    foot = plan.rig.names.index("LFoot")
+    ((heel, toe),) = plan.sole(foot, 1.0)
+    assert heel == pytest.approx([10.0, 3.0, -4.0])
+    assert toe == pytest.approx([10.0, 3.0, 16.0])
+    file.write_text(bvh(DOG))
+    assert Plan(1, rig_of_bvh(file)).feet == []
 
 
 def test_limbs_that_lie_sideways_swing_about_the_upright_axis(tmp_path: Path):

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from importing.rigs import stated_longer
 from keys.made import bvh, columns, glb, swings, table
 
 from mjxgait.creature import Creature
@@ -86,6 +87,13 @@ def circle(document: dict) -> None:
 GLB = {
     "empty": (lambda d: b"", "is empty"),
     "text": (lambda d: b"solid cube " * 9, "not a GLB file"),
+    "cut off": (lambda d: d[: len(d) // 2], "is cut off"),
+    "longer than it is": (stated_longer, "is cut off"),
+    "shorter than it is": (lambda d: d[:8] + struct.pack("<I", 16) + d[12:], "damaged"),
+    "parts without end": (
+        lambda d: altered(d, lambda x: x.update(accessors=x["accessors"] * 9000)),
+        "export one creature",
+    ),
     "no animation": (lambda d: altered(d, lambda x: x.pop("animations")), "no animation"),
     "wrong names": (lambda d: altered(d, rename), "none of its bones is like a part"),
     "10,000 bones": (

@@ -2,25 +2,28 @@
 
 import dataclasses
 import json
+import tomllib
 from pathlib import Path
 
 import jax
 import numpy as np
 import pytest
-from helpers import small_config
+from helpers import STOOL, small_config
 from keys.made import swings, write
+from PIL import Image
 from viewing.made_up import treading
 
-from mjxgait.champion import read_champion
+import mjxgait
+from mjxgait.champion import read_champion, write_champion
 from mjxgait.cli import main
 from mjxgait.control.poses import PoseTracker
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
-from mjxgait.keys import Brought, bring
-from mjxgait.keys.departure import _feet_in_words, departure
-from mjxgait.keys.refine import KEYS, Original, read_original, refining
+from mjxgait.keys import Brought, bring, front
+from mjxgait.keys.departure import _feet_in_words, departure, departure_of
+from mjxgait.keys.refine import KEYS, Original, begin, read_original, refining
 from mjxgait.parts.fit import check_fit
-from mjxgait.runs.folder import CHAMPION, open_run
+from mjxgait.runs.folder import CERTIFICATE, CHAMPION, open_run
 from mjxgait.settings.config import EvolutionConfig
 from mjxgait.viewing.walk import record_walk
 
@@ -120,8 +123,6 @@ def said(capsys: pytest.CaptureFixture, *arguments: object, code: int) -> str:
 
 
 def test_from_a_file_to_a_run_that_can_be_gone_on_with(tmp_path: Path, capsys, stool: Creature):
-    from helpers import STOOL
-
     (tmp_path / "small.toml").write_text(SETTINGS)
     file, run = write(tmp_path, "bvh", stool, swings(stool)), tmp_path / "run"
     given = ("--env", STOOL, "--keys", file, "--config", tmp_path / "small.toml", "--keep", 0.8)
@@ -137,6 +138,12 @@ def test_from_a_file_to_a_run_that_can_be_gone_on_with(tmp_path: Path, capsys, s
     champion = read_champion(run / CHAMPION, creature)
     assert np.degrees(np.abs(champion.genome["key_poses"] - drawn)).max() <= 6.0 + 1e-3
     assert "From walk.bvh" in said(capsys, "--resume", run, code=0)
+    settings = tomllib.loads(SETTINGS)
+    sizes = {"population": 6, "generations": 2, "settings": settings, "quiet": True}
+    again = mjxgait.refine(STOOL, file, keep=0.8, out=tmp_path / "again", **sizes)
+    assert again.champion.fingerprint == champion.fingerprint
+    assert again.departure.poses == departure_of(run).poses
+    assert capsys.readouterr().out == ""
     assert "holds another run" in said(capsys, *given, "--out", run, code=2)
     (run / KEYS).write_text(json.dumps({"source": "x"}))
     with pytest.raises(UserError, match="damaged"):
@@ -156,3 +163,50 @@ def test_where_evolution_looked_is_no_part_of_who_somebody_is(stool: Creature):
     near = dataclasses.replace(champion.settings, around=(0.1, 0.2), within=3.0)
     others = [dataclasses.replace(champion, settings=settings) for settings in (before, near)]
     assert {other.fingerprint for other in others} == {champion.fingerprint}
+
+
+def ended(run: Path, creature: Creature, share: float, passed: bool) -> None:
+    """As a run leaves its folder."""
+    settings = open_run(run)[1].controller
+    near = dataclasses.replace(treading(creature), settings=settings)
+    drawn = np.reshape(settings.around, (settings.key_poses, -1))
+    poses = drawn + np.radians(0.5 * settings.within)
+    near = dataclasses.replace(near, genome={**near.genome, "key_poses": poses})
+    write_champion(near, creature, run / CHAMPION)
+    measure = {"name": "share that stays up", "value": share}
+    criterion = {"number": 4, "passed": passed, "measures": [measure]}
+    document = {"passed": passed, "criteria": [criterion]}
+    (run / CERTIFICATE).write_text(json.dumps(document))
+
+
+def test_several_that_keep_more_or_less_are_one_picture(
+    tmp_path: Path, capsys, stool, brought, monkeypatch
+):
+    out = tmp_path / "all"
+    for keep in (0.0, 1.0):
+        config = refining(small_config(), brought, keep)
+        begin(front.folder_of(out, keep), stool, config, Path("x.csv"), brought)
+    monkeypatch.setattr(front, "LOOP_SECONDS", 2.0)
+    faithful, free = front.runs_in(out)
+    with pytest.raises(UserError, match="has no certificate yet"):
+        front.draw(out)
+    ended(faithful, stool, 0.25, passed=False)
+    ended(free, stool, 0.75, passed=True)
+    found = {run: front.look(run) for run in front.runs_in(out)}
+    told = [(one.keep, one.departs, one.stays, one.certified) for one in found.values()]
+    assert told[0] == (1.0, 0.0, 0.25, False)
+    assert told[1] == (0.0, pytest.approx(15.0, abs=0.01), 0.75, True)
+    monkeypatch.setattr(front, "look", found.get)
+    assert "Side by side" in said(capsys, "--resume", out, code=0)
+    picture = np.asarray(Image.open(out / "front.png"))
+    assert picture.std() > 10
+
+
+def test_several_are_begun_in_an_empty_folder_only(tmp_path: Path, capsys, stool: Creature):
+    file = write(tmp_path, "csv", stool, swings(stool))
+    given = ("--env", STOOL, "--keys", file, "--tolerance", 9, "--out", tmp_path)
+    before = {*tmp_path.iterdir()}
+    assert "holds something already" in said(capsys, *given, "--keep", 1, 0.5, code=2)
+    empty = (*given[:-1], tmp_path / "new", "--keep", 1, 1)
+    assert "twice" in said(capsys, *empty, code=2)
+    assert {*tmp_path.iterdir()} == before
