@@ -42,7 +42,8 @@ def poses(creature: Creature, angles: np.ndarray) -> np.ndarray:
 def glb(creature: Creature, angles: np.ndarray) -> bytes:
     """As `mjxgait export` writes it."""
     walk = Walk(creature, treading(creature), None, np.inf)
-    return build_glb(WalkLoop(walk, poses(creature, angles), RATE, 1, 0.0, 1.0))
+    frames = (0, len(angles) - 1)
+    return build_glb(WalkLoop(walk, poses(creature, angles), RATE, 1, 0.0, 1.0, frames))
 
 
 def bvh(creature: Creature, angles: np.ndarray, order: str = "ZXY") -> str:

@@ -172,7 +172,8 @@ def test_of_a_long_file_the_user_says_which_seconds(stool: Creature, tmp_path: P
 def exported(stool: Creature) -> WalkLoop:
     """A walk whose joints follow their targets late and not all the way."""
     walk = Walk(stool, treading(stool, degrees=12.0), None, np.inf)
-    return WalkLoop(walk, poses(stool, swings(stool)), RATE, 1, 0.0, 1.0)
+    qpos = poses(stool, swings(stool))
+    return WalkLoop(walk, qpos, RATE, 1, 0.0, 1.0, (0, len(qpos) - 1))
 
 
 def test_an_exported_walk_comes_back_with_the_key_poses_that_made_it(exported, tmp_path):
