@@ -1,8 +1,11 @@
 import contextlib
 import ctypes
+import gc
 import os
 from collections.abc import Iterator
+from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 # One cache of compiled programs for all workers and for the commands that tests start; without the
 # second line it keeps nothing that takes less than a second, of which there are hundreds.
@@ -12,6 +15,12 @@ os.environ.setdefault(
 os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
 # Compiling is what takes the time in most tests, and in the commands that they start; see `as_shipped`.
 os.environ.setdefault("JAX_DISABLE_MOST_OPTIMIZATIONS", "1")
+# XLA's older way from fused operations to machine code needs a third less of the compiler's time. A
+# flag that XLA does not know ends the process, so only a release with which it was tried is asked.
+if version("jaxlib").startswith("0.10."):
+    os.environ["XLA_FLAGS"] = (
+        os.environ.get("XLA_FLAGS", "") + " --xla_cpu_use_fusion_emitters=false"
+    ).lstrip()
 # Runs are compared to the bit, and how lanes are dealt to devices decides on the last of them.
 os.environ["JAX_NUM_CPU_DEVICES"] = "2"
 
@@ -25,6 +34,11 @@ from mjxgait.settings.shipped import data_folder
 FOLDERS = sorted(path.parent for path in data_folder("envs").glob("*/creature.toml"))
 SHIPPED = [path.name for path in FOLDERS if not load_creature(path).settings.creature.grows]
 """Those that have a body before they are trained."""
+
+
+def pytest_collection_finish() -> None:
+    """Modules and lists of tests stay: no collection of garbage need look at them again."""
+    gc.freeze()
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -49,7 +63,16 @@ def shipped(request: pytest.FixtureRequest) -> Creature:
 
 @pytest.fixture(scope="module")
 def as_shipped() -> Iterator[None]:
-    """Programs compiled with all optimizations, where these could make a difference."""
+    """What is lowered and compiled is so as for users, where that could make a difference."""
+    compile_it, usual = jax.stages.Lowered.compile, dict[str, Any]()
+    if "fusion_emitters" in os.environ.get("XLA_FLAGS", ""):
+        usual["xla_cpu_use_fusion_emitters"] = True
+
+    def compiled(lowered: jax.stages.Lowered, compiler_options: Any = None) -> Any:
+        return compile_it(lowered, usual | (compiler_options or {}))
+
     jax.config.update("jax_disable_most_optimizations", False)
-    yield
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(jax.stages.Lowered, "compile", compiled)
+        yield
     jax.config.update("jax_disable_most_optimizations", True)
