@@ -28,7 +28,7 @@ from mjxgait.bench.machine import machine_facts
 from mjxgait.control import spd
 from mjxgait.creature import Creature, load_creature
 from mjxgait.physics import make_plant
-from mjxgait.runs.experiment import prepare_devices
+from mjxgait.runs.devices import prepare_devices
 from mjxgait.settings.shipped import find_creature
 from mjxgait.types import BodyState, Plant, Sensed
 

@@ -41,7 +41,8 @@ from mjxgait.creature import Creature
 from mjxgait.library import load_creature
 from mjxgait.parts import resolve_config
 from mjxgait.runs.checkpoint import Checkpoints
-from mjxgait.runs.experiment import build_experiment, prepare_devices
+from mjxgait.runs.devices import prepare_devices
+from mjxgait.runs.experiment import build_experiment
 from mjxgait.runs.packed import pack
 from mjxgait.settings.config import Config
 from mjxgait.settings.tables import build, merge

@@ -33,7 +33,7 @@ from mujoco import rollout
 from mjxgait.bench.machine import machine_facts
 from mjxgait.creature import Creature, load_creature
 from mjxgait.physics import make_plant
-from mjxgait.runs.experiment import prepare_devices
+from mjxgait.runs.devices import prepare_devices
 from mjxgait.settings.shipped import data_folder
 from mjxgait.types import BodyState, Plant
 

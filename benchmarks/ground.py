@@ -27,7 +27,7 @@ from mjxgait.creature.frame import start_place
 from mjxgait.ground.spec import parse_ground
 from mjxgait.ground.surface import lay_ground, named_draws
 from mjxgait.physics import make_plant
-from mjxgait.runs.experiment import prepare_devices
+from mjxgait.runs.devices import prepare_devices
 from mjxgait.settings.shipped import find_creature
 from mjxgait.types import BodyState, Plant, Sensed
 

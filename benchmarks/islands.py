@@ -21,7 +21,8 @@ from mjxgait.ablation.statistics import compare, estimate
 from mjxgait.cluster.migration import exchanged
 from mjxgait.library import load_creature
 from mjxgait.parts import resolve_config
-from mjxgait.runs.experiment import build_batch, prepare_devices
+from mjxgait.runs.devices import prepare_devices
+from mjxgait.runs.experiment import build_batch
 from mjxgait.runs.packed import Packed, pack
 from mjxgait.search.state import EvolutionState
 from mjxgait.settings.config import Config

@@ -17,7 +17,8 @@ from statistics import median
 import jax
 
 from mjxgait.creature import load_creature
-from mjxgait.runs.experiment import build_batch, build_experiment, prepare_devices
+from mjxgait.runs.devices import prepare_devices
+from mjxgait.runs.experiment import build_batch, build_experiment
 from mjxgait.settings.config import Config
 from mjxgait.settings.layers import resolve_config
 from mjxgait.settings.shipped import find_creature

@@ -248,7 +248,7 @@ def _evolved(folder: Path, creature: Creature, config: Config, quiet: bool) -> R
     from rich.console import Console
 
     from mjxgait.cluster.evolve import evolve
-    from mjxgait.runs.experiment import prepare_devices
+    from mjxgait.runs.devices import prepare_devices
     from mjxgait.runs.screen import Screen
 
     prepare_devices()

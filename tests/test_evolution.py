@@ -16,7 +16,8 @@ from mjxgait.search.breeding import parents, proportional_parents
 from mjxgait.search.evolution import Evolution
 from mjxgait.search.state import EvolutionState, GenerationMetrics, Origin, stop_reason
 from mjxgait.search.variation import Box, first_occurrence
-from mjxgait.settings.config import Config, EvolutionConfig, ForcedConfig
+from mjxgait.settings.config import Config
+from mjxgait.settings.evolution import EvolutionConfig, ForcedConfig
 from mjxgait.settings.traced import traced
 from mjxgait.types import Judged, pytree
 

@@ -18,8 +18,8 @@ from mjxgait.parts import resolve_config
 from mjxgait.parts.own import load
 from mjxgait.parts.settings import build_config
 from mjxgait.runs.experiment import Experiment, build_experiment
-from mjxgait.settings.config import RolloutConfig
 from mjxgait.settings.hop import GOALS, NOMINAL_GOAL, HopConfig, HopWeights
+from mjxgait.settings.rollout import RolloutConfig
 from mjxgait.settings.shipped import find_creature
 from mjxgait.settings.walk import WalkConfig
 from mjxgait.tasks.falls import Reason

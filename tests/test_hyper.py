@@ -12,7 +12,8 @@ from helpers import small_config
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.runs.experiment import Batch, Step, build_batch
-from mjxgait.settings.config import Config, EvolutionConfig
+from mjxgait.settings.config import Config
+from mjxgait.settings.evolution import EvolutionConfig
 from mjxgait.settings.traced import chosen, traced
 
 

@@ -27,8 +27,8 @@ from mjxgait.errors import UserError
 from mjxgait.parts.settings import build_config
 from mjxgait.runs.experiment import build_experiment
 from mjxgait.settings import limbo as evolution
-from mjxgait.settings.config import RolloutConfig
 from mjxgait.settings.limbo import BAR_PLACE, LimboConfig
+from mjxgait.settings.rollout import RolloutConfig
 from mjxgait.settings.shipped import find_creature
 from mjxgait.tasks.hop.fitness import signed_weights
 from mjxgait.tasks.limbo.bar import bar_distance, intrusion

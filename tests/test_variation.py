@@ -13,7 +13,8 @@ from mjxgait.control.pose_variation import pose_variation
 from mjxgait.control.poses import Genome
 from mjxgait.search import variation
 from mjxgait.search.variation import Box, first_occurrence
-from mjxgait.settings.config import Config, EvolutionConfig
+from mjxgait.settings.config import Config
+from mjxgait.settings.evolution import EvolutionConfig
 from mjxgait.settings.traced import traced
 
 K, J, E = 3, 5, 7

@@ -12,7 +12,8 @@ from mjxgait.creature import Creature
 from mjxgait.errors import UserError, did_you_mean
 from mjxgait.ground.spec import FLAT
 from mjxgait.parts import resolve_config
-from mjxgait.settings.config import Config, GroundText
+from mjxgait.settings.config import Config
+from mjxgait.settings.rollout import GroundText
 from mjxgait.settings.shipped import data_folder
 from mjxgait.settings.tables import STRICT, Count, Finite, Whole, build, merge, read_toml
 

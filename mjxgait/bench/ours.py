@@ -13,7 +13,8 @@ import numpy as np
 from mjxgait.bench.workload import Lap, Workload
 from mjxgait.control.poses import TUNING, Genome
 from mjxgait.creature import load_creature
-from mjxgait.runs.experiment import Experiment, build_experiment, prepare_devices
+from mjxgait.runs.devices import prepare_devices
+from mjxgait.runs.experiment import Experiment, build_experiment
 from mjxgait.search.state import EvolutionState
 from mjxgait.settings.config import Config
 

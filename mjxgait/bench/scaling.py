@@ -12,7 +12,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from mjxgait.settings.config import RolloutConfig
+from mjxgait.settings.rollout import RolloutConfig
 
 POPULATIONS = (32, 128, 512, 2048, 8192)
 LANES = (8, 16, 32, 64, 128, 256)

@@ -11,7 +11,8 @@ import jax
 
 from mjxgait.cluster.recipe import Recipe
 from mjxgait.runs.blueprint import Plan, draw_up
-from mjxgait.runs.experiment import Batch, Step, build_batch, compiled
+from mjxgait.runs.devices import compiled
+from mjxgait.runs.experiment import Batch, Step, build_batch
 from mjxgait.settings.traced import traced
 from mjxgait.types import Judged
 

@@ -30,7 +30,7 @@ class RemoteWorker:
     def __init__(self, tag: str) -> None:
         os.environ.update(ENVIRONMENT)
         from mjxgait.cluster.programs import Programs
-        from mjxgait.runs.experiment import prepare_devices
+        from mjxgait.runs.devices import prepare_devices
 
         prepare_devices(1, tag)
         self._programs = Programs(_turn)

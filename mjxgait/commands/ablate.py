@@ -88,7 +88,7 @@ def ablate_command(arguments: Sequence[str]) -> int:
     plan = make_plan(study, creature, str(options.study or folder / STUDY))
     # JAX takes a second to import: only once the study is known to be good.
     from mjxgait.ablation.rows import groups
-    from mjxgait.runs.experiment import prepare_devices
+    from mjxgait.runs.devices import prepare_devices
 
     prepare_devices()
     hours = _hours(plan.upper_bound(creature), len(parts := groups(plan)))

@@ -110,7 +110,7 @@ def _run(folder: Path, resume: bool) -> int:
     from mjxgait.cluster.evolve import evolve
     from mjxgait.keys.departure import departure_of
     from mjxgait.keys.refine import read_original
-    from mjxgait.runs.experiment import prepare_devices
+    from mjxgait.runs.devices import prepare_devices
     from mjxgait.runs.screen import Screen
 
     creature, config = open_run(folder)

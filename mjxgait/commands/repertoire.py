@@ -76,7 +76,7 @@ def repertoire_command(arguments: Sequence[str]) -> int:
     from mjxgait.cluster.board import crew_at
     from mjxgait.repertoire.evolve import evolve
     from mjxgait.repertoire.examine import examine
-    from mjxgait.runs.experiment import prepare_devices
+    from mjxgait.runs.devices import prepare_devices
     from mjxgait.runs.loop import interruptible
 
     prepare_devices(1 if options.cluster else None)

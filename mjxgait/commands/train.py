@@ -108,7 +108,7 @@ def train_command(arguments: Sequence[str]) -> int:
     # JAX takes a second to import: only once the options are known to be good.
     from mjxgait.cluster.evolve import evolve
     from mjxgait.commands.view import following
-    from mjxgait.runs.experiment import prepare_devices
+    from mjxgait.runs.devices import prepare_devices
     from mjxgait.runs.screen import Screen
 
     if options.resume:

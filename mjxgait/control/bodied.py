@@ -10,7 +10,7 @@ import numpy as np
 
 from mjxgait.control.protocol import Command, Controller, Senses
 from mjxgait.search.variation import Box, Variation, creation, in_ranges, jittered, narrowed
-from mjxgait.settings.config import EvolutionConfig
+from mjxgait.settings.evolution import EvolutionConfig
 from mjxgait.types import pytree
 
 

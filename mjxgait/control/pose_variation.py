@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 
 from mjxgait.search.variation import Box, Variation, creation, jittered, narrowed
-from mjxgait.settings.config import EvolutionConfig
+from mjxgait.settings.evolution import EvolutionConfig
 from mjxgait.settings.traced import chosen
 
 

@@ -15,8 +15,8 @@ from mjxgait.body import Body
 from mjxgait.control.pose_variation import pose_variation
 from mjxgait.control.protocol import Command, Senses
 from mjxgait.search.variation import Box, Variation, in_ranges
-from mjxgait.settings.config import EvolutionConfig
 from mjxgait.settings.control import STEPPING, TUNING, PoseConfig
+from mjxgait.settings.evolution import EvolutionConfig
 from mjxgait.settings.traced import chosen
 from mjxgait.types import Number, pytree
 

@@ -7,7 +7,7 @@ import jax
 import numpy as np
 
 from mjxgait.search.variation import Variation
-from mjxgait.settings.config import EvolutionConfig
+from mjxgait.settings.evolution import EvolutionConfig
 
 Senses = Mapping[str, jax.Array]
 """What a controller perceives of one moment, by name (`senses.py`, and what a task adds)."""

@@ -11,7 +11,7 @@ import numpy as np
 from mjxgait.body import Body
 from mjxgait.control.protocol import Command, Senses
 from mjxgait.search.variation import Box, Variation, in_ranges, real_variation
-from mjxgait.settings.config import EvolutionConfig
+from mjxgait.settings.evolution import EvolutionConfig
 from mjxgait.settings.tables import NoSettings
 
 Bounds = Mapping[str, tuple[Any, Any]]

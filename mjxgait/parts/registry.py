@@ -9,7 +9,8 @@ import numpy as np
 from mjxgait.creature import Creature
 from mjxgait.creature.settings import Termination
 from mjxgait.errors import UserError, did_you_mean, not_loaded
-from mjxgait.settings.config import Config, RolloutConfig, UseConfig
+from mjxgait.settings.config import Config, UseConfig
+from mjxgait.settings.rollout import RolloutConfig
 
 if TYPE_CHECKING:  # JAX takes a second to import
     from mjxgait.body import Body, Ends

@@ -11,9 +11,10 @@ from rich.console import Console
 from mjxgait.cores import process_per_core, survivable
 from mjxgait.repertoire.grid import Grid
 from mjxgait.runs.checkpoint import Checkpoints
+from mjxgait.runs.devices import prepare_devices
 from mjxgait.runs.examination import Examiner
 from mjxgait.runs.exams import Exams
-from mjxgait.runs.experiment import build_experiment, prepare_devices
+from mjxgait.runs.experiment import build_experiment
 from mjxgait.runs.folder import CERTIFICATE, EXAMS, open_run
 from mjxgait.runs.loop import conclude, versions
 from mjxgait.runs.screen import Screen

@@ -26,7 +26,8 @@ from mjxgait.physics.trees.plant import TreePlant
 from mjxgait.physics.trees.tree import Surroundings
 from mjxgait.runs.growth import GraphGrowth, Growth, SizeGrowth, growth_of
 from mjxgait.senses import check_senses
-from mjxgait.settings.config import Config, RolloutConfig
+from mjxgait.settings.config import Config
+from mjxgait.settings.rollout import RolloutConfig
 from mjxgait.simulation.rollout import AXIS, Simulator
 from mjxgait.tasks.protocol import Task
 from mjxgait.tasks.trials import Starts

@@ -1,7 +1,6 @@
 """Wires the rooms into a run: the one place that jits and that knows the devices."""
 
 import dataclasses
-import os
 from collections.abc import Callable, Sequence
 from functools import cached_property, partial
 from typing import Any
@@ -9,15 +8,14 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.sharding import NamedSharding, PartitionSpec
 
 from mjxgait.champion import Champion
-from mjxgait.cores import cores
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.parts import make_task
 from mjxgait.parts.registry import what_ends
 from mjxgait.runs.blueprint import Numbers, Plan, draw_up
+from mjxgait.runs.devices import compiled, everywhere
 from mjxgait.runs.generation import Row, absorb, evolution_of, judge, propose
 from mjxgait.search.state import EvolutionState, GenerationMetrics
 from mjxgait.settings.config import Config
@@ -28,21 +26,6 @@ from mjxgait.tasks.trials import Starts
 
 Step = Callable[[EvolutionState], tuple[EvolutionState, GenerationMetrics]]
 """A compiled generation."""
-
-
-def prepare_devices(devices: int | None = None, kind: str = "") -> None:
-    """One JAX host device per core, and compiled programs kept in the user's cache folder. Call before JAX's first computation.
-
-    Args:
-      devices: another number of them.
-      kind: of machine; its programs lie apart from those of others, for a home folder may be shared.
-    """
-    if jax.config.values["jax_num_cpu_devices"] < 0:
-        jax.config.update("jax_num_cpu_devices", devices or cores())
-    if jax.config.values["jax_compilation_cache_dir"] is None:
-        cache = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
-        jax.config.update("jax_compilation_cache_dir", os.path.join(cache, "mjxgait", "jax", kind))
-        jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -115,7 +98,7 @@ class Experiment:
 
     def place(self, state: EvolutionState) -> EvolutionState:
         """The state on all devices, where the compiled program wants it."""
-        return jax.device_put(state, _everywhere(self.simulator))
+        return jax.device_put(state, everywhere(self.simulator))
 
     def champion(self, state: EvolutionState, versions: dict[str, str], rank: int = 0) -> Champion:
         """An individual of a state; rank 0 is the best."""
@@ -218,21 +201,21 @@ class Batch:
         """What the programs read of the body and of the rows, on all devices."""
         one = self.experiments[0]
         known: tuple[Numbers | None, Row] = jax.device_put(
-            (one.blueprint.numbers, self.rows), _everywhere(one.simulator)
+            (one.blueprint.numbers, self.rows), everywhere(one.simulator)
         )
         return known
 
     def _lowered(self, function: Callable[..., Any], *given: Any) -> jax.stages.Lowered:
         one = self.experiments[0]
-        everywhere = _everywhere(one.simulator)
+        placed = everywhere(one.simulator)
         program = jax.jit(
-            partial(function, one.blueprint), in_shardings=everywhere, out_shardings=everywhere
+            partial(function, one.blueprint), in_shardings=placed, out_shardings=placed
         )
         return program.lower(one.blueprint.numbers, *given)
 
     def place(self, states: EvolutionState) -> EvolutionState:
         """The states on all devices, where the compiled program wants them."""
-        return jax.device_put(states, _everywhere(self.experiments[0].simulator))
+        return jax.device_put(states, everywhere(self.experiments[0].simulator))
 
 
 def build_experiment(creature: Creature, config: Config) -> Experiment:
@@ -313,10 +296,6 @@ def _experiment(blueprint: Plan, config: Config) -> Experiment:
     return Experiment(creature, config, blueprint, Row(traced(config), starts))
 
 
-def _everywhere(simulator: Simulator) -> NamedSharding:
-    return NamedSharding(simulator.mesh, PartitionSpec())
-
-
 def _lone(tree: Any) -> Any:
     """One row [1, ...] of everything."""
     return jax.tree.map(lambda leaf: leaf[None], tree)
@@ -329,11 +308,3 @@ def _only(tree: Any) -> Any:
 
 def _stack(trees: Sequence[Any]) -> Any:
     return jax.tree.map(lambda *leaves: jnp.stack(leaves), *trees)
-
-
-def compiled(lowered: jax.stages.Lowered) -> jax.stages.Compiled:
-    """The program; the fast plant gains a third from the widest vectors, which XLA's CPU compiler does not use by itself."""
-    options: dict[str, str | bool] = (
-        {"xla_cpu_prefer_vector_width": "512"} if jax.default_backend() == "cpu" else {}
-    )
-    return lowered.compile(compiler_options=options)

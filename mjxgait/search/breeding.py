@@ -13,7 +13,7 @@ import jax
 import jax.numpy as jnp
 
 from mjxgait.search.variation import Variation
-from mjxgait.settings.config import EvolutionConfig
+from mjxgait.settings.evolution import EvolutionConfig
 from mjxgait.settings.traced import chosen
 
 TRIES = 16

@@ -17,7 +17,7 @@ from mjxgait.search.breeding import Nursery, parents, proportional_parents
 from mjxgait.search.metrics import metrics
 from mjxgait.search.state import EvolutionState, GenerationMetrics, Origin, Proposal
 from mjxgait.search.variation import Variation, first_occurrence
-from mjxgait.settings.config import EvolutionConfig
+from mjxgait.settings.evolution import EvolutionConfig
 from mjxgait.settings.traced import chosen
 from mjxgait.types import Judged
 

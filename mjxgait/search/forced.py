@@ -7,7 +7,7 @@ import jax.numpy as jnp
 
 from mjxgait.search.metrics import finite_mean
 from mjxgait.search.state import EvolutionState
-from mjxgait.settings.config import EvolutionConfig
+from mjxgait.settings.evolution import EvolutionConfig
 
 
 def admitted(

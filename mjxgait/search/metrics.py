@@ -5,7 +5,7 @@ import jax.numpy as jnp
 
 from mjxgait.search.state import EvolutionState, GenerationMetrics
 from mjxgait.search.variation import first_occurrence
-from mjxgait.settings.config import EvolutionConfig
+from mjxgait.settings.evolution import EvolutionConfig
 from mjxgait.types import Judged
 
 

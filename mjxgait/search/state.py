@@ -5,7 +5,7 @@ from typing import Any
 
 import jax
 
-from mjxgait.settings.config import EvolutionConfig
+from mjxgait.settings.evolution import EvolutionConfig
 from mjxgait.types import pytree
 
 

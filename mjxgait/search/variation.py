@@ -14,7 +14,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from mjxgait.settings.config import EvolutionConfig
+from mjxgait.settings.evolution import EvolutionConfig
 from mjxgait.settings.traced import chosen
 from mjxgait.types import pytree
 

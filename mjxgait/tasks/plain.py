@@ -11,7 +11,7 @@ import jax.numpy as jnp
 from mjxgait.body import Body, Ends
 from mjxgait.creature import Creature
 from mjxgait.creature.settings import Termination
-from mjxgait.settings.config import RolloutConfig
+from mjxgait.settings.rollout import RolloutConfig
 from mjxgait.settings.tables import NoSettings
 from mjxgait.tasks.falls import why_fallen
 from mjxgait.tasks.protocol import Tally

@@ -6,7 +6,7 @@ from typing import Any, Protocol
 import jax
 
 from mjxgait.creature import Creature
-from mjxgait.settings.config import RolloutConfig
+from mjxgait.settings.rollout import RolloutConfig
 from mjxgait.tasks.trials import Starts
 from mjxgait.types import Sensed, pytree
 

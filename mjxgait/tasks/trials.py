@@ -10,7 +10,7 @@ from mjxgait.creature import Creature
 from mjxgait.creature.frame import horizontal_freedoms, start_place
 from mjxgait.ground.spec import Place, parse_ground
 from mjxgait.ground.surface import DRAWS, Ground, lay_ground, lay_uneven, named_draws
-from mjxgait.settings.config import RolloutConfig
+from mjxgait.settings.rollout import RolloutConfig
 from mjxgait.types import pytree
 
 NEVER = -1

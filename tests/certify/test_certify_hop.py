@@ -19,7 +19,7 @@ from mjxgait.certify.tasks.hop import HopDemands
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 from mjxgait.settings import hop as evolution
-from mjxgait.settings.config import RolloutConfig
+from mjxgait.settings.rollout import RolloutConfig
 from mjxgait.tasks.hop.task import Hop
 
 CONFIG, DEMANDS = CertificateConfig(), HopDemands()

@@ -13,7 +13,8 @@ from mjxgait.control.poses import TUNING
 from mjxgait.creature import load_creature
 from mjxgait.runs.checkpoint import Checkpoints
 from mjxgait.runs.folder import CHAMPION, METRICS, create_run
-from mjxgait.settings.config import Config, EvolutionConfig
+from mjxgait.settings.config import Config
+from mjxgait.settings.evolution import EvolutionConfig
 from mjxgait.settings.shipped import find_creature
 
 

@@ -24,7 +24,7 @@ from mjxgait.keys.departure import _feet_in_words, departure, departure_of
 from mjxgait.keys.refine import KEYS, Original, begin, read_original, refining
 from mjxgait.parts.fit import check_fit
 from mjxgait.runs.folder import CERTIFICATE, CHAMPION, open_run
-from mjxgait.settings.config import EvolutionConfig
+from mjxgait.settings.evolution import EvolutionConfig
 from mjxgait.viewing.walk import record_walk
 
 SETTINGS = """

@@ -19,7 +19,7 @@ from mjxgait.control.brains.thought import Mind, Perceived, blank, thought
 from mjxgait.control.protocol import Command, Senses
 from mjxgait.search.variation import Variation
 from mjxgait.settings.brains import BrainConfig
-from mjxgait.settings.config import EvolutionConfig
+from mjxgait.settings.evolution import EvolutionConfig
 
 LIGHT = "light"
 

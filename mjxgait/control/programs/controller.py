@@ -21,7 +21,7 @@ from mjxgait.control.programs.operators import program_variation
 from mjxgait.control.programs.trees import Trees
 from mjxgait.control.protocol import Command, Senses
 from mjxgait.search.variation import Variation
-from mjxgait.settings.config import EvolutionConfig
+from mjxgait.settings.evolution import EvolutionConfig
 from mjxgait.settings.programs import ProgramConfig
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from mjxgait.creature import Creature
 from mjxgait.settings.blocks import BlocksConfig
-from mjxgait.settings.config import RolloutConfig
+from mjxgait.settings.rollout import RolloutConfig
 from mjxgait.tasks import protocol
 from mjxgait.tasks.plain import PlainTask
 from mjxgait.tasks.protocol import FINISHED

@@ -14,7 +14,7 @@ import numpy as np
 
 from mjxgait.champion.blocks.material import LIGHT
 from mjxgait.creature import Creature
-from mjxgait.settings.config import RolloutConfig
+from mjxgait.settings.rollout import RolloutConfig
 from mjxgait.tasks.blocks.alive import GoingTask, length
 from mjxgait.tasks.blocks.roam import Roam
 from mjxgait.tasks.blocks.swim import Swim

@@ -7,8 +7,8 @@ import jax
 import jax.numpy as jnp
 
 from mjxgait.creature import Creature
-from mjxgait.settings.config import RolloutConfig
 from mjxgait.settings.hop import GOALS, NOMINAL_GOAL, HopConfig
+from mjxgait.settings.rollout import RolloutConfig
 from mjxgait.tasks.falls import touches
 from mjxgait.tasks.hop.fitness import TERMS, fitness_terms, signed_weights
 from mjxgait.tasks.hop.tally import Standards, Tally, empty, goal_distance, rested, updated

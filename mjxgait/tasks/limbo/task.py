@@ -9,8 +9,8 @@ import jax.numpy as jnp
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.ground.spec import parse_ground
-from mjxgait.settings.config import RolloutConfig
 from mjxgait.settings.limbo import GOALS, NOMINAL_GOAL, LimboConfig, LimboWeights
+from mjxgait.settings.rollout import RolloutConfig
 from mjxgait.tasks.hop import tally as hop
 from mjxgait.tasks.hop.fitness import fitness_terms
 from mjxgait.tasks.hop.task import Hop

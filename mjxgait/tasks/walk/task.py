@@ -10,7 +10,7 @@ from mjxgait.body import Body, Ends
 from mjxgait.creature import Creature
 from mjxgait.creature.settings import Termination
 from mjxgait.senses import sense
-from mjxgait.settings.config import RolloutConfig
+from mjxgait.settings.rollout import RolloutConfig
 from mjxgait.settings.walk import WalkConfig, WishConfig
 from mjxgait.tasks.plain import PlainTask
 from mjxgait.tasks.trials import Starts, draw_starts
