@@ -46,7 +46,8 @@ def connected(
     except (ConnectionError, RuntimeError, ValueError) as error:
         reason = (str(error).strip().splitlines() or [type(error).__name__])[0]
         raise UserError(
-            f"--cluster {address}: {reason} (is this machine a part of it, by `ray start`?)"
+            f"--cluster {address}: {reason} (is this machine a part of it, by `ray start`? "
+            "Has it the token, if there is one?)"
         ) from None
     from mjxgait.cluster.machines import Machines
 
