@@ -15,12 +15,6 @@ os.environ.setdefault(
 os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
 # Compiling is what takes the time in most tests, and in the commands that they start; see `as_shipped`.
 os.environ.setdefault("JAX_DISABLE_MOST_OPTIMIZATIONS", "1")
-# XLA's older way from fused operations to machine code needs a third less of the compiler's time. A
-# flag that XLA does not know ends the process, so only a release with which it was tried is asked.
-if version("jaxlib").startswith("0.10."):
-    os.environ["XLA_FLAGS"] = (
-        os.environ.get("XLA_FLAGS", "") + " --xla_cpu_use_fusion_emitters=false"
-    ).lstrip()
 # Runs are compared to the bit, and how lanes are dealt to devices decides on the last of them.
 os.environ["JAX_NUM_CPU_DEVICES"] = "2"
 
@@ -30,6 +24,11 @@ from helpers import STOOL
 
 from mjxgait.creature import Creature, load_creature
 from mjxgait.settings.shipped import data_folder
+
+OLDER = "--xla_cpu_use_fusion_emitters=false"
+"""XLA's older way from fused operations to machine code, which needs a third less of the compiler's time."""
+if version("jaxlib").startswith("0.10."):  # a flag that XLA does not know ends the process
+    os.environ["XLA_FLAGS"] = f"{OLDER} {os.environ.get('XLA_FLAGS', '')}".strip()
 
 FOLDERS = sorted(path.parent for path in data_folder("envs").glob("*/creature.toml"))
 SHIPPED = [path.name for path in FOLDERS if not load_creature(path).settings.creature.grows]
@@ -62,17 +61,24 @@ def shipped(request: pytest.FixtureRequest) -> Creature:
 
 
 @pytest.fixture(scope="module")
-def as_shipped() -> Iterator[None]:
-    """What is lowered and compiled is so as for users, where that could make a difference."""
-    compile_it, usual = jax.stages.Lowered.compile, dict[str, Any]()
-    if "fusion_emitters" in os.environ.get("XLA_FLAGS", ""):
-        usual["xla_cpu_use_fusion_emitters"] = True
+def emitted_as_shipped() -> Iterator[None]:
+    """Machine code as users get it, also in commands: in the older way bits depend on a program's rows."""
+    flags, compile_it = os.environ.get("XLA_FLAGS", ""), jax.stages.Lowered.compile
 
     def compiled(lowered: jax.stages.Lowered, compiler_options: Any = None) -> Any:
+        usual = {"xla_cpu_use_fusion_emitters": True}
         return compile_it(lowered, usual | (compiler_options or {}))
 
-    jax.config.update("jax_disable_most_optimizations", False)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(jax.stages.Lowered, "compile", compiled)
+        if OLDER in flags:
+            patch.setenv("XLA_FLAGS", flags.replace(OLDER, "").strip())
+            patch.setattr(jax.stages.Lowered, "compile", compiled)
         yield
+
+
+@pytest.fixture(scope="module")
+def as_shipped(emitted_as_shipped: None) -> Iterator[None]:
+    """The same, and all optimizations."""
+    jax.config.update("jax_disable_most_optimizations", False)
+    yield
     jax.config.update("jax_disable_most_optimizations", True)
