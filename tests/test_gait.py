@@ -243,6 +243,24 @@ def test_steering_lengthens_the_stride(stool: Creature):
     assert np.allclose(change, [0.06, -0.06, -0.02, 0], atol=1e-5)
 
 
+def test_who_is_to_turn_steers_more_as_the_examiner_has_it(stool: Creature):
+    """By the factor of the settings, bend and stride alike."""
+    weights = {"steer_bend": np.array([0.3, 0, 0, 0]), "steer_stride": np.array([0, -1.0, 0.5, 0])}
+    creature, poses = altered(stool, corrections=weights), random_poses(stool)
+    felt, genes = sensed(stool, stool.joints.stand, turned(2, 0.2)), tuning(steer=1.0)
+    targets = []
+    for rules in (settings(), settings(steering=2.0)):
+        control = tracker(creature)
+        cycle = control.prepare(Genome(jnp.asarray(poses), genes), rules)
+        target, _ = control.act(cycle, control.init(), felt)
+        named = dict(zip(TUNING, map(float, genes), strict=True))
+        twin = PoseTwin(creature, pose_champion(creature, poses, named, rules), 0.005)
+        of_one = {name: np.asarray(value)[None] for name, value in felt.items()}
+        np.testing.assert_allclose(target, twin.target(np.zeros(1, int), of_one)[0], atol=1e-5)
+        targets.append(target - poses[0])
+    np.testing.assert_allclose(targets[1], 2 * targets[0], atol=1e-5)
+
+
 def test_the_target_keeps_to_the_joint_ranges(stool: Creature):
     narrow = altered(stool, joints={"low": np.full(4, -0.1), "high": np.full(4, 0.2)})
     control, poses = tracker(narrow), jnp.array([[3.0, -3.0, 0.1, 0.0]] * 2)

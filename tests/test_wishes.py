@@ -357,6 +357,7 @@ def test_wishes_are_names_for_settings(body: Creature):
     assert config.fitness.wish.table == {"speed": 0.25, "gait": "trot", "turn": 20.0}
     assert config.controller.interpolation > Config().controller.interpolation
     assert config.controller.mirror
+    assert config.controller.steering > Config().controller.steering
     assert not wished(Config(), body, Wishes(gait="bound")).controller.mirror
     assert wished(Config(), body, Wishes()) is not None
     assert wished(Config(), body, Wishes()) == Config()

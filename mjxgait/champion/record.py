@@ -22,6 +22,8 @@ SCHEMA = 2
 
 SOUGHT = ("around", "within")
 """Settings that say where evolution looked for the poses, and nothing of how they move."""
+USUAL = {"steering": 1.0}
+"""Settings that came later, and what they were before: champions of then keep their fingerprint."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -84,7 +86,11 @@ class Champion:
             # As float64, which is what a file gives back: a champion has one fingerprint before it
             # is written and after.
             "genome": {n: np.asarray(array, float).tolist() for n, array in self.genome.items()},
-            "settings": {k: v for k, v in as_table(self.settings).items() if k not in SOUGHT},
+            "settings": {
+                name: value
+                for name, value in as_table(self.settings).items()
+                if name not in SOUGHT and USUAL.get(name) != value
+            },
             "drive": as_table(self.drive),
         }
         if self.sizes:

@@ -44,7 +44,7 @@ class PoseCycle:
     """What an episode keeps of a genome and the settings.
 
     poses: [C, J] rad, of which the first `count` [] are the cycle. tuning: [E]. interpolation: [] steps between neighbours.
-    clocked: [] whether the clock moves the target on.
+    clocked: [] whether the clock moves the target on. steering: factor on the weights of steering.
     """
 
     poses: jax.Array
@@ -52,6 +52,7 @@ class PoseCycle:
     count: jax.Array
     interpolation: jax.Array
     clocked: jax.Array
+    steering: float = dataclasses.field(default=1.0, metadata={"static": True})
 
 
 @pytree
@@ -144,6 +145,7 @@ class PoseTracker:
             count,
             jnp.int32(config.interpolation),
             chosen(config.advance, "clock"),
+            config.steering,
         )
 
     def init(self) -> GaitState:
@@ -156,7 +158,7 @@ class PoseTracker:
         """Target pose [J] of this moment, and the state of the next."""
         creature = self.creature
         target = interpolate(cycle.poses, state.position, cycle.interpolation, cycle.count)
-        target = target + corrections(creature, cycle.tuning, target, senses)
+        target = target + corrections(creature, cycle.tuning, target, senses, cycle.steering)
         target = jnp.clip(
             target, creature.joints.low.astype(np.float32), creature.joints.high.astype(np.float32)
         )
@@ -205,8 +207,17 @@ def interpolate(
     return jnp.sum(weight[:, None] * poses, axis=0)
 
 
-def corrections(creature: Body, tuning: jax.Array, target: jax.Array, senses: Senses) -> jax.Array:
-    """Change [J] of the target pose by steering and balance; zero where the genes are zero."""
+def corrections(
+    creature: Body,
+    tuning: jax.Array,
+    target: jax.Array,
+    senses: Senses,
+    steering: float = 1.0,
+) -> jax.Array:
+    """Change [J] of the target pose by steering and balance; zero where the genes are zero.
+
+    steering: factor on the creature's weights of steering.
+    """
     aside = senses["aside"] / (2 * creature.frame.body_length)
     steer = _clip(tuning[STEER] * (senses["heading"] + aside))
     pitch, roll = (
@@ -216,8 +227,8 @@ def corrections(creature: Body, tuning: jax.Array, target: jax.Array, senses: Se
     bend, stride, on_pitch, on_roll, stand = (
         value.astype(np.float32)
         for value in (
-            creature.corrections.steer_bend,
-            creature.corrections.steer_stride,
+            creature.corrections.steer_bend * steering,
+            creature.corrections.steer_stride * steering,
             creature.corrections.balance_pitch,
             creature.corrections.balance_roll,
             creature.joints.stand,

@@ -161,7 +161,8 @@ def _gait(name: str | None, creature: Creature, config: Config) -> dict[str, Any
 def _turn(name: str, rate: float | None) -> dict[str, Any]:
     if rate is None:
         return {}
-    return {"fitness": {"wish": {name: rate}}, "controller": {"tuning": {"steer": [0.0, 6.0]}}}
+    controller = {"tuning": {"steer": [0.0, 6.0]}, "steering": 3.0}
+    return {"fitness": {"wish": {name: rate}}, "controller": controller}
 
 
 def _styled(config: Config, name: str) -> Config:

@@ -98,6 +98,7 @@ class PoseConfig:
       mirror: whether the other half of a symmetric creature's cycle is the mirror image; else
         the K poses are the whole cycle.
       interpolation: n, steps between neighbouring poses.
+      steering: factor on the creature's weights of steering; turns want more than a straight way.
       advance: the target moves on when the pose error is below the threshold, or by the
         clock.
       around: rad; key poses near which all others lie, pose by pose and joint by joint, as
@@ -111,6 +112,7 @@ class PoseConfig:
     key_poses: Annotated[int, pydantic.Field(ge=2), SHAPE] = 2
     mirror: bool = True
     interpolation: Count = 10
+    steering: Annotated[Positive, SHAPE] = 1.0
     advance: Literal["error", "clock"] = "error"
     around: tuple[Finite, ...] = ()
     within: NonNegative = 0.0

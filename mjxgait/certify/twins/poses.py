@@ -58,6 +58,7 @@ class PoseTwin:
         """Target [S, J] in rad with steering and balance, within the joints' ranges."""
         creature = self.creature
         steer, pitch, roll = (part[:, None] for part in self.corrections(senses))
+        steer = steer * self.settings.steering
         stretched = creature.joints.stand + (self.planned(position) - creature.joints.stand) * (
             1 + steer * creature.corrections.steer_stride
         )
