@@ -109,7 +109,7 @@ def begun(options: RepertoireOptions) -> tuple[Path, Creature, Grid]:
     base = _settings(options, creature)
     check(base)
     folder = options.out or Path("runs") / f"repertoire-{creature.name}"
-    configs = {cell: settings_of(cell, creature, base) for cell in grid.cells}
+    configs = {cell: settings_of(cell, grid, creature, base) for cell in grid.cells}
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise UserError(
             f"{folder}: holds something already; name another folder with --out, or go on with "

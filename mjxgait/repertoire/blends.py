@@ -98,4 +98,5 @@ def _cycle(champion: Champion, creature: Creature) -> np.ndarray:
 def _between(one: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
     turn = (one.get("turn", 0.0) + other.get("turn", 0.0)) / 2
     speed = (one["speed"] + other["speed"]) / 2
-    return {**one, "speed": speed} | ({"turn": turn} if turn else {})
+    told = {name: value for name, value in one.items() if name not in ("turn", "steer")}
+    return {**told, "speed": speed} | ({"turn": turn} if turn else {})

@@ -8,7 +8,7 @@ import numpy as np
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.parts.wishes import Wishes, wished
-from mjxgait.repertoire.grid import Cell
+from mjxgait.repertoire.grid import Cell, Grid
 from mjxgait.runs.packed import Packed
 from mjxgait.settings.config import Config
 
@@ -38,30 +38,17 @@ def has_mirror(creature: Creature) -> bool:
     return creature.mirror.symmetric
 
 
-def settings_of(cell: Cell, creature: Creature, base: Config) -> Config:
-    """The settings of a cell's run. Who turns does not do the same to both sides, so all its cycle
-    is of its own poses.
+def settings_of(cell: Cell, grid: Grid, creature: Creature, base: Config) -> Config:
+    """The settings of a cell's run. Where there are turns, who walks straight on obeys all of them, so
+    who turns begins with somebody that does.
     """
-    wishes = Wishes(speed=f"{cell.speed:.6f}", turn=cell.turn or None)
+    steer = max(grid.turns, default=None) if not cell.turn else None
+    wishes = Wishes(speed=f"{cell.speed:.6f}", turn=cell.turn or None, steer=steer)
     config = wished(base, creature, wishes)
-    controller = config.controller
-    if cell.turn and _halved(creature, config):
-        controller = dataclasses.replace(
-            controller, mirror=False, key_poses=2 * controller.key_poses
-        )
     forced = dataclasses.replace(config.evolution.forced, patience=0)
     # All rows of a program go on together.
     evolution = dataclasses.replace(config.evolution, target=None, forced=forced)
-    return dataclasses.replace(config, controller=controller, evolution=evolution)
-
-
-def seeds(straight: Packed, creature: Creature, config: Config) -> dict[str, np.ndarray]:
-    """The population of who walks straight on, as that of who turns. config: of the former."""
-    found = {name: straight.arrays[name] for name in GENOMES}
-    if _halved(creature, config):
-        poses = found[POSES]
-        found[POSES] = np.concatenate([poses, mirrored(poses, creature)], axis=-2)
-    return found
+    return dataclasses.replace(config, evolution=evolution)
 
 
 def mirror_image(state: Packed, creature: Creature) -> Packed:
@@ -76,13 +63,8 @@ def mirrored(poses: np.ndarray, creature: Creature) -> np.ndarray:
     return swapped
 
 
-def planted(
-    cells: list[Cell], straight: Mapping[float, Packed], creature: Creature, config: Config
-) -> dict[str, np.ndarray]:
+def planted(cells: list[Cell], straight: Mapping[float, Packed]) -> dict[str, np.ndarray]:
     """What turning cells begin with, [B, P, ...]: who walks straight on at their speed."""
-    rows = [seeds(straight[cell.speed], creature, config) for cell in cells]
-    return {name: np.stack([row[name] for row in rows]) for name in GENOMES}
-
-
-def _halved(creature: Creature, config: Config) -> bool:
-    return creature.mirror.symmetric and config.controller.mirror
+    return {
+        name: np.stack([straight[cell.speed].arrays[name] for cell in cells]) for name in GENOMES
+    }

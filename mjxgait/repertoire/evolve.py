@@ -44,7 +44,7 @@ def evolve(
     if found is None or not turning:
         return found is not None
     by_speed = {cell.speed: found.row(row) for row, cell in enumerate(straight)}
-    begin = planted(turning, by_speed, creature, first.configs[0])
+    begin = planted(turning, by_speed)
     second = Side(folder, creature, grid, turning, "turning")
     return second.to_the_end(begin, crew, tell, stopped) is not None
 

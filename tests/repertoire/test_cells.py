@@ -5,15 +5,15 @@ import numpy as np
 import pytest
 from helpers import small_config
 
-from mjxgait.control.poses import pose_cycle
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.repertoire.cells import POSES, check, mirror_image, mirrored, planted, settings_of
-from mjxgait.repertoire.grid import Cell
+from mjxgait.repertoire.grid import Cell, Grid
 from mjxgait.runs.packed import Packed
 from mjxgait.settings.traced import traced
 
 STRAIGHT, LEFT = Cell(0.4, 0.0), Cell(0.4, 15.0)
+GRID = Grid.of([0.4, 0.8], [15.0])
 
 
 def population(creature: Creature) -> Packed:
@@ -22,29 +22,32 @@ def population(creature: Creature) -> Packed:
     return Packed({POSES: poses, "genomes.tuning": rng.normal(size=(6, 7))}, "fry")
 
 
-def test_who_turns_has_a_cycle_of_its_own_poses(stool: Creature):
-    straight, left = (settings_of(cell, stool, small_config()) for cell in (STRAIGHT, LEFT))
-    assert (straight.controller.mirror, straight.controller.key_poses) == (True, 2)
-    assert (left.controller.mirror, left.controller.key_poses) == (False, 4)
-    assert straight.wish == {"speed": 0.4}
+def test_who_walks_straight_on_obeys_the_turns_and_who_turns_always_does(stool: Creature):
+    straight, left = (settings_of(cell, GRID, stool, small_config()) for cell in (STRAIGHT, LEFT))
+    assert straight.wish == {"speed": 0.4, "steer": 15.0}
     assert left.wish == {"speed": 0.4, "turn": 15.0}
+    assert straight.controller == left.controller
+
+
+def test_without_turns_nobody_is_steered(stool: Creature):
+    config = settings_of(STRAIGHT, Grid.of([0.4], []), stool, small_config())
+    assert config.wish == {"speed": 0.4}
 
 
 def test_all_that_turn_share_a_program(stool: Creature):
     shapes = {
-        jax.tree.structure(traced(settings_of(cell, stool, small_config())))
+        jax.tree.structure(traced(settings_of(cell, GRID, stool, small_config())))
         for cell in (LEFT, Cell(0.8, 15.0), Cell(0.4, -30.0))
     }
     assert len(shapes) == 1
 
 
-def test_it_begins_with_the_cycles_of_who_walks_straight_on(stool: Creature):
-    straight = population(stool)
-    begin = planted([LEFT], {0.4: straight}, stool, settings_of(STRAIGHT, stool, small_config()))
-    assert begin[POSES].shape == (1, 6, 4, len(stool.joints.names))
-    for one, poses in zip(begin[POSES][0], straight.arrays[POSES], strict=True):
-        np.testing.assert_array_equal(one, pose_cycle(stool, poses))
-    np.testing.assert_array_equal(begin["genomes.tuning"][0], straight.arrays["genomes.tuning"])
+def test_it_begins_with_who_walks_straight_on(stool: Creature):
+    slow, fast = population(stool), mirror_image(population(stool), stool)
+    begin = planted([Cell(0.8, 15.0), LEFT], {0.4: slow, 0.8: fast})
+    for row, straight in enumerate((fast, slow)):
+        for name, arrays in begin.items():
+            np.testing.assert_array_equal(arrays[row], straight.arrays[name])
 
 
 def test_the_mirror_image_of_a_mirror_image_is_the_population(shipped: Creature):

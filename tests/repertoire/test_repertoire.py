@@ -143,8 +143,7 @@ def test_who_turns_begins_with_the_poses_of_who_walks_straight_on(finished):
     folder, creature, grid = finished
     for speed in grid.speeds:
         straight, left = (poses_of(folder, Cell(speed, turn), creature) for turn in (0.0, 10.0))
-        whole = np.concatenate([straight, mirrored(straight, creature)], axis=1)
-        np.testing.assert_allclose(left, whole + 0.02, atol=1e-6)
+        np.testing.assert_allclose(left, straight + 0.02, atol=1e-6)
 
 
 def test_stopped_on_the_way_it_goes_on_to_the_same_walks(finished, tmp_path: Path):
@@ -204,7 +203,7 @@ def test_what_is_certified_becomes_clips_with_their_places(
 
 
 def test_half_way_is_the_mean_of_two_controllers(stool: Creature):
-    one = dataclasses.replace(treading(stool), wish={"speed": 0.2})
+    one = dataclasses.replace(treading(stool), wish={"speed": 0.2, "steer": 10.0})
     cycle = np.concatenate([one.genome["key_poses"], mirrored(one.genome["key_poses"], stool)])
     other = dataclasses.replace(
         one,
