@@ -1,7 +1,7 @@
 """A walk as an animation file that other programs open."""
 
 from mjxgait.animation.bvh import build_bvh, export_bvh
-from mjxgait.animation.glb import build_clips, build_glb, export_glb
+from mjxgait.animation.glb import build_clips, build_driven, build_glb, export_glb
 from mjxgait.animation.loop import RATES, WalkLoop, walk_loop, walk_take
 from mjxgait.animation.phase import standing_still, stride_in_phase
 
@@ -10,6 +10,7 @@ __all__ = [
     "WalkLoop",
     "build_bvh",
     "build_clips",
+    "build_driven",
     "build_glb",
     "export_bvh",
     "export_glb",

@@ -13,7 +13,7 @@ import numpy as np
 import pygltflib as gltf  # type: ignore[import-untyped]
 
 from mjxgait.animation.buffer import Buffer
-from mjxgait.animation.floor import add_floor
+from mjxgait.animation.floor import add_floor, add_tiles
 from mjxgait.animation.loop import WalkLoop
 from mjxgait.animation.note import note_of
 from mjxgait.animation.skeleton import (
@@ -74,6 +74,15 @@ def build_clips(loops: Mapping[str, WalkLoop], travelling: bool = False) -> byte
     document, buffer = _scene(loops, travelling)
     buffer.close()
     return b"".join(document.save_to_bytes())
+
+
+def build_driven(loops: Mapping[str, WalkLoop]) -> tuple[bytes, float]:
+    """The same in place, on tiles that whoever plays it moves; and the m between two of these."""
+    document, buffer = _scene(loops, travelling=False)
+    walk = next(iter(loops.values())).walk
+    apart = add_tiles(document, buffer, walk.creature.frame.body_length)
+    buffer.close()
+    return b"".join(document.save_to_bytes()), apart
 
 
 def _scene(loops: Mapping[str, WalkLoop], travelling: bool) -> tuple[gltf.GLTF2, Buffer]:

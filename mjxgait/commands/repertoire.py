@@ -20,7 +20,7 @@ from mjxgait.runs.folder import create_run, open_run
 from mjxgait.settings.config import Config
 from mjxgait.settings.tables import build, merge
 
-MAP, CLIPS, TABLE = "map.png", "repertoire.glb", "repertoire.json"
+MAP = "map.png"
 OF_FILES = ("rate", "travelling", "blends", "cluster")
 """Options that decide nothing about the walks."""
 
@@ -152,7 +152,7 @@ def _leave(
 ) -> None:
     """The map, and the clips where there are any."""
     from mjxgait.repertoire.blends import blends
-    from mjxgait.repertoire.clips import clips_of, write_clips
+    from mjxgait.repertoire.clips import CLIPS, TABLE, clips_of, write_clips
     from mjxgait.repertoire.found import draw_map, found_in, table
     from mjxgait.viewing.style import figure
 

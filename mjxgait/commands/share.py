@@ -1,4 +1,4 @@
-"""`mjxgait share`: one offline page of a run's champion."""
+"""`mjxgait share`: one offline page of a run's champion, or of a repertoire to drive."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -12,10 +12,10 @@ from mjxgait.errors import UserError
 @dataclasses.dataclass(frozen=True)
 class ShareOptions:
     """Write one HTML file with the 3D walk, the curves and the certificate; it plays by double
-    click, without a network.
+    click, without a network. Of a repertoire one that is driven by arrow keys or a stick.
 
     Attributes:
-      run: Run folder.
+      run: Run folder, or the folder of a repertoire.
       out: File to write, ending with .html.
     """
 
@@ -30,10 +30,13 @@ def share_command(arguments: Sequence[str]) -> int:
         raise UserError(
             f'{options.out}: cannot write "{options.out.suffix}"; end the name with .html'
         )
+    from mjxgait.repertoire.grid import GRID
     from mjxgait.runs.disk import require_writable
+    from mjxgait.web.drive import write_driven
     from mjxgait.web.page import write_page
 
     require_writable(options.out)
-    write_page(options.run, options.out)
+    write = write_driven if (options.run / GRID).is_file() else write_page
+    write(options.run, options.out)
     print(f"{options.out} ({options.out.stat().st_size / 1024:,.0f} KiB)")
     return 0

@@ -14,6 +14,7 @@ from mjxgait.runs.disk import disk_errors
 from mjxgait.viewing.cast import LOOP_SECONDS, champion_of
 
 SCHEMA = 1
+CLIPS, TABLE = "repertoire.glb", "repertoire.json"
 IDLE = "idle"
 
 

@@ -38,21 +38,32 @@ def write_page(run: Path, out: Path) -> None:
     creature, champion = open_champion(run)
     walk = record_walk(creature, champion, LOOP_SECONDS)
     page = build_page(walk, walk_loop(walk, RATE), _sections(run, creature, champion, walk))
+    write_text(out, page)
+
+
+def write_text(out: Path, page: str) -> None:
+    """Writes a page.
+
+    Raises:
+      UserError: the file cannot be written.
+    """
     try:
         out.write_text(page, encoding="utf-8")
     except OSError as error:
         raise UserError(f"{out}: cannot be written ({error.strerror})") from None
 
 
+def viewer_script() -> str:
+    """The viewer, to stand in a page."""
+    script = resources.files("mjxgait.web") / "assets" / "model-viewer.min.js"
+    # Without the reference to a source map, which a browser's tools would ask for.
+    text = script.read_text(encoding="utf-8").rsplit("//# sourceMappingURL", 1)[0]
+    return text.replace("</script", "<\\/script")
+
+
 def build_page(walk: Walk, loop: WalkLoop, sections: str) -> str:
     """The text of the page; sections: HTML below the walk."""
     web = resources.files("mjxgait.web") / "assets"
-    # Without the reference to a source map, which a browser's tools would ask for.
-    viewer = (
-        (web / "model-viewer.min.js")
-        .read_text(encoding="utf-8")
-        .rsplit("//# sourceMappingURL", 1)[0]
-    )
     stride = loop.times[-1] / loop.strides
     lead = (
         f"{loop.speed:.2f} m/s, {loop.speed / walk.creature.frame.body_length:.2f} body lengths per "
@@ -66,7 +77,7 @@ def build_page(walk: Walk, loop: WalkLoop, sections: str) -> str:
         target=f"0m {0.6 * walk.creature.frame.stand_pos[2]:.3f}m 0m",
         far=f"{FAR * walk.creature.model.stat.extent:.3f}m",
         frames=len(loop.times) - 1,
-        viewer=viewer.replace("</script", "<\\/script"),
+        viewer=viewer_script(),
         sections=sections,
     )
 

@@ -13,36 +13,23 @@ import numpy as np
 import pygltflib as gltf
 import pytest
 from helpers import STOOL, said_by
+from repertoire.made_up import CERTIFIED, GENERATIONS, begin, examine
 from viewing.made_up import metrics_line, treading
 
-from mjxgait.certify import Certificate, CertificateConfig, Criterion, Measure
-from mjxgait.champion import write_champion
 from mjxgait.cluster.crew import Crew, Report, Worker
 from mjxgait.cluster.jobs import Advanced, AdvanceRows
 from mjxgait.cluster.programs import Programs
 from mjxgait.cluster.recipe import Recipe
-from mjxgait.commands.repertoire import RepertoireOptions, begun
 from mjxgait.creature import Creature
 from mjxgait.repertoire.blends import half_way
 from mjxgait.repertoire.cells import POSES, mirrored
 from mjxgait.repertoire.evolve import evolve
 from mjxgait.repertoire.grid import Cell, Grid
-from mjxgait.runs.folder import CERTIFICATE, CHAMPION, METRICS, read_metrics
+from mjxgait.runs.folder import METRICS, read_metrics
 from mjxgait.runs.packed import pack
 from mjxgait.runs.stored import read_stored, stored_generations
 
-SMALL = """
-checkpoint_every = 1
-[rollout]
-seconds = 0.4
-starts = 2
-lanes = 4
-[examination]
-candidates = 0
-"""
-GENERATIONS = 2
 PROGRAMS = Programs()
-CERTIFIED = (Cell(0.2, 0.0), Cell(0.2, 10.0))
 
 
 class Pretend:
@@ -87,22 +74,6 @@ class Interrupted(Crew):
     def next(self, stopped: Callable[[], bool]) -> Any:
         self.left -= 1
         return super().next(lambda: self.left < 0)
-
-
-def begin(folder: Path) -> tuple[Path, Creature, Grid]:
-    settings = folder.with_suffix(".toml")
-    settings.write_text(SMALL)
-    return begun(
-        RepertoireOptions(
-            env=str(STOOL),
-            speeds=("0.2", "0.4"),
-            turns=(10.0,),
-            config=str(settings),
-            out=folder,
-            population=6,
-            generations=GENERATIONS,
-        )
-    )
 
 
 def run(folder: Path, creature: Creature, grid: Grid, kind: type[Crew] = Crew) -> bool:
@@ -159,26 +130,11 @@ def test_stopped_on_the_way_it_goes_on_to_the_same_walks(finished, tmp_path: Pat
         )
 
 
-def certificate(creature: Creature, passed: bool) -> str:
-    measure = Measure("speed", 0.6 if passed else 0.4, ">=", 0.5, 1.0)
-    report = {"speed": 0.21, "duty_factor": {"a": 0.5, "b": 0.7}, "gait": "trot", "summary": ""}
-    criteria = (Criterion(2, "progress", (measure,)),)
-    config = CertificateConfig()
-    return Certificate(
-        creature.name, creature.digest, "walk", "", criteria, report, config, 1.0
-    ).to_json()
-
-
 @pytest.fixture(scope="module")
 def examined(finished) -> Path:
     """The folder as an examination that two walks passed would leave it."""
     folder, creature, grid = finished
-    champion = treading(creature, degrees=35.0)
-    for cell in grid.cells:
-        wish = {"speed": cell.speed} | ({"turn": cell.turn} if cell.turn else {})
-        place = folder / cell.name
-        write_champion(dataclasses.replace(champion, wish=wish), creature, place / CHAMPION)
-        (place / CERTIFICATE).write_text(certificate(creature, cell in CERTIFIED))
+    examine(folder, creature, grid)
     return folder
 
 

@@ -1,0 +1,62 @@
+"""A repertoire of the smallest creature as its commands would leave it: nobody evolves or examines it."""
+
+import dataclasses
+from pathlib import Path
+
+from helpers import STOOL
+from viewing.made_up import treading
+
+from mjxgait.certify import Certificate, CertificateConfig, Criterion, Measure
+from mjxgait.champion import write_champion
+from mjxgait.commands.repertoire import RepertoireOptions, begun
+from mjxgait.creature import Creature
+from mjxgait.repertoire.grid import Cell, Grid
+from mjxgait.runs.folder import CERTIFICATE, CHAMPION
+
+SMALL = """
+checkpoint_every = 1
+[rollout]
+seconds = 0.4
+starts = 2
+lanes = 4
+[examination]
+candidates = 0
+"""
+GENERATIONS = 2
+CERTIFIED = (Cell(0.2, 0.0), Cell(0.2, 10.0))
+
+
+def begin(folder: Path) -> tuple[Path, Creature, Grid]:
+    settings = folder.with_suffix(".toml")
+    settings.write_text(SMALL)
+    return begun(
+        RepertoireOptions(
+            env=str(STOOL),
+            speeds=("0.2", "0.4"),
+            turns=(10.0,),
+            config=str(settings),
+            out=folder,
+            population=6,
+            generations=GENERATIONS,
+        )
+    )
+
+
+def certificate(creature: Creature, passed: bool) -> str:
+    measure = Measure("speed", 0.6 if passed else 0.4, ">=", 0.5, 1.0)
+    report = {"speed": 0.21, "duty_factor": {"a": 0.5, "b": 0.7}, "gait": "trot", "summary": ""}
+    criteria = (Criterion(2, "progress", (measure,)),)
+    config = CertificateConfig()
+    return Certificate(
+        creature.name, creature.digest, "walk", "", criteria, report, config, 1.0
+    ).to_json()
+
+
+def examine(folder: Path, creature: Creature, grid: Grid) -> None:
+    """Leaves what an examination that two walks passed would."""
+    champion = treading(creature, degrees=35.0)
+    for cell in grid.cells:
+        wish = {"speed": cell.speed} | ({"turn": cell.turn} if cell.turn else {})
+        place = folder / cell.name
+        write_champion(dataclasses.replace(champion, wish=wish), creature, place / CHAMPION)
+        (place / CERTIFICATE).write_text(certificate(creature, cell in CERTIFIED))
