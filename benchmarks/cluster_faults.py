@@ -2,6 +2,7 @@
 
     python benchmarks/cluster_faults.py study    # random kills of workers, machines and the command
     python benchmarks/cluster_faults.py islands  # the same in a run on four islands
+    python benchmarks/cluster_faults.py blocks   # the same in one population, judged in blocks
     python benchmarks/cluster_faults.py disk     # machines whose disk is full (mounts one: needs root)
 
 One run that nobody touches, then others until there were `--kills` kills; a killed command is called
@@ -42,9 +43,12 @@ name = "base"
 name = "slow"
 settings = {{ evolution = {{ mutation_rate = 0.1 }} }}
 """
-ISLANDS = f"""--env {STOOL} --population 6 --generations 60 --evolution.islands.count 4
---evolution.islands.every 2 --rollout.seconds 0.4 --rollout.starts 2 --rollout.lanes 4
---examination.candidates 0 --no-plots""".split()
+TRAIN = f"""--env {STOOL} --generations 60 --rollout.seconds 0.4 --rollout.starts 2 --rollout.lanes 4
+--examination.candidates 0 --no-plots"""
+RUNS = {
+    "islands": "--population 6 --evolution.islands.count 4 --evolution.islands.every 2",
+    "blocks": "--population 16 --rollout.block 4",
+}
 TIMES = ("wall_s", "steps_per_second")
 
 
@@ -52,7 +56,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("what", choices=("study", "islands", "disk"))
+    parser.add_argument("what", choices=("study", *RUNS, "disk"))
     parser.add_argument("--kills", type=int, default=20)
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
@@ -113,7 +117,7 @@ class Command:
             (study := folder.with_suffix(".toml")).write_text(STUDY)
             given = [study, *given]
         elif not resume:
-            given = [*ISLANDS, *given]
+            given = [*f"{TRAIN} {RUNS[what]}".split(), *given]
         self.log = folder.with_suffix(".log")
         with self.log.open("a") as log:
             self.process = subprocess.Popen(
