@@ -39,12 +39,14 @@ def has_mirror(creature: Creature) -> bool:
 
 
 def settings_of(cell: Cell, grid: Grid, creature: Creature, base: Config) -> Config:
-    """The settings of a cell's run. Where there are turns, who walks straight on obeys all of them, so
-    who turns begins with somebody that does.
+    """The settings of a cell's run. Where there are turns, who walks straight on has the controller of
+    who turns: its population is what those begin with.
     """
-    steer = max(grid.turns, default=None) if not cell.turn else None
-    wishes = Wishes(speed=f"{cell.speed:.6f}", turn=cell.turn or None, steer=steer)
-    config = wished(base, creature, wishes)
+    speed = f"{cell.speed:.6f}"
+    config = wished(base, creature, Wishes(speed=speed, turn=cell.turn or None))
+    if grid.turns:
+        turning = wished(base, creature, Wishes(speed=speed, turn=grid.turns[-1]))
+        config = dataclasses.replace(config, controller=turning.controller)
     forced = dataclasses.replace(config.evolution.forced, patience=0)
     # All rows of a program go on together.
     evolution = dataclasses.replace(config.evolution, target=None, forced=forced)

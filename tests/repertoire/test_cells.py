@@ -22,16 +22,13 @@ def population(creature: Creature) -> Packed:
     return Packed({POSES: poses, "genomes.tuning": rng.normal(size=(6, 7))}, "fry")
 
 
-def test_who_walks_straight_on_obeys_the_turns_and_who_turns_always_does(stool: Creature):
+def test_who_walks_straight_on_has_the_controller_of_who_turns(stool: Creature):
     straight, left = (settings_of(cell, GRID, stool, small_config()) for cell in (STRAIGHT, LEFT))
-    assert straight.wish == {"speed": 0.4, "steer": 15.0}
+    assert straight.wish == {"speed": 0.4}
     assert left.wish == {"speed": 0.4, "turn": 15.0}
     assert straight.controller == left.controller
-
-
-def test_without_turns_nobody_is_steered(stool: Creature):
-    config = settings_of(STRAIGHT, Grid.of([0.4], []), stool, small_config())
-    assert config.wish == {"speed": 0.4}
+    alone = settings_of(STRAIGHT, Grid.of([0.4], []), stool, small_config())
+    assert alone.controller != straight.controller
 
 
 def test_all_that_turn_share_a_program(stool: Creature):

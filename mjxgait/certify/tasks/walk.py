@@ -100,7 +100,8 @@ class WalkDemands(StaysUp):
 
     def report(self, whole: Recording, config: CertificateConfig) -> dict[str, Any]:
         """See `Demands`."""
-        window = unrolled(whole, self.wish).window(config.warmup)
+        whole = unrolled(whole, self.wish)
+        window = whole.window(config.warmup)
         told = describe(window, config.gait.clearance)
         if self.wish:
             told |= {"asked": self.wish, "posture": posture(window)}
