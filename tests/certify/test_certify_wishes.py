@@ -78,8 +78,13 @@ def test_a_turn_is_a_walk_along_the_heading_that_it_was_told():
     assert "off the heading it was told (deg)" in missed(turning, turn=-30.0)
     assert "off the heading it was told (deg)" in missed(on_a_circle(30.0, late=20.0), turn=30.0)
     assert missed(on_a_circle(30.0, late=10.0), turn=30.0) == set()
-    # Unasked it is a walk in circles.
+    # Unasked it is a walk in circles, and has ended behind where it began.
     assert "drift / distance" in missed(turning)
+    said = [
+        demands_of("walk", wish).report(turning, CONFIG)["obstacle"] for wish in ({}, {"turn": 30.0})
+    ]
+    assert said[0].startswith("went backwards")
+    assert said[1] is None
 
 
 def test_an_unrolled_circle_is_straight():
