@@ -15,7 +15,7 @@ from mjxgait.repertoire.grid import Grid
 from mjxgait.web.page import viewer_script, write_text
 
 RATE = 60
-FAR = 1.9
+FAR = 3.2
 """Of the camera, in units of the creature's size: farther than of a walk, for it goes somewhere."""
 KEPT = ("name", "speed", "turn", "duration")
 
