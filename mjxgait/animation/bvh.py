@@ -7,13 +7,12 @@ import dataclasses
 from collections.abc import Mapping
 from pathlib import Path
 
-import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mjxgait.animation.loop import WalkLoop
 from mjxgait.animation.skeleton import STILL, gltf_axes, resting, skeleton_of, travel, world_poses
-from mjxgait.animation.surface import geom_surface
+from mjxgait.animation.surface import far_end
 from mjxgait.errors import UserError
 
 ORDER = "ZXY"
@@ -80,7 +79,7 @@ def _bones(loop: WalkLoop, travelling: bool) -> dict[int, Bone]:
         moves = i == 1 or bool(np.abs(place - offset).max() > STILL)
         channels = [f"{a}position" for a in "XYZ"] * moves + [f"{a}rotation" for a in ORDER]
         columns = np.concatenate([place] * moves + [_angles(back @ turned[:, i])], 1)
-        end = axes @ _farthest(model, skeleton.bodies[i], rest_qpos)
+        end = axes @ far_end(model, skeleton.bodies[i], rest_qpos)
         bones[i] = Bone(skeleton.names[i], parent, offset, channels, columns, end)
     return bones
 
@@ -105,20 +104,6 @@ def _angles(rotations: np.ndarray) -> np.ndarray:
     """[F, 3] deg of rotations [F, 3, 3], without jumps by a turn between frames."""
     angles = Rotation.from_matrix(rotations).as_euler(ORDER, degrees=True)
     return np.unwrap(angles, period=360.0, axis=0)
-
-
-def _farthest(model: mujoco.MjModel, body: int, qpos: np.ndarray) -> np.ndarray:
-    """[3] m in the world from a body's origin to its farthest point in the rest pose."""
-    data = mujoco.MjData(model)
-    data.qpos[:] = qpos
-    mujoco.mj_kinematics(model, data)
-    points = [np.zeros((1, 3))]
-    for geom in np.flatnonzero(model.geom_bodyid == body):
-        local, _, _ = geom_surface(model, int(geom))
-        turned = local @ data.geom_xmat[geom].reshape(3, 3).T
-        points.append(turned + data.geom_xpos[geom] - data.xpos[body])
-    cloud = np.concatenate(points)
-    return cloud[np.linalg.norm(cloud, axis=1).argmax()]
 
 
 def _word(name: str) -> str:

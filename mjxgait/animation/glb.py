@@ -14,6 +14,7 @@ import pygltflib as gltf  # type: ignore[import-untyped]
 
 from mjxgait.animation.buffer import Buffer
 from mjxgait.animation.floor import add_floor, add_tiles
+from mjxgait.animation.limbs import along_limbs
 from mjxgait.animation.loop import WalkLoop
 from mjxgait.animation.note import note_of
 from mjxgait.animation.skeleton import (
@@ -89,8 +90,9 @@ def _scene(loops: Mapping[str, WalkLoop], travelling: bool) -> tuple[gltf.GLTF2,
     """The creature with its skin, and the animations."""
     loop = next(iter(loops.values()))
     creature = loop.walk.creature
-    skeleton = skeleton_of(creature.model, creature.trunk)
     axes = gltf_axes(loop.walk.forward)
+    plain = skeleton_of(creature.model, creature.trunk)
+    skeleton = along_limbs(creature.model, plain, resting(loop), axes)
     document = gltf.GLTF2(asset=gltf.Asset(version="2.0", generator="mjxgait"))
     buffer = Buffer(document)
     rest_pos, rest_quat = local_poses(creature.model, skeleton, resting(loop)[None], axes)
@@ -146,7 +148,8 @@ def _add_mesh(
                 )
             )
         primitives.append(_primitive(buffer, parts, len(document.materials)))
-        document.materials.append(_material(np.array(colour)))
+        name = _material_name(model, next(g for g in geoms if tuple(colours[g]) == colour))
+        document.materials.append(_material(name, np.array(colour)))
     document.meshes.append(gltf.Mesh(name="body", primitives=primitives))
 
 
@@ -179,7 +182,14 @@ def _unit(vectors: np.ndarray) -> np.ndarray:
     return (vectors / np.linalg.norm(vectors, axis=1, keepdims=True)).astype(np.float32)
 
 
-def _material(colour: np.ndarray) -> gltf.Material:
+def _material_name(model: mujoco.MjModel, geom: int) -> str:
+    """What the model calls it, else the part that has it first."""
+    material, body = int(model.geom_matid[geom]), int(model.geom_bodyid[geom])
+    called = model.mat(material).name if material >= 0 else model.body(body).name
+    return str(called) or f"body_{body}"
+
+
+def _material(name: str, colour: np.ndarray) -> gltf.Material:
     """From sRGB [4] to the linear colours of glTF."""
     rgb = np.where(colour[:3] <= 0.04045, colour[:3] / 12.92, ((colour[:3] + 0.055) / 1.055) ** 2.4)
     look = gltf.PbrMetallicRoughness(
@@ -188,7 +198,9 @@ def _material(colour: np.ndarray) -> gltf.Material:
         roughnessFactor=ROUGHNESS,
     )
     return gltf.Material(
-        pbrMetallicRoughness=look, alphaMode="BLEND" if colour[3] < 1 else "OPAQUE"
+        name=name,
+        pbrMetallicRoughness=look,
+        alphaMode="BLEND" if colour[3] < 1 else "OPAQUE",
     )
 
 

@@ -8,8 +8,8 @@ from mjxgait.animation.loop import WalkLoop
 from mjxgait.champion.codecs import codec_of
 from mjxgait.clips.clip import NOTE
 
-SAMPLES = 60
-"""Of a cycle's motion."""
+SAMPLES = 120
+"""Of a cycle's motion, as many as its reader takes."""
 
 
 def note_of(loop: WalkLoop) -> dict[str, str]:
@@ -18,10 +18,8 @@ def note_of(loop: WalkLoop) -> dict[str, str]:
     if champion.controller != "poses" or not loop.strides:
         return {}
     joints = creature.joints
-    at = np.arange(SAMPLES) / SAMPLES * (len(loop.qpos) - 1) / loop.strides
-    frames = np.arange(len(loop.qpos))
     motion = {
-        name: [round(float(v), 5) for v in np.interp(at, frames, loop.qpos[:, place])]
+        name: [round(float(v), 5) for v in _stride(loop, loop.qpos[:, place])]
         for name, place in zip(joints.names, joints.qpos, strict=True)
     }
     known = codec_of("poses").document(champion.genome, champion.settings, creature)
@@ -31,3 +29,12 @@ def note_of(loop: WalkLoop) -> dict[str, str]:
         "motion": motion,
     }
     return {NOTE: json.dumps(document | known)}
+
+
+def _stride(loop: WalkLoop, angles: np.ndarray) -> np.ndarray:
+    """The first stride of angles [F], closed: what its end lacks is spread over it."""
+    share = np.linspace(0.0, 1.0, SAMPLES + 1)
+    at = share * (len(angles) - 1) / loop.strides
+    samples = np.interp(at, np.arange(len(angles)), angles)
+    closed: np.ndarray = (samples - share * (samples[-1] - samples[0]))[:-1]
+    return closed

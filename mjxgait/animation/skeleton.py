@@ -20,23 +20,30 @@ class Skeleton:
     """The joints of the skin in glTF's axes.
 
     names: [B]. parent: [B] place of the parent, -1 for the root. bodies: [B] MuJoCo's body, 0 (the
-    world) for the root.
+    world) for the root. offset: [B, 3] m from the body's origin to the joint, in the body's axes.
+    turn: [B, 3, 3] from the joint's axes to the body's.
     """
 
     names: tuple[str, ...]
     parent: tuple[int, ...]
     bodies: tuple[int, ...]
+    offset: np.ndarray
+    turn: np.ndarray
 
 
 def skeleton_of(model: mujoco.MjModel, trunk: int) -> Skeleton:
-    """The bodies of the tree that begins at the trunk, below a root that stays on the floor."""
+    """The bodies of the tree that begins at the trunk, below a root that stays on the floor, with
+    the bodies' own axes.
+    """
     bodies = [
         0,
         *(b for b in range(1, model.nbody) if model.body_rootid[b] == model.body_rootid[trunk]),
     ]
     parents = (-1, *(bodies.index(int(model.body_parentid[b])) for b in bodies[1:]))
+    names = ("root", *(model.body(b).name or f"body_{b}" for b in bodies[1:]))
+    count = len(bodies)
     return Skeleton(
-        ("root", *(model.body(b).name or f"body_{b}" for b in bodies[1:])), parents, tuple(bodies)
+        names, parents, tuple(bodies), np.zeros((count, 3)), np.tile(np.eye(3), (count, 1, 1))
     )
 
 
@@ -69,12 +76,14 @@ def world_poses(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Each joint in the world: positions [F, B, 3] m and rotations [F, B, 3, 3], in glTF's axes."""
     data = mujoco.MjData(model)
-    pos, rot = [], []
+    bodies, pos, rot = list(skeleton.bodies), [], []
     for row in qpos:
         data.qpos[:] = row
         mujoco.mj_kinematics(model, data)
-        pos.append(data.xpos[list(skeleton.bodies)] @ axes.T)
-        rot.append(axes @ data.xmat[list(skeleton.bodies)].reshape(-1, 3, 3) @ axes.T)
+        turned = data.xmat[bodies].reshape(-1, 3, 3)
+        place = data.xpos[bodies] + (turned @ skeleton.offset[..., None])[..., 0]
+        pos.append(place @ axes.T)
+        rot.append(axes @ turned @ axes.T @ skeleton.turn)
     return np.array(pos), np.array(rot)
 
 

@@ -8,6 +8,8 @@ from mjxgait.viewing.triangles import mesh_of
 GEOM = mujoco.mjtGeom
 AROUND, RINGS = 20, 10
 """Parts of a round shape about its axis, and from pole to pole."""
+FAR = 0.98
+"""Of the greatest distance, from which on points are among the farthest."""
 
 Surface = tuple[np.ndarray, np.ndarray, np.ndarray]
 """Points [V, 3] m, unit normals [V, 3], triangles [F, 3] counterclockwise from outside."""
@@ -29,6 +31,24 @@ def geom_surface(model: mujoco.MjModel, geom: int) -> Surface:
             return _mesh(*mesh_of(model, geom))
         case _:
             return _box(size)
+
+
+def far_end(model: mujoco.MjModel, body: int, qpos: np.ndarray) -> np.ndarray:
+    """[3] m in the world from a body's origin to where it reaches farthest in a pose: the middle of
+    its farthest points.
+    """
+    data = mujoco.MjData(model)
+    data.qpos[:] = qpos
+    mujoco.mj_kinematics(model, data)
+    points = [np.zeros((1, 3))]
+    for geom in np.flatnonzero(model.geom_bodyid == body):
+        local, _, _ = geom_surface(model, int(geom))
+        turned = local @ data.geom_xmat[geom].reshape(3, 3).T
+        points.append(turned + data.geom_xpos[geom] - data.xpos[body])
+    cloud = np.concatenate(points)
+    far = np.linalg.norm(cloud, axis=1)
+    middle: np.ndarray = cloud[far >= FAR * far.max()].mean(0)
+    return middle
 
 
 def _globe() -> tuple[np.ndarray, np.ndarray]:

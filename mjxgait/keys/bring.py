@@ -101,6 +101,7 @@ def _bring(
         tell(line)
     cycle = find_cycle(creature, read.times, track.angles, *ends)
     own = own_poses(creature, read.note, cycle) if isinstance(read, Clip) and read.note else None
+    cycle = own.cycle if own else cycle
     fit = own.fit if own else fit_poses(creature, cycle, tolerance)
     for line in told_cycle(cycle) + (told_own(own) if own else told_fit(fit)) + told_clipped(fit):
         tell(line)

@@ -24,7 +24,8 @@ class Cycle:
     """angles: [N, J] rad over one cycle, the first not repeated. period: s. begins: s in the file.
 
     gap: rad, root mean square, between the end and the beginning before they were joined.
-    mirrored: whether the second half is the mirror image of the first; then it is so exactly.
+    mirrored: whether the second half is the mirror image of the first; then it is made so exactly.
+    drawn: [N, J] rad before that.
     """
 
     angles: np.ndarray
@@ -32,6 +33,7 @@ class Cycle:
     begins: float
     gap: float
     mirrored: bool
+    drawn: np.ndarray
 
 
 def find_cycle(
@@ -68,9 +70,8 @@ def find_cycle(
     other = creature.mirror.image(np.roll(whole, -SAMPLES // 2, axis=0))
     alike = float(np.sqrt(np.mean((whole - other) ** 2)))
     mirrored = creature.mirror.symmetric and alike < MIRRORED
-    if mirrored:
-        whole = 0.5 * (whole + other)
-    return Cycle(whole, float(period), float(first), gap, mirrored)
+    angles = 0.5 * (whole + other) if mirrored else whole
+    return Cycle(angles, float(period), float(first), gap, mirrored, whole)
 
 
 def interpolated(at: np.ndarray, times: np.ndarray, angles: np.ndarray) -> np.ndarray:

@@ -16,16 +16,20 @@ from mjxgait.keys.cycle import Cycle, interpolated
 from mjxgait.keys.fit import Fit, within_range
 
 UNCHANGED = np.radians(0.5)
-"""rad, root mean square; what differs by less was not edited."""
+"""rad, root mean square of a joint; what differs by less was not edited, or is the same on both
+sides.
+"""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Own:
     """fit: key poses with what was changed. changed: rad, root mean square. advance: how the
-    target moves on. tuning: genes by name.
+    target moves on. tuning: genes by name. cycle: as it was drawn, mirrored if the walk was and what
+    was changed is.
     """
 
     fit: Fit
+    cycle: Cycle
     changed: float
     advance: str
     tuning: Mapping[str, float]
@@ -46,23 +50,26 @@ def own_poses(creature: Creature, note: str, cycle: Cycle) -> Own | None:
             return None
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return None
-    motion = _resampled(motion, len(cycle.angles))
-    if cycle.mirrored:
-        other = creature.mirror.image(np.roll(motion, -len(motion) // 2, axis=0))
-        motion = 0.5 * (motion + other)
-    shifts = [np.roll(cycle.angles, -s, axis=0) for s in range(len(motion))]
+    motion = _resampled(motion, len(cycle.drawn))
+    shifts = [np.roll(cycle.drawn, -s, axis=0) for s in range(len(motion))]
     shift = int(np.argmin([np.mean((angles - motion) ** 2) for angles in shifts]))
     change = shifts[shift] - motion
-    changed = float(np.sqrt(np.mean(change**2)))
-    if mirrored and not cycle.mirrored:
-        poses = np.concatenate([poses, creature.mirror.image(poses)])
-    if changed >= UNCHANGED:
-        whole = len(poses) * (2 if cycle.mirrored else 1)
-        places = np.arange(len(poses)) * len(motion) // whole
-        poses = poses + change[places]
+    other = creature.mirror.image(np.roll(change, -len(change) // 2, axis=0))
+    if mirrored and _most(change - other) >= UNCHANGED:
+        poses, mirrored = np.concatenate([poses, creature.mirror.image(poses)]), False
+    if _most(change) >= UNCHANGED:
+        whole = len(poses) * (2 if mirrored else 1)
+        poses = poses + change[np.arange(len(poses)) * len(motion) // whole]
     kept, clipped = within_range(creature, poses)
-    starts = shift / len(motion)
-    return Own(Fit(kept, changed, starts, clipped), changed, advance, tuning)
+    changed = float(np.sqrt(np.mean(change**2)))
+    fit = Fit(kept, changed, shift / len(motion), clipped)
+    drawn = dataclasses.replace(cycle, angles=cycle.drawn, mirrored=mirrored)
+    return Own(fit, drawn, changed, advance, tuning)
+
+
+def _most(change: np.ndarray) -> float:
+    """rad, root mean square over a cycle [N, J], of the joint that changes most."""
+    return float(np.sqrt(np.mean(change**2, 0)).max())
 
 
 def _resampled(motion: np.ndarray, count: int) -> np.ndarray:

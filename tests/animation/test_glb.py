@@ -13,7 +13,8 @@ import pytest
 from viewing.made_up import treading
 
 from mjxgait.animation import RATES, build_glb, walk_loop
-from mjxgait.animation.skeleton import gltf_axes
+from mjxgait.animation.limbs import ALONG
+from mjxgait.animation.skeleton import gltf_axes, resting
 from mjxgait.animation.surface import geom_surface
 from mjxgait.cli import main
 from mjxgait.errors import UserError
@@ -80,11 +81,24 @@ def node_poses(document, frame=None):
     return {document.nodes[node].name: pose for node, pose in poses.items()}
 
 
+def body_axes(loop, document):
+    """[3, 3] from each body's axes, which MuJoCo gives, to its bone's, by name."""
+    model, axes = loop.walk.creature.model, gltf_axes(loop.walk.forward)
+    data, poses = mujoco.MjData(model), node_poses(document)
+    data.qpos[:] = resting(loop)
+    mujoco.mj_kinematics(model, data)
+    bodies = {
+        model.body(b).name: axes @ data.xmat[b].reshape(3, 3) @ axes.T for b in range(model.nbody)
+    }
+    return {n: poses[n][:3, :3].T @ turned for n, turned in bodies.items() if n in poses}
+
+
 @pytest.mark.parametrize("travelling", [False, True])
 def test_joints_are_where_mujoco_has_them_at_every_frame(loop, travelling):
     creature = loop.walk.creature
     document = gltf.GLTF2.load_from_bytes(build_glb(loop, travelling))
     axes, data = gltf_axes(loop.walk.forward), mujoco.MjData(creature.model)
+    own = body_axes(loop, document)
     worst = 0.0
     for frame, qpos in enumerate(loop.qpos):
         data.qpos[:] = qpos
@@ -94,11 +108,11 @@ def test_joints_are_where_mujoco_has_them_at_every_frame(loop, travelling):
         for joint in range(creature.model.njnt):
             body = creature.model.jnt_bodyid[joint]
             pose = poses[creature.model.body(body).name]
-            anchor = pose[:3, 3] + pose[:3, :3] @ (axes @ creature.model.jnt_pos[joint])
+            turned = pose[:3, :3] @ own[creature.model.body(body).name]
+            anchor = pose[:3, 3] + turned @ (axes @ creature.model.jnt_pos[joint])
             expected = data.xanchor[joint] if creature.model.jnt_type[joint] else data.xpos[body]
             worst = max(worst, np.abs(anchor - (axes @ expected + moved)).max())
-            turned = axes @ data.xmat[body].reshape(3, 3) @ axes.T
-            assert np.abs(pose[:3, :3] - turned).max() < 1e-4
+            assert np.abs(turned - axes @ data.xmat[body].reshape(3, 3) @ axes.T).max() < 1e-4
     assert worst < MILLIMETRE
 
 
@@ -161,6 +175,45 @@ def test_one_skin_whose_rest_is_the_standing_pose(loop):
         [read(document, p.attributes.POSITION) for p in document.meshes[0].primitives]
     )
     assert abs(points[:, 1].min()) < 0.02 * loop.walk.creature.frame.stand_height + 0.005
+
+
+def test_bones_lie_along_the_limbs_and_turn_about_their_hinges(loop):
+    """Programs draw a bone along its Y axis; who turns it about X turns the part's last hinge."""
+    document, model = gltf.GLTF2.load_from_bytes(build_glb(loop)), loop.walk.creature.model
+    nodes, poses = document.nodes, node_poses(document)
+    data, axes = mujoco.MjData(model), gltf_axes(loop.walk.forward)
+    data.qpos[:] = resting(loop)
+    mujoco.mj_kinematics(model, data)
+    alone = [n for n in nodes if len(n.children or []) == 1 and n.name != "root"]
+    assert alone
+    for bone in alone:
+        x, y, _, start = poses[bone.name][:3].T
+        way = poses[nodes[bone.children[0]].name][:3, 3] - start
+        assert y @ way == pytest.approx(np.linalg.norm(way))
+        part = model.body(bone.name)
+        axis = axes @ data.xaxis[int(part.jntadr[0] + part.jntnum[0]) - 1]
+        if abs(axis @ y) < ALONG:
+            assert abs(x @ axis) == pytest.approx(np.linalg.norm(axis - (axis @ y) * y), abs=1e-5)
+
+
+def test_limbs_end_in_a_joint_where_the_part_ends(loop):
+    document, creature = gltf.GLTF2.load_from_bytes(build_glb(loop)), loop.walk.creature
+    poses = node_poses(document)
+    model = creature.model
+    feet = {int(model.geom_bodyid[geom]) for geom in creature.feet.stepping} - {creature.trunk}
+    for foot in (model.body(body).name for body in feet):
+        height = poses[f"{foot}_tip"][1, 3]
+        assert abs(height) < 0.1 * creature.frame.stand_height
+
+
+def test_materials_have_the_names_of_the_model_or_of_a_part(loop):
+    model = loop.walk.creature.model
+    known = {model.mat(m).name for m in range(model.nmat)} | {
+        model.body(b).name for b in range(model.nbody)
+    }
+    names = [m.name for m in gltf.GLTF2.load_from_bytes(build_glb(loop)).materials]
+    assert set(names) <= known
+    assert len(names) == len(set(names))
 
 
 @pytest.mark.parametrize(

@@ -1,106 +1,20 @@
-"""The program as a library: the same runs as the command line makes, from a script or a notebook.
-
-import mjxgait
-
-run = mjxgait.train("tall_quadruped", seed=0, out="runs/x", generations=20)
-run.champion, run.certificate, run.metrics()
-mjxgait.walk(run)["trunk_z"]
-"""
+"""Making runs: a body, who moves it and what is asked of it, evolved and examined."""
 
 import dataclasses
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from mjxgait.certify import Certificate, CertificateConfig, certify, read_certificate
-from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 from mjxgait.creature import load_creature as load_folder
 from mjxgait.creature.scale import load_files, scaled
-from mjxgait.errors import UserError
-from mjxgait.runs.exams import Exams
-from mjxgait.runs.folder import (
-    CERTIFICATE,
-    CHAMPION,
-    EXAMS,
-    METRICS,
-    create_run,
-    open_champion,
-    open_run,
-    read_metrics,
-)
+from mjxgait.library.run import Place, Run
+from mjxgait.runs.folder import create_run
 from mjxgait.settings.config import Config
 from mjxgait.settings.shipped import find_creature
 from mjxgait.settings.tables import build, merge, read_toml
-
-if TYPE_CHECKING:  # it leads to all that draws
-    from mjxgait.keys.departure import Departure
-
-Place = str | Path
-
-
-@dataclasses.dataclass(frozen=True)
-class Run:
-    """A run folder.
-
-    folder: where everything of it lies (the README says what).
-    """
-
-    folder: Path
-
-    @property
-    def creature(self) -> Creature:
-        """The champion's body: where bodies evolve its own, else that which the run was given."""
-        if (self.folder / CHAMPION).exists():
-            return open_champion(self.folder)[0]
-        return open_run(self.folder)[0]
-
-    @property
-    def config(self) -> Config:
-        """The settings, every key."""
-        return open_run(self.folder)[1]
-
-    @property
-    def champion(self) -> Champion:
-        """The best individual: its genome by name, its settings, its fitness.
-
-        Raises:
-          UserError: there is none yet.
-        """
-        return open_champion(self.folder)[1]
-
-    @property
-    def certificate(self) -> dict[str, Any] | None:
-        """What the examiner said, as `certificate.json` has it; None before an examination."""
-        return read_certificate(self.folder / CERTIFICATE)
-
-    @property
-    def certified(self) -> bool:
-        """Whether its champion has passed every criterion."""
-        document = self.certificate
-        return bool(document and document["passed"])
-
-    @property
-    def departure(self) -> "Departure":
-        """How far the champion is from the cycle that the run stays near, in numbers and in words.
-
-        Raises:
-          UserError: the run was not made by `refine`, or has no champion.
-        """
-        from mjxgait.keys.departure import departure_of
-
-        return departure_of(self.folder)
-
-    def metrics(self) -> dict[str, np.ndarray]:
-        """Each number of `metrics.jsonl` over generations [G], NaN where there was none."""
-        lines = read_metrics(self.folder / METRICS)
-        names = dict.fromkeys(name for line in lines for name in line)
-        return {
-            name: np.array([np.nan if line.get(name) is None else line[name] for line in lines])
-            for name in names
-        }
 
 
 def load_creature(
@@ -254,68 +168,6 @@ def _evolved(folder: Path, creature: Creature, config: Config, quiet: bool) -> R
     prepare_devices()
     evolve(folder, creature, config, Screen(Console(quiet=True)) if quiet else Screen())
     return Run(folder)
-
-
-def open(folder: Place) -> Run:
-    """A run that is there already.
-
-    Raises:
-      UserError: it is not a run folder.
-    """
-    run = Run(Path(folder))
-    open_run(run.folder)
-    return run
-
-
-def examine(run: Run | Place, config: Place | None = None) -> Certificate:
-    """Examines the champion of a run in C MuJoCo, criterion by criterion; writes nothing.
-
-    Args:
-      config: TOML file with other thresholds (configs/certificate/default.toml shows all).
-
-    Raises:
-      UserError: no run, no champion, or a bad file.
-    """
-    known = run if isinstance(run, Run) else open(run)
-    table = read_toml(Path(config)) if config else {}
-    champion = known.champion
-    attempt = Exams(known.folder / EXAMS).attempt(
-        champion.fingerprint, int(champion.origin.get("generation", 0))
-    )
-    return certify(
-        known.creature, champion, build(CertificateConfig, table, str(config)), attempts=attempt
-    )
-
-
-def walk(run: Run | Place, seconds: float = 12.0) -> dict[str, np.ndarray]:
-    """The champion's undisturbed motion in C MuJoCo, as columns [T] for pandas or a plot.
-
-    `time` s; `trunk_x`, `trunk_y`, `trunk_z` m, forward, left and up from the start; `pitch`,
-    `roll` rad; per joint `pos_NAME` rad, `vel_NAME` rad/s, `torque_NAME` N·m; per foot
-    `height_NAME` m, `force_NAME` N. It ends soon after a fall.
-
-    Raises:
-      UserError: no run or no champion.
-    """
-    from mjxgait.viewing.walk import record_walk
-
-    known = run if isinstance(run, Run) else open(run)
-    if not seconds > 0:
-        raise UserError(f"seconds = {seconds}: must be more than zero")
-    creature = known.creature
-    seen = record_walk(creature, known.champion, seconds).recording
-    columns = {"time": np.arange(len(seen.pitch)) * seen.time_step}
-    columns |= {f"trunk_{axis}": seen.trunk_pos[:, i] for i, axis in enumerate("xyz")}
-    columns |= {"pitch": seen.pitch, "roll": seen.roll}
-    joints = {"pos": seen.joint_pos, "vel": seen.joint_vel, "torque": seen.torque}
-    feet = {"height": seen.foot_height, "force": seen.foot_force}
-    for names, values in ((creature.joints.names, joints), (creature.feet.names, feet)):
-        columns |= {
-            f"{what}_{name}": array[:, i]
-            for what, array in values.items()
-            for i, name in enumerate(names)
-        }
-    return columns
 
 
 def _use(**named: str | None) -> dict[str, str]:

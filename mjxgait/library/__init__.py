@@ -1,0 +1,14 @@
+"""The program as a library: the same runs as the command line makes, from a script or a notebook.
+
+import mjxgait
+
+run = mjxgait.train("tall_quadruped", seed=0, out="runs/x", generations=20)
+run.champion, run.certificate, run.metrics()
+mjxgait.walk(run)["trunk_z"]
+"""
+
+from mjxgait.library.look import examine, walk
+from mjxgait.library.make import load_creature, refine, train
+from mjxgait.library.run import Run, open
+
+__all__ = ["Run", "examine", "load_creature", "open", "refine", "train", "walk"]
