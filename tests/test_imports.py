@@ -15,7 +15,7 @@ FLOORS = (
     ("commands",),
     ("library",),
     ("bench",),
-    ("ablation", "repertoire"),
+    ("ablation", "repertoire", "zoo"),
     ("cluster",),
     ("web",),
     ("animation",),

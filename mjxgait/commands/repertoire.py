@@ -75,8 +75,8 @@ def repertoire_command(arguments: Sequence[str]) -> int:
     # JAX takes a second to import: only once the options are known to be good.
     from mjxgait.cluster.board import crew_at
     from mjxgait.repertoire.evolve import evolve
-    from mjxgait.repertoire.examine import examine
     from mjxgait.runs.devices import prepare_devices
+    from mjxgait.runs.examine import examine
     from mjxgait.runs.loop import interruptible
 
     prepare_devices(1 if options.cluster else None)
@@ -85,7 +85,9 @@ def repertoire_command(arguments: Sequence[str]) -> int:
     with interruptible() as interrupted, crew_at(options.cluster, console) as crew:
         told = interrupted.is_set
         ended = evolve(folder, creature, grid, crew, screen.evolved, told)
-        ended = ended and examine(folder, grid, screen.examined, told)
+        walks = [folder / cell.name for cell in grid.cells]
+        again = f"mjxgait repertoire --resume {folder}"
+        ended = ended and examine(folder, walks, again, screen.examined, told)
     if not ended:
         console.print(f"interrupted; go on with: mjxgait repertoire --resume {folder}")
         return INTERRUPTED

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from mjxgait.commands.zoo import evolve_zoo
 from mjxgait.creature import Creature
 from mjxgait.creature.scale import parse_scales
 from mjxgait.errors import INTERRUPTED, UserError
@@ -28,6 +29,7 @@ from mjxgait.runs.folder import (
 )
 from mjxgait.settings.config import Config, ExaminationConfig
 from mjxgait.settings.tables import build, merge
+from mjxgait.zoo.seeds import create_zoo, folders_of, is_zoo
 
 if TYPE_CHECKING:  # JAX takes a second to import
     from mjxgait.runs.screen import Screen
@@ -49,6 +51,8 @@ class TrainOptions:
       scale: Parts of another size, as PATTERN=FACTOR: '*_shin=1.2' for longer shins, 'trunk=0.9'
         (docs/creature.md). Lengths, masses and inertias follow, gains do not.
       out: Folder for the run; by default a new one under runs/.
+      runs: So many separate runs side by side, with seeds from --seed on, each a run folder in the
+        folder, and a picture of all champions (docs/zoo.md).
       resume: Run folder to go on with; its own creature and settings are used, only what ends a run
         may differ: --generations, --evolution.target, --examination.
       generation: With --resume: the checkpoint to go on from instead of the latest.
@@ -77,6 +81,7 @@ class TrainOptions:
     config: str | None = None
     scale: tuple[str, ...] = ()
     out: Path | None = None
+    runs: int | None = None
     resume: Path | None = None
     generation: int | None = None
     population: int | None = None
@@ -105,6 +110,8 @@ def train_command(arguments: Sequence[str]) -> int:
     config = _settings(options)
     if said := hint(config):
         print(said)
+    if options.runs is not None or _is_zoo(options.resume):
+        return _several(options, creature, config, default)
     # JAX takes a second to import: only once the options are known to be good.
     from mjxgait.cluster.evolve import evolve
     from mjxgait.commands.view import following
@@ -135,6 +142,26 @@ def train_command(arguments: Sequence[str]) -> int:
         screen.next_steps(folder, Run(folder).certified)
     drawn = _draw(folder, screen, all_plots=ended and options.plots)
     return 0 if ended and drawn else INTERRUPTED
+
+
+def _several(options: TrainOptions, creature: Creature, config: Config, default: Config) -> int:
+    """Runs side by side; returns the exit code."""
+    if options.view or options.generation is not None:
+        raise UserError("--runs: several runs have no --view and no --generation")
+    if options.resume is None:
+        assert options.runs is not None
+        zoo = create_zoo(options.out, creature, config, options.runs)
+        return evolve_zoo(zoo, options.cluster)
+    if options.runs is not None or options.scale or config != default:
+        raise UserError(
+            f"{options.resume}: resumed runs keep their number, body and settings; only --cluster "
+            "may be given"
+        )
+    return evolve_zoo(options.resume, options.cluster)
+
+
+def _is_zoo(folder: Path | None) -> bool:
+    return folder is not None and is_zoo(folder)
 
 
 def _options_of(config: type[Config]) -> type[TrainOptions]:
@@ -199,7 +226,8 @@ def _layers(arguments: Sequence[str]) -> tuple[Creature, Config]:
                 f"{given.resume}: a resumed run keeps its settings; what is asked of a walk needs a "
                 "new run"
             )
-        return open_run(Path(given.resume))
+        folder = Path(given.resume)
+        return open_run(folders_of(folder)[0] if is_zoo(folder) else folder)
     scales = parse_scales(given.scale or ())
     creature = load_creature(given.env or TrainOptions.env, scales, tell=print)
     file = Path(given.config) if given.config else None

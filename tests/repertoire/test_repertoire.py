@@ -5,75 +5,24 @@ Who evolves it are made-up hands, so that no program is compiled; `test_guests.p
 
 import dataclasses
 import json
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pygltflib as gltf
 import pytest
 from helpers import STOOL, said_by
+from made_up_hands import Interrupted, Pretend
 from repertoire.made_up import CERTIFIED, GENERATIONS, begin, examine
-from viewing.made_up import metrics_line, treading
+from viewing.made_up import treading
 
-from mjxgait.cluster.crew import Crew, Report, Worker
-from mjxgait.cluster.jobs import Advanced, AdvanceRows
-from mjxgait.cluster.programs import Programs
-from mjxgait.cluster.recipe import Recipe
+from mjxgait.cluster.crew import Crew
 from mjxgait.creature import Creature
 from mjxgait.repertoire.blends import half_way
 from mjxgait.repertoire.cells import POSES, mirrored
 from mjxgait.repertoire.evolve import evolve
 from mjxgait.repertoire.grid import Cell, Grid
 from mjxgait.runs.folder import METRICS, read_metrics
-from mjxgait.runs.packed import pack
 from mjxgait.runs.stored import read_stored, stored_generations
-
-PROGRAMS = Programs()
-
-
-class Pretend:
-    """Hands that evolve nobody: each generation bends all poses a little."""
-
-    def __init__(self) -> None:
-        self._coming, self._work = [Worker(0, "here")], None
-
-    def arrivals(self) -> list[Worker]:
-        coming, self._coming = self._coming, []
-        return coming
-
-    def start(self, worker: Worker, recipe: Recipe, job: Any) -> None:
-        self._work = worker, recipe, job
-
-    def wait(self, seconds: float) -> list[Report]:
-        if self._work is None:
-            return []
-        (worker, recipe, job), self._work = self._work, None
-        return [Report(worker, pretended(recipe, job))]
-
-
-def pretended(recipe: Recipe, job: AdvanceRows) -> Advanced:
-    batch = PROGRAMS.batch(recipe)
-    before = job.state or pack(batch.init()).with_arrays(job.planted or {})
-    rows = len(batch.experiments)
-    new = {
-        "generation": np.full(rows, job.until, np.int32),
-        "fitness": np.ones_like(before.arrays["fitness"]),
-        POSES: before.arrays[POSES] + np.float32(0.01),
-    }
-    begun = -1 if job.state is None else job.state.generation
-    lines = [[metrics_line(g)] * rows for g in range(begun + 1, job.until + 1)]
-    return Advanced(before.with_arrays(new), lines, "", 1.0, 1)
-
-
-class Interrupted(Crew):
-    """One that is told to stop after so many pieces of work."""
-
-    left = 3
-
-    def next(self, stopped: Callable[[], bool]) -> Any:
-        self.left -= 1
-        return super().next(lambda: self.left < 0)
 
 
 def run(folder: Path, creature: Creature, grid: Grid, kind: type[Crew] = Crew) -> bool:

@@ -1,15 +1,14 @@
-"""Who of a repertoire walks: one of the best few of each cell with its certificate."""
+"""Runs that have come to their last generation: one of the best few of each with its certificate."""
 
 import concurrent.futures
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import jax
 from rich.console import Console
 
 from mjxgait.cores import process_per_core, survivable
-from mjxgait.repertoire.grid import Grid
 from mjxgait.runs.checkpoint import Checkpoints
 from mjxgait.runs.devices import prepare_devices
 from mjxgait.runs.examination import Examiner
@@ -21,21 +20,24 @@ from mjxgait.runs.screen import Screen
 
 
 def examine(
-    folder: Path, grid: Grid, tell: Callable[[int, int], object], stopped: Callable[[], bool]
+    folder: Path,
+    runs: Sequence[Path],
+    again: str,
+    tell: Callable[[int, int], object],
+    stopped: Callable[[], bool],
 ) -> bool:
-    """Leaves champion and certificate in the folder of each cell that has none, one cell per core;
-    whether all have.
+    """Leaves champion and certificate in each of these run folders that has none, one per core;
+    whether all have been looked at.
 
-    tell: called with how many are done, and of how many.
+    folder: that they lie in. again: the command that goes on. tell: called with how many are done,
+    and of how many.
 
     Raises:
       UserError: a process was killed from outside, or the folder cannot be written.
     """
-    places = [folder / cell.name for cell in grid.cells]
-    left = [place for place in places if not (place / CERTIFICATE).is_file()]
+    left = [run for run in runs if not (run / CERTIFICATE).is_file()]
     if not left:
         return True
-    again = f"mjxgait repertoire --resume {folder}"
     with survivable(folder, again), process_per_core(len(left), prepare_devices) as pool:
         work = [pool.submit(_examine, place) for place in left]
         for number, done in enumerate(concurrent.futures.as_completed(work), 1):

@@ -1,0 +1,83 @@
+"""`mjxgait train --runs`: several runs side by side."""
+
+import time
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from mjxgait.errors import INTERRUPTED
+from mjxgait.runs.disk import disk_errors
+from mjxgait.runs.folder import open_run
+from mjxgait.zoo.seeds import folders_of
+
+PICTURE = "zoo.png"
+
+
+def evolve_zoo(zoo: Path, cluster: str | None = None) -> int:
+    """Evolves the runs of a folder, or goes on with them, and shows who came of it; returns the exit
+    code.
+
+    cluster: address of the one that does it, if not this machine.
+    """
+    from mjxgait.cluster.board import crew_at
+    from mjxgait.cluster.rows import Rows
+    from mjxgait.runs.devices import prepare_devices
+    from mjxgait.runs.examine import examine
+    from mjxgait.runs.loop import interruptible
+
+    prepare_devices(1 if cluster else None)
+    folders = folders_of(zoo)
+    creature, config = open_run(folders[0])
+    again = f"mjxgait train --resume {zoo}"
+    console, began = Console(highlight=False, soft_wrap=True), time.perf_counter()
+    screen = _Screen(console)
+    with interruptible() as interrupted, crew_at(cluster, console) as crew:
+        told = interrupted.is_set
+        rows = Rows(creature, folders, keep_every=config.keep_every)
+        ended = rows.to_the_end(None, crew, screen.evolved, told) is not None
+        ended = ended and examine(zoo, folders, again, screen.examined, told)
+    if not ended:
+        console.print(f"interrupted; go on with: {again}")
+        return INTERRUPTED
+    _leave(zoo, creature.name, folders, console)
+    console.print(f"{time.perf_counter() - began:.0f} s; each is a run: mjxgait inspect {zoo}")
+    return 0
+
+
+def _leave(zoo: Path, name: str, folders: list[Path], console: Console) -> None:
+    from mjxgait.viewing.style import figure
+    from mjxgait.zoo.found import draw_zoo, found_in, size, table
+
+    found = found_in(folders)
+    console.print(table(found))
+    with disk_errors(zoo / PICTURE), figure(size(found)) as drawing:
+        draw_zoo(drawing, name, found)
+        drawing.savefig(zoo / PICTURE)
+    count = sum(one.certified for one in found)
+    console.print(f"{count} of {len(found)} are certified: {zoo / PICTURE}")
+
+
+class _Screen:
+    """Plain lines."""
+
+    def __init__(self, console: Console) -> None:
+        self.console = console
+
+    def evolved(self, generation: int, last: int, done: Any) -> None:
+        if done is None:
+            self.console.print("compiling")
+            return
+        left = (last - generation) * done.seconds / max(len(done.lines), 1)
+        best = " ".join("-" if b is None else f"{b:.3g}" for b in _best(done.lines))
+        self.console.print(
+            f"generation {generation} of {last}, best fitness of each: {best}; "
+            f"{done.steps / done.seconds / 1e6:.2f} M steps/s, {left:.0f} s left"
+        )
+
+    def examined(self, count: int, of: int) -> None:
+        self.console.print(f"examined in C MuJoCo: {count} of {of}")
+
+
+def _best(lines: list[list[dict[str, Any]]]) -> list[float | None]:
+    return [line["best"] for line in lines[-1]] if lines else []

@@ -1,0 +1,78 @@
+"""Which runs a zoo is of, and where they lie."""
+
+import dataclasses
+from pathlib import Path
+
+from mjxgait.creature import Creature
+from mjxgait.errors import UserError
+from mjxgait.parts.fit import check_fit
+from mjxgait.runs.disk import disk_errors
+from mjxgait.runs.folder import create_run, new_run_folder
+from mjxgait.settings.config import Config
+from mjxgait.settings.tables import STRICT, build, dump_toml, read_toml
+
+ZOO = "zoo.toml"
+
+
+@dataclasses.dataclass(frozen=True)
+class Seeds:
+    """Of the runs of a folder, in order."""
+
+    __pydantic_config__ = STRICT
+    seeds: tuple[int, ...]
+
+    def folders(self, zoo: Path) -> list[Path]:
+        """A run folder for each."""
+        return [zoo / f"seed{seed}" for seed in self.seeds]
+
+
+def is_zoo(folder: Path) -> bool:
+    """Whether several runs lie in it, rather than one."""
+    return (folder / ZOO).is_file()
+
+
+def folders_of(zoo: Path) -> list[Path]:
+    """The runs of a folder.
+
+    Raises:
+      UserError: what says which they are cannot be read, or names none.
+    """
+    seeds = build(Seeds, read_toml(zoo / ZOO), str(zoo / ZOO))
+    if not seeds.seeds:
+        raise UserError(f"{zoo / ZOO}: seeds: there is none")
+    return seeds.folders(zoo)
+
+
+def create_zoo(zoo: Path | None, creature: Creature, config: Config, runs: int) -> Path:
+    """Makes a folder with a run folder for each seed, from the config's on; by default a new one
+    under runs/.
+
+    Raises:
+      UserError: fewer than two runs, or islands, which have rows of their own; see `create_run`.
+    """
+    if runs < 2:
+        raise UserError(f"--runs {runs}: give 2 or more, or leave it out for a single run")
+    if config.evolution.islands.count > 1:
+        raise UserError("--runs: runs with islands do not go side by side; start them one by one")
+    check_fit(creature, config)
+    zoo = zoo or new_run_folder(f"{creature.name}-zoo", config.seed)
+    if zoo.exists() and (not zoo.is_dir() or any(zoo.iterdir())):
+        raise UserError(
+            f"{zoo}: holds something already; name another folder with --out, or go on with "
+            f"--resume {zoo}"
+        )
+    seeds = Seeds(tuple(range(config.seed, config.seed + runs)))
+    for seed, folder in zip(seeds.seeds, seeds.folders(zoo), strict=True):
+        create_run(folder, creature, together(dataclasses.replace(config, seed=seed)))
+    # Last: what is whole can be gone on with.
+    with disk_errors(zoo):
+        (zoo / ZOO).write_text(dump_toml(seeds), encoding="utf-8")
+    return zoo
+
+
+def together(config: Config) -> Config:
+    """Without what ends a run before its last generation: the rows of a program go on together."""
+    forced = dataclasses.replace(config.evolution.forced, patience=0)
+    examination = dataclasses.replace(config.examination, every=0)
+    evolution = dataclasses.replace(config.evolution, target=None, forced=forced)
+    return dataclasses.replace(config, evolution=evolution, examination=examination)
