@@ -81,7 +81,8 @@ def test_a_turn_is_a_walk_along_the_heading_that_it_was_told():
     # Unasked it is a walk in circles, and has ended behind where it began.
     assert "drift / distance" in missed(turning)
     said = [
-        demands_of("walk", wish).report(turning, CONFIG)["obstacle"] for wish in ({}, {"turn": 30.0})
+        demands_of("walk", wish).report(turning, CONFIG)["obstacle"]
+        for wish in ({}, {"turn": 30.0})
     ]
     assert said[0].startswith("went backwards")
     assert said[1] is None
