@@ -31,8 +31,8 @@ def share_command(arguments: Sequence[str]) -> int:
             f'{options.out}: cannot write "{options.out.suffix}"; end the name with .html'
         )
     from mjxgait.repertoire.grid import GRID
+    from mjxgait.repertoire.share import write_driven
     from mjxgait.runs.disk import require_writable
-    from mjxgait.web.drive import write_driven
     from mjxgait.web.page import write_page
 
     require_writable(options.out)

@@ -1,0 +1,42 @@
+"""A repertoire as a page to give away, in which it is driven."""
+
+import json
+from pathlib import Path
+
+from mjxgait.errors import UserError
+from mjxgait.repertoire.clips import TABLE, clips_of, table_of
+from mjxgait.repertoire.found import found_in
+from mjxgait.repertoire.grid import Grid
+from mjxgait.web.drive import driven_page
+from mjxgait.web.page import write_text
+
+RATE = 60
+
+
+def write_driven(folder: Path, out: Path) -> None:
+    """Writes the page of a repertoire's certified walks.
+
+    Raises:
+      UserError: no repertoire, none of its walks is certified, or the file cannot be written.
+    """
+    found = found_in(folder, Grid.read(folder))
+    loops = clips_of(folder, found, RATE)
+    if not loops:
+        raise UserError(
+            f"{folder}: none of its walks is certified, so there is nothing to drive; "
+            f"`mjxgait inspect {folder}` says why"
+        )
+    clips = table_of("", loops, found, travelling=False)["clips"]
+    write_text(out, driven_page(loops, clips, len(found), _blends(folder)))
+
+
+def _blends(folder: Path) -> str:
+    """How many blends were tried as physics, and how many walked."""
+    try:
+        tried = json.loads((folder / TABLE).read_text(encoding="utf-8"))["blends"]
+        walking = sum(bool(blend["walks"]) for blend in tried)
+    except (OSError, ValueError, KeyError, TypeError):
+        tried, walking = [], 0
+    if not tried:
+        return "no blend of them has been tried as physics"
+    return f"half way between neighbours {walking} of {len(tried)} walk as physics too"
