@@ -4,6 +4,7 @@ from mjxgait.animation.bvh import build_bvh, export_bvh
 from mjxgait.animation.glb import build_clips, build_driven, build_glb, export_glb
 from mjxgait.animation.loop import RATES, WalkLoop, walk_loop, walk_take
 from mjxgait.animation.phase import standing_still, stride_in_phase
+from mjxgait.animation.usd import export_usd
 
 __all__ = [
     "RATES",
@@ -14,6 +15,7 @@ __all__ = [
     "build_glb",
     "export_bvh",
     "export_glb",
+    "export_usd",
     "standing_still",
     "stride_in_phase",
     "walk_loop",

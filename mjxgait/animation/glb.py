@@ -17,6 +17,7 @@ from mjxgait.animation.floor import add_floor, add_tiles
 from mjxgait.animation.limbs import along_limbs
 from mjxgait.animation.loop import WalkLoop
 from mjxgait.animation.note import note_of
+from mjxgait.animation.pieces import Piece, linear, pieces_of
 from mjxgait.animation.skeleton import (
     STILL,
     Skeleton,
@@ -27,9 +28,7 @@ from mjxgait.animation.skeleton import (
     travel,
     world_poses,
 )
-from mjxgait.animation.surface import geom_surface
 from mjxgait.errors import UserError
-from mjxgait.viewing.painter import geom_colours, seen_geoms
 
 ROUGHNESS = 0.75
 
@@ -97,7 +96,7 @@ def _scene(loops: Mapping[str, WalkLoop], travelling: bool) -> tuple[gltf.GLTF2,
     buffer = Buffer(document)
     rest_pos, rest_quat = local_poses(creature.model, skeleton, resting(loop)[None], axes)
     _add_joints(document, skeleton, rest_pos[0], rest_quat[0])
-    _add_mesh(document, buffer, creature.model, skeleton, axes, resting(loop))
+    _add_mesh(document, buffer, pieces_of(creature.model, skeleton, axes, resting(loop)))
     _add_skin(document, buffer, creature.model, skeleton, axes, resting(loop))
     _add_animations(document, buffer, loops, skeleton, axes, travelling)
     name = creature.name
@@ -118,58 +117,23 @@ def _add_joints(
         document.nodes.append(node)
 
 
-def _add_mesh(
-    document: gltf.GLTF2,
-    buffer: Buffer,
-    model: mujoco.MjModel,
-    skeleton: Skeleton,
-    axes: np.ndarray,
-    stand: np.ndarray,
-) -> None:
-    """One primitive and material per colour, in the rest pose."""
-    data = mujoco.MjData(model)
-    data.qpos[:] = stand
-    mujoco.mj_kinematics(model, data)
-    colours = geom_colours(model)
-    geoms = [int(g) for g in seen_geoms(model) if int(model.geom_bodyid[g]) in skeleton.bodies]
-    primitives = []
-    for colour in dict.fromkeys(tuple(colours[g]) for g in geoms):
-        parts = []
-        for g in (g for g in geoms if tuple(colours[g]) == colour):
-            points, normals, faces = geom_surface(model, g)
-            turn = axes @ data.geom_xmat[g].reshape(3, 3)
-            joint = skeleton.bodies.index(int(model.geom_bodyid[g]))
-            parts.append(
-                (
-                    points @ turn.T + axes @ data.geom_xpos[g],
-                    normals @ turn.T,
-                    faces,
-                    np.full(len(points), joint),
-                )
-            )
-        primitives.append(_primitive(buffer, parts, len(document.materials)))
-        name = _material_name(model, next(g for g in geoms if tuple(colours[g]) == colour))
-        document.materials.append(_material(name, np.array(colour)))
+def _add_mesh(document: gltf.GLTF2, buffer: Buffer, pieces: Sequence[Piece]) -> None:
+    """One primitive and material per piece."""
+    primitives = [_primitive(buffer, piece, i) for i, piece in enumerate(pieces)]
+    document.materials += [_material(piece.name, piece.colour) for piece in pieces]
     document.meshes.append(gltf.Mesh(name="body", primitives=primitives))
 
 
-def _primitive(
-    buffer: Buffer, parts: Sequence[tuple[np.ndarray, ...]], material: int
-) -> gltf.Primitive:
-    """parts: points [V, 3], normals [V, 3], triangles [F, 3] and joint [V] of each shape."""
-    firsts = np.cumsum([0, *(len(part[0]) for part in parts)])
-    points, normals, joints = (np.concatenate([part[i] for part in parts]) for i in (0, 1, 3))
-    faces = np.concatenate(
-        [part[2] + first for part, first in zip(parts, firsts[:-1], strict=True)]
-    )
-    places = np.zeros((len(points), 4), np.uint16 if joints.max() > 255 else np.uint8)
+def _primitive(buffer: Buffer, piece: Piece, material: int) -> gltf.Primitive:
+    count, joints = len(piece.points), piece.joints
+    places = np.zeros((count, 4), np.uint16 if joints.max() > 255 else np.uint8)
     places[:, 0] = joints
-    weights = np.tile(np.array([255, 0, 0, 0], np.uint8), (len(points), 1))
-    indices = faces.astype(np.uint16 if len(points) < 0xFFFF else np.uint32)
+    weights = np.tile(np.array([255, 0, 0, 0], np.uint8), (count, 1))
+    indices = piece.faces.astype(np.uint16 if count < 0xFFFF else np.uint32)
     return gltf.Primitive(
         attributes=gltf.Attributes(
-            POSITION=buffer.add(points.astype(np.float32), gltf.ARRAY_BUFFER, bounds=True),
-            NORMAL=buffer.add(_unit(normals), gltf.ARRAY_BUFFER),
+            POSITION=buffer.add(piece.points.astype(np.float32), gltf.ARRAY_BUFFER, bounds=True),
+            NORMAL=buffer.add(_unit(piece.normals), gltf.ARRAY_BUFFER),
             JOINTS_0=buffer.add(places, gltf.ARRAY_BUFFER),
             WEIGHTS_0=buffer.add(weights, gltf.ARRAY_BUFFER, normalized=True),
         ),
@@ -182,18 +146,9 @@ def _unit(vectors: np.ndarray) -> np.ndarray:
     return (vectors / np.linalg.norm(vectors, axis=1, keepdims=True)).astype(np.float32)
 
 
-def _material_name(model: mujoco.MjModel, geom: int) -> str:
-    """What the model calls it, else the part that has it first."""
-    material, body = int(model.geom_matid[geom]), int(model.geom_bodyid[geom])
-    called = model.mat(material).name if material >= 0 else model.body(body).name
-    return str(called) or f"body_{body}"
-
-
 def _material(name: str, colour: np.ndarray) -> gltf.Material:
-    """From sRGB [4] to the linear colours of glTF."""
-    rgb = np.where(colour[:3] <= 0.04045, colour[:3] / 12.92, ((colour[:3] + 0.055) / 1.055) ** 2.4)
     look = gltf.PbrMetallicRoughness(
-        baseColorFactor=[*map(float, rgb), float(colour[3])],
+        baseColorFactor=[*map(float, linear(colour[:3])), float(colour[3])],
         metallicFactor=0.0,
         roughnessFactor=ROUGHNESS,
     )

@@ -12,12 +12,12 @@ from mjxgait.errors import UserError
 
 @dataclasses.dataclass(frozen=True)
 class ExportOptions:
-    """Write the champion's walk as a loop without a seam: as a GLB with a skin, or as a BVH skeleton.
-    Units m, Y up, forward +Z.
+    """Write the champion's walk as a loop without a seam: as a GLB or USD with a skin, or as a BVH
+    skeleton. Units m, Y up, forward +Z.
 
     Attributes:
       run: Run folder.
-      out: File to write, ending with .glb or .bvh.
+      out: File to write, ending with .glb, .bvh, .usda or .usdc.
       rate: Key frames per second.
       travelling: The root moves forward; otherwise the creature walks in place.
     """
@@ -31,14 +31,15 @@ class ExportOptions:
 def export_command(arguments: Sequence[str]) -> int:
     """Returns the exit code."""
     options = tyro.cli(ExportOptions, args=list(arguments), prog="mjxgait export")
-    from mjxgait.animation import export_bvh, export_glb, walk_loop
+    from mjxgait.animation import export_bvh, export_glb, export_usd, walk_loop
     from mjxgait.runs.disk import require_writable
     from mjxgait.viewing.cast import LOOP_SECONDS, champion_of
 
-    writers = {".glb": export_glb, ".bvh": export_bvh}
+    writers = {".glb": export_glb, ".bvh": export_bvh, ".usda": export_usd, ".usdc": export_usd}
     if (kind := options.out.suffix.lower()) not in writers:
         raise UserError(
-            f'{options.out}: cannot write "{options.out.suffix}"; end the name with .glb or .bvh'
+            f'{options.out}: cannot write "{options.out.suffix}"; end the name with '
+            f"{', '.join(writers)}"
         )
     require_writable(options.out)
     loop = walk_loop(champion_of(options.run, LOOP_SECONDS).walk, options.rate)
