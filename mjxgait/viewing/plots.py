@@ -14,8 +14,9 @@ from mjxgait.parts import make_task
 from mjxgait.parts.registry import what_ends
 from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.folder import CHAMPION, METRICS, PLOTS, open_run, read_metrics
+from mjxgait.runs.stored import stored_generations
 from mjxgait.settings.config import Config
-from mjxgait.viewing import strobe, trees
+from mjxgait.viewing import grown, strobe, trees
 from mjxgait.viewing.cast import LOOP_SECONDS, champion_of
 from mjxgait.viewing.curves import Lines, progress_figures
 from mjxgait.viewing.filmstrip import draw_filmstrip
@@ -46,7 +47,7 @@ def plot_run(run: Path, out: Path | None = None, formats: Sequence[str] = FORMAT
         figures |= dict(gait_figures(walk)) | {
             "filmstrip": ((12, 4.8), lambda drawing: draw_filmstrip(drawing, walk))
         }
-        figures |= {**_of_goals(walk), **_of_programs(walk)}
+        figures |= {**_of_goals(walk), **_of_programs(walk), **_of_grown(run, walk)}
     files = []
     with disk_errors(out, "the run itself is safe", f"draw it with mjxgait plot {run}"):
         for name, (size, compose) in figures.items():
@@ -71,6 +72,20 @@ def _of_programs(walk: Walk) -> Figures:
         return {}
     found = trees.expressions_of(walk.creature, walk.champion)
     return {"expressions": (trees.shape(found), lambda drawing: trees.draw_trees(drawing, found))}
+
+
+def _of_grown(run: Path, walk: Walk) -> Figures:
+    """Graph and body, and bodies of earlier generations; nothing where the body did not grow."""
+    if "graph.half" not in walk.champion.genome:
+        return {}
+    bodies = grown.bodies_of(run, stored_generations(run))
+    return {
+        "graph": ((10, 4.6), lambda drawing: grown.draw_graph(drawing, walk)),
+        "bodies": (
+            (2.2 * max(len(bodies), 2), 2.4),
+            lambda drawing: grown.draw_bodies(drawing, bodies),
+        ),
+    }
 
 
 def _weights(creature: Creature, config: Config, lines: Lines) -> dict[str, np.ndarray]:

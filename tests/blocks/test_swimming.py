@@ -14,6 +14,7 @@ from mjxgait.certify.simulate import simulate
 from mjxgait.certify.starts import nominal_starts
 from mjxgait.champion import read_champion, write_champion
 from mjxgait.champion.blocks.material import DRAG
+from mjxgait.champion.blocks.parts import grow
 from mjxgait.library import load_creature
 from mjxgait.parts.settings import build_config
 from mjxgait.runs.experiment import Experiment, Step, build_experiment
@@ -21,6 +22,9 @@ from mjxgait.search.state import EvolutionState
 from mjxgait.settings.blocks import SwimConfig
 from mjxgait.tasks.blocks.alive import FASTEST_HINGE, FURTHEST
 from mjxgait.tasks.blocks.swim import Swim
+from mjxgait.viewing.grown import draw_graph
+from mjxgait.viewing.style import figure
+from mjxgait.viewing.walk import record_walk
 
 TABLE = {
     "use": {"controller": "brain", "task": "swim"},
@@ -149,6 +153,20 @@ def test_the_examiner_sees_them_swim_as_far(experiment: Experiment, evolved):
     apart = np.abs(mine - lengths)
     assert np.median(apart / (lengths + 0.01)) < 0.02
     assert (apart < 0.1 * lengths + 0.002).mean() >= 0.75, "a threshold may be met a tick apart"
+
+
+def test_a_champion_is_drawn_with_the_nodes_that_its_body_grew_from(experiment, evolved):
+    champion = experiment.champion(evolved[0], {})
+    body = champion.embodied(experiment.creature)
+    parts = grow(champion.genome, champion.settings.parts, champion.settings.links)
+    with figure((10, 4.6)) as drawing:
+        draw_graph(drawing, record_walk(body, champion, 0.1))
+        graph, picture = drawing.axes
+        said = [text.get_text() for text in graph.texts]
+    nodes = {str(part.node) for part in parts}
+    assert {text for text in said if text.isdigit()} == nodes
+    assert sum("cm" in text for text in said) == len(nodes)
+    assert len(picture.images) == 1
 
 
 def test_a_champion_of_theirs_is_a_file(experiment: Experiment, evolved, tmp_path: Path):
