@@ -62,7 +62,9 @@ def shipped(request: pytest.FixtureRequest) -> Creature:
 
 @pytest.fixture(scope="module")
 def emitted_as_shipped() -> Iterator[None]:
-    """Machine code as users get it, also in commands: in the older way bits depend on a program's rows."""
+    """Programs that are lowered and compiled, and commands that are started, are emitted as users get
+    them: in the older way bits depend on how many rows a program has.
+    """
     flags, compile_it = os.environ.get("XLA_FLAGS", ""), jax.stages.Lowered.compile
 
     def compiled(lowered: jax.stages.Lowered, compiler_options: Any = None) -> Any:
