@@ -21,21 +21,21 @@ from mjxgait.repertoire.cells import POSES
 from mjxgait.runs.folder import CERTIFICATE, CHAMPION, METRICS, open_run, read_metrics
 from mjxgait.runs.stored import read_stored, stored_generations
 from mjxgait.zoo.found import found_in
-from mjxgait.zoo.seeds import create_zoo, folders_of
+from mjxgait.zoo.seeds import create_zoo, folders_of, read_seeds
 
 SEEDS = (5, 6, 7)
 
 
-def begun(zoo: Path, creature: Creature) -> Path:
+def begun(zoo: Path, creature: Creature, together: int = 0) -> Path:
     """Of runs that would end early if they were alone."""
     config = small_config(evolution={"target": 1e-3, "generations": 4}, examination={"every": 2})
-    return create_zoo(
-        zoo, creature, dataclasses.replace(config, seed=5, checkpoint_every=1), len(SEEDS)
-    )
+    config = dataclasses.replace(config, seed=5, checkpoint_every=1)
+    return create_zoo(zoo, creature, config, len(SEEDS), together)
 
 
 def go_on(zoo: Path, creature: Creature, kind: type[Crew] = Crew) -> bool:
-    rows = Rows(creature, folders_of(zoo), keep_every=1)
+    seeds = read_seeds(zoo)
+    rows = Rows(creature, seeds.folders(zoo), keep_every=1, together=seeds.together)
     crew = kind(Pretend())
     return rows.to_the_end(None, crew, lambda *told: None, lambda: False) is not None
 
@@ -73,6 +73,18 @@ def test_stopped_on_the_way_all_go_on_to_the_same_end(
     for one, again in zip(folders_of(finished), folders_of(zoo), strict=True):
         states = [read_stored(folder, stool.digest).arrays[POSES] for folder in (one, again)]
         np.testing.assert_array_equal(*states)
+
+
+def test_in_several_pieces_of_work_all_come_to_the_same(
+    finished: Path, tmp_path: Path, stool: Creature
+):
+    """Two runs and one; what made-up hands do to a run does not depend on who is beside it."""
+    zoo = begun(tmp_path / "pieces", stool, together=2)
+    assert go_on(zoo, stool)
+    for one, other in zip(folders_of(finished), folders_of(zoo), strict=True):
+        states = [read_stored(folder, stool.digest).arrays[POSES] for folder in (one, other)]
+        np.testing.assert_array_equal(*states)
+        assert read_metrics(one / METRICS) == read_metrics(other / METRICS)
 
 
 @pytest.fixture(scope="module")

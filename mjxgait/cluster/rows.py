@@ -1,7 +1,8 @@
 """Whole runs as rows of one program, each with a run folder of its own."""
 
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,7 @@ class Rows:
       sources: see `build_batch`. images: a row's second folder, where there is one, with what is
         written there in place of its state.
       keep_every: see `Checkpoints`; by default no generation stays but the latest.
+      together: so many rows are one piece of work; 0: all, as those with sources must be.
     """
 
     def __init__(
@@ -37,10 +39,13 @@ class Rows:
         sources: Sequence[Sequence[int]] = (),
         images: Mapping[Path, tuple[Path, Callable[[Packed], Packed]]] | None = None,
         keep_every: int | None = None,
+        together: int = 0,
     ) -> None:
         self.creature, self.folders, self.images = creature, list(folders), images or {}
         self.configs: list[Config] = [open_run(folder)[1] for folder in folders]
-        self.recipe = Recipe.of(creature, self.configs, sources)
+        size = together or len(self.folders)
+        self.pieces = [slice(at, at + size) for at in range(0, len(self.folders), size)]
+        self.recipes = [Recipe.of(creature, self.configs[piece], sources) for piece in self.pieces]
         self.last = self.configs[0].evolution.generations
         self.keep_every = keep_every or self.last + 1
 
@@ -62,16 +67,26 @@ class Rows:
                 tell(generation, self.last, None)
             while generation < self.last:
                 until = min((max(generation, 0) // stride + 1) * stride, self.last)
-                job = AdvanceRows(state, until, begin if state is None else None)
-                if (done := crew.all([(self.recipe, job)], stopped)) is None:
+                if (done := crew.all(self._work(state, begin, until), stopped)) is None:
                     return None
-                state, generation = done[0].packed, until
-                self._keep(stores, done[0])
-                tell(generation, self.last, done[0])
+                advanced = _joined(done)
+                state, generation = advanced.packed, until
+                self._keep(stores, advanced)
+                tell(generation, self.last, advanced)
             return state
         finally:
             for store in stores.values():
                 store.close()
+
+    def _work(
+        self, state: Packed | None, begin: Mapping[str, np.ndarray] | None, until: int
+    ) -> Iterator[tuple[Recipe, AdvanceRows]]:
+        for recipe, piece in zip(self.recipes, self.pieces, strict=True):
+            if state is not None:
+                yield recipe, AdvanceRows(state.rows(piece), until)
+            else:
+                planted = begin and {name: array[piece] for name, array in begin.items()}
+                yield recipe, AdvanceRows(None, until, planted)
 
     def _stored(self, stores: Mapping[Path, Checkpoints]) -> Packed | None:
         """What was left by the latest generation that all have a checkpoint of."""
@@ -107,3 +122,15 @@ class Rows:
         with disk_errors(folder), path.open("a", encoding="utf-8") as log:
             log.writelines(json.dumps(line) + "\n" for line in lines)
         stores[folder].keep(state, self.creature.name, self.creature.digest)
+
+
+def _joined(pieces: Sequence[Advanced]) -> Advanced:
+    """Pieces that were worked on at the same time, as one."""
+    rows = [piece.packed.row(row) for piece in pieces for row in range(piece.packed.count)]
+    return Advanced(
+        side_by_side(rows),
+        [list(chain(*lines)) for lines in zip(*(piece.lines for piece in pieces), strict=True)],
+        pieces[0].note,
+        max(piece.seconds for piece in pieces),
+        sum(piece.steps for piece in pieces),
+    )

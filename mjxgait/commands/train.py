@@ -150,7 +150,9 @@ def _several(options: TrainOptions, creature: Creature, config: Config, default:
         raise UserError("--runs: several runs have no --view and no --generation")
     if options.resume is None:
         assert options.runs is not None
-        zoo = create_zoo(options.out, creature, config, options.runs)
+        # On a cluster each run is a piece of work, so all machines have some.
+        together = 1 if options.cluster else 0
+        zoo = create_zoo(options.out, creature, config, options.runs, together)
         return evolve_zoo(zoo, options.cluster)
     if options.runs is not None or options.scale or config != default:
         raise UserError(

@@ -9,7 +9,7 @@ from rich.console import Console
 from mjxgait.errors import INTERRUPTED
 from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.folder import open_run
-from mjxgait.zoo.seeds import folders_of
+from mjxgait.zoo.seeds import read_seeds
 
 PICTURE = "zoo.png"
 
@@ -27,14 +27,15 @@ def evolve_zoo(zoo: Path, cluster: str | None = None) -> int:
     from mjxgait.runs.loop import interruptible
 
     prepare_devices(1 if cluster else None)
-    folders = folders_of(zoo)
+    seeds = read_seeds(zoo)
+    folders = seeds.folders(zoo)
     creature, config = open_run(folders[0])
     again = f"mjxgait train --resume {zoo}"
     console, began = Console(highlight=False, soft_wrap=True), time.perf_counter()
     screen = _Screen(console)
     with interruptible() as interrupted, crew_at(cluster, console) as crew:
         told = interrupted.is_set
-        rows = Rows(creature, folders, keep_every=config.keep_every)
+        rows = Rows(creature, folders, keep_every=config.keep_every, together=seeds.together)
         ended = rows.to_the_end(None, crew, screen.evolved, told) is not None
         ended = ended and examine(zoo, folders, again, screen.examined, told)
     if not ended:

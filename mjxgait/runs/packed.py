@@ -39,6 +39,15 @@ class Packed:
         """One run's state, of several side by side."""
         return Packed({name: array[number] for name, array in self.arrays.items()}, self.key_impl)
 
+    def rows(self, some: slice) -> "Packed":
+        """The states of some of several runs side by side."""
+        return Packed({name: array[some] for name, array in self.arrays.items()}, self.key_impl)
+
+    @property
+    def count(self) -> int:
+        """How many runs are side by side."""
+        return len(self.arrays["generation"])
+
     def state(self, abstract: EvolutionState, where: str) -> EvolutionState:
         """The state on the first of this machine's devices.
 

@@ -9,17 +9,21 @@ from mjxgait.parts.fit import check_fit
 from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.folder import create_run, new_run_folder
 from mjxgait.settings.config import Config
-from mjxgait.settings.tables import STRICT, build, dump_toml, read_toml
+from mjxgait.settings.tables import STRICT, Whole, build, dump_toml, read_toml
 
 ZOO = "zoo.toml"
 
 
 @dataclasses.dataclass(frozen=True)
 class Seeds:
-    """Of the runs of a folder, in order."""
+    """Of the runs of a folder, in order.
+
+    together: so many are rows of one program, which decides on their last bits; 0: all.
+    """
 
     __pydantic_config__ = STRICT
     seeds: tuple[int, ...]
+    together: Whole = 0
 
     def folders(self, zoo: Path) -> list[Path]:
         """A run folder for each."""
@@ -31,7 +35,7 @@ def is_zoo(folder: Path) -> bool:
     return (folder / ZOO).is_file()
 
 
-def folders_of(zoo: Path) -> list[Path]:
+def read_seeds(zoo: Path) -> Seeds:
     """The runs of a folder.
 
     Raises:
@@ -40,12 +44,19 @@ def folders_of(zoo: Path) -> list[Path]:
     seeds = build(Seeds, read_toml(zoo / ZOO), str(zoo / ZOO))
     if not seeds.seeds:
         raise UserError(f"{zoo / ZOO}: seeds: there is none")
-    return seeds.folders(zoo)
+    return seeds
 
 
-def create_zoo(zoo: Path | None, creature: Creature, config: Config, runs: int) -> Path:
+def folders_of(zoo: Path) -> list[Path]:
+    """Their folders; see `read_seeds`."""
+    return read_seeds(zoo).folders(zoo)
+
+
+def create_zoo(
+    zoo: Path | None, creature: Creature, config: Config, runs: int, together: int = 0
+) -> Path:
     """Makes a folder with a run folder for each seed, from the config's on; by default a new one
-    under runs/.
+    under runs/. together: see `Seeds`.
 
     Raises:
       UserError: fewer than two runs, or islands, which have rows of their own; see `create_run`.
@@ -61,16 +72,16 @@ def create_zoo(zoo: Path | None, creature: Creature, config: Config, runs: int) 
             f"{zoo}: holds something already; name another folder with --out, or go on with "
             f"--resume {zoo}"
         )
-    seeds = Seeds(tuple(range(config.seed, config.seed + runs)))
+    seeds = Seeds(tuple(range(config.seed, config.seed + runs)), together)
     for seed, folder in zip(seeds.seeds, seeds.folders(zoo), strict=True):
-        create_run(folder, creature, together(dataclasses.replace(config, seed=seed)))
+        create_run(folder, creature, to_the_last(dataclasses.replace(config, seed=seed)))
     # Last: what is whole can be gone on with.
     with disk_errors(zoo):
         (zoo / ZOO).write_text(dump_toml(seeds), encoding="utf-8")
     return zoo
 
 
-def together(config: Config) -> Config:
+def to_the_last(config: Config) -> Config:
     """Without what ends a run before its last generation: the rows of a program go on together."""
     forced = dataclasses.replace(config.evolution.forced, patience=0)
     examination = dataclasses.replace(config.examination, every=0)
