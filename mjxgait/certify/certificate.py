@@ -140,24 +140,28 @@ def rehearse(
 ) -> float:
     """The worst margin of criteria 4 and 5 on the draw that is the same for all champions.
 
-    Champions are chosen by it, and examined on another draw. It ends when those pushed last have
-    had time to fall.
+    Champions are chosen by it, and examined on another draw. Where pushes decide it ends when those
+    pushed last have had time to fall. Else it is as long as the examination: who gets to a goal late
+    is late for that only.
 
     Args:
-      count: perturbed starts, and as many pushes.
+      count: perturbed starts, and as many pushes where those decide.
     """
     config = config or CertificateConfig()
     draw, demands = draws.common(config), demands_of(champion.task, champion.wish)
     disturbed = demands.aimed(
         draws.starts(creature, config, draw, count), config, draw.generator(AIMS)
     )
-    pushes = (draws.pushes(creature, config, draw, count),) if demands.pushed else ()
+    pushes: tuple[Starts, ...] = ()
+    seconds = config.seconds
+    if demands.by_pushes:
+        pushes = (draws.pushes(creature, config, draw, count),)
+        seconds = min(seconds, config.pushes.window[1] + config.pushes.ladder_seconds)
     starts = demands.aimed(join(disturbed, *pushes), config)
-    seconds = min(config.seconds, config.pushes.window[1] + config.pushes.ladder_seconds)
     fall = demands.fall(config)
     outcome = simulate(creature, champion, starts, seconds, fall=fall, threads=threads)
     started = demands.succeeded(outcome, starts, config)[:count]
-    pushed = float(outcome.stayed_up[count:].mean()) if demands.pushed else np.nan
+    pushed = float(outcome.stayed_up[count:].mean()) if pushes else np.nan
     judged = demands.disturbed(float(started.mean()), pushed, config)
     judged += told_to_turn(creature, champion, config, draw, threads)
     return min(criterion.margin for criterion in judged)

@@ -2,18 +2,25 @@
 
 import dataclasses
 from collections.abc import Mapping
+from typing import Any
 
 import jax
 import numpy as np
 import pytest
 from certify_made_up import DOG, make_champion, walk
 
-from mjxgait.certify import CertificateConfig, draws
+from mjxgait.certify import CertificateConfig, certificate, draws, rehearse
 from mjxgait.certify.config import HopConfig
 from mjxgait.certify.measure import Recording
 from mjxgait.certify.outcome import Outcome, Trajectory
 from mjxgait.certify.simulate import simulate
-from mjxgait.certify.starts import join, nominal_starts, perturbed_starts, pushed_starts
+from mjxgait.certify.starts import (
+    Starts,
+    join,
+    nominal_starts,
+    perturbed_starts,
+    pushed_starts,
+)
 from mjxgait.certify.tasks import demands_of
 from mjxgait.certify.tasks.hop import HopDemands
 from mjxgait.champion import Champion
@@ -136,6 +143,22 @@ def test_nine_of_ten_must_succeed_and_pushes_do_not_count():
     assert [c.number for c in DEMANDS.disturbed(58 / 64, 0.0, CONFIG)] == [4]
     assert all(c.passed for c in DEMANDS.disturbed(58 / 64, 0.0, CONFIG))
     assert not any(c.passed for c in DEMANDS.disturbed(57 / 64, 1.0, CONFIG))
+
+
+def test_to_be_chosen_one_has_as_long_as_in_the_examination_and_bears_no_pushes(
+    tiny: Creature, monkeypatch: pytest.MonkeyPatch
+):
+    tried: list[tuple[int, float]] = []
+
+    def simulated(creature: Creature, champion: Champion, starts: Starts, seconds: float, **_: Any):
+        tried.append((len(starts), seconds))
+        assert not starts.push.any()
+        return became([to((0, 0), (16, goal)) for goal in starts.goal], [np.inf] * len(starts))
+
+    monkeypatch.setattr(certificate, "simulate", simulated)
+    hopper = dataclasses.replace(make_champion(tiny), task="hop")
+    assert rehearse(tiny, hopper, 6) == 1.0
+    assert tried == [(6, CONFIG.seconds)]
 
 
 def test_walking_is_asked_to_stay_up_and_nothing_else(tiny: Creature):

@@ -26,7 +26,7 @@ UNITS = {"speed": "m/s", "height": "m"}
 class BlocksDemands(StaysUp, abc.ABC):
     """See `Demands`. No body has a right way up, so none falls, and nobody is pushed."""
 
-    pushed = False
+    pushed = by_pushes = False
     grown = True
     verb: str
     """What one that passes does."""

@@ -22,6 +22,7 @@ class GoalDemands(Unasked, abc.ABC):
 
     drag: float = 0.0
     pushed: bool = True
+    by_pushes: bool = False
     grown: bool = False
     leaps: bool = False
     share: str

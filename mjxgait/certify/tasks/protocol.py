@@ -23,6 +23,8 @@ class Demands(Protocol):
     """Of the water around it, N·s/m³; 0 without."""
     pushed: bool
     """Whether it is tried what pushes do."""
+    by_pushes: bool
+    """Whether that decides: criterion 5. Else it is only told."""
     grown: bool
     """Whether it is for bodies of blocks, which have grown."""
     leaps: bool

@@ -42,11 +42,12 @@ class Unasked:
 class StaysUp(Unasked):
     """See `Demands`: criteria 4 and 5 of those that have no goal but to be up in the end.
 
-    drag, pushed, grown, leaps: see `Demands`.
+    drag, pushed, by_pushes, grown, leaps: see `Demands`.
     """
 
     drag: float = 0.0
     pushed: bool = True
+    by_pushes: bool = True
     grown: bool = False
     leaps: bool = False
 
