@@ -8,6 +8,8 @@ from pathlib import Path
 import jax.numpy as jnp
 import numpy as np
 
+from mjxgait.certify.twins.brains import BrainTwin
+from mjxgait.certify.twins.registry import twin_of
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.parts import make_task
@@ -16,11 +18,12 @@ from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.folder import CHAMPION, METRICS, PLOTS, open_run, read_metrics
 from mjxgait.runs.stored import stored_generations
 from mjxgait.settings.config import Config
-from mjxgait.viewing import grown, strobe, trees
+from mjxgait.viewing import brain, grown, strobe, trees
 from mjxgait.viewing.cast import LOOP_SECONDS, champion_of
 from mjxgait.viewing.curves import Lines, progress_figures
 from mjxgait.viewing.filmstrip import draw_filmstrip
 from mjxgait.viewing.gaitplots import gait_figures
+from mjxgait.viewing.network import network_of
 from mjxgait.viewing.style import FORMATS, Figures, figure, save
 from mjxgait.viewing.walk import Walk
 
@@ -75,12 +78,16 @@ def _of_programs(walk: Walk) -> Figures:
 
 
 def _of_grown(run: Path, walk: Walk) -> Figures:
-    """Graph and body, and bodies of earlier generations; nothing where the body did not grow."""
+    """Graph and body, brain, and bodies of earlier generations; nothing where the body did not grow."""
     if "graph.half" not in walk.champion.genome:
         return {}
     bodies = grown.bodies_of(run, stored_generations(run))
+    twin = twin_of(walk.creature, walk.champion, walk.time_step)
+    assert isinstance(twin, BrainTwin)
+    thoughts = network_of(twin)
     return {
         "graph": ((10, 4.6), lambda drawing: grown.draw_graph(drawing, walk)),
+        "brain": (brain.shape(thoughts), lambda drawing: brain.draw_brain(drawing, thoughts)),
         "bodies": (
             (2.2 * max(len(bodies), 2), 2.4),
             lambda drawing: grown.draw_bodies(drawing, bodies),

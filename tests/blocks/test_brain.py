@@ -1,6 +1,6 @@
 """Brains: the arrays think what a plain network thinks, whatever the genes."""
 
-from functools import partial
+from functools import cache, partial
 
 import jax
 import jax.numpy as jnp
@@ -19,6 +19,9 @@ from mjxgait.champion.blocks.parts import grow
 from mjxgait.control.brains.neurons import fired
 from mjxgait.control.brains.thought import Perceived, blank, thought
 from mjxgait.runs.experiment import arrays_of
+from mjxgait.viewing.brain import draw_brain, shape
+from mjxgait.viewing.network import READS, kind_of, network_of
+from mjxgait.viewing.style import figure
 
 CAPACITY, ROOM, COUNT, STEP = Capacity(), NerveRoom(), 200, 0.01
 KIN = Kin(CAPACITY, ROOM, Ranges())
@@ -90,23 +93,78 @@ def test_a_brain_thinks_as_its_twin_does():
 
 def test_what_a_twin_keeps_of_two_kinds_is_kept_apart():
     """The examiner writes into what it was given at first."""
-    genotype = KIN.create(jax.random.key(9))
-    _, plain = twin(jax.tree.map(np.asarray, genotype), body_of(genotype.graph, CAPACITY))
-    first = plain.init(2)
+    first = brain_of(one(some(), 0)).init(2)
     first["values"][:] = 1.0
     assert (first["memory"] == 0).all()
 
 
-def twin(genotype: Genotype, body: Body) -> tuple[list[int], BrainTwin]:
-    """The links of all hinges, part by part, and the brain that moves them."""
+@cache
+def some() -> Genotype:
+    """Thirty drawn at random."""
+    return jax.vmap(KIN.create)(jax.random.split(jax.random.key(11), 30))
+
+
+def brain_of(genotype: Genotype) -> BrainTwin:
+    """Of the body that it grows into, without the arrays."""
     genome = arrays_of(genotype)
     parts = grow(genome, CAPACITY.parts, CAPACITY.links)
     hinges = [(p, h) for p, part in enumerate(parts) for h in range(len(part.hinges))]
+    return BrainTwin(genome, parts, hinges, STEP)
+
+
+def twin(genotype: Genotype, body: Body) -> tuple[list[int], BrainTwin]:
+    """The links of all hinges, part by part, and the brain that moves them."""
+    plain = brain_of(genotype)
     links = [
         int(np.flatnonzero((body.part == p) & (body.hinge == h) & (body.tree.moves > 0))[0])
-        for p, h in hinges
+        for p, h in plain.hinges
     ]
-    return links, BrainTwin(genome, parts, hinges, STEP)
+    return links, plain
+
+
+def pulled(brain: BrainTwin) -> np.ndarray:
+    """Torques of some commands, under senses that are always the same."""
+    rng, memory, torques = np.random.default_rng(7), brain.init(3), []
+    for _ in range(4):
+        senses = {
+            "joint_pos": rng.uniform(-1, 1, (3, len(brain.hinges))),
+            "contact": rng.integers(0, 2, (3, len(brain.parts))),
+            "light": rng.normal(size=(3, len(brain.parts), 3)),
+        }
+        torque, memory = brain.act(memory, senses)
+        torques.append(torque)
+    return np.array(torques)
+
+
+def test_what_a_picture_of_a_brain_leaves_out_moves_nothing():
+    """And what it shows is all that it says: a neuron's inputs are wires, numbers, or not read."""
+    rng, moving, left_out = np.random.default_rng(12), 0, 0
+    for brain in [found for found in (brain_of(one(some(), i)) for i in range(30)) if found.hinges]:
+        before, network = pulled(brain), network_of(brain)
+        for neuron, column in enumerate(sorted(brain.place.values())):
+            shown = READS.get(kind_of(brain, column), 1) if column in network.cells else 0
+            brain.weight[neuron, shown:] = rng.normal(0, 3, 3 - shown)
+            left_out += shown == 0
+        np.testing.assert_array_equal(pulled(brain), before)
+        for wire in network.wires:
+            assert network.cells[wire.source].depth >= network.cells[wire.target].depth - 1
+        moving += bool(before.any())
+    assert moving > 10
+    assert left_out > 100
+
+
+def test_a_brain_is_drawn_by_parts():
+    """A wave that drives a hinge, and the other hinge of the same joint, which nothing drives."""
+    brain = brain_of(one(some(), 0))
+    wave = brain.place[0, 0]
+    brain.alike = {"oscillate-wave": np.arange(len(brain.place))}
+    brain.hinges, brain.driver, brain.gain = ((0, 0), (0, 1)), np.array([wave, 0]), np.ones(2)
+    brain.column[0], brain.weight[0] = [1, wave, 1], [0.25, -2.0, 9.0]
+    network = network_of(brain)
+    with figure(shape(network)) as drawing:
+        draw_brain(drawing, network)
+        said = [text.get_text() for text in drawing.axes[0].texts if text.get_text()]
+    assert said == ["part 0", "none 0", "none 1 = 0", "oscillate-wave(0.25, ·)", "1.00", "-2.00"]
 
 
 def test_a_mirror_image_pulls_the_other_way():
