@@ -14,7 +14,7 @@ from mjxgait.control.pose_variation import pose_variation
 from mjxgait.control.poses import Genome
 from mjxgait.search.breeding import parents, proportional_parents
 from mjxgait.search.evolution import Evolution
-from mjxgait.search.state import EvolutionState, GenerationMetrics, Origin, stop_reason
+from mjxgait.search.state import NOBODY, EvolutionState, GenerationMetrics, Origin, stop_reason
 from mjxgait.search.variation import Box, first_occurrence
 from mjxgait.settings.config import Config
 from mjxgait.settings.evolution import EvolutionConfig, ForcedConfig
@@ -74,7 +74,7 @@ class Toy(Evolution):
 
 def toy(problem: Problem = CENTRE, **settings) -> Toy:
     """A spell of forced evolution looks two generations back, so that most toys share a program."""
-    plain = EvolutionConfig(population=20, generations=30, forced=FORCED)
+    plain = EvolutionConfig(population=20, generations=30, forced=FORCED, lineage=True)
     return made(dataclasses.replace(plain, **settings), problem)
 
 
@@ -301,9 +301,28 @@ def test_without_a_limit_a_spell_in_which_nobody_is_fit_does_not_end():
     assert spells[0] > 12
 
 
+def test_the_log_tells_whose_child_each_is():
+    """Mutants of one joint: nobody else in a population is as like to them as their mother."""
+    never = ForcedConfig(enabled=False, window=2)
+    following = toy(crossover=0.0, mutation="single", forced=never)
+    history, children = run(following, 12), 0
+    assert (history[0][1].mothers == NOBODY).all()
+    for (before, _), (after, metrics) in itertools.pairwise(history):
+        mothers = before.genomes.key_poses[metrics.mothers]
+        changed = (after.genomes.key_poses != mothers).sum(axis=(1, 2))
+        born = after.born == after.generation
+        assert (changed[born] <= 1).all()
+        assert (changed[~born] == 0).all()
+        children += born.sum()
+    assert children > 20
+    assert history[0][1].mothers.shape == (20,)
+
+
 def test_a_growing_pool_evolves_and_simulates_nobody_twice():
     settings = {"selection": "uniform", "crossing": "permute", "crossover": 1.0}
-    evolution = toy(mutation_rate=0.0, pool="growing", unique_children=True, **settings)
+    evolution = toy(
+        mutation_rate=0.0, pool="growing", unique_children=True, lineage=False, **settings
+    )
     history = run(evolution, 10)
     assert float(history[-1][1].best) > float(history[0][1].best)
     state = history[-1][0]

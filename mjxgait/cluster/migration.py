@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from mjxgait.runs.lineage import MOTHERS
 from mjxgait.runs.packed import Packed
 from mjxgait.settings.islands import IslandsConfig
 
@@ -37,6 +38,8 @@ def together(lines: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     bests = [-np.inf if line["best"] is None else line["best"] for line in lines]
     leader = int(np.argmax(bests))
     line = dict(lines[leader]) | {"island": leader}
+    # Who comes from another island has no mother on this one.
+    line.pop(MOTHERS, None)
     line |= {name: sum(each[name] for each in lines) for name in SUMS}
     for name in MEANS:
         known = [each[name] for each in lines if each[name] is not None]

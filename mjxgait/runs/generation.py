@@ -11,7 +11,7 @@ import jax.numpy as jnp
 
 from mjxgait.runs.blueprint import Numbers, Plan
 from mjxgait.search.evolution import Evolution
-from mjxgait.search.state import EvolutionState, GenerationMetrics, Proposal
+from mjxgait.search.state import NOBODY, EvolutionState, GenerationMetrics, Proposal
 from mjxgait.settings.config import Config
 from mjxgait.simulation.evaluator import Local
 from mjxgait.simulation.rollout import Simulator
@@ -80,10 +80,14 @@ def with_guests(sources: jax.Array, states: EvolutionState, proposals: Proposal)
         who = comes.reshape(*comes.shape, *[1] * (guests.ndim - 2))
         return children.at[:, -count:].set(jnp.where(who, guests, last))
 
+    mothers = proposals.mothers
+    if mothers is not None:
+        mothers = seated(mothers, jnp.full_like(states.origin, NOBODY))
     return dataclasses.replace(
         proposals,
         offspring=jax.tree.map(seated, proposals.offspring, states.genomes),
         origin=seated(proposals.origin, states.origin),
+        mothers=mothers,
     )
 
 

@@ -35,6 +35,7 @@ from mjxgait.runs.folder import (
     read_metrics,
     truncate_metrics,
 )
+from mjxgait.runs.lineage import MOTHERS
 from mjxgait.runs.screen import Screen
 from mjxgait.search.state import EvolutionState, GenerationMetrics, stop_reason
 from mjxgait.settings.config import Config
@@ -176,13 +177,14 @@ def metrics_line(metrics: GenerationMetrics, seconds: float, task: Task) -> dict
     line = {
         field.name: getattr(metrics, field.name).item()
         for field in dataclasses.fields(metrics)
-        if field.name not in ("best_terms", "best_outcome")
+        if field.name not in ("best_terms", "best_outcome", "mothers")
     }
     line["forced"] = bool(line["forced"])
     line |= {"steps_per_second": round(line["sim_steps"] / seconds), "wall_s": round(seconds, 4)}
     line |= named("term", task.terms, metrics.best_terms)
     line |= named("outcome", task.outcomes, metrics.best_outcome)
-    return {key: value if np.isfinite(value) else None for key, value in line.items()}
+    told = {key: value if np.isfinite(value) else None for key, value in line.items()}
+    return told if metrics.mothers is None else told | {MOTHERS: metrics.mothers.tolist()}
 
 
 def followed(numbers: Mapping[str, np.ndarray]) -> dict[str, float]:

@@ -15,7 +15,7 @@ import jax.numpy as jnp
 from mjxgait.search import forced
 from mjxgait.search.breeding import Nursery, parents, proportional_parents
 from mjxgait.search.metrics import metrics
-from mjxgait.search.state import EvolutionState, GenerationMetrics, Origin, Proposal
+from mjxgait.search.state import NOBODY, EvolutionState, GenerationMetrics, Origin, Proposal
 from mjxgait.search.variation import Variation, first_occurrence
 from mjxgait.settings.evolution import EvolutionConfig
 from mjxgait.settings.traced import chosen
@@ -63,9 +63,9 @@ class Evolution:
     def propose(self, state: EvolutionState) -> Proposal:
         """The offspring of a generation."""
         key, key_offspring = jax.random.split(state.key)
-        offspring, origin = self._offspring(key_offspring, state, self._seeding(state))
+        offspring, origin, mothers = self._offspring(key_offspring, state, self._seeding(state))
         born = jnp.full(self.config.offspring, state.generation + 1)
-        return self._with_elite(state, Proposal(key, offspring, origin, born))
+        return self._with_elite(state, Proposal(key, offspring, origin, born, mothers))
 
     def _with_elite(self, state: EvolutionState, proposal: Proposal) -> Proposal:
         """With the best parents in the first places, to be judged once more."""
@@ -82,6 +82,7 @@ class Evolution:
             offspring=jax.tree.map(kept, proposal.offspring, state.genomes),
             origin=kept(proposal.origin, state.origin),
             born=kept(proposal.born, state.born),
+            mothers=None if proposal.mothers is None else kept(proposal.mothers, _own(state)),
         )
 
     def absorb(
@@ -91,7 +92,7 @@ class Evolution:
         seeding = self._seeding(state)
         recalled, rounds = self._recalled(state, judged)
         generation = jnp.where(seeding, jnp.where(self._filled(state), 0, -1), state.generation + 1)
-        grown = self._survive(state, proposal, recalled, rounds, generation)
+        grown, mothers = self._survive(state, proposal, recalled, rounds, generation)
         planted = self._plant(state, proposal, judged, generation)
         state = jax.tree.map(
             lambda a, b: jnp.where(seeding, a, b), _without_key(planted), _without_key(grown)
@@ -99,7 +100,9 @@ class Evolution:
         was_forced = state.forced
         state = dataclasses.replace(state, key=proposal.key, generation=generation)
         state = forced.decided(self.config, state)
-        return state, metrics(self.config, state, judged, was_forced)
+        if mothers is not None:
+            mothers = jnp.where(seeding, NOBODY, mothers)
+        return state, metrics(self.config, state, judged, was_forced, mothers)
 
     def _recalled(self, state: EvolutionState, judged: Judged) -> tuple[Judged, jax.Array | None]:
         """The verdict, in which those that are judged once more have the mean of all their rounds; and
@@ -130,9 +133,9 @@ class Evolution:
 
     def _offspring(
         self, key: jax.Array, state: EvolutionState, seeding: jax.Array
-    ) -> tuple[Any, jax.Array]:
-        """Genomes [M, ...] and their origins [M]: the unjudged initial population, forced ones,
-        or children.
+    ) -> tuple[Any, jax.Array, jax.Array | None]:
+        """Genomes [M, ...], their origins and their mothers' places [M]: the unjudged initial
+        population, forced ones, or children.
         """
         key_children, key_forced = jax.random.split(key)
         places = state.seeded + jnp.arange(self.config.offspring)
@@ -140,21 +143,28 @@ class Evolution:
         created = self.variation.create(keys_forced[0], self.config.offspring)
         known = jax.tree.map(lambda leaf: leaf[places % self.config.population], state.genomes)
         initial = _pick(places < self.config.population, known, created)
-        children, child_origin = self._children(key_children, state)
-        mutants, forced_origin = self._forced(keys_forced[1:], state, created)
+        children, child_origin, of_child = self._children(key_children, state)
+        mutants, forced_origin, of_mutant = self._forced(keys_forced[1:], state, created)
 
         def pick(first: jax.Array, second: jax.Array, third: jax.Array) -> jax.Array:
             return jnp.where(seeding, first, jnp.where(state.forced, second, third))
 
-        return jax.tree.map(pick, initial, mutants, children), pick(
-            jnp.zeros_like(child_origin), forced_origin, child_origin
-        )
+        genomes = jax.tree.map(pick, initial, mutants, children)
+        origin = pick(jnp.zeros_like(child_origin), forced_origin, child_origin)
+        if not self.config.lineage or of_child is None:
+            return genomes, origin, None
+        of_mutant = jnp.where(forced_origin == int(Origin.NEWCOMER), NOBODY, of_mutant)
+        return genomes, origin, pick(jnp.full_like(origin, NOBODY), of_mutant, of_child)
 
-    def _children(self, key: jax.Array, state: EvolutionState) -> tuple[Any, jax.Array]:
+    def _children(
+        self, key: jax.Array, state: EvolutionState
+    ) -> tuple[Any, jax.Array, jax.Array | None]:
+        """Genomes, origins and mothers' places, which are not followed of those born in turn."""
         config, count = self.config, self.config.offspring
         if config.pool == "growing" or config.unique_children:
             bred, of_two = Nursery(config, self.variation).children(key, state.genomes)
-            return bred, jnp.where(of_two, int(Origin.CROSSOVER), int(Origin.MUTATION))
+            origin = jnp.where(of_two, int(Origin.CROSSOVER), int(Origin.MUTATION))
+            return bred, origin, None
         key_parents, key_cross, key_whether, key_mutate, key_mutated = jax.random.split(key, 5)
         if config.proportional:
             mothers, fathers = proportional_parents(key_parents, count, state.fitness)
@@ -175,12 +185,14 @@ class Evolution:
             ~crosses & (config.mutation_rate > 0)
         )
         origin = jnp.where(crosses, int(Origin.CROSSOVER), int(Origin.MUTATION))
-        return _pick(mutates, mutated, child), origin
+        return _pick(mutates, mutated, child), origin, mothers
 
     def _forced(
         self, keys: jax.Array, state: EvolutionState, created: Any
-    ) -> tuple[Any, jax.Array]:
-        """Newcomers and often mutated ones. keys: [1 + mutations]."""
+    ) -> tuple[Any, jax.Array, jax.Array]:
+        """Newcomers and often mutated ones, origins, and whose mutants they are. keys: [1 +
+        mutations].
+        """
         config, count = self.config.forced, self.config.offspring
         newcomers = jnp.round(config.newcomers * count)
         drawn = jax.random.randint(keys[0], (count,), 0, self.config.population)
@@ -191,9 +203,8 @@ class Evolution:
 
         mutants, _ = jax.lax.scan(mutated, mutants, keys[1:])
         is_new = jnp.arange(count) < newcomers
-        return _pick(is_new, created, mutants), jnp.where(
-            is_new, int(Origin.NEWCOMER), int(Origin.MUTATION)
-        )
+        origin = jnp.where(is_new, int(Origin.NEWCOMER), int(Origin.MUTATION))
+        return _pick(is_new, created, mutants), origin, drawn
 
     def _plant(
         self, state: EvolutionState, proposal: Proposal, judged: Judged, generation: jax.Array
@@ -230,9 +241,9 @@ class Evolution:
         judged: Judged,
         rounds: jax.Array | None,
         generation: jax.Array,
-    ) -> EvolutionState:
-        """The P best of the grown population, without duplicates; in a forced generation what
-        was fit enough goes before the old.
+    ) -> tuple[EvolutionState, jax.Array | None]:
+        """The P best of the grown population, without duplicates, and the places of their mothers;
+        in a forced generation what was fit enough goes before the old.
         """
         count = self.config.population
         pool = jax.tree.map(
@@ -265,7 +276,10 @@ class Evolution:
         kept = kept[jnp.argsort(-fitness[kept], stable=True)]
         genomes, terms, outcome, born, origin, rounds = jax.tree.map(lambda leaf: leaf[kept], pool)
         refreshed = state.refreshed + jnp.where(state.forced, jnp.sum(admitted), 0)
-        return dataclasses.replace(
+        mothers = proposal.mothers
+        if mothers is not None:
+            mothers = jnp.append(_own(state), mothers)[kept]
+        survivors = dataclasses.replace(
             state,
             genomes=genomes,
             terms=terms,
@@ -276,6 +290,12 @@ class Evolution:
             rounds=rounds,
             refreshed=refreshed.astype(jnp.int32),
         )
+        return survivors, mothers
+
+
+def _own(state: EvolutionState) -> jax.Array:
+    """[P] everybody's own place."""
+    return jnp.arange(state.fitness.shape[0])
 
 
 def _pick(condition: jax.Array, yes: Any, no: Any) -> Any:

@@ -10,7 +10,11 @@ from mjxgait.types import Judged
 
 
 def metrics(
-    config: EvolutionConfig, state: EvolutionState, judged: Judged, forced: jax.Array
+    config: EvolutionConfig,
+    state: EvolutionState,
+    judged: Judged,
+    forced: jax.Array,
+    mothers: jax.Array | None,
 ) -> GenerationMetrics:
     """Of a state that is sorted, and the verdict that led to it. forced: [] whether it was."""
     quartiles = jnp.percentile(
@@ -37,6 +41,7 @@ def metrics(
         computed_steps=judged.computed_steps,
         best_terms=jnp.mean(state.terms[0], axis=0),
         best_outcome=jnp.mean(state.outcome[0], axis=0),
+        mothers=mothers,
     )
 
 

@@ -8,6 +8,9 @@ import jax
 from mjxgait.settings.evolution import EvolutionConfig
 from mjxgait.types import pytree
 
+NOBODY = -1
+"""The mother's place of one that has none, or of whom it is not known."""
+
 
 class Origin(IntEnum):
     """How an individual came to be."""
@@ -58,7 +61,8 @@ class GenerationMetrics:
     the mean over the trials of the best individual's terms and outcome.
 
     unique: different genomes. spread: mean standard deviation of a gene. failures: how many of the
-    offspring's episodes ended early.
+    offspring's episodes ended early. mothers: [P] the places that the population, or its mothers,
+    had in the generation before; None where that is not followed.
     """
 
     generation: jax.Array
@@ -78,19 +82,22 @@ class GenerationMetrics:
     computed_steps: jax.Array
     best_terms: jax.Array
     best_outcome: jax.Array
+    mothers: jax.Array | None = None
 
 
 @pytree
 class Proposal:
     """What a generation wants judged.
 
-    key: of the next generation. offspring: leaves [M, ...]; origin, born: [M].
+    key: of the next generation. offspring: leaves [M, ...]; origin, born: [M]. mothers: [M] places
+    of their first parents, or `NOBODY`; None where that is not followed.
     """
 
     key: jax.Array
     offspring: Any
     origin: jax.Array
     born: jax.Array
+    mothers: jax.Array | None = None
 
 
 def stop_reason(state: EvolutionState, config: EvolutionConfig) -> str | None:

@@ -95,6 +95,7 @@ class EvolutionConfig:
         body's.
       tuning_sigma: by how much it changes, in units of its range; likewise a body's.
       remove_duplicates: of individuals with the same genome only one survives.
+      lineage: whether a run's metrics tell whose child each is, not of islands.
       forced: a spell of rapid mutation and newcomers when growth stalls.
       islands: several such populations that exchange their best (docs/cluster.md).
     """
@@ -126,6 +127,7 @@ class EvolutionConfig:
     tuning_rate: Fraction = 0.3
     tuning_sigma: Positive = 0.1
     remove_duplicates: bool = True
+    lineage: Annotated[bool, SHAPE] = False
     forced: ForcedConfig = dataclasses.field(default_factory=ForcedConfig)
     islands: IslandsConfig = dataclasses.field(default_factory=IslandsConfig)
 
@@ -137,8 +139,10 @@ class EvolutionConfig:
                 f"growth = {self.growth} leaves no room for offspring; make it larger than {1 + 1 / self.population:.3g}"
             )
 
-        if self.proportional and (self.unique_children or self.pool == "growing"):
-            raise ValueError("proportional is for children that are born all at once")
+        at_once = not self.unique_children and self.pool != "growing"
+        if (self.proportional or self.lineage) and not at_once:
+            which = "proportional" if self.proportional else "lineage"
+            raise ValueError(f"{which} is for children that are born all at once")
         if self.elite and self.survival == "best":
             raise ValueError('elite is for survival = "children": of the best all live on anyway')
         if self.remember and not self.elite:

@@ -2,7 +2,7 @@
 generations.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from mjxgait.runs.folder import open_champion
@@ -36,10 +36,19 @@ def through_generations(run: Path, generations: Sequence[int], seconds: float) -
     Raises:
       UserError: there is no checkpoint of one of them.
     """
+    return in_generations(run, dict.fromkeys(generations, 0), seconds)
+
+
+def in_generations(run: Path, places: Mapping[int, int], seconds: float) -> list[Runner]:
+    """Those who had these places in these generations; 0 is the best's.
+
+    Raises:
+      UserError: there is no checkpoint of one of them.
+    """
     return [
         Runner(walk, f"generation {generation}")
-        for generation in generations
-        for _, walk in _walks(run, generation, range(1, 2), seconds)
+        for generation, place in places.items()
+        for _, walk in _walks(run, generation, range(place + 1, place + 2), seconds)
     ]
 
 

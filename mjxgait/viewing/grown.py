@@ -1,5 +1,6 @@
-"""Bodies that grew: the graph beside what grows from it, and the best of several generations."""
+"""Bodies that grew: the graph beside what grows from it, and its ancestors."""
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -8,8 +9,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from mjxgait.champion import Champion
 from mjxgait.champion.blocks.parts import Part, grow
-from mjxgait.viewing.cast import through_generations
+from mjxgait.inspect.snapshot import Snapshot, read_snapshot
+from mjxgait.runs.lineage import mothers_line
+from mjxgait.viewing.cast import in_generations
 from mjxgait.viewing.stage import Stage
 from mjxgait.viewing.style import ACCENT, DARK, MIDDLE
 from mjxgait.viewing.video import Runner
@@ -37,24 +41,48 @@ def draw_graph(drawing: Figure, walk: Walk) -> None:
     body.set_title("the body that grows")
 
 
-def bodies_of(run: Path, generations: Sequence[int]) -> list[Runner]:
-    """The best of some of these generations, the last one among them."""
-    count = min(len(generations), MOST)
-    chosen = np.unique(np.linspace(0, len(generations) - 1, count).round().astype(int))
-    return through_generations(run, [generations[i] for i in chosen], STANDING)
+@dataclasses.dataclass(frozen=True)
+class Row:
+    """Bodies of several generations. descend: whether each descends from the one before."""
+
+    bodies: Sequence[Runner]
+    descend: bool
 
 
-def draw_bodies(drawing: Figure, bodies: Sequence[Runner]) -> None:
+def bodies_of(run: Path, champion: Champion) -> Row:
+    """The champion and its first ancestors in some of the generations that are kept; where a log does
+    not tell of mothers, the best of these.
+    """
+    latest = read_snapshot(run)
+    line = mothers_line(latest.lines, latest.generation, _place(latest, champion))
+    descend = len(line) > 1
+    places = line if descend else dict.fromkeys(latest.generations, 0)
+    known = [generation for generation in latest.generations if generation in places]
+    chosen = np.linspace(0, len(known) - 1, min(len(known), MOST)).round().astype(int)
+    shown = {known[i]: places[known[i]] for i in np.unique(chosen)}
+    return Row(in_generations(run, shown, STANDING), descend)
+
+
+def draw_bodies(drawing: Figure, row: Row) -> None:
     """In a row, each with a scale of its own."""
-    fields = drawing.subplots(1, len(bodies), squeeze=False)[0]
-    for axes, body in zip(fields, bodies, strict=True):
+    fields = drawing.subplots(1, len(row.bodies), squeeze=False)[0]
+    for axes, body in zip(fields, row.bodies, strict=True):
         axes.imshow(Stage([body.walk], *SIZE).picture(0), interpolation="lanczos")
         axes.set_axis_off()
         axes.set_title(body.label, fontsize=9)
-    drawing.suptitle(
-        "The best of each generation that was kept; one need not descend from the one before",
-        fontsize=10,
-    )
+    said = "The champion and its ancestors, mother by mother"
+    if not row.descend:
+        said = "The best of each generation that was kept; one need not descend from the one before"
+    drawing.suptitle(said, fontsize=10)
+
+
+def _place(population: Snapshot, champion: Champion) -> int:
+    """The champion's; the best's if it is not there."""
+    genes = [
+        (found == champion.genome[name]).reshape(len(found), -1).all(1)
+        for name, found in population.genomes.items()
+    ]
+    return int(np.argmax(np.all(genes, axis=0)))
 
 
 def _draw_graph(axes: Axes, genome: Mapping[str, np.ndarray], parts: Sequence[Part]) -> None:

@@ -16,7 +16,6 @@ from mjxgait.parts import make_task
 from mjxgait.parts.registry import what_ends
 from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.folder import CHAMPION, METRICS, PLOTS, open_run, read_metrics
-from mjxgait.runs.stored import stored_generations
 from mjxgait.settings.config import Config
 from mjxgait.viewing import brain, grown, strobe, trees
 from mjxgait.viewing.cast import LOOP_SECONDS, champion_of
@@ -78,10 +77,10 @@ def _of_programs(walk: Walk) -> Figures:
 
 
 def _of_grown(run: Path, walk: Walk) -> Figures:
-    """Graph and body, brain, and bodies of earlier generations; nothing where the body did not grow."""
+    """Graph and body, brain, and ancestors; nothing where the body did not grow."""
     if "graph.half" not in walk.champion.genome:
         return {}
-    bodies = grown.bodies_of(run, stored_generations(run))
+    row = grown.bodies_of(run, walk.champion)
     twin = twin_of(walk.creature, walk.champion, walk.time_step)
     assert isinstance(twin, BrainTwin)
     thoughts = network_of(twin)
@@ -89,8 +88,8 @@ def _of_grown(run: Path, walk: Walk) -> Figures:
         "graph": ((10, 4.6), lambda drawing: grown.draw_graph(drawing, walk)),
         "brain": (brain.shape(thoughts), lambda drawing: brain.draw_brain(drawing, thoughts)),
         "bodies": (
-            (2.2 * max(len(bodies), 2), 2.4),
-            lambda drawing: grown.draw_bodies(drawing, bodies),
+            (2.2 * max(len(row.bodies), 2), 2.4),
+            lambda drawing: grown.draw_bodies(drawing, row),
         ),
     }
 

@@ -1,6 +1,7 @@
 """Bodies and brains that evolve together, through the same run as everybody's."""
 
 import dataclasses
+import json
 from pathlib import Path
 
 import jax
@@ -15,21 +16,25 @@ from mjxgait.certify.starts import nominal_starts
 from mjxgait.champion import read_champion, write_champion
 from mjxgait.champion.blocks.material import DRAG
 from mjxgait.champion.blocks.parts import grow
+from mjxgait.inspect.snapshot import read_snapshot
 from mjxgait.library import load_creature
 from mjxgait.parts.settings import build_config
+from mjxgait.runs.checkpoint import Checkpoints
 from mjxgait.runs.experiment import Experiment, Step, build_experiment
+from mjxgait.runs.folder import METRICS, create_run
+from mjxgait.runs.loop import metrics_line
 from mjxgait.search.state import EvolutionState
 from mjxgait.settings.blocks import SwimConfig
 from mjxgait.tasks.blocks.alive import FASTEST_HINGE, FURTHEST
 from mjxgait.tasks.blocks.swim import Swim
-from mjxgait.viewing.grown import draw_graph
+from mjxgait.viewing.grown import bodies_of, draw_bodies, draw_graph
 from mjxgait.viewing.style import figure
 from mjxgait.viewing.walk import record_walk
 
 TABLE = {
     "use": {"controller": "brain", "task": "swim"},
     "controller": {"nodes": 3, "parts": 4, "links": 4, "local": 2, "central": 1},
-    "evolution": {"population": 60},
+    "evolution": {"population": 60, "lineage": True},
     "rollout": {"seconds": 1.6, "starts": 2, "lanes": 20, "joint_noise": 0.1},
     "fitness": {"settle": 0.1, "weights": {"overlap": 0.0, "elsewhere": 0.0}},
 }
@@ -167,6 +172,33 @@ def test_a_champion_is_drawn_with_the_nodes_that_its_body_grew_from(experiment, 
     assert {text for text in said if text.isdigit()} == nodes
     assert sum("cm" in text for text in said) == len(nodes)
     assert len(picture.images) == 1
+
+
+def test_a_champion_is_drawn_with_its_ancestors(experiment: Experiment, step: Step, tmp_path: Path):
+    """In the generations that are kept; the best of each where the log says nothing of mothers."""
+    run = tmp_path / "run"
+    create_run(run, experiment.creature, experiment.config)
+    state, checkpoints, lines = experiment.place(experiment.init()), Checkpoints(run), []
+    for _ in range(4):
+        state, metrics = step(state)
+        lines.append(metrics_line(jax.device_get(metrics), 1.0, experiment.simulator.task))
+        checkpoints.save(state, experiment.creature.name, experiment.creature.digest)
+    checkpoints.close()
+    (run / METRICS).write_text("".join(json.dumps(line) + "\n" for line in lines))
+    rank = 2
+    row = bodies_of(run, experiment.champion(state, {}, rank))
+    assert [body.label for body in row.bodies] == [f"generation {g}" for g in range(4)]
+    places = [rank]
+    for line in lines[:0:-1]:
+        places.append(line["mothers"][places[-1]])
+    for body, generation, place in zip(row.bodies, range(4), places[::-1], strict=True):
+        half = read_snapshot(run, generation).genomes["graph.half"][place]
+        np.testing.assert_array_equal(body.walk.champion.genome["graph.half"], half)
+    with figure((8, 2.4)) as drawing:
+        draw_bodies(drawing, row)
+        assert len(drawing.axes) == 4
+    (run / METRICS).write_text(json.dumps(lines[3] | {"mothers": [-1] * 60}) + "\n")
+    assert not bodies_of(run, experiment.champion(state, {})).descend
 
 
 def test_a_champion_of_theirs_is_a_file(experiment: Experiment, evolved, tmp_path: Path):

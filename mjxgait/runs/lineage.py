@@ -1,0 +1,23 @@
+"""Whose child somebody is, from what the log of a run tells of each generation."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from mjxgait.search.state import NOBODY
+
+MOTHERS = "mothers"
+"""In a line of the log, of everybody in the population the place that it had itself, or its mother,
+in the generation before."""
+
+
+def mothers_line(lines: Sequence[Mapping[str, Any]], generation: int, place: int) -> dict[int, int]:
+    """By generation, latest first, the place of somebody's first ancestors in the population.
+
+    Back to where somebody has no mother, or the log does not tell.
+    """
+    known = {line["generation"]: line[MOTHERS] for line in lines if MOTHERS in line}
+    found = {generation: place}
+    while (mother := known.get(generation, {place: NOBODY})[place]) != NOBODY:
+        generation, place = generation - 1, mother
+        found[generation] = place
+    return found
