@@ -14,13 +14,13 @@ class BlocksConfig:
       overlap: how deep blocks are in each other or in the ground, of the smaller one's size, of
         which half counts of what was done.
       apart: generations until that counts in full: whoever is fast learns to keep its blocks apart
-        more easily than the other way round.
+        more easily than the other way round. 0: from the first on.
     """
 
     __pydantic_config__ = STRICT
     settle: NonNegative = 2.0
     overlap: Positive = 0.05
-    apart: Positive = 30.0
+    apart: NonNegative = 30.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -81,25 +81,27 @@ class RoamConfig(BlocksConfig):
     """
 
     __pydantic_config__ = STRICT
-    apart: Positive = 10.0
+    apart: NonNegative = 10.0
     tilt: Positive = 45.0
     weights: RoamWeights = dataclasses.field(default_factory=RoamWeights)
 
 
 @dataclasses.dataclass(frozen=True)
 class JumpWeights:
-    """What each term counts; `overlap` and `wild` are penalties.
+    """What each term counts; all but `height` are penalties.
 
     Attributes:
       height: m, the greatest height of the lowest part.
       overlap: what of it is lost by blocks that stand in each other or in the ground.
       wild: what of the rest is lost by an episode that ends early: its share that was not lived.
+      once: what of the rest is lost by jumping less high at other times.
     """
 
     __pydantic_config__ = STRICT
     height: NonNegative = 1.0
     overlap: NonNegative = 1.0
     wild: NonNegative = 1.0
+    once: NonNegative = 1.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -111,5 +113,6 @@ class JumpConfig(BlocksConfig):
     """
 
     __pydantic_config__ = STRICT
-    apart: Positive = 10.0
+    overlap: Positive = 0.04
+    apart: NonNegative = 0.0
     weights: JumpWeights = dataclasses.field(default_factory=JumpWeights)

@@ -172,18 +172,27 @@ def test_to_jump_is_to_have_the_lowest_part_high_once_settled(task: Roam):
     jumping = Jump(task.creature, task.step, task.horizon, task.ends)
     settings = JumpConfig(settle=0.5)
 
-    def jumped(sunk: float) -> dict[str, float]:
+    def jumped(sunk: float = 0.0, again: float = 0.0) -> dict[str, float]:
+        """To 0.3 m once, and to another height in each of the other quarters."""
         tally, standards = jumping.init(), jumping.standards(settings)
+        heights = {10: 0.7, 60: again, 80: 0.3, 120: again, 140: again}
         for k in range(task.horizon):
-            low = CALM.geom_low.at[:].set(1.0).at[1].set({10: 0.7, 80: 0.3}.get(k, 0.0))
+            low = CALM.geom_low.at[:].set(1.0).at[1].set(heights.get(k, 0.0))
             deep = jnp.float32(sunk if k == 100 else -1.0)
             sensed = dataclasses.replace(CALM, geom_low=low, sunk=deep)
             tally = jumping.update(tally, sensed, jnp.zeros(3), standards, ())
         return {name: float(value) for name, value in jumping.judge(tally, settings).items()}
 
-    assert jumped(0.0) == pytest.approx({"height": 0.3, "overlap": 0.0, "wild": 0.0})
+    always, once = jumped(again=0.3), jumped()
+    assert always == pytest.approx({"height": 0.3, "overlap": 0, "wild": 0, "once": 0})
+    assert once == pytest.approx({"height": 0.3, "overlap": 0, "wild": 0, "once": 0.225})
     assert jumped(settings.overlap)["overlap"] == pytest.approx(0.15)
-    half = dataclasses.replace(jumping.init(), height=0.3, steps=task.horizon // 2)
+    assert jumped(settings.overlap / 2)["overlap"] < 0.01, "who jumps has to land"
+    deep = jumped(10 * settings.overlap)
+    assert deep["overlap"] + deep["once"] < deep["height"]
+    half = dataclasses.replace(
+        jumping.init(), heights=jnp.full(4, 0.3), steps=jnp.int32(task.horizon // 2)
+    )
     assert float(jumping.judge(half, settings)["wild"]) == pytest.approx(0.15)
 
 

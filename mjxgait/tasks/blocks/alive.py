@@ -74,7 +74,7 @@ class BlocksTask(PlainTask):
         counts more and more.
         """
         counts = {name: getattr(settings.weights, name) for name in self.terms}
-        share = jnp.minimum(generation / settings.apart, 1.0)
+        share = jnp.where(generation < settings.apart, generation / settings.apart, 1.0)
         counts["overlap"] = counts["overlap"] * share
         wanted = self.terms[0]
         return {n: jnp.asarray(c) if n == wanted else -jnp.asarray(c) for n, c in counts.items()}

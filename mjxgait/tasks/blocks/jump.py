@@ -14,12 +14,24 @@ from mjxgait.tasks import protocol
 from mjxgait.tasks.blocks.alive import BlocksTask, lost
 from mjxgait.types import Sensed, pytree
 
+SHARPNESS = 3
+"""By how much later than a walker's a depth costs, and more from there on. Whoever falls from a height
+is in the ground for a moment, as deep as the root of that height: at a walker's price no jump above
+a tenth of a metre is worth more.
+"""
+
+
+SPANS = 4
+"""Of the time that counts; in each of them it is to jump. Once in eight seconds somebody comes off the
+ground by chance, as high as those that are meant to, and only in the trial that it was chosen in.
+"""
+
 
 @pytree
 class Tally(protocol.Tally):
-    """See `protocol.Tally`. height: [] m, the greatest of its lowest part since counting began."""
+    """See `protocol.Tally`. heights: [SPANS] m, the greatest of its lowest part in each."""
 
-    height: jax.Array
+    heights: jax.Array
 
 
 class Jump(BlocksTask):
@@ -31,8 +43,8 @@ class Jump(BlocksTask):
 
     def init(self) -> Tally:
         """See `Task`."""
-        none, nothing = jnp.zeros((), jnp.int32), jnp.zeros(())
-        return Tally(none, none, nothing, nothing)
+        none = jnp.zeros((), jnp.int32)
+        return Tally(none, none, jnp.zeros(()), jnp.zeros(SPANS))
 
     def update(
         self, tally: Tally, sensed: Sensed, torque: jax.Array, standards: Any, aim: Any
@@ -40,25 +52,30 @@ class Jump(BlocksTask):
         """See `Task`."""
         assert sensed.sunk is not None
         begins, low = tally.steps <= standards, jnp.min(sensed.geom_low)
+        span = SPANS * (tally.steps - standards) // jnp.maximum(self.horizon - standards, 1)
+        now = (jnp.arange(SPANS) == span) & ~begins
         return dataclasses.replace(
             tally,
             steps=tally.steps + 1,
             overlap=jnp.where(begins, tally.overlap, jnp.maximum(tally.overlap, sensed.sunk)),
-            height=jnp.where(begins, 0.0, jnp.maximum(tally.height, low)),
+            heights=jnp.where(now, jnp.maximum(tally.heights, low), tally.heights),
         )
 
     def judge(self, tally: Tally, settings: JumpConfig) -> Mapping[str, jax.Array]:
-        """See `Task`: m; what of it is lost by blocks that stand in each other or in the ground; and of
-        the rest by an end before the end, for the wildest leap is the last.
+        """See `Task`: m; what of it is lost by blocks that stand in each other or in the ground; of
+        the rest by an end before the end, for the wildest leap is the last; and of what then is
+        left by the spans in which it jumps less high.
         """
-        inside = lost(tally.overlap / settings.overlap)
-        wild = (1 - inside) * (1 - tally.steps / self.horizon)
+        height = jnp.max(tally.heights)
+        inside = lost((tally.overlap / settings.overlap) ** SHARPNESS)
+        lived = (1 - inside) * tally.steps / self.horizon
         return {
-            "height": tally.height,
-            "overlap": tally.height * inside,
-            "wild": tally.height * wild,
+            "height": height,
+            "overlap": height * inside,
+            "wild": height * (1 - inside - lived),
+            "once": (height - jnp.mean(tally.heights)) * lived,
         }
 
     def outcome(self, tally: Tally) -> Mapping[str, jax.Array]:
         """See `Task`: m, and s until the end."""
-        return {"height": tally.height, "seconds": tally.steps * self.step}
+        return {"height": jnp.max(tally.heights), "seconds": tally.steps * self.step}
