@@ -4,6 +4,7 @@ Who evolves them are made-up hands; that a row is the run that its seed alone is
 """
 
 import dataclasses
+import json
 from pathlib import Path
 
 import numpy as np
@@ -69,10 +70,14 @@ def test_stopped_on_the_way_all_go_on_to_the_same_end(
 ):
     zoo = begun(tmp_path / "again", stool)
     assert not go_on(zoo, stool, Interrupted)
+    last = read_metrics(folders_of(zoo)[0] / METRICS)[-1]
+    with (folders_of(zoo)[0] / METRICS).open("a") as log:  # killed before its state was stored
+        log.write(json.dumps(last | {"generation": last["generation"] + 1}) + "\n")
     assert go_on(zoo, stool)
     for one, again in zip(folders_of(finished), folders_of(zoo), strict=True):
         states = [read_stored(folder, stool.digest).arrays[POSES] for folder in (one, again)]
         np.testing.assert_array_equal(*states)
+        assert read_metrics(one / METRICS) == read_metrics(again / METRICS)
 
 
 def test_in_several_pieces_of_work_all_come_to_the_same(
