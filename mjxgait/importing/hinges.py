@@ -17,6 +17,11 @@ MIDDLE = 0.02
 """Share of the skeleton's span within which a bone begins in the middle."""
 SHORT = 0.04
 """Share of the height below which a bone does not bend on its own."""
+TOE = 0.5
+"""Share of the longest toe that another one reaches, or it is a spur."""
+LIMB, LOW = 0.4, 0.1
+"""Share that a limb reaches of the longest one, or it is an ear; of the height within which it ends at the
+floor."""
 BENT = np.radians(8.0)
 SWING, SPREAD, SPINE, ANKLE, LOOSE = 60.0, 30.0, 25.0, 45.0, 45.0
 FOLD, STRETCH = 75.0, 3.0
@@ -48,7 +53,7 @@ class Plan:
         spots = np.concatenate([rig.places, *rig.ends])
         self.span = float(np.ptp(spots, axis=0).max())
         self.height = float(np.ptp(np.concatenate([spots, *rig.skins])[:, up])) or self.span
-        level = [(up + 2) % 3, (up + 1) % 3]  # with Y up the side is X, as is usual, if both are
+        level = [axis for axis in range(3) if axis != up]  # the side is X, as usual, if both are
         self.side = min(level, key=self._unlike)
         self.ahead = next(axis for axis in level if axis != self.side)
 
@@ -64,12 +69,16 @@ class Plan:
         return abs(float(apart)) < MIDDLE * self.span
 
     def carries(self, bone: int) -> bool:
-        """Whether it is the root, or in the middle with limbs below it."""
-        return bone == 0 or (self.in_middle(bone) and self._limbs_below[bone])
+        """Whether it is the root, or in the middle with limbs of both sides below it."""
+        return bone == 0 or (self.in_middle(bone) and len(self.sides_below[bone]) > 1)
 
     @cached_property
-    def _limbs_below(self) -> list[bool]:
-        found = [not self.in_middle(b) for b in range(len(self.rig.names))]
+    def sides_below(self) -> list[set[float]]:
+        """Of each bone the sides of limbs that it or one below it begins."""
+        found: list[set[float]] = [set() for _ in self.rig.names]
+        for bone in self.limbs:
+            apart = self.rig.places[bone, self.side] - self.rig.places[0, self.side]
+            found[bone].add(float(np.sign(apart)))
         for bone in reversed(range(1, len(found))):
             found[self.rig.parents[bone]] |= found[bone]
         return found
@@ -78,21 +87,58 @@ class Plan:
     def half_width(self) -> float:
         """m, mean distance from the middle at which limbs begin."""
         rig = self.rig
-        firsts = [b for b in range(len(rig.names)) if self.begins_limb(b)]
-        apart = np.abs(rig.places[firsts, self.side] - rig.places[0, self.side])
-        return float(apart.mean()) if firsts else 0.0
+        apart = np.abs(rig.places[self.limbs, self.side] - rig.places[0, self.side])
+        return float(apart.mean()) if self.limbs else 0.0
 
-    def begins_limb(self, bone: int) -> bool:
-        """Whether a limb leaves the trunk there."""
+    def leaves_middle(self, bone: int) -> bool:
+        """Whether a limb, or an ear, leaves the trunk there."""
         parent = self.rig.parents[bone]
         return not self.in_middle(bone) and (parent < 0 or self.in_middle(parent))
+
+    def is_limb(self, bone: int) -> bool:
+        """Whether a limb begins there: what is short is an ear, an eye, a handle."""
+        return self.leaves_middle(bone) and self.reach(bone) > LIMB * self.longest
+
+    @cached_property
+    def limbs(self) -> list[int]:
+        """The first bone of each."""
+        return [bone for bone in range(len(self.rig.names)) if self.is_limb(bone)]
+
+    @cached_property
+    def longest(self) -> float:
+        """m, that what leaves the middle reaches at most."""
+        firsts = filter(self.leaves_middle, range(len(self.rig.names)))
+        return max(map(self.reach, firsts), default=0.0)
+
+    def reach(self, first: int) -> float:
+        """m, from where a limb, or what is left of it, begins to its end."""
+        return float(np.linalg.norm(self.tips[first] - self.rig.places[first]))
+
+    @cached_property
+    def tips(self) -> np.ndarray:
+        """[B, 3] where the limb ends that a bone belongs to."""
+        found = self.rig.places + [self.way(bone) for bone in range(len(self.rig.names))]
+        for bone in reversed(range(len(found))):
+            if below := self.rig.children(bone):
+                found[bone] = found[max(below, key=self._length)]
+        return found
+
+    def _length(self, bone: int) -> float:
+        return float(np.linalg.norm(self.way(bone)))
+
+    @cached_property
+    def stands(self) -> float:
+        """m, that limbs which end at the floor come down in all: much where up is up."""
+        tips = self.tips[self.limbs, self.up]
+        drops = np.maximum(self.rig.places[self.limbs, self.up] - tips, 0.0)
+        return float(drops[tips - self.floor < LOW * self.height].sum())
 
     def segments(self, bone: int) -> list[tuple[np.ndarray, np.ndarray]]:
         """From where a bone begins to where it ends, [3] each, those within the trunk left out."""
         rig, start = self.rig, self.rig.places[bone]
         below = rig.children(bone)
         if self.in_middle(bone):
-            below = [b for b in below if not self.begins_limb(b)] or below
+            below = [b for b in below if not self.leaves_middle(b)] or below
         ends = [*rig.places[below], *rig.ends[bone]]
         if not ends and len(rig.skins[bone]):
             ends = [start + 1.8 * (rig.skins[bone].mean(0) - start)]
@@ -107,15 +153,20 @@ class Plan:
         """A limb's bones from its first one down, along the longest."""
         chain = [first]
         while below := self.rig.children(chain[-1]):
-            chain.append(max(below, key=lambda b: float(self.way(b) @ self.way(b))))
+            chain.append(max(below, key=self._length))
         return chain
+
+    def has_toes(self, bone: int) -> bool:
+        """Whether a limb goes on from there as several of about one length, as fingers do."""
+        reaches = sorted(map(self.reach, self.rig.children(bone)), reverse=True)
+        return len(reaches) > 1 and reaches[1] > TOE * reaches[0]
 
     @cached_property
     def feet(self) -> list[int]:
         """Bones below the ankles of a body on two feet, which needs heels to stand; else none."""
         rig, floor = self.rig, self.floor
         found = []
-        for first in (b for b in range(len(rig.names)) if self.begins_limb(b)):
+        for first in self.limbs:
             for bone in self.limb(first):
                 low = rig.places[bone, self.up] - floor < ANKLE_HIGH * self.height
                 if low and toes(self, bone):
@@ -147,16 +198,16 @@ class Plan:
 
     def moves(self, bone: int) -> bool:
         """Whether it is long enough to bend on its own."""
-        return bool(np.linalg.norm(self.way(bone)) > SHORT * self.height)
+        return self._length(bone) > SHORT * self.height
 
 
 def hinges_of(plan: Plan) -> list[list[Hinge]]:
     """Of each bone, the root's none."""
     found: list[list[Hinge]] = [[] for _ in plan.rig.names]
     for bone in range(1, len(found)):
-        if plan.begins_limb(bone):
+        if plan.is_limb(bone):
             _limb(plan, bone, found)
-        elif plan.in_middle(bone) and not plan.carries(bone) and plan.moves(bone):
+        elif plan.in_middle(bone) and not plan.sides_below[bone] and plan.moves(bone):
             found[bone] = _spine(plan, "it may nod and turn")
     for bone in plan.rig.children(0):
         chain = _spine_below(plan, bone)
@@ -176,19 +227,23 @@ def _spine_below(plan: Plan, bone: int) -> list[int]:
 
 
 def _limb(plan: Plan, first: int, found: list[list[Hinge]]) -> None:
-    """Fills in the hinges of a limb, its side branches rigid."""
+    """Fills in the hinges of a limb, its side branches and toes rigid."""
     chain = plan.limb(first)
-    below = next((i for i, bone in enumerate(chain) if bone in plan.feet), len(chain))
-    chain = [bone for bone in chain[: below + 1] if plan.moves(bone)]
+    ends = (i for i, bone in enumerate(chain) if bone in plan.feet or plan.has_toes(bone))
+    below = next(ends, len(chain))
+    *upper, last = chain[: below + 1]
+    chain = [*filter(plan.moves, upper), *[last] * (plan.reach(last) > SHORT * plan.height)]
     if not chain:
         return
-    end = plan.rig.places[chain[-1]] + plan.way(chain[-1])
-    along = np.abs(end - plan.rig.places[first])
+    ways = [plan.way(bone) for bone in chain]
+    if chain[-1] == last and last not in plan.feet:
+        ways[-1] = plan.tips[last] - plan.rig.places[last]
+    along = np.abs(plan.tips[first] - plan.rig.places[first])
     vertical = int(along.argmax()) == plan.up
     found[chain[0]] = _hip(plan, int(along.argmax()))
-    for above, bone in itertools.pairwise(chain):
-        last = bone == chain[-1]
-        found[bone] = [_knee(plan, above, bone, last, vertical, toes(plan, chain[-1]))]
+    for (one, other), bone in zip(itertools.pairwise(ways), chain[1:], strict=True):
+        is_last = bone == chain[-1]
+        found[bone] = [_knee(plan, one, other, is_last, vertical, toes(plan, chain[-1]))]
 
 
 def _hip(plan: Plan, along: int) -> list[Hinge]:
@@ -202,9 +257,12 @@ def _hip(plan: Plan, along: int) -> list[Hinge]:
     ]
 
 
-def _knee(plan: Plan, above: int, bone: int, last: bool, vertical: bool, forward: float) -> Hinge:
-    """The hinge between two bones of a limb: about the axis across the plane in which they lie."""
-    one, other = plan.way(above), plan.way(bone)
+def _knee(
+    plan: Plan, one: np.ndarray, other: np.ndarray, last: bool, vertical: bool, forward: float
+) -> Hinge:
+    """The hinge between two bones of a limb that lie along two ways [3]: about the axis across the
+    plane in which they lie.
+    """
     across = np.cross(one, other)
     size = float(np.linalg.norm(one) * np.linalg.norm(other))
     if float(np.linalg.norm(across)) > np.sin(BENT) * size:
