@@ -13,9 +13,10 @@ from mjxgait.clips.read_bvh import rig_of_bvh
 from mjxgait.clips.rig import Rig
 from mjxgait.clips.rig_of_glb import rig_of_glb
 from mjxgait.errors import UserError
-from mjxgait.importing.hinges import Hinge, Plan, hinges_of
+from mjxgait.importing.hinges import Hinge, hinges_of
 from mjxgait.importing.notes import Confidence, Guess, Notes, listed
 from mjxgait.importing.parts import plain_names
+from mjxgait.importing.plan import Plan
 
 RIGS: Mapping[str, Callable[[Path], Rig]] = {".bvh": rig_of_bvh, ".glb": rig_of_glb}
 UP, OTHER, SURER = "y", "z", 1.5

@@ -19,8 +19,9 @@ from mjxgait.creature import Creature
 from mjxgait.creature.scale import load_files
 from mjxgait.errors import UserError
 from mjxgait.importing import ImportChoices, Imported, import_model
-from mjxgait.importing.hinges import Hinge, Plan, hinges_of
+from mjxgait.importing.hinges import Hinge, hinges_of
 from mjxgait.importing.notes import Notes
+from mjxgait.importing.plan import Plan
 from mjxgait.importing.rigged import model_of
 from mjxgait.keys.axes import axes_of
 from mjxgait.keys.retarget import retarget
@@ -248,6 +249,12 @@ def test_a_body_on_two_feet_has_heels(tmp_path: Path):
     ((heel, toe),) = plan.sole(foot, 1.0)
     assert heel == pytest.approx([10.0, 3.0, -4.0])
     assert toe == pytest.approx([10.0, 3.0, 16.0])
+    assert len(plan.capsules(foot, 1.0)) == 1  # whose upper part would touch before the sole
+    spurs = {f"{side}Heel": (f"{side}Foot", (0, 0, -6), (30, 0, -6)) for side in ("L", "R")}
+    file.write_text(bvh(HUMAN | spurs))
+    plan = Plan(1, rig_of_bvh(file))
+    ((heel, toe),) = plan.sole(plan.rig.names.index("LFoot"), 1.0)
+    assert (heel[2], toe[2]) == pytest.approx((-6.0, 16.0))
     file.write_text(bvh(DOG))
     assert Plan(1, rig_of_bvh(file)).feet == []
 
