@@ -3,8 +3,9 @@ of its own, and prints a table.
 
     python benchmarks/imported.py --models "laikago" "gym ant" --out runs/imported
 
-Names are those of `tests/importing/packages.py`, whose files come from the package index. Options
-after `--` go to `train`. Columns: wall time of both commands together and of the import alone;
+Names are those of `tests/importing/packages.py`, whose files come from the package index; `--files`
+takes others, such as the rigs that `benchmarks/rig_of_blender.py` writes. Options after `--` go to
+`train`. Columns: wall time of both commands together and of the import alone;
 whether the champion is certified, and the margin of its worst criterion; speed over the
 certificate's 20 s; generations; what fails, each measure with its value.
 """
@@ -15,6 +16,7 @@ import shutil
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -42,17 +44,19 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--models", nargs="+", choices=MODELS, default=list(MODELS), metavar="NAME")
+    parser.add_argument("--files", nargs="+", type=Path, metavar="FILE")
     parser.add_argument("--out", type=Path, default=Path("runs/imported"))
     parser.add_argument("more", nargs="*", help="options of train, after --")
     options = parser.parse_args()
     print(*HEADER, sep=" | ")
-    for name in options.models:
-        print(*walk(name, options.out, options.more), sep=" | ", flush=True)
+    for name in [] if options.files else options.models:
+        print(*walk(name, *model_file(name), options.out, options.more), sep=" | ", flush=True)
+    for file in options.files or ():
+        print(*walk(file.name, file, (), options.out, options.more), sep=" | ", flush=True)
 
 
-def walk(name: str, out: Path, more: list[str]) -> list[str]:
+def walk(name: str, path: Path, search: Sequence[Path], out: Path, more: list[str]) -> list[str]:
     """A row of the table; a refusal of the import or of the training is its last column."""
-    path, search = model_file(name)
     env, run = (out / kind / name.replace(" ", "_") for kind in ("envs", "runs"))
     for folder in (env, run):
         shutil.rmtree(folder, ignore_errors=True)

@@ -29,7 +29,8 @@ class RefineOptions:
       begin: Second at which the cycle begins.
       end: Second at which it ends.
       tolerance: Degrees, root mean square, within which the key poses reproduce the cycle.
-      forward: Where the creature in the file looks, Y being up.
+      forward: Where the creature in the file looks, Y being up; by default z, or as in the rig that
+        the creature was imported from.
       only_show: Show names, errors, cycle and key poses, and evolve nothing.
       config: TOML file with settings, or the name of a shipped config.
       seed: Of all randomness.
@@ -46,7 +47,7 @@ class RefineOptions:
     begin: Annotated[float | None, tyro.conf.arg(name="from")] = None
     end: Annotated[float | None, tyro.conf.arg(name="to")] = None
     tolerance: float = 3.0
-    forward: Literal["z", "-z", "x", "-x"] = "z"
+    forward: Literal["z", "-z", "x", "-x"] | None = None
     only_show: bool = False
     config: Path | None = None
     seed: int = 0

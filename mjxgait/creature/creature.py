@@ -59,8 +59,12 @@ class Creature:
     @property
     def rest_qpos(self) -> np.ndarray:
         """[nq], the pose in which the bones of files with its motion rest."""
-        key = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_KEY, REST)
-        return self.stand_qpos if key < 0 else np.array(self.model.key_qpos[key])
+        return np.array(self.model.key(REST).qpos) if self.is_rig else self.stand_qpos
+
+    @property
+    def is_rig(self) -> bool:
+        """Whether it was made of a skeleton, whose bones rest in a pose of their own."""
+        return mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_KEY, REST) >= 0
 
     @property
     def evolution_model(self) -> mujoco.MjModel:

@@ -21,7 +21,7 @@ from mjxgait.importing.mjcf import clean_mjcf
 from mjxgait.importing.notes import Notes, listed
 from mjxgait.importing.orient import find_forward, find_mirror, is_planar, yaw_to
 from mjxgait.importing.parts import HINGE, one_line, plain_names, rotation
-from mjxgait.importing.rigged import RIGS, UP, model_of
+from mjxgait.importing.rigged import RIGS, model_of
 from mjxgait.importing.root import in_plane
 from mjxgait.importing.same import check_same
 from mjxgait.importing.skeleton import build_bodies
@@ -99,10 +99,10 @@ def _import(path: Path, choices: ImportChoices, notes: Notes) -> Imported:
     for what, why in changes:
         notes.change(what, why)
     _tell_dropped(model, notes)
-    up = choices.up or source.up
+    up = source.up.value if source.up else choices.up
     anatomy = find_anatomy(model, source.coupled, choices.keep, choices.freeze, up, notes)
-    if source.up and not choices.up:
-        notes.guess("up", source.up, "high", "the convention of BVH and glTF")
+    if source.up:
+        notes.guess("up", source.up.value, source.up.confidence, source.up.reason)
     _tell_left_out(model, anatomy, notes)
     bodies = build_bodies(model, anatomy, source.efforts, notes)
     puppet = Puppet(
@@ -141,7 +141,8 @@ def _read(path: Path, choices: ImportChoices, notes: Notes) -> Source:
                 f"--height is for skeletons ({', '.join(RIGS)}); {path} has its lengths"
             )
         return read_source(path, choices.search, notes)
-    return Source(model_of(path, choices.up, choices.height, notes), up=UP)
+    tree, up = model_of(path, choices.up, choices.height, notes)
+    return Source(tree, up=up)
 
 
 def read_source(path: Path, search: Sequence[Path], notes: Notes) -> Source:

@@ -41,9 +41,13 @@ RANGES = {
     "twist": 12.0,
     "ankle": 25.0,
     "spine": 15.0,
+    "distal": 20.0,
     "other": 20.0,
 }
-"""deg to both sides of the standing angle, by what a joint does."""
+"""deg to both sides of the standing angle, by what a joint does. Distal is what swings a foot below two
+joints that do, as hocks and pasterns: limbs flail that swing widely in all of them."""
+SWINGING = 2
+"""Joints of a leg that swing it widely."""
 STEPPERS, APART = 2, 0.5
 """Feet of a body that must step under its fall; with more, or so many hip heights one behind the
 other, it stands."""
@@ -104,7 +108,7 @@ def plan_drive(puppet: Puppet, q: np.ndarray, stance: Stance, planar: bool, note
     notes.guess("torque_limit", f"{torque.min():.3g} to {torque.max():.3g}", "high" if used.all() else "medium",
                 f"stated for {used.sum()} of {len(q)} joints; else from weight times hip height")  # fmt: skip
     notes.guess(
-        "range", "by what each joint does", "low", "45 degrees and less, within the file's limits"
+        "range", "by what each joint does", "low", "40 degrees and less, within the file's limits"
     )
     if not planar:
         _steering(puppet, stance, drive, moves)
@@ -163,6 +167,9 @@ def _roles(puppet: Puppet, q: np.ndarray, stance: Stance) -> tuple[list[str], np
             roles.append(
                 ROLES[int((np.abs(mean[j]) * [1.3, 1.0, 1.0]).argmax())]
             )  # a tie is a stride
+    for f in range(len(puppet.feet)):
+        for j in [j for j in puppet.leg(f) if roles[j] in ("stride", "lift")][SWINGING:]:
+            roles[j] = "distal"
     return roles, mean
 
 

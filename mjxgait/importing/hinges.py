@@ -6,26 +6,18 @@ place. Axes are those of the file; angles are deg from rest.
 
 import dataclasses
 import itertools
-from functools import cached_property
 
 import numpy as np
 
-from mjxgait.clips.rig import Rig
 from mjxgait.importing.notes import Confidence
+from mjxgait.importing.plan import SHORT, Plan, toes
 
-MIDDLE = 0.02
-"""Share of the skeleton's span within which a bone begins in the middle."""
-SHORT = 0.04
-"""Share of the height below which a bone does not bend on its own."""
 BENT = np.radians(8.0)
 SWING, SPREAD, SPINE, ANKLE, LOOSE = 60.0, 30.0, 25.0, 45.0, 45.0
 FOLD, STRETCH = 75.0, 3.0
 """deg that a knee bends further from where it rests; that it stays from being straight."""
 KNEE = (5.0, 110.0)
 """deg that a knee which rests straight bends the wrong way, and the right one."""
-FOOT, ANKLE_HIGH, HEEL = 0.3, 0.1, 0.25
-"""Share of its length that a foot points forward; of the height below which an ankle lies; of a foot's
-length that its heel is behind the ankle."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -40,123 +32,13 @@ class Hinge:
     reason: str
 
 
-class Plan:
-    """A skeleton in metres and what its limbs are. up: number of the axis that points up."""
-
-    def __init__(self, up: int, rig: Rig) -> None:
-        self.up, self.rig = up, rig
-        spots = np.concatenate([rig.places, *rig.ends])
-        self.span = float(np.ptp(spots, axis=0).max())
-        self.height = float(np.ptp(np.concatenate([spots, *rig.skins])[:, up])) or self.span
-        level = [(up + 2) % 3, (up + 1) % 3]  # with Y up the side is X, as is usual, if both are
-        self.side = min(level, key=self._unlike)
-        self.ahead = next(axis for axis in level if axis != self.side)
-
-    def _unlike(self, axis: int) -> float:
-        """m, how far the joints are from their images across an axis, at most."""
-        places = self.rig.places - self.rig.places[0]
-        images = places * np.where(np.arange(3) == axis, -1.0, 1.0)
-        return float(np.linalg.norm(places[:, None] - images, axis=2).min(1).max())
-
-    def in_middle(self, bone: int) -> bool:
-        """Whether a bone begins between left and right."""
-        apart = self.rig.places[bone, self.side] - self.rig.places[0, self.side]
-        return abs(float(apart)) < MIDDLE * self.span
-
-    def carries(self, bone: int) -> bool:
-        """Whether it is the root, or in the middle with limbs below it."""
-        return bone == 0 or (self.in_middle(bone) and self._limbs_below[bone])
-
-    @cached_property
-    def _limbs_below(self) -> list[bool]:
-        found = [not self.in_middle(b) for b in range(len(self.rig.names))]
-        for bone in reversed(range(1, len(found))):
-            found[self.rig.parents[bone]] |= found[bone]
-        return found
-
-    @cached_property
-    def half_width(self) -> float:
-        """m, mean distance from the middle at which limbs begin."""
-        rig = self.rig
-        firsts = [b for b in range(len(rig.names)) if self.begins_limb(b)]
-        apart = np.abs(rig.places[firsts, self.side] - rig.places[0, self.side])
-        return float(apart.mean()) if firsts else 0.0
-
-    def begins_limb(self, bone: int) -> bool:
-        """Whether a limb leaves the trunk there."""
-        parent = self.rig.parents[bone]
-        return not self.in_middle(bone) and (parent < 0 or self.in_middle(parent))
-
-    def segments(self, bone: int) -> list[tuple[np.ndarray, np.ndarray]]:
-        """From where a bone begins to where it ends, [3] each, those within the trunk left out."""
-        rig, start = self.rig, self.rig.places[bone]
-        below = rig.children(bone)
-        if self.in_middle(bone):
-            below = [b for b in below if not self.begins_limb(b)] or below
-        ends = [*rig.places[below], *rig.ends[bone]]
-        if not ends and len(rig.skins[bone]):
-            ends = [start + 1.8 * (rig.skins[bone].mean(0) - start)]
-        return [(start, end) for end in ends if np.linalg.norm(end - start) > 1e-4 * self.span]
-
-    def way(self, bone: int) -> np.ndarray:
-        """[3] m from where a bone begins to its farthest end; zeros where it has none."""
-        ways = [end - start for start, end in self.segments(bone)]
-        return max(ways, key=lambda way: float(way @ way), default=np.zeros(3))
-
-    def limb(self, first: int) -> list[int]:
-        """A limb's bones from its first one down, along the longest."""
-        chain = [first]
-        while below := self.rig.children(chain[-1]):
-            chain.append(max(below, key=lambda b: float(self.way(b) @ self.way(b))))
-        return chain
-
-    @cached_property
-    def feet(self) -> list[int]:
-        """Bones below the ankles of a body on two feet, which needs heels to stand; else none."""
-        rig, floor = self.rig, self.floor
-        found = []
-        for first in (b for b in range(len(rig.names)) if self.begins_limb(b)):
-            for bone in self.limb(first):
-                low = rig.places[bone, self.up] - floor < ANKLE_HIGH * self.height
-                if low and toes(self, bone):
-                    found.append(bone)
-                    break
-        return found if len(found) == 2 else []
-
-    @cached_property
-    def floor(self) -> float:
-        """m, of the lowest place."""
-        return float(np.concatenate([self.rig.places, *self.rig.ends])[:, self.up].min())
-
-    def capsules(self, bone: int, radius: float) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Ends [3], [3] of a bone's capsules; toes have none of their own where there is a sole."""
-        above = self.rig.parents[bone]
-        while above >= 0 and above not in self.feet:
-            above = self.rig.parents[above]
-        return [] if above >= 0 else [*self.segments(bone), *self.sole(bone, radius)]
-
-    def sole(self, bone: int, radius: float) -> list[tuple[np.ndarray, np.ndarray]]:
-        """From heel to toe on the floor, of the bone below an ankle; nothing of any other."""
-        if bone not in self.feet:
-            return []
-        last = self.limb(bone)[-1]
-        heel, toe = self.rig.places[bone].copy(), self.rig.places[last] + self.way(last)
-        heel[self.ahead] -= HEEL * (toe - heel)[self.ahead]
-        heel[self.up] = toe[self.up] = self.floor + radius
-        return [(heel, toe)]
-
-    def moves(self, bone: int) -> bool:
-        """Whether it is long enough to bend on its own."""
-        return bool(np.linalg.norm(self.way(bone)) > SHORT * self.height)
-
-
 def hinges_of(plan: Plan) -> list[list[Hinge]]:
     """Of each bone, the root's none."""
     found: list[list[Hinge]] = [[] for _ in plan.rig.names]
     for bone in range(1, len(found)):
-        if plan.begins_limb(bone):
+        if plan.is_limb(bone):
             _limb(plan, bone, found)
-        elif plan.in_middle(bone) and not plan.carries(bone) and plan.moves(bone):
+        elif plan.in_middle(bone) and not plan.sides_below[bone] and plan.moves(bone):
             found[bone] = _spine(plan, "it may nod and turn")
     for bone in plan.rig.children(0):
         chain = _spine_below(plan, bone)
@@ -176,19 +58,23 @@ def _spine_below(plan: Plan, bone: int) -> list[int]:
 
 
 def _limb(plan: Plan, first: int, found: list[list[Hinge]]) -> None:
-    """Fills in the hinges of a limb, its side branches rigid."""
+    """Fills in the hinges of a limb, its side branches and toes rigid."""
     chain = plan.limb(first)
-    below = next((i for i, bone in enumerate(chain) if bone in plan.feet), len(chain))
-    chain = [bone for bone in chain[: below + 1] if plan.moves(bone)]
+    ends = (i for i, bone in enumerate(chain) if bone in plan.feet or plan.has_toes(bone))
+    below = next(ends, len(chain))
+    *upper, last = chain[: below + 1]
+    chain = [*filter(plan.moves, upper), *[last] * (plan.reach(last) > SHORT * plan.height)]
     if not chain:
         return
-    end = plan.rig.places[chain[-1]] + plan.way(chain[-1])
-    along = np.abs(end - plan.rig.places[first])
+    ways = [plan.way(bone) for bone in chain]
+    if chain[-1] == last and last not in plan.feet:
+        ways[-1] = plan.tips[last] - plan.rig.places[last]
+    along = np.abs(plan.tips[first] - plan.rig.places[first])
     vertical = int(along.argmax()) == plan.up
     found[chain[0]] = _hip(plan, int(along.argmax()))
-    for above, bone in itertools.pairwise(chain):
-        last = bone == chain[-1]
-        found[bone] = [_knee(plan, above, bone, last, vertical, toes(plan, chain[-1]))]
+    for (one, other), bone in zip(itertools.pairwise(ways), chain[1:], strict=True):
+        is_last = bone == chain[-1]
+        found[bone] = [_knee(plan, one, other, is_last, vertical, toes(plan, chain[-1]))]
 
 
 def _hip(plan: Plan, along: int) -> list[Hinge]:
@@ -202,9 +88,12 @@ def _hip(plan: Plan, along: int) -> list[Hinge]:
     ]
 
 
-def _knee(plan: Plan, above: int, bone: int, last: bool, vertical: bool, forward: float) -> Hinge:
-    """The hinge between two bones of a limb: about the axis across the plane in which they lie."""
-    one, other = plan.way(above), plan.way(bone)
+def _knee(
+    plan: Plan, one: np.ndarray, other: np.ndarray, last: bool, vertical: bool, forward: float
+) -> Hinge:
+    """The hinge between two bones of a limb that lie along two ways [3]: about the axis across the
+    plane in which they lie.
+    """
     across = np.cross(one, other)
     size = float(np.linalg.norm(one) * np.linalg.norm(other))
     if float(np.linalg.norm(across)) > np.sin(BENT) * size:
@@ -224,13 +113,6 @@ def _knee(plan: Plan, above: int, bone: int, last: bool, vertical: bool, forward
     low, high = sorted((-back * KNEE[0], back * KNEE[1]))
     reason = "it rests straight; taken for a knee, which folds away from the toes"
     return Hinge(_name(plan, number), axis, low, high, "low", reason)
-
-
-def toes(plan: Plan, foot: int) -> float:
-    """Where a foot points along the way: 1, -1, or 0 where it does not."""
-    way = plan.way(foot)
-    share = float(way[plan.ahead]) / max(float(np.linalg.norm(way)), 1e-9)
-    return float(np.sign(share)) if abs(share) > FOOT else 0.0
 
 
 def _spine(plan: Plan, reason: str) -> list[Hinge]:

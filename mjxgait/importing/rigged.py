@@ -13,13 +13,15 @@ from mjxgait.clips.read_bvh import rig_of_bvh
 from mjxgait.clips.rig import Rig
 from mjxgait.clips.rig_of_glb import rig_of_glb
 from mjxgait.errors import UserError
-from mjxgait.importing.hinges import Hinge, Plan, hinges_of
-from mjxgait.importing.notes import Confidence, Notes, listed
+from mjxgait.importing.hinges import Hinge, hinges_of
+from mjxgait.importing.notes import Confidence, Guess, Notes, listed
 from mjxgait.importing.parts import plain_names
+from mjxgait.importing.plan import Plan
 
 RIGS: Mapping[str, Callable[[Path], Rig]] = {".bvh": rig_of_bvh, ".glb": rig_of_glb}
-UP = "y"
-"""In both formats."""
+UP, OTHER, SURER = "y", "z", 1.5
+"""Which axis is taken for up if a file does not say; which other one if limbs come down along it that
+many times as far."""
 DENSITY = 1000.0
 """kg/m³, of water, as animals have it."""
 MOST_BONES = 400
@@ -32,19 +34,23 @@ SKINNED = 8
 """Vertices from which on they tell how thick a bone's part is."""
 
 
-def model_of(path: Path, up: str | None, height: float | None, notes: Notes) -> ET.Element:
-    """An MJCF tree of a BVH or GLB file's skeleton.
+def model_of(
+    path: Path, up: str | None, height: float | None, notes: Notes
+) -> tuple[ET.Element, Guess]:
+    """An MJCF tree of a BVH or GLB file's skeleton, and which of its axes points up.
 
     Args:
-      up: axis of the file that points up. height: m, that it is tall at rest.
+      up: that axis, as told. height: m, that it is tall at rest.
 
     Raises:
       UserError: the file is damaged, or has no skeleton.
     """
     rig = _bare(RIGS[path.suffix.lower()](path))
     _check(path, rig)
-    plan = Plan("xyz".index(up or UP), _measured(path, rig, "xyz".index(up or UP), height, notes))
-    if not any(map(plan.begins_limb, range(len(plan.rig.names)))):
+    upward = Guess("up", up, "high", "as told") if up else _upward(rig)
+    axis = "xyz".index(upward.value)
+    plan = Plan(axis, _measured(path, rig, axis, height, notes))
+    if not plan.limbs:
         raise UserError(
             f"{path}: all its bones begin in the middle; a creature needs legs to its left and right"
         )
@@ -55,7 +61,7 @@ def model_of(path: Path, up: str | None, height: float | None, notes: Notes) -> 
         [f"bone_{i}" for i in range(len(plan.rig.names))],
     )
     _tell(plan, hinges, names, notes)
-    return _written(plan, hinges, radii, names, notes)
+    return _written(plan, hinges, radii, names, notes), upward
 
 
 def _bare(rig: Rig) -> Rig:
@@ -98,6 +104,19 @@ def _check(path: Path, rig: Rig) -> None:
         raise UserError(f"{path}: the place of a bone or of its skin is not a finite number")
     if not np.ptp(rig.places, axis=0).max() > 1e-6:
         raise UserError(f"{path}: all its bones are in one place; there is no skeleton to walk on")
+
+
+def _upward(rig: Rig) -> Guess:
+    """The axis that points up: glTF's, or that along which the limbs come down to the floor."""
+    if rig.metres is not None:
+        return Guess("up", UP, "high", "glTF has Y up")
+    usual, other = (Plan("xyz".index(axis), rig).stands for axis in (UP, OTHER))
+    if other > SURER * usual:
+        return Guess(
+            "up", OTHER, "medium", f"limbs come down to the floor along it, not along {UP}"
+        )
+    sure: Confidence = "high" if usual > SURER * other else "low"
+    return Guess("up", UP, sure, "as in most BVH files")
 
 
 def _measured(path: Path, rig: Rig, up: int, height: float | None, notes: Notes) -> Rig:

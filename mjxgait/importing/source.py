@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from mjxgait.errors import UserError
-from mjxgait.importing.notes import Notes
+from mjxgait.importing.notes import Guess, Notes
 
 MOST_XML = 4_000_000
 MOST_MESH = 30_000_000
@@ -31,7 +31,7 @@ class Source:
     coupled: joints that follow others.
     poses: standing poses that the file offers outside of keyframes.
     missing: names of meshes that cannot be had, with the file that each should be in; MJCF only.
-    up: axis that points up where the format says so.
+    up: axis that points up, of a skeleton.
     """
 
     tree: ET.Element
@@ -40,7 +40,7 @@ class Source:
     coupled: list[str] = dataclasses.field(default_factory=list)
     poses: list[list[float]] = dataclasses.field(default_factory=list)
     missing: dict[str, str] = dataclasses.field(default_factory=dict)
-    up: str | None = None
+    up: Guess | None = None
 
     @property
     def urdf(self) -> bool:

@@ -12,6 +12,7 @@ from mjxgait.clips.read_bvh import read_bvh
 from mjxgait.clips.read_glb import read_glb
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
+from mjxgait.keys.axes import axes_of
 from mjxgait.keys.cycle import Cycle, find_cycle
 from mjxgait.keys.fit import Fit, fit_poses
 from mjxgait.keys.match import matched
@@ -27,8 +28,6 @@ READERS: Mapping[str, Callable[[Path], Clip | AngleTrack]] = {
 Read = Clip | AngleTrack
 MOST_FRAMES = 1500
 """That a cycle is looked for in."""
-WAYS = {"z": (0, 0, 1), "-z": (0, 0, -1), "x": (1, 0, 0), "-x": (-1, 0, 0)}
-"""Where a creature at rest in the file looks, in the file's axes with Y up."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -53,15 +52,15 @@ def bring(
     table: Mapping[str, str] | None = None,
     ends: tuple[float | None, float | None] = (None, None),
     tolerance: float = np.radians(3.0),
-    way: str = "z",
+    way: str | None = None,
     tell: Callable[[str], object] = lambda said: None,
 ) -> Brought:
     """Reads a file and fits key poses to its cycle.
 
     Args:
       table: names in the file by the creature's part (of a CSV or JSON: joint). ends: s, of one
-        cycle. tolerance: rad, of the key poses. way: where the file's creature looks. tell: called
-        with each line of the report.
+        cycle. tolerance: rad, of the key poses. way: where the file's creature looks, see `axes_of`.
+        tell: called with each line of the report.
 
     Raises:
       UserError: one sentence that says what is wrong with the file.
@@ -79,7 +78,7 @@ def _bring(
     table: Mapping[str, str] | None,
     ends: tuple[float | None, float | None],
     tolerance: float,
-    way: str,
+    way: str | None,
     tell: Callable[[str], object],
 ) -> Brought:
     kind = path.suffix.lower()
@@ -95,7 +94,7 @@ def _bring(
     track = (
         _angles(creature, read, names)
         if isinstance(read, AngleTrack)
-        else retarget(creature, read, names, _axes(creature, way))
+        else retarget(creature, read, names, axes_of(creature, read, names, way))
     )
     for line in told_errors(track):
         tell(line)
@@ -127,17 +126,6 @@ def _cut(read: Read, ends: tuple[float | None, float | None]) -> Read:
     if isinstance(read, AngleTrack):
         return dataclasses.replace(read, times=read.times[kept], angles=read.angles[kept])
     return dataclasses.replace(read, times=read.times[kept], turned=read.turned[kept])
-
-
-def _axes(creature: Creature, way: str) -> np.ndarray:
-    """[3, 3] from the creature's world to the file's."""
-    if way not in WAYS:
-        raise UserError(f'forward = "{way}": must be one of {", ".join(WAYS)}')
-    forward, left = creature.frame.start_axes
-    own = np.stack([left, [0.0, 0.0, 1.0], forward])
-    ahead = np.array(WAYS[way], float)
-    up = np.array([0.0, 1.0, 0.0])
-    return np.stack([np.cross(up, ahead), up, ahead], 1) @ own
 
 
 def _angles(creature: Creature, read: AngleTrack, names: Mapping[str, str]) -> Retargeted:

@@ -117,7 +117,7 @@ def refine(
     begin: float | None = None,
     end: float | None = None,
     tolerance: float = 3.0,
-    forward: str = "z",
+    forward: str | None = None,
     config: Place | None = None,
     seed: int = 0,
     population: int | None = None,
@@ -136,7 +136,8 @@ def refine(
       names: name in the file by part (of a CSV or JSON: joint), or a TOML file of these, where the
         guess is wrong.
       begin, end: s, of the cycle in the file. tolerance: degrees, root mean square, within which key
-        poses reproduce it. forward: z, -z, x or -x, where the file's creature looks, Y being up.
+        poses reproduce it. forward: z, -z, x or -x, where the file's creature looks, Y being up; by
+        default z, or as in the rig that the creature was imported from.
       config, seed, population, generations, settings, quiet: as for `train`.
 
     Raises:

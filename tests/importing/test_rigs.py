@@ -10,16 +10,20 @@ import mujoco
 import numpy as np
 import pytest
 from importing.rigs import DOG, Bone, bvh, glb, stated_longer
+from scipy.spatial.transform import Rotation
 
+from mjxgait.clips.clip import Clip
 from mjxgait.clips.read_bvh import read_bvh, rig_of_bvh
 from mjxgait.commands.import_ import import_command
 from mjxgait.creature import Creature
 from mjxgait.creature.scale import load_files
 from mjxgait.errors import UserError
 from mjxgait.importing import ImportChoices, Imported, import_model
-from mjxgait.importing.hinges import Hinge, Plan, hinges_of
+from mjxgait.importing.hinges import Hinge, hinges_of
 from mjxgait.importing.notes import Notes
+from mjxgait.importing.plan import Plan
 from mjxgait.importing.rigged import model_of
+from mjxgait.keys.axes import axes_of
 from mjxgait.keys.retarget import retarget
 
 FEET = ["LeftHand", "RightHand", "LeftHindPaw", "RightHindPaw"]
@@ -115,7 +119,7 @@ def test_every_guess_is_told(dog: Imported):
 
 def test_of_a_skin_its_bones_are_as_thick_as_it(tmp_path: Path):
     """And what moves no skin, such as handles of a rig, is no part of the body."""
-    tree = model_of(made(tmp_path, "glb"), None, None, Notes())
+    tree, _ = model_of(made(tmp_path, "glb"), None, None, Notes())
     bodies = {body.get("name"): body for body in tree.iter("body")}
     assert set(bodies) == set(DOG)
     for leg in ("LeftThigh", "RightShin", "LeftForearm"):
@@ -145,6 +149,82 @@ def hinges(folder: Path, bones: Mapping[str, Bone]) -> dict[str, list[Hinge]]:
     return dict(zip(plan.rig.names, hinges_of(plan), strict=True))
 
 
+def upright(bones: Mapping[str, Bone]) -> dict[str, Bone]:
+    """The same in a file that has Z up, as Blender writes BVH."""
+    return {
+        name: (parent, *(p and (p[0], -p[2], p[1]) for p in points))
+        for name, (parent, *points) in bones.items()
+    }
+
+
+@pytest.mark.parametrize("bones", [DOG, HUMAN, SPIDER])
+def test_up_is_where_limbs_come_down_to_the_floor(tmp_path: Path, bones: Mapping[str, Bone]):
+    file = tmp_path / "rig.bvh"
+    for kind, up in ((bones, "y"), (upright(bones), "z")):
+        file.write_text(bvh(kind))
+        assert model_of(file, None, None, Notes())[1].value == up
+    file.write_text(bvh(bones))
+    assert model_of(file, "z", None, Notes())[1].value == "z"  # as told
+
+
+def test_ears_are_no_limbs(tmp_path: Path):
+    """What is short does not make its bone part of the trunk, which bends between the limbs."""
+    ears = {
+        side + "Ear": ("Head", (3 * sign, 64, 32), (5 * sign, 70, 30))
+        for side, sign in (("Left", 1), ("Right", -1))
+    }
+    found, bare = hinges(tmp_path, DOG | ears), hinges(tmp_path, DOG)
+    assert [found.pop(name) for name in ears] == [[], []]
+    assert {n: [h.name for h in own] for n, own in found.items()} == {
+        n: [h.name for h in own] for n, own in bare.items()
+    }
+
+
+def test_a_bone_to_one_leg_is_no_trunk_that_bends(tmp_path: Path):
+    pelvis = {f"{side}Pelvis": ("Hips", (0, 48, -28), None) for side in ("Left", "Right")}
+    hung = {
+        f"{side}Thigh": (f"{side}Pelvis", *DOG[f"{side}Thigh"][1:]) for side in ("Left", "Right")
+    }
+    found = hinges(tmp_path, DOG | pelvis | hung)
+    assert [found[name] for name in pelvis] == [[], []]
+    assert len(found["LeftThigh"]) == len(found["Spine"]) == 2
+
+
+def test_toes_are_one_with_their_foot_and_a_spur_is_no_toe(tmp_path: Path):
+    toes = {
+        f"{side}{name}": (f"{side}HindPaw", (x * sign, 2, -27), (x * sign, 0, -20))
+        for side, sign in (("Left", 1), ("Right", -1))
+        for name, x in (("Inner", 6), ("Outer", 10))
+    }
+    found = hinges(tmp_path, DOG | toes)
+    assert [len(found[name]) for name in ("LeftHindPaw", "LeftInner", "LeftOuter")] == [1, 0, 0]
+    spur = {"LeftTwist": ("LeftThigh", (9, 35, -24), (9, 34, -24))}
+    assert len(hinges(tmp_path, DOG | spur)["LeftShin"]) == 1
+
+
+def test_what_bends_below_a_knee_bends_little(creature: Creature):
+    widths = np.degrees(creature.joints.pose_high - creature.joints.pose_low)
+    width = dict(zip(creature.joints.names, widths, strict=True))
+    assert width["LeftHock_pitch"] == pytest.approx(40.0)
+    assert width["LeftShin_pitch"] > 60.0
+
+
+def test_a_cycle_of_its_own_rig_is_read_in_the_axes_of_that_file(tmp_path: Path):
+    """Of another file with the same names in those that its joints can follow better."""
+    file = tmp_path / "dog.bvh"
+    file.write_text(bvh(upright(DOG)))
+    own = load_files(import_model(file, ImportChoices(apart=False)).files)
+    names = ("Hips", "LeftThigh")
+    bones = dict(zip(names, names, strict=True))
+    for ahead in (np.array([0.0, -1.0, 0.0]), np.array([0.0, 0.0, 1.0])):
+        turned = np.tile(np.eye(3), (2, 2, 1, 1))
+        turned[1, 1] = Rotation.from_rotvec(np.radians(20.0) * ahead).as_matrix()
+        clip = Clip(names, (-1, 0), np.array([0.0, 1.0]), turned)
+        track = retarget(own, clip, bones, axes_of(own, clip, bones, None))
+        roll = track.angles[1, own.joints.names.index("LeftThigh_roll")]
+        assert abs(np.degrees(roll)) == pytest.approx(20.0, abs=0.1)
+
+
 def test_a_knee_that_rests_straight_folds_away_from_the_toes(tmp_path: Path):
     (knee,) = hinges(tmp_path, HUMAN)["LShin"]
     shin = np.array([0.0, -1.0, 0.0])
@@ -169,6 +249,12 @@ def test_a_body_on_two_feet_has_heels(tmp_path: Path):
     ((heel, toe),) = plan.sole(foot, 1.0)
     assert heel == pytest.approx([10.0, 3.0, -4.0])
     assert toe == pytest.approx([10.0, 3.0, 16.0])
+    assert len(plan.capsules(foot, 1.0)) == 1  # whose upper part would touch before the sole
+    spurs = {f"{side}Heel": (f"{side}Foot", (0, 0, -6), (30, 0, -6)) for side in ("L", "R")}
+    file.write_text(bvh(HUMAN | spurs))
+    plan = Plan(1, rig_of_bvh(file))
+    ((heel, toe),) = plan.sole(plan.rig.names.index("LFoot"), 1.0)
+    assert (heel[2], toe[2]) == pytest.approx((-6.0, 16.0))
     file.write_text(bvh(DOG))
     assert Plan(1, rig_of_bvh(file)).feet == []
 
@@ -182,7 +268,7 @@ def test_limbs_that_lie_sideways_swing_about_the_upright_axis(tmp_path: Path):
 def test_names_lose_what_a_tool_put_before_them(tmp_path: Path):
     file = tmp_path / "dog.bvh"
     file.write_text(bvh(prefix="mixamorig:"))
-    tree = model_of(file, None, None, Notes())
+    tree, _ = model_of(file, None, None, Notes())
     assert {b.get("name") for b in tree.iter("body")} == set(DOG)
 
 
