@@ -78,7 +78,9 @@ class Run:
         return departure_of(self.folder)
 
     def metrics(self) -> dict[str, np.ndarray]:
-        """Each number of `metrics.jsonl` over generations [G], NaN where there was none."""
+        """Each number of `metrics.jsonl` over generations [G], NaN where there was none; `mothers` [G, P]
+        where it tells of them.
+        """
         lines = read_metrics(self.folder / METRICS)
         names = dict.fromkeys(name for line in lines for name in line)
         return {

@@ -203,8 +203,8 @@ class Evolution:
 
         mutants, _ = jax.lax.scan(mutated, mutants, keys[1:])
         is_new = jnp.arange(count) < newcomers
-        origin = jnp.where(is_new, int(Origin.NEWCOMER), int(Origin.MUTATION))
-        return _pick(is_new, created, mutants), origin, drawn
+        genomes = _pick(is_new, created, mutants)
+        return genomes, jnp.where(is_new, int(Origin.NEWCOMER), int(Origin.MUTATION)), drawn
 
     def _plant(
         self, state: EvolutionState, proposal: Proposal, judged: Judged, generation: jax.Array

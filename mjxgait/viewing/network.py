@@ -44,19 +44,22 @@ class Network:
     wires: tuple[Wire, ...]
 
 
-def network_of(twin: BrainTwin) -> Network:
-    """Breadth first from all hinges against the wires' direction; what it does not meet is silent."""
+def network_of(twin: BrainTwin, lit: bool) -> Network:
+    """Breadth first from all hinges against the wires' direction; what it does not meet is silent.
+
+    lit: whether there is a light; else nothing comes from those who would see it.
+    """
     depth = {-1 - h: 0 for h in range(len(twin.hinges))}
     waiting, wires = list(depth), []
     for target in waiting:
-        for source, weight in _inputs(twin, target):
+        for source, weight in _inputs(twin, target, lit):
             if source in (NOTHING, ONE):
                 continue
             wires.append(Wire(source, target, weight))
             if source not in depth:
                 depth[source] = depth[target] + 1
                 waiting.append(source)
-    cells = {number: _cell(twin, number, depth[number]) for number in waiting}
+    cells = {number: _cell(twin, number, depth[number], lit) for number in waiting}
     return Network(cells, tuple(wires))
 
 
@@ -66,20 +69,25 @@ def kind_of(twin: BrainTwin, column: int) -> str:
     return next(kind for kind, these in twin.alike.items() if place in these)
 
 
-def _inputs(twin: BrainTwin, number: int) -> Iterator[tuple[int, float]]:
+def _inputs(twin: BrainTwin, number: int, lit: bool) -> Iterator[tuple[int, float]]:
     """Column and weight of all that a cell makes use of."""
     first = min(twin.place.values())
     if number < 0:
-        yield int(twin.driver[-1 - number]), float(twin.gain[-1 - number])
+        wires = [(int(twin.driver[-1 - number]), float(twin.gain[-1 - number]))]
     elif number >= first:
         reads = READS.get(kind_of(twin, number), 1)
         columns, weights = twin.column[number - first], twin.weight[number - first]
-        yield from zip(columns[:reads].tolist(), weights[:reads].tolist(), strict=True)
+        wires = list(zip(columns[:reads].tolist(), weights[:reads].tolist(), strict=True))
+    else:
+        wires = []
+    seen = range(first - 3 * len(twin.parts), first)
+    for column, weight in wires:
+        yield NOTHING if column in seen and not lit else column, weight
 
 
-def _cell(twin: BrainTwin, number: int, depth: int) -> Cell:
+def _cell(twin: BrainTwin, number: int, depth: int, lit: bool) -> Cell:
     joints, parts = len(twin.hinges), len(twin.parts)
-    given = [_written(column, weight) for column, weight in _inputs(twin, number)]
+    given = [_written(column, weight) for column, weight in _inputs(twin, number, lit)]
     if number < 0:
         part, hinge = twin.hinges[-1 - number]
         driven = "" if given == ["·"] else f" = {given[0]}"

@@ -10,6 +10,7 @@ import numpy as np
 
 from mjxgait.certify.twins.brains import BrainTwin
 from mjxgait.certify.twins.registry import twin_of
+from mjxgait.champion.blocks.material import IN_LIGHT
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.parts import make_task
@@ -83,7 +84,7 @@ def _of_grown(run: Path, walk: Walk) -> Figures:
     row = grown.bodies_of(run, walk.champion)
     twin = twin_of(walk.creature, walk.champion, walk.time_step)
     assert isinstance(twin, BrainTwin)
-    thoughts = network_of(twin)
+    thoughts = network_of(twin, walk.champion.task in IN_LIGHT)
     return {
         "graph": ((10, 4.6), lambda drawing: grown.draw_graph(drawing, walk)),
         "brain": (brain.shape(thoughts), lambda drawing: brain.draw_brain(drawing, thoughts)),

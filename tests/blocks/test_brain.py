@@ -122,30 +122,32 @@ def twin(genotype: Genotype, body: Body) -> tuple[list[int], BrainTwin]:
     return links, plain
 
 
-def pulled(brain: BrainTwin) -> np.ndarray:
-    """Torques of some commands, under senses that are always the same."""
+def pulled(brain: BrainTwin, lit: bool) -> np.ndarray:
+    """Torques of some commands, under senses that are always the same. lit: with a light."""
     rng, memory, torques = np.random.default_rng(7), brain.init(3), []
     for _ in range(4):
         senses = {
             "joint_pos": rng.uniform(-1, 1, (3, len(brain.hinges))),
             "contact": rng.integers(0, 2, (3, len(brain.parts))),
-            "light": rng.normal(size=(3, len(brain.parts), 3)),
+            "light": rng.normal(size=(3, len(brain.parts), 3)) * lit,
         }
         torque, memory = brain.act(memory, senses)
         torques.append(torque)
     return np.array(torques)
 
 
-def test_what_a_picture_of_a_brain_leaves_out_moves_nothing():
+@pytest.mark.parametrize("lit", [True, False])
+def test_what_a_picture_of_a_brain_leaves_out_moves_nothing(lit: bool):
     """And what it shows is all that it says: a neuron's inputs are wires, numbers, or not read."""
     rng, moving, left_out = np.random.default_rng(12), 0, 0
     for brain in [found for found in (brain_of(one(some(), i)) for i in range(30)) if found.hinges]:
-        before, network = pulled(brain), network_of(brain)
+        before, network = pulled(brain, lit), network_of(brain, lit)
         for neuron, column in enumerate(sorted(brain.place.values())):
             shown = READS.get(kind_of(brain, column), 1) if column in network.cells else 0
             brain.weight[neuron, shown:] = rng.normal(0, 3, 3 - shown)
             left_out += shown == 0
-        np.testing.assert_array_equal(pulled(brain), before)
+            assert lit or not any("light" in cell.label for cell in network.cells.values())
+        np.testing.assert_array_equal(pulled(brain, lit), before)
         for wire in network.wires:
             assert network.cells[wire.source].depth >= network.cells[wire.target].depth - 1
         moving += bool(before.any())
@@ -160,7 +162,7 @@ def test_a_brain_is_drawn_by_parts():
     brain.alike = {"oscillate-wave": np.arange(len(brain.place))}
     brain.hinges, brain.driver, brain.gain = ((0, 0), (0, 1)), np.array([wave, 0]), np.ones(2)
     brain.column[0], brain.weight[0] = [1, wave, 1], [0.25, -2.0, 9.0]
-    network = network_of(brain)
+    network = network_of(brain, lit=False)
     with figure(shape(network)) as drawing:
         draw_brain(drawing, network)
         said = [text.get_text() for text in drawing.axes[0].texts if text.get_text()]
