@@ -16,8 +16,10 @@ import numpy as np
 from mjxgait.ablation.plan import Plan, Run, Study
 from mjxgait.ablation.rows import GROUPS, champion_path
 from mjxgait.certify import certify
+from mjxgait.certify.config import CertificateConfig
 from mjxgait.certify.simulate import simulate
 from mjxgait.certify.starts import join, nominal_starts, perturbed_starts
+from mjxgait.certify.tasks import demands_of
 from mjxgait.champion import Champion, read_champion
 from mjxgait.cores import process_per_core, survivable
 from mjxgait.creature import Creature, load_creature
@@ -43,7 +45,7 @@ class Result:
     """What became of a run.
 
     walk: body lengths per second covered before the fall or the end, mean over unseen perturbed
-    starts. up: share of them that stay up.
+    starts. up: share of them that stay up and do what criterion 4 asks of the task besides.
     certified: whether the champion passes the whole certificate; None when nobody asked. fitness:
     best at the end. area: mean of the best over the generations. generations: until the best
     reached the study's threshold, one more than there were if it never did.
@@ -153,7 +155,7 @@ def _judge(
     creature = _creature(creature_folder)
     champion = read_champion(path, creature)
     body = champion.embodied(creature)
-    walks = {g: _walk(body.on(g), champion) if finite else (0.0, 0.0, 0.0) for g in grounds}
+    walks = {g: walked(body.on(g), champion) if finite else (0.0, 0.0, 0.0) for g in grounds}
     # One that falls or lags this far behind the speed that the certificate of a walk asks for cannot
     # pass, so the long examination is spared.
     worth = champion.task != "walk" or walks[grounds[0]][2] > 0.4
@@ -169,17 +171,19 @@ def _creature(folder: Path) -> Creature:
     return load_creature(folder)
 
 
-def _walk(creature: Creature, champion: Champion) -> tuple[float, float, float]:
-    """Mean speed and share up over the unseen starts, and the speed from the undisturbed start
-    (0 if it falls).
+def walked(creature: Creature, champion: Champion) -> tuple[float, float, float]:
+    """Mean speed and share that succeeds over the unseen starts, and the speed from the undisturbed
+    start (0 if it falls).
     """
-    starts = join(
-        nominal_starts(creature, 1), perturbed_starts(creature, STARTS, np.random.default_rng(SEED))
-    )
-    outcome = simulate(creature, champion, starts, SECONDS, threads=1)
+    config, rng = CertificateConfig(), np.random.default_rng(SEED)
+    demands = demands_of(champion.task, champion.wish)
+    unseen = demands.aimed(perturbed_starts(creature, STARTS, rng), config, rng)
+    starts = demands.aimed(join(nominal_starts(creature, 1), unseen), config)
+    fall = demands.fall(config)
+    outcome = simulate(creature, champion, starts, SECONDS, fall=fall, threads=1)
     speed = outcome.travel[:, 0] / creature.frame.body_length / SECONDS
     return (
         float(speed[1:].mean()),
-        float(outcome.stayed_up[1:].mean()),
+        float(demands.succeeded(outcome, starts, config)[1:].mean()),
         float(speed[0] * outcome.stayed_up[0]),
     )

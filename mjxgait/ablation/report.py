@@ -25,7 +25,8 @@ from mjxgait.runs.disk import disk_errors
 NAMES = {
     "walk": "body lengths per second covered before a fall or the end of 22 s, mean over 16 unseen "
     "perturbed starts in C MuJoCo",
-    "up": "share of 16 unseen perturbed starts that stay up for 22 s in C MuJoCo",
+    "up": "share of 16 unseen perturbed starts that stay up for 22 s in C MuJoCo, and arrive if the task "
+    "has a goal",
     "certified": "share of champions that pass the stable-walk certificate",
     "fitness": "best fitness at the end",
     "area": "best fitness, mean over the generations (area under the curve)",

@@ -1,0 +1,19 @@
+"""What every champion of a study is judged by, whatever it evolved for."""
+
+import dataclasses
+
+import numpy as np
+from helpers import pose_champion
+
+from mjxgait.ablation.measures import walked
+from mjxgait.creature import load_creature
+from mjxgait.settings.shipped import find_creature
+
+
+def test_who_stands_is_up_where_it_must_walk_and_not_where_it_has_a_goal():
+    luxo = load_creature(find_creature("luxo"))
+    stands = pose_champion(luxo, np.stack([luxo.joints.stand] * 2), {})
+    _, up, _ = walked(luxo, stands)
+    _, arrived, _ = walked(luxo, dataclasses.replace(stands, task="hop"))
+    assert up == 1
+    assert arrived == 0
