@@ -14,12 +14,12 @@ from helpers import SHORT, STOOL, pose_champion, said_by
 from mjxgait.certify import CertificateConfig, record
 from mjxgait.certify.bar import FAR, Clearance
 from mjxgait.certify.bar import RADIUS as EXAMINED_RADIUS
-from mjxgait.certify.config import LimboConfig as Demanded
 from mjxgait.certify.measure import Recording
 from mjxgait.certify.outcome import Outcome, Trajectory
 from mjxgait.certify.simulate import simulate
 from mjxgait.certify.starts import nominal_starts, perturbed_starts
 from mjxgait.certify.tasks import demands_of
+from mjxgait.certify.thresholds.goals import LimboConfig as Demanded
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature, load_creature
 from mjxgait.creature.geometry import support_extents

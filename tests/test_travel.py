@@ -11,12 +11,12 @@ from certify_made_up import walk
 from test_hop import HORIZON, REACH, STEP, moment, reaching
 
 from mjxgait.certify import CertificateConfig
-from mjxgait.certify.config import TravelConfig as Demanded
 from mjxgait.certify.measure import Recording
 from mjxgait.certify.outcome import Outcome, Trajectory
 from mjxgait.certify.simulate import simulate
 from mjxgait.certify.starts import nominal_starts
 from mjxgait.certify.tasks import demands_of, travel
+from mjxgait.certify.thresholds.goals import TravelConfig as Demanded
 from mjxgait.creature import Creature
 from mjxgait.settings.hop import GOALS, NEAR, NOMINAL_GOAL, TravelConfig
 from mjxgait.tasks.hop.travel import Aim, Travel

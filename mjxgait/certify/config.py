@@ -1,14 +1,13 @@
 """What the certificate demands: the nine criteria and the tasks, one table each, with the defaults.
 
-The first table is `simulate.Fall`.
+The first table is `outcome.Fall`; those of the tasks are in `thresholds`.
 """
 
 import dataclasses
-from typing import Annotated
-
-import pydantic
 
 from mjxgait.certify.outcome import Fall
+from mjxgait.certify.thresholds.blocks import FollowConfig, JumpConfig, RoamConfig, SwimConfig
+from mjxgait.certify.thresholds.goals import HopConfig, LimboConfig, TravelConfig
 from mjxgait.settings.tables import STRICT, Count, Fraction, NonNegative, Positive, Whole
 
 
@@ -155,148 +154,6 @@ class WishesConfig:
     height: Positive = 0.05
     bounce: Positive = 0.02
     sway: Positive = 2.0
-
-
-@dataclasses.dataclass(frozen=True)
-class GoalConfig:
-    """What is demanded of who has a goal, instead of 1 to 3 and 7.
-
-    Attributes:
-      nominal: m, the goal of the undisturbed way. goals: m, range of the others.
-      min_up: least product of the trunk's up axis with the world's; below it, one has fallen.
-      arrive: share of the perturbed starts that must do what the task demands.
-    """
-
-    __pydantic_config__ = STRICT
-    nominal: Positive = 1.2
-    goals: tuple[Positive, Positive] = (0.4, 2.0)
-    min_up: Annotated[float, pydantic.Field(ge=-1, le=1)] = 0.2
-    arrive: Fraction = 0.9
-
-
-@dataclasses.dataclass(frozen=True)
-class HopConfig(GoalConfig):
-    """What is demanded of who hops to a goal.
-
-    Attributes:
-      near: share of the goal's distance within which one has arrived.
-      stay: s at the end, all of which it is there.
-    """
-
-    __pydantic_config__ = STRICT
-    near: Positive = 0.05
-    stay: Positive = 5.0
-
-
-@dataclasses.dataclass(frozen=True)
-class LimboConfig(HopConfig):
-    """What is demanded of who goes to a goal beneath a bar: as of who hops, and to stay clear.
-
-    Attributes:
-      place: m ahead of the start, of the bar's middle. height: m, of its lower edge.
-      clearance: m that every part must stay away from it, and from all above it.
-    """
-
-    __pydantic_config__ = STRICT
-    nominal: Positive = 1.4
-    goals: tuple[Positive, Positive] = (1.0, 2.0)
-    place: Positive = 0.6
-    height: Positive = 0.35
-    clearance: NonNegative = 0.0
-
-
-@dataclasses.dataclass(frozen=True)
-class TravelConfig(GoalConfig):
-    """What is demanded of who travels: goals as of who hops; within which distance one is reached
-    is the task's own (docs/hop.md), and no demand.
-
-    Attributes:
-      speed: m/s, least. second_half: its speed over the first half's.
-    """
-
-    __pydantic_config__ = STRICT
-    speed: NonNegative = 0.15
-    second_half: Positive = 0.8
-
-
-@dataclasses.dataclass(frozen=True)
-class BlocksConfig:
-    """What is demanded of all bodies of blocks, instead of 1 to 5 and 7.
-
-    Attributes:
-      arrive: share of the perturbed starts that must do what is demanded.
-      body_speed: m/s, of the fastest block. overlap: of the smaller block's size, the cube root of
-        its volume, how deep blocks may stand in each other that no joint joins, or in the ground.
-      again: largest relative change of what evolution saw.
-    """
-
-    __pydantic_config__ = STRICT
-    arrive: Fraction = 0.9
-    body_speed: Positive = 5.0
-    overlap: Positive = 0.05
-    again: Positive = 0.2
-
-
-@dataclasses.dataclass(frozen=True)
-class GoingConfig(BlocksConfig):
-    """What is demanded of those that are to get on.
-
-    Attributes:
-      speed: m/s, least, as the crow flies. straight: least way over path. second_half: its speed
-        over the first half's.
-    """
-
-    __pydantic_config__ = STRICT
-    speed: NonNegative = 0.2
-    straight: Fraction = 0.5
-    second_half: Positive = 0.7
-
-
-@dataclasses.dataclass(frozen=True)
-class JumpConfig(BlocksConfig):
-    """What is demanded of who jumps. height: m, least, of the lowest part at the best moment."""
-
-    __pydantic_config__ = STRICT
-    height: NonNegative = 0.1
-
-
-@dataclasses.dataclass(frozen=True)
-class SwimConfig(GoingConfig):
-    """What is demanded of who swims.
-
-    Attributes:
-      elsewhere: momentum that is not the water's, as a share of all that was exchanged with it.
-    """
-
-    __pydantic_config__ = STRICT
-    elsewhere: Positive = 0.05
-
-
-@dataclasses.dataclass(frozen=True)
-class RoamConfig(GoingConfig):
-    """What is demanded of blocks that walk.
-
-    Attributes:
-      min_up: least product of the world's up axis with the root's own direction that was up when it
-        had settled.
-    """
-
-    __pydantic_config__ = STRICT
-    min_up: Annotated[float, pydantic.Field(ge=-1, le=1)] = 0.5
-
-
-@dataclasses.dataclass(frozen=True)
-class FollowConfig(BlocksConfig):
-    """What is demanded of who follows a light, besides what is of who swims or walks.
-
-    Attributes:
-      speed: m/s, least, by which the light comes nearer.
-      arrive: share of the perturbed starts, each with a light of its own, in which it does.
-    """
-
-    __pydantic_config__ = STRICT
-    speed: NonNegative = 0.1
-    arrive: Fraction = 0.75
 
 
 @dataclasses.dataclass(frozen=True)

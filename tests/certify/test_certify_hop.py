@@ -10,7 +10,6 @@ import pytest
 from certify_made_up import DOG, make_champion, walk
 
 from mjxgait.certify import CertificateConfig, certificate, draws, rehearse
-from mjxgait.certify.config import HopConfig
 from mjxgait.certify.measure import Recording
 from mjxgait.certify.outcome import Outcome, Trajectory
 from mjxgait.certify.simulate import simulate
@@ -23,6 +22,7 @@ from mjxgait.certify.starts import (
 )
 from mjxgait.certify.tasks import demands_of
 from mjxgait.certify.tasks.hop import HopDemands
+from mjxgait.certify.thresholds.goals import HopConfig
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 from mjxgait.settings import hop as evolution

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from mjxgait.certify.config import BlocksConfig, CertificateConfig, GoingConfig
+from mjxgait.certify.config import CertificateConfig
 from mjxgait.certify.criteria import Criterion, Measure, at_least, at_most, joint_overrun, steady
 from mjxgait.certify.describe import worst_overlap
 from mjxgait.certify.grown import Grown
@@ -17,6 +17,7 @@ from mjxgait.certify.measure import Recording
 from mjxgait.certify.outcome import Fall, Outcome
 from mjxgait.certify.starts import Starts
 from mjxgait.certify.tasks.staying import StaysUp, to_the_end
+from mjxgait.certify.thresholds.blocks import BlocksConfig, GoingConfig
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 

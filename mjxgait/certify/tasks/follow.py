@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from mjxgait.certify.config import CertificateConfig, FollowConfig
+from mjxgait.certify.config import CertificateConfig
 from mjxgait.certify.criteria import Criterion, at_least
 from mjxgait.certify.measure import Recording
 from mjxgait.certify.outcome import Outcome
@@ -12,6 +12,7 @@ from mjxgait.certify.starts import Starts
 from mjxgait.certify.tasks.blocks import BlocksDemands, seen
 from mjxgait.certify.tasks.roam import balanced
 from mjxgait.certify.tasks.swim import by_water
+from mjxgait.certify.thresholds.blocks import FollowConfig
 from mjxgait.champion import Champion
 from mjxgait.champion.blocks.material import LIGHT
 

@@ -5,12 +5,13 @@ import dataclasses
 
 import numpy as np
 
-from mjxgait.certify.config import CertificateConfig, GoalConfig
+from mjxgait.certify.config import CertificateConfig
 from mjxgait.certify.criteria import Criterion, at_least, at_most, parts, physics
 from mjxgait.certify.measure import Recording
 from mjxgait.certify.outcome import Fall
 from mjxgait.certify.starts import Starts
 from mjxgait.certify.tasks.staying import Unasked
+from mjxgait.certify.thresholds.goals import GoalConfig
 from mjxgait.champion import Champion
 
 HIGHEST = 1e3

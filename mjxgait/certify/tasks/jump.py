@@ -2,12 +2,13 @@
 
 import numpy as np
 
-from mjxgait.certify.config import CertificateConfig, JumpConfig
+from mjxgait.certify.config import CertificateConfig
 from mjxgait.certify.criteria import Criterion, at_least
 from mjxgait.certify.measure import Recording
 from mjxgait.certify.outcome import Outcome
 from mjxgait.certify.starts import Starts
 from mjxgait.certify.tasks.blocks import BlocksDemands, seen
+from mjxgait.certify.thresholds.blocks import JumpConfig
 
 
 class JumpDemands(BlocksDemands):

@@ -6,12 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from mjxgait.certify.config import CertificateConfig, LimboConfig
+from mjxgait.certify.config import CertificateConfig
 from mjxgait.certify.criteria import Criterion, at_least
 from mjxgait.certify.measure import Recording
 from mjxgait.certify.outcome import Outcome
 from mjxgait.certify.starts import Starts
 from mjxgait.certify.tasks.hop import HopDemands
+from mjxgait.certify.thresholds.goals import LimboConfig
 from mjxgait.creature import Creature
 
 ENOUGH = 0.01

@@ -2,10 +2,11 @@
 
 import numpy as np
 
-from mjxgait.certify.config import CertificateConfig, RoamConfig
+from mjxgait.certify.config import CertificateConfig
 from mjxgait.certify.criteria import Criterion, at_least
 from mjxgait.certify.measure import Recording
 from mjxgait.certify.tasks.blocks import GoingDemands
+from mjxgait.certify.thresholds.blocks import RoamConfig
 
 
 class RoamDemands(GoingDemands):

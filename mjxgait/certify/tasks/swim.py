@@ -2,10 +2,11 @@
 
 import numpy as np
 
-from mjxgait.certify.config import CertificateConfig, SwimConfig
+from mjxgait.certify.config import CertificateConfig
 from mjxgait.certify.criteria import Criterion, at_most
 from mjxgait.certify.measure import Recording
 from mjxgait.certify.tasks.blocks import GoingDemands, seen
+from mjxgait.certify.thresholds.blocks import SwimConfig
 from mjxgait.champion.blocks.material import DRAG
 
 

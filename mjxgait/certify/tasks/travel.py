@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from mjxgait.certify.config import CertificateConfig, TravelConfig
+from mjxgait.certify.config import CertificateConfig
 from mjxgait.certify.criteria import Criterion, at_least
 from mjxgait.certify.describe import worst_overlap
 from mjxgait.certify.measure import Recording
@@ -13,6 +13,7 @@ from mjxgait.certify.outcome import Outcome
 from mjxgait.certify.starts import Starts
 from mjxgait.certify.tasks.goals import GoalDemands
 from mjxgait.certify.tasks.staying import to_the_end
+from mjxgait.certify.thresholds.goals import TravelConfig
 from mjxgait.creature import Creature
 
 NEAR = 0.05
