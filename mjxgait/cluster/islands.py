@@ -49,8 +49,12 @@ def train(
     )
     try:
         with interruptible() as interrupted:
-            while reason is None and (found := islands.advance(crew, interrupted.is_set)):
-                for line in islands.keep(found):
+            while reason is None:
+                start = time.perf_counter()
+                found = islands.advance(crew, interrupted.is_set)
+                if not found:
+                    break
+                for line in islands.keep(found, time.perf_counter() - start):
                     screen.generation(line, config.evolution.generations)
                 reason, examined = _over(islands, examiner)
     finally:
@@ -108,11 +112,11 @@ class _Islands:
         work = ((self.recipe, AdvanceIsland(state, until, i)) for i, state in sent)
         return crew.all(work, stopped)
 
-    def keep(self, found: list[Advanced]) -> list[dict[str, Any]]:
-        """Puts all on disk; returns the lines of all islands together."""
+    def keep(self, found: list[Advanced], seconds: float) -> list[dict[str, Any]]:
+        """Puts all on disk; returns the lines of all islands together. seconds: they took so long."""
         # One that has reached the target has fewer generations than the others.
-        rows = zip(*([lines[0] for lines in each.lines] for each in found), strict=False)
-        lines = [together(row) for row in rows]
+        rows = list(zip(*([lines[0] for lines in each.lines] for each in found), strict=False))
+        lines = [together(row, seconds / len(rows)) for row in rows]
         for place, advanced in zip(self.places, found, strict=True):
             _append(place / METRICS, [own[0] for own in advanced.lines])
         _append(self.folder / METRICS, lines)

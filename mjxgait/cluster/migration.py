@@ -33,8 +33,12 @@ def gathered(states: Sequence[Packed]) -> Packed:
     return states[leader].with_arrays(_sorted(_joined(found), size))
 
 
-def together(lines: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """One line of the metrics for all islands; island: whose best it has."""
+def together(lines: Sequence[Mapping[str, Any]], seconds: float) -> dict[str, Any]:
+    """One line of the metrics for all islands; island: whose best it has.
+
+    seconds: that all of them took for a generation, with compiling where there was any. Islands that
+    took turns took the sum of theirs, which has none.
+    """
     bests = [-np.inf if line["best"] is None else line["best"] for line in lines]
     leader = int(np.argmax(bests))
     line = dict(lines[leader]) | {"island": leader}
@@ -47,7 +51,7 @@ def together(lines: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     worst = [each["worst"] for each in lines if each["worst"] is not None]
     line["worst"] = min(worst, default=None)
     line["forced"] = any(each["forced"] for each in lines)
-    line["wall_s"] = max(each["wall_s"] for each in lines)
+    line["wall_s"] = round(min(seconds, sum(each["wall_s"] for each in lines)), 4)
     line["steps_per_second"] = round(line["sim_steps"] / max(line["wall_s"], 1e-9))
     return line
 
