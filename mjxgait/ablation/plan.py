@@ -218,7 +218,9 @@ def _lay(config: Config, table: Mapping[str, Any], where: str) -> Config:
         )
     laid = build(type(config), merge(dataclasses.asdict(config), table), where)
     if laid.evolution.islands.count > 1:
-        raise UserError(f"{where}: a run of a study is one population; leave evolution.islands out")
+        raise UserError(
+            f"{where}: a run of a study is one population; evolution.islands.count must be 1"
+        )
     return laid
 
 

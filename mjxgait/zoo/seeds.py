@@ -64,7 +64,10 @@ def create_zoo(
     if runs < 2:
         raise UserError(f"--runs {runs}: give 2 or more, or leave it out for a single run")
     if config.evolution.islands.count > 1:
-        raise UserError("--runs: runs with islands do not go side by side; start them one by one")
+        raise UserError(
+            "--runs: runs with islands do not go side by side; start them one by one,"
+            " or give --evolution.islands.count 1"
+        )
     check_fit(creature, config)
     zoo = zoo or new_run_folder(f"{creature.name}-zoo", config.seed)
     if zoo.exists() and (not zoo.is_dir() or any(zoo.iterdir())):

@@ -123,7 +123,7 @@ def test_values_share_a_program_and_shapes_need_one_each(stool: Creature):
         ),
         (
             {"base": {"evolution": {"islands": {"count": 4}}}},
-            ["[base]", "one population; leave evolution.islands out"],
+            ["[base]", "one population; evolution.islands.count"],
         ),
         ({"base": {"rollout": {"start": 3}}}, ["[base]", "start"]),
         ({"measure": "beauty"}, ["measure", "beauty"]),
