@@ -77,6 +77,7 @@ class Looks:
     def __init__(self) -> None:
         self.glances, self.rehearsals, self.certificates = [0.3], [0.3], [0.3]
         self.asked: list[str] = []
+        self.wanted: list[float] = []
 
     def answer(self, kind: str, answers: list[float]) -> float:
         self.asked.append(kind)
@@ -94,9 +95,12 @@ def looks(monkeypatch: pytest.MonkeyPatch) -> Looks:
         return certificate(said.answer("exam", said.certificates), attempts)
 
     monkeypatch.setattr(examination, "glance", glance)
-    monkeypatch.setattr(
-        examination, "rehearse", lambda *_: said.answer("rehearsal", said.rehearsals)
-    )
+
+    def rehearse(*_: object, wanted: float) -> float:
+        said.wanted.append(wanted)
+        return said.answer("rehearsal", said.rehearsals)
+
+    monkeypatch.setattr(examination, "rehearse", rehearse)
     monkeypatch.setattr(examination, "certify", certify)
     return said
 
@@ -168,6 +172,7 @@ def test_in_the_second_half_any_margin_is_worth_an_examination(experiment, looks
     same = examiner(experiment, exams)
     assert same.early(state_with(experiment, 3)) is None
     assert same.early(state_with(experiment, 6)) is not None
+    assert looks.wanted == pytest.approx([0.2, 0.0])
     looks.rehearsals = [-0.1]
     assert examiner(experiment, exams).early(state_with(experiment, 6)) is None
 
@@ -284,6 +289,8 @@ def test_in_the_end_the_best_margin_is_examined_where_nobody_has_room(experiment
     assert examined.champion.fitness == 3.0
     # Who fails undisturbed is not disturbed.
     assert looks.asked == ["glance", *["glance", "rehearsal"] * 2, "exam"]
+    # Nor is one disturbed further than the best so far can be beaten.
+    assert looks.wanted == pytest.approx([-0.3, 0.05])
 
 
 def test_in_the_end_one_that_has_failed_before_is_not_chosen(experiment, looks, exams):

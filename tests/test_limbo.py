@@ -26,13 +26,14 @@ from mjxgait.creature.geometry import support_extents
 from mjxgait.errors import UserError
 from mjxgait.parts.settings import build_config
 from mjxgait.runs.experiment import build_experiment
+from mjxgait.runs.generation import Row, next_starts
 from mjxgait.settings import limbo as evolution
 from mjxgait.settings.limbo import BAR_PLACE, LimboConfig
 from mjxgait.settings.rollout import RolloutConfig
 from mjxgait.settings.shipped import find_creature
 from mjxgait.tasks.hop.fitness import signed_weights
 from mjxgait.tasks.limbo.bar import bar_distance, intrusion
-from mjxgait.tasks.limbo.task import Limbo
+from mjxgait.tasks.limbo.task import Aim, Limbo
 from mjxgait.types import Sensed
 
 CONFIG, DEMANDS = CertificateConfig(), demands_of("limbo")
@@ -155,16 +156,24 @@ def test_the_deepest_counts_and_a_run_through_the_bar_is_worth_less(luxo: Creatu
     task = Limbo(luxo, STEP, HORIZON, luxo.settings.termination)
     moments = [sensed(luxo, posed(luxo, ahead)) for ahead in (0.0, 0.5, 1.4)]
     tally, standards = task.init(), task.standards(LimboConfig(height=HEIGHT))
+    aim = Aim(goal=jnp.float32(1.4), raised=jnp.float32(0.03))
     for moment in moments:
-        tally = task.update(tally, moment, jnp.zeros(3), standards, jnp.float32(1.4))
+        tally = task.update(tally, moment, jnp.zeros(3), standards, aim)
     assert float(tally.bar) == pytest.approx(depth(luxo, posed(luxo, 0.5)))
+    assert float(task.outcome(tally)["bar"]) == float(tally.bar)
+    # What counts is how deep it is in the bar where that is now.
+    deep = (float(tally.bar) - 0.03) / luxo.frame.hip_height
+    terms = task.judge(tally, LimboConfig())
+    assert float(terms["bar"]) == pytest.approx(deep / (deep + 0.1), rel=1e-4)
+    above = task.judge(dataclasses.replace(tally, raised=jnp.float32(0.2)), LimboConfig())
+    assert float(above["bar"]) == 0.0
+    tally = dataclasses.replace(tally, raised=jnp.float32(0.0))
     terms = task.judge(tally, LimboConfig())
     deep = float(tally.bar) / luxo.frame.hip_height
     assert float(terms["bar"]) == pytest.approx(deep / (deep + 0.1), rel=1e-5)
     clear = task.judge(dataclasses.replace(tally, bar=jnp.zeros(())), LimboConfig())
     assert float(clear["bar"]) == 0.0
     assert all(float(clear[name]) == float(terms[name]) for name in task.terms if name != "bar")
-    assert float(task.outcome(tally)["bar"]) == float(tally.bar)
 
 
 def test_to_run_through_the_bar_is_better_than_to_stay_before_it(luxo: Creature):
@@ -174,6 +183,28 @@ def test_to_run_through_the_bar_is_better_than_to_stay_before_it(luxo: Creature)
     assert set(weights) == set(task.terms)
     manner = sum(float(w) for name, w in weights.items() if name not in ("distance", "missed"))
     assert manner > float(weights["distance"])
+
+
+def test_the_bar_comes_down_in_so_many_generations_and_stays(stool: Creature):
+    """In the program that is run; the two rows come down by settings of their own."""
+    common = {"use": {"task": "limbo"}, "evolution": {"population": 6}}
+    rollout = {"seconds": 0.2, "starts": 3, "lanes": 4, "physics": "mjx"}
+    rows = [
+        build_experiment(
+            stool, build_config({**common, "fitness": fitness, "rollout": rollout}, "test")
+        )
+        for fitness in ({"higher": 0.1, "lowering": 10}, {"lowering": 0})
+    ]
+    state, task = rows[0].init(), rows[0].simulator.task
+
+    def raised(row: Row, latest: int) -> np.ndarray:
+        before = dataclasses.replace(state, generation=jnp.int32(latest))
+        return np.asarray(next_starts(task, row, before).raised)
+
+    # While seeding it is where it will be in generation 0.
+    for latest, expected in ((-1, 0.1), (0, 0.09), (4, 0.05), (9, 0.0), (50, 0.0)):
+        assert raised(rows[0].row, latest) == pytest.approx([expected] * 3, abs=1e-6)
+        assert raised(rows[1].row, latest) == pytest.approx([0.0] * 3)
 
 
 def test_all_goals_lie_beyond_the_bar(luxo: Creature):

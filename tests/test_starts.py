@@ -9,7 +9,7 @@ from helpers import small_config
 
 from mjxgait.creature import Creature
 from mjxgait.runs.experiment import build_experiment
-from mjxgait.runs.generation import starts_of_round
+from mjxgait.runs.generation import next_starts
 from mjxgait.settings.control import HOLDS
 from mjxgait.simulation.rollout import CHECK_EVERY
 from mjxgait.tasks.trials import NEVER, Starts, draw_starts
@@ -136,7 +136,9 @@ def test_each_generation_has_other_starts_until_all_have_had_their_turn(stool: C
 
     def told(generation: int) -> list[float]:
         latest = dataclasses.replace(state, generation=generation - 1)
-        return np.asarray(starts_of_round(experiment.row, latest).friction).tolist()
+        return np.asarray(
+            next_starts(experiment.simulator.task, experiment.row, latest).friction
+        ).tolist()
 
     rounds = [told(generation) for generation in range(5)]
     assert {friction[0] for friction in rounds} == {1.0}

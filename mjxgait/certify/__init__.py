@@ -8,11 +8,11 @@ from mjxgait.certify.certificate import (
     glance,
     push_ladder,
     record,
-    rehearse,
     survival,
 )
 from mjxgait.certify.config import CertificateConfig
 from mjxgait.certify.criteria import Criterion, Measure
+from mjxgait.certify.rehearsal import rehearse
 from mjxgait.certify.standing import outdated, read_certificate, read_stress
 
 __all__ = [

@@ -131,42 +131,6 @@ def glance(
     return Glance(whole, (*found, *demands.kept(champion, whole, config)))
 
 
-def rehearse(
-    creature: Creature,
-    champion: Champion,
-    count: int,
-    config: CertificateConfig | None = None,
-    threads: int = 0,
-) -> float:
-    """The worst margin of criteria 4 and 5 on the draw that is the same for all champions.
-
-    Champions are chosen by it, and examined on another draw. Where pushes decide it ends when those
-    pushed last have had time to fall. Else it is as long as the examination: who gets to a goal late
-    is late for that only.
-
-    Args:
-      count: perturbed starts, and as many pushes where those decide.
-    """
-    config = config or CertificateConfig()
-    draw, demands = draws.common(config), demands_of(champion.task, champion.wish)
-    disturbed = demands.aimed(
-        draws.starts(creature, config, draw, count), config, draw.generator(AIMS)
-    )
-    pushes: tuple[Starts, ...] = ()
-    seconds = config.seconds
-    if demands.by_pushes:
-        pushes = (draws.pushes(creature, config, draw, count),)
-        seconds = min(seconds, config.pushes.window[1] + config.pushes.ladder_seconds)
-    starts = demands.aimed(join(disturbed, *pushes), config)
-    fall = demands.fall(config)
-    outcome = simulate(creature, champion, starts, seconds, fall=fall, threads=threads)
-    started = demands.succeeded(outcome, starts, config)[:count]
-    pushed = float(outcome.stayed_up[count:].mean()) if pushes else np.nan
-    judged = demands.disturbed(float(started.mean()), pushed, config)
-    judged += told_to_turn(creature, champion, config, draw, threads)
-    return min(criterion.margin for criterion in judged)
-
-
 def certify(
     creature: Creature,
     champion: Champion,

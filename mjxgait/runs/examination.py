@@ -89,7 +89,7 @@ class Examiner:
             return None
         if self.exams.attempt(name, generation) >= config.examination.attempts:
             return None
-        seen = self._look(champion, wanted)
+        seen = self._look(champion, wanted, beaten=wanted)
         if seen.margin >= wanted and (examined := self._examine(seen, hasty=True)).passed:
             return examined
         self._margins[name] = seen.margin
@@ -108,20 +108,23 @@ class Examiner:
             if self.exams.failed(champion.fingerprint, int(state.generation) - 1):
                 known.append(champion)
                 continue
-            chosen.append(self._look(champion, 0.0))
+            beaten = max((seen.margin for seen in chosen), default=-np.inf)
+            chosen.append(self._look(champion, 0.0, beaten))
             if chosen[-1].margin >= self.experiment.config.examination.enough:
                 break
-        chosen = chosen or [self._look(champion, np.inf) for champion in known[:1]]
+        chosen = chosen or [self._look(champion, np.inf, np.inf) for champion in known[:1]]
         return self._examine(max(chosen, key=lambda seen: seen.margin)) if chosen else None
 
-    def _look(self, champion: Champion, wanted: float) -> Seen:
-        """At the undisturbed walk, and if its margin is what is wanted, at the disturbed ones."""
+    def _look(self, champion: Champion, wanted: float, beaten: float) -> Seen:
+        """At the undisturbed walk, and if its margin is what is wanted, at the disturbed ones; at
+        all of them only if they can still have a margin of `beaten`.
+        """
         creature = champion.embodied(self.experiment.creature)
         seen = glance(creature, champion)
         margin = seen.margin
         if margin >= wanted:
             count = self.experiment.config.examination.draws
-            margin = min(margin, rehearse(creature, champion, count))
+            margin = min(margin, rehearse(creature, champion, count, wanted=beaten))
         return Seen(champion, seen, margin)
 
     def _examine(self, seen: Seen, hasty: bool = False) -> Examined:

@@ -5,6 +5,7 @@ to have theirs judged among its own.
 """
 
 import dataclasses
+from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -15,6 +16,7 @@ from mjxgait.search.state import NOBODY, EvolutionState, GenerationMetrics, Prop
 from mjxgait.settings.config import Config
 from mjxgait.simulation.evaluator import Local
 from mjxgait.simulation.rollout import Simulator
+from mjxgait.tasks.protocol import Task
 from mjxgait.tasks.score import in_order, score
 from mjxgait.tasks.trials import Starts
 from mjxgait.types import Judged, pytree
@@ -61,8 +63,7 @@ def propose(
     proposals = jax.lax.map(of_row, (rows, states))
     if rows.sources is not None:
         proposals = with_guests(rows.sources, states, proposals)
-    one_round = rows.settings.rollout.variety == 1
-    return proposals, rows.starts if one_round else jax.vmap(starts_of_round)(rows, states)
+    return proposals, jax.vmap(partial(next_starts, simulator.task))(rows, states)
 
 
 def with_guests(sources: jax.Array, states: EvolutionState, proposals: Proposal) -> Proposal:
@@ -118,10 +119,18 @@ def absorb(
     return jax.lax.map(of_row, (rows, states, proposals, judged))
 
 
-def starts_of_round(row: Row, state: EvolutionState) -> Starts:
-    """The starts [R] of the next generation: the nominal one, and the next of all others in turn."""
+def next_starts(task: Task, row: Row, state: EvolutionState) -> Starts:
+    """The starts [R] of the next generation, as hard as they are by then."""
+    generation = jnp.maximum(state.generation + 1, 0)
+    starts = row.starts
+    if row.settings.rollout.variety > 1:
+        starts = _of_round(row, generation)
+    return task.harder(starts, row.settings.fitness, generation)
+
+
+def _of_round(row: Row, generation: jax.Array) -> Starts:
+    """The nominal one, and the next of all others in turn."""
     others = row.settings.rollout.starts - 1
-    first = jnp.maximum(state.generation + 1, 0) * others
-    turn = 1 + (first + jnp.arange(others)) % (row.starts.friction.shape[0] - 1)
+    turn = 1 + (generation * others + jnp.arange(others)) % (row.starts.friction.shape[0] - 1)
     places = jnp.append(0, turn)
     return jax.tree.map(lambda leaf: leaf[places], row.starts)

@@ -3,7 +3,7 @@
 import dataclasses
 
 from mjxgait.settings.hop import HopConfig, HopWeights
-from mjxgait.settings.tables import STRICT, Finite, Positive
+from mjxgait.settings.tables import STRICT, Finite, NonNegative, Positive, Whole
 
 BAR_PLACE = 0.6
 """m ahead of the start; the bar lies across the way, and ends nowhere."""
@@ -34,9 +34,13 @@ class LimboConfig(HopConfig):
 
     Attributes:
       height: m, of the bar's lower edge above the floor.
+      higher: m by which it is higher in the first generation.
+      lowering: generations in which it comes down from there, a little in each.
       weights: what each term counts.
     """
 
     __pydantic_config__ = STRICT
     height: Positive = 0.35
+    higher: NonNegative = 0.12
+    lowering: Whole = 30
     weights: LimboWeights = dataclasses.field(default_factory=LimboWeights)

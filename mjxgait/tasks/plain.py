@@ -44,6 +44,10 @@ class PlainTask(abc.ABC):
         """See `Task`: the first start is nominal, the others are perturbed and pushed."""
         return draw_starts(key, creature, settings)
 
+    def harder(self, trials: Starts, settings: Any, generation: jax.Array) -> Starts:
+        """See `Task`: the same from the first generation on."""
+        return trials
+
     def aim(self, trial: Starts) -> Any:
         """See `Task`."""
         return ()

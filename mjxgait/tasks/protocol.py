@@ -52,6 +52,10 @@ class Task(Protocol):
         """The R trials [R, ...] that everybody is judged on; drawn once, by the host."""
         ...
 
+    def harder(self, trials: Starts, settings: Any, generation: jax.Array) -> Starts:
+        """The trials [R, ...] as they are at a generation [], for what is asked may grow."""
+        ...
+
     def aim(self, trial: Starts) -> Any:
         """What an episode keeps of its trial besides the start: a goal, a light; () if nothing."""
         ...

@@ -27,6 +27,7 @@ class Starts:
     numbers: leaves [R, ...], the bodies that follow from it, as the plant reads them.
     ground: leaves [R, ...], each trial's own; None where all are flat.
     goal: [R] m ahead of the start; None where the task has none.
+    raised: [R] m by which a bar is higher than it will be; None where there is no bar.
     light: [R, 3] m from where the root starts; None where there is none.
     turn: [R] rad/s by which the commanded heading grows; None where nobody is told to turn.
     delay: [R] control steps by which torques come late; None where they never do.
@@ -43,6 +44,7 @@ class Starts:
     heaviness: jax.Array | None = None
     numbers: Any = None
     goal: jax.Array | None = None
+    raised: jax.Array | None = None
     light: jax.Array | None = None
     turn: jax.Array | None = None
     delay: jax.Array | None = None

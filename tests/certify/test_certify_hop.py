@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from certify_made_up import DOG, make_champion, walk
 
-from mjxgait.certify import CertificateConfig, certificate, draws, rehearse
+from mjxgait.certify import CertificateConfig, draws, rehearsal, rehearse
 from mjxgait.certify.measure import Recording
 from mjxgait.certify.outcome import Outcome, Trajectory
 from mjxgait.certify.simulate import simulate
@@ -155,10 +155,42 @@ def test_to_be_chosen_one_has_as_long_as_in_the_examination_and_bears_no_pushes(
         assert not starts.push.any()
         return became([to((0, 0), (16, goal)) for goal in starts.goal], [np.inf] * len(starts))
 
-    monkeypatch.setattr(certificate, "simulate", simulated)
+    monkeypatch.setattr(rehearsal, "simulate", simulated)
     hopper = dataclasses.replace(make_champion(tiny), task="hop")
     assert rehearse(tiny, hopper, 6) == 1.0
-    assert tried == [(6, CONFIG.seconds)]
+    assert tried == [(1, CONFIG.seconds), (5, CONFIG.seconds)]
+
+
+@pytest.mark.parametrize(
+    ("failing", "wanted", "tried", "margin"),
+    [
+        (0, 0.0, [16, 48], 1.0),
+        (6, 0.0, [16, 48], 0.0625),  # 58 of 64 do
+        (7, 0.0, [16], -1 / 64 / 0.1 + 0.0625),  # 57 at best, whatever the rest does
+        (7, -np.inf, [16, 48], -1 / 64 / 0.1 + 0.0625),
+        (5, 0.25, [16], 0.21875),  # it would pass, but not with so much room
+    ],
+)
+def test_nobody_is_tried_further_than_what_is_wanted_is_in_reach(
+    tiny: Creature,
+    monkeypatch: pytest.MonkeyPatch,
+    failing: int,
+    wanted: float,
+    tried: list[int],
+    margin: float,
+):
+    """The first of the starts are those who fail."""
+    counts: list[int] = []
+
+    def simulated(creature: Creature, champion: Champion, starts: Starts, seconds: float, **_: Any):
+        counts.append(len(starts))
+        fall = np.where(np.arange(len(starts)) < failing * (len(counts) == 1), 1.0, np.inf)
+        return became([to((0, 0), (16, goal)) for goal in starts.goal], fall)
+
+    monkeypatch.setattr(rehearsal, "simulate", simulated)
+    hopper = dataclasses.replace(make_champion(tiny), task="hop")
+    assert rehearse(tiny, hopper, 64, wanted=wanted) == pytest.approx(margin)
+    assert counts == tried
 
 
 def test_walking_is_asked_to_stay_up_and_nothing_else(tiny: Creature):

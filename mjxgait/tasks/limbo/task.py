@@ -15,6 +15,7 @@ from mjxgait.tasks.hop import tally as hop
 from mjxgait.tasks.hop.fitness import fitness_terms
 from mjxgait.tasks.hop.task import Hop
 from mjxgait.tasks.limbo.bar import bar_distance, intrusion
+from mjxgait.tasks.score import ramped
 from mjxgait.tasks.trials import Starts
 from mjxgait.types import Sensed, pytree
 
@@ -23,10 +24,21 @@ HALF = 0.1
 
 
 @pytree
+class Aim:
+    """goal: [] m ahead of the start. raised: [] m by which the bar is higher than it will be."""
+
+    goal: jax.Array
+    raised: jax.Array
+
+
+@pytree
 class Tally(hop.Tally):
-    """See `hop.Tally`. bar: [] m, the deepest that it was in the place of the bar."""
+    """See `hop.Tally`. bar: [] m, the deepest that it was in the place of the bar, were that as low as
+    it will be. raised: [] m of it that nobody minds yet.
+    """
 
     bar: jax.Array
+    raised: jax.Array
 
 
 @pytree
@@ -53,34 +65,48 @@ class Limbo(Hop):
         """
         if not parse_ground(settings.ground).flat:
             raise UserError(f"rollout.ground = {settings.ground}: task limbo needs flat ground")
-        return super().trials(key, creature, settings)
+        starts = super().trials(key, creature, settings)
+        return dataclasses.replace(starts, raised=jnp.zeros(settings.starts))
+
+    def harder(self, trials: Starts, settings: Any, generation: jax.Array) -> Starts:
+        """See `Task`: the bar comes down, so that whoever hops learns to duck little by little."""
+        left = 1.0 - ramped(settings.lowering, generation)
+        raised = jnp.full(trials.friction.shape, settings.higher * left)
+        return dataclasses.replace(trials, raised=raised)
+
+    def aim(self, trial: Starts) -> Any:
+        """See `Task`."""
+        return Aim(super().aim(trial), jnp.asarray(trial.raised))
 
     def standards(self, settings: Any) -> Any:
         """See `Task`."""
         height = jnp.asarray(settings.height, jnp.float32)
         return Standards(**vars(super().standards(settings)), height=height)
 
-    def senses(self, aim: jax.Array, sensed: Sensed) -> dict[str, jax.Array]:
+    def senses(self, aim: Any, sensed: Sensed) -> dict[str, jax.Array]:
         """See `Task`."""
-        return super().senses(aim, sensed) | {"bar_distance": bar_distance(self.creature, sensed)}
+        return super().senses(aim.goal, sensed) | {
+            "bar_distance": bar_distance(self.creature, sensed)
+        }
 
     def init(self) -> Tally:
         """See `Task`."""
-        return Tally(**vars(super().init()), bar=jnp.zeros(()))
+        return Tally(**vars(super().init()), bar=jnp.zeros(()), raised=jnp.zeros(()))
 
     def update(
-        self, tally: Any, sensed: Sensed, torque: jax.Array, standards: Any, aim: jax.Array
+        self, tally: Any, sensed: Sensed, torque: jax.Array, standards: Any, aim: Any
     ) -> Any:
         """See `Task`."""
-        after: Any = super().update(tally, sensed, torque, standards, aim)
+        after: Any = super().update(tally, sensed, torque, standards, aim.goal)
         deepest = jnp.maximum(tally.bar, intrusion(self.creature, sensed, standards.height))
-        return dataclasses.replace(after, bar=deepest)
+        return dataclasses.replace(after, bar=deepest, raised=aim.raised)
 
     def judge(self, tally: Any, settings: Any) -> dict[str, jax.Array]:
         """See `Task`."""
-        bar = tally.bar / (tally.bar + HALF * self.creature.frame.hip_height)
+        deep = jnp.maximum(tally.bar - tally.raised, 0.0)
+        bar = deep / (deep + HALF * self.creature.frame.hip_height)
         return fitness_terms(self.creature, self.horizon, tally, {"bar": bar})
 
     def outcome(self, tally: Any) -> dict[str, jax.Array]:
-        """See `Task`: of hopping, and m that the deepest part was in the place of the bar."""
+        """See `Task`: of hopping, and m that it was in the place of the bar, were that down."""
         return super().outcome(tally) | {"bar": tally.bar}
