@@ -189,8 +189,11 @@ def test_a_mistake_of_ours_is_not_blamed_on_the_disk(
         raise KeyError("born")
 
     monkeypatch.setattr(checkpoints._manager, "save", mistaken)
+    checkpoints.save(states[0], "toy", DIGEST)
     with pytest.raises(KeyError, match="born"):
-        checkpoints.save(states[0], "toy", DIGEST)
+        checkpoints.save(states[1], "toy", DIGEST)
+    with pytest.raises(KeyError, match="born"):
+        checkpoints.close()
 
 
 FILLS = """
@@ -205,7 +208,7 @@ begun = begin(*inputs(toy()), jax.random.key(0))
 state, later = (dataclasses.replace(begun, generation=jax.numpy.int32(g)) for g in (0, 1))
 checkpoints = checkpoint.Checkpoints(Path(sys.argv[1]))
 checkpoints.save(state, "toy", "0" * 16)
-checkpoints._manager.wait_until_finished()
+checkpoints.wait()
 if sys.argv[2] == "after the trial":
     checkpoint.try_room = lambda *_: None
 resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))

@@ -9,6 +9,7 @@ import logging
 import sys
 import threading
 from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -55,6 +56,9 @@ class Checkpoints:
             self._manager = ocp.CheckpointManager(
                 self._folder, options=options, item_handlers=handlers
             )
+        self._beginner = ThreadPoolExecutor(1, "checkpoints")
+        self._begun: Future[Any] = Future()
+        self._begun.set_result(None)
 
     def generations(self) -> list[int]:
         """The generations there are checkpoints of, oldest first."""
@@ -87,14 +91,24 @@ class Checkpoints:
             manifest=ocp.args.JsonSave(dataclasses.asdict(manifest)),
         )
         with disk_errors(self._folder):
+            self._begun.result()
             # Told before anything of it is written.
             try_room(self._folder, 2 * packed.size + OVERHEAD)
-            self._manager.save(manifest.generation, args=args, force=True)
+        # Orbax writes in the background, but takes a tenth of a generation to begin with it.
+        self._begun = self._beginner.submit(
+            self._manager.save, manifest.generation, args=args, force=True
+        )
 
-    def close(self) -> None:
+    def wait(self) -> None:
         """Waits until everything is on disk."""
         with disk_errors(self._folder):
+            self._begun.result()
             self._manager.wait_until_finished()
+
+    def close(self) -> None:
+        """Waits until everything is on disk, or will never be."""
+        with self._beginner, disk_errors(self._folder):
+            self.wait()
             self._manager.close()
 
     def restore(
