@@ -164,13 +164,13 @@ def test_the_deepest_counts_and_a_run_through_the_bar_is_worth_less(luxo: Creatu
     # What counts is how deep it is in the bar where that is now.
     deep = (float(tally.bar) - 0.03) / luxo.frame.hip_height
     terms = task.judge(tally, LimboConfig())
-    assert float(terms["bar"]) == pytest.approx(deep / (deep + 0.1), rel=1e-4)
+    assert float(terms["bar"]) == pytest.approx(deep / 0.3, rel=1e-4)
     above = task.judge(dataclasses.replace(tally, raised=jnp.float32(0.2)), LimboConfig())
     assert float(above["bar"]) == 0.0
     tally = dataclasses.replace(tally, raised=jnp.float32(0.0))
     terms = task.judge(tally, LimboConfig())
     deep = float(tally.bar) / luxo.frame.hip_height
-    assert float(terms["bar"]) == pytest.approx(deep / (deep + 0.1), rel=1e-5)
+    assert float(terms["bar"]) == pytest.approx(min(deep / 0.3, 1.0), rel=1e-5)
     clear = task.judge(dataclasses.replace(tally, bar=jnp.zeros(())), LimboConfig())
     assert float(clear["bar"]) == 0.0
     assert all(float(clear[name]) == float(terms[name]) for name in task.terms if name != "bar")

@@ -19,8 +19,8 @@ from mjxgait.tasks.score import ramped
 from mjxgait.tasks.trials import Starts
 from mjxgait.types import Sensed, pytree
 
-HALF = 0.1
-"""Hip heights; a body so deep in the place of the bar counts half."""
+DEEP = 0.3
+"""Hip heights; a body so deep in the place of the bar counts whole."""
 
 
 @pytree
@@ -104,7 +104,7 @@ class Limbo(Hop):
     def judge(self, tally: Any, settings: Any) -> dict[str, jax.Array]:
         """See `Task`."""
         deep = jnp.maximum(tally.bar - tally.raised, 0.0)
-        bar = deep / (deep + HALF * self.creature.frame.hip_height)
+        bar = jnp.minimum(deep / (DEEP * self.creature.frame.hip_height), 1.0)
         return fitness_terms(self.creature, self.horizon, tally, {"bar": bar})
 
     def outcome(self, tally: Any) -> dict[str, jax.Array]:
