@@ -304,7 +304,7 @@ def test_the_senses_that_tasks_add_are_those_of_evolution(tiny):
         if name in (*IN_WATER, *ON_LAND):
             continue
         task = make()(tiny, STEP, 1000, tiny.settings.termination)
-        aim = task.aim(SimpleNamespace(goal=jnp.float32(0.8)))
+        aim = task.aim(SimpleNamespace(goal=jnp.float32(0.8), raised=jnp.float32(0.0)))
         found |= task.senses(aim, sensed)
         assert set(task.adds) <= set(found)
     assert {*found, "light"} == ADDED.keys()
