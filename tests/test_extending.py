@@ -13,7 +13,7 @@ from mjxgait.cli import main
 
 PAGE = Path(__file__).parents[1] / "docs" / "extending.md"
 SMALL = (
-    "--population 6 --generations 1 --rollout.seconds 0.4 --rollout.physics mjx --rollout.lanes 4"
+    "--population 6 --generations 1 --rollout.seconds 0.4 --rollout.lanes 4"
     " --examination.candidates 0 --no-plots"
 )
 
@@ -94,7 +94,7 @@ grounds = ["flat", "rough:0.1"]
 [base]
 use = {{ controller = "my.py:Spin" }}
 evolution = {{ population = 6 }}
-rollout = {{ seconds = 0.4, physics = "mjx", lanes = 4 }}
+rollout = {{ seconds = 0.4, lanes = 4 }}
 
 [[variant]]
 name = "much"

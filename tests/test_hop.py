@@ -242,7 +242,7 @@ def experiment(stool: Creature) -> Experiment:
     table = {
         "use": {"task": "hop"},
         "evolution": {"population": 6},
-        "rollout": {"seconds": 0.4, "starts": 3, "lanes": 4, "physics": "mjx"},
+        "rollout": {"seconds": 0.4, "starts": 3, "lanes": 4},
     }
     return build_experiment(stool, build_config(table, "test"))
 
@@ -282,7 +282,7 @@ def reaching(stool: Creature, folder: Path, task: str, source: str = REACH) -> E
     table = {
         "use": {"task": task, "controller": name},
         "evolution": {"population": 6},
-        "rollout": {"seconds": 0.4, "starts": 3, "lanes": 4, "physics": "mjx", **ALIKE},
+        "rollout": {"seconds": 0.4, "starts": 3, "lanes": 4, **ALIKE},
     }
     return build_experiment(stool, build_config(table, "test"))
 

@@ -145,7 +145,7 @@ def saving(folder: Path, generation: int) -> Callable[[], bool]:
     return lambda: any((folder / "checkpoints").glob(f"{generation}.*tmp*"))
 
 
-MOMENTS = ("generation 1", "save 1", "save 3", "generation 5", "save 6")
+MOMENTS = ("save 1", "generation 3", "save 5")
 
 
 def test_a_run_killed_again_and_again_goes_on_to_the_same_champion_bit_for_bit(
@@ -159,7 +159,7 @@ def test_a_run_killed_again_and_again_goes_on_to_the_same_champion_bit_for_bit(
         ready = (generations if kind == "generation" else saving)(folder, int(number))
         codes.append(kill_when(ready, *begin))
         begin = ("train", "--resume", folder)
-    assert codes.count(-signal.SIGKILL) >= 4, "at most one moment may have passed unseen"
+    assert codes.count(-signal.SIGKILL) >= 2, "at most one moment may have passed unseen"
     said_by(capsys, *begin, code=0)
     assert result(folder) == result(finished[0])
     assert without_times(folder) == without_times(finished[0])

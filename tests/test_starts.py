@@ -128,7 +128,7 @@ def test_every_command_that_holds_ends_with_a_round():
 
 def test_each_generation_has_other_starts_until_all_have_had_their_turn(stool: Creature):
     config = small_config(
-        rollout={"starts": 3, "variety": 4, "friction": (0.6, 1.4), "physics": "mjx"},
+        rollout={"starts": 3, "variety": 4, "friction": (0.6, 1.4)},
         evolution={"survival": "children", "elite": 0.1},
     )
     experiment = build_experiment(stool, config)
