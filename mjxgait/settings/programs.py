@@ -47,11 +47,13 @@ class ProgramConfig:
       initial_depth: of the first expressions, half of them full and half grown.
       constants: range of the random constants.
       functions_cross: share of crossing points at functions, where there is one (Koza: 0.9).
-      subtree: how often, relative to the other three, a mutation puts a new subtree.
+      subtree: how often, relative to the other four, a mutation puts a new subtree.
       point: how often another function or sense.
       hoist: how often a subtree in place of the whole.
       constant: how often a moved constant.
-      constant_sigma: by how much a constant moves, in units of the range.
+      nudge: how often a small constant is added to a subtree, or one near 1 multiplied with it.
+      constant_sigma: by how much constants move and subtrees are nudged, in units of the range;
+        a hundredth of it is as likely.
       parsimony: fitness that each node costs.
     """
 
@@ -74,6 +76,7 @@ class ProgramConfig:
     point: NonNegative = 1.0
     hoist: NonNegative = 0.5
     constant: Positive = 2.0
+    nudge: NonNegative = 3.0
     constant_sigma: NonNegative = 0.1
     parsimony: NonNegative = 0.0
 

@@ -4,6 +4,7 @@ of the same and against DEAP.
 
 import operator
 from functools import partial
+from types import SimpleNamespace
 from typing import Any
 
 import jax
@@ -61,6 +62,21 @@ def programs() -> tuple[np.ndarray, np.ndarray]:
     return np.asarray(code), np.asarray(value)
 
 
+KINDS = ("subtree", "point", "hoist", "constant", "nudge")
+
+
+@jax.jit
+def _mutants(keys: jax.Array, code: jax.Array, value: jax.Array, shares: jax.Array) -> Any:
+    settings = SimpleNamespace(**vars(SETTINGS) | dict(zip(KINDS, shares, strict=True)))
+    return jax.vmap(lambda key: mutated(key, (code, value), WORDS, settings))(keys)
+
+
+def mutants(keys: jax.Array, tree: Any, shares: jax.Array) -> tuple[np.ndarray, np.ndarray]:
+    """Of one tree [C], [N, C], by mutations of such shares."""
+    code, value = _mutants(keys, *map(jnp.asarray, tree), shares)
+    return np.asarray(code), np.asarray(value)
+
+
 def taken(code: int) -> int:
     return int(ARITY[code]) if code < FIRST_ADDED else 0
 
@@ -106,11 +122,12 @@ def test_subtrees_and_depths_are_those_of_a_plain_reading(programs: Any):
 
 
 def test_splicing_is_cutting_and_pasting(programs: Any):
-    code, rng = programs[0], np.random.default_rng(0)
+    largest = np.argsort((programs[0] != EMPTY).sum(1))[-500:]
+    code, rng = programs[0][largest], np.random.default_rng(0)
     splice = jax.jit(lambda *a: spliced((a[0], a[1]), a[2], (a[3], a[4]), a[5], 99))
     kept = 0
     for _ in range(200):
-        host, donor = code[rng.integers(MANY, size=2)]
+        host, donor = code[rng.integers(len(code), size=2)]
         here, there = (rng.integers((row != EMPTY).sum()) for row in (host, donor))
         graft = donor[there : plain_end(donor, there)]
         wanted = np.concatenate([host[:here], graft, host[plain_end(host, here) :]])
@@ -271,15 +288,11 @@ def test_crossing_prefers_functions():
 
 
 def test_each_mutation_does_its_own():
-    tree = map(jnp.asarray, to_arrays("(+ (* a0 0.5) (ifltz a1 a2 a3))", KNOWN, NODES, "x"))
-    code, value = tree
-    alone = {"subtree": 0.0, "point": 0.0, "hoist": 0.0, "constant": 1e-30}
+    tree = to_arrays("(+ (* a0 0.5) (ifltz a1 a2 a3))", KNOWN, NODES, "x")
+    keys = jax.random.split(jax.random.key(0), 64)
 
     def all_of(kind: str) -> set[str]:
-        settings = ProgramConfig(**{**alone, kind: 1.0}, nodes=NODES, functions=tuple(FUNCTIONS))
-        keys = jax.random.split(jax.random.key(0), 64)
-        make = jax.jit(jax.vmap(lambda key: mutated(key, (code, value), WORDS, settings)))
-        rows = zip(*map(np.asarray, make(keys)), strict=True)
+        rows = zip(*mutants(keys, tree, jnp.array([one == kind for one in KINDS])), strict=True)
         return {to_text(*row, KNOWN) for row in rows}
 
     assert all(text.startswith("(+ (* a0 ") for text in all_of("constant"))
@@ -289,6 +302,22 @@ def test_each_mutation_does_its_own():
     assert "(- (* a0 0.5) (ifltz a1 a2 a3))" in point
     assert all(text.count("(") == 3 for text in point)
     assert max(text.count("(") for text in all_of("subtree")) > 3
+    assert all(text.count("(") == 4 for text in all_of("nudge"))
+
+
+def test_a_nudge_changes_little_and_often_very_little():
+    """Of a single sense: `a0` and something, or times something near 1."""
+    tree = to_arrays("a0", KNOWN, NODES, "x")
+    keys = jax.random.split(jax.random.key(0), 1000)
+
+    code, value = mutants(keys, tree, jnp.array([0, 0, 0, 0, 1]))
+    sums, products = (code[:, 0] == FUNCTION_CODES[name] for name in "+*")
+    assert sums.sum() + products.sum() == len(keys)
+    assert 0.4 < sums.mean() < 0.6
+    by = abs(np.where(sums, value[:, 2], value[:, 2] - 1.0))
+    assert by.max() < 5 * 0.2
+    # Half of all are below a tenth of the largest standard deviation.
+    assert 0.005 < np.median(by) < 0.02
 
 
 def test_a_node_costs_what_the_settings_say():

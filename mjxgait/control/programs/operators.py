@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from mjxgait.champion.expressions import ARITY, CONSTANT, EMPTY
+from mjxgait.champion.expressions import ARITY, CONSTANT, EMPTY, FUNCTION_CODES
 from mjxgait.control.programs.grow import Words, grown, half_and_half
 from mjxgait.control.programs.trees import Trees, arity, canonical, depths, size, subtree_sizes
 from mjxgait.search.variation import Variation
@@ -17,6 +17,10 @@ Tree = tuple[jax.Array, jax.Array]
 """code, value [C]."""
 GRAFT = 3
 """Depth of a new subtree in mutation."""
+NEUTRAL = {FUNCTION_CODES["+"]: 0.0, FUNCTION_CODES["*"]: 1.0}
+"""Functions, and the second argument with which each gives its first."""
+FINEST = 0.01
+"""Share of the largest change of a constant."""
 
 
 def program_variation(words: Words, joints: int, settings: Any) -> Variation:
@@ -73,13 +77,10 @@ def mutated(key: jax.Array, tree: Tree, words: Words, settings: Any) -> Tree:
         _another(key_change, tree, place, words),
         spliced((jnp.zeros_like(tree[0]), tree[1]), jnp.int32(0), tree, place, settings.depth),
         _moved(key_change, tree, settings),
+        _nudged(key_change, tree, place, words, settings),
     )
-    shares = jnp.stack(
-        [
-            jnp.asarray(share, jnp.float32)
-            for share in (settings.subtree, settings.point, settings.hoist, settings.constant)
-        ]
-    )
+    kinds = ("subtree", "point", "hoist", "constant", "nudge")
+    shares = jnp.stack([jnp.asarray(getattr(settings, kind), jnp.float32) for kind in kinds])
     kind = jax.random.categorical(key_kind, jnp.log(shares))
     code, value = (jnp.stack(parts)[kind] for parts in zip(*options, strict=True))
     return code, value
@@ -136,14 +137,36 @@ def functions_at(key: jax.Array, functions: np.ndarray, allowed: jax.Array) -> j
 
 
 def _moved(key: jax.Array, tree: Tree, settings: Any) -> Tree:
-    """With one of its constants moved by a Gaussian; itself where it has none."""
+    """With one of its constants moved; itself where it has none."""
     key_which, key_by = jax.random.split(key)
     constants = tree[0] == CONSTANT
     place = jax.random.categorical(key_which, jnp.where(constants, 0.0, -jnp.inf))
-    low, high = settings.constants
-    by = settings.constant_sigma * (high - low) * jax.random.normal(key_by)
     moves = constants & (np.arange(len(constants)) == place)
-    return tree[0], jnp.where(moves, tree[1] + by, tree[1])
+    return tree[0], jnp.where(moves, tree[1] + _step(key_by, settings), tree[1])
+
+
+def _nudged(key: jax.Array, tree: Tree, place: jax.Array, words: Words, settings: Any) -> Tree:
+    """With what is at a place [] a little more or less, or larger or smaller; itself where it has
+    neither sums nor products.
+    """
+    ways = [(code, at) for code, at in NEUTRAL.items() if code in words.functions]
+    if not ways:
+        return tree
+    key_way, key_by = jax.random.split(key)
+    function, neutral = jax.random.choice(key_way, jnp.array(ways, jnp.float32))
+    room = jnp.zeros_like(tree[0])
+    code = room.at[:3].set(jnp.stack([function.astype(room.dtype), CONSTANT, CONSTANT]))
+    value = jnp.zeros_like(tree[1]).at[2].set(neutral + _step(key_by, settings))
+    changed = spliced((code, value), jnp.int32(1), tree, place, settings.depth)
+    return spliced(tree, place, changed, jnp.int32(0), settings.depth)
+
+
+def _step(key: jax.Array, settings: Any) -> jax.Array:
+    """[] Gaussian, and as often fine as coarse: nobody knows how sensitive an expression is."""
+    key_fine, key_by = jax.random.split(key)
+    low, high = settings.constants
+    fine = FINEST ** jax.random.uniform(key_fine)
+    return settings.constant_sigma * (high - low) * fine * jax.random.normal(key_by)
 
 
 def _of(trees: Trees, joint: jax.Array) -> Tree:
