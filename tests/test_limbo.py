@@ -26,7 +26,8 @@ from mjxgait.creature.geometry import support_extents
 from mjxgait.errors import UserError
 from mjxgait.parts.settings import build_config
 from mjxgait.runs.experiment import build_experiment
-from mjxgait.runs.generation import Row, next_starts
+from mjxgait.runs.generation import LEADERS, Row, climbed, next_starts
+from mjxgait.search.state import EvolutionState
 from mjxgait.settings import limbo as evolution
 from mjxgait.settings.limbo import BAR_PLACE, LimboConfig
 from mjxgait.settings.rollout import RolloutConfig
@@ -185,7 +186,7 @@ def test_to_run_through_the_bar_is_better_than_to_stay_before_it(luxo: Creature)
     assert manner > float(weights["distance"])
 
 
-def test_the_bar_comes_down_in_so_many_generations_and_stays(stool: Creature):
+def test_the_bar_comes_down_in_so_many_steps_and_stays(stool: Creature):
     """In the program that is run; the two rows come down by settings of their own."""
     common = {"use": {"task": "limbo"}, "evolution": {"population": 6}}
     rollout = {"seconds": 0.2, "starts": 3, "lanes": 4}
@@ -197,14 +198,48 @@ def test_the_bar_comes_down_in_so_many_generations_and_stays(stool: Creature):
     ]
     state, task = rows[0].init(), rows[0].simulator.task
 
-    def raised(row: Row, latest: int) -> np.ndarray:
-        before = dataclasses.replace(state, generation=jnp.int32(latest))
-        return np.asarray(next_starts(task, row, before).raised)
+    assert state.level == 0
 
-    # While seeding it is where it will be in generation 0.
-    for latest, expected in ((-1, 0.1), (0, 0.09), (4, 0.05), (9, 0.0), (50, 0.0)):
-        assert raised(rows[0].row, latest) == pytest.approx([expected] * 3, abs=1e-6)
-        assert raised(rows[1].row, latest) == pytest.approx([0.0] * 3)
+    def raised(row: Row, level: int) -> np.ndarray:
+        return np.asarray(next_starts(task, row, at(state, level=level)).raised)
+
+    for level, expected in ((0, 0.1), (1, 0.09), (5, 0.05), (10, 0.0), (50, 0.0)):
+        assert raised(rows[0].row, level) == pytest.approx([expected] * 3, abs=1e-6)
+        assert raised(rows[1].row, level) == pytest.approx([0.0] * 3)
+
+
+def at(state: EvolutionState, **changed: float) -> EvolutionState:
+    return dataclasses.replace(state, **{k: jnp.asarray(v) for k, v in changed.items()})
+
+
+@pytest.mark.parametrize(
+    ("missed", "bar", "of", "climbs"),
+    [
+        ([0.9, 0.2], [0.0, 0.08], LEADERS, True),
+        ([0.9, 0.5], [0.0, 0.0], LEADERS, False),
+        ([0.0, 0.0], [0.0, 0.12], LEADERS, False),
+        ([0.0, 0.0], [0.0, 0.0], LEADERS // 2 + 1, True),
+        ([0.0, 0.0], [0.0, 0.0], LEADERS // 2, False),
+    ],
+)
+def test_the_bar_comes_down_a_step_when_most_of_the_best_have_mastered_it(
+    stool: Creature, missed: list[float], bar: list[float], of: int, climbs: bool
+):
+    """Means over the two trials; and what they were worth under the higher bar is forgotten."""
+    task = Limbo(stool, STEP, HORIZON, stool.settings.termination)
+    terms = np.ones((LEADERS + 3, 2, len(task.terms)), np.float32)
+    terms[:of, :, task.terms.index("missed")] = missed
+    terms[:of, :, task.terms.index("bar")] = bar
+    names = {field.name: None for field in dataclasses.fields(EvolutionState)}
+    rounds, fitness = jnp.full(len(terms), 3.0), -jnp.arange(float(len(terms)))
+    state = EvolutionState(**names | {"terms": jnp.asarray(terms), "rounds": rounds})
+    state = at(dataclasses.replace(state, fitness=fitness), level=4, generation=7)
+    after = climbed(task, state)
+    assert int(after.level) == 4 + climbs
+    assert (np.asarray(after.rounds) == (0.0 if climbs else 3.0)).all()
+    nobody = (at(state, generation=-1), at(state, fitness=np.full(len(terms), -np.inf)))
+    assert all(int(climbed(task, unjudged).level) == 4 for unjudged in nobody)
+    assert climbed(task, dataclasses.replace(state, level=None)).level is None
 
 
 def test_all_goals_lie_beyond_the_bar(luxo: Creature):

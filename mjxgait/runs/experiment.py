@@ -263,7 +263,8 @@ def _initial(
     """The same compiled function for every run, alone or beside others, so that they begin with the same bits."""
     simulator = blueprint.simulator(numbers)
     task, trials = simulator.task, settings.rollout.starts
-    return evolution_of(simulator, settings).init(key, trials, len(task.terms), len(task.outcomes))
+    state = evolution_of(simulator, settings).init(key, trials, len(task.terms), len(task.outcomes))
+    return dataclasses.replace(state, level=jnp.int32(0)) if task.climbs else state
 
 
 def _filled_up(sources: Sequence[Sequence[int]]) -> list[list[int]]:

@@ -21,6 +21,8 @@ from mjxgait.tasks.score import in_order, score
 from mjxgait.tasks.trials import Starts
 from mjxgait.types import Judged, pytree
 
+LEADERS = 16
+"""Of the best of a row, those that decide whether trials become harder."""
 SENT = 4
 """Of the best of a row, those that it sends to others, one in each generation in turn."""
 
@@ -114,18 +116,35 @@ def absorb(
         given: tuple[Row, EvolutionState, Proposal, Judged],
     ) -> tuple[EvolutionState, GenerationMetrics]:
         row, state, proposal, judged = given
-        return evolution_of(simulator, row.settings).absorb(state, proposal, judged)
+        after, told = evolution_of(simulator, row.settings).absorb(state, proposal, judged)
+        after = climbed(simulator.task, after)
+        return after, dataclasses.replace(told, level=after.level)
 
     return jax.lax.map(of_row, (rows, states, proposals, judged))
 
 
+def climbed(task: Task, state: EvolutionState) -> EvolutionState:
+    """The state after a generation, one level higher if most of the best have mastered theirs.
+
+    What they were worth at the old level is then forgotten: it was easier.
+    """
+    if state.level is None:
+        return state
+    best = dict(zip(task.terms, jnp.mean(state.terms[:LEADERS], axis=1).T, strict=True))
+    known = (state.generation >= 0) & jnp.isfinite(state.fitness[:LEADERS])
+    higher = jnp.mean(jax.vmap(task.mastered)(best) & known) > 0.5
+    rounds = None if state.rounds is None else jnp.where(higher, 0.0, state.rounds)
+    return dataclasses.replace(state, level=state.level + higher, rounds=rounds)
+
+
 def next_starts(task: Task, row: Row, state: EvolutionState) -> Starts:
     """The starts [R] of the next generation, as hard as they are by then."""
-    generation = jnp.maximum(state.generation + 1, 0)
     starts = row.starts
     if row.settings.rollout.variety > 1:
-        starts = _of_round(row, generation)
-    return task.harder(starts, row.settings.fitness, generation)
+        starts = _of_round(row, jnp.maximum(state.generation + 1, 0))
+    if state.level is None:
+        return starts
+    return task.harder(starts, row.settings.fitness, state.level)
 
 
 def _of_round(row: Row, generation: jax.Array) -> Starts:

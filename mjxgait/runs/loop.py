@@ -177,7 +177,7 @@ def metrics_line(metrics: GenerationMetrics, seconds: float, task: Task) -> dict
     line = {
         field.name: getattr(metrics, field.name).item()
         for field in dataclasses.fields(metrics)
-        if field.name not in ("best_terms", "best_outcome", "mothers")
+        if getattr(metrics, field.name) is not None and not getattr(metrics, field.name).ndim
     }
     line["forced"] = bool(line["forced"])
     line |= {"steps_per_second": round(line["sim_steps"] / seconds), "wall_s": round(seconds, 4)}

@@ -33,6 +33,7 @@ class EvolutionState:
     spell_best: [] best fitness when the last spell began. barren: [] spells in a row that began
     without a better best than the one before.
     rounds: [P] of which `terms` is the mean; None where nobody's earlier rounds count.
+    level: [] how often the trials have become harder; None where they never do.
     """
 
     genomes: Any
@@ -53,6 +54,7 @@ class EvolutionState:
     spell_best: jax.Array
     barren: jax.Array
     rounds: jax.Array | None = None
+    level: jax.Array | None = None
 
 
 @pytree
@@ -62,7 +64,8 @@ class GenerationMetrics:
 
     unique: different genomes. spread: mean standard deviation of a gene. failures: how many of the
     offspring's episodes ended early. mothers: [P] the places that the population, or its mothers,
-    had in the generation before; None where that is not followed.
+    had in the generation before; None where that is not followed. level: of the next generation's
+    trials; None where they never become harder.
     """
 
     generation: jax.Array
@@ -83,6 +86,7 @@ class GenerationMetrics:
     best_terms: jax.Array
     best_outcome: jax.Array
     mothers: jax.Array | None = None
+    level: jax.Array | None = None
 
 
 @pytree

@@ -35,12 +35,13 @@ class LimboConfig(HopConfig):
     Attributes:
       height: m, of the bar's lower edge above the floor.
       higher: m by which it is higher in the first generation.
-      lowering: generations in which it comes down from there, a little in each.
+      lowering: steps in which it comes down from there: one in each generation whose best have
+        mastered the step before.
       weights: what each term counts.
     """
 
     __pydantic_config__ = STRICT
     height: Positive = 0.35
     higher: NonNegative = 0.12
-    lowering: Whole = 30
+    lowering: Whole = 24
     weights: LimboWeights = dataclasses.field(default_factory=LimboWeights)

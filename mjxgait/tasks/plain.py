@@ -31,6 +31,7 @@ class PlainTask(abc.ABC):
     counts: ClassVar[Mapping[str, float]] = {}
     outcomes: ClassVar[tuple[str, ...]] = ("seconds",)
     adds: ClassVar[tuple[str, ...]] = ()
+    climbs: ClassVar[bool] = False
 
     def __init__(self, creature: Body, step: float, horizon: int, ends: Termination | Ends) -> None:
         self.creature, self.step, self.horizon, self.ends = creature, step, horizon, ends
@@ -44,9 +45,13 @@ class PlainTask(abc.ABC):
         """See `Task`: the first start is nominal, the others are perturbed and pushed."""
         return draw_starts(key, creature, settings)
 
-    def harder(self, trials: Starts, settings: Any, generation: jax.Array) -> Starts:
-        """See `Task`: the same from the first generation on."""
+    def harder(self, trials: Starts, settings: Any, level: jax.Array) -> Starts:
+        """See `Task`: always the same."""
         return trials
+
+    def mastered(self, terms: Mapping[str, jax.Array]) -> jax.Array:
+        """See `Task`."""
+        return jnp.zeros((), bool)
 
     def aim(self, trial: Starts) -> Any:
         """See `Task`."""

@@ -52,8 +52,17 @@ class Task(Protocol):
         """The R trials [R, ...] that everybody is judged on; drawn once, by the host."""
         ...
 
-    def harder(self, trials: Starts, settings: Any, generation: jax.Array) -> Starts:
-        """The trials [R, ...] as they are at a generation [], for what is asked may grow."""
+    @property
+    def climbs(self) -> bool:
+        """Whether trials become harder as the best master them."""
+        ...
+
+    def harder(self, trials: Starts, settings: Any, level: jax.Array) -> Starts:
+        """The trials [R, ...] after they have become harder so many times []."""
+        ...
+
+    def mastered(self, terms: Mapping[str, jax.Array]) -> jax.Array:
+        """Whether [] one of these terms, means over its trials, is ready for harder ones."""
         ...
 
     def aim(self, trial: Starts) -> Any:

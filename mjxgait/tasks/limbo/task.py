@@ -1,6 +1,7 @@
 """Limbo as a task: to a goal beneath a bar, of which every part must stay clear."""
 
 import dataclasses
+from collections.abc import Mapping
 from typing import Any
 
 import jax
@@ -12,7 +13,7 @@ from mjxgait.ground.spec import parse_ground
 from mjxgait.settings.limbo import GOALS, NOMINAL_GOAL, LimboConfig, LimboWeights
 from mjxgait.settings.rollout import RolloutConfig
 from mjxgait.tasks.hop import tally as hop
-from mjxgait.tasks.hop.fitness import fitness_terms
+from mjxgait.tasks.hop.fitness import MISSED, fitness_terms
 from mjxgait.tasks.hop.task import Hop
 from mjxgait.tasks.limbo.bar import bar_distance, intrusion
 from mjxgait.tasks.score import ramped
@@ -21,6 +22,8 @@ from mjxgait.types import Sensed, pytree
 
 DEEP = 0.3
 """Hip heights; a body so deep in the place of the bar counts whole."""
+THERE, BENEATH = 0.6, 0.05
+"""Of the terms `missed` and `bar`, means over the trials: who has no more is ready for a lower bar."""
 
 
 @pytree
@@ -55,6 +58,7 @@ class Limbo(Hop):
     terms = tuple(field.name for field in dataclasses.fields(LimboWeights))
     outcomes = (*Hop.outcomes, "bar")
     adds = (*Hop.adds, "bar_distance")
+    climbs = True
     goals, nominal = GOALS, NOMINAL_GOAL
 
     def trials(self, key: jax.Array, creature: Creature, settings: RolloutConfig) -> Starts:
@@ -68,11 +72,15 @@ class Limbo(Hop):
         starts = super().trials(key, creature, settings)
         return dataclasses.replace(starts, raised=jnp.zeros(settings.starts))
 
-    def harder(self, trials: Starts, settings: Any, generation: jax.Array) -> Starts:
+    def harder(self, trials: Starts, settings: Any, level: jax.Array) -> Starts:
         """See `Task`: the bar comes down, so that whoever hops learns to duck little by little."""
-        left = 1.0 - ramped(settings.lowering, generation)
+        left = 1.0 - ramped(settings.lowering, level)
         raised = jnp.full(trials.friction.shape, settings.higher * left)
         return dataclasses.replace(trials, raised=raised)
+
+    def mastered(self, terms: Mapping[str, jax.Array]) -> jax.Array:
+        """See `Task`: who is at its goal in the end, and hardly touches the bar."""
+        return (terms[MISSED] <= THERE) & (terms["bar"] <= BENEATH)
 
     def aim(self, trial: Starts) -> Any:
         """See `Task`."""
