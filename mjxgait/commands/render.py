@@ -4,7 +4,7 @@ import dataclasses
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import tyro
 
@@ -19,10 +19,10 @@ SECONDS = 5.0
 
 @dataclasses.dataclass(frozen=True)
 class RenderOptions:
-    """Make a video of a run's champion walking; several walks side by side as a race.
+    """Make a video of a run's champion walking; several walks, or runs, side by side as a race.
 
     Attributes:
-      run: Run folder.
+      runs: Run folder; the champions of several race, whatever their creatures.
       out: File to write: .webp, .gif, .mp4 (extra [video]), or .png for a filmstrip of one stride.
       top: The best N of the latest population as a race.
       generations: The best of each of these generations as a race, such as 0,5,20.
@@ -37,7 +37,7 @@ class RenderOptions:
         works.
     """
 
-    run: tyro.conf.Positional[Path]
+    runs: tyro.conf.Positional[Annotated[tuple[Path, ...], tyro.conf.arg(metavar="RUN [RUN ...]")]]
     out: Path
     top: int | None = None
     generations: str | None = None
@@ -61,15 +61,17 @@ def render_command(arguments: Sequence[str]) -> int:
 
     generations = _check(options)
     video.require_writer(options.out)
-    races = bool(options.top or generations)
     still = options.out.suffix.lower() == ".png"
-    seconds = options.seconds or (cast.LOOP_SECONDS if still and not races else SECONDS)
-    if options.top:
-        runners = cast.top_of(options.run, options.top, seconds)
+    alone = not (options.top or generations or len(options.runs) > 1)
+    seconds = options.seconds or (cast.LOOP_SECONDS if still and alone else SECONDS)
+    if alone:
+        runners = [cast.champion_of(options.runs[0], seconds)]
+    elif options.top:
+        runners = cast.top_of(options.runs[0], options.top, seconds)
     elif generations:
-        runners = cast.through_generations(options.run, generations, seconds)
+        runners = cast.through_generations(options.runs[0], generations, seconds)
     else:
-        runners = [cast.champion_of(options.run, seconds)]
+        runners = cast.champions_of(options.runs, seconds)
     stage = Stage([runner.walk for runner in runners], *(options.size or SIZE), options.camera)
     if still:
         _still(runners, stage, options)
@@ -100,6 +102,10 @@ def _check(options: RenderOptions) -> list[int]:
     ):
         if not low <= value <= high:
             raise UserError(f"--{name} {value}: must lie between {low} and {high}")
+    if not 1 <= len(options.runs) <= MOST_RUNNERS:
+        raise UserError(f"name a run folder, or up to {MOST_RUNNERS} for a race")
+    if len(options.runs) > 1 and (options.top or options.generations):
+        raise UserError("--top and --generations are races of one run; name only that")
     if options.top and options.generations:
         raise UserError("--top and --generations are two kinds of race; name one of them")
     try:

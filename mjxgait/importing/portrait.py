@@ -10,7 +10,7 @@ from mjxgait.creature import Creature
 from mjxgait.importing.hold import Held, hold
 from mjxgait.viewing.camera import Camera
 from mjxgait.viewing.floor import DARK_INK, font
-from mjxgait.viewing.painter import Painter
+from mjxgait.viewing.painter import Painter, paint
 from mjxgait.viewing.shapes import Silhouettes
 
 WIDTH, HEIGHT = 1100, 760
@@ -91,7 +91,7 @@ def portrait(creature: Creature) -> Image.Image:
     painter = Painter(creature.model)
     places = (data.geom_xpos.copy(), data.geom_xmat.reshape(-1, 3, 3).copy())
     camera = _camera(creature, painter, places)
-    picture = painter.picture(camera, [places], data.xpos[creature.trunk][:2])
+    picture = paint(camera, [(painter, *places)], data.xpos[creature.trunk][:2])
     draw = ImageDraw.Draw(picture)
     _mark_feet(draw, camera, creature, data)
     _mark_joints(draw, camera, creature, data)

@@ -1,12 +1,12 @@
-"""Who is shown: the champion of a run, the best of its population, or the best of several
-generations.
+"""Who is shown: the champions of one or several runs, the best of a population, or the best of
+several generations.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from mjxgait.runs.folder import open_champion
-from mjxgait.viewing.video import Runner
+from mjxgait.viewing.video import Runner, spoken
 from mjxgait.viewing.walk import Walk, record_walk
 
 LOOP_SECONDS = 12.0
@@ -16,6 +16,15 @@ LOOP_SECONDS = 12.0
 def champion_of(run: Path, seconds: float) -> Runner:
     """The run's champion."""
     return Runner(record_walk(*open_champion(run), seconds))
+
+
+def champions_of(runs: Sequence[Path], seconds: float) -> list[Runner]:
+    """The champion of each run, named by its creature; by its folder where a creature comes twice."""
+    walks = [champion_of(run, seconds).walk for run in runs]
+    names = [spoken(walk) for walk in walks]
+    for others in ([run.resolve().name for run in runs], [str(run) for run in runs]):
+        names = names if len(set(names)) == len(names) else others
+    return [Runner(walk, name) for walk, name in zip(walks, names, strict=True)]
 
 
 def top_of(run: Path, count: int, seconds: float) -> list[Runner]:

@@ -33,6 +33,8 @@ def working_backend(stage: Stage, wanted: str | None = None) -> tuple[str | None
     """
     if wanted and wanted.lower() in OFF:
         return None, f"drawn without GL, as MUJOCO_GL={wanted} says"
+    if not stage.alike:
+        return None, "drawn without GL, which draws several creatures of one kind only"
     candidates = (
         [wanted] if wanted else ["egl", "osmesa"] if sys.platform == "linux" else ["default"]
     )
@@ -95,14 +97,14 @@ def scene_file(stage: Stage, frames: Sequence[int], path: Path) -> None:
     """Writes all that the worker needs: poses [F, N, nq] with each creature in its lane, and the
     camera of every frame.
     """
-    spec = stage.walks[0].marked
+    walk = stage.entrants[0].walk
+    spec, creature = walk.marked, walk.creature
     cameras = [stage.camera(frame) for frame in frames]
     first = cameras[0]
-    into, creature = first.axes[2], stage.walks[0].creature
+    into = first.axes[2]
     place = int(creature.model.jnt_qposadr[creature.model.body_jntadr[creature.trunk]])
-    poses = np.array(
-        [[walk.qpos[min(frame, len(walk.qpos) - 1)] for walk in stage.walks] for frame in frames]
-    )
+    times = [frame * stage.time_step for frame in frames]
+    poses = np.array([[one.walk.qpos[one.frame(time)] for one in stage.entrants] for time in times])
     poses[..., place : place + 3] += stage.lanes
     numbers = {
         int(n) for camera in (first, cameras[-1]) for n in band_lines(camera, stage.origin)[0]
@@ -138,8 +140,9 @@ def _ground(stage: Stage) -> dict[str, Any]:
     """
     if stage.relief is None:
         return {}
-    creature, room = stage.walks[0].creature, 2.5 * stage.width / stage.camera(0).scale
-    cell, lanes = GROUND_CELL * creature.frame.hip_height, stage.lanes @ stage.left
+    room = 2.5 * stage.width / stage.camera(0).scale
+    hip_height = stage.entrants[0].walk.creature.frame.hip_height
+    cell, lanes = GROUND_CELL * hip_height, stage.lanes @ stage.left
     ahead = np.arange(stage.way[:, 0].min() - room, stage.way[:, 0].max() + room, cell)
     aside = stage.way[:, 1]
     left = np.arange(aside.min() + lanes.min() - room, aside.max() + lanes.max() + 2 * room, cell)

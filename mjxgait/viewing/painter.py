@@ -39,7 +39,7 @@ SEEN_GROUPS = 3
 
 
 class Painter:
-    """Draws one kind of creature, any number of them at a time."""
+    """What is needed to draw one kind of creature, anywhere."""
 
     def __init__(self, model: mujoco.MjModel) -> None:
         """`far` [G] may be set: 1 for parts on the creature's far side, which are drawn paler; 0
@@ -51,63 +51,70 @@ class Painter:
         self.outlines = Silhouettes(model, self.geoms)
         self.far = np.zeros(len(self.geoms))
 
-    def picture(
-        self,
-        camera: Camera,
-        creatures: Sequence[tuple[np.ndarray, np.ndarray]],
-        origin: np.ndarray,
-        relief: Relief | None = None,
-    ) -> Image.Image:
-        """One frame.
+    def shadows(self, pos: np.ndarray, rot: np.ndarray) -> np.ndarray:
+        """[geoms, points, 3] m: what hides the floor from light that falls straight down.
 
-        Args:
-          creatures: world positions [ngeom, 3] m and rotations [ngeom, 3, 3] of each creature's
-            geoms.
-          origin: [2] m, where the scale on the floor is zero.
-          relief: of ground that is no plane.
+        pos, rot: world positions [ngeom, 3] m and rotations [ngeom, 3, 3] of its geoms.
         """
-        fine = camera.enlarged(SMOOTH)
-        picture = draw_floor(camera, origin, relief).resize(
-            (fine.width, fine.height), Image.Resampling.BICUBIC
-        )
-        mine = [(pos[self.geoms], rot[self.geoms]) for pos, rot in creatures]
-        self._shade_floor(picture, fine, mine, relief)
-        canvas = _Canvas(np.asarray(picture, dtype=np.float32).copy(), fine)
-        for pos, rot in mine:
-            self._draw(canvas, pos, rot)
-        return canvas.image().reduce(SMOOTH)
-
-    def _shade_floor(
-        self,
-        picture: Image.Image,
-        camera: Camera,
-        creatures: Sequence[tuple[np.ndarray, np.ndarray]],
-        relief: Relief | None,
-    ) -> None:
-        """Darkens the floor where the light from above does not reach it."""
-        mask = Image.new("L", picture.size)
-        draw = ImageDraw.Draw(mask)
         directions = np.column_stack([COMPASS, np.zeros(len(COMPASS))])
-        for pos, rot in creatures:
-            rims = self.outlines.outermost(pos, rot, directions)
-            rims[..., 2] = 0.0 if relief is None else relief(rims[..., 0], rims[..., 1])
-            for polygon in camera.pixels(rims):
-                draw.polygon([tuple(p) for p in polygon], fill=round(255 * SHADOW_GREY))
-        mask = mask.filter(ImageFilter.BoxBlur(max(camera.scale * 0.012, 1)))
-        picture.paste((40, 44, 52), mask=mask)
+        return self.outlines.outermost(pos[self.geoms], rot[self.geoms], directions)
 
-    def _draw(self, canvas: "_Canvas", pos: np.ndarray, rot: np.ndarray) -> None:
+    def draw(self, canvas: "_Canvas", pos: np.ndarray, rot: np.ndarray, first: int = 0) -> None:
+        """Onto a canvas whose bodies are numbered from `first` on."""
+        pos, rot = pos[self.geoms], rot[self.geoms]
         right, up, _ = canvas.camera.axes
         rims = canvas.camera.pixels(
             self.outlines.outermost(pos, rot, np.stack([right, up, -right, -up]))
         )
         for i, geom in enumerate(self.geoms):
-            paint = _Paint(self.colours[i], float(self.far[i]), int(self.model.geom_bodyid[geom]))
+            body = first + int(self.model.geom_bodyid[geom])
+            paint = _Paint(self.colours[i], float(self.far[i]), body)
             kind = int(self.model.geom_type[geom])
             if kind == mujoco.mjtGeom.mjGEOM_MESH:
                 fill_mesh(canvas, self.model, int(geom), pos[i], rot[i], paint)
             else:
                 canvas.primitive(kind, self.model.geom_size[geom], pos[i], rot[i], rims[i], paint)
+
+
+def paint(
+    camera: Camera,
+    creatures: Sequence[tuple[Painter, np.ndarray, np.ndarray]],
+    origin: np.ndarray,
+    relief: Relief | None = None,
+) -> Image.Image:
+    """One frame.
+
+    Args:
+      creatures: the painter of each, and world positions [ngeom, 3] m and rotations [ngeom, 3, 3]
+        of its geoms.
+      origin: [2] m, where the scale on the floor is zero.
+      relief: of ground that is no plane.
+    """
+    fine = camera.enlarged(SMOOTH)
+    picture = draw_floor(camera, origin, relief).resize(
+        (fine.width, fine.height), Image.Resampling.BICUBIC
+    )
+    rims = [painter.shadows(pos, rot) for painter, pos, rot in creatures]
+    _shade_floor(picture, fine, rims, relief)
+    canvas, first = _Canvas(np.asarray(picture, dtype=np.float32).copy(), fine), 0
+    for painter, pos, rot in creatures:
+        painter.draw(canvas, pos, rot, first)
+        first += painter.model.nbody
+    return canvas.image().reduce(SMOOTH)
+
+
+def _shade_floor(
+    picture: Image.Image, camera: Camera, rims: Sequence[np.ndarray], relief: Relief | None
+) -> None:
+    """Darkens the floor where the light from above does not reach it."""
+    mask = Image.new("L", picture.size)
+    draw = ImageDraw.Draw(mask)
+    for points in rims:
+        points[..., 2] = 0.0 if relief is None else relief(points[..., 0], points[..., 1])
+        for polygon in camera.pixels(points):
+            draw.polygon([tuple(p) for p in polygon], fill=round(255 * SHADOW_GREY))
+    mask = mask.filter(ImageFilter.BoxBlur(max(camera.scale * 0.012, 1)))
+    picture.paste((40, 44, 52), mask=mask)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

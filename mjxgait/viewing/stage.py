@@ -6,9 +6,9 @@ import numpy as np
 from PIL import Image
 
 from mjxgait.viewing.camera import Camera, view_of
-from mjxgait.viewing.painter import COMPASS, Painter
+from mjxgait.viewing.entrant import Entrant
+from mjxgait.viewing.painter import paint
 from mjxgait.viewing.relief import Relief
-from mjxgait.viewing.shapes import Silhouettes
 from mjxgait.viewing.walk import Walk
 
 ROOM = 1.35
@@ -23,32 +23,38 @@ SMOOTH_SECONDS = 0.6
 
 
 class Stage:
-    """Walks of one creature in lanes side by side, the first one nearest, seen from the side.
+    """Walks in lanes side by side, the first one nearest, seen from the side.
 
-    Frames are control steps. view: a name in `camera.VIEWS`; by default a little from the front and
-    from above.
+    Frames are control steps of the first. view: a name in `camera.VIEWS`; by default a little from
+    the front and from above.
     """
 
     def __init__(
         self, walks: Sequence[Walk], width: int, height: int, view: str | None = None
     ) -> None:
-        self.walks, self.width, self.height = walks, width, height
-        self.painter = Painter(walks[0].shown)
-        self.origin = walks[0].trunk_pos[0, :2]
-        self.forward = walks[0].forward
-        self.frames = max(len(walk.qpos) for walk in walks)
+        self.width, self.height, self.time_step = width, height, walks[0].time_step
+        self.origin, self.forward = walks[0].trunk_pos[0, :2], walks[0].forward
+        self.left = np.array([-self.forward[1], self.forward[0], 0.0])
+        self.entrants = [Entrant(walk, self.origin, self.forward) for walk in walks]
+        self.frames = max(round(walk.seconds / self.time_step) for walk in walks)
         usual = {} if len(walks) == 1 else {"elevation": float(RACE_ELEVATION)}
         self.view = usual if view is None else view_of(view)
-        self._place_lanes()
+        self.lanes = self._lanes()
         self._choose_view()
+
+    @property
+    def alike(self) -> bool:
+        """Whether all are one creature, with the same things on its way."""
+        first = self.entrants[0].walk
+        return all(_same_scene(first, entrant.walk) for entrant in self.entrants[1:])
 
     def picture(self, frame: int) -> Image.Image:
         """The moment of a frame; a walk that is over stays as it ended."""
         shown = []
-        for walk, lane in zip(self.walks, self.lanes, strict=True):
-            pos, rot = walk.geom_poses(np.array([min(frame, len(walk.qpos) - 1)]))
-            shown.append((pos[0] + lane, rot[0]))
-        return self.painter.picture(self.camera(frame), shown, self.origin, self.relief)
+        for entrant, lane in zip(self.entrants, self.lanes, strict=True):
+            pos, rot = entrant.poses(frame * self.time_step)
+            shown.append((entrant.painter, pos + lane, rot))
+        return paint(self.camera(frame), shown, self.origin, self.relief)
 
     def pictures(self, frames: Sequence[int]) -> Iterator[Image.Image]:
         """The moments of several frames."""
@@ -66,52 +72,41 @@ class Stage:
 
     def behind(self, frame: int, place: int) -> np.ndarray:
         """[2] pixels, right behind the creature in a lane and half as high as it stands."""
-        walk = self.walks[place]
-        trunk = walk.trunk_pos[min(frame, len(walk.qpos) - 1)] + self.lanes[place]
-        point = trunk[:2] + self.back * self.forward
+        entrant = self.entrants[place]
+        trunk = entrant.trunk(frame * self.time_step) + self.lanes[place]
+        point = trunk[:2] + entrant.back * self.forward
         level = float(self.relief(*point)) if self.relief else 0.0
-        return self.camera(frame).pixels(np.append(point, 0.5 * self.top + level))
+        return self.camera(frame).pixels(np.append(point, 0.5 * entrant.top + level))
 
     @property
     def relief(self) -> Relief | None:
         """The ground, if it is no plane; each lane has that of its own walk."""
-        if self.walks[0].ground is None:
+        if all(entrant.walk.ground is None for entrant in self.entrants):
             return None
         return self._height
 
     def _height(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """m at places of the world, seen from the nearest lane."""
-        ground = self.walks[0].ground
-        assert ground is not None
-        aside = (x - self.origin[0]) * self.left[0] + (y - self.origin[1]) * self.left[1]
-        lane = self.lanes[np.abs(np.asarray(aside)[..., None] - self.lanes @ self.left).argmin(-1)]
-        return ground.height(x - lane[..., 0], y - lane[..., 1])
+        places = np.stack(np.broadcast_arrays(x, y), -1).reshape(-1, 2)
+        aside = (places - self.origin) @ self.left[:2]
+        nearest = np.abs(aside[:, None] - self.lanes @ self.left).argmin(-1)
+        heights = np.zeros(len(places))
+        for lane, entrant in enumerate(self.entrants):
+            mine = nearest == lane
+            heights[mine] = entrant.ground_heights(places[mine] - self.lanes[lane, :2])
+        return heights.reshape(np.shape(x))
 
-    def _place_lanes(self) -> None:
-        forward = np.append(self.forward, 0.0)
-        self.left = np.cross([0.0, 0.0, 1.0], forward)
-        model = self.walks[0].creature.model
-        own = self.painter.geoms[self.painter.geoms < model.ngeom]
-        pos, rot = (poses[0][own] for poses in self.walks[0].geom_poses(np.array([0])))
-        side = pos @ self.left - (pos @ self.left).mean()
-        far = np.clip(side / max(float(np.abs(side).max()), 1e-6), 0.0, 1.0)
-        self.painter.far[: len(own)] = far
-        directions = np.concatenate(
-            [np.column_stack([COMPASS, 0 * COMPASS[:, 0]]), [[0, 0, 1], [0, 0, -1]]]
-        )
-        self.outline = Silhouettes(model, own).outermost(pos, rot, directions).reshape(-1, 3)
-        self.top = float(self.outline[:, 2].max())
-        self.back = float(((self.outline[:, :2] - self.origin) @ self.forward).min())
-        across, along = np.ptp(self.outline @ self.left), np.ptp(self.outline @ forward)
-        places = (np.arange(len(self.walks)) - (len(self.walks) - 1) / 2) * max(
-            LANE * across, LONG_LANE * along
-        )
-        self.lanes = places[:, None] * self.left
+    def _lanes(self) -> np.ndarray:
+        """[lanes, 3] m from the middle of all."""
+        widths = np.array([max(LANE * one.across, LONG_LANE * one.along) for one in self.entrants])
+        places = np.cumsum(widths) - widths / 2
+        return (places - places[[0, -1]].mean())[:, None] * self.left
 
     def _choose_view(self) -> None:
         """Scale and height at which all lanes fill the picture well."""
         flat = Camera(np.append(self.origin, 0.0), self.forward, 1.0, 0, 0, **self.view)
-        seen = flat.pixels((self.outline[None] + self.lanes[[0, -1], None]).reshape(-1, 3))
+        outlines = [one.outline + lane for one, lane in zip(self.entrants, self.lanes, strict=True)]
+        seen = flat.pixels(np.concatenate(outlines))
         size = np.ptp(seen, axis=0)
         self.scale = float(min(self.width / (ROOM * size[0]), self.height / (ROOM * size[1])))
         self.shift = float(seen[:, 0].max() + seen[:, 0].min()) / 2 * flat.axes[0]
@@ -120,19 +115,29 @@ class Stage:
             float(-seen[:, 1].min() - 0.5 * size[1]) / np.cos(flat.elevation)
             - 0.03 * self.height / self.scale
         )
-        ways = []
-        for walk in self.walks:
-            moved = walk.trunk_pos[:, :2] - self.origin
-            level = walk.ground_heights(walk.trunk_pos[:, :2])
-            path = np.column_stack([moved @ self.forward, moved @ self.left[:2], level])
-            ways.append(np.concatenate([path, np.repeat(path[-1:], self.frames - len(path), 0)]))
-        everyone = np.array(ways)
+        everyone = np.array([self._path(entrant) for entrant in self.entrants])
         # In a race there is room behind the one in front.
-        behind = 0.0 if len(ways) == 1 else LAG * self.width / self.scale
+        behind = 0.0 if len(everyone) == 1 else LAG * self.width / self.scale
         front = np.column_stack(
             [everyone[..., 0].max(0) - behind, everyone[..., 1].mean(0), everyone[..., 2].mean(0)]
         )
-        self.way = smooth(front, round(SMOOTH_SECONDS / self.walks[0].time_step))
+        self.way = smooth(front, round(SMOOTH_SECONDS / self.time_step))
+
+    def _path(self, entrant: Entrant) -> np.ndarray:
+        """[frames, 3] m: ahead of the start, to its left, and the ground's height there."""
+        steps = [entrant.frame(frame * self.time_step) for frame in range(self.frames)]
+        places = entrant.placed(entrant.walk.trunk_pos[steps])[:, :2]
+        moved = places - self.origin
+        level = entrant.ground_heights(places)
+        return np.column_stack([moved @ self.forward, moved @ self.left[:2], level])
+
+
+def _same_scene(first: Walk, other: Walk) -> bool:
+    """Whether one model shows both."""
+    if first.creature.files["creature.xml"] != other.creature.files["creature.xml"]:
+        return False
+    specs = [walk.marked for walk in (first, other)]
+    return len({None if spec is None else spec.to_xml() for spec in specs}) == 1
 
 
 def smooth(path: np.ndarray, frames: int) -> np.ndarray:

@@ -7,6 +7,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from mjxgait.viewing.camera import Camera
+from mjxgait.viewing.painter import paint
 from mjxgait.viewing.stage import Stage
 from mjxgait.viewing.walk import Walk
 
@@ -31,10 +32,9 @@ def moments(walk: Walk) -> np.ndarray:
 def strobe(walk: Walk) -> Image.Image:
     """All moments, seen square from the side; the way is as wide as it must be."""
     stage, frames = Stage([walk], 2 * HEIGHT, HEIGHT), moments(walk)
-    poses = walk.geom_poses(frames)
-    return stage.painter.picture(
-        _camera(stage, walk, frames), list(zip(*poses, strict=True)), stage.origin, stage.relief
-    )
+    (entrant,) = stage.entrants
+    shown = [(entrant.painter, *entrant.poses(frame * walk.time_step)) for frame in frames]
+    return paint(_camera(stage, walk, frames), shown, stage.origin, stage.relief)
 
 
 def draw_strobe(drawing: Figure, walk: Walk, picture: Image.Image) -> None:
@@ -58,7 +58,7 @@ def _camera(stage: Stage, walk: Walk, frames: np.ndarray) -> Camera:
     moved = walk.trunk_pos[frames] - walk.trunk_pos[0]
     way = moved[:, :2] @ walk.forward
     length = float(np.ptp(way)) + 2.4 * walk.creature.frame.body_length
-    high = stage.top + max(float(moved[:, 2].max()), 0.0)
+    high = stage.entrants[0].top + max(float(moved[:, 2].max()), 0.0)
     side = dataclasses.replace(stage.camera(0), azimuth=0.0, elevation=ELEVATION)
     scale = min(HEIGHT / (ROOM * high), WIDEST / length)
     middle = stage.origin + (way.min() + way.max()) / 2 * stage.forward

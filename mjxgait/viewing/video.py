@@ -20,6 +20,8 @@ FORMATS = (".webp", ".gif", ".mp4", ".png")
 PAPER = (255, 255, 255, 200)
 LABEL_GAP = 8
 """Pixels between a creature and its label."""
+EDGE = 8
+"""Pixels between a label and the picture's edge."""
 GIF_HUNDREDTHS = 100
 """A GIF counts the time of a frame in hundredths of a second."""
 
@@ -39,7 +41,7 @@ def moving_pictures(
 
     slow: how many times slower than life. backend: of GL; None draws without.
     """
-    step = runners[0].walk.time_step
+    step = stage.time_step
     count = max(int(stage.frames * step * slow * fps), 1)
     frames = [min(round(i / fps / slow / step), stage.frames - 1) for i in range(count)]
     pictures = gl_pictures(stage, frames, backend) if backend else stage.pictures(frames)
@@ -53,33 +55,40 @@ def write_captions(
 ) -> None:
     """Name, speed and time; in a race also who is who."""
     draw = ImageDraw.Draw(picture, "RGBA")
-    size = max(stage.height // 20, 13)
+    size, now = max(stage.height // 20, 13), frame * stage.time_step
     lead = runners[0].walk
-    name = lead.creature.name.replace("_", " ")
-    time = f"{frame * lead.time_step:.1f} s" + (f"  (slowed {slow:g} times)" if slow != 1 else "")
-    draw.text((12, 10), name, fill=DARK_INK, font=font(size))
+    if len({runner.walk.creature.name for runner in runners}) == 1:
+        draw.text((12, 10), spoken(lead), fill=DARK_INK, font=font(size))
+    time = f"{now:.1f} s" + (f"  (slowed {slow:g} times)" if slow != 1 else "")
     draw.text((stage.width - 12, 10), time, fill=DARK_INK, font=font(size), anchor="ra")
     if len(runners) == 1:
         draw.text(
-            (12, 14 + size), condition(lead, frame), fill=DARK_INK, font=font(round(0.8 * size))
+            (12, 14 + size), condition(lead, now), fill=DARK_INK, font=font(round(0.8 * size))
         )
         return
     for place, runner in reversed(list(enumerate(runners))):
         x, y = stage.behind(frame, place) - [LABEL_GAP, 0]
-        text = f"{runner.label}: {condition(runner.walk, frame)}"
+        text = f"{runner.label}: {condition(runner.walk, now)}"
         letters = font(round(0.7 * size))
         box = draw.textbbox((x, y), text, font=letters, anchor="rm")
         # Whoever has been left behind keeps a label at the edge.
-        shift = max(8 - box[0], 0) + min(stage.width - 8 - box[2], 0)
-        draw.rectangle((box[0] - 4 + shift, box[1] - 3, box[2] + 4 + shift, box[3] + 3), fill=PAPER)
-        draw.text((x + shift, y), text, fill=DARK_INK, font=letters, anchor="rm")
+        x += max(EDGE - box[0], 0) + min(stage.width - EDGE - box[2], 0)
+        y += max(EDGE - box[1], 0) + min(stage.height - EDGE - box[3], 0)
+        left, top, right, bottom = draw.textbbox((x, y), text, font=letters, anchor="rm")
+        draw.rectangle((left - 4, top - 3, right + 4, bottom + 3), fill=PAPER)
+        draw.text((x, y), text, fill=DARK_INK, font=letters, anchor="rm")
 
 
-def condition(walk: Walk, frame: int) -> str:
-    """The mean forward speed of the last second, or that it fell."""
-    if frame * walk.time_step >= walk.fell:
+def spoken(walk: Walk) -> str:
+    """The creature's name as it is written in pictures."""
+    return walk.creature.name.replace("_", " ")
+
+
+def condition(walk: Walk, time: float) -> str:
+    """The mean forward speed of the last second at s since the start, or that it fell."""
+    if time >= walk.fell:
         return f"fell at {walk.fell:.1f} s"
-    frame = min(frame, len(walk.qpos) - 1)
+    frame = min(round(time / walk.time_step), len(walk.qpos) - 1)
     before = max(frame - round(1.0 / walk.time_step), 0)
     if frame == before:
         return "0.00 m/s"

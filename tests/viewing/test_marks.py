@@ -53,8 +53,9 @@ def test_the_creature_is_drawn_as_it_is_and_where_it_is(limbo: Walk, stool_walk:
     """Scale and view follow from the creature, and its parts are the first of all that is shown."""
     with_bar, without = Stage([limbo], 320, 180), Stage([stool_walk], 320, 180)
     assert with_bar.scale == without.scale
-    count = len(without.painter.far)
-    np.testing.assert_array_equal(with_bar.painter.far[:count], without.painter.far)
+    (barred,), (plain,) = with_bar.entrants, without.entrants
+    count = len(plain.painter.far)
+    np.testing.assert_array_equal(barred.painter.far[:count], plain.painter.far)
     for mine, plain in zip(
         limbo.geom_poses(np.array([3])), stool_walk.geom_poses(np.array([3])), strict=True
     ):

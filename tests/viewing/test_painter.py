@@ -9,7 +9,7 @@ from viewing.made_up import treading
 
 from mjxgait.viewing.camera import Camera
 from mjxgait.viewing.floor import band_width
-from mjxgait.viewing.painter import Painter, geom_colours, seen_geoms
+from mjxgait.viewing.painter import Painter, geom_colours, paint, seen_geoms
 from mjxgait.viewing.shapes import Silhouettes, hit
 from mjxgait.viewing.stage import Stage
 from mjxgait.viewing.walk import record_walk
@@ -41,8 +41,10 @@ def painted(model):
     """[240, 320] where the shape's red is."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    picture = Painter(model).picture(
-        view(), [(data.geom_xpos, data.geom_xmat.reshape(-1, 3, 3))], np.zeros(2)
+    picture = paint(
+        view(),
+        [(Painter(model), data.geom_xpos, data.geom_xmat.reshape(-1, 3, 3))],
+        np.zeros(2),
     )
     colour = np.asarray(picture).astype(int)
     return colour[..., 0] - colour[..., 1] > 40, data
@@ -94,8 +96,8 @@ def test_nearer_shapes_hide_those_behind():
         painter = Painter(model)
         painter.geoms, painter.colours = painter.geoms[order], painter.colours[order]
         painter.outlines = Silhouettes(model, painter.geoms)
-        picture = painter.picture(
-            camera, [(data.geom_xpos, data.geom_xmat.reshape(-1, 3, 3))], np.zeros(2)
+        picture = paint(
+            camera, [(painter, data.geom_xpos, data.geom_xmat.reshape(-1, 3, 3))], np.zeros(2)
         )
         red, _, blue = picture.getpixel((100, 95))
         assert red > blue
@@ -128,7 +130,7 @@ def test_only_what_mujoco_shows_is_shown():
 def test_every_shipped_creature_fills_its_picture(shipped):
     stage = Stage([record_walk(shipped, treading(shipped), 0.3)], 320, 180)
     with_creature = np.asarray(stage.picture(10), int)
-    empty = np.asarray(stage.painter.picture(stage.camera(10), [], stage.origin), int)
+    empty = np.asarray(paint(stage.camera(10), [], stage.origin), int)
     differs = np.abs(with_creature - empty).sum(2) > 30
     rows, columns = np.flatnonzero(differs.any(1)), np.flatnonzero(differs.any(0))
     assert differs.mean() > 0.05
