@@ -12,11 +12,9 @@ from mjxgait.certify.simulate import simulate
 from mjxgait.certify.starts import Starts, join
 from mjxgait.certify.steering import told_to_turn
 from mjxgait.certify.tasks import demands_of
+from mjxgait.certify.watch import Watch
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
-
-FIRST = 4
-"""Divides the starts: after so small a share of them the worst are told from the good."""
 
 
 def rehearse(
@@ -35,8 +33,8 @@ def rehearse(
 
     Args:
       count: perturbed starts, and as many pushes where those decide.
-      wanted: a margin that is out of reach after the first of them ends it; returned is then
-        what it would be at most.
+      wanted: as soon as this margin is out of reach nobody is simulated any further; returned is
+        then what it would be at most.
     """
     config = config or CertificateConfig()
     draw, demands = draws.common(config), demands_of(champion.task, champion.wish)
@@ -49,18 +47,21 @@ def rehearse(
         pushes = (draws.pushes(creature, config, draw, count),)
         seconds = min(seconds, config.pushes.window[1] + config.pushes.ladder_seconds)
     starts = demands.aimed(join(disturbed, *pushes), config)
-    fall, well, margin = demands.fall(config), np.ones(len(starts), bool), np.inf
-    first = np.arange(len(starts)) % count < max(count // FIRST, 1)
-    for rows in filter(len, (np.flatnonzero(first), np.flatnonzero(~first))):
-        mine = starts.rows(rows)
-        outcome = simulate(creature, champion, mine, seconds, fall=fall, threads=threads)
-        succeeded = demands.succeeded(outcome, mine, config)
-        well[rows] = np.where(rows < count, succeeded, outcome.stayed_up)
+
+    def margin(well: np.ndarray) -> float:
         pushed = float(well[count:].mean()) if pushes else np.nan
-        margin = _worst(demands.disturbed(float(well[:count].mean()), pushed, config))
-        if margin < wanted:
-            return margin
-    return min(margin, _worst(told_to_turn(creature, champion, config, draw, threads)))
+        return _worst(demands.disturbed(float(well[:count].mean()), pushed, config))
+
+    watch = Watch(len(starts), lambda lost: margin(~lost) < wanted)
+    fall = demands.fall(config)
+    outcome = simulate(creature, champion, starts, seconds, fall=fall, threads=threads, watch=watch)
+    if watch.over:
+        return margin(~watch.lost)
+    succeeded = demands.succeeded(outcome, starts, config)
+    reached = margin(np.where(np.arange(len(starts)) < count, succeeded, outcome.stayed_up))
+    if reached < wanted:
+        return reached
+    return min(reached, _worst(told_to_turn(creature, champion, config, draw, threads)))
 
 
 def _worst(criteria: Sequence[Criterion]) -> float:

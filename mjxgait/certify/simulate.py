@@ -4,6 +4,7 @@ Letters: `S` simulations, `R` recorded ones (the first of the `S`), `T` control 
 """
 
 import concurrent.futures
+from functools import partial
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from mjxgait.certify.outcome import Fall, Outcome, Trajectory
 from mjxgait.certify.starts import Starts
 from mjxgait.certify.stepping import Stepping
 from mjxgait.certify.tasks import how_simulated
+from mjxgait.certify.watch import Watch
 from mjxgait.champion import Champion
 from mjxgait.cores import cores
 from mjxgait.creature import Creature
@@ -27,6 +29,7 @@ def simulate(
     heading: np.ndarray | None = None,
     fall: Fall | None = None,
     threads: int = 0,
+    watch: Watch | None = None,
 ) -> Outcome:
     """Simulates the champion from every start, to the task's nominal goal where that has none.
 
@@ -37,6 +40,8 @@ def simulate(
       heading: [T] or [S, T] rad, commanded heading at each control step; None is as its task has
         it, mostly straight ahead.
       threads: 0 takes the machine's cores. The result does not depend on it.
+      watch: is told who is lost, and ends all as soon as that decides; how far they have come then
+        does depend on threads.
     """
     threads = threads or cores()
     # Dealt out like cards, so that each thread gets its share of every kind of start.
@@ -52,7 +57,8 @@ def simulate(
     def run(share: np.ndarray) -> Outcome:
         mine, kept = starts.rows(share), int((share < record).sum())
         stepping = Stepping(creature, champion, mine, kept, fall, task)
-        return stepping.to_the_end(steps, None if told is None else told[share])
+        tell = None if watch is None else partial(watch.tell, share)
+        return stepping.to_the_end(steps, None if told is None else told[share], tell)
 
     with concurrent.futures.ThreadPoolExecutor(len(shares)) as pool:
         parts = list(pool.map(run, shares))

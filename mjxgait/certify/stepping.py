@@ -5,6 +5,7 @@ joints, `nq nv` as in MuJoCo.
 """
 
 import copy
+from collections.abc import Callable
 from typing import Protocol
 
 import mujoco
@@ -28,6 +29,8 @@ from mjxgait.certify.twins import twin_of
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 
+LOOK = 10
+"""Control steps from one look at who can no longer succeed to the next."""
 WARMUP = CertificateConfig().warmup
 """s; who leaps before has not settled yet."""
 
@@ -49,6 +52,10 @@ class Around(Protocol):
     leaps: bool
 
     def onward(self, goal: np.ndarray, first: np.ndarray, way: np.ndarray) -> np.ndarray:
+        """See `tasks.Demands`."""
+        ...
+
+    def lost(self, outcome: Outcome, starts: Starts, steps: int) -> np.ndarray:
         """See `tasks.Demands`."""
         ...
 
@@ -79,10 +86,16 @@ class Stepping:
         # What the controller has sent last, for those whose torques come late.
         self.sent = np.zeros((int(starts.delay.max()) + 1, *starts.stiffness.shape))
 
-    def to_the_end(self, steps: int, heading: np.ndarray | None) -> Outcome:
+    def to_the_end(
+        self,
+        steps: int,
+        heading: np.ndarray | None,
+        tell: Callable[[np.ndarray], bool] | None = None,
+    ) -> Outcome:
         """Steps until the end, leaving out what has fallen and is not recorded.
 
-        heading: [S, T] rad that each is told; None where nobody is told any.
+        heading: [S, T] rad that each is told; None where nobody is told any. tell: is told now and
+        then who [S] can no longer succeed, and says whether all may end.
         """
         count, time_step = len(self.starts), self.creature.model.opt.timestep
         film = blank_film(self.creature, time_step, self.record, steps)
@@ -91,6 +104,8 @@ class Stepping:
         running = np.setdiff1d(np.arange(count), waiting)
         for k in range(steps):
             if not len(running):
+                break
+            if tell is not None and k % LOOK == 0 and tell(self.task.lost(seen, self.starts, k)):
                 break
             if len(waiting) and np.isinf(seen.fell[leader]):
                 released = waiting[self._pushed(waiting, k)]

@@ -23,6 +23,7 @@ from mjxgait.certify.starts import (
 from mjxgait.certify.tasks import demands_of
 from mjxgait.certify.tasks.hop import HopDemands
 from mjxgait.certify.thresholds.goals import HopConfig
+from mjxgait.certify.watch import Watch
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 from mjxgait.settings import hop as evolution
@@ -158,17 +159,17 @@ def test_to_be_chosen_one_has_as_long_as_in_the_examination_and_bears_no_pushes(
     monkeypatch.setattr(rehearsal, "simulate", simulated)
     hopper = dataclasses.replace(make_champion(tiny), task="hop")
     assert rehearse(tiny, hopper, 6) == 1.0
-    assert tried == [(1, CONFIG.seconds), (5, CONFIG.seconds)]
+    assert tried == [(6, CONFIG.seconds)]
 
 
 @pytest.mark.parametrize(
-    ("failing", "wanted", "tried", "margin"),
+    ("failing", "wanted", "ended", "margin"),
     [
-        (0, 0.0, [16, 48], 1.0),
-        (6, 0.0, [16, 48], 0.0625),  # 58 of 64 do
-        (7, 0.0, [16], -1 / 64 / 0.1 + 0.0625),  # 57 at best, whatever the rest does
-        (7, -np.inf, [16, 48], -1 / 64 / 0.1 + 0.0625),
-        (5, 0.25, [16], 0.21875),  # it would pass, but not with so much room
+        (0, 0.0, None, 1.0),
+        (6, 0.0, None, 0.0625),  # 58 of 64 do
+        (12, 0.0, 7, -1 / 64 / 0.1 + 0.0625),  # 57 at best, whatever the others do
+        (7, -np.inf, None, -1 / 64 / 0.1 + 0.0625),
+        (6, 0.25, 5, 0.21875),  # it would pass, but not with so much room
     ],
 )
 def test_nobody_is_tried_further_than_what_is_wanted_is_in_reach(
@@ -176,21 +177,76 @@ def test_nobody_is_tried_further_than_what_is_wanted_is_in_reach(
     monkeypatch: pytest.MonkeyPatch,
     failing: int,
     wanted: float,
-    tried: list[int],
+    ended: int | None,
     margin: float,
 ):
-    """The first of the starts are those who fail."""
-    counts: list[int] = []
+    """They fall one by one; all end with the one whose fall decides it."""
+    told: list[int] = []
 
-    def simulated(creature: Creature, champion: Champion, starts: Starts, seconds: float, **_: Any):
-        counts.append(len(starts))
-        fall = np.where(np.arange(len(starts)) < failing * (len(counts) == 1), 1.0, np.inf)
-        return became([to((0, 0), (16, goal)) for goal in starts.goal], fall)
+    def simulated(
+        creature: Creature,
+        champion: Champion,
+        starts: Starts,
+        seconds: float,
+        watch: Watch,
+        **_: Any,
+    ):
+        for fallen in range(failing + 1):
+            if watch.tell(np.arange(64), np.arange(64) < fallen):
+                told.append(fallen)
+                break
+        fell = np.where(np.arange(64) < failing, 1.0, np.inf)
+        return became([to((0, 0), (16, goal)) for goal in starts.goal], fell)
 
     monkeypatch.setattr(rehearsal, "simulate", simulated)
     hopper = dataclasses.replace(make_champion(tiny), task="hop")
     assert rehearse(tiny, hopper, 64, wanted=wanted) == pytest.approx(margin)
-    assert counts == tried
+    assert told == ([] if ended is None else [ended])
+
+
+@pytest.mark.parametrize("task", ["hop", "limbo"])
+def test_in_the_end_all_are_lost_but_those_that_succeed(tiny: Creature, task: str):
+    """And nobody is lost before it cannot be mended any more."""
+    demands = demands_of(task)
+    ways = [good(), good(), to((0, 0), (3, 1.0)), to((0, 0), (19, 0), (20, GOAL)), good()]
+    starts = nominal_starts(tiny, 5)
+    starts.goal[:] = GOAL
+    clearance = np.array([0.02, 0.02, 0.02, 0.02, -0.01 if task == "limbo" else np.inf])
+    outcome = dataclasses.replace(
+        became(ways, [np.inf, 21.0, np.inf, np.inf, np.inf]), clearance=clearance
+    )
+    lost = demands.lost(outcome, starts, FRAMES)
+    assert (~lost).tolist() == demands.succeeded(outcome, starts, CONFIG).tolist()
+    assert lost.tolist() == [False, True, True, True, task == "limbo"]
+    # Who stands still may get there yet, until it must be there.
+    before = round((CONFIG.seconds - demands.wanted(CONFIG).stay) / STEP)
+    assert not demands.lost(outcome, starts, before)[[2, 3]].any()
+    assert demands.lost(outcome, starts, before + 1)[[2, 3]].all()
+
+
+def test_a_simulation_ends_when_those_that_are_lost_decide_it(tiny: Creature):
+    """Whatever the threads: nobody is stepped on for long once it is decided. Those that are
+    recorded would go on after their fall.
+    """
+    flat = make_champion(tiny, np.tile([1.0, 1.4], (2, 4)))
+    starts = nominal_starts(tiny, 4)
+    step = tiny.model.opt.timestep
+
+    def seen(watch: Watch | None, threads: int = 2) -> tuple[np.ndarray, float]:
+        outcome = simulate(tiny, flat, starts, 3.0, record=4, threads=threads, watch=watch)
+        return outcome.fell, step * float(np.isfinite(outcome.trajectory.qpos[..., 0]).sum(1).max())
+
+    fell, whole = seen(None)
+    assert np.isfinite(fell).all()
+    assert whole == pytest.approx(3.0)
+    patient = Watch(4, lambda lost: False)
+    assert seen(patient)[1] == whole
+    assert patient.lost.all()
+    assert not patient.over
+    for threads in (1, 2):
+        hasty = Watch(4, lambda lost: bool(lost.sum() >= 2))
+        assert seen(hasty, threads)[1] == pytest.approx(fell.max(), abs=20 * step)
+        assert hasty.over
 
 
 def test_walking_is_asked_to_stay_up_and_nothing_else(tiny: Creature):

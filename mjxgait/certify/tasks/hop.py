@@ -37,6 +37,14 @@ class HopDemands(GoalDemands):
         away = farthest(starts.goal[:, None] - outcome.path, starts.goal, frames)
         return outcome.stayed_up & (away <= wanted.near)
 
+    def lost(self, outcome: Outcome, starts: Starts, steps: int) -> np.ndarray:
+        """See `Demands`: who is down, or not near when it must be there."""
+        wanted = self.wanted(CertificateConfig())
+        frames = frames_in(wanted.stay, outcome.trajectory.time_step)
+        due = outcome.path[:, outcome.path.shape[1] - frames : steps]
+        away = np.abs(starts.goal[:, None] - due) > wanted.near * starts.goal[:, None]
+        return super().lost(outcome, starts, steps) | away.any(1)
+
     def report(self, whole: Recording, config: CertificateConfig) -> dict[str, Any]:
         """See `Demands`: how far off it ends, and since when it is there for good."""
         left = whole.goal - whole.trunk_pos[:, 0]

@@ -41,6 +41,11 @@ class LimboDemands(HopDemands):
         clear: np.ndarray = outcome.clearance > config.limbo.clearance
         return super().succeeded(outcome, starts, config) & clear
 
+    def lost(self, outcome: Outcome, starts: Starts, steps: int) -> np.ndarray:
+        """See `Demands`: of hopping, and who has touched the bar."""
+        touched = outcome.clearance <= CertificateConfig().limbo.clearance
+        return super().lost(outcome, starts, steps) | touched
+
     def basic(self, whole: Recording, config: CertificateConfig) -> tuple[Criterion, ...]:
         """See `GoalDemands`: 1, 2 and 3."""
         least, room = _least(whole), config.limbo.clearance

@@ -86,6 +86,10 @@ class Demands(Protocol):
         """Which [S] of the simulations from perturbed starts did what the task demands."""
         ...
 
+    def lost(self, outcome: Outcome, starts: Starts, steps: int) -> np.ndarray:
+        """Which [S] cannot succeed any more, after so many of their control steps."""
+        ...
+
     def disturbed(
         self, started: float, pushed: float, config: CertificateConfig
     ) -> tuple[Criterion, ...]:

@@ -38,6 +38,10 @@ class Unasked:
         """See `Demands`: nothing was told."""
         return ()
 
+    def lost(self, outcome: Outcome, starts: Starts, steps: int) -> np.ndarray:
+        """See `Demands`: who is down."""
+        return ~outcome.stayed_up
+
 
 class StaysUp(Unasked):
     """See `Demands`: criteria 4 and 5 of those that have no goal but to be up in the end.
