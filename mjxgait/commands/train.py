@@ -12,6 +12,7 @@ import tyro
 
 from mjxgait.commands.zoo import evolve_zoo
 from mjxgait.creature import Creature
+from mjxgait.creature.facing import Way
 from mjxgait.creature.scale import parse_scales
 from mjxgait.errors import INTERRUPTED, UserError
 from mjxgait.library import Run, load_creature
@@ -50,6 +51,7 @@ class TrainOptions:
       config: TOML file with settings, or the name of a shipped config such as wilson.
       scale: Parts of another size, as PATTERN=FACTOR: '*_shin=1.2' for longer shins, 'trunk=0.9'
         (docs/creature.md). Lengths, masses and inertias follow, gains do not.
+      way: back, left or right: where it goes, seen from itself; forward by default (docs/wishes.md).
       out: Folder for the run; by default a new one under runs/.
       runs: So many separate runs side by side, with seeds from --seed on, each a run folder in the
         folder, and a picture of all champions (docs/zoo.md).
@@ -80,6 +82,7 @@ class TrainOptions:
     env: str = "tall_quadruped"
     config: str | None = None
     scale: tuple[str, ...] = ()
+    way: Way = "forward"
     out: Path | None = None
     runs: int | None = None
     resume: Path | None = None
@@ -119,9 +122,9 @@ def train_command(arguments: Sequence[str]) -> int:
     from mjxgait.runs.screen import Screen
 
     if options.resume:
-        if options.scale:
+        if options.scale or options.way != "forward":
             raise UserError(
-                f"{options.resume}: a resumed run keeps its body; --scale needs a new run"
+                f"{options.resume}: a resumed run keeps its body; --scale and --way need a new run"
             )
         if _without_ends(config) != _without_ends(default):
             raise UserError(
@@ -154,7 +157,8 @@ def _several(options: TrainOptions, creature: Creature, config: Config, default:
         together = 1 if options.cluster else 0
         zoo = create_zoo(options.out, creature, config, options.runs, together)
         return evolve_zoo(zoo, options.cluster)
-    if options.runs is not None or options.scale or config != default:
+    other = options.scale or options.way != "forward"
+    if options.runs is not None or other or config != default:
         raise UserError(
             f"{options.resume}: resumed runs keep their number, body and settings; only --cluster "
             "may be given"
@@ -217,6 +221,7 @@ def _layers(arguments: Sequence[str]) -> tuple[Creature, Config]:
     for name in WISHES:
         early.add_argument(f"--{name}", nargs="?")
     early.add_argument("--scale", nargs="*")
+    early.add_argument("--way", nargs="?")
     try:
         given, _ = early.parse_known_args(list(arguments))
     except argparse.ArgumentError as error:
@@ -231,7 +236,8 @@ def _layers(arguments: Sequence[str]) -> tuple[Creature, Config]:
         folder = Path(given.resume)
         return open_run(folders_of(folder)[0] if is_zoo(folder) else folder)
     scales = parse_scales(given.scale or ())
-    creature = load_creature(given.env or TrainOptions.env, scales, tell=print)
+    way = given.way or "forward"
+    creature = load_creature(given.env or TrainOptions.env, scales, print, way)
     file = Path(given.config) if given.config else None
     named = {kind: getattr(given, f"use.{kind}") for kind in ("controller", "task")}
     use = {kind: name for kind, name in named.items() if name}

@@ -9,6 +9,7 @@ import numpy as np
 
 from mjxgait.creature import Creature
 from mjxgait.creature import load_creature as load_folder
+from mjxgait.creature.facing import facing
 from mjxgait.creature.scale import load_files, scaled
 from mjxgait.library.run import Place, Run
 from mjxgait.runs.folder import create_run
@@ -21,24 +22,28 @@ def load_creature(
     env: Place,
     scale: Mapping[str, float] | None = None,
     tell: Callable[[str], object] = lambda said: None,
+    way: str = "forward",
 ) -> Creature:
     """A shipped creature by name, a creature folder, or a model file (MJCF, URDF) as it is.
 
     Args:
       scale: factors of the parts' size by pattern of their names (docs/creature.md).
       tell: called with what was found in a model file.
+      way: forward, back, left or right: which side of it is to be ahead (docs/wishes.md).
 
     Raises:
       UserError: there is none, or it cannot be used; says why.
     """
     path = Path(env)
     if not path.is_file():
-        return scaled(load_folder(find_creature(str(env))), scale or {})
-    from mjxgait.importing import import_model
+        creature = load_folder(find_creature(str(env)))
+    else:
+        from mjxgait.importing import import_model
 
-    imported = import_model(path)
-    tell(imported.notes.text())
-    return scaled(load_files(imported.files), scale or {})
+        imported = import_model(path)
+        tell(imported.notes.text())
+        creature = load_files(imported.files)
+    return facing(scaled(creature, scale or {}), way)
 
 
 def train(
@@ -49,6 +54,7 @@ def train(
     controller: str | None = None,
     task: str | None = None,
     scale: Mapping[str, float] | None = None,
+    way: str = "forward",
     speed: str | float | None = None,
     gait: str | None = None,
     turn: float | None = None,
@@ -72,6 +78,7 @@ def train(
       controller, task: who moves the creature and what it is to do: a shipped name, or
         FILE.py:CLASS of your own (docs/extending.md).
       scale: factors of the parts' size, such as {"*_shin": 1.2} (docs/creature.md).
+      way: forward, back, left or right: where it goes, seen from itself (docs/wishes.md).
       speed, gait, turn, steer, style: what is asked of a walk (docs/wishes.md): m/s or text such as
         "0.4bl/s", a name, deg/s to the left, deg/s to either side, a name or a file.
       certificate: walks, or anywhere (docs/certificate.md).
@@ -86,7 +93,7 @@ def train(
     from mjxgait.parts.wishes import Wishes, wished
 
     use = _use(controller=controller, task=task)
-    creature = load_creature(env, scale)
+    creature = load_creature(env, scale, way=way)
     resolved = resolve_config(
         creature.settings.train, creature.name, Path(config) if config else None, use
     )

@@ -1,0 +1,135 @@
+"""`--way`: the same body, of which another side is ahead."""
+
+import dataclasses
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from helpers import STOOL, said_by
+from scipy.spatial.transform import Rotation
+
+from mjxgait.creature import Creature
+from mjxgait.creature.facing import WAYS, facing
+from mjxgait.creature.settings import Balance, Steering, Stepping
+from mjxgait.errors import UserError
+from mjxgait.library import load_creature
+from mjxgait.runs.folder import create_run, open_run
+from mjxgait.senses import SENSES
+from mjxgait.settings.config import Config
+
+RNG = np.random.default_rng(5)
+
+
+@pytest.fixture(scope="module")
+def rich(stool: Creature) -> Creature:
+    """The stool with a weight of everything for every joint."""
+
+    def table() -> dict[str, float]:
+        return {name: float(RNG.normal()) for name in stool.joints.names}
+
+    settings = dataclasses.replace(
+        stool.settings,
+        balance=Balance(table(), table()),
+        steering=Steering(table(), table()),
+        stepping=Stepping(table(), table()),
+    )
+    return dataclasses.replace(stool, settings=settings)
+
+
+def weights(creature: Creature, table: dict[str, float]) -> np.ndarray:
+    return np.array([table[name] for name in creature.joints.names])
+
+
+@pytest.mark.parametrize("way", WAYS[1:])
+def test_its_axes_are_turned_and_it_stands_as_before(stool: Creature, way: str):
+    turned, frame = facing(stool, way), stool.frame
+    ahead = {"back": -frame.forward, "left": frame.left, "right": -frame.left}[way]
+    np.testing.assert_allclose(turned.frame.forward, ahead, atol=1e-9)
+    np.testing.assert_allclose(turned.frame.up, frame.up, atol=1e-9)
+    np.testing.assert_allclose(turned.frame.left, np.cross(frame.up, ahead), atol=1e-9)
+    np.testing.assert_array_equal(turned.stand_qpos, stool.stand_qpos)
+    assert turned.frame.hip_height == stool.frame.hip_height
+    assert turned.joints.names == stool.joints.names
+    assert turned.name == f"{stool.name}_{way}"
+    assert turned.files["creature.xml"] == stool.files["creature.xml"]
+
+
+@pytest.mark.parametrize("way", WAYS[1:])
+def test_a_fall_is_answered_by_the_same_motion(rich: Creature, way: str):
+    """Balance and stepping add up to the same angles, whatever side is called front."""
+    turned = facing(rich, way)
+
+    def answer(creature: Creature, rotation: np.ndarray, fall: np.ndarray) -> np.ndarray:
+        """[J]; rotation: of the trunk. fall: [2] m along world x and y, where the feet are to go."""
+        sensed = SimpleNamespace(trunk_rot=rotation)
+        pitch, roll = (float(SENSES[name](creature, sensed, 0.0)) for name in ("pitch", "roll"))
+        ahead, left = (fall @ axis[:2] for axis in creature.frame.start_axes)
+        tables = creature.settings
+        return (
+            pitch * weights(creature, tables.balance.pitch)
+            + roll * weights(creature, tables.balance.roll)
+            + ahead * weights(creature, tables.stepping.ahead)
+            + left * weights(creature, tables.stepping.aside)
+        )
+
+    for _ in range(5):
+        tilt = Rotation.from_rotvec(RNG.normal(scale=0.3, size=3)).as_matrix()
+        moment = tilt @ rich.frame.stand_rot, RNG.normal(size=2)
+        np.testing.assert_allclose(answer(turned, *moment), answer(rich, *moment), atol=1e-5)
+
+
+def test_backwards_it_steers_the_other_way_and_has_its_mirror(rich: Creature):
+    """As a car in reverse: what turned it to the left turns it to the right."""
+    back = facing(rich, "back")
+    for table in ("bend", "stride"):
+        mine, its = (getattr(c.settings.steering, table) for c in (rich, back))
+        np.testing.assert_allclose(weights(back, its), -weights(rich, mine))
+    np.testing.assert_array_equal(back.mirror.partner, rich.mirror.partner)
+    np.testing.assert_array_equal(back.mirror.sign, rich.mirror.sign)
+    again = facing(back, "back")
+    np.testing.assert_allclose(again.frame.forward, rich.frame.forward, atol=1e-9)
+    assert again.settings.balance == rich.settings.balance
+
+
+def test_aside_it_is_as_long_as_it_was_wide(stool: Creature):
+    """And has neither a mirror nor a stated length: its image goes the other way."""
+    stated = dataclasses.replace(stool.settings.creature, body_length=3.0)
+    long = dataclasses.replace(stool, settings=dataclasses.replace(stool.settings, creature=stated))
+    for way in ("left", "right"):
+        aside = facing(long, way)
+        assert not aside.mirror.symmetric
+        assert aside.settings.steering == Steering()
+        assert aside.frame.body_length < 1.0
+    assert facing(long, "back").frame.body_length == 3.0
+
+
+def test_a_run_keeps_the_way(tmp_path: Path):
+    creature = load_creature(STOOL, way="back")
+    folder = create_run(tmp_path / "run", creature, Config())
+    kept, _ = open_run(folder)
+    np.testing.assert_array_equal(kept.frame.forward, creature.frame.forward)
+    assert kept.digest == creature.digest
+
+
+def test_forward_changes_nothing(stool: Creature):
+    assert facing(stool, "forward") is stool
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--env", STOOL, "--way", "backwards"), 'did you mean "back"'),
+        (("--env", STOOL, "--way", "up"), "known: back, forward, left, right"),
+    ],
+)
+def test_mistakes_are_one_sentence(arguments, words, capsys: pytest.CaptureFixture):
+    assert words in said_by(capsys, "train", *arguments, code=2)
+    with pytest.raises(UserError, match="--way"):
+        load_creature(STOOL, way="up")
+
+
+def test_a_resumed_run_keeps_its_way(tmp_path: Path, stool: Creature, capsys):
+    folder = create_run(tmp_path / "run", stool, Config())
+    said = said_by(capsys, "train", "--resume", folder, "--way", "back", code=2)
+    assert "--way need" in said
