@@ -1,6 +1,6 @@
 """Processor seconds that `mjxgait inspect RUN` takes, the median of some: it should stay below 3.
 
-python benchmarks/inspect_seconds.py runs/zoo/duck-0 --times 5
+python benchmarks/inspect_seconds.py runs/every/duck-0 --times 5
 """
 
 import argparse

@@ -1,7 +1,7 @@
 """How much more than the certificate asks a champion can bear, as a table for docs/results.md; all
 in C MuJoCo by the examiner.
 
-    python benchmarks/raise.py runs/zoo/tall_quadruped-0 runs/zoo/duck-0 --json raise.json
+    python benchmarks/raise.py runs/every/tall_quadruped-0 runs/every/duck-0 --json raise.json
 
 The starts are those of the certificate's criterion 4 with another seed; the same ones for every
 column. `A%, B%`: share that stays up for 22 s, and the mean way forward over that of the same

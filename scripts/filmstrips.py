@@ -1,5 +1,5 @@
 """Makes docs/filmstrips.md, one stride of each champion: `python scripts/filmstrips.py
-runs/zoo/*-[0-4]`.
+runs/every/*-[0-4]`.
 """
 
 import sys

@@ -1,5 +1,5 @@
 """Makes the small moving pictures of the README from finished runs: `python scripts/portraits.py
-runs/zoo/*-0`.
+runs/every/*-0`.
 """
 
 import sys

@@ -1,6 +1,6 @@
 """Stores a champion's undisturbed walk as the certificate sees it, for docs/worked-example.md.
 
-    python scripts/store_walk.py runs/zoo/tall_quadruped-0 docs/data/tall_quadruped-0
+    python scripts/store_walk.py runs/every/tall_quadruped-0 docs/data/tall_quadruped-0
 
 Writes into the second folder the champion, its certificate, made anew, and `walk.npz`: integers,
 millionths of m, rad, N and m/s.

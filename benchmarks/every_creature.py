@@ -1,8 +1,8 @@
 """Trains creatures over seeds, each in a process of its own, and prints a table of what C MuJoCo
 says of the champions.
 
-    python benchmarks/zoo.py --env tall_quadruped short_quadruped --seeds 0 1 2 3 4 \\
-        --config default --out runs/zoo
+    python benchmarks/every_creature.py --env tall_quadruped short_quadruped --seeds 0 1 2 3 4 \\
+        --config default --out runs/every
 
 A run that is there already is not repeated. Options after `--` go to `train`, such as
 `-- --cluster HOST:PORT`. Columns: whether the champion is certified ("outdated"
@@ -53,7 +53,7 @@ def main() -> None:
     parser.add_argument(
         "--candidates", type=int, default=12, help="how many of the best are looked at in the end"
     )
-    parser.add_argument("--out", type=Path, default=Path("runs/zoo"))
+    parser.add_argument("--out", type=Path, default=Path("runs/every"))
     parser.add_argument("more", nargs="*", help="options of train, after --")
     options = parser.parse_args()
     more = ["--examination.candidates", str(options.candidates), *options.more]
