@@ -161,7 +161,11 @@ def test_the_deepest_counts_and_a_run_through_the_bar_is_worth_less(luxo: Creatu
     for moment in moments:
         tally = task.update(tally, moment, jnp.zeros(3), standards, aim)
     assert float(tally.bar) == pytest.approx(depth(luxo, posed(luxo, 0.5)))
-    assert float(task.outcome(tally)["bar"]) == float(tally.bar)
+    # The bar that it would have stayed beneath, and none lower than its own.
+    needed = float(task.outcome(tally)["bar"])
+    assert needed == pytest.approx(HEIGHT + depth(luxo, posed(luxo, 0.5)))
+    unhurt = dataclasses.replace(tally, bar=jnp.zeros(()))
+    assert float(task.outcome(unhurt)["bar"]) == pytest.approx(HEIGHT)
     # What counts is how deep it is in the bar where that is now.
     deep = (float(tally.bar) - 0.03) / luxo.frame.hip_height
     terms = task.judge(tally, LimboConfig())
@@ -342,8 +346,11 @@ def test_perturbed_starts_are_watched_too(luxo: Creature):
 
 def test_who_is_worth_an_examination(luxo: Creature):
     there = {"left": np.zeros(2), "seconds": np.full(2, 8.0)}
-    assert DEMANDS.promising(there | {"bar": np.zeros(2)}, 8.0, luxo)
-    assert not DEMANDS.promising(there | {"bar": np.array([0.0, 0.001])}, 8.0, luxo)
+    examined = CONFIG.limbo.height
+    # It may learn with a lower bar than it is examined with, and touch that one.
+    for beneath in (examined, examined - 0.02):
+        assert DEMANDS.promising(there | {"bar": np.array([beneath, examined])}, 8.0, luxo)
+    assert not DEMANDS.promising(there | {"bar": np.array([0.0, examined + 1e-3])}, 8.0, luxo)
 
 
 def test_a_short_run_ends_with_a_champion_and_a_verdict(tmp_path: Path, capsys):

@@ -62,8 +62,11 @@ class LimboDemands(HopDemands):
     def promising(
         self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
     ) -> bool:
-        """See `Demands`: of hopping, where a trial that touched the bar has failed."""
-        lived = np.where(outcome["bar"] > 0, 0.0, outcome["seconds"])
+        """See `Demands`: of hopping, where a trial has failed that would have touched the bar of
+        the examination. That of evolution may be lower.
+        """
+        touched = outcome["bar"] > CertificateConfig().limbo.height
+        lived = np.where(touched, 0.0, outcome["seconds"])
         return super().promising({**outcome, "seconds": lived}, seconds, creature)
 
 

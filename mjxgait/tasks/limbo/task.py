@@ -37,11 +37,12 @@ class Aim:
 @pytree
 class Tally(hop.Tally):
     """See `hop.Tally`. bar: [] m, the deepest that it was in the place of the bar, were that as low as
-    it will be. raised: [] m of it that nobody minds yet.
+    it will be. raised: [] m of it that nobody minds yet. height: [] m, of the bar as it will be.
     """
 
     bar: jax.Array
     raised: jax.Array
+    height: jax.Array
 
 
 @pytree
@@ -99,7 +100,8 @@ class Limbo(Hop):
 
     def init(self) -> Tally:
         """See `Task`."""
-        return Tally(**vars(super().init()), bar=jnp.zeros(()), raised=jnp.zeros(()))
+        none = jnp.zeros(())
+        return Tally(**vars(super().init()), bar=none, raised=none, height=none)
 
     def update(
         self, tally: Any, sensed: Sensed, torque: jax.Array, standards: Any, aim: Any
@@ -107,7 +109,7 @@ class Limbo(Hop):
         """See `Task`."""
         after: Any = super().update(tally, sensed, torque, standards, aim.goal)
         deepest = jnp.maximum(tally.bar, intrusion(self.creature, sensed, standards.height))
-        return dataclasses.replace(after, bar=deepest, raised=aim.raised)
+        return dataclasses.replace(after, bar=deepest, raised=aim.raised, height=standards.height)
 
     def judge(self, tally: Any, settings: Any) -> dict[str, jax.Array]:
         """See `Task`."""
@@ -116,5 +118,5 @@ class Limbo(Hop):
         return fitness_terms(self.creature, self.horizon, tally, {"bar": bar})
 
     def outcome(self, tally: Any) -> dict[str, jax.Array]:
-        """See `Task`: of hopping, and m that it was in the place of the bar, were that down."""
-        return super().outcome(tally) | {"bar": tally.bar}
+        """See `Task`: of hopping, and how high in m a bar must be for it, at least its own."""
+        return super().outcome(tally) | {"bar": tally.height + tally.bar}
