@@ -1,7 +1,7 @@
 """Who of a population walks: looks at the best few in C MuJoCo and has one of them examined."""
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -30,6 +30,12 @@ class Examined:
     def passed(self) -> bool:
         """Whether it has what was asked for."""
         return self.certificate.passed and (self.beyond is None or self.beyond.passed)
+
+
+def passed_or_first(tried: Sequence[Examined]) -> Examined | None:
+    """Of those that were examined, one that is certified, else the first."""
+    certified = (one for one in tried if one.certificate.passed)
+    return next(certified, tried[0] if tried else None)
 
 
 def why_ended(generation: int, margin: float) -> str:
@@ -98,22 +104,43 @@ class Examiner:
     def best(self, state: EvolutionState) -> Examined | None:
         """One of the best few with its certificate, passed or not; None if there are none.
 
-        Chosen is the first that has room to spare, else the one with the best margin. Only that one
-        is examined; one that has failed on the way only if there is no other.
+        Whoever has room to spare is examined at once; when all have been looked at, those who have
+        any, the best margin first. It ends with the first that passes, or when the run has no
+        examination left. If nobody passes it is the first that was examined: the best margin of
+        all if nobody had any. One that has failed on the way is chosen only if there is no other.
         """
+        generation, settings = int(state.generation), self.experiment.config.examination
         known: list[Champion] = []
-        chosen: list[Seen] = []
+        waiting: list[Seen] = []
+        tried: list[Examined] = []
         for rank in self.experiment.candidates(state):
             champion = self.experiment.champion(state, self.versions, rank)
-            if self.exams.failed(champion.fingerprint, int(state.generation) - 1):
+            if self.exams.failed(champion.fingerprint, generation - 1):
                 known.append(champion)
                 continue
-            beaten = max((seen.margin for seen in chosen), default=-np.inf)
-            chosen.append(self._look(champion, 0.0, beaten))
-            if chosen[-1].margin >= self.experiment.config.examination.enough:
+            beaten = max((seen.margin for seen in waiting), default=-np.inf)
+            seen = self._look(champion, 0.0, min(beaten, 0.0))
+            if seen.margin < settings.enough:
+                waiting.append(seen)
+            elif self._examined(seen, tried) or self._spent(generation):
+                return passed_or_first(tried)
+        if not waiting and not tried:
+            waiting = [self._look(champion, np.inf, np.inf) for champion in known[:1]]
+        for seen in sorted(waiting, key=lambda seen: -seen.margin):
+            if tried and (seen.margin < 0 or self._spent(generation)):
                 break
-        chosen = chosen or [self._look(champion, np.inf, np.inf) for champion in known[:1]]
-        return self._examine(max(chosen, key=lambda seen: seen.margin)) if chosen else None
+            if self._examined(seen, tried):
+                break
+        return passed_or_first(tried)
+
+    def _examined(self, seen: Seen, tried: list[Examined]) -> bool:
+        """Whether it is certified; it is kept among those that were tried."""
+        tried.append(self._examine(seen))
+        return tried[-1].certificate.passed
+
+    def _spent(self, generation: int) -> bool:
+        """Whether the run has had all its examinations."""
+        return self.exams.taken(generation) >= self.experiment.config.examination.attempts
 
     def _look(self, champion: Champion, wanted: float, beaten: float) -> Seen:
         """At the undisturbed walk, and if its margin is what is wanted, at the disturbed ones; at
