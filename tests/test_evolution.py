@@ -186,6 +186,24 @@ def test_an_elite_that_remembers_is_worth_the_mean_of_its_rounds():
     assert before.rounds.max() > 1
 
 
+@pytest.mark.parametrize("stale", [True, False])
+def test_all_are_judged_again_once_trials_have_become_harder(stale: bool):
+    """Then nobody lives on by an old verdict, and else nobody is judged twice."""
+    never = ForcedConfig(enabled=False)
+    climbing = toy(forced=never, growth=3.0)
+    (before, _), settings = run(climbing, 4)[-1], inputs(climbing)[0]
+    before = dataclasses.replace(before, level=jnp.int32(1), stale=jnp.asarray(stale))
+    after, _, births = jax.device_get(advance(settings, Problem(slope=2.0), before))
+    again = (births.key_poses[:20] == before.genomes.key_poses).all((1, 2))
+    old = after.born < after.generation
+    assert again.all() if stale else not again.any()
+    assert old.any()
+    assert not old.all()
+    worth = np.where(old & ~np.asarray(stale), 1, 2) * near_zero(after.genomes)
+    np.testing.assert_allclose(after.fitness, worth, rtol=1e-6)
+    assert len(np.unique(after.genomes.key_poses, axis=0)) == 20
+
+
 def test_what_a_genome_costs_is_taken_from_its_fitness():
     """Half of the genes cost as much as their squares are worth, so the others decide."""
     plain = toy(crossover=0.5)

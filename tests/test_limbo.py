@@ -240,6 +240,7 @@ def test_the_bar_comes_down_a_step_when_most_of_the_best_have_mastered_it(
     state = at(dataclasses.replace(state, fitness=fitness), level=4, generation=7)
     after = climbed(task, state)
     assert int(after.level) == 4 + climbs
+    assert bool(after.stale) == climbs
     assert (np.asarray(after.rounds) == (0.0 if climbs else 3.0)).all()
     nobody = (at(state, generation=-1), at(state, fitness=np.full(len(terms), -np.inf)))
     assert all(int(climbed(task, unjudged).level) == 4 for unjudged in nobody)

@@ -9,6 +9,7 @@ from typing import Any
 import tyro
 
 from mjxgait.creature import Creature, load_creature
+from mjxgait.creature.step import at_step
 from mjxgait.errors import INTERRUPTED, UserError
 from mjxgait.runs.folder import CREATURE
 from mjxgait.settings.shipped import find_creature
@@ -86,6 +87,7 @@ def ablate_command(arguments: Sequence[str]) -> int:
             study = dataclasses.replace(study, rows=ROWS)
         creature = load_creature(find_creature(study.env))
     plan = make_plan(study, creature, str(options.study or folder / STUDY))
+    creature = at_step(creature, plan.runs[0].config.rollout.step)
     # JAX takes a second to import: only once the study is known to be good.
     from mjxgait.ablation.rows import groups
     from mjxgait.runs.devices import prepare_devices

@@ -14,6 +14,7 @@ from mjxgait.commands.zoo import evolve_zoo
 from mjxgait.creature import Creature
 from mjxgait.creature.facing import Way
 from mjxgait.creature.scale import parse_scales
+from mjxgait.creature.step import at_step
 from mjxgait.errors import INTERRUPTED, UserError
 from mjxgait.library import Run, load_creature
 from mjxgait.parts import resolve_config
@@ -111,6 +112,8 @@ def train_command(arguments: Sequence[str]) -> int:
         shape, args=list(arguments), prog="mjxgait train", default=shape(settings=default)
     )
     config = _settings(options)
+    if not options.resume:
+        creature = at_step(creature, config.rollout.step)
     if said := hint(config):
         print(said)
     if options.runs is not None or _is_zoo(options.resume):

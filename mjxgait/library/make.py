@@ -11,6 +11,7 @@ from mjxgait.creature import Creature
 from mjxgait.creature import load_creature as load_folder
 from mjxgait.creature.facing import facing
 from mjxgait.creature.scale import load_files, scaled
+from mjxgait.creature.step import at_step
 from mjxgait.library.run import Place, Run
 from mjxgait.runs.folder import create_run
 from mjxgait.settings.config import Config
@@ -110,6 +111,7 @@ def train(
     evolution = {key: value for key, value in short.items() if value is not None}
     table = merge(dataclasses.asdict(resolved), {"seed": seed, "evolution": evolution})
     chosen = build(type(resolved), merge(table, settings or {}), "the settings given to train")
+    creature = at_step(creature, chosen.rollout.step)
     folder = create_run(Path(out) if out else None, creature, chosen)
     return _evolved(folder, creature, chosen, quiet)
 

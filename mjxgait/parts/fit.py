@@ -31,6 +31,10 @@ def check_fit(creature: Creature, config: Config) -> None:
                 f"of {name} have {wanted}"
             )
     if not creature.settings.creature.grows:
+        if config.rollout.step:
+            raise UserError(
+                f"{name}: rollout.step is for bodies that grow; creature.xml has this one's step"
+            )
         if getattr(kind, "grows", False):
             raise UserError(
                 f"{name}: its body is there already, and a {controller} grows with its own; take "
@@ -49,6 +53,12 @@ def check_fit(creature: Creature, config: Config) -> None:
     if task in SHIPPED["task"] and task not in (*IN_WATER, *ON_LAND):
         known = ", ".join((*IN_WATER, *ON_LAND))
         raise UserError(f"{name}: bodies that grow cannot {task}, only {known}")
+    step = float(creature.model.opt.timestep)
+    if config.rollout.step not in (0.0, step):
+        raise UserError(
+            f"{name}: rollout.step = {config.rollout.step:g}, but its creature.xml has {step:g} s; "
+            "whoever is compared or goes on has one step"
+        )
     _check_settings(name, config)
 
 

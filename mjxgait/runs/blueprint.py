@@ -11,7 +11,7 @@ from jax.sharding import Mesh
 
 from mjxgait.blocks.anatomy import anatomy
 from mjxgait.body import Body, Ends, GivenBody, given_body, given_ends
-from mjxgait.champion.blocks.material import DRAG, FRICTION, GRAVITY, IN_WATER
+from mjxgait.champion.blocks.material import DRAG, FRICTION, GRAVITY, HARDEST, IN_WATER
 from mjxgait.control.bodied import BodiedController
 from mjxgait.control.brains.controller import capacity_of
 from mjxgait.control.drive import Drive
@@ -162,6 +162,7 @@ class GrownBlueprint:
         around = Surroundings(
             step=step,
             friction=FRICTION,
+            contact=HARDEST * step,
             floor=not wet,
             gravity=0.0 if wet else GRAVITY,
             drag=DRAG if wet else 0.0,

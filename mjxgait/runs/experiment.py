@@ -264,7 +264,9 @@ def _initial(
     simulator = blueprint.simulator(numbers)
     task, trials = simulator.task, settings.rollout.starts
     state = evolution_of(simulator, settings).init(key, trials, len(task.terms), len(task.outcomes))
-    return dataclasses.replace(state, level=jnp.int32(0)) if task.climbs else state
+    if not task.climbs:
+        return state
+    return dataclasses.replace(state, level=jnp.int32(0), stale=jnp.zeros((), bool))
 
 
 def _filled_up(sources: Sequence[Sequence[int]]) -> list[list[int]]:

@@ -126,7 +126,8 @@ def absorb(
 def climbed(task: Task, state: EvolutionState) -> EvolutionState:
     """The state after a generation, one level higher if most of the best have mastered theirs.
 
-    What they were worth at the old level is then forgotten: it was easier.
+    What they were worth at the old level is then forgotten, for it was easier: of those that live
+    on all are judged again.
     """
     if state.level is None:
         return state
@@ -134,7 +135,7 @@ def climbed(task: Task, state: EvolutionState) -> EvolutionState:
     known = (state.generation >= 0) & jnp.isfinite(state.fitness[:LEADERS])
     higher = jnp.mean(jax.vmap(task.mastered)(best) & known) > 0.5
     rounds = None if state.rounds is None else jnp.where(higher, 0.0, state.rounds)
-    return dataclasses.replace(state, level=state.level + higher, rounds=rounds)
+    return dataclasses.replace(state, level=state.level + higher, stale=higher, rounds=rounds)
 
 
 def next_starts(task: Task, row: Row, state: EvolutionState) -> Starts:

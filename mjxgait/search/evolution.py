@@ -69,12 +69,13 @@ class Evolution:
 
     def _with_elite(self, state: EvolutionState, proposal: Proposal) -> Proposal:
         """With the best parents in the first places, to be judged once more."""
-        count = self.config.elites
+        count, now = self._again(state)
         if not count:
             return proposal
+        children = self._seeding(state) | ~now
 
         def kept(leaf: jax.Array, old: jax.Array) -> jax.Array:
-            first = jnp.where(self._seeding(state), leaf[:count], old[:count])
+            first = jnp.where(children, leaf[:count], old[:count])
             return leaf.at[:count].set(first)
 
         return dataclasses.replace(
@@ -84,6 +85,12 @@ class Evolution:
             born=kept(proposal.born, state.born),
             mothers=None if proposal.mothers is None else kept(proposal.mothers, _own(state)),
         )
+
+    def _again(self, state: EvolutionState) -> tuple[int, jax.Array]:
+        """How many of the best are judged again beside the children, and whether they are now."""
+        if self.config.elites or state.stale is None:
+            return self.config.elites, jnp.ones((), bool)
+        return min(self.config.population, self.config.offspring), state.stale
 
     def absorb(
         self, state: EvolutionState, proposal: Proposal, judged: Judged
@@ -261,12 +268,14 @@ class Evolution:
         fitness = self._fitness(pool[0], pool[1], generation)
         fresh = jnp.arange(fitness.shape[0]) >= count
         first = first_occurrence(pool[0])
-        if self.config.elites:  # one that is judged once more is like its old self
-            first = jnp.append(jnp.zeros(count, bool), first_occurrence(proposal.offspring))
+        again, now = self._again(state)
+        if again:  # one that is judged once more is like its old self
+            young = jnp.append(jnp.zeros(count, bool), first_occurrence(proposal.offspring))
+            first = jnp.where(now, young, first)
         distinct = first | jnp.logical_not(self.config.remove_duplicates)
         admitted = forced.admitted(self.config, state, fitness, fresh & distinct)
-        if self.config.elites:  # nobody has judged the old in this round
-            fitness = jnp.where(fresh, fitness, -jnp.inf)
+        if again:  # nobody has judged the old in this round
+            fitness = jnp.where(fresh | ~now, fitness, -jnp.inf)
         lives = distinct & (fresh | chosen(self.config.survival, "best"))
         tier = jnp.where(state.forced & fresh, jnp.where(admitted, 2, 0), jnp.where(lives, 1, 0))
         if not self.config.elites:  # the best is never lost, whatever the tiers say

@@ -34,6 +34,7 @@ class EvolutionState:
     without a better best than the one before.
     rounds: [P] of which `terms` is the mean; None where nobody's earlier rounds count.
     level: [] how often the trials have become harder; None where they never do.
+    stale: [] whether they have since `terms` were judged; None likewise.
     """
 
     genomes: Any
@@ -55,6 +56,7 @@ class EvolutionState:
     barren: jax.Array
     rounds: jax.Array | None = None
     level: jax.Array | None = None
+    stale: jax.Array | None = None
 
 
 @pytree

@@ -51,6 +51,7 @@ class RolloutConfig:
       seconds: length of an episode.
       starts: R, episodes per individual; the first is nominal, the others are perturbed, the
         same for all.
+      step: s of the simulation, of bodies that grow; 0 takes that of creature.xml.
       variety: so many times as many perturbed starts there are in all; each generation takes
         the next ones. With more than 1 everybody must be judged anew: `evolution.elite`.
       joint_noise: rad; half width of the uniform perturbation of each joint at a perturbed
@@ -85,6 +86,7 @@ class RolloutConfig:
     __pydantic_config__ = STRICT
     seconds: Annotated[Positive, SHAPE] = 8.0
     starts: Annotated[Count, SHAPE] = 3
+    step: Annotated[NonNegative, SHAPE] = 0.0
     variety: Annotated[Count, SHAPE] = 1
     joint_noise: NonNegative = 0.1
     velocity_noise: NonNegative = 0.3

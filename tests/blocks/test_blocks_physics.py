@@ -22,7 +22,7 @@ from mjxgait.tasks.blocks.follow import Following
 from mjxgait.types import BodyState
 
 CAPACITY, LANES = Capacity(), 96
-ON_LAND = Surroundings(iterations=20, line_iterations=20)
+ON_LAND = Surroundings(contact=0.01, iterations=20, line_iterations=20)
 IN_WATER = Surroundings(floor=False, gravity=0.0, drag=300.0)
 forward = jax.jit(TreePlant(ON_LAND).forward)
 

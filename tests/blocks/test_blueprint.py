@@ -7,6 +7,7 @@ import pytest
 
 from mjxgait.champion.blocks.material import DRAG, GRAVITY
 from mjxgait.control.brains.controller import Brains
+from mjxgait.creature.step import at_step
 from mjxgait.errors import UserError
 from mjxgait.library import load_creature
 from mjxgait.parts.registry import add_own, find
@@ -47,7 +48,19 @@ def test_who_swims_has_water_and_neither_ground_nor_weight():
 
 def test_who_walks_has_ground_and_weight():
     plant: Any = simulator("brain", "roam").plant
-    assert plant.around == Surroundings(step=0.01, floor=True, gravity=GRAVITY, drag=0.0)
+    assert plant.around == Surroundings(
+        step=0.01, contact=0.02, floor=True, gravity=GRAVITY, drag=0.0
+    )
+
+
+def test_a_shorter_step_makes_harder_ground():
+    """Half the step, and a touch that is over in half the time."""
+    seed = at_step(load_creature("blocks"), 0.005)
+    use = {"controller": "brain", "task": "jump"}
+    config = build_config({"use": use, "rollout": {"step": 0.005}}, "test")
+    plant: Any = draw_up(seed, config).simulator().plant
+    assert (plant.around.step, plant.around.contact) == (0.005, 0.01)
+    assert at_step(seed, 0.0) is seed
 
 
 def test_bodies_that_grow_walk_by_another_task_of_that_name():
@@ -98,6 +111,12 @@ def test_a_creature_says_things_to_one_task_only():
             "blocks",
             {"use": {"controller": "brain", "task": "swim"}, "rollout": {"ground": "bumps:0.05"}},
             "rollout.ground is for a body that is there",
+        ),
+        ("tall_quadruped", {"rollout": {"step": 0.002}}, "rollout.step is for bodies that grow"),
+        (
+            "blocks",
+            {"use": {"controller": "brain", "task": "jump"}, "rollout": {"step": 0.002}},
+            "rollout.step = 0.002, but its creature.xml has 0.01 s",
         ),
     ],
 )

@@ -50,6 +50,14 @@ def test_grown_bodies_are_creatures(grown_parts: list):
     assert tried > COUNT / 2
 
 
+@pytest.mark.parametrize("step", [0.005, 0.01])
+def test_a_touch_is_as_hard_as_the_step_allows(grown_parts: list, step: float):
+    parts = next(p for p in grown_parts if sum(len(part.hinges) for part in p) > 3)
+    model = load_files(body_files(parts, "grown", step, 9.81, 0.9, "on land")).model
+    assert model.opt.timestep == step
+    assert np.allclose(model.geom_solref, [2 * step, 1.0])
+
+
 def test_nothing_touches_the_floor_of_a_swimmer(grown_parts: list):
     parts = next(p for p in grown_parts if sum(len(part.hinges) for part in p) > 3)
     creature = load_files(body_files(parts, "swimmer", 0.005, 0.0, None, "in water"))

@@ -24,7 +24,8 @@ from mjxgait.parts.settings import build_config
 from mjxgait.runs.experiment import Experiment, build_experiment
 from mjxgait.search.state import EvolutionState
 from mjxgait.settings.blocks import JumpConfig, RoamConfig
-from mjxgait.tasks.blocks.follow import FollowInWater, FollowOnLand, directions
+from mjxgait.settings.rollout import RolloutConfig
+from mjxgait.tasks.blocks.follow import Following, FollowInWater, FollowOnLand, directions
 from mjxgait.tasks.blocks.jump import Jump
 from mjxgait.tasks.blocks.roam import Roam
 
@@ -33,7 +34,7 @@ TABLE = {
     "controller": {"nodes": 3, "parts": 4, "links": 4, "local": 2, "central": 1},
     "evolution": {"population": 60},
     "rollout": {"seconds": 1.6, "starts": 2, "lanes": 20, "joint_noise": 0.1},
-    "fitness": {"settle": 0.1, "weights": {"overlap": 0.0, "balance": 0.0}},
+    "fitness": {"settle": 0.1, "widening": 0, "weights": {"overlap": 0.0, "balance": 0.0}},
 }
 COUNT = 8
 
@@ -219,12 +220,65 @@ def test_to_follow_is_to_get_nearer_to_the_light(task: Roam, follower: type):
         assert (judged["overlap"] > 0) == (way > 0), "nothing is gained by blocks in each other"
 
 
+@pytest.mark.parametrize("follower", [FollowInWater, FollowOnLand])
+def test_lights_spread_in_so_many_steps_and_stay(task: Roam, follower: type):
+    """From a cone ahead, all at once and each its own way, until they are where they belong."""
+    following: Following = follower(task.creature, task.step, task.horizon, task.ends)
+    rollout = RolloutConfig(starts=4)
+    trials = following.trials(jax.random.key(0), load_creature("blocks"), rollout)
+    behind = np.pi
+
+    def aside(level: int, steps: int) -> np.ndarray:
+        settings = following.Settings(widening=steps)
+        harder = following.harder(trials, settings, jnp.int32(level))
+        lights = harder.light
+        np.testing.assert_allclose(np.linalg.norm(lights, axis=1), LIGHT, rtol=1e-6)
+        return np.arccos(np.clip(np.asarray(lights)[:, 0] / LIGHT, -1, 1))
+
+    whole = aside(0, 0)
+    assert whole.max() == pytest.approx(behind, abs=1e-3)
+    for level, share in ((0, 0.2), (1, 0.4), (3, 0.8), (4, 1.0), (50, 1.0)):
+        np.testing.assert_allclose(aside(level, 4), share * whole, atol=2e-3)
+    np.testing.assert_allclose(
+        trials.light,
+        following.harder(trials, following.Settings(widening=0), jnp.int32(0)).light,
+        atol=1e-5,
+    )
+
+
+def test_who_gets_nearer_is_ready_for_wider_lights(task: Roam):
+    following = FollowOnLand(task.creature, task.step, task.horizon, task.ends)
+    for speed, lost, ready in ((0.11, 0.0, True), (0.3, 0.25, False), (0.09, 0.0, False)):
+        terms = {"speed": speed, "overlap": lost, "balance": 0.0}
+        assert bool(following.mastered(terms)) == ready
+    assert FollowInWater.climbs
+    assert FollowOnLand.climbs
+
+
+def test_how_far_aside_a_light_is_can_be_seen(task: Roam):
+    """So that nobody is looked at who has followed none but lights ahead."""
+    following = FollowOnLand(task.creature, task.step, task.horizon, task.ends)
+    for light, angle in (([10.0, 0, 3], 0.0), ([0, -10.0, 0], np.pi / 2), ([-10.0, 0, 0], np.pi)):
+        tally = dataclasses.replace(following.init(), light=jnp.array(light))
+        assert float(following.outcome(tally)["aside"]) == pytest.approx(angle, abs=1e-6)
+    demands, creature = demands_of("follow-on-land"), load_creature("blocks")
+    for widest, looked_at in ((np.pi, True), (np.pi / 2, False)):
+        outcome = {
+            "way": np.array([2.0, 2.0]),
+            "seconds": np.array([10.0, 10.0]),
+            "aside": np.array([0.0, widest]),
+        }
+        assert demands.promising(outcome, 10.0, creature) == looked_at
+        slow = {**outcome, "way": np.array([2.0, 0.9])}
+        assert not demands.promising(slow, 10.0, creature)
+
+
 def test_lights_are_all_around():
     for axes, least in ((2, 1.0), (3, 0.8)):
-        found = directions(6, axes)
-        np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1.0)
-        assert found[0] == pytest.approx([1, 0, 0])
+        found = np.asarray(directions(6, axes))
+        np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1.0, rtol=1e-6)
+        assert found[0] == pytest.approx([1, 0, 0], abs=1e-6)
         between = np.linalg.norm(found[:, None] - found[None], axis=2) + 2 * np.eye(6)
-        assert between.min() >= least - 1e-9
+        assert between.min() >= least - 1e-6
         assert np.abs(found.mean(0)).max() < 0.15
-    assert not directions(4, 2)[:, 2].any()
+    assert not np.asarray(directions(4, 2))[:, 2].any()

@@ -1,6 +1,7 @@
 """What is demanded of followers: to get nearer to lights that nobody has seen."""
 
 import dataclasses
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -15,6 +16,10 @@ from mjxgait.certify.tasks.swim import by_water
 from mjxgait.certify.thresholds.blocks import FollowConfig
 from mjxgait.champion import Champion
 from mjxgait.champion.blocks.material import LIGHT
+from mjxgait.creature import Creature
+
+WIDE = 2.0
+"""rad from ahead to the light that is farthest aside: who has seen less is not looked at yet."""
 
 
 class FollowDemands(BlocksDemands):
@@ -75,6 +80,13 @@ class FollowDemands(BlocksDemands):
             apart, axis=1
         )
         return outcome.stayed_up & (nearer >= config.follow.speed * seconds)
+
+    def promising(
+        self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
+    ) -> bool:
+        """See `Demands`: lights aside are among its trials."""
+        wide = bool(outcome["aside"].max() >= WIDE)
+        return wide and super().promising(outcome, seconds, creature)
 
     def enough(self, seconds: float, config: CertificateConfig) -> float:
         """See `BlocksDemands`: m in the seconds that count, as much nearer as it must get in all."""

@@ -29,6 +29,8 @@ ROTOR = 0.01
 """s: its armature over its damping, so that the smallest blocks can be simulated."""
 GRAVITY, FRICTION = 9.81, 0.9
 """m/s², and of the ground; there is neither in water."""
+HARDEST = 2.0
+"""Steps, the time constant of a touch (`solref`): the least that MuJoCo simulates as it is given."""
 DRAG = 500.0
 """N·s/m³, what water does to a face per area and normal velocity."""
 IN_WATER, ON_LAND = ("swim", "follow"), ("roam", "jump", "follow-on-land")

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 import mujoco
 import numpy as np
 
-from mjxgait.champion.blocks.material import DAMPING, DENSITY, ROTOR
+from mjxgait.champion.blocks.material import DAMPING, DENSITY, HARDEST, ROTOR
 from mjxgait.champion.blocks.parts import Part
 
 SPIN, ROLL = 0.005, 0.0001
@@ -32,7 +32,10 @@ def body_xml(
     option = ET.SubElement(root, "option", timestep=f"{step:g}", gravity=down)
     ET.SubElement(option, "flag", eulerdamp="disable")
     world = ET.SubElement(root, "worldbody")
-    sticking = {} if friction is None else {"friction": _text((friction, SPIN, ROLL))}
+    sticking = {}
+    if friction is not None:
+        hard = {"solref": _text((HARDEST * step, 1.0))}
+        sticking = {"friction": _text((friction, SPIN, ROLL)), **hard}
     touched = "0" if friction is None else "1"
     plane = {"type": "plane", "size": "0 0 1", "contype": "0", "conaffinity": touched}
     ET.SubElement(world, "geom", {"name": "floor", **plane, **sticking})

@@ -29,7 +29,7 @@ IMPEDANCE = np.array([0.9, 0.95, 0.001, 0.5], np.float32).reshape(1, 4, 1)
 POWER = (2.0,)
 """MuJoCo's default `solimp`."""
 TIME_CONSTANT = 0.02
-"""s, MuJoCo's default `solref`, critically damped."""
+"""s, MuJoCo's default `solref`, which hinges have at their limits."""
 LEVEL = Level()
 
 
@@ -126,23 +126,22 @@ def make_constraints(
 ) -> Constraints:
     """Those of the current state: all corners, all limits. friction: [L], a factor."""
     pin, shape = footing.pin, Dense(tree.links, around.iterations, around.line_iterations)
-    softness = _softness(around)
     over_low, under_high = qpos[7:] - tree.low[1:], tree.high[1:] - qpos[7:]
-    hinges = Springs(softness, POWER, tree.dof_weight[1:])
+    hinges = Springs(_softness(max(TIME_CONSTANT, 2 * around.step)), POWER, tree.dof_weight[1:])
     limit = limit_terms(hinges, over_low, under_high, qvel[6:], pin)
     if touch is None:
         empty = jnp.zeros((0, *friction.shape), friction.dtype)
         return Constraints(shape, None, empty, (empty, empty, empty), empty, *limit)
+    softness = _softness(around.contact)
     corners = Springs(softness, POWER, jnp.concatenate([tree.body_weight] * CORNERS))
     mu = jnp.broadcast_to(around.friction * friction, touch.distance.shape)
     contact = contact_terms(corners, touch.distance, mu, footing.along(list(qvel)), pin)
     return Constraints(shape, footing, *contact, *limit)
 
 
-def _softness(around: Surroundings) -> Softness:
-    """Of every constraint (MuJoCo's computation docs, "Reference")."""
-    most = float(IMPEDANCE[0, 1, 0])
-    time = most * max(TIME_CONSTANT, 2 * around.step)
+def _softness(time_constant: float) -> Softness:
+    """Of a constraint critically damped (MuJoCo's computation docs, "Reference")."""
+    time = float(IMPEDANCE[0, 1, 0]) * time_constant
     stiffness, damping, none = (
         np.full((1, 1), x, np.float32) for x in (1 / time**2, 2 / time, 0.0)
     )

@@ -61,14 +61,15 @@ class Tree:
 class Surroundings:
     """What is the same in all lanes, and constant in the program.
 
-    step: s. friction: of the ground. floor: whether there is one, z = 0. gravity: m/s². drag:
-    N·s/m³, the resistance of a face to its normal velocity, per area; 0 without water. lit: whether
-    there is something to see.
+    step: s. friction: of the ground. contact: s, time constant of a touch (`solref`). floor:
+    whether there is one, z = 0. gravity: m/s². drag: N·s/m³, the resistance of a face to its normal
+    velocity, per area; 0 without water. lit: whether there is something to see.
     iterations, line_iterations: of the contact solver.
     """
 
     step: float = 0.005
     friction: float = 0.9
+    contact: float = 0.02
     floor: bool = True
     gravity: float = 9.81
     drag: float = 0.0

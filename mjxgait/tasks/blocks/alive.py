@@ -86,7 +86,7 @@ class GoingTask(BlocksTask):
     axes: along how many of the world's a way counts. dark: the light of an empty tally.
     """
 
-    outcomes = ("way", "seconds")
+    outcomes: ClassVar[tuple[str, ...]] = ("way", "seconds")
     axes: ClassVar[int] = 3
     dark: ClassVar[np.ndarray | None] = None
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from mjxgait.champion.blocks.material import LIGHT
 from mjxgait.creature import Creature
+from mjxgait.settings.blocks import FollowInWaterConfig, FollowOnLandConfig
 from mjxgait.settings.rollout import RolloutConfig
 from mjxgait.tasks.blocks.alive import GoingTask, length
 from mjxgait.tasks.blocks.roam import Roam
@@ -24,6 +25,9 @@ from mjxgait.types import Sensed
 GOLDEN = np.pi * (3 - np.sqrt(5.0))
 """rad; so turned one after another, directions are spread evenly about an axis."""
 
+READY = 0.1
+"""m/s by which lights come nearer, mean over the trials: who does it is ready for wider ones."""
+
 
 class Following(GoingTask):
     """See `Task`: what followers in water and on land have in common. A way is what the distance to
@@ -31,6 +35,8 @@ class Following(GoingTask):
     """
 
     adds: ClassVar[tuple[str, ...]] = ("light",)
+    outcomes = (*GoingTask.outcomes, "aside")
+    climbs = True
     dark = np.zeros(3, np.float32)
 
     def trials(self, key: jax.Array, creature: Creature, settings: RolloutConfig) -> Starts:
@@ -38,6 +44,18 @@ class Following(GoingTask):
         lights = LIGHT * directions(settings.starts, self.axes)
         plain = super().trials(key, creature, settings)
         return dataclasses.replace(plain, light=jnp.asarray(lights, jnp.float32))
+
+    def harder(self, trials: Starts, settings: Any, level: jax.Array) -> Starts:
+        """See `Task`: lights spread, so that whoever gets on learns to turn little by little."""
+        steps = settings.widening
+        spread = jnp.where(level < steps, (level + 1) / (steps + 1), 1.0)
+        lights = LIGHT * directions(trials.friction.shape[0], self.axes, spread)
+        return dataclasses.replace(trials, light=lights.astype(jnp.float32))
+
+    def mastered(self, terms: Mapping[str, jax.Array]) -> jax.Array:
+        """See `Task`."""
+        wanted, *penalties = (terms[name] for name in self.terms)
+        return wanted - sum(penalties) >= READY
 
     def aim(self, trial: Starts) -> jax.Array:
         """See `Task`: [3] m, where the light is."""
@@ -65,21 +83,34 @@ class Following(GoingTask):
         )
         return before - now
 
+    def outcome(self, tally: Any) -> Mapping[str, jax.Array]:
+        """See `Task`: of those that get on, and rad from ahead to the light."""
+        ahead, *aside = (tally.light[axis] for axis in range(self.axes))
+        return {**super().outcome(tally), "aside": jnp.arctan2(length(jnp.stack(aside)), ahead)}
+
 
 class FollowInWater(Following, Swim):
     """See `Task`."""
+
+    Settings: ClassVar[type] = FollowInWaterConfig
 
 
 class FollowOnLand(Following, Roam):
     """See `Task`."""
 
+    Settings: ClassVar[type] = FollowOnLandConfig
 
-def directions(count: int, axes: int) -> np.ndarray:
-    """[count, 3] of length 1, the first along x: all around in the plane, or on the sphere."""
+
+def directions(count: int, axes: int, spread: jax.Array | float = 1.0) -> jax.Array:
+    """[count, 3] of length 1, the first along x: all around in the plane, or on the sphere; with a
+    smaller spread than 1 that share of the angle from x.
+    """
     place = np.arange(count)
     if axes == 2:
-        angle = 2 * np.pi * place / count
-        return np.stack([np.cos(angle), np.sin(angle), np.zeros(count)], axis=1)
-    ahead = 1 - 2 * place / max(count - 1, 1)
-    aside = np.sqrt(1 - ahead**2)
-    return np.stack([ahead, aside * np.cos(GOLDEN * place), aside * np.sin(GOLDEN * place)], axis=1)
+        turn = 2 * np.pi * place / count
+        angle = spread * np.where(turn > np.pi, turn - 2 * np.pi, turn)
+        return jnp.stack([jnp.cos(angle), jnp.sin(angle), jnp.zeros(count)], axis=1)
+    angle = spread * np.arccos(1 - 2 * place / max(count - 1, 1))
+    about = GOLDEN * place
+    aside = jnp.sin(angle)
+    return jnp.stack([jnp.cos(angle), aside * np.cos(about), aside * np.sin(about)], axis=1)
