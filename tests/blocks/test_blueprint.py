@@ -6,10 +6,12 @@ from typing import Any
 import pytest
 
 from mjxgait.champion.blocks.material import DRAG, GRAVITY
+from mjxgait.commands.train import train_command
 from mjxgait.control.brains.controller import Brains
+from mjxgait.creature import Creature
 from mjxgait.creature.step import at_step
 from mjxgait.errors import UserError
-from mjxgait.library import load_creature
+from mjxgait.library import load_creature, train
 from mjxgait.parts.registry import add_own, find
 from mjxgait.parts.settings import build_config, resolve_config
 from mjxgait.physics.trees.tree import Surroundings
@@ -17,6 +19,7 @@ from mjxgait.runs.blueprint import draw_up
 from mjxgait.runs.folder import create_run
 from mjxgait.settings.blocks import RoamConfig
 from mjxgait.settings.brains import BrainConfig
+from mjxgait.settings.config import Config
 from mjxgait.simulation.rollout import Simulator
 
 
@@ -61,6 +64,24 @@ def test_a_shorter_step_makes_harder_ground():
     plant: Any = draw_up(seed, config).simulator().plant
     assert (plant.around.step, plant.around.contact) == (0.005, 0.01)
     assert at_step(seed, 0.0) is seed
+
+
+@pytest.mark.parametrize(("task", "step"), [("jump", 0.005), ("walk", 0.01)])
+def test_a_run_has_the_step_of_its_task(task: str, step: float, monkeypatch: pytest.MonkeyPatch):
+    """From the command line and from Python."""
+    seen = []
+
+    def only_look(folder: Path | None, creature: Creature, config: Config) -> Path:
+        seen.append(float(creature.model.opt.timestep))
+        raise UserError("that is enough")
+
+    for caller in ("mjxgait.commands.train", "mjxgait.library.make"):
+        monkeypatch.setattr(f"{caller}.create_run", only_look)
+    with pytest.raises(UserError, match="enough"):
+        train_command(["--env", "blocks", "--use.task", task])
+    with pytest.raises(UserError, match="enough"):
+        train("blocks", task=task)
+    assert seen == [step, step]
 
 
 def test_bodies_that_grow_walk_by_another_task_of_that_name():
