@@ -14,6 +14,7 @@ from mjxgait.control.pose_variation import pose_variation
 from mjxgait.control.poses import Genome
 from mjxgait.search.breeding import parents, proportional_parents
 from mjxgait.search.evolution import Evolution
+from mjxgait.search.families import families, place_in_family
 from mjxgait.search.state import NOBODY, EvolutionState, GenerationMetrics, Origin, stop_reason
 from mjxgait.search.variation import Box, first_occurrence
 from mjxgait.settings.config import Config
@@ -202,6 +203,40 @@ def test_all_are_judged_again_once_trials_have_become_harder(stale: bool):
     worth = np.where(old & ~np.asarray(stale), 1, 2) * near_zero(after.genomes)
     np.testing.assert_allclose(after.fitness, worth, rtol=1e-6)
     assert len(np.unique(after.genomes.key_poses, axis=0)) == 20
+
+
+def test_no_family_takes_more_than_its_share():
+    """Mother by mother from one of the first generation; and the best are still the best."""
+    sparing = toy(growth=3.0, forced=ForcedConfig(enabled=False), family=0.25)
+    history = run(sparing, 25)
+    plain = run(toy(growth=3.0, forced=ForcedConfig(enabled=False)), 25)
+    for (before, _), (after, told) in itertools.pairwise(history):
+        mothers = np.asarray(told.mothers)
+        assert (after.family == before.family[mothers]).all()
+        assert np.bincount(after.family).max() <= 5
+        assert after.fitness[0] >= before.fitness[0]
+    ancestors = np.arange(20)
+    for _, told in plain[1:]:
+        ancestors = ancestors[np.asarray(told.mothers)]
+    assert len(np.unique(ancestors)) < len(np.unique(history[-1][0].family)) >= 4
+
+
+def test_of_a_family_the_best_come_first():
+    family = jnp.array([7, 7, 3, 7, 3, 7])
+    fitness = jnp.array([1.0, 5.0, 2.0, 5.0, 2.0, 9.0])
+    counts = jnp.array([True, True, True, True, True, False])
+    assert place_in_family(family, fitness, counts).tolist() == [2, 0, 0, 1, 1, 0]
+
+
+def test_newcomers_begin_families_of_their_own():
+    begun = run(toy(family=0.25), 1)[-1][0]
+    state = dataclasses.replace(begun, family=jnp.arange(20) // 2)
+    mothers = jnp.array([4, NOBODY, 5, NOBODY])
+    old, new = np.split(np.asarray(families(state, mothers)), [20])
+    assert (old == np.arange(20) // 2).all()
+    assert new[[0, 2]].tolist() == [2, 2]
+    assert len({*new[[1, 3]], *old}) == 12
+    assert families(dataclasses.replace(state, family=None), mothers) is None
 
 
 def test_what_a_genome_costs_is_taken_from_its_fitness():

@@ -23,6 +23,11 @@ def check_fit(creature: Creature, config: Config) -> None:
             f"examination.level = {config.examination.level}: only who is to walk can walk there, and "
             f"this is to {task}"
         )
+    if config.evolution.family < 1 and config.evolution.islands.count > 1:
+        raise UserError(
+            f"{name}: evolution.family is for one population, and islands are several as they are; "
+            "take --evolution.family 1"
+        )
     if around := getattr(config.controller, "around", ()):
         wanted = config.controller.key_poses * len(creature.joints.names)
         if len(around) != wanted:

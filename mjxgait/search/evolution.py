@@ -14,6 +14,7 @@ import jax.numpy as jnp
 
 from mjxgait.search import forced
 from mjxgait.search.breeding import Nursery, parents, proportional_parents
+from mjxgait.search.families import families, place_in_family
 from mjxgait.search.metrics import metrics
 from mjxgait.search.state import NOBODY, EvolutionState, GenerationMetrics, Origin, Proposal
 from mjxgait.search.variation import Variation, first_occurrence
@@ -58,6 +59,7 @@ class Evolution:
             spell_best=jnp.float32(-jnp.inf),
             barren=integer,
             rounds=jnp.ones(count) if self.config.remember else None,
+            family=jnp.arange(count) if self.config.family < 1 else None,
         )
 
     def propose(self, state: EvolutionState) -> Proposal:
@@ -107,9 +109,10 @@ class Evolution:
         was_forced = state.forced
         state = dataclasses.replace(state, key=proposal.key, generation=generation)
         state = forced.decided(self.config, state)
-        if mothers is not None:
-            mothers = jnp.where(seeding, NOBODY, mothers)
-        return state, metrics(self.config, state, judged, was_forced, mothers)
+        told = None
+        if self.config.lineage and mothers is not None:
+            told = jnp.where(seeding, NOBODY, mothers)
+        return state, metrics(self.config, state, judged, was_forced, told)
 
     def _recalled(self, state: EvolutionState, judged: Judged) -> tuple[Judged, jax.Array | None]:
         """The verdict, in which those that are judged once more have the mean of all their rounds; and
@@ -158,7 +161,7 @@ class Evolution:
 
         genomes = jax.tree.map(pick, initial, mutants, children)
         origin = pick(jnp.zeros_like(child_origin), forced_origin, child_origin)
-        if not self.config.lineage or of_child is None:
+        if not self.config.follows or of_child is None:
             return genomes, origin, None
         of_mutant = jnp.where(forced_origin == int(Origin.NEWCOMER), NOBODY, of_mutant)
         return genomes, origin, pick(jnp.full_like(origin, NOBODY), of_mutant, of_child)
@@ -281,6 +284,10 @@ class Evolution:
         if not self.config.elites:  # the best is never lost, whatever the tiers say
             best = jnp.arange(fitness.shape[0]) == jnp.argmax(fitness)
             tier = jnp.where(best & distinct, 3, tier)
+        family = families(state, proposal.mothers)
+        if family is not None:
+            most = max(round(self.config.family * count), 1)
+            tier = 2 * tier + (place_in_family(family, fitness, distinct) < most)
         kept = jnp.lexsort((-fitness, -tier))[:count]
         kept = kept[jnp.argsort(-fitness[kept], stable=True)]
         genomes, terms, outcome, born, origin, rounds = jax.tree.map(lambda leaf: leaf[kept], pool)
@@ -297,6 +304,7 @@ class Evolution:
             origin=origin,
             fitness=fitness[kept],
             rounds=rounds,
+            family=None if family is None else family[kept],
             refreshed=refreshed.astype(jnp.int32),
         )
         return survivors, mothers

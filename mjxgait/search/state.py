@@ -35,6 +35,8 @@ class EvolutionState:
     rounds: [P] of which `terms` is the mean; None where nobody's earlier rounds count.
     level: [] how often the trials have become harder; None where they never do.
     stale: [] whether they have since `terms` were judged; None likewise.
+    family: [P] who of the first generation is the first of their mothers; None where a family may
+    be of any size.
     """
 
     genomes: Any
@@ -57,6 +59,7 @@ class EvolutionState:
     rounds: jax.Array | None = None
     level: jax.Array | None = None
     stale: jax.Array | None = None
+    family: jax.Array | None = None
 
 
 @pytree

@@ -96,6 +96,8 @@ class EvolutionConfig:
       tuning_sigma: by how much it changes, in units of its range; likewise a body's.
       remove_duplicates: of individuals with the same genome only one survives.
       lineage: whether a run's metrics tell whose child each is, not of islands.
+      family: of the population, the largest share that descends, mother by mother, from one of the
+        first generation: so that not all become one family.
       forced: a spell of rapid mutation and newcomers when growth stalls.
       islands: several such populations that exchange their best (docs/cluster.md).
     """
@@ -128,6 +130,7 @@ class EvolutionConfig:
     tuning_sigma: Positive = 0.1
     remove_duplicates: bool = True
     lineage: Annotated[bool, SHAPE] = False
+    family: Annotated[Fraction, SHAPE] = 1.0
     forced: ForcedConfig = dataclasses.field(default_factory=ForcedConfig)
     islands: IslandsConfig = dataclasses.field(default_factory=IslandsConfig)
 
@@ -140,8 +143,8 @@ class EvolutionConfig:
             )
 
         at_once = not self.unique_children and self.pool != "growing"
-        if (self.proportional or self.lineage) and not at_once:
-            which = "proportional" if self.proportional else "lineage"
+        if (self.proportional or self.follows) and not at_once:
+            which = "proportional" if self.proportional else "lineage or family"
             raise ValueError(f"{which} is for children that are born all at once")
         if self.elite and self.survival == "best":
             raise ValueError('elite is for survival = "children": of the best all live on anyway')
@@ -149,6 +152,11 @@ class EvolutionConfig:
             raise ValueError("remember is for an elite: nobody else is judged more than once")
         if self.elites >= self.offspring:
             raise ValueError(f"elite = {self.elite} leaves no room for children")
+
+    @property
+    def follows(self) -> bool:
+        """Whether it is known whose child each is."""
+        return self.lineage or self.family < 1
 
     @property
     def offspring(self) -> int:

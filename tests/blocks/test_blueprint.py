@@ -133,6 +133,11 @@ def test_a_creature_says_things_to_one_task_only():
             {"use": {"controller": "brain", "task": "swim"}, "rollout": {"ground": "bumps:0.05"}},
             "rollout.ground is for a body that is there",
         ),
+        (
+            "tall_quadruped",
+            {"evolution": {"family": 0.5, "islands": {"count": 2}}},
+            "evolution.family is for one population",
+        ),
         ("tall_quadruped", {"rollout": {"step": 0.002}}, "rollout.step is for bodies that grow"),
         (
             "blocks",

@@ -1,0 +1,30 @@
+"""Who descends from whom, so that not all of a population become one family.
+
+Letters: `P` population, `M` offspring, `N` all of them.
+"""
+
+import jax
+import jax.numpy as jnp
+
+from mjxgait.search.state import NOBODY, EvolutionState
+
+
+def families(state: EvolutionState, mothers: jax.Array | None) -> jax.Array | None:
+    """[P + M] of the old and of the offspring; None where that is not followed.
+
+    mothers: [M] places of the offspring's; who has none begins a family of its own.
+    """
+    if state.family is None or mothers is None:
+        return None
+    population, offspring = len(state.family), len(mothers)
+    own = population + (state.generation + 2) * offspring + jnp.arange(offspring)
+    theirs = state.family[jnp.maximum(mothers, 0)]
+    return jnp.append(state.family, jnp.where(mothers == NOBODY, own, theirs))
+
+
+def place_in_family(family: jax.Array, fitness: jax.Array, counts: jax.Array) -> jax.Array:
+    """[N] how many of its family that count are better than each; of equals the first is."""
+    order = jnp.arange(len(fitness))
+    equal = (fitness[:, None] == fitness) & (order[:, None] > order)
+    better = (fitness[:, None] < fitness) | equal
+    return jnp.sum(better & (family[:, None] == family) & counts, axis=1)
