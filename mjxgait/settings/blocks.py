@@ -118,17 +118,15 @@ class JumpWeights:
     """What each term counts; all but `height` are penalties.
 
     Attributes:
-      height: m, the greatest height of the lowest part.
+      height: m, of the lowest part at the best moment, mean of the halves of the time that counts.
       overlap: what of it is lost by blocks that stand in each other or in the ground.
       wild: what of the rest is lost by an episode that ends early: its share that was not lived.
-      once: what of the rest is lost by jumping less high at other times.
     """
 
     __pydantic_config__ = STRICT
     height: NonNegative = 1.0
     overlap: NonNegative = 1.0
     wild: NonNegative = 1.0
-    once: NonNegative = 1.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -140,6 +138,6 @@ class JumpConfig(BlocksConfig):
     """
 
     __pydantic_config__ = STRICT
-    overlap: Positive = 0.04
+    overlap: Positive = 0.035
     apart: NonNegative = 0.0
     weights: JumpWeights = dataclasses.field(default_factory=JumpWeights)

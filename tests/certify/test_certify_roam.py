@@ -52,10 +52,12 @@ def roam(speed: Any = SPEED, rising: float = 0.0, tilt: Any = 0.0, buried: Any =
     )
 
 
-def jump(height: float, at: float = 10.0) -> Recording:
+def jump(height: float, until: float = 22.0, since: float = 0.0) -> Recording:
+    """In the middle of every two seconds."""
     made = roam()
     assert made.grown
-    low = np.where(np.abs(TIMES - at) < STEP / 2, height, -0.001)
+    leaps = (np.abs(TIMES % 2 - 1) < STEP / 2) & (until > TIMES) & (since < TIMES)
+    low = np.where(leaps, height, -0.001)
     return dataclasses.replace(made, grown=dataclasses.replace(made.grown, low=low))
 
 
@@ -112,7 +114,7 @@ def test_how_deep_a_block_is_in_the_ground_is_told_in_its_sizes():
     assert (seen.buried[:2] <= -seen.low[:2] / least).all()
 
 
-def test_who_is_off_the_ground_once_jumps():
+def test_who_is_off_the_ground_over_and_over_jumps():
     def failed(whole: Recording, halved: Recording) -> set[int]:
         judged = JumpDemands().undisturbed(whole, halved, CONFIG)
         assert [c.number for c in judged] == [2, 6, 8, 9]
@@ -121,7 +123,11 @@ def test_who_is_off_the_ground_once_jumps():
     assert not failed(jump(0.11), jump(0.12))
     assert failed(jump(0.09), jump(0.09)) == {2, 6}
     assert failed(jump(0.2), jump(0.15)) == {6}
-    assert 2 in failed(jump(0.2, at=1.0), jump(0.2)), "it has to settle first"
-    champion: Any = SimpleNamespace(terms={"height": 0.2}, origin={"nominal": {"seconds": 8.0}})
-    held = [JumpDemands().kept(champion, jump(0.17, at), CONFIG)[0].passed for at in (6.0, 9.0)]
-    assert held == [True, False], "in as many seconds as evolution saw"
+    assert 2 in failed(jump(0.5, until=2.0), jump(0.2)), "it has to settle first"
+    assert 2 in failed(jump(0.15, until=14.0), jump(0.15)), "six of ten, and 0.09 m in the mean"
+    assert not failed(jump(0.15, until=16.0), jump(0.12, until=20.0)), "seven, and by finer steps nine"
+    told = {"seconds": 8.0, "height": 0.2}
+    champion: Any = SimpleNamespace(terms={"height": 9.0}, origin={"nominal": told})
+    for later in (0.0, 9.0):
+        (again,) = JumpDemands().kept(champion, jump(0.17, since=later), CONFIG)
+        assert again.passed == (later == 0.0), "in as many seconds as evolution saw"

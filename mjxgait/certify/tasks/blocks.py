@@ -81,7 +81,8 @@ class BlocksDemands(StaysUp, abc.ABC):
         window, other = whole.window(config.warmup), halved.window(config.warmup)
         does, repeated = (self.second(each, config) for each in (window, other))
         failed = sum(not m.passed for m in repeated.measures)
-        change = abs(self.done(other) / self.done(window) - 1)
+        done, halved_done = self.done(window), self.done(other)
+        change = abs(halved_done / done - 1) if done else np.inf
         halves = (
             at_most("failures in 2", failed, 0.0),
             at_most("change", change, config.half_step.distance),

@@ -43,7 +43,9 @@ class GoingConfig(BlocksConfig):
 
 @dataclasses.dataclass(frozen=True)
 class JumpConfig(BlocksConfig):
-    """What is demanded of who jumps. height: m, least, of the lowest part at the best moment."""
+    """What is demanded of who jumps. height: m, least, of the lowest part at the best moment of every
+    two seconds, in the mean.
+    """
 
     __pydantic_config__ = STRICT
     height: NonNegative = 0.1
