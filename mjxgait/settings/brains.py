@@ -30,6 +30,7 @@ class BrainConfig:
       grow: chance of a new node.
       crossover: share of the offspring of two parents whose nodes are crossed over.
       grafting: share that has a graft of its second parent; the others have one parent.
+      drawn: whether bodies stay as they were drawn, and brains alone evolve.
     """
 
     __pydantic_config__ = STRICT
@@ -46,3 +47,4 @@ class BrainConfig:
     grow: Fraction = 0.25
     crossover: Fraction = 0.3
     grafting: Fraction = 0.3
+    drawn: bool = False

@@ -15,6 +15,9 @@ from mjxgait.blocks.growth import grown
 from mjxgait.blocks.nerves import NerveRoom
 from mjxgait.blocks.variation import Genotype, Kin, Rates, reachable
 from mjxgait.champion.blocks.material import JOINTS, NEURONS
+from mjxgait.control.brains.controller import Brains
+from mjxgait.settings.brains import BrainConfig
+from mjxgait.settings.evolution import EvolutionConfig
 
 CAPACITY, ROOM, RANGES, COUNT = Capacity(), NerveRoom(), Ranges(), 2000
 KIN = Kin(CAPACITY, ROOM, RANGES, Rates(value=20.0, connection=0.8, node=0.8))
@@ -172,3 +175,27 @@ def test_nodes_and_connections_come_and_go(parents: tuple[Genotype, Genotype]):
     alive, were = (np.asarray(ALIVE(g.graph)).sum(1) for g in (child, parents[0]))
     assert (alive > were).mean() > 0.2
     assert (alive < were).mean() > 0.03
+
+
+@pytest.mark.parametrize("drawn", [True, False])
+def test_a_drawn_body_is_its_mothers(parents: tuple[Genotype, Genotype], drawn: bool):
+    """Whatever befalls the child, and its brain still varies."""
+    controller = Brains(0.01, BrainConfig())
+    bred = controller.variation(BrainConfig(drawn=drawn), EvolutionConfig())
+    keys = jax.random.split(jax.random.key(3), 200)
+    few = [jax.tree.map(lambda leaf: leaf[:200], parent) for parent in parents]
+
+    @jax.jit
+    @jax.vmap
+    def child(key: jax.Array, mother: Genotype, father: Genotype) -> Genotype:
+        return bred.mutate(key, bred.cross(key, mother, father))
+
+    def changed(part: str) -> float:
+        """The share of children of which this part is not quite their mother's."""
+        leaves = [jax.tree.leaves(getattr(each, part)) for each in (young, few[0])]
+        pairs = [(np.asarray(a), np.asarray(b)) for a, b in zip(*leaves, strict=True)]
+        return np.mean([any((a[i] != b[i]).any() for a, b in pairs) for i in range(200)])
+
+    young = child(keys, *few)
+    assert changed("graph") == 0 if drawn else changed("graph") > 0.9
+    assert changed("nerves") > 0.9

@@ -125,7 +125,9 @@ def test_who_is_off_the_ground_over_and_over_jumps():
     assert failed(jump(0.2), jump(0.15)) == {6}
     assert 2 in failed(jump(0.5, until=2.0), jump(0.2)), "it has to settle first"
     assert 2 in failed(jump(0.15, until=14.0), jump(0.15)), "six of ten, and 0.09 m in the mean"
-    assert not failed(jump(0.15, until=16.0), jump(0.12, until=20.0)), "seven, and by finer steps nine"
+    assert not failed(jump(0.15, until=16.0), jump(0.12, until=20.0)), (
+        "seven, and by finer steps nine"
+    )
     told = {"seconds": 8.0, "height": 0.2}
     champion: Any = SimpleNamespace(terms={"height": 9.0}, origin={"nominal": told})
     for later in (0.0, 9.0):

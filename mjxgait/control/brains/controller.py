@@ -62,14 +62,26 @@ class Brains:
             draw = jax.random.uniform(how)
             crossed, grafted = kin.cross(key, mother, father), kin.graft(key, mother, father)
             crosses, grafts = draw < settings.crossover, draw > 1 - settings.grafting
-            return jax.tree.map(
+            child = jax.tree.map(
                 lambda own, c, g: jnp.where(crosses, c, jnp.where(grafts, g, own)),
                 mother,
                 crossed,
                 grafted,
             )
+            return embodied(child, mother)
 
-        return Variation(create, cross, kin.mutate)
+        def mutate(key: jax.Array, genotype: Genotype) -> Genotype:
+            return embodied(kin.mutate(key, genotype), genotype)
+
+        def embodied(child: Genotype, mother: Genotype) -> Genotype:
+            graph = jax.tree.map(
+                lambda own, of_mother: jnp.where(settings.drawn, of_mother, own),
+                child.graph,
+                mother.graph,
+            )
+            return dataclasses.replace(child, graph=graph)
+
+        return Variation(create, cross, mutate)
 
     def genes(self, genomes: Genotype, settings: BrainConfig) -> np.ndarray:
         """See `Controller`: any other kind or flag is a difference."""
