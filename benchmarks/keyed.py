@@ -2,7 +2,8 @@
 
 A chart says when each leg carries, how far its hip swings and how far its knee bends on the way
 forward; nobody has simulated it. Each is written as a CSV file of angles and given to `mjxgait
-refine`; a line of JSON per cycle tells what became of it. `--only NAME ...` takes some of them.
+refine`; a line of JSON per cycle tells what became of it. `--only NAME ...` takes some of them;
+other options are handed on: `--config near.toml`.
 """
 
 import argparse
@@ -93,13 +94,13 @@ def write_cycle(folder: Path, name: str) -> Path:
     return file
 
 
-def refined(folder: Path, name: str, keep: float) -> dict[str, object]:
-    """What became of a chart."""
+def refined(folder: Path, name: str, keep: float, others: list[str]) -> dict[str, object]:
+    """What became of a chart; others: options of the command."""
     file, run = write_cycle(folder, name), folder / name.replace(" ", "-")
     kind, began = CHARTS[name][0], time.perf_counter()
     command = [sys.executable, "-m", "mjxgait", "refine", "--env", kind, "--keys", str(file)]
     done = subprocess.run(
-        [*command, "--out", str(run), "--keep", str(keep)], capture_output=True, text=True
+        [*command, "--out", str(run), "--keep", str(keep), *others], capture_output=True, text=True
     )
     seconds = time.perf_counter() - began
     (folder / f"{run.name}.log").write_text(done.stdout + done.stderr)
@@ -123,10 +124,11 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--only", nargs="*", default=list(CHARTS), choices=CHARTS)
     parser.add_argument("--keep", type=float, default=0.5)
-    options = parser.parse_args()
+    options, others = parser.parse_known_args()
     options.folder.mkdir(parents=True, exist_ok=True)
     for name in options.only:
-        print(json.dumps(refined(options.folder, name, options.keep)), flush=True)
+        found = refined(options.folder, name, options.keep, others)
+        print(json.dumps(found), flush=True)
 
 
 if __name__ == "__main__":

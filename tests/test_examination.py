@@ -327,6 +327,55 @@ def test_in_the_end_the_best_margin_is_examined_where_nobody_has_room(experiment
     assert looks.wanted == pytest.approx([-0.3, 0.0])
 
 
+class Shares:
+    """A tryout that knows what each is worth."""
+
+    def __init__(self, *shares: float) -> None:
+        self.known = shares
+
+    def shares(self, state: object, ranks: list[int]) -> np.ndarray:
+        return np.array([self.known[rank] for rank in ranks])
+
+    def margin(self, share: float) -> float:
+        return share - 0.9
+
+
+def test_on_the_way_those_are_looked_at_that_do_best_in_the_tryout(experiment, looks, exams):
+    """Whatever their fitness; nobody with less than the margin that is wanted."""
+    state = state_with(experiment, 6)
+    all_alike = dataclasses.replace(
+        state,
+        fitness=jnp.arange(6.0)[::-1],
+        outcome=jnp.tile(state.outcome[:1], (6, 1, 1)),
+    )
+    settings = {"candidates": 4, "difference": 0.0, "on_the_way": 2}
+    looks.rehearsals = [-0.1]
+    same = dataclasses.replace(
+        examiner(experiment, exams, **settings), tryout=Shares(0.8, 0.92, 0.85, 0.95)
+    )
+    assert same.early(all_alike) is None
+    assert looks.asked == [*LOOK * 2]
+    looks.rehearsals = [0.3]
+    examined = dataclasses.replace(same, _margins={}).early(all_alike)
+    assert examined.champion.fitness == 2.0
+
+
+def test_in_the_end_who_fails_the_tryout_is_looked_at_only_if_all_do(experiment, looks, exams):
+    settings = {"candidates": 3, "difference": 0.0}
+    looks.rehearsals = [0.1]
+    some = dataclasses.replace(
+        examiner(experiment, exams, **settings), tryout=Shares(0.5, 0.95, 0.92)
+    )
+    assert some.best(ranked(experiment)).champion.fitness == 4.0
+    assert looks.asked == [*LOOK * 2, "exam"]
+    looks.asked.clear()
+    none = dataclasses.replace(
+        examiner(experiment, exams, **settings), tryout=Shares(0.5, 0.6, 0.7)
+    )
+    assert none.best(ranked(experiment)).champion.fitness == 3.0
+    assert looks.asked == [*LOOK, "exam"]
+
+
 def test_in_the_end_one_that_has_failed_before_is_not_chosen(experiment, looks, exams):
     settings = {"candidates": 2, "difference": 0.0, "attempts": 1}
     looks.certificates = [-0.1]

@@ -18,7 +18,7 @@ from mjxgait.certify.measure import Recording
 from mjxgait.certify.outcome import Outcome, Trajectory
 from mjxgait.certify.simulate import simulate
 from mjxgait.certify.starts import nominal_starts, perturbed_starts
-from mjxgait.certify.tasks import demands_of
+from mjxgait.certify.tasks import demands_of, promising
 from mjxgait.certify.thresholds.goals import LimboConfig as Demanded
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature, load_creature
@@ -346,12 +346,12 @@ def test_perturbed_starts_are_watched_too(luxo: Creature):
 
 
 def test_who_is_worth_an_examination(luxo: Creature):
-    there = {"left": np.zeros(2), "seconds": np.full(2, 8.0)}
+    there = {"off": np.zeros(2), "seconds": np.full(2, 8.0)}
     examined = CONFIG.limbo.height
     # It may learn with a lower bar than it is examined with, and touch that one.
     for beneath in (examined, examined - 0.02):
-        assert DEMANDS.promising(there | {"bar": np.array([beneath, examined])}, 8.0, luxo)
-    assert not DEMANDS.promising(there | {"bar": np.array([0.0, examined + 1e-3])}, 8.0, luxo)
+        assert promising(DEMANDS, there | {"bar": np.array([beneath, examined])}, 8.0, luxo)
+    assert not promising(DEMANDS, there | {"bar": np.array([0.0, examined + 1e-3])}, 8.0, luxo)
 
 
 def test_a_short_run_ends_with_a_champion_and_a_verdict(tmp_path: Path, capsys):

@@ -15,7 +15,7 @@ from mjxgait.certify.measure import Recording
 from mjxgait.certify.outcome import Outcome, Trajectory
 from mjxgait.certify.simulate import simulate
 from mjxgait.certify.starts import nominal_starts
-from mjxgait.certify.tasks import demands_of, travel
+from mjxgait.certify.tasks import demands_of, promising, travel
 from mjxgait.certify.thresholds.goals import TravelConfig as Demanded
 from mjxgait.creature import Creature
 from mjxgait.settings.hop import GOALS, NEAR, NOMINAL_GOAL, TravelConfig
@@ -144,6 +144,6 @@ def test_of_the_disturbed_those_succeed_that_are_fast_enough_and_up(stool: Creat
     outcome = Outcome(np.array([np.inf, np.inf, 20.0]), np.zeros((3, 2)), path, clear, film)
     starts = DEMANDS.aimed(nominal_starts(stool, 3), CONFIG)
     assert DEMANDS.succeeded(outcome, starts, CONFIG).tolist() == [True, False, False]
-    promising = {"way": np.full(2, 0.15 * 8 + 0.01), "seconds": np.full(2, 8.0)}
-    assert DEMANDS.promising(promising, 8.0, stool)
-    assert not DEMANDS.promising(promising | {"way": np.array([2.0, 1.0])}, 8.0, stool)
+    fast = {"way": np.full(2, 0.15 * 8 + 0.01), "seconds": np.full(2, 8.0)}
+    assert promising(DEMANDS, fast, 8.0, stool)
+    assert not promising(DEMANDS, fast | {"way": np.array([2.0, 1.0])}, 8.0, stool)

@@ -30,6 +30,7 @@ from mjxgait.runs.folder import CHAMPION, EXAMS, ISLANDS, METRICS, MIGRATIONS, t
 from mjxgait.runs.loop import conclude, interruptible, report, versions
 from mjxgait.runs.packed import Packed
 from mjxgait.runs.screen import Screen
+from mjxgait.runs.tryout import tryout_of
 from mjxgait.search.state import stop_reason
 from mjxgait.settings.config import Config
 
@@ -42,7 +43,9 @@ def train(
     if experiment.plant_note:
         screen.say(experiment.plant_note)
     islands = _Islands(folder, creature, config, resume)
-    examiner = Examiner(experiment, versions(), screen.say, Exams(folder / EXAMS))
+    examiner = Examiner(
+        experiment, versions(), screen.say, Exams(folder / EXAMS), tryout_of(experiment)
+    )
     began, reason, examined = time.perf_counter(), None, None
     screen.say(
         f"{config.evolution.islands.count} islands, from generation {islands.generation + 1}"

@@ -23,6 +23,8 @@ FARTHEST = 30.0
 """deg; how far each joint of each key pose may depart where nothing is to be kept."""
 SLOWER = 0.3
 """Share by which the period may change where nothing is to be kept."""
+OWN_SPREAD = 0.2
+"""Share of its range in which each gene begins where the file says which genes made the walk."""
 
 
 def _near(value: float, ends: Sequence[float], share: float) -> list[float]:
@@ -88,12 +90,14 @@ def refining(config: Config, brought: Brought, keep: float) -> Config:
         "within": FARTHEST * (1.0 - keep),
         "tuning": {"period": [period * (1.0 - slack), period * (1.0 + slack)]},
     }
+    spread = config.evolution.initial_spread
     if own := brought.own:
         ranges = dataclasses.asdict(config)["controller"]["tuning"]
         near["advance"] = own.advance
         near["tuning"] = {n: _near(own.tuning[n], ranges[n], 1.0 - keep) for n in own.tuning}
-    table = merge(dataclasses.asdict(config), {"controller": near})
-    return build(type(config), table, "the settings of refine")
+        spread = min(spread, OWN_SPREAD)
+    changes = {"controller": near, "evolution": {"initial_spread": spread}}
+    return build(type(config), merge(dataclasses.asdict(config), changes), "the settings of refine")
 
 
 def begin(

@@ -7,11 +7,12 @@ import numpy as np
 
 from mjxgait.certify import Certificate, Glance, certify, glance, rehearse
 from mjxgait.certify.stress import Stress, stress
-from mjxgait.certify.tasks import demands_of
+from mjxgait.certify.tasks import demands_of, promising
 from mjxgait.champion import Champion
 from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.exams import Exams
 from mjxgait.runs.experiment import Experiment
+from mjxgait.runs.tryout import Tryout
 from mjxgait.search.state import EvolutionState
 from mjxgait.settings.config import Config, ExaminationConfig
 
@@ -59,12 +60,14 @@ class Examiner:
     Attributes:
       versions: of the packages, for the champions. tell: called with what is about to be done.
       exams: the run's examinations so far. Each is one more try, and the certificate says which.
+      tryout: in the order of which its best are looked at; None looks at them in their own.
     """
 
     experiment: Experiment
     versions: dict[str, str]
     tell: Callable[[str], None]
     exams: Exams
+    tryout: Tryout | None = None
     _margins: dict[str, float] = dataclasses.field(default_factory=dict)
     """Of the champions that did not do on the way, by fingerprint, at most: another look would say the same."""
 
@@ -73,19 +76,32 @@ class Examiner:
 
         Depends on nothing but the state, the settings and the examinations that led here, so that a
         resumed run ends where it would have ended. Looking takes as long as five generations: first
-        comes what evolution knows already, then the undisturbed walk, then the draw to choose on.
-        The last examination that the settings allow is kept for the end.
+        comes what evolution knows already, then the tryout if there is one, then the undisturbed
+        walk, then the draw to choose on. The last examination that the settings allow is kept for
+        the end.
         """
-        settings, generation = self.experiment.config.examination, int(state.generation)
-        if not due(settings, generation):
+        config, generation = self.experiment.config, int(state.generation)
+        if not due(config.examination, generation):
             return None
-        for rank in self.experiment.candidates(state)[: settings.on_the_way]:
-            if not _promising(self.experiment, state, rank):
-                continue
+        ranks, most = self.experiment.candidates(state), config.examination.on_the_way
+        if self.tryout is None:
+            ranks = ranks[:most]
+        likely = [rank for rank in ranks if _promising(self.experiment, state, rank)]
+        for rank in self._in_order(state, likely, enough(config, generation))[:most]:
             champion = self.experiment.champion(state, self.versions, rank)
             if examined := self._on_the_way(champion, generation):
                 return examined
         return None
+
+    def _in_order(self, state: EvolutionState, ranks: list[int], wanted: float) -> list[int]:
+        """Those who may have a margin of `wanted` by what they do in the tryout, the best first;
+        all of them in their order if there is none.
+        """
+        if self.tryout is None or not ranks:
+            return ranks
+        shares = self.tryout.shares(state, ranks)
+        order = np.argsort(-shares, kind="stable")
+        return [ranks[place] for place in order if self.tryout.margin(shares[place]) >= wanted]
 
     def _on_the_way(self, champion: Champion, generation: int) -> Examined | None:
         """With its certificate, if it passes; nobody is looked at twice."""
@@ -108,12 +124,14 @@ class Examiner:
         any, the best margin first. It ends with the first that passes, or when the run has no
         examination left. If nobody passes it is the first that was examined: the best margin of
         all if nobody had any. One that has failed on the way is chosen only if there is no other.
+        Of those that have failed the tryout only the best is looked at, and only if all have.
         """
         generation, settings = int(state.generation), self.experiment.config.examination
         known: list[Champion] = []
         waiting: list[Seen] = []
         tried: list[Examined] = []
-        for rank in self.experiment.candidates(state):
+        ranks = self.experiment.candidates(state)
+        for rank in self._in_order(state, ranks, 0.0) or self._in_order(state, ranks, -np.inf)[:1]:
             champion = self.experiment.champion(state, self.versions, rank)
             if self.exams.failed(champion.fingerprint, generation - 1):
                 known.append(champion)
@@ -195,4 +213,4 @@ def _promising(experiment: Experiment, state: EvolutionState, rank: int) -> bool
     config, names = experiment.config, experiment.simulator.task.outcomes
     outcome = dict(zip(names, np.asarray(state.outcome[rank]).T, strict=True))
     demands = demands_of(config.use.task, config.wish)
-    return demands.promising(outcome, config.rollout.seconds, experiment.creature)
+    return promising(demands, outcome, config.rollout.seconds, experiment.creature)

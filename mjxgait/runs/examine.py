@@ -17,6 +17,7 @@ from mjxgait.runs.experiment import build_experiment
 from mjxgait.runs.folder import CERTIFICATE, EXAMS, open_run
 from mjxgait.runs.loop import conclude, versions
 from mjxgait.runs.screen import Screen
+from mjxgait.runs.tryout import tryout_of
 
 
 def examine(
@@ -58,5 +59,7 @@ def _examine(folder: Path) -> None:
     finally:
         store.close()
     quiet = Screen(Console(file=io.StringIO()))
-    examiner = Examiner(experiment, versions(), quiet.say, Exams(folder / EXAMS))
+    examiner = Examiner(
+        experiment, versions(), quiet.say, Exams(folder / EXAMS), tryout_of(experiment)
+    )
     conclude(folder, creature, quiet, examiner.best(state))

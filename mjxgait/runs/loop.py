@@ -37,6 +37,7 @@ from mjxgait.runs.folder import (
 )
 from mjxgait.runs.lineage import MOTHERS
 from mjxgait.runs.screen import Screen
+from mjxgait.runs.tryout import tryout_of
 from mjxgait.search.state import EvolutionState, GenerationMetrics, stop_reason
 from mjxgait.settings.config import Config
 from mjxgait.simulation.evaluator import Evaluator
@@ -75,10 +76,12 @@ def train(
         truncate_metrics(folder / METRICS, begun)
     if experiment.plant_note:
         screen.say(experiment.plant_note)
+    if tryout := tryout_of(experiment):
+        tryout.begin()
     with screen.compiling(creature.name, experiment):
         step, state = _compiled(experiment, evaluator, restored)
     began = time.perf_counter()
-    examiner = Examiner(experiment, versions(), screen.say, Exams(folder / EXAMS))
+    examiner = Examiner(experiment, versions(), screen.say, Exams(folder / EXAMS), tryout)
     try:
         with interruptible() as interrupted:
             state, reason, examined = _evolve(

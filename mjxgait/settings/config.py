@@ -25,6 +25,8 @@ class ExaminationConfig:
         one has enough margin; 0 leaves all examinations out.
       on_the_way: so many of them are looked at on the way. With few starts in each generation the
         first is often the luckiest.
+      tryout: so many starts on which all candidates are tried in evolution's physics before one is
+        looked at, the best first; 0 takes them by their fitness.
       difference: in units of each gene's range, root mean square; what counts as different.
       level: what ends a run early: one that walks by the certificate, or that walks anywhere
         (docs/certificate.md).
@@ -37,6 +39,7 @@ class ExaminationConfig:
     attempts: Annotated[Count, HOST] = 3
     candidates: Annotated[Whole, HOST] = 12
     on_the_way: Annotated[Count, HOST] = 1
+    tryout: Annotated[Whole, HOST] = 0
     difference: Annotated[NonNegative, HOST] = 0.02
     level: Annotated[Literal["walks", "anywhere"], HOST] = "walks"
 

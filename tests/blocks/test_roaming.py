@@ -16,7 +16,7 @@ from mjxgait.certify.outcome import Outcome
 from mjxgait.certify.simulate import simulate
 from mjxgait.certify.starts import nominal_starts
 from mjxgait.certify.stepping import Stepping
-from mjxgait.certify.tasks import demands_of
+from mjxgait.certify.tasks import demands_of, promising
 from mjxgait.champion.blocks.material import LIGHT
 from mjxgait.creature import Creature
 from mjxgait.library import load_creature
@@ -267,9 +267,9 @@ def test_how_far_aside_a_light_is_can_be_seen(task: Roam):
             "seconds": np.array([10.0, 10.0]),
             "aside": np.array([0.0, widest]),
         }
-        assert demands.promising(outcome, 10.0, creature) == looked_at
+        assert promising(demands, outcome, 10.0, creature) == looked_at
         slow = {**outcome, "way": np.array([2.0, 0.9])}
-        assert not demands.promising(slow, 10.0, creature)
+        assert not promising(demands, slow, 10.0, creature)
 
 
 def test_lights_are_all_around():

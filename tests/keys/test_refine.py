@@ -21,9 +21,11 @@ from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.keys import Brought, bring, front
 from mjxgait.keys.departure import _feet_in_words, departure, departure_of
+from mjxgait.keys.own import Own
 from mjxgait.keys.refine import KEYS, Original, begin, read_original, refining
 from mjxgait.parts.fit import check_fit
 from mjxgait.runs.folder import CERTIFICATE, CHAMPION, open_run
+from mjxgait.settings.control import TUNING
 from mjxgait.settings.evolution import EvolutionConfig
 from mjxgait.viewing.walk import record_walk
 
@@ -63,6 +65,20 @@ def test_the_first_that_is_made_is_the_one_that_was_drawn(stool, brought):
     made = variation.create(jax.random.key(0), 4)
     assert made.key_poses[0] == pytest.approx(brought.fit.key_poses, abs=1e-5)
     assert np.abs(made.key_poses[1] - brought.fit.key_poses).max() > 0.01
+
+
+def test_a_walk_that_names_its_genes_begins_close_to_them(stool, brought):
+    """It has walked already; a cycle that nobody has simulated is sought further off."""
+    own = Own(brought.fit, brought.cycle, 0.0, "error", dict.fromkeys(TUNING, 0.0))
+    usual, close = (
+        refining(small_config(), each, 0.5).evolution.initial_spread
+        for each in (brought, dataclasses.replace(brought, own=own))
+    )
+    assert usual == EvolutionConfig().initial_spread
+    assert close == 0.2
+    still_closer = small_config(evolution={"initial_spread": 0.1})
+    known = dataclasses.replace(brought, own=own)
+    assert refining(still_closer, known, 0.5).evolution.initial_spread == 0.1
 
 
 def test_settings_of_another_creature_are_refused(shipped, brought):

@@ -58,13 +58,13 @@ class BlocksDemands(StaysUp, abc.ABC):
         demanded.
         """
 
-    def promising(
+    def managed(
         self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
-    ) -> bool:
-        """See `Demands`: to the end in all its trials, and clearly more than is demanded."""
+    ) -> np.ndarray:
+        """See `Demands`: to the end, and clearly more than is demanded."""
         lived = to_the_end(outcome, seconds, creature)
-        enough = outcome[self.evidence] >= self.enough(seconds, CertificateConfig())
-        return bool(lived.all() and enough.all())
+        enough: np.ndarray = outcome[self.evidence] >= self.enough(seconds, CertificateConfig())
+        return lived & enough
 
     def alone(self, window: Recording, config: CertificateConfig) -> tuple[Criterion, ...]:
         """What is demanded of this task alone."""

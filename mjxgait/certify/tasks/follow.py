@@ -81,12 +81,13 @@ class FollowDemands(BlocksDemands):
         )
         return outcome.stayed_up & (nearer >= config.follow.speed * seconds)
 
-    def promising(
+    def managed(
         self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
-    ) -> bool:
-        """See `Demands`: lights aside are among its trials."""
-        wide = bool(outcome["aside"].max() >= WIDE)
-        return wide and super().promising(outcome, seconds, creature)
+    ) -> np.ndarray:
+        """See `Demands`: none, unless lights aside are among its trials."""
+        wide = outcome["aside"].max() >= WIDE
+        managed: np.ndarray = super().managed(outcome, seconds, creature) & wide
+        return managed
 
     def enough(self, seconds: float, config: CertificateConfig) -> float:
         """See `BlocksDemands`: m in the seconds that count, as much nearer as it must get in all."""

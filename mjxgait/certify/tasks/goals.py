@@ -26,6 +26,7 @@ class GoalDemands(Unasked, abc.ABC):
     by_pushes: bool = False
     grown: bool = False
     leaps: bool = False
+    worth: float = 1.0
     share: str
     """What the share of criterion 4 does."""
 

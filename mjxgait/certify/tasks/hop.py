@@ -16,13 +16,15 @@ from mjxgait.certify.tasks.staying import to_the_end
 from mjxgait.certify.thresholds.goals import HopConfig
 from mjxgait.creature import Creature
 
-MOST = 0.6
-"""Share of the trials in evolution that make it worth a look."""
-
 
 class HopDemands(GoalDemands):
-    """See `Demands`."""
+    """See `Demands`.
 
+    worth: not all trials, for an episode is shorter than an examination, and who is slow to a far
+    goal may be there in time.
+    """
+
+    worth: float = 0.6
     verdict = "it gets to its goal and stays"
     share = "share that arrives and stays"
 
@@ -69,16 +71,12 @@ class HopDemands(GoalDemands):
         there = at_most("farthest left / goal distance", away, wanted.near)
         return Criterion(2, "arrives and stays", (there,))
 
-    def promising(
+    def managed(
         self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
-    ) -> bool:
-        """See `Demands`: up to the end, and near enough to be near every goal, in most of its
-        trials. Not in all: an episode is shorter than an examination, and who is slow to a far goal
-        may be there in time.
-        """
-        demands = self.wanted(CertificateConfig())
-        near = outcome["left"] <= demands.near * demands.goals[1]
-        return bool((to_the_end(outcome, seconds, creature) & near).mean() >= MOST)
+    ) -> np.ndarray:
+        """See `Demands`: up to the end, and then near its goal."""
+        near: np.ndarray = outcome["off"] <= self.wanted(CertificateConfig()).near
+        return to_the_end(outcome, seconds, creature) & near
 
 
 def farthest(left: np.ndarray, goal: np.ndarray, frames: int) -> np.ndarray:

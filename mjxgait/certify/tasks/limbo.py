@@ -59,15 +59,14 @@ class LimboDemands(HopDemands):
         bar = f"a bar {config.limbo.height:g} m high {'cleared' if least > 0 else 'touched'}"
         return told | {"clearance": least, "summary": f"{told['summary']}; {bar}"}
 
-    def promising(
+    def managed(
         self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
-    ) -> bool:
-        """See `Demands`: of hopping, where a trial has failed that would have touched the bar of
-        the examination. That of evolution may be lower.
+    ) -> np.ndarray:
+        """See `Demands`: of hopping, and clear of the bar of the examination. That of evolution may
+        be lower.
         """
-        touched = outcome["bar"] > CertificateConfig().limbo.height
-        lived = np.where(touched, 0.0, outcome["seconds"])
-        return super().promising({**outcome, "seconds": lived}, seconds, creature)
+        clear = outcome["bar"] <= CertificateConfig().limbo.height
+        return super().managed(outcome, seconds, creature) & clear
 
 
 def _least(whole: Recording) -> float:

@@ -54,11 +54,11 @@ class PlainDemands(StaysUp):
         v = speed(window)
         return {"speed": v, "overlap": worst_overlap(window), "summary": f"{v:.2f} m/s"}
 
-    def promising(
+    def managed(
         self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
-    ) -> bool:
-        """See `Demands`: to the end in all its trials."""
-        return bool(to_the_end(outcome, seconds, creature).all())
+    ) -> np.ndarray:
+        """See `Demands`: to the end."""
+        return to_the_end(outcome, seconds, creature)
 
     def _basic(self, whole: Recording, config: CertificateConfig) -> tuple[Criterion, ...]:
         window = whole.window(config.warmup)

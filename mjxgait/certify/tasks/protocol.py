@@ -29,6 +29,8 @@ class Demands(Protocol):
     """Whether it is for bodies of blocks, which have grown."""
     leaps: bool
     """Whether it is watched how high they leap."""
+    worth: float
+    """Share of its trials in evolution that one must manage to be worth a look."""
 
     def asked(self, wish: Mapping[str, Any]) -> "Demands":
         """The demands where this was asked besides, by name."""
@@ -103,11 +105,19 @@ class Demands(Protocol):
         """Numbers without a threshold; `summary` is a line for the screen."""
         ...
 
-    def promising(
+    def managed(
         self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
-    ) -> bool:
-        """Whether an individual with these outcomes [R] in evolution is worth an examination.
+    ) -> np.ndarray:
+        """In which [R] of its trials in evolution, with these outcomes [R], an individual did what
+        is demanded, as far as evolution can tell.
 
         seconds: of an episode.
         """
         ...
+
+
+def promising(
+    demands: Demands, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
+) -> bool:
+    """Whether an individual is worth a look; see `Demands.managed`."""
+    return bool(demands.managed(outcome, seconds, creature).mean() >= demands.worth)

@@ -46,7 +46,7 @@ class Unasked:
 class StaysUp(Unasked):
     """See `Demands`: criteria 4 and 5 of those that have no goal but to be up in the end.
 
-    drag, pushed, by_pushes, grown, leaps: see `Demands`.
+    drag, pushed, by_pushes, grown, leaps, worth: see `Demands`.
     """
 
     drag: float = 0.0
@@ -54,6 +54,7 @@ class StaysUp(Unasked):
     by_pushes: bool = True
     grown: bool = False
     leaps: bool = False
+    worth: float = 1.0
 
     def fall(self, config: CertificateConfig) -> Fall:
         """See `Demands`: as criterion 1 has it."""

@@ -70,9 +70,9 @@ class TravelDemands(GoalDemands):
             "summary": f"{way[-1]:.2f} m and {goals} goals in {seconds:g} s",
         }
 
-    def promising(
+    def managed(
         self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
-    ) -> bool:
-        """See `Demands`: up to the end and fast enough in all its trials."""
-        fast = outcome["way"] >= CertificateConfig().travel.speed * seconds
-        return bool(to_the_end(outcome, seconds, creature).all() and fast.all())
+    ) -> np.ndarray:
+        """See `Demands`: up to the end and fast enough."""
+        fast: np.ndarray = outcome["way"] >= CertificateConfig().travel.speed * seconds
+        return to_the_end(outcome, seconds, creature) & fast

@@ -108,16 +108,16 @@ class WalkDemands(StaysUp):
         found = {"obstacle": obstacle(whole, config)}
         return told | found | {"summary": f"{told['gait']}, {told['speed']:.2f} m/s"}
 
-    def promising(
+    def managed(
         self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
-    ) -> bool:
-        """See `Demands`: up to the end in all its trials, and clearly faster than it must be."""
+    ) -> np.ndarray:
+        """See `Demands`: up to the end, and clearly faster than it must be."""
         lived = to_the_end(outcome, seconds, creature)
         if "speed" in self.wish:
             came = outcome["forward"] / seconds / self.wish["speed"]
-            return bool(lived.all() and ((came > STARTED[0]) & (came < STARTED[1])).all())
+            return lived & (came > STARTED[0]) & (came < STARTED[1])
         wanted = SPARE * CertificateConfig().progress.speed * seconds * creature.frame.body_length
-        return bool(lived.all() and (outcome["forward"] >= wanted).all())
+        return lived & (outcome["forward"] >= wanted)
 
 
 def basic(whole: Recording, config: CertificateConfig) -> tuple[Criterion, Criterion, Criterion]:

@@ -22,7 +22,7 @@ class Hop(PlainTask):
 
     Settings: ClassVar[type] = HopConfig
     terms: ClassVar[tuple[str, ...]] = TERMS
-    outcomes: ClassVar[tuple[str, ...]] = ("left", "arrival", "seconds")
+    outcomes: ClassVar[tuple[str, ...]] = ("left", "off", "arrival", "seconds")
     adds: ClassVar[tuple[str, ...]] = ("goal_distance",)
     goals: ClassVar[tuple[float, float]] = GOALS
     nominal: ClassVar[float] = NOMINAL_GOAL
@@ -64,9 +64,12 @@ class Hop(PlainTask):
         return fitness_terms(self.creature, self.horizon, tally)
 
     def outcome(self, tally: Tally) -> dict[str, jax.Array]:
-        """See `Task`: m from the goal in the end; s until it first was there, and until the end."""
+        """See `Task`: m from the goal in the end, and over the goal's distance; s until it first was
+        there, and until the end.
+        """
         return {
             "left": jnp.abs(tally.left),
+            "off": jnp.abs(tally.left) / tally.goal,
             "arrival": tally.arrived * self.step,
             "seconds": tally.steps * self.step,
         }

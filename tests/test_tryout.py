@@ -1,0 +1,151 @@
+"""Who is looked at first: those that do best on many starts in evolution's own physics."""
+
+import dataclasses
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from helpers import STOOL, small_config
+
+from mjxgait.certify import CertificateConfig
+from mjxgait.creature import load_creature
+from mjxgait.parts import resolve_config
+from mjxgait.runs import tryout
+from mjxgait.runs.examination import Examiner
+from mjxgait.runs.exams import Exams
+from mjxgait.runs.experiment import Experiment, build_experiment
+from mjxgait.runs.tryout import Tryout, tried_settings, tryout_of
+from mjxgait.settings.config import Config
+from mjxgait.settings.shipped import find_creature
+
+STARTS, MOST = 5, 3
+SECONDS = 0.1
+
+
+def tried(tables: dict | None = None) -> Config:
+    config = small_config(**(tables or {}))
+    examination = dataclasses.replace(config.examination, tryout=STARTS, candidates=MOST)
+    return dataclasses.replace(config, examination=examination)
+
+
+@pytest.fixture(scope="module")
+def experiment() -> Experiment:
+    return build_experiment(load_creature(STOOL), tried())
+
+
+@pytest.fixture
+def brief(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Tryouts are as short as a test can bear."""
+
+    def shorter(config: Config) -> Config:
+        long = tried_settings(config)
+        return dataclasses.replace(long, rollout=dataclasses.replace(long.rollout, seconds=SECONDS))
+
+    monkeypatch.setattr(tryout, "tried_settings", shorter)
+
+
+def test_starts_are_as_far_disturbed_and_as_long_as_the_examiners():
+    config, exam = tried({"rollout": {"variety": 1, "joint_noise": 0.3}}), CertificateConfig()
+    settings = tried_settings(config)
+    assert settings.rollout.starts == 1 + STARTS
+    assert settings.rollout.seconds == exam.seconds
+    assert settings.rollout.joint_noise == exam.starts.joints
+    assert settings.rollout.velocity_noise == exam.starts.velocities
+    assert settings.rollout.gains == exam.starts.gains
+    assert settings.rollout.latency == exam.starts.latency
+    same = dataclasses.replace(settings, seed=config.seed, rollout=config.rollout)
+    assert same == config
+
+
+def test_starts_are_others_than_those_of_the_generations(experiment: Experiment, brief: None):
+    """Even where both are disturbed alike: a prefix of the same draw would be no draw of its own."""
+    ours, others = experiment.starts, Tryout(experiment)._starts
+    assert not np.isin(np.asarray(others.friction)[0, 1:], np.asarray(ours.friction)).any()
+
+
+def test_trials_are_as_hard_as_they_become():
+    """The bar of limbo is where it belongs, however high it hangs in the run's first generations."""
+    luxo = load_creature(find_creature("luxo"))
+    resolved = resolve_config(luxo.settings.train, "luxo", None, {"task": "limbo"})
+    limbo = build_experiment(luxo, dataclasses.replace(resolved, examination=tried().examination))
+    assert np.asarray(Tryout(limbo)._starts.raised).tolist() == [[0.0] * (1 + STARTS)]
+
+
+def test_a_share_is_of_the_disturbed_starts_that_are_managed(
+    experiment: Experiment, brief: None, monkeypatch: pytest.MonkeyPatch
+):
+    """Individual by individual as simulated alone; the nominal start is not among them."""
+    trying, state = Tryout(experiment), experiment.init()
+    task = trying._trials.simulator.task
+    ranks = [4, 0]
+
+    class AboveTheMedian:
+        worth = 1.0
+
+        @staticmethod
+        def managed(outcome: dict, seconds: float, creature: object) -> np.ndarray:
+            assert seconds == SECONDS
+            assert len(outcome["forward"]) == STARTS
+            return outcome["forward"] > middle
+
+    genomes = jax.tree.map(lambda leaf: leaf[jnp.array(ranks)], state.genomes)
+    starts = jax.tree.map(lambda leaf: leaf[0], trying._starts)
+    tally = jax.jit(lambda g: trying._trials.simulate(g, starts).tally)(genomes)
+    ways = np.asarray(jax.vmap(jax.vmap(lambda one: task.outcome(one)["forward"]))(tally))[:, 1:]
+    middle = float(np.median(ways))
+    monkeypatch.setattr(Tryout, "_demands", AboveTheMedian)
+    assert trying.shares(state, ranks).tolist() == (ways > middle).mean(1).tolist()
+    assert np.ptp((ways > middle).mean(1)) > 0
+
+
+def test_the_margin_is_that_of_the_criterion_which_the_starts_decide(experiment: Experiment):
+    margin = Tryout(experiment).margin
+    assert margin(0.9) == pytest.approx(0.0)
+    assert margin(0.95) == pytest.approx(0.5)
+    assert margin(0.8) < 0
+
+
+def test_there_is_none_unless_it_is_asked_for(experiment: Experiment):
+    def of(**settings: int) -> Tryout | None:
+        examination = dataclasses.replace(experiment.config.examination, **settings)
+        config = dataclasses.replace(experiment.config, examination=examination)
+        return tryout_of(dataclasses.replace(experiment, config=config))
+
+    assert of() is not None
+    assert of(tryout=0) is None
+    assert of(candidates=0) is None
+
+
+class Shares:
+    """A tryout that says what a test wants."""
+
+    def __init__(self, shares: dict[int, float]) -> None:
+        self.of = shares
+
+    def shares(self, state: object, ranks: list[int]) -> np.ndarray:
+        return np.array([self.of[rank] for rank in ranks])
+
+    def margin(self, share: float) -> float:
+        return share - 0.9
+
+
+@pytest.mark.parametrize(
+    ("shares", "wanted", "order"),
+    [
+        ({0: 0.92, 1: 0.95, 2: 1.0}, 0.0, [2, 1, 0]),
+        ({0: 0.92, 1: 0.95, 2: 0.92}, 0.0, [1, 0, 2]),  # of equals the fittest first
+        ({0: 0.5, 1: 0.95, 2: 0.89}, 0.0, [1]),
+        ({0: 0.92, 1: 0.97, 2: 0.95}, 0.04, [1, 2]),
+        ({0: 0.5, 1: 0.6, 2: 0.1}, 0.0, []),
+    ],
+)
+def test_the_best_go_first_and_who_cannot_do_not_go(
+    experiment: Experiment, tmp_path: Path, shares: dict, wanted: float, order: list
+):
+    exams = Exams(tmp_path / "exams.jsonl")
+    trying = Examiner(experiment, {}, lambda _: None, exams, Shares(shares))
+    assert trying._in_order(experiment.init(), [0, 1, 2], wanted) == order
+    without = Examiner(experiment, {}, lambda _: None, exams)
+    assert without._in_order(experiment.init(), [0, 1, 2], wanted) == [0, 1, 2]
