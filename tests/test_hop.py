@@ -353,7 +353,7 @@ def test_a_short_run_ends_with_a_champion_and_a_verdict(tmp_path: Path, capsys):
     champion = json.loads((folder / "champion.json").read_text())
     assert champion["task"] == "hop"
     assert list(champion["terms"]) == list(TERMS)
-    assert set(champion["origin"]["nominal"]) == {"left", "arrival", "seconds"}
+    assert set(champion["origin"]["nominal"]) == {"left", "off", "arrival", "seconds"}
     said_by(capsys, "certify", folder, "--config", short, code=0)
     certificate = json.loads((folder / "certificate.json").read_text())
     assert [c["number"] for c in certificate["criteria"]] == [1, 2, 4, 6, 8, 9]

@@ -362,7 +362,7 @@ def test_a_short_run_ends_with_a_champion_and_a_verdict(tmp_path: Path, capsys):
     said_by(capsys, "train", "--env", STOOL, *small.split(), *rest.split(), "--out", folder, code=0)
     champion = json.loads((folder / "champion.json").read_text())
     assert list(champion["terms"]) == list(Limbo.terms)
-    assert set(champion["origin"]["nominal"]) == {"left", "arrival", "seconds", "bar"}
+    assert set(champion["origin"]["nominal"]) == {"left", "off", "arrival", "seconds", "bar"}
     said_by(capsys, "certify", folder, "--config", short, code=0)
     certificate = json.loads((folder / "certificate.json").read_text())
     assert [c["number"] for c in certificate["criteria"]] == [1, 2, 3, 4, 6, 8, 9]
