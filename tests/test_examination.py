@@ -355,6 +355,10 @@ def test_on_the_way_those_are_looked_at_that_do_best_in_the_tryout(experiment, l
     )
     assert same.early(all_alike) is None
     assert looks.asked == [*LOOK * 2]
+    looks.asked.clear()
+    one = dataclasses.replace(same, tryout=Shares(0.8, 0.92, 0.85, 0.85), _margins={})
+    assert one.early(all_alike) is None
+    assert looks.asked == LOOK
     looks.rehearsals = [0.3]
     examined = dataclasses.replace(same, _margins={}).early(all_alike)
     assert examined.champion.fitness == 2.0

@@ -132,20 +132,19 @@ class Shares:
 
 
 @pytest.mark.parametrize(
-    ("shares", "wanted", "order"),
+    ("shares", "order"),
     [
-        ({0: 0.92, 1: 0.95, 2: 1.0}, 0.0, [2, 1, 0]),
-        ({0: 0.92, 1: 0.95, 2: 0.92}, 0.0, [1, 0, 2]),  # of equals the fittest first
-        ({0: 0.5, 1: 0.95, 2: 0.89}, 0.0, [1]),
-        ({0: 0.92, 1: 0.97, 2: 0.95}, 0.04, [1, 2]),
-        ({0: 0.5, 1: 0.6, 2: 0.1}, 0.0, []),
+        ({0: 0.92, 1: 0.95, 2: 1.0}, [2, 1, 0]),
+        ({0: 0.92, 1: 0.95, 2: 0.92}, [1, 0, 2]),  # of equals the fittest first
+        ({0: 0.5, 1: 0.95, 2: 0.89}, [1, 2, 0]),
     ],
 )
-def test_the_best_go_first_and_who_cannot_do_not_go(
-    experiment: Experiment, tmp_path: Path, shares: dict, wanted: float, order: list
+def test_the_best_go_first_with_what_they_are_worth(
+    experiment: Experiment, tmp_path: Path, shares: dict, order: list
 ):
     exams = Exams(tmp_path / "exams.jsonl")
     trying = Examiner(experiment, {}, lambda _: None, exams, Shares(shares))
-    assert trying._in_order(experiment.init(), [0, 1, 2], wanted) == order
+    found = trying._in_order(experiment.init(), [0, 1, 2])
+    assert found == [(rank, shares[rank] - 0.9) for rank in order]
     without = Examiner(experiment, {}, lambda _: None, exams)
-    assert without._in_order(experiment.init(), [0, 1, 2], wanted) == [0, 1, 2]
+    assert without._in_order(experiment.init(), [0, 1, 2]) == [(n, np.inf) for n in range(3)]

@@ -87,21 +87,23 @@ class Examiner:
         if self.tryout is None:
             ranks = ranks[:most]
         likely = [rank for rank in ranks if _promising(self.experiment, state, rank)]
-        for rank in self._in_order(state, likely, enough(config, generation))[:most]:
+        wanted = enough(config, generation)
+        able = [rank for rank, margin in self._in_order(state, likely) if margin >= wanted]
+        for rank in able[:most]:
             champion = self.experiment.champion(state, self.versions, rank)
             if examined := self._on_the_way(champion, generation):
                 return examined
         return None
 
-    def _in_order(self, state: EvolutionState, ranks: list[int], wanted: float) -> list[int]:
-        """Those who may have a margin of `wanted` by what they do in the tryout, the best first;
-        all of them in their order if there is none.
+    def _in_order(self, state: EvolutionState, ranks: list[int]) -> list[tuple[int, float]]:
+        """These individuals, each with the margin that it has by the tryout, the best first; without
+        a tryout in their own order, and nobody is doubted.
         """
         if self.tryout is None or not ranks:
-            return ranks
+            return [(rank, np.inf) for rank in ranks]
         shares = self.tryout.shares(state, ranks)
         order = np.argsort(-shares, kind="stable")
-        return [ranks[place] for place in order if self.tryout.margin(shares[place]) >= wanted]
+        return [(ranks[place], self.tryout.margin(shares[place])) for place in order]
 
     def _on_the_way(self, champion: Champion, generation: int) -> Examined | None:
         """With its certificate, if it passes; nobody is looked at twice."""
@@ -130,8 +132,8 @@ class Examiner:
         known: list[Champion] = []
         waiting: list[Seen] = []
         tried: list[Examined] = []
-        ranks = self.experiment.candidates(state)
-        for rank in self._in_order(state, ranks, 0.0) or self._in_order(state, ranks, -np.inf)[:1]:
+        order = self._in_order(state, self.experiment.candidates(state))
+        for rank, _ in [one for one in order if one[1] >= 0] or order[:1]:
             champion = self.experiment.champion(state, self.versions, rank)
             if self.exams.failed(champion.fingerprint, generation - 1):
                 known.append(champion)
