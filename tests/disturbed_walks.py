@@ -73,7 +73,8 @@ DISTURBANCES = {
     "pushed forward": Disturbance(push=(0.3, 0.0)),
     "pushed to the left": Disturbance(push=(0.0, 0.25)),
     "joints displaced": Disturbance(joints=0.08),
-    "joints moving": Disturbance(spin=0.8),
+    # By 0.8 plain MJX in single precision ends elsewhere on some processors.
+    "joints moving": Disturbance(spin=0.9),
     "other gains": Disturbance(gains=0.3),
     "torques two steps late": Disturbance(delay=2),
     "all at once": Disturbance(0.6, (-0.2, -0.2), 0.05, 0.5, 0.2, 1),
