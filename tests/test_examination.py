@@ -11,7 +11,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from helpers import STOOL, small_config
+from helpers import STOOL, Shares, small_config
 from rich.console import Console
 
 from mjxgait.certify import Certificate, CertificateConfig, Criterion, Measure
@@ -325,19 +325,6 @@ def test_in_the_end_the_best_margin_is_examined_where_nobody_has_room(experiment
     assert looks.asked == ["glance", *["glance", "rehearsal"] * 2, "exam"]
     # Nor is one disturbed further than it can pass, or be better than the best so far.
     assert looks.wanted == pytest.approx([-0.3, 0.0])
-
-
-class Shares:
-    """A tryout that knows what each is worth."""
-
-    def __init__(self, *shares: float) -> None:
-        self.known = shares
-
-    def shares(self, state: object, ranks: list[int]) -> np.ndarray:
-        return np.array([self.known[rank] for rank in ranks])
-
-    def margin(self, share: float) -> float:
-        return share - 0.9
 
 
 def test_on_the_way_those_are_looked_at_that_do_best_in_the_tryout(experiment, looks, exams):

@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from helpers import STOOL, small_config
+from helpers import STOOL, Shares, small_config
 
 from mjxgait.certify import CertificateConfig
 from mjxgait.creature import load_creature
@@ -118,32 +118,19 @@ def test_there_is_none_unless_it_is_asked_for(experiment: Experiment):
     assert of(candidates=0) is None
 
 
-class Shares:
-    """A tryout that says what a test wants."""
-
-    def __init__(self, shares: dict[int, float]) -> None:
-        self.of = shares
-
-    def shares(self, state: object, ranks: list[int]) -> np.ndarray:
-        return np.array([self.of[rank] for rank in ranks])
-
-    def margin(self, share: float) -> float:
-        return share - 0.9
-
-
 @pytest.mark.parametrize(
     ("shares", "order"),
     [
-        ({0: 0.92, 1: 0.95, 2: 1.0}, [2, 1, 0]),
-        ({0: 0.92, 1: 0.95, 2: 0.92}, [1, 0, 2]),  # of equals the fittest first
-        ({0: 0.5, 1: 0.95, 2: 0.89}, [1, 2, 0]),
+        ((0.92, 0.95, 1.0), [2, 1, 0]),
+        ((0.92, 0.95, 0.92), [1, 0, 2]),  # of equals the fittest first
+        ((0.5, 0.95, 0.89), [1, 2, 0]),
     ],
 )
 def test_the_best_go_first_with_what_they_are_worth(
-    experiment: Experiment, tmp_path: Path, shares: dict, order: list
+    experiment: Experiment, tmp_path: Path, shares: tuple, order: list
 ):
     exams = Exams(tmp_path / "exams.jsonl")
-    trying = Examiner(experiment, {}, lambda _: None, exams, Shares(shares))
+    trying = Examiner(experiment, {}, lambda _: None, exams, Shares(*shares))
     found = trying._in_order(experiment.init(), [0, 1, 2])
     assert found == [(rank, shares[rank] - 0.9) for rank in order]
     without = Examiner(experiment, {}, lambda _: None, exams)
