@@ -116,6 +116,14 @@ def test_near_is_a_share_of_the_way(stool: Creature):
     assert after(stool, [moment(stool, 0.37)], goal=0.4).arrived == HORIZON
 
 
+@pytest.mark.parametrize("forward", [1.9, 2.1])
+def test_how_far_off_it_ends_is_told_in_m_and_over_the_goals_distance(stool: Creature, forward):
+    task = Hop(stool, STEP, HORIZON, stool.settings.termination)
+    outcome = task.outcome(after(stool, [moment(stool, forward)], goal=2.0))
+    assert float(outcome["left"]) == pytest.approx(0.1, abs=1e-6)
+    assert float(outcome["off"]) == pytest.approx(0.05, abs=1e-6)
+
+
 def test_what_moves_after_the_arrival_is_counted(stool: Creature):
     fast = jnp.array([0.3, 0.0, 0.4])
     way = [moment(stool, forward, trunk_vel=fast) for forward in (0.0, 0.5, 1.0, 1.0, 0.7, 1.0)]

@@ -98,6 +98,9 @@ def test_a_share_is_of_the_disturbed_starts_that_are_managed(
     monkeypatch.setattr(Tryout, "_demands", AboveTheMedian)
     assert trying.shares(state, ranks).tolist() == (ways > middle).mean(1).tolist()
     assert np.ptp((ways > middle).mean(1)) > 0
+    ahead = Tryout(experiment)
+    ahead.begin()
+    assert ahead.shares(state, ranks).tolist() == trying.shares(state, ranks).tolist()
 
 
 def test_the_margin_is_that_of_the_criterion_which_the_starts_decide(experiment: Experiment):

@@ -62,10 +62,11 @@ class Tryout:
 
         ranks: at most as many as the settings have candidates.
         """
+        program = self._program  # first: while it is being compiled ahead all below is being made
         padded = np.resize(ranks, self.run.config.examination.candidates)
         genomes = jax.tree.map(lambda leaf: leaf[None, padded], state.genomes)
         numbers, rows = self._batch.known
-        judged = self._program(numbers, rows.settings, self._starts, genomes)
+        judged = program(numbers, rows.settings, self._starts, genomes)
         task, config = self._trials.simulator.task, self._trials.config
         outcome = np.asarray(judged.outcome)[0, : len(ranks), 1:]
         seconds, creature = config.rollout.seconds, self.run.creature
