@@ -4,6 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from certify_made_up import LEGS
 from disturbed_walks import (
     CONFIGS,
     DISTURBANCES,
@@ -19,7 +20,8 @@ from recorded_tally import Frames, end, tally_of
 
 from mjxgait.creature import Creature
 from mjxgait.tasks.falls import Reason, why_fallen
-from mjxgait.tasks.walk.tally import Judge, Tally
+from mjxgait.tasks.walk.tally import CONTACT_GAP, Judge, Tally
+from mjxgait.tasks.walk.wish_tally import WishTally, wish_tally, wish_updated
 from mjxgait.types import Sensed
 
 
@@ -58,16 +60,17 @@ def sensed_of(frames: Frames) -> Sensed:
 
 
 @pytest.fixture(scope="module")
-def judged(body: Creature, recordings: list[Frames]) -> tuple[Tally, jax.Array]:
+def judged(body: Creature, recordings: list[Frames]) -> tuple[WishTally, jax.Array]:
     """The tallies [E, ...] of whole episodes, and what would have ended them, [E, T]."""
     ends = body.settings.termination
     judge, clearance = Judge(body, STEP, STEPS // 2), jnp.float32(clearance_of(body))
 
-    def episode(sensed: Sensed, torque: jax.Array) -> tuple[Tally, jax.Array]:
-        def step(tally: Tally, now: tuple) -> tuple[Tally, jax.Array]:
-            return judge.update(tally, *now, clearance), why_fallen(body, ends, now[0])
+    def episode(sensed: Sensed, torque: jax.Array) -> tuple[WishTally, jax.Array]:
+        def step(tally: WishTally, now: tuple) -> tuple[WishTally, jax.Array]:
+            after = judge.update(tally, *now, clearance)
+            return wish_updated(body, tally, after, now[0]), why_fallen(body, ends, now[0])
 
-        return jax.lax.scan(step, judge.init(), (sensed, torque))
+        return jax.lax.scan(step, wish_tally(judge.init(), 4), (sensed, torque))
 
     sensed = jax.tree.map(lambda *rows: jnp.stack(rows), *map(sensed_of, recordings))
     torque = jnp.float32([frames.torque[:STEPS] for frames in recordings])
@@ -88,6 +91,22 @@ def test_the_running_sum_is_the_sum(
         theirs = np.asarray(tally[name], float)
         most = tolerance(name, theirs)
         np.testing.assert_allclose(ours, theirs, rtol=0, atol=most, err_msg=str(episode))
+
+
+def test_bearing_is_summed_from_the_same_moments(
+    judged: tuple[WishTally, jax.Array], recordings: list[Frames]
+):
+    tallies = judged[0]
+    for row, frames in enumerate(recordings):
+        nose = frames.trunk_rot[:STEPS] @ frames.creature.frame.forward
+        level = nose[:, :2] / np.linalg.norm(nose[:, :2], axis=1, keepdims=True)
+        place, low = frames.place[:STEPS, :4], frames.low[:STEPS, :4]
+        ahead = ((place - frames.trunk_pos[:STEPS, None, :2]) * level[:, None]).sum(2)
+        moved = (ahead - [x for x, _ in LEGS.values()]) * (low < CONTACT_GAP)
+        np.testing.assert_allclose(tallies.reach[row], moved.sum(0), atol=0.02)
+        np.testing.assert_allclose(tallies.pitch[row], -np.arcsin(nose[:, 2]).sum(), atol=0.02)
+    assert np.abs(tallies.reach).max() > 0.2
+    assert np.abs(tallies.pitch).max() > 0.2
 
 
 def test_an_episode_ends_where_the_recording_does(

@@ -20,7 +20,7 @@ from mjxgait.parts.fit import check_fit
 from mjxgait.parts.wishes import Wishes, hint, speed_of, wished
 from mjxgait.runs.experiment import build_batch
 from mjxgait.settings.config import Config, UseConfig
-from mjxgait.settings.gaits import GAITS, gait_of, placed, stations_of
+from mjxgait.settings.gaits import GAITS, animal_stride, gait_of, placed, stations_of
 from mjxgait.settings.traced import traced
 from mjxgait.settings.walk import WalkConfig, Weights, WishWeights
 from mjxgait.tasks.score import in_order, score
@@ -361,6 +361,40 @@ def test_wishes_are_names_for_settings(body: Creature):
     assert not wished(Config(), body, Wishes(gait="bound")).controller.mirror
     assert wished(Config(), body, Wishes()) is not None
     assert wished(Config(), body, Wishes()) == Config()
+
+
+def test_natural_is_the_gait_of_an_animal_at_this_speed(body: Creature):
+    def asked(**wishes) -> Config:
+        return wished(Config(), body, Wishes(gait="natural", **wishes))
+
+    for speed, gait in (("fr0.1", "walk"), ("fr0.45", "walk"), ("fr0.6", "trot")):
+        wish = asked(speed=speed).fitness.wish
+        assert wish.gait == gait
+        assert [wish.stride, wish.duty_factor, wish.reach, wish.pitch] == [1.0, 1.0, 0.0, 0.0]
+    assert asked().fitness.wish.speed is None
+    two, eight = (altered(body, feet={"names": tuple(map(str, range(n)))}) for n in (1, 8))
+    for other in (two, eight):
+        config = wished(Config(), other, Wishes(gait="natural"))
+        assert config.fitness.wish.gait == "auto"
+        assert config.controller == Config().controller
+
+
+def test_natural_begins_with_a_drawn_cycle_in_an_animals_time(body: Creature):
+    slow, fast = (
+        wished(Config(), body, Wishes(gait="natural", speed=speed)).controller
+        for speed in ("0.2", "1.0")
+    )
+    assert slow.advance == fast.advance == "clock"
+    assert len(slow.around) == slow.key_poses * len(body.joints.names)
+    hip = body.frame.hip_height
+    for config, speed in ((slow, 0.2), (fast, 1.0)):
+        low, high = config.tuning.period
+        assert low < animal_stride(speed, hip) / speed < high
+    # A controller without poses has nothing to begin near.
+    other = dataclasses.replace(Config(), use=UseConfig("program", "walk"))
+    natural = wished(other, body, Wishes(gait="natural"))
+    assert natural.controller == other.controller
+    assert natural.evolution == other.evolution
 
 
 def test_who_sets_a_low_limit_instead_of_a_wish_is_told(body: Creature):

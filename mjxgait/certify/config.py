@@ -140,6 +140,7 @@ class WishesConfig:
     Attributes:
       speed: over the speed asked for. heading: deg off the heading it was told, mean over a second.
       height: standing heights. bounce: hip heights. sway: deg.
+      stride, duty_factor: over an animal's. reach: hip heights. pitch: deg.
       commands: turns that who is to be steered is told, in so many simulations of their own; each
         from straight on, at a rate that no one knew, to either side.
       delay: s from a command on until the heading must be the one told. obey: share that must.
@@ -154,6 +155,10 @@ class WishesConfig:
     height: Positive = 0.05
     bounce: Positive = 0.02
     sway: Positive = 2.0
+    stride: Positive = 0.25
+    duty_factor: Positive = 0.25
+    reach: Positive = 0.15
+    pitch: Positive = 8.0
 
 
 @dataclasses.dataclass(frozen=True)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from mjxgait.certify.criteria import speed
+from mjxgait.certify.likeness import likeness
 from mjxgait.certify.measure import Dimensions, Recording
 from mjxgait.certify.strides import stride_frequency, stride_starts
 
@@ -30,6 +31,7 @@ def describe(window: Recording, clearance: float) -> dict[str, Any]:
         "footfall_diagram": dict(zip(size.foot_names, footfall_diagram(window), strict=True)),
         "slip": dict(zip(size.foot_names, map(float, slip_distance(window)), strict=True)),
         "gait": gait_name(size, duty, phases),
+        "likeness": likeness(window, clearance),
         "overlap": worst_overlap(window),
     }
 

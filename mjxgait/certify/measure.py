@@ -62,6 +62,7 @@ class Recording:
     light: [3] m where it is in the world; None where the task has none.
     clearance: [T] m to the bar, `bar.FAR` at most; None where the task has none.
     grown: what else is seen of a body of blocks; None of others.
+    foot_ahead: [T, N] m along the trunk's nose from the trunk to the foot; None where nobody looked.
     overlap_pairs: P names of parts that are ever in each other. overlap: [T, P] m, how deep.
     """
 
@@ -87,6 +88,7 @@ class Recording:
     clearance: np.ndarray | None = None
     grown: Grown | None = None
     light: np.ndarray | None = None
+    foot_ahead: np.ndarray | None = None
 
     @property
     def contact(self) -> np.ndarray:
@@ -197,7 +199,19 @@ def measure(
         clearance=None if bar is None else sight.clearance,
         light=start.place + aimed.light[row] if aimed is not None and lit else None,
         grown=None if drag is None else seen_grown(creature, qpos, qvel, drag),
+        foot_ahead=_ahead(sight, forward),
     )
+
+
+def _ahead(sight: "_Sight", forward: np.ndarray) -> np.ndarray:
+    """[T, N] m from the trunk to each foot, along the level direction of its nose [T, 3]."""
+    feet = sight.creature.feet
+    places = sight.geom_xpos[:, feet.watched[: len(feet.foot_of)], :2]
+    middles = [places[:, feet.foot_of == n].mean(1) for n in range(len(feet.names))]
+    nose = forward[:, :2] / np.linalg.norm(forward[:, :2], axis=1, keepdims=True)
+    apart = np.stack(middles, 1) - sight.trunk_pos[:, None, :2]
+    found: np.ndarray = np.einsum("tnx,tx->tn", apart, nose)
+    return found
 
 
 class _Sight:

@@ -253,7 +253,7 @@ def stepping(creature: Body, genes: jax.Array, senses: Senses) -> jax.Array:
     step, step_rate, side, side_rate, hold, hold_rate, sway, sway_rate = genes
     swing = jnp.clip(senses["foot_height"] / (LIFTED * hip), 0.0, 1.0)
     stance = 1.0 - swing
-    moved = senses["foot_place"] - weights.places.astype(np.float32)
+    moved = senses["foot_place"] - creature.feet.places.astype(np.float32)
     share = stance / jnp.maximum(jnp.sum(stance), 1.0)
     over = -jnp.sum(share[:, None] * moved, axis=0) / hip
     speed = senses["nose_vel"] / jnp.sqrt(GRAVITY * hip)

@@ -104,13 +104,11 @@ class Mirror:
 class Stepping:
     """Weights [J], rad per hip height, with which joints take their foot ahead, and to the left.
 
-    places: [F, 2] m ahead of the trunk and left of it, where the feet stand. legs: [J] the foot that
-    each joint moves; of joints without a weight any.
+    legs: [J] the foot that each joint moves; of joints without a weight any.
     """
 
     ahead: np.ndarray
     aside: np.ndarray
-    places: np.ndarray
     legs: tuple[int, ...] = _static()
 
 
@@ -140,6 +138,7 @@ class Feet:
     names: one per foot. foot_of: [F] which foot each geom of a foot belongs to. watched: [G] ids of
     geoms whose height is sensed. ground: ids of the other geoms that may touch the floor.
     stations: of each foot its rank from the front on its side, and whether that is the left.
+    places: [N, 2] m ahead of the trunk and left of it along its nose, where the N feet stand.
     """
 
     names: tuple[str, ...] = _static()
@@ -147,6 +146,7 @@ class Feet:
     seen: tuple[int, ...] = _static()
     others: tuple[int, ...] = _static()
     stations: tuple[tuple[int, bool], ...] = dataclasses.field(default=(), metadata=STATIC)
+    places: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros((0, 2)))
 
     @property
     def stepping(self) -> tuple[int, ...]:

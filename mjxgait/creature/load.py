@@ -93,12 +93,10 @@ def _assemble(
             balance_roll=_weights(settings.balance.roll, names, "balance.roll"),
             stepping=stepping_of(
                 model,
-                data,
                 _weights(settings.stepping.ahead, names, "stepping.ahead"),
                 _weights(settings.stepping.aside, names, "stepping.aside"),
                 found,
-                _foot_bodies(model, settings.creature.feet),
-                (trunk, axes[0]),
+                _foot_bodies(model, settings.creature.feet)[0],
             ),
         ),
         feet=_feet(model, data, settings, trunk, axes),
@@ -241,15 +239,18 @@ def _feet(
     bodies, stepping = _foot_bodies(model, settings.creature.feet)
     kind = mujoco.mjtObj.mjOBJ_GEOM
     ground = [_id(model, kind, name, "creature.ground") for name in settings.creature.ground]
-    axes = data.xmat[trunk].reshape(3, 3) @ axes[:2].T
+    nose = data.xmat[trunk].reshape(3, 3) @ axes[0] * [1, 1, 0]
+    nose = nose / np.linalg.norm(nose)
+    level = np.stack([nose, np.cross([0, 0, 1], nose)], 1)
     own = [[g for g in stepping if model.geom_bodyid[g] == body] for body in bodies]
-    places = [data.geom_xpos[geoms].mean(0) @ axes for geoms in own]
+    places = [(data.geom_xpos[geoms].mean(0) - data.xpos[trunk]) @ level for geoms in own]
     return Feet(
         names=tuple(model.body(b).name for b in bodies),
         geoms=tuple(bodies.index(int(model.geom_bodyid[g])) for g in stepping),
         seen=(*stepping, *_forbidden(model, stepping, ground)),
         others=tuple(ground),
         stations=stations_of([(float(ahead), float(left)) for ahead, left in places]),
+        places=np.array(places),
     )
 
 

@@ -13,6 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from mjxgait.certify import outdated, read_certificate, read_stress
+from mjxgait.certify.likeness import in_words
 from mjxgait.champion import read_champion
 from mjxgait.errors import UserError
 from mjxgait.inspect.genomes import view_of
@@ -79,7 +80,11 @@ def certificate(snapshot: Snapshot) -> str:
     failed = " ".join(str(c["number"]) for c in document["criteria"] if not c["passed"])
     if failed:
         return f"The champion fails criteria {failed}."
-    return f"The champion is certified, margin {document['margin']:.2f}.{_anywhere(snapshot)}"
+    like = in_words(document.get("report", {}))
+    told = (
+        f"margin {document['margin']:.2f}. {like}" if like else f"margin {document['margin']:.2f}."
+    )
+    return f"The champion is certified, {told}{_anywhere(snapshot)}"
 
 
 def _anywhere(snapshot: Snapshot) -> str:

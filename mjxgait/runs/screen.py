@@ -15,6 +15,7 @@ from rich.status import Status
 from rich.table import Table
 
 from mjxgait.certify import Certificate
+from mjxgait.certify.likeness import in_words
 from mjxgait.certify.tasks import demands_of
 from mjxgait.certify.tasks.wishes import in_the_way
 from mjxgait.ground.spec import FLAT
@@ -115,6 +116,8 @@ class Screen:
             f"{verdict} (margin {certificate.margin:.2f}). {report['summary']}{where}; "
             f"{certificate.seconds:.0f} s."
         )
+        if like := in_words(report):
+            self.console.print(like)
         self.console.print(
             "The margin is that of the tightest measure: 0 just passes, 1 is far from its threshold."
         )

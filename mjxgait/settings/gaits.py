@@ -40,6 +40,10 @@ GRAVITY = 9.81
 """m/s², for the strides of animals."""
 SHORTEST = 0.5
 """Share of an animal's stride length that a walk at a speed asked for must have."""
+SLOWEST = 0.02
+"""Froude number below which animals are not known to stand for more of the time."""
+WALKS_UP_TO = 0.5
+"""Froude number from which four-legged animals trot rather than walk."""
 
 
 def stride_limit(mass: float) -> float:
@@ -54,6 +58,14 @@ def animal_stride(speed: Any, hip_height: Any) -> Any:
     1976); of numbers or arrays.
     """
     return 2.3 * (speed**2 / (GRAVITY * hip_height)) ** 0.3 * hip_height
+
+
+def animal_duty(speed: Any, hip_height: Any) -> Any:
+    """Duty factor of an animal at a speed in m/s, 0.52 (v²/gh)^-0.14 (Alexander & Jayes 1983,
+    mammals that run), 0.9 at most; of numbers or arrays.
+    """
+    froude = speed**2 / (GRAVITY * hip_height)
+    return 0.52 * (froude**2 + SLOWEST**2) ** -0.07
 
 
 def most_strides(speed: Any, hip_height: Any) -> Any:

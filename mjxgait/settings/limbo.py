@@ -43,5 +43,5 @@ class LimboConfig(HopConfig):
     __pydantic_config__ = STRICT
     height: Positive = 0.35
     higher: NonNegative = 0.12
-    lowering: Whole = 24
+    lowering: Whole = 12
     weights: LimboWeights = dataclasses.field(default_factory=LimboWeights)

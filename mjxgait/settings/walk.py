@@ -8,7 +8,9 @@ import pydantic
 from mjxgait.settings.gaits import AUTO, check_gait
 from mjxgait.settings.tables import SHAPE, STRICT, Finite, NonNegative, Positive, Whole
 
-WISHES = ("speed", "gait", "turn", "steer", "height", "bounce", "sway")
+LIKENESS = ("stride", "duty_factor", "reach", "pitch")
+"""What a walk is compared with an animal's by."""
+WISHES = ("speed", "gait", "turn", "steer", "height", "bounce", "sway", *LIKENESS)
 GaitText = Annotated[str, pydantic.AfterValidator(check_gait)]
 
 
@@ -71,6 +73,10 @@ class WishWeights:
       height: a trunk that is too high or too low.
       bounce: a trunk that goes up and down more, or less.
       sway: a trunk that rolls more, or less.
+      stride: strides that are shorter or longer.
+      duty_factor: feet that are on the floor for less, or more, of the time.
+      reach: feet that are ahead of or behind their hips while they stand.
+      pitch: a trunk whose nose points up more, or less.
     """
 
     __pydantic_config__ = STRICT
@@ -79,6 +85,10 @@ class WishWeights:
     height: NonNegative = 3.0
     bounce: NonNegative = 3.0
     sway: NonNegative = 3.0
+    stride: NonNegative = 4.0
+    duty_factor: NonNegative = 4.0
+    reach: NonNegative = 2.0
+    pitch: NonNegative = 2.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -94,6 +104,11 @@ class WishConfig:
       height: of the trunk while walking, in standing heights.
       bounce: of the trunk's height about its mean, in hip heights, root mean square.
       sway: deg, of the trunk's roll, root mean square.
+      stride: stride length over that of an animal with such legs at its own speed.
+      duty_factor: mean duty factor over that of such an animal.
+      reach: hip heights, where feet are in the middle of their stances, ahead of or behind where
+        they stand at rest; mean of the feet.
+      pitch: deg, of the trunk's nose above the horizon, mean.
       weights: what each wish counts.
     """
 
@@ -105,6 +120,10 @@ class WishConfig:
     height: Positive | None = None
     bounce: NonNegative | None = None
     sway: NonNegative | None = None
+    stride: Positive | None = None
+    duty_factor: Positive | None = None
+    reach: NonNegative | None = None
+    pitch: Finite | None = None
     weights: WishWeights = dataclasses.field(default_factory=WishWeights)
 
     def __post_init__(self) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 from mjxgait.certify.config import CertificateConfig, WishesConfig
 from mjxgait.certify.criteria import Criterion, Measure, at_least, at_most, speed
 from mjxgait.certify.describe import footfall_phases, gait_name
+from mjxgait.certify.likeness import likeness
 from mjxgait.certify.measure import Dimensions, Recording
 from mjxgait.certify.outcome import Outcome
 from mjxgait.settings.gaits import SHORTEST, animal_stride, gait_of
@@ -103,7 +104,8 @@ def unrolled(recording: Recording, wish: Wish) -> Recording:
 
 def as_asked(window: Recording, wish: Wish, config: CertificateConfig) -> Criterion:
     """10. It does what it was asked. window: unrolled, after the warm-up."""
-    limits, found = config.wishes, posture(window)
+    limits = config.wishes
+    found = posture(window) | likeness(window, config.gait.clearance)
     measures: list[Measure] = []
     if "speed" in wish:
         off = abs(speed(window) / wish["speed"] - 1)

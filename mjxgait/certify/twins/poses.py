@@ -78,7 +78,7 @@ class PoseTwin:
         swings = np.clip(senses["foot_height"] / (0.02 * hip), 0, 1)
         stands = 1 - swings
         carried = np.maximum(stands.sum(1), 1)
-        astray = senses["foot_place"] - weights.places
+        astray = senses["foot_place"] - self.creature.feet.places
         over_ahead, over_left = (-(stands[:, :, None] * astray).sum(1) / carried[:, None] / hip).T
         fast_ahead, fast_left = senses["nose_vel"].T / np.sqrt(9.81 * hip)
 

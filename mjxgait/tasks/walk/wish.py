@@ -11,12 +11,14 @@ import jax
 import jax.numpy as jnp
 
 from mjxgait.body import Body
-from mjxgait.settings.gaits import most_strides, stride_limit
-from mjxgait.settings.walk import WalkConfig, WishConfig
+from mjxgait.settings.gaits import animal_duty, animal_stride, most_strides, stride_limit
+from mjxgait.settings.walk import LIKENESS, WalkConfig, WishConfig
 from mjxgait.tasks.walk.fitness import REWARDS, STYLE, TERMS, plain_terms
 from mjxgait.tasks.walk.footfalls import gait_missed
 from mjxgait.tasks.walk.wish_tally import WishTally
 
+SLOW = 0.01
+"""m/s; who goes no faster is compared with an animal that goes so fast."""
 WORTH = 7.2
 """What all of the wanted way earns: as many body lengths as without a wish, so that the weights of
 the penalties mean what they mean there."""
@@ -28,6 +30,8 @@ NEAR = 0.25
 """Share of the wanted value that it may be missed by until the penalty is half of what it can be."""
 ROUGH = {"height": 0.05, "bounce": 0.02, "sway": 2.0}
 """Likewise, in standing heights, hip heights and deg."""
+UNLIKE = {"stride": 0.15, "duty_factor": 0.15, "reach": 0.1, "pitch": 5.0}
+"""Likewise of what a walk is compared with an animal's by: over the animal's, in hip heights, deg."""
 
 
 def wished_terms(
@@ -98,7 +102,30 @@ def missed(
     if wish.sway is not None:
         rolls = jnp.degrees(jnp.sqrt(tally.roll_squared / lived + 1e-12))
         found["sway"] = _half_at(ROUGH["sway"], rolls - wish.sway)
+    if set(LIKENESS) & set(wish.asked):
+        own = likeness(creature, step, horizon, tally)
+        likes = [name for name in LIKENESS if name in wish.asked]
+        off = {name: (own[name] - getattr(wish, name)) / UNLIKE[name] for name in likes}
+        # Animals differ too: what is a little off costs next to nothing.
+        found |= {name: _half_at(1.0, away**2) for name, away in off.items()}
     return found
+
+
+def likeness(creature: Body, step: float, horizon: int, tally: WishTally) -> dict[str, jax.Array]:
+    """What a walk is compared with an animal's by, each [] in the unit in which it is asked for; as
+    the examiner has it (`certify.likeness`).
+    """
+    lived, hip = jnp.maximum(tally.steps, 1), creature.frame.hip_height
+    speed = jnp.maximum(steady_speed(step, horizon, tally), SLOW)
+    swings = jnp.sort(tally.swings)[tally.swings.shape[0] // 2]
+    stride = speed * lived * step / jnp.maximum(swings, 1.0)
+    stood = tally.reach / jnp.maximum(tally.contact, 1.0)
+    return {
+        "stride": stride / animal_stride(speed, hip),
+        "duty_factor": jnp.mean(tally.contact) / lived / animal_duty(speed, hip),
+        "reach": jnp.mean(jnp.abs(stood)) / hip,
+        "pitch": -jnp.degrees(tally.pitch / lived),
+    }
 
 
 def steady_speed(step: float, horizon: int, tally: Any) -> jax.Array:

@@ -4,6 +4,7 @@ import dataclasses
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from mjxgait.body import Body
 from mjxgait.senses import sense, trunk_height
@@ -17,7 +18,8 @@ class WishTally(Tally):
     """See `Tally`.
 
     falls: the footfalls. height, height_squared: [] m·steps, m²·steps of the trunk. roll_squared:
-    [] rad²·steps of its roll.
+    [] rad²·steps of its roll. pitch: [] rad·steps of its nose below the horizon. reach: [F] m·steps in
+    contact of how far ahead of where it stands at rest a foot is.
     trunk: [2] m, where the trunk was, forward and left of the start.
     """
 
@@ -25,6 +27,8 @@ class WishTally(Tally):
     height: jax.Array
     height_squared: jax.Array
     roll_squared: jax.Array
+    pitch: jax.Array
+    reach: jax.Array
     trunk: jax.Array
 
 
@@ -37,6 +41,8 @@ def wish_tally(tally: Tally, feet: int) -> WishTally:
         height=none,
         height_squared=none,
         roll_squared=none,
+        pitch=none,
+        reach=jnp.zeros(feet),
         trunk=jnp.zeros(2),
     )
 
@@ -44,13 +50,17 @@ def wish_tally(tally: Tally, feet: int) -> WishTally:
 def wish_updated(creature: Body, before: WishTally, after: Tally, sensed: Sensed) -> WishTally:
     """The tally after one step more, of which `after` has what every walk leaves behind."""
     height = trunk_height(sensed)
-    way = sense(creature, sensed, jnp.zeros(()), ["roll", "forward", "aside"])
+    reads = ["roll", "pitch", "forward", "aside", "foot_place"]
+    way = sense(creature, sensed, jnp.zeros(()), reads)
+    ahead = (way["foot_place"] - creature.feet.places.astype(np.float32))[:, 0]
     return WishTally(
         **vars(after),
         falls=stepped(before.falls, before, after),
         height=before.height + height,
         height_squared=before.height_squared + height**2,
         roll_squared=before.roll_squared + way["roll"] ** 2,
+        pitch=before.pitch + way["pitch"],
+        reach=before.reach + ahead * after.foot_down,
         trunk=jnp.stack([way["forward"], way["aside"]]),
     )
 

@@ -1,0 +1,111 @@
+"""A cycle as a textbook draws it, from a body's geometry and its footfalls alone.
+
+Feet that stand go back evenly beneath the trunk, feet that swing come forward in an arc; the joints
+follow by inverse kinematics. Nobody has simulated it: it is where evolution may begin. Letters: `N`
+feet, `C` poses of the cycle, `J` joints.
+"""
+
+import dataclasses
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+
+from mjxgait.creature import geometry
+from mjxgait.creature.creature import Creature
+
+CROUCH = 0.05
+"""Hip heights by which the trunk is lower than it stands, so that legs reach ahead and back."""
+TURN = 0.02
+"""Hip heights off its place that count as much as a radian by which a foot is turned: soles stay
+level where the leg has joints to spare."""
+ROUNDS, DAMPING = 20, 1e-3
+
+
+@dataclasses.dataclass(frozen=True)
+class Footfalls:
+    """phases: of each foot the middle of its stance, in cycles. duty: share of the cycle that a foot
+    stands. stride, lift: m, way of the body in a cycle, and height of a swing.
+    """
+
+    phases: Sequence[float]
+    duty: float
+    stride: float
+    lift: float
+
+
+def textbook_cycle(creature: Creature, falls: Footfalls, poses: int) -> np.ndarray:
+    """Angles [C, J] rad, within the pose ranges, of so many moments of the cycle."""
+    legs = [_Leg(creature, foot) for foot in range(len(creature.feet.names))]
+    cycle = np.tile(creature.joints.stand, (poses, 1))
+    for leg, phase in zip(legs, falls.phases, strict=True):
+        # Twice around: the second time each moment begins where the one before it ended.
+        for moment in [*range(poses), *range(poses)]:
+            share = (moment / poses - phase + falls.duty / 2) % 1.0
+            cycle[moment, leg.joints] = leg.reach(_path(share, falls), cycle[moment - 1])
+    return cycle
+
+
+def _path(share: float, falls: Footfalls) -> tuple[float, float]:
+    """m ahead of where it stands at rest and above it, at a share of the foot's own cycle."""
+    half = 0.5 * falls.duty * falls.stride
+    if share < falls.duty:
+        return half * (1.0 - 2.0 * share / falls.duty), 0.0
+    swing = (share - falls.duty) / (1.0 - falls.duty)
+    return -half * np.cos(np.pi * swing), falls.lift * np.sin(np.pi * swing)
+
+
+class _Leg:
+    """The joints that move one foot and no other, and where they take it."""
+
+    def __init__(self, creature: Creature, foot: int) -> None:
+        model, feet = creature.model, creature.feet
+        self.creature, self.model = creature, model
+        self.data = mujoco.MjData(model)
+        own = [feet.stepping[g] for g in range(len(feet.geoms)) if feet.geoms[g] == foot]
+        self.body = int(model.geom_bodyid[own[0]])
+        others = [int(model.geom_bodyid[g]) for g in feet.stepping if g not in own]
+        shared = {b for other in others for b in geometry.ancestors(model, other)}
+        chain = [b for b in geometry.ancestors(model, self.body) if b not in shared]
+        bodies = model.dof_bodyid[creature.joints.dof_adr]
+        self.joints = np.flatnonzero(np.isin(bodies, chain))
+        self._pose(creature.joints.stand)
+        place = self.data.geom_xpos[own].mean(0)
+        self.arm = self.data.xmat[self.body].reshape(3, 3).T @ (place - self.data.xpos[self.body])
+        self.place, self.level = place, self.data.xmat[self.body].reshape(3, 3).copy()
+        nose = self.data.xmat[creature.trunk].reshape(3, 3) @ creature.frame.forward * [1, 1, 0]
+        self.ahead = nose / np.linalg.norm(nose)
+
+    def reach(self, path: tuple[float, float], pose: np.ndarray) -> np.ndarray:
+        """Angles of the leg's joints [j] that take the foot there, by damped least squares from a
+        pose [J] on; as near as they come.
+        """
+        hip, joints = self.creature.frame.hip_height, self.creature.joints
+        ahead, above = path
+        goal = self.place + ahead * self.ahead + [0, 0, above + CROUCH * hip]
+        pose = pose.copy()
+        low, high = joints.pose_low[self.joints], joints.pose_high[self.joints]
+        for _ in range(ROUNDS):
+            off, slopes = self._off(goal, pose)
+            square = slopes.T @ slopes + DAMPING * np.eye(len(self.joints))
+            moved = pose[self.joints] + np.linalg.solve(square, slopes.T @ off)
+            pose[self.joints] = np.clip(moved, low, high)
+        return pose[self.joints]
+
+    def _off(self, goal: np.ndarray, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What is left to the goal, in hip heights, and its slopes [6, j]."""
+        self._pose(pose)
+        hip, turned = self.creature.frame.hip_height, self.data.xmat[self.body].reshape(3, 3)
+        point = self.data.xpos[self.body] + turned @ self.arm
+        moves, turns = np.zeros((3, self.model.nv)), np.zeros((3, self.model.nv))
+        mujoco.mj_jac(self.model, self.data, moves, turns, point, self.body)
+        dofs = self.creature.joints.dof_adr[self.joints]
+        tilt = 0.5 * sum(np.cross(turned[:, axis], self.level[:, axis]) for axis in range(3))
+        off = np.concatenate([(goal - point) / hip, TURN * tilt])
+        return off, np.concatenate([moves[:, dofs] / hip, TURN * turns[:, dofs]])
+
+    def _pose(self, pose: np.ndarray) -> None:
+        self.data.qpos[:] = self.creature.stand_qpos
+        self.data.qpos[self.creature.joints.qpos_adr] = pose
+        mujoco.mj_kinematics(self.model, self.data)
+        mujoco.mj_comPos(self.model, self.data)
