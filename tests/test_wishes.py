@@ -5,6 +5,7 @@ import itertools
 
 import jax
 import jax.numpy as jnp
+import mujoco
 import numpy as np
 import pytest
 from helpers import altered, pose_champion, small_config
@@ -14,13 +15,14 @@ from hypothesis import strategies as st
 from mjxgait.certify.describe import gait_name
 from mjxgait.certify.stress import StressConfig
 from mjxgait.champion import read_champion, write_champion
-from mjxgait.creature import Creature
+from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import UserError
 from mjxgait.parts.fit import check_fit
 from mjxgait.parts.wishes import Wishes, hint, speed_of, wished
 from mjxgait.runs.experiment import build_batch
 from mjxgait.settings.config import Config, UseConfig
 from mjxgait.settings.gaits import GAITS, animal_stride, gait_of, placed, stations_of
+from mjxgait.settings.shipped import data_folder
 from mjxgait.settings.traced import traced
 from mjxgait.settings.walk import WalkConfig, Weights, WishWeights
 from mjxgait.tasks.score import in_order, score
@@ -390,11 +392,56 @@ def test_natural_begins_with_a_drawn_cycle_in_an_animals_time(body: Creature):
     for config, speed in ((slow, 0.2), (fast, 1.0)):
         low, high = config.tuning.period
         assert low < animal_stride(speed, hip) / speed < high
+    assert wished(Config(), body, Wishes(speed="0.2")).controller.around == slow.around
     # A controller without poses has nothing to begin near.
     other = dataclasses.replace(Config(), use=UseConfig("program", "walk"))
     natural = wished(other, body, Wishes(gait="natural"))
     assert natural.controller == other.controller
     assert natural.evolution == other.evolution
+
+
+def test_a_gait_by_name_begins_with_its_own_footfalls(body: Creature):
+    def drawn(name: str) -> tuple[float, ...]:
+        return wished(Config(), body, Wishes(gait=name)).controller.around
+
+    cycles = {name: drawn(name) for name in ("walk", "amble", "trot", "pace")}
+    assert len(set(cycles.values())) == 4
+    assert () not in cycles.values()
+    # Of those whose halves do not mirror each other none is drawn.
+    assert [drawn(name) for name in ("canter", "bound", "gallop")] == [()] * 3
+    assert wished(Config(), body, Wishes(turn=20.0)).controller.around == ()
+
+
+@pytest.mark.parametrize("name", ["walk", "amble", "trot", "pace"])
+def test_a_drawn_gait_is_what_its_name_says(dog_sizes, name: str):
+    """By the examiner, from which feet stand in each pose of the cycle."""
+    body = load_creature(data_folder("envs") / "short_quadruped")
+    config = wished(Config(), body, Wishes(gait=name)).controller
+    half = np.array(config.around).reshape(config.key_poses, -1)
+    cycle = np.concatenate([half, body.mirror.image(half)])
+    fine = np.array(
+        [
+            np.interp(np.arange(64) / 8, np.arange(9), np.append(column, column[0]))
+            for column in cycle.T
+        ]
+    ).T
+    data = mujoco.MjData(body.model)
+    heights = []
+    for pose in fine:
+        data.qpos[:] = body.stand_qpos
+        data.qpos[body.joints.qpos_adr] = pose
+        mujoco.mj_kinematics(body.model, data)
+        heights.append(data.geom_xpos[list(body.feet.stepping), 2].copy())
+    stands = np.array(heights) < np.min(heights, axis=0) + 0.01
+    angle = np.exp(2j * np.pi * np.arange(64) / 64)
+    phases = np.angle((stands * angle[:, None]).sum(0)) / (2 * np.pi)
+    size = dataclasses.replace(
+        dog_sizes, foot_names=tuple("abcd"), foot_places=tuple(map(tuple, body.feet.places))
+    )
+    gait = gait_of(name, 4)
+    # Feet are near the floor for longer than they stand on it.
+    duty = np.clip(stands.mean(0), *gait.duty) - 1e-6
+    assert gait_name(size, duty, (phases - phases[0]) % 1.0) in gait.labels
 
 
 def test_who_sets_a_low_limit_instead_of_a_wish_is_told(body: Creature):

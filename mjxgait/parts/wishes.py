@@ -9,18 +9,10 @@ from typing import Any
 from mjxgait.certify import CertificateConfig
 from mjxgait.certify.tasks.walk import SPARE
 from mjxgait.creature import Creature
-from mjxgait.creature.textbook import Footfalls, textbook_cycle
 from mjxgait.errors import UserError, did_you_mean
+from mjxgait.parts.drawn import drawn, natural_gait, top_speed
 from mjxgait.settings.config import Config
-from mjxgait.settings.gaits import (
-    AUTO,
-    SHORTEST,
-    WALKS_UP_TO,
-    animal_duty,
-    animal_stride,
-    gait_of,
-    placed,
-)
+from mjxgait.settings.gaits import AUTO, SHORTEST, animal_stride, gait_of
 from mjxgait.settings.shipped import data_folder
 from mjxgait.settings.tables import build, merge, read_toml
 
@@ -70,11 +62,6 @@ class Wishes:
 
 NATURAL = "natural"
 """The gait of an animal at this speed, whatever its name."""
-DRAWN = 8
-"""Poses of a cycle that is drawn."""
-WITHIN, SLACK, BEGINS = 25.0, 0.15, 0.4
-"""How far evolution may depart from a drawn cycle: deg of each joint of each pose, share of its time;
-and the share of that in which it begins."""
 TURNS = ("turn", "steer")
 LEVELS = ("walks", "anywhere")
 WISHES = tuple(field.name for field in dataclasses.fields(Wishes))
@@ -98,8 +85,7 @@ def wished(config: Config, creature: Creature, wishes: Wishes) -> Config:
         config = _demanded(config, wishes.certificate)
     table: dict[str, Any] = {}
     for layer in (
-        _speed(wishes.speed, creature),
-        _gait(wishes, creature, config),
+        _pace(wishes, creature, config),
         _turn("turn", wishes.turn),
         _turn("steer", wishes.steer),
     ):
@@ -145,15 +131,27 @@ def speed_of(text: str, creature: Creature) -> float:
     return value * creature.frame.body_length if plain.endswith("bl/s") else value
 
 
-def _speed(text: str | None, creature: Creature) -> dict[str, Any]:
-    """The speed, and a cycle that takes as long as the shortest strides there may be at that speed.
+def _pace(wishes: Wishes, creature: Creature, config: Config) -> dict[str, Any]:
+    """The speed and the gait, and a cycle drawn after both, near which evolution begins."""
+    asked, name = wishes.speed, wishes.gait or AUTO
+    if asked is None and name == AUTO:
+        return {}
+    speed = top_speed(creature, config) if asked is None else speed_of(asked, creature)
+    usual = natural_gait(creature, speed)
+    wish = _natural(usual) if name == NATURAL else _named(name, creature)
+    if asked is not None:
+        wish = merge(wish, _speed(round(speed, 6), creature))
+    begins = drawn(usual if name in (AUTO, NATURAL) else name, speed, creature, config)
+    return merge(wish, begins)
+
+
+def _speed(speed: float, creature: Creature) -> dict[str, Any]:
+    """A speed in m/s, and a cycle of at least as many steps as the shortest strides there may be at
+    that speed.
 
     A cycle moves on by a step at most every control step: ten steps from pose to pose, a fifth of
     a second for all four, let whoever moves little run through them far too often.
     """
-    if text is None:
-        return {}
-    speed = round(speed_of(text, creature), 6)
     hip, step = creature.frame.hip_height, float(creature.model.opt.timestep)
     poses = 4
     steps = round(SHORTEST * animal_stride(speed, hip) / speed / step / poses)
@@ -163,12 +161,15 @@ def _speed(text: str | None, creature: Creature) -> dict[str, Any]:
     }
 
 
-def _gait(wishes: Wishes, creature: Creature, config: Config) -> dict[str, Any]:
-    name = wishes.gait
-    if name is None or name == AUTO:
+def _natural(name: str) -> dict[str, Any]:
+    """Footfalls by name, an animal's strides and duty factor, feet below their hips, level."""
+    like = {"gait": name, "stride": 1.0, "duty_factor": 1.0, "reach": 0.0, "pitch": 0.0}
+    return {"fitness": {"wish": like}}
+
+
+def _named(name: str, creature: Creature) -> dict[str, Any]:
+    if name == AUTO:
         return {}
-    if name == NATURAL:
-        return _natural(wishes.speed, creature, config)
     try:
         gait = gait_of(name, len(creature.feet.names))
     except ValueError as error:
@@ -176,44 +177,6 @@ def _gait(wishes: Wishes, creature: Creature, config: Config) -> dict[str, Any]:
     whole: dict[str, Any] = {"mirror": False, "key_poses": 4}
     wish = {"gait": name} | ({} if gait.sway is None else {"sway": gait.sway})
     return {"fitness": {"wish": wish}} | ({} if gait.twice else {"controller": whole})
-
-
-def _natural(asked: str | None, creature: Creature, config: Config) -> dict[str, Any]:
-    """An animal's gait at this speed, its strides and duty factor, feet below their hips, level.
-
-    Four feet walk up to a Froude number of 0.5 and trot beyond, six go in tripods, two walk; others
-    by whatever footfalls. Where the gait has a name, evolution begins with a cycle drawn after it.
-    """
-    fastest = config.fitness.speed * creature.frame.body_length
-    speed = speed_of(asked, creature) if asked else fastest
-    froude = speed**2 / (_gravity(creature) * creature.frame.hip_height)
-    names = {2: "walk", 4: "walk" if froude < WALKS_UP_TO else "trot", 6: "tripod"}
-    name = names.get(len(creature.feet.names), AUTO)
-    like = {"gait": name, "stride": 1.0, "duty_factor": 1.0, "reach": 0.0, "pitch": 0.0}
-    drawn = {} if name == AUTO else _drawn(name, speed, creature, config)
-    return {"fitness": {"wish": like}} | drawn
-
-
-def _drawn(name: str, speed: float, creature: Creature, config: Config) -> dict[str, Any]:
-    """The cycle of a gait at an animal's stride and duty factor, near which evolution begins."""
-    hip, gait = creature.frame.hip_height, gait_of(name, len(creature.feet.names))
-    stride = animal_stride(speed, hip)
-    falls = Footfalls(
-        phases=placed(gait, creature.feet.stations)[0],
-        duty=animal_duty(speed, hip),
-        stride=stride,
-        lift=config.fitness.clearance * hip,
-    )
-    cycle = textbook_cycle(creature, falls, DRAWN)
-    poses = cycle[: DRAWN // 2] if creature.mirror.symmetric else cycle
-    near = {
-        "key_poses": len(poses),
-        "advance": "clock",
-        "around": [round(float(angle), 6) for angle in poses.ravel()],
-        "within": WITHIN,
-        "tuning": {"period": [(1 - SLACK) * stride / speed, (1 + SLACK) * stride / speed]},
-    }
-    return {"controller": near, "evolution": {"initial_spread": BEGINS}}
 
 
 def _turn(name: str, rate: float | None) -> dict[str, Any]:
