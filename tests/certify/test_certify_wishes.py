@@ -58,6 +58,15 @@ def test_the_least_speed_and_stride_follow_what_is_asked():
     assert following(CONFIG, {"gait": "trot"}, DOG) == CONFIG
 
 
+@pytest.mark.parametrize("speed", [0.25, 0.4, 0.8])
+def test_who_does_just_what_was_asked_has_room(speed: float):
+    """However slow that is: a run goes on until its walk has some."""
+    asked = walk(speed=speed, period=0.9)
+    judged = demands_of("walk", {"speed": speed}).undisturbed(asked, asked, CONFIG)
+    speeds = [m for c in judged for m in c.measures if "speed" in m.name and "body" in m.name]
+    assert min(m.margin for m in speeds) > 0.3
+
+
 @pytest.mark.parametrize(
     ("phases", "name"),
     [

@@ -23,6 +23,9 @@ ASKED, BOUNDS = "as asked", ("gait", "physics")
 """Names of criteria: the wishes', and those whose numbers bound what a body can."""
 COMMANDED, TOLD_FOR = (2.0, 4.0), 12.0
 """s, when a command comes, and for how long one is watched who is steered."""
+FAST_ENOUGH = 0.75
+"""Share of the speed asked for that is the least of a walk: by the tenth that a wish may be missed by
+the very speed that was asked for would have next to no margin."""
 HEADING_MEAN = 1.0
 """s; within a stride the nose swings."""
 
@@ -68,13 +71,14 @@ def steered(outcome: Outcome, told: np.ndarray, limits: WishesConfig) -> Criteri
 def following(config: CertificateConfig, wish: Wish, size: Dimensions) -> CertificateConfig:
     """The thresholds with those that depend on the speed as the speed asked for has them.
 
-    The least speed is no more than what the wish bears, and the least stride no more than half of
-    an animal's at that speed: a slow walk has short strides.
+    The least speed is no more than a share of the one asked for, which is held from both sides by a
+    criterion of its own, and the least stride no more than half of an animal's at that speed: a slow
+    walk has short strides.
     """
     if "speed" not in wish:
         return config
     asked = wish["speed"]
-    slowest = (1 - config.wishes.speed) * asked / size.body_length
+    slowest = FAST_ENOUGH * asked / size.body_length
     stride = SHORTEST * animal_stride(asked, size.hip_height) / size.hip_height
     return dataclasses.replace(
         config,
