@@ -238,13 +238,19 @@ def test_the_bar_comes_down_a_step_when_most_of_the_best_have_mastered_it(
     rounds, fitness = jnp.full(len(terms), 3.0), -jnp.arange(float(len(terms)))
     state = EvolutionState(**names | {"terms": jnp.asarray(terms), "rounds": rounds})
     state = at(dataclasses.replace(state, fitness=fitness), level=4, generation=7)
-    after = climbed(task, state)
+    settings = LimboConfig(lowering=5)
+    after = climbed(task, settings, state)
     assert int(after.level) == 4 + climbs
     assert bool(after.stale) == climbs
     assert (np.asarray(after.rounds) == (0.0 if climbs else 3.0)).all()
     nobody = (at(state, generation=-1), at(state, fitness=np.full(len(terms), -np.inf)))
-    assert all(int(climbed(task, unjudged).level) == 4 for unjudged in nobody)
-    assert climbed(task, dataclasses.replace(state, level=None)).level is None
+    assert all(int(climbed(task, settings, unjudged).level) == 4 for unjudged in nobody)
+    assert climbed(task, settings, dataclasses.replace(state, level=None)).level is None
+    # Where the bar is down nothing is harder, and nothing is forgotten.
+    down = climbed(task, LimboConfig(lowering=4), state)
+    assert int(down.level) == 4
+    assert not bool(down.stale)
+    assert (np.asarray(down.rounds) == 3.0).all()
 
 
 def test_all_goals_lie_beyond_the_bar(luxo: Creature):

@@ -6,6 +6,7 @@ to have theirs judged among its own.
 
 import dataclasses
 from functools import partial
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -117,14 +118,15 @@ def absorb(
     ) -> tuple[EvolutionState, GenerationMetrics]:
         row, state, proposal, judged = given
         after, told = evolution_of(simulator, row.settings).absorb(state, proposal, judged)
-        after = climbed(simulator.task, after)
+        after = climbed(simulator.task, row.settings.fitness, after)
         return after, dataclasses.replace(told, level=after.level)
 
     return jax.lax.map(of_row, (rows, states, proposals, judged))
 
 
-def climbed(task: Task, state: EvolutionState) -> EvolutionState:
-    """The state after a generation, one level higher if most of the best have mastered theirs.
+def climbed(task: Task, settings: Any, state: EvolutionState) -> EvolutionState:
+    """The state after a generation, one level higher if most of the best have mastered theirs and
+    there is a higher one.
 
     What they were worth at the old level is then forgotten, for it was easier: of those that live
     on all are judged again.
@@ -133,7 +135,8 @@ def climbed(task: Task, state: EvolutionState) -> EvolutionState:
         return state
     best = dict(zip(task.terms, jnp.mean(state.terms[:LEADERS], axis=1).T, strict=True))
     known = (state.generation >= 0) & jnp.isfinite(state.fitness[:LEADERS])
-    higher = jnp.mean(jax.vmap(task.mastered)(best) & known) > 0.5
+    ready = jnp.mean(jax.vmap(task.mastered)(best) & known) > 0.5
+    higher = ready & (state.level < task.levels(settings))
     rounds = None if state.rounds is None else jnp.where(higher, 0.0, state.rounds)
     return dataclasses.replace(state, level=state.level + higher, stale=higher, rounds=rounds)
 

@@ -45,6 +45,10 @@ class PlainTask(abc.ABC):
         """See `Task`: the first start is nominal, the others are perturbed and pushed."""
         return draw_starts(key, creature, settings)
 
+    def levels(self, settings: Any) -> jax.Array | int:
+        """See `Task`."""
+        return 0
+
     def harder(self, trials: Starts, settings: Any, level: jax.Array) -> Starts:
         """See `Task`: always the same."""
         return trials

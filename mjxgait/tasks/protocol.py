@@ -57,6 +57,10 @@ class Task(Protocol):
         """Whether trials become harder as the best master them."""
         ...
 
+    def levels(self, settings: Any) -> jax.Array | int:
+        """How many times [] they become harder."""
+        ...
+
     def harder(self, trials: Starts, settings: Any, level: jax.Array) -> Starts:
         """The trials [R, ...] after they have become harder so many times []."""
         ...

@@ -45,6 +45,11 @@ class Following(GoingTask):
         plain = super().trials(key, creature, settings)
         return dataclasses.replace(plain, light=jnp.asarray(lights, jnp.float32))
 
+    def levels(self, settings: Any) -> jax.Array | int:
+        """See `Task`."""
+        steps: jax.Array | int = settings.widening
+        return steps
+
     def harder(self, trials: Starts, settings: Any, level: jax.Array) -> Starts:
         """See `Task`: lights spread, so that whoever gets on learns to turn little by little."""
         steps = settings.widening

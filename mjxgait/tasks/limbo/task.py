@@ -73,6 +73,11 @@ class Limbo(Hop):
         starts = super().trials(key, creature, settings)
         return dataclasses.replace(starts, raised=jnp.zeros(settings.starts))
 
+    def levels(self, settings: Any) -> jax.Array | int:
+        """See `Task`."""
+        steps: jax.Array | int = settings.lowering
+        return steps
+
     def harder(self, trials: Starts, settings: Any, level: jax.Array) -> Starts:
         """See `Task`: the bar comes down, so that whoever hops learns to duck little by little."""
         left = 1.0 - ramped(settings.lowering, level)
