@@ -5,8 +5,8 @@ processes, one after the other.
     python benchmarks/wishes.py --env crab --speeds 0.25 1 --gaits --seeds 0 1 --json crab.json
 
 For each creature every speed, then every gait that a body with so many feet has; one row each, with
-the speed in C MuJoCo, the gait's name there, whether the champion is certified, and the wall time.
-Options after `--` go to `train`, such as `-- --cluster HOST:PORT`.
+the speed in C MuJoCo, the gait's name there, how like an animal's it is, whether the champion is
+certified, and the wall time. Options after `--` go to `train`, such as `-- --cluster HOST:PORT`.
 """
 
 import argparse
@@ -19,12 +19,26 @@ import time
 from pathlib import Path
 
 from mjxgait.library import load_creature
+from mjxgait.parts.wishes import NATURAL
 from mjxgait.settings.gaits import GAITS
 
 ENVS = ("tall_quadruped", "short_quadruped", "crab", "duck")
 SPEEDS = ("0.25", "0.5", "1", "1.5")
-GAITS_ASKED = ("walk", "trot", "pace")
-HEADER = ("creature", "asked", "seed", "m/s in C", "gait", "certified", "fails", "gens", "wall s")
+GAITS_ASKED = ("natural", "walk", "trot", "pace")
+HEADER = (
+    "creature",
+    "asked",
+    "seed",
+    "m/s in C",
+    "gait",
+    "stride / animal's",
+    "duty / animal's",
+    "certified",
+    "margin",
+    "fails",
+    "gens",
+    "wall s",
+)
 
 
 def main() -> None:
@@ -44,7 +58,7 @@ def main() -> None:
     for env in options.env:
         known = GAITS.get(len(load_creature(env).feet.names), {})
         asked = [["--speed", speed] for speed in options.speeds]
-        asked += [["--gait", gait] for gait in options.gaits if gait in known]
+        asked += [["--gait", gait] for gait in options.gaits if gait in (*known, NATURAL)]
         for wish in asked:
             for seed in options.seeds:
                 found.append(run(env, wish, seed, options.more))
@@ -69,13 +83,17 @@ def run(env: str, wish: list[str], seed: int, more: list[str]) -> dict:
         for measure in criterion["measures"]
         if not measure["passed"]
     ]
+    likeness = certificate["report"]["likeness"]
     return {
         "creature": env,
         "asked": " ".join(wish),
         "seed": seed,
         "speed": round(certificate["report"]["speed"] or float("nan"), 3),
         "gait": certificate["report"]["gait"],
+        "stride": round(likeness["stride"] or float("nan"), 2),
+        "duty_factor": round(likeness["duty_factor"] or float("nan"), 2),
         "certified": certificate["passed"],
+        "margin": round(certificate["margin"], 2),
         "fails": "; ".join(failed) or "-",
         "generations": json.loads(lines[-1])["generation"],
         "seconds": round(seconds),

@@ -173,7 +173,7 @@ def _named(name: str, creature: Creature) -> dict[str, Any]:
     try:
         gait = gait_of(name, len(creature.feet.names))
     except ValueError as error:
-        raise UserError(f"--gait {name}: {creature.name}: {error}") from None
+        raise UserError(f"--gait {name}: {creature.name}: {error}, and {NATURAL}") from None
     whole: dict[str, Any] = {"mirror": False, "key_poses": 4}
     wish = {"gait": name} | ({} if gait.sway is None else {"sway": gait.sway})
     return {"fitness": {"wish": wish}} | ({} if gait.twice else {"controller": whole})
