@@ -31,6 +31,14 @@ def test_the_list_is_long_and_names_each_fault_once():
     assert len(FAULTS) == len(script.read_faults()) >= 30
 
 
+def test_the_docs_say_who_catches_each():
+    """A row for each in docs/testing.md, and how many there are."""
+    text = (ROOT / "docs" / "testing.md").read_text(encoding="utf-8")
+    missing = [name for name in FAULTS if f"| {name} | `" not in text]
+    assert not missing
+    assert f"All {len(FAULTS)} are caught" in text
+
+
 @pytest.mark.parametrize("name", FAULTS)
 def test_a_fault_can_be_planted(name: str):
     """Its text is there exactly once, what comes of it is Python, and the tests named exist."""
