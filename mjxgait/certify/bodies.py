@@ -9,7 +9,14 @@ import mujoco
 import numpy as np
 
 from mjxgait.certify.batch import batch_of
-from mjxgait.certify.layout import Layout, LowestPoint, colliding_geoms, per_foot, start_frame
+from mjxgait.certify.layout import (
+    Layout,
+    LowestPoint,
+    colliding_geoms,
+    foot_middles,
+    per_foot,
+    start_frame,
+)
 from mjxgait.certify.outcome import Fall
 from mjxgait.certify.starts import Starts
 from mjxgait.certify.state import FOOT_SENSES, State
@@ -123,11 +130,7 @@ class Bodies:
         """[rows, F, 3] m, the middle of each foot; empty where nobody asks."""
         if not self.sees_feet:
             return np.zeros((len(rows), 0, 3))
-        feet = self.creature.feet
-        pos = self.geom_xpos[rows][:, list(feet.stepping)]
-        return np.stack(
-            [pos[:, feet.foot_of == foot].mean(1) for foot in range(len(feet.names))], 1
-        )
+        return foot_middles(self.creature, self.geom_xpos[rows])
 
     def light(self, rows: np.ndarray) -> np.ndarray:
         """[rows, F, 3], its direction in each foot's own axes; empty where nobody asks."""

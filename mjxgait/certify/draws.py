@@ -82,4 +82,4 @@ def ladder(creature: Creature, config: CertificateConfig, draw: Draw) -> list[St
 
 
 def _unit_speed(creature: Creature) -> float:
-    return float(np.sqrt(-creature.model.opt.gravity[2] * creature.frame.hip_height))
+    return float(np.sqrt(creature.gravity * creature.frame.hip_height))

@@ -77,6 +77,20 @@ def per_foot(creature: Creature, heights: np.ndarray) -> np.ndarray:
     return np.stack([heights[:, creature.feet.foot_of == foot].min(1) for foot in feet], 1)
 
 
+def foot_middles(creature: Creature, places: np.ndarray) -> np.ndarray:
+    """[S, F, 3] m, the middle of each foot's geoms, from the places [S, ngeom, 3] of all."""
+    feet = creature.feet
+    own = places[:, list(feet.stepping)]
+    return np.stack([own[:, feet.foot_of == foot].mean(1) for foot in range(len(feet.names))], 1)
+
+
+def level_nose(creature: Creature, trunk_rot: np.ndarray) -> np.ndarray:
+    """[S, 3] horizontal unit vectors along the nose of trunks [S, 3, 3]."""
+    nose = trunk_rot @ creature.frame.forward * [1, 1, 0]
+    level: np.ndarray = nose / np.maximum(np.linalg.norm(nose, axis=1, keepdims=True), 1e-6)
+    return level
+
+
 class LowestPoint:
     """How far some geoms' lowest points are above the ground, exact for MuJoCo's primitive shapes.
 

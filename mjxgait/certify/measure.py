@@ -10,7 +10,13 @@ import numpy as np
 
 from mjxgait.certify.bar import Clearance
 from mjxgait.certify.grown import Grown, seen_grown
-from mjxgait.certify.layout import LowestPoint, per_foot, start_frame
+from mjxgait.certify.layout import (
+    LowestPoint,
+    foot_middles,
+    level_nose,
+    per_foot,
+    start_frame,
+)
 from mjxgait.certify.outcome import Trajectory
 from mjxgait.certify.overlap import overlaps
 from mjxgait.certify.starts import Starts
@@ -118,15 +124,14 @@ def dimensions(creature: Creature) -> Dimensions:
     axes = data.xmat[creature.trunk].reshape(3, 3) @ np.stack(
         [creature.frame.forward, creature.frame.left], 1
     )
-    feet = creature.feet.watched[: len(creature.feet.foot_of)]
-    places = (data.geom_xpos[feet] - data.xpos[creature.trunk]) @ axes
-    middles = [places[creature.feet.foot_of == n].mean(0) for n in range(len(creature.feet.names))]
+    feet = foot_middles(creature, data.geom_xpos[None])[0]
+    middles = (feet - data.xpos[creature.trunk]) @ axes
     return Dimensions(
         stand_height=creature.frame.stand_height,
         hip_height=creature.frame.hip_height,
         body_length=creature.frame.body_length,
         mass=creature.frame.mass,
-        gravity=float(-model.opt.gravity[2]),
+        gravity=creature.gravity,
         torque_limit=tuple(map(float, creature.gains.torque_limit)),
         joint_range=tuple(
             (float(low), float(high))
@@ -199,18 +204,14 @@ def measure(
         clearance=None if bar is None else sight.clearance,
         light=start.place + aimed.light[row] if aimed is not None and lit else None,
         grown=None if drag is None else seen_grown(creature, qpos, qvel, drag),
-        foot_ahead=_ahead(sight, forward),
+        foot_ahead=_ahead(sight),
     )
 
 
-def _ahead(sight: "_Sight", forward: np.ndarray) -> np.ndarray:
-    """[T, N] m from the trunk to each foot, along the level direction of its nose [T, 3]."""
-    feet = sight.creature.feet
-    places = sight.geom_xpos[:, feet.watched[: len(feet.foot_of)], :2]
-    middles = [places[:, feet.foot_of == n].mean(1) for n in range(len(feet.names))]
-    nose = forward[:, :2] / np.linalg.norm(forward[:, :2], axis=1, keepdims=True)
-    apart = np.stack(middles, 1) - sight.trunk_pos[:, None, :2]
-    found: np.ndarray = np.einsum("tnx,tx->tn", apart, nose)
+def _ahead(sight: "_Sight") -> np.ndarray:
+    """[T, N] m from the trunk to each foot, along the level direction of its nose."""
+    apart = foot_middles(sight.creature, sight.geom_xpos) - sight.trunk_pos[:, None]
+    found: np.ndarray = np.einsum("tnx,tx->tn", apart, level_nose(sight.creature, sight.trunk_rot))
     return found
 
 

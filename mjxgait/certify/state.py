@@ -8,7 +8,7 @@ from collections.abc import Callable, Collection, Mapping
 
 import numpy as np
 
-from mjxgait.certify.layout import Ground, StartFrame
+from mjxgait.certify.layout import Ground, StartFrame, level_nose
 from mjxgait.creature import Creature
 
 CONTACT_GAP = 0.002
@@ -78,8 +78,7 @@ def _right_down(creature: Creature, state: State) -> np.ndarray:
 
 def _nose(creature: Creature, state: State) -> tuple[np.ndarray, np.ndarray]:
     """[S, 3] horizontal unit vectors along the nose and to its left."""
-    nose = state.trunk_rot @ creature.frame.forward * [1, 1, 0]
-    nose = nose / np.maximum(np.linalg.norm(nose, axis=1, keepdims=True), 1e-6)
+    nose = level_nose(creature, state.trunk_rot)
     return nose, np.cross([0.0, 0.0, 1.0], nose)
 
 

@@ -51,6 +51,11 @@ class Creature:
         return int(self.model.nv)
 
     @property
+    def gravity(self) -> float:
+        """m/s², downwards."""
+        return float(-self.model.opt.gravity[2])
+
+    @property
     def digest(self) -> str:
         """Hash of the files that define the body; the README does not count."""
         text = "\0".join(f"{name}\0{self.files[name]}" for name in sorted(self.files))

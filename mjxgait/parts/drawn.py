@@ -31,7 +31,7 @@ def top_speed(creature: Creature, config: Config) -> float:
 
 def natural_gait(creature: Creature, speed: float) -> str:
     """The gait of an animal with so many feet at a speed in m/s; `auto` where it has no name."""
-    froude = speed**2 / (-creature.model.opt.gravity[2] * creature.frame.hip_height)
+    froude = speed**2 / (creature.gravity * creature.frame.hip_height)
     names = {2: "walk", 4: "walk" if froude < WALKS_UP_TO else "trot", 6: "tripod"}
     return names.get(len(creature.feet.names), AUTO)
 

@@ -127,7 +127,7 @@ def speed_of(text: str, creature: Creature) -> float:
     if not value > 0:
         raise UserError(f"--speed {text}: must be more than 0; who is to stand still needs no walk")
     if plain.startswith("fr"):
-        return float((value * _gravity(creature) * creature.frame.hip_height) ** 0.5)
+        return float((value * creature.gravity * creature.frame.hip_height) ** 0.5)
     return value * creature.frame.body_length if plain.endswith("bl/s") else value
 
 
@@ -212,7 +212,3 @@ def _demanded(config: Config, level: str) -> Config:
         return config
     path = data_folder("configs") / f"{level}.toml"
     return build(type(config), merge(dataclasses.asdict(config), read_toml(path)), str(path))
-
-
-def _gravity(creature: Creature) -> float:
-    return float(-creature.model.opt.gravity[2])

@@ -71,7 +71,7 @@ def draw_starts(key: jax.Array, creature: Creature, config: RolloutConfig) -> St
     )
     angle = jax.random.uniform(key_direction, (count,), maxval=2 * jnp.pi)
     direction = perturbed * jnp.stack([jnp.cos(angle), jnp.sin(angle)], axis=1)
-    speed = config.push * float(np.sqrt(-creature.model.opt.gravity[2] * creature.frame.hip_height))
+    speed = config.push * float(np.sqrt(creature.gravity * creature.frame.hip_height))
     steps = round(config.seconds / creature.model.opt.timestep)
     moment = jax.random.randint(
         key_moment, (count,), steps // 4, max(3 * steps // 4, steps // 4 + 1)
