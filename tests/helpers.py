@@ -14,6 +14,7 @@ from mjxgait.certify import CertificateConfig
 from mjxgait.champion import Champion
 from mjxgait.cli import main
 from mjxgait.creature import Creature
+from mjxgait.runs.experiment import Batch
 from mjxgait.settings.config import Config
 from mjxgait.settings.control import STEPPING, TUNING, DriveConfig, PoseConfig, gene_names
 from mjxgait.settings.tables import build
@@ -36,6 +37,11 @@ def small_config(**tables: dict) -> Config:
     for name, values in tables.items():
         table[name] = {**table.get(name, {}), **values}
     return build(Config, table, "test")
+
+
+def program_text(batch: Batch) -> str:
+    """That of all programs of a generation, before they are compiled."""
+    return "\n".join(program.as_text() for _, program in batch.lower())
 
 
 def altered(creature: Creature, **facts: Any) -> Creature:

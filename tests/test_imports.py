@@ -134,4 +134,4 @@ def test_only_one_place_jits():
         for path in folder.rglob("*.py")
         if "jax.jit" in path.read_text(encoding="utf-8")
     }
-    assert calls <= {"experiment.py"}
+    assert calls <= {"stages.py"}

@@ -7,7 +7,7 @@ from pathlib import Path
 import jax
 import numpy as np
 import pytest
-from helpers import STOOL, small_config
+from helpers import STOOL, program_text, small_config
 
 from mjxgait.creature import Creature, load_creature
 from mjxgait.creature.overlap import find_crossings
@@ -51,7 +51,8 @@ OTHERS = {
 
 
 def program(creature: Creature, **rollout) -> str:
-    return Batch((build_experiment(creature, small_config(rollout=rollout)),)).lower().as_text()
+    batch = Batch((build_experiment(creature, small_config(rollout=rollout)),))
+    return program_text(batch)
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import jax
 import numpy as np
 
 from mjxgait.champion import write_champion
@@ -25,7 +24,7 @@ from mjxgait.runs.checkpoint import Checkpoints
 from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.examination import Examined, Examiner, why_ended
 from mjxgait.runs.exams import Exams
-from mjxgait.runs.experiment import build_experiment
+from mjxgait.runs.experiment import Experiment, build_experiment
 from mjxgait.runs.folder import CHAMPION, EXAMS, ISLANDS, METRICS, MIGRATIONS, truncate_metrics
 from mjxgait.runs.loop import conclude, interruptible, report, versions
 from mjxgait.runs.packed import Packed
@@ -64,7 +63,7 @@ def train(
         screen.close()
         islands.close()
     if reason is not None:
-        best = examined or examiner.best(islands.together(experiment.init))
+        best = examined or examiner.best(islands.together(experiment))
         conclude(folder, creature, screen, best)
     report(folder, screen, reason, time.perf_counter() - began)
     return reason is not None
@@ -73,7 +72,7 @@ def train(
 def _over(islands: "_Islands", examiner: Examiner) -> tuple[str | None, Examined | None]:
     """Why the run is over, if it is, and who ended it; leaves the best of now as champion."""
     experiment = examiner.experiment
-    state = islands.together(experiment.init)
+    state = islands.together(experiment)
     if np.isfinite(state.fitness[0]):
         with disk_errors(islands.folder):
             champion = experiment.champion(state, versions())
@@ -134,10 +133,10 @@ class _Islands:
         )
         return lines
 
-    def together(self, init: Callable[[], Any]) -> Any:
-        """The best of all as one state. init: makes a state of its shapes."""
+    def together(self, experiment: Experiment) -> Any:
+        """The best of all as one state."""
         known = [state for state in self.states if state is not None]
-        return gathered(known).state(jax.eval_shape(init), str(self.folder))
+        return gathered(known).state(experiment.abstract(), str(self.folder))
 
     def close(self) -> None:
         """Waits until everything is on disk."""

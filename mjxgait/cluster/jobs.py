@@ -88,7 +88,7 @@ class AdvanceIsland:
         """See `Job`. The state is packed without a row's axis, as a run's checkpoint has it."""
         batch = programs.batch(recipe)
         one = batch.experiments[0]
-        begun = self.state and self.state.state(jax.eval_shape(one.init), "an island's state")
+        begun = self.state and self.state.state(one.abstract(), "an island's state")
         state, reason = begun or one.init(self.island), None
         alone = jax.tree.map(lambda leaf: leaf[None], state)
         way = _Way(programs.step(recipe), batch, alone, self.until)

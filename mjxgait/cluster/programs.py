@@ -1,7 +1,6 @@
 """Programs that a process has compiled, so that work of the same shape finds them again."""
 
 import collections
-import contextlib
 import hashlib
 from collections.abc import Callable, Hashable
 from contextlib import AbstractContextManager
@@ -13,6 +12,7 @@ from mjxgait.cluster.recipe import Recipe
 from mjxgait.runs.blueprint import Plan, draw_up
 from mjxgait.runs.devices import compiled
 from mjxgait.runs.experiment import Batch, Step, build_batch
+from mjxgait.runs.stages import Stages, Turn, at_once
 from mjxgait.settings.traced import traced
 from mjxgait.types import Judged
 
@@ -20,22 +20,16 @@ T = TypeVar("T")
 KEPT = 8
 """Of each sort, those that were used last; a program takes some hundred MB."""
 
-Turn = Callable[[str], AbstractContextManager[object]]
-"""Whose turn it is to compile a program, by its name, where several processes share a cache."""
-
-
-def _at_once(name: str) -> AbstractContextManager[object]:
-    return contextlib.nullcontext()
-
 
 class Programs:
     """Of one process. turn: held while a program is compiled."""
 
-    def __init__(self, turn: Turn = _at_once) -> None:
+    def __init__(self, turn: Turn = at_once) -> None:
         self._turn = turn
         self._batches: _Latest[tuple[Hashable, Batch]] = _Latest()
         self._plans: _Latest[Plan] = _Latest()
-        self._compiled: _Latest[jax.stages.Compiled] = _Latest()
+        self._stages: _Latest[Stages] = _Latest()
+        self._judges: _Latest[jax.stages.Compiled] = _Latest()
 
     def batch(self, recipe: Recipe) -> Batch:
         """The runs of a recipe."""
@@ -44,13 +38,23 @@ class Programs:
     def step(self, recipe: Recipe) -> Step:
         """A generation of all runs of a recipe."""
         shape, batch = self._known(recipe)
-        return batch.bound(self._program(("step", shape), batch.lower))
+
+        def turn(part: str) -> AbstractContextManager[object]:
+            return self._turn(_name(shape, part))
+
+        return batch.bound(self._stages.find(shape, lambda: batch.stages(turn=turn)))
 
     def judge(self, recipe: Recipe, genomes: Any, starts: Any) -> Judged:
         """The verdict on genomes [1, N, ...], in NumPy."""
         shape, batch = self._known(recipe)
         count = jax.tree.leaves(genomes)[0].shape[1]
-        program = self._program(("judge", shape, count), lambda: batch.lower_judge(genomes, starts))
+
+        def compile_it() -> jax.stages.Compiled:
+            program = batch.lower_judge(genomes, starts)
+            with self._turn(_name(shape, "judge", count)):
+                return compiled(program)
+
+        program = self._judges.find((shape, count), compile_it)
         numbers, rows = batch.known
         judged: Judged = jax.device_get(program(numbers, rows.settings, starts, genomes))
         return judged
@@ -66,15 +70,9 @@ class Programs:
         batch = build_batch(creature, configs, plan, recipe.sources)
         return (one, len(configs), max(map(len, recipe.sources), default=0)), batch
 
-    def _program(
-        self, key: Hashable, lower: Callable[[], jax.stages.Lowered]
-    ) -> jax.stages.Compiled:
-        def compile_it() -> jax.stages.Compiled:
-            lowered = lower()
-            with self._turn(hashlib.sha256(repr(key).encode()).hexdigest()[:16]):
-                return compiled(lowered)
 
-        return self._compiled.find(key, compile_it)
+def _name(*key: Hashable) -> str:
+    return hashlib.sha256(repr(key).encode()).hexdigest()[:16]
 
 
 class _Latest(collections.OrderedDict[Hashable, T]):

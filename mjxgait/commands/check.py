@@ -8,7 +8,7 @@ import tyro
 
 from mjxgait.creature import load_creature
 from mjxgait.errors import UserError
-from mjxgait.parts import resolve_config
+from mjxgait.parts.wishes import Wishes, configured
 from mjxgait.runs.disk import require_writable
 from mjxgait.settings.shipped import find_creature
 
@@ -32,7 +32,7 @@ def check_command(arguments: Sequence[str]) -> int:
     options = tyro.cli(CheckOptions, args=list(arguments), prog="mjxgait check")
     folder = Path(options.env)
     creature = load_creature(folder if folder.is_dir() else find_creature(options.env))
-    resolve_config(creature.settings.train, creature.name)
+    configured(creature, None, {}, Wishes())
     from mjxgait.importing.portrait import facts, portrait, standing
 
     out = options.out or Path(f"{creature.name}-check.png")

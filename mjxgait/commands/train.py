@@ -17,9 +17,8 @@ from mjxgait.creature.scale import parse_scales
 from mjxgait.creature.step import at_step
 from mjxgait.errors import INTERRUPTED, UserError
 from mjxgait.library import Run, load_creature
-from mjxgait.parts import resolve_config
 from mjxgait.parts.registry import meant
-from mjxgait.parts.wishes import WISHES, Wishes, hint, wished
+from mjxgait.parts.wishes import WISHES, Wishes, configured, hint
 from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.folder import (
     METRICS,
@@ -66,7 +65,8 @@ class TrainOptions:
       speed: How fast it should walk: 0.4 (m/s), 0.4bl/s (body lengths per second), or fr0.2 (Froude
         number). This and the next four are for walking (docs/wishes.md).
       gait: walk, amble, trot, pace, canter, bound, gallop, hop (four feet), walk, tripod, wave (six),
-        walk, waddle, hop (two), or auto.
+        walk, waddle, hop (two), natural (an animal's at this speed), or auto (what comes). Where
+        nothing is asked it is what creature.toml has as usual: natural for both dogs.
       turn: Degrees per second to the left that it should turn while it walks.
       steer: Degrees per second up to which it should obey when it is told to turn, to either side.
       style: calm, sneaky, heavy, proud, tired, hurried, or a FILE.toml of settings.
@@ -244,8 +244,7 @@ def _layers(arguments: Sequence[str]) -> tuple[Creature, Config]:
     file = Path(given.config) if given.config else None
     named = {kind: getattr(given, f"use.{kind}") for kind in ("controller", "task")}
     use = {kind: name for kind, name in named.items() if name}
-    config = resolve_config(creature.settings.train, creature.name, file, use)
-    return creature, wished(config, creature, Wishes.of(asked))
+    return creature, configured(creature, file, use, Wishes.of(asked))
 
 
 def _settings(options: TrainOptions) -> Config:

@@ -10,7 +10,7 @@ import numpy as np
 
 from mjxgait.creature.creature import Creature
 from mjxgait.creature.scale import SETTINGS, load_files
-from mjxgait.creature.settings import Balance, CreatureSettings, Steering, Stepping
+from mjxgait.creature.settings import Balance, CreatureSettings, Steering, Stepping, Usual
 from mjxgait.errors import UserError, did_you_mean
 from mjxgait.settings.tables import dump_toml
 
@@ -40,6 +40,8 @@ def facing(creature: Creature, way: str) -> Creature:
 
 
 def _turned(settings: CreatureSettings, way: str, axis: np.ndarray) -> CreatureSettings:
+    # What is usual ahead is not known to be so the other way round.
+    settings = dataclasses.replace(settings, usual=Usual())
     balance, stepping, steering = settings.balance, settings.stepping, settings.steering
     x, y, z = np.round(axis, 9) + 0.0
     identity = dataclasses.replace(

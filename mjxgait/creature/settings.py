@@ -119,6 +119,14 @@ class Termination:
 
 
 @dataclasses.dataclass(frozen=True)
+class Usual:
+    """What is asked of its walk where nobody asks anything. gait: as after `--gait`."""
+
+    __pydantic_config__ = STRICT
+    gait: str = "auto"
+
+
+@dataclasses.dataclass(frozen=True)
 class CreatureSettings:
     """The whole of `creature.toml`."""
 
@@ -131,4 +139,5 @@ class CreatureSettings:
     balance: Balance = dataclasses.field(default_factory=Balance)
     stepping: Stepping = dataclasses.field(default_factory=Stepping)
     termination: Termination = dataclasses.field(default_factory=Termination)
+    usual: Usual = dataclasses.field(default_factory=Usual)
     train: dict[str, Any] = dataclasses.field(default_factory=dict)

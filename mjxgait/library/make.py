@@ -90,14 +90,10 @@ def train(
     Raises:
       UserError: one sentence that says what is wrong with what was given.
     """
-    from mjxgait.parts import resolve_config
-    from mjxgait.parts.wishes import Wishes, wished
+    from mjxgait.parts.wishes import Wishes, configured
 
     use = _use(controller=controller, task=task)
     creature = load_creature(env, scale, way=way)
-    resolved = resolve_config(
-        creature.settings.train, creature.name, Path(config) if config else None, use
-    )
     asked = {
         "speed": speed,
         "gait": gait,
@@ -106,7 +102,8 @@ def train(
         "style": style,
         "certificate": certificate,
     }
-    resolved = wished(resolved, creature, Wishes.of(asked))
+    file = Path(config) if config else None
+    resolved = configured(creature, file, use, Wishes.of(asked))
     short = {"population": population, "generations": generations}
     evolution = {key: value for key, value in short.items() if value is not None}
     table = merge(dataclasses.asdict(resolved), {"seed": seed, "evolution": evolution})

@@ -33,7 +33,7 @@ def check_fit(creature: Creature, config: Config) -> None:
         if len(around) != wanted:
             raise UserError(
                 f"controller.around has {len(around)} angles; {config.controller.key_poses} key poses "
-                f"of {name} have {wanted}"
+                f"of {name} have {wanted}; --gait auto begins with no poses that were drawn"
             )
     if not creature.settings.creature.grows:
         if config.rollout.step:

@@ -11,6 +11,7 @@ from mjxgait.certify.tasks.walk import SPARE
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError, did_you_mean
 from mjxgait.parts.drawn import drawn, natural_gait, top_speed
+from mjxgait.parts.settings import resolve_config
 from mjxgait.settings.config import Config
 from mjxgait.settings.gaits import AUTO, SHORTEST, animal_stride, gait_of
 from mjxgait.settings.shipped import data_folder
@@ -65,6 +66,26 @@ NATURAL = "natural"
 TURNS = ("turn", "steer")
 LEVELS = ("walks", "anywhere")
 WISHES = tuple(field.name for field in dataclasses.fields(Wishes))
+
+
+def configured(
+    creature: Creature, file: Path | None, use: Mapping[str, str], wishes: Wishes
+) -> Config:
+    """The settings of a run: the layers below the options, and what is asked laid over them.
+
+    Where nothing is, and no file says what is wanted, it is what this creature usually does.
+
+    Raises:
+      UserError: names the layer and the key, or the wish.
+    """
+    config = resolve_config(creature.settings.train, creature.name, file, use)
+    walks = config.use.task == "walk" and config.use.controller == "poses"
+    if wishes != Wishes() or file is not None or not walks:
+        return wished(config, creature, wishes)
+    try:
+        return wished(config, creature, Wishes(gait=creature.settings.usual.gait))
+    except UserError as error:
+        raise UserError(f"{creature.name}/creature.toml: [usual]: {error}") from None
 
 
 def wished(config: Config, creature: Creature, wishes: Wishes) -> Config:

@@ -5,7 +5,6 @@ import io
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-import jax
 from rich.console import Console
 
 from mjxgait.cores import process_per_core, survivable
@@ -55,7 +54,7 @@ def _examine(folder: Path) -> None:
     creature, config = open_run(folder)
     experiment, store = build_experiment(creature, config), Checkpoints(folder, config.keep_every)
     try:
-        state = store.restore(jax.eval_shape(experiment.init), creature.digest)
+        state = store.restore(experiment.abstract(), creature.digest)
     finally:
         store.close()
     quiet = Screen(Console(file=io.StringIO()))

@@ -1,7 +1,7 @@
-"""Wires the rooms into a run: the one place that jits and that knows the devices."""
+"""Wires the rooms into a run."""
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property, partial
 from typing import Any
 
@@ -15,8 +15,18 @@ from mjxgait.errors import UserError
 from mjxgait.parts import make_task
 from mjxgait.parts.registry import what_ends
 from mjxgait.runs.blueprint import Numbers, Plan, draw_up
-from mjxgait.runs.devices import compiled, everywhere
-from mjxgait.runs.generation import Row, absorb, evolution_of, judge, propose
+from mjxgait.runs.devices import everywhere
+from mjxgait.runs.generation import Row, first_state, judge
+from mjxgait.runs.stages import (
+    Stages,
+    Turn,
+    at_once,
+    begin,
+    compile_stages,
+    embodied,
+    lower_stages,
+    lowered,
+)
 from mjxgait.search.state import EvolutionState, GenerationMetrics
 from mjxgait.settings.config import Config
 from mjxgait.settings.traced import traced
@@ -57,13 +67,20 @@ class Experiment:
 
         island: other populations on the same starts are those of other islands; the run's own is 0.
         """
-        key = jax.random.fold_in(jax.random.key(self.config.seed), 0)
-        return _initial(
-            self.blueprint,
-            self.blueprint.numbers,
-            self.row.settings,
-            jax.random.fold_in(key, island) if island else key,
+        return begin(self.blueprint, *self._origin(island))
+
+    def abstract(self) -> EvolutionState:
+        """Shapes and types of a state."""
+        shapes: EvolutionState = jax.eval_shape(
+            partial(first_state, self.blueprint), *self._origin()
         )
+        return shapes
+
+    def _origin(self, island: int = 0) -> tuple[Numbers | None, Config, jax.Array]:
+        """What the first state follows from."""
+        key = jax.random.fold_in(jax.random.key(self.config.seed), 0)
+        known = (self.blueprint.numbers, self.row.settings)
+        return *known, jax.random.fold_in(key, island) if island else key
 
     def simulate(self, genomes: Any, starts: Starts | None = None) -> Episodes:
         """Genomes [N, ...] on the starts [R] of this run or on others: episodes with leaves [N, R, ...]."""
@@ -72,7 +89,7 @@ class Experiment:
         return Episodes(_only(episodes.tally), episodes.computed_steps)
 
     def compile(self, evaluator: Evaluator | None = None) -> Step:
-        """The generation as one compiled program, or as two around an evaluator elsewhere."""
+        """A generation by compiled programs; an evaluator elsewhere may judge."""
         batch = Batch((self,))
         step = batch.compile(evaluator)
 
@@ -152,49 +169,36 @@ class Batch:
 
     def abstract(self) -> EvolutionState:
         """Shapes and types of the states."""
-        count, one = len(self.experiments), jax.eval_shape(self.experiments[0].init)
+        count, one = len(self.experiments), self.experiments[0].abstract()
         return jax.tree.map(
             lambda leaf: jax.ShapeDtypeStruct((count, *leaf.shape), leaf.dtype), one
         )
 
-    def lower(self) -> jax.stages.Lowered:
-        """The program of a generation, the same for all settings of the same shape: what has been compiled once is found again."""
-        return self._lowered(_generation, self.rows, self.abstract())
-
     def compile(self, evaluator: Evaluator | None = None) -> Step:
-        """A generation of all rows: states and metrics have leaves [B, ...].
-
-        One compiled program; with an evaluator elsewhere two, and it is asked in between.
+        """A generation of all rows: states and metrics have leaves [B, ...]. evaluator: who judges, if not
+        this machine.
         """
-        if evaluator is None:
-            return self.bound(compiled(self.lower()))
-        return self._around(evaluator)
+        return self.bound(self.stages(judges=evaluator is None), evaluator)
 
-    def bound(self, program: jax.stages.Compiled) -> Step:
-        """The generation of these rows by a program of their shape."""
-        return partial(program, *self.known)
+    def stages(self, judges: bool = True, turn: Turn = at_once) -> Stages:
+        """See `compile_stages`."""
+        return compile_stages(self.lower(judges), turn)
 
-    def _around(self, evaluator: Evaluator) -> Step:
-        numbers, rows = self.known
-        lowered = self._lowered(propose, rows, self.abstract())
-        proposals, starts = lowered.out_info
-        wanting = compiled(lowered)
-        judged = jax.eval_shape(
-            partial(judge, self.experiments[0].blueprint),
-            *(numbers, rows.settings, starts, proposals.offspring),
-        )
-        absorbing = compiled(self._lowered(absorb, rows, self.abstract(), proposals, judged))
+    def lower(self, judges: bool = True) -> Iterator[tuple[str, jax.stages.Lowered]]:
+        """The programs of a generation, see `lower_stages`; the same for all settings of the same shape."""
+        return lower_stages(self._blueprint, self.rows, self.abstract(), judges)
 
-        def step(states: EvolutionState) -> tuple[EvolutionState, GenerationMetrics]:
-            proposals, starts = wanting(numbers, rows, states)
-            judged = evaluator.judge(proposals.offspring, starts, rows.settings)
-            return absorbing(numbers, rows, states, proposals, judged)
-
-        return step
+    def bound(self, stages: Stages, evaluator: Evaluator | None = None) -> Step:
+        """The generation of these rows by programs of their shape."""
+        return partial(stages.step, *self.known, evaluator=evaluator)
 
     def lower_judge(self, genomes: Any, starts: Starts) -> jax.stages.Lowered:
         """The program that judges so many genomes [B, N, ...]; see `generation.judge`."""
-        return self._lowered(judge, self.rows.settings, starts, genomes)
+        return lowered(self._blueprint, judge, self.rows.settings, starts, genomes)
+
+    @property
+    def _blueprint(self) -> Plan:
+        return self.experiments[0].blueprint
 
     @cached_property
     def known(self) -> tuple[Numbers | None, Row]:
@@ -204,14 +208,6 @@ class Batch:
             (one.blueprint.numbers, self.rows), everywhere(one.simulator)
         )
         return known
-
-    def _lowered(self, function: Callable[..., Any], *given: Any) -> jax.stages.Lowered:
-        one = self.experiments[0]
-        placed = everywhere(one.simulator)
-        program = jax.jit(
-            partial(function, one.blueprint), in_shardings=placed, out_shardings=placed
-        )
-        return program.lower(one.blueprint.numbers, *given)
 
     def place(self, states: EvolutionState) -> EvolutionState:
         """The states on all devices, where the compiled program wants them."""
@@ -256,32 +252,10 @@ def build_batch(
     return Batch(tuple(experiments))
 
 
-@partial(jax.jit, static_argnums=0)
-def _initial(
-    blueprint: Plan, numbers: Numbers | None, settings: Config, key: jax.Array
-) -> EvolutionState:
-    """The same compiled function for every run, alone or beside others, so that they begin with the same bits."""
-    simulator = blueprint.simulator(numbers)
-    task, trials = simulator.task, settings.rollout.starts
-    state = evolution_of(simulator, settings).init(key, trials, len(task.terms), len(task.outcomes))
-    if not task.climbs:
-        return state
-    return dataclasses.replace(state, level=jnp.int32(0), stale=jnp.zeros((), bool))
-
-
 def _filled_up(sources: Sequence[Sequence[int]]) -> list[list[int]]:
     """All as long as the longest; a row's own number stands for nobody."""
     most = max(map(len, sources))
     return [[*rows, *[own] * (most - len(rows))] for own, rows in enumerate(sources)]
-
-
-def _generation(
-    blueprint: Plan, numbers: Numbers | None, rows: Row, states: EvolutionState
-) -> tuple[EvolutionState, GenerationMetrics]:
-    """One generation of all rows [B], as one program."""
-    proposals, starts = propose(blueprint, numbers, rows, states)
-    judged = judge(blueprint, numbers, rows.settings, starts, proposals.offspring)
-    return absorb(blueprint, numbers, rows, states, proposals, judged)
 
 
 def _experiment(blueprint: Plan, config: Config) -> Experiment:
@@ -294,8 +268,7 @@ def _experiment(blueprint: Plan, config: Config) -> Experiment:
     task = make_task(blueprint.own.creature, step, ends, config)
     starts = task.trials(key, creature, drawn)
     if starts.heaviness is not None:
-        # As one program, or each of its hundreds of operations is compiled alone.
-        starts = jax.jit(blueprint.embodied)(starts)
+        starts = embodied(blueprint, starts)
     return Experiment(creature, config, blueprint, Row(traced(config), starts))
 
 

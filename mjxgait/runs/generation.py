@@ -53,6 +53,18 @@ def evolution_of(simulator: Simulator, settings: Config) -> Evolution:
     return Evolution(settings.evolution, variation, rank)
 
 
+def first_state(
+    blueprint: Plan, numbers: Numbers | None, settings: Config, key: jax.Array
+) -> EvolutionState:
+    """That of a run, before anybody has been judged."""
+    simulator = blueprint.simulator(numbers)
+    task, trials = simulator.task, settings.rollout.starts
+    state = evolution_of(simulator, settings).init(key, trials, len(task.terms), len(task.outcomes))
+    if not task.climbs:
+        return state
+    return dataclasses.replace(state, level=jnp.int32(0), stale=jnp.zeros((), bool))
+
+
 def propose(
     blueprint: Plan, numbers: Numbers | None, rows: Row, states: EvolutionState
 ) -> tuple[Proposal, Starts]:

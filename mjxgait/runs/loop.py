@@ -65,7 +65,7 @@ def train(
     # done.
     restored, begun = None, -1
     if resume and (checkpoints.generations() or generation is not None):
-        abstract = jax.eval_shape(experiment.init)
+        abstract = experiment.abstract()
         restored = checkpoints.restore(abstract, creature.digest, generation)
         begun = int(restored.generation)
     # First the checkpoints: a kill in between leaves lines too many, never a log with a gap.

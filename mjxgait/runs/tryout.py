@@ -113,7 +113,7 @@ class Tryout:
         def some(leaf: Any) -> Any:
             return jax.ShapeDtypeStruct((1, count, *leaf.shape[1:]), leaf.dtype)
 
-        genomes = jax.tree.map(some, jax.eval_shape(self._trials.init).genomes)
+        genomes = jax.tree.map(some, self._trials.abstract().genomes)
         return compiled(self._batch.lower_judge(genomes, self._starts))
 
 

@@ -1,0 +1,108 @@
+"""The one place that jits: a generation as three compiled programs in a row, of which only the middle
+one, which simulates, is worth the compiler's best.
+"""
+
+import contextlib
+import dataclasses
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import AbstractContextManager
+from functools import partial
+from typing import Any
+
+import jax
+
+from mjxgait.runs.blueprint import Numbers, Plan
+from mjxgait.runs.devices import SLIM, compiled, everywhere
+from mjxgait.runs.generation import Row, absorb, first_state, judge, propose
+from mjxgait.search.state import EvolutionState, GenerationMetrics
+from mjxgait.simulation.evaluator import Evaluator
+from mjxgait.tasks.trials import Starts
+
+Turn = Callable[[str], AbstractContextManager[object]]
+"""Whose turn it is to compile a program, by its name, where several processes share a cache."""
+
+
+def at_once(name: str) -> AbstractContextManager[object]:
+    """Nobody waits for anybody."""
+    return contextlib.nullcontext()
+
+
+@dataclasses.dataclass(frozen=True)
+class Stages:
+    """The compiled programs of one shape; see `generation`. judge: None where others judge."""
+
+    propose: jax.stages.Compiled
+    absorb: jax.stages.Compiled
+    judge: jax.stages.Compiled | None = None
+
+    def step(
+        self,
+        numbers: Numbers | None,
+        rows: Row,
+        states: EvolutionState,
+        evaluator: Evaluator | None = None,
+    ) -> tuple[EvolutionState, GenerationMetrics]:
+        """A generation of the rows [B]. evaluator: who judges instead of this machine's program."""
+        proposals, starts = self.propose(numbers, rows, states)
+        if evaluator is not None:
+            judged = evaluator.judge(proposals.offspring, starts, rows.settings)
+        else:
+            assert self.judge is not None, "compiled for an evaluator elsewhere"
+            judged = self.judge(numbers, rows.settings, starts, proposals.offspring)
+        after: tuple[EvolutionState, GenerationMetrics] = self.absorb(
+            numbers, rows, states, proposals, judged
+        )
+        return after
+
+
+def lowered(blueprint: Plan, function: Callable[..., Any], *given: Any) -> jax.stages.Lowered:
+    """A part of a generation as a program of these shapes, the same for all settings that have them:
+    what has been compiled once is found again.
+    """
+    placed = everywhere(blueprint.own)
+    program = jax.jit(partial(function, blueprint), in_shardings=placed, out_shardings=placed)
+    return program.lower(blueprint.numbers, *given)
+
+
+def lower_stages(
+    blueprint: Plan, rows: Row, states: EvolutionState, judges: bool = True
+) -> Iterator[tuple[str, jax.stages.Lowered]]:
+    """The programs for rows and states of these shapes, by name, each traced when it is asked for.
+
+    judges: whether one of them does.
+    """
+    first = lowered(blueprint, propose, rows, states)
+    yield "propose", first
+    proposals, starts = first.out_info
+    given = (rows.settings, starts, proposals.offspring)
+    if judges:
+        middle = lowered(blueprint, judge, *given)
+        yield "judge", middle
+        judged = middle.out_info
+    else:
+        judged = jax.eval_shape(partial(judge, blueprint), blueprint.numbers, *given)
+    yield "absorb", lowered(blueprint, absorb, rows, states, proposals, judged)
+
+
+def compile_stages(
+    programs: Iterable[tuple[str, jax.stages.Lowered]], turn: Turn = at_once
+) -> Stages:
+    """Each compiled while the next is traced."""
+
+    def in_turn(part: str, program: jax.stages.Lowered) -> jax.stages.Compiled:
+        with turn(part):
+            return compiled(program, optimized=part == "judge")
+
+    with ThreadPoolExecutor() as aside:
+        found = {part: aside.submit(in_turn, part, program) for part, program in programs}
+    return Stages(**{part: one.result() for part, one in found.items()})
+
+
+begin = jax.jit(first_state, static_argnums=0, compiler_options=SLIM)
+"""The same compiled function for every run, alone or beside others, so that they begin with the same bits."""
+
+
+def embodied(blueprint: Plan, starts: Starts) -> Starts:
+    """See `Plan.embodied`; as one program, or each of its hundreds of operations is compiled alone."""
+    return jax.jit(blueprint.embodied)(starts)
