@@ -1,10 +1,9 @@
 """Programs that a process has compiled, so that work of the same shape finds them again."""
 
-import collections
 import hashlib
-from collections.abc import Callable, Hashable
+from collections.abc import Hashable
 from contextlib import AbstractContextManager
-from typing import Any, TypeVar
+from typing import Any
 
 import jax
 
@@ -12,11 +11,11 @@ from mjxgait.cluster.recipe import Recipe
 from mjxgait.runs.blueprint import Plan, draw_up
 from mjxgait.runs.devices import compiled
 from mjxgait.runs.experiment import Batch, Step, build_batch
+from mjxgait.runs.latest import Latest
 from mjxgait.runs.stages import Stages, Turn, at_once
 from mjxgait.settings.traced import traced
 from mjxgait.types import Judged
 
-T = TypeVar("T")
 KEPT = 8
 """Of each sort, those that were used last; a program takes some hundred MB."""
 
@@ -26,10 +25,10 @@ class Programs:
 
     def __init__(self, turn: Turn = at_once) -> None:
         self._turn = turn
-        self._batches: _Latest[tuple[Hashable, Batch]] = _Latest()
-        self._plans: _Latest[Plan] = _Latest()
-        self._stages: _Latest[Stages] = _Latest()
-        self._judges: _Latest[jax.stages.Compiled] = _Latest()
+        self._batches: Latest[tuple[Hashable, Batch]] = Latest(KEPT)
+        self._plans: Latest[Plan] = Latest(KEPT)
+        self._stages: Latest[Stages] = Latest(KEPT)
+        self._judges: Latest[jax.stages.Compiled] = Latest(KEPT)
 
     def batch(self, recipe: Recipe) -> Batch:
         """The runs of a recipe."""
@@ -73,15 +72,3 @@ class Programs:
 
 def _name(*key: Hashable) -> str:
     return hashlib.sha256(repr(key).encode()).hexdigest()[:16]
-
-
-class _Latest(collections.OrderedDict[Hashable, T]):
-    """What was used last."""
-
-    def find(self, key: Hashable, make: Callable[[], T]) -> T:
-        if key not in self:
-            self[key] = make()
-            while len(self) > KEPT:
-                self.popitem(last=False)
-        self.move_to_end(key)
-        return self[key]

@@ -90,11 +90,18 @@ class Experiment:
 
     def compile(self, evaluator: Evaluator | None = None) -> Step:
         """A generation by compiled programs; an evaluator elsewhere may judge."""
-        batch = Batch((self,))
-        step = batch.compile(evaluator)
+        return self.step(self.stages(judges=evaluator is None), evaluator)
+
+    def stages(self, judges: bool = True) -> Stages:
+        """See `Batch.stages`."""
+        return Batch((self,)).stages(judges)
+
+    def step(self, stages: Stages, evaluator: Evaluator | None = None) -> Step:
+        """A generation by programs of this shape."""
+        together = Batch((self,)).bound(stages, evaluator)
 
         def alone(state: EvolutionState) -> tuple[EvolutionState, GenerationMetrics]:
-            return _only(step(_lone(state)))
+            return _only(together(_lone(state)))
 
         return alone
 

@@ -19,6 +19,7 @@ import numpy as np
 
 from mjxgait.champion import write_champion
 from mjxgait.creature import Creature
+from mjxgait.parts.registry import find
 from mjxgait.runs.checkpoint import Checkpoints
 from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.examination import Examined, Examiner, why_ended
@@ -35,8 +36,10 @@ from mjxgait.runs.folder import (
     read_metrics,
     truncate_metrics,
 )
+from mjxgait.runs.latest import Latest
 from mjxgait.runs.lineage import MOTHERS
 from mjxgait.runs.screen import Screen
+from mjxgait.runs.stages import Stages
 from mjxgait.runs.tryout import tryout_of
 from mjxgait.search.state import EvolutionState, GenerationMetrics, stop_reason
 from mjxgait.settings.config import Config
@@ -105,10 +108,28 @@ def _compiled(
     seconds on the large one need one core.
     """
     if restored is not None:
-        return experiment.compile(evaluator), restored
+        return _step(experiment, evaluator), restored
     with ThreadPoolExecutor(1) as aside:
         first = aside.submit(experiment.init)
-        return experiment.compile(evaluator), first.result()
+        return _step(experiment, evaluator), first.result()
+
+
+_COMPILED: Latest[Stages] = Latest(2)
+"""Of the runs of this process, so that the next seed in a notebook need not be traced again."""
+
+
+def _step(experiment: Experiment, evaluator: Evaluator | None) -> Step:
+    use = experiment.config.use
+    shape = (
+        experiment.creature.digest,
+        jax.tree.structure(experiment.row),
+        find("controller", use.controller),
+        find("task", use.task),
+        evaluator is None,
+    )
+    return experiment.step(
+        _COMPILED.find(shape, lambda: experiment.stages(evaluator is None)), evaluator
+    )
 
 
 def conclude(folder: Path, creature: Creature, screen: Screen, examined: Examined | None) -> None:
