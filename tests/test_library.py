@@ -7,10 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers import SHORT, STOOL, short_examination
+from helpers import SHORT, STOOL, short_examination, small_config
 
 import mjxgait
+from mjxgait.creature import Creature
+from mjxgait.creature.scale import scaled
 from mjxgait.errors import UserError
+from mjxgait.runs.experiment import build_experiment
 
 SMALL = {
     "rollout": {"seconds": 0.4, "starts": 2, "lanes": 4},
@@ -41,6 +44,40 @@ def test_a_run_is_its_folder(run: mjxgait.Run):
     assert run.certificate == json.loads((run.folder / "certificate.json").read_text())
     assert run.certified == run.certificate["passed"]
     assert mjxgait.open(run.folder) == run
+
+
+def test_a_second_run_of_the_same_shape_compiles_nothing(
+    run: mjxgait.Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """Another seed and another weight are numbers; the first is what it would be alone."""
+
+    def compiled(*_: object) -> None:
+        raise AssertionError("compiled anew")
+
+    monkeypatch.setattr("mjxgait.runs.experiment.compile_stages", compiled)
+    other = SMALL | {"fitness": {"weights": {"slip": 3.0}}}
+    mjxgait.train(
+        STOOL, out=tmp_path / "x", seed=4, population=6, generations=1, settings=other, quiet=True
+    )
+    again = mjxgait.train(
+        STOOL, out=tmp_path / "y", seed=3, population=6, generations=2, settings=SMALL, quiet=True
+    )
+    assert again.champion.fitness == run.champion.fitness
+
+
+def test_another_body_or_shape_has_programs_of_its_own(stool: Creature):
+    other = scaled(stool, {"*_left": 1.2})
+    shapes = [
+        build_experiment(body, small_config(**tables)).shape
+        for body, tables in (
+            (stool, {}),
+            (other, {}),
+            (stool, {"controller": {"key_poses": 3}}),
+            (stool, {"rollout": {"starts": 3}}),
+        )
+    ]
+    assert len(set(shapes)) == len(shapes)
+    assert build_experiment(stool, small_config(fitness={"speed": 0.7})).shape == shapes[0]
 
 
 def test_metrics_are_columns_over_generations(run: mjxgait.Run):

@@ -2,6 +2,7 @@
 
 import dataclasses
 import itertools
+from pathlib import Path
 
 import jax
 import jax.numpy as jnp
@@ -16,9 +17,11 @@ from mjxgait.certify.describe import gait_name
 from mjxgait.certify.stress import StressConfig
 from mjxgait.champion import read_champion, write_champion
 from mjxgait.creature import Creature, load_creature
+from mjxgait.creature.facing import facing
+from mjxgait.creature.scale import SETTINGS, load_files
 from mjxgait.errors import UserError
 from mjxgait.parts.fit import check_fit
-from mjxgait.parts.wishes import Wishes, hint, speed_of, wished
+from mjxgait.parts.wishes import Wishes, configured, hint, speed_of, wished
 from mjxgait.runs.experiment import build_batch
 from mjxgait.settings.config import Config, UseConfig
 from mjxgait.settings.gaits import GAITS, animal_stride, gait_of, placed, stations_of
@@ -379,6 +382,36 @@ def test_natural_is_the_gait_of_an_animal_at_this_speed(body: Creature):
         config = wished(Config(), other, Wishes(gait="natural"))
         assert config.fitness.wish.gait == "auto"
         assert config.controller == Config().controller
+
+
+def usually(creature: Creature, file: Path | None = None, **asked) -> Config:
+    return configured(creature, file, {}, Wishes(**asked))
+
+
+@pytest.mark.parametrize("dog", ["tall_quadruped", "short_quadruped"])
+def test_of_whom_nobody_asks_anything_its_usual_gait_is_asked(dog: str):
+    creature = load_creature(data_folder("envs") / dog)
+    assert usually(creature) == usually(creature, gait="natural")
+    assert usually(creature).fitness.wish.stride == 1.0
+
+
+def test_what_is_asked_or_written_in_a_file_is_all_that_is_asked(tmp_path: Path):
+    creature = load_creature(data_folder("envs") / "tall_quadruped")
+    (tmp_path / "mine.toml").write_text("[evolution]\npopulation = 40\n")
+    nothing = Config().fitness.wish
+    assert usually(creature, gait="auto").fitness.wish == nothing
+    assert usually(creature, tmp_path / "mine.toml").fitness.wish == nothing
+    assert usually(creature, Path("wilson")).fitness.wish == nothing
+    assert usually(creature, style="calm").fitness.wish.stride is None
+    assert usually(facing(creature, "back")).fitness.wish == nothing
+
+
+def test_a_usual_gait_that_it_does_not_have_is_named(stool: Creature):
+    odd = load_files(
+        {**stool.files, SETTINGS: stool.files[SETTINGS] + '[usual]\ngait = "waddle"\n'}
+    )
+    with pytest.raises(UserError, match=r"stool/creature\.toml: \[usual\]: .*waddle"):
+        usually(odd)
 
 
 def test_natural_begins_with_a_drawn_cycle_in_an_animals_time(body: Creature):

@@ -1,7 +1,7 @@
 """Wires the rooms into a run."""
 
 import dataclasses
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from functools import cached_property, partial
 from typing import Any
 
@@ -13,7 +13,7 @@ from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.parts import make_task
-from mjxgait.parts.registry import what_ends
+from mjxgait.parts.registry import find, what_ends
 from mjxgait.runs.blueprint import Numbers, Plan, draw_up
 from mjxgait.runs.devices import everywhere
 from mjxgait.runs.generation import Row, first_state, judge
@@ -61,6 +61,15 @@ class Experiment:
     def plant_note(self) -> str:
         """What a user should know about the physics; empty if there is nothing to say."""
         return self.simulator.plant.note
+
+    @property
+    def shape(self) -> Hashable:
+        """What decides on its compiled programs: the body, the shapes of settings and starts, and whose
+        code takes part.
+        """
+        use = self.config.use
+        code = (find("controller", use.controller), find("task", use.task))
+        return self.creature.digest, jax.tree.structure(self.row), code
 
     def init(self, island: int = 0) -> EvolutionState:
         """The state of generation -1: a population that nobody has judged.

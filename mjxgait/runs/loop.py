@@ -19,7 +19,6 @@ import numpy as np
 
 from mjxgait.champion import write_champion
 from mjxgait.creature import Creature
-from mjxgait.parts.registry import find
 from mjxgait.runs.checkpoint import Checkpoints
 from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.examination import Examined, Examiner, why_ended
@@ -119,17 +118,9 @@ _COMPILED: Latest[Stages] = Latest(2)
 
 
 def _step(experiment: Experiment, evaluator: Evaluator | None) -> Step:
-    use = experiment.config.use
-    shape = (
-        experiment.creature.digest,
-        jax.tree.structure(experiment.row),
-        find("controller", use.controller),
-        find("task", use.task),
-        evaluator is None,
-    )
-    return experiment.step(
-        _COMPILED.find(shape, lambda: experiment.stages(evaluator is None)), evaluator
-    )
+    judges = evaluator is None
+    stages = _COMPILED.find((experiment.shape, judges), lambda: experiment.stages(judges))
+    return experiment.step(stages, evaluator)
 
 
 def conclude(folder: Path, creature: Creature, screen: Screen, examined: Examined | None) -> None:
