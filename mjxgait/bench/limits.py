@@ -22,7 +22,7 @@ def step_cost(experiment: Experiment) -> dict[str, float]:
     from step to step.
     """
     simulator, lanes = experiment.simulator, experiment.simulator.lanes
-    lane = jax.eval_shape(partial(_lanes, experiment, lanes))
+    lane = jax.eval_shape(partial(_lanes, experiment, lanes), experiment.abstract().genomes)
     # The one look under the rollout's bonnet: its loop around the step would hide the step's own
     # cost.
     step = partial(simulator._step, jnp.int32(0))
@@ -56,10 +56,10 @@ def distance_to_limit(
     }
 
 
-def _lanes(experiment: Experiment, lanes: int) -> Lane:
-    """Simulations at the start, as many as a device holds."""
+def _lanes(experiment: Experiment, lanes: int, genomes: Any) -> Lane:
+    """Simulations at the start, as many as a device holds, of the first of genomes [N, ...]."""
     simulator = experiment.simulator
-    genomes = jax.tree.map(lambda leaf: leaf[None, :1], experiment.init().genomes)
+    genomes = jax.tree.map(lambda leaf: leaf[None, :1], genomes)
     starts, settings = jax.tree.map(
         lambda leaf: leaf[None], (experiment.row.starts, experiment.row.settings)
     )

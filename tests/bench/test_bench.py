@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
-from helpers import pose_champion
+from helpers import STOOL, pose_champion
 
 from mjxgait.bench import contest
 from mjxgait.bench.flops import count_flops
@@ -272,6 +272,8 @@ def test_the_command_writes_the_ratios(tmp_path):
         "bench",
         "--json",
         str(file),
+        "--env",
+        str(STOOL),
         "--rounds",
         "1",
         "--generations",
