@@ -8,12 +8,6 @@ from jax.sharding import NamedSharding, PartitionSpec
 from mjxgait.cores import cores
 from mjxgait.simulation.rollout import Simulator
 
-SLIM: dict[str, str | bool] = {
-    "xla_backend_optimization_level": "0",
-    "xla_llvm_disable_expensive_passes": True,
-}
-"""For programs that take longer to compile than to run."""
-
 
 def prepare_devices(devices: int | None = None, kind: str = "") -> None:
     """One JAX host device per core, and compiled programs kept in the user's cache folder. Call before JAX's first computation.
@@ -36,13 +30,16 @@ def everywhere(simulator: Simulator) -> NamedSharding:
 
 
 def compiled(lowered: jax.stages.Lowered, optimized: bool = True) -> jax.stages.Compiled:
-    """The program; the fast plant gains a third from the widest vectors, which XLA's CPU compiler does not use by itself.
+    """The program. optimized: not worth the compiler's time for what is a small part of a generation."""
+    return lowered.compile(compiler_options=compiler_options(optimized))
 
-    optimized: not worth the compiler's time for what is a small part of a generation.
+
+def compiler_options(optimized: bool) -> dict[str, str | bool]:
+    """Those of this machine's compiler; the fast plant gains a third from the widest vectors, which
+    XLA's CPU compiler does not use by itself.
     """
-    if not optimized:
-        return lowered.compile(compiler_options=SLIM)
-    options: dict[str, str | bool] = (
-        {"xla_cpu_prefer_vector_width": "512"} if jax.default_backend() == "cpu" else {}
-    )
-    return lowered.compile(compiler_options=options)
+    if jax.default_backend() != "cpu":
+        return {}
+    if optimized:
+        return {"xla_cpu_prefer_vector_width": "512"}
+    return {"xla_backend_optimization_level": "0", "xla_llvm_disable_expensive_passes": True}

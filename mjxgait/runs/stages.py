@@ -4,18 +4,19 @@ one, which simulates, is worth the compiler's best.
 
 import contextlib
 import dataclasses
+import functools
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager
-from functools import partial
 from typing import Any
 
 import jax
 
 from mjxgait.runs.blueprint import Numbers, Plan
-from mjxgait.runs.devices import SLIM, compiled, everywhere
+from mjxgait.runs.devices import compiled, compiler_options, everywhere
 from mjxgait.runs.generation import Row, absorb, first_state, judge, propose
 from mjxgait.search.state import EvolutionState, GenerationMetrics
+from mjxgait.settings.config import Config
 from mjxgait.simulation.evaluator import Evaluator
 from mjxgait.tasks.trials import Starts
 
@@ -61,7 +62,9 @@ def lowered(blueprint: Plan, function: Callable[..., Any], *given: Any) -> jax.s
     what has been compiled once is found again.
     """
     placed = everywhere(blueprint.own)
-    program = jax.jit(partial(function, blueprint), in_shardings=placed, out_shardings=placed)
+    program = jax.jit(
+        functools.partial(function, blueprint), in_shardings=placed, out_shardings=placed
+    )
     return program.lower(blueprint.numbers, *given)
 
 
@@ -81,7 +84,7 @@ def lower_stages(
         yield "judge", middle
         judged = middle.out_info
     else:
-        judged = jax.eval_shape(partial(judge, blueprint), blueprint.numbers, *given)
+        judged = jax.eval_shape(functools.partial(judge, blueprint), blueprint.numbers, *given)
     yield "absorb", lowered(blueprint, absorb, rows, states, proposals, judged)
 
 
@@ -99,8 +102,20 @@ def compile_stages(
     return Stages(**{part: one.result() for part, one in found.items()})
 
 
-begin = jax.jit(first_state, static_argnums=0, compiler_options=SLIM)
-"""The same compiled function for every run, alone or beside others, so that they begin with the same bits."""
+def begin(
+    blueprint: Plan, numbers: Numbers | None, settings: Config, key: jax.Array
+) -> EvolutionState:
+    """See `first_state`; the same compiled function for every run, alone or beside others, so that they
+    begin with the same bits.
+    """
+    return _beginning()(blueprint, numbers, settings, key)
+
+
+@functools.cache
+def _beginning() -> Callable[..., EvolutionState]:
+    """Not at import: the options ask which machine this is."""
+    options = compiler_options(optimized=False)
+    return jax.jit(first_state, static_argnums=0, compiler_options=options)
 
 
 def embodied(blueprint: Plan, starts: Starts) -> Starts:
