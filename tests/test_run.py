@@ -153,7 +153,7 @@ def test_a_run_killed_again_and_again_goes_on_to_the_same_champion_bit_for_bit(
     begin = ("train", *SMALL, "--out", folder)
     for generation in (1, 5):
         codes.append(kill_when(saving(folder, generation), *begin))
-        begin = ("train", "--resume", folder)
+        begin = ("train", "--resume", folder, "--no-plots")
     assert -signal.SIGKILL in codes, "at most one moment may have passed unseen"
     said_by(capsys, *begin, code=0)
     assert result(folder) == result(finished[0])
@@ -174,7 +174,7 @@ def test_killed_between_two_checkpoints_it_repeats_what_came_after_the_first(
     assert kill_when(between, *arguments) == -signal.SIGKILL
     kept = [int(path.name) for path in (folder / "checkpoints").iterdir() if path.name.isdigit()]
     assert max(kept) < len(read_metrics(folder / "metrics.jsonl")) - 1
-    said_by(capsys, "train", "--resume", folder, code=0)
+    said_by(capsys, "train", "--resume", folder, "--no-plots", code=0)
     assert result(folder) == result(finished[0])
     assert without_times(folder) == without_times(finished[0])
 
@@ -197,7 +197,7 @@ def test_twice_interrupted_is_the_same_too(
     folder = tmp_path / "stopped"
     said_by(capsys, "train", *SMALL, "--generations", "2", "--out", folder, code=0)
     for last in ("4", "7"):
-        said_by(capsys, "train", "--resume", folder, "--generations", last, code=0)
+        said_by(capsys, "train", "--resume", folder, "--generations", last, "--no-plots", code=0)
     assert result(folder) == result(finished[0])
 
 
