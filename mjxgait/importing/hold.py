@@ -72,6 +72,9 @@ def hold(
         np.zeros((model.nv, model.nv)),
     )
     up, height, touched = 1.0, 1.0, ""
+    known = feet | {"floor"}
+    may_touch = np.array([model.geom(geom).name in known for geom in range(model.ngeom)])
+    own = np.arange(6, model.nv)
     for _ in range(round(seconds / step)):
         mujoco.mj_step1(model, data)
         mujoco.mj_fullM(model, data, mass)
@@ -79,16 +82,16 @@ def hold(
         spring = -kp * (data.qpos[7:] + step * data.qvel[6:] - target) - kd * data.qvel[6:]
         force = data.qfrc_passive - data.qfrc_bias
         force[6:] += spring
-        damped = mass.copy()
-        damped[range(6, model.nv), range(6, model.nv)] += step * kd
-        acceleration = np.linalg.solve(damped, force)
-        data.qfrc_applied[6:] = np.clip(spring - step * kd * acceleration[6:], -limit, limit)
+        mass[own, own] += step * kd
+        acceleration = np.linalg.solve(mass, force)
+        torque = spring - step * kd * acceleration[6:]
+        data.qfrc_applied[6:] = np.minimum(np.maximum(torque, -limit), limit)
         mujoco.mj_step2(model, data)
         if not np.isfinite(data.qpos).all() or np.abs(data.qvel).max() > 1e3:
             return Held(-1.0, 0.0, 0.0, 9.0, 9.0, touched)
         up = min(up, float((data.xmat[1].reshape(3, 3) @ up_axis)[2]))
         height = min(height, float(data.xpos[1][2] / max(start[2], 1e-9)))
-        touched = touched or _touching(model, data, feet)
+        touched = touched or _touching(model, data, may_touch)
         if up < 0.3:
             break
     error = data.qpos[7:] - goal
@@ -103,9 +106,8 @@ def hold(
     )
 
 
-def _touching(model: mujoco.MjModel, data: mujoco.MjData, feet: set[str]) -> str:
-    for geom in set(data.contact.geom.ravel().tolist()):
-        name = model.geom(geom).name
-        if name != "floor" and name not in feet:
-            return str(model.body(int(model.geom_bodyid[geom])).name)
-    return ""
+def _touching(model: mujoco.MjModel, data: mujoco.MjData, may_touch: np.ndarray) -> str:
+    """A part that touches something and may not, or "". may_touch: [G] of geoms."""
+    touching = data.contact.geom.ravel()
+    wrong = touching[~may_touch[touching]]
+    return str(model.body(int(model.geom_bodyid[wrong[0]])).name) if len(wrong) else ""

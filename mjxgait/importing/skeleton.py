@@ -1,6 +1,7 @@
 """From the compiled model and its anatomy to the list of bodies that will be written."""
 
 import dataclasses
+import functools
 from collections.abc import Mapping
 
 import mujoco
@@ -156,7 +157,7 @@ def height_of(bodies: list[Body], xpos: np.ndarray, xrot: np.ndarray, chosen: li
     lows = [np.inf]
     for i in chosen:
         shapes = [s for s in bodies[i].shapes if s.solid] or [s for s in bodies[i].shapes if s.seen]
-        lows += [float((xpos[i] + s.points @ xrot[i].T)[:, 2].min() - s.radius) for s in shapes]
+        lows += [float((xpos[i, 2] + s.points @ xrot[i, 2]).min() - s.radius) for s in shapes]
     return min(lows)
 
 
@@ -171,6 +172,11 @@ class Tip:
     body: int
     shape: Shape
     far: np.ndarray
+
+    @functools.cached_property
+    def ends(self) -> tuple[np.ndarray, np.ndarray]:
+        """Points of the shank, and of the foot's end, each [n, 3]; a search asks for them often."""
+        return self.shape.points[~self.far], self.shape.points[self.far]
 
 
 def foot_tips(bodies: list[Body], group: list[int]) -> list[Tip]:
@@ -204,6 +210,7 @@ def tip_points(tips: list[Tip], xpos: np.ndarray, xrot: np.ndarray, far: bool = 
     """[n, 3] lowest points of the balls of a foot's end, or of its shank."""
     found = []
     for t in tips:
-        chosen = t.shape.points[t.far if far else ~t.far]
-        found.append(xpos[t.body] + chosen @ xrot[t.body].T - [0.0, 0.0, t.shape.radius])
+        low = xpos[t.body] + t.ends[far] @ xrot[t.body].T
+        low[:, 2] -= t.shape.radius
+        found.append(low)
     return np.concatenate(found) if found else np.zeros((0, 3))

@@ -2,6 +2,7 @@
 animal.
 """
 
+import functools
 from pathlib import Path
 
 import mujoco
@@ -16,6 +17,7 @@ from mjxgait.creature.overlap import find_crossings
 from mjxgait.creature.scale import load_files
 from mjxgait.errors import UserError
 from mjxgait.importing import ImportChoices, import_model
+from mjxgait.importing.convert import Imported
 from mjxgait.importing.portrait import standing
 from mjxgait.physics.fast import UnsupportedModel, fast_plant
 from mjxgait.physics.fast.difference import difference
@@ -44,10 +46,16 @@ MASS = {"gym half_cheetah": 14.0, "solo12": 2.5, "unitree g1": 33.34, "laikago":
 pytestmark = pytest.mark.slow
 
 
+@functools.cache
+def imported_model(name: str) -> Imported:
+    """By default settings; once for all tests that look at it."""
+    path, search = model_file(name)
+    return import_model(path, ImportChoices(search=search, apart=False))
+
+
 @pytest.mark.parametrize("name", [name for name in MODELS if name not in REFUSED])
 def test_file_to_standing_creature(tmp_path: Path, name: str):
-    path, search = model_file(name)
-    imported = import_model(path, ImportChoices(search=search, apart=False))
+    imported = imported_model(name)
     write_folder(tmp_path / "mine", imported)
     creature = load_creature(tmp_path / "mine")
     assert standing(creature).stands == imported.stands == (name not in FALLS)
@@ -89,8 +97,7 @@ def test_the_ant_is_the_same_animal(tmp_path: Path):
 @pytest.mark.parametrize("name", ["laikago", "mini cheetah", "solo12"])
 def test_a_stance_that_was_searched_has_no_foot_within_the_hips(tmp_path: Path, name: str):
     """Legs tucked in or crossed under the trunk stand, but whatever steps from there tips over."""
-    path, search = model_file(name)
-    write_folder(tmp_path / "mine", import_model(path, ImportChoices(search=search, apart=False)))
+    write_folder(tmp_path / "mine", imported_model(name))
     creature = load_creature(tmp_path / "mine")
     data = mujoco.MjData(creature.model)
     data.qpos[:] = creature.stand_qpos
@@ -116,9 +123,7 @@ def test_robot_dogs_share_one_program():
     """Twelve joints each, whatever rotors, sensors and shapes their files have."""
 
     def topology(name: str) -> Topology:
-        path, search = model_file(name)
-        files = import_model(path, ImportChoices(search=search, apart=False)).files
-        creature = load_files(files)
+        creature = load_files(imported_model(name).files)
         known = (creature.evolution_model, sense_layout(creature), find_crossings(creature))
         return fast_plant(*known, roomy=True).topology
 
