@@ -128,7 +128,7 @@ def test_bars_that_are_watched_grow_with_their_parts(stool: Creature):
     """Alike factors scale every depth alike."""
     plant = fast_plant(stool.evolution_model, sense_layout(stool), find_crossings(stool))
     assert plant.topology.first
-    grew = plant.resized(plant.parameters, jnp.full(stool.model.nbody - 1, 1.2))
+    grew = jax.jit(plant.resized)(plant.parameters, jnp.full(stool.model.nbody - 1, 1.2))
     for name in ("centre", "half", "radius", "reach"):
         before, after = getattr(plant.parameters.bars, name), getattr(grew.bars, name)
         np.testing.assert_allclose(after, 1.2 * before, rtol=1e-5, err_msg=name)

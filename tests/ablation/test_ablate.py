@@ -65,7 +65,7 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def finished(study: Path, emitted_as_shipped: None) -> tuple[Path, str]:
+def finished(study: Path) -> tuple[Path, str]:
     folder = study.parent / "out"
     return folder, mjxgait("ablate", study, "--out", folder)
 

@@ -186,9 +186,9 @@ def test_what_has_no_hinge_starts_unbent():
     weightless: Any = SimpleNamespace(rested=lambda tree, qpos: qpos)
     bent = jnp.full(7 + CAPACITY.links - 1, 0.3)
     start = Starts(bent, *[jnp.zeros(1)] * 6)
+    embody = jax.jit(lambda genome: GraphGrowth(CAPACITY).body(weightless, genome, start).qpos)
     for joint, hinges in (("rigid", 0), ("universal", 2)):
-        genome = Genotype(star(mirror=0, joint=joint), nobody, nobody)
-        qpos = np.asarray(GraphGrowth(CAPACITY).body(weightless, genome, start).qpos)
+        qpos = np.asarray(embody(Genotype(star(mirror=0, joint=joint), nobody, nobody)))
         np.testing.assert_allclose(qpos, [0.3] * (7 + hinges) + [0] * (11 - hinges), atol=1e-7)
 
 

@@ -249,9 +249,10 @@ def test_the_evaluator_does_not_care_for_its_neighbours(programs: Any):
     """One alone, as the examiner has a user's code, and among others of other lengths."""
     code, value = (jnp.asarray(rows[:16]) for rows in programs)
     seen = jnp.asarray(np.random.default_rng(1).normal(size=(16, len(KNOWN))), jnp.float32)
-    plans = [listed(Trees(code[i : i + 1], value[i : i + 1]), WORDS) for i in range(16)]
+    plan = jax.jit(lambda *rows: listed(Trees(*rows), WORDS))
+    plans = [plan(code[i : i + 1], value[i : i + 1]) for i in range(16)]
     together = jax.vmap(evaluate)(jax.tree.map(lambda *x: jnp.stack(x), *plans), seen)
-    alone = [evaluate(plan, senses) for plan, senses in zip(plans, seen, strict=True)]
+    alone = list(map(jax.jit(evaluate), plans, seen))
     np.testing.assert_allclose(np.stack(alone), together, rtol=1e-6, atol=1e-6)
 
 
