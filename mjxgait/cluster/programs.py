@@ -1,6 +1,6 @@
 """Programs that a process has compiled, so that work of the same shape finds them again."""
 
-import hashlib
+import dataclasses
 from collections.abc import Hashable
 from contextlib import AbstractContextManager
 from typing import Any
@@ -12,12 +12,25 @@ from mjxgait.runs.blueprint import Plan, draw_up
 from mjxgait.runs.devices import compiled
 from mjxgait.runs.experiment import Batch, Step, build_batch
 from mjxgait.runs.latest import Latest
+from mjxgait.runs.shape import Shape, shape_of
 from mjxgait.runs.stages import Stages, Turn, at_once
-from mjxgait.settings.traced import traced
 from mjxgait.types import Judged
 
 KEPT = 8
 """Of each sort, those that were used last; a program takes some hundred MB."""
+
+
+@dataclasses.dataclass(frozen=True)
+class BatchShape:
+    """That of runs side by side. rows: how many. sources: the most that one of them has."""
+
+    run: Shape
+    rows: int
+    sources: int
+
+    def name(self, *more: Hashable) -> str:
+        """See `Shape.name`."""
+        return self.run.name(self.rows, self.sources, *more)
 
 
 class Programs:
@@ -25,7 +38,7 @@ class Programs:
 
     def __init__(self, turn: Turn = at_once) -> None:
         self._turn = turn
-        self._batches: Latest[tuple[Hashable, Batch]] = Latest(KEPT)
+        self._batches: Latest[tuple[BatchShape, Batch]] = Latest(KEPT)
         self._plans: Latest[Plan] = Latest(KEPT)
         self._stages: Latest[Stages] = Latest(KEPT)
         self._judges: Latest[jax.stages.Compiled] = Latest(KEPT)
@@ -39,7 +52,7 @@ class Programs:
         shape, batch = self._known(recipe)
 
         def turn(part: str) -> AbstractContextManager[object]:
-            return self._turn(_name(shape, part))
+            return self._turn(shape.name(part))
 
         return batch.bound(self._stages.find(shape, lambda: batch.stages(turn=turn)))
 
@@ -50,7 +63,7 @@ class Programs:
 
         def compile_it() -> jax.stages.Compiled:
             program = batch.lower_judge(genomes, starts)
-            with self._turn(_name(shape, "judge", count)):
+            with self._turn(shape.name("judge", count)):
                 return compiled(program)
 
         program = self._judges.find((shape, count), compile_it)
@@ -58,17 +71,14 @@ class Programs:
         judged: Judged = jax.device_get(program(numbers, rows.settings, starts, genomes))
         return judged
 
-    def _known(self, recipe: Recipe) -> tuple[Hashable, Batch]:
+    def _known(self, recipe: Recipe) -> tuple[BatchShape, Batch]:
         """The runs of a recipe, and what decides the shape of their program."""
         return self._batches.find(recipe.digest, lambda: self._built(recipe))
 
-    def _built(self, recipe: Recipe) -> tuple[Hashable, Batch]:
+    def _built(self, recipe: Recipe) -> tuple[BatchShape, Batch]:
         creature, configs = recipe.read()
-        one = (creature.digest, jax.tree.structure(traced(configs[0])))
-        plan = self._plans.find(one, lambda: draw_up(creature, configs[0]))
+        shape = shape_of(creature, configs[0])
+        plan = self._plans.find(shape, lambda: draw_up(creature, configs[0]))
         batch = build_batch(creature, configs, plan, recipe.sources)
-        return (one, len(configs), max(map(len, recipe.sources), default=0)), batch
-
-
-def _name(*key: Hashable) -> str:
-    return hashlib.sha256(repr(key).encode()).hexdigest()[:16]
+        sources = max(map(len, recipe.sources), default=0)
+        return BatchShape(shape, len(configs), sources), batch

@@ -13,10 +13,11 @@ from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.parts import make_task
-from mjxgait.parts.registry import find, what_ends
+from mjxgait.parts.registry import what_ends
 from mjxgait.runs.blueprint import Numbers, Plan, draw_up
 from mjxgait.runs.devices import everywhere
 from mjxgait.runs.generation import Row, first_state, judge
+from mjxgait.runs.shape import shape_of
 from mjxgait.runs.stages import (
     Stages,
     Turn,
@@ -64,12 +65,8 @@ class Experiment:
 
     @property
     def shape(self) -> Hashable:
-        """What decides on its compiled programs: the body, the shapes of settings and starts, and whose
-        code takes part.
-        """
-        use = self.config.use
-        code = (find("controller", use.controller), find("task", use.task))
-        return self.creature.digest, jax.tree.structure(self.row), code
+        """What decides on its compiled programs; see `Shape`."""
+        return shape_of(self.creature, self.config), jax.tree.structure(self.row)
 
     def init(self, island: int = 0) -> EvolutionState:
         """The state of generation -1: a population that nobody has judged.

@@ -1,0 +1,32 @@
+"""Which runs share compiled programs; other bodies and sizes are tried in `test_library`."""
+
+import dataclasses
+
+import pytest
+from helpers import small_config
+
+from mjxgait.creature import Creature
+from mjxgait.parts import registry
+from mjxgait.runs.shape import shape_of
+
+
+def test_numbers_are_free(stool: Creature):
+    """So is the seed, and the lock that is held while a program is compiled has the same name."""
+    config = small_config(drive={"law": "pd"}, fitness={"weights": {"slip": 3.0}})
+    one, other = (
+        shape_of(stool, each) for each in (small_config(), dataclasses.replace(config, seed=5))
+    )
+    assert one == other
+    assert hash(one) == hash(other)
+    assert one.name("judge") == other.name("judge") != one.name("absorb")
+
+
+@pytest.mark.parametrize("kind", ["controller", "task"])
+def test_code_of_the_same_name_that_was_defined_anew_is_other_code(
+    stool: Creature, kind: str, monkeypatch: pytest.MonkeyPatch
+):
+    before = shape_of(stool, small_config())
+    name = getattr(small_config().use, kind)
+    own = type(name, (registry.find(kind, name),), {})
+    monkeypatch.setitem(registry._OWN, (kind, name), own)
+    assert shape_of(stool, small_config()) != before
