@@ -85,7 +85,7 @@ def hold(
         mass[own, own] += step * kd
         acceleration = np.linalg.solve(mass, force)
         torque = spring - step * kd * acceleration[6:]
-        data.qfrc_applied[6:] = np.minimum(np.maximum(torque, -limit), limit)
+        data.qfrc_applied[6:] = np.clip(torque, -limit, limit)
         mujoco.mj_step2(model, data)
         if not np.isfinite(data.qpos).all() or np.abs(data.qvel).max() > 1e3:
             return Held(-1.0, 0.0, 0.0, 9.0, 9.0, touched)

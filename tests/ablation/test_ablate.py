@@ -27,7 +27,7 @@ generations = 3
 
 [base]
 evolution = {{ population = 6 }}
-rollout = {{ seconds = 0.4, starts = 2, lanes = 4 }}
+rollout = {{ seconds = 0.4, starts = 2, physics = "mjx", lanes = 4 }}
 
 [[variant]]
 name = "stable PD"
@@ -38,7 +38,7 @@ settings = {{ drive = {{ law = "pd" }} }}
 
 [[variant]]
 name = "three key poses"
-settings = {{ controller = {{ key_poses = 3 }} }}
+settings = {{ controller = {{ key_poses = 3 }}, rollout = {{ physics = "auto" }} }}
 generations = 2
 """
 
@@ -65,7 +65,7 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def finished(study: Path) -> tuple[Path, str]:
+def finished(study: Path, emitted_as_shipped: None) -> tuple[Path, str]:
     folder = study.parent / "out"
     return folder, mjxgait("ablate", study, "--out", folder)
 
@@ -100,7 +100,7 @@ def test_a_row_is_the_run_that_train_makes(finished: tuple[Path, str], tmp_path:
     """
     folder, _ = finished
     train = "--seed 1 --population 6 --generations 3 --drive.law pd"
-    train += " --rollout.seconds 0.4 --rollout.starts 2 --rollout.lanes 4"
+    train += " --rollout.seconds 0.4 --rollout.starts 2 --rollout.physics mjx --rollout.lanes 4"
     train += " --evolution.forced.patience 0 --examination.candidates 0 --no-plots"
     out = tmp_path / "alone"
     mjxgait("train", "--env", STOOL, *train.split(), "--out", out)
