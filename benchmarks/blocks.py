@@ -19,6 +19,7 @@ from mjxgait.blocks.phenotype import body_of
 from mjxgait.physics import make_plant
 from mjxgait.physics.trees.plant import TreePlant
 from mjxgait.physics.trees.tree import Surroundings
+from mjxgait.search.chance import key_of
 from mjxgait.types import BodyState
 
 LANES, STEPS = 64, 200
@@ -31,7 +32,7 @@ def blocks(capacity: Capacity, around: Surroundings) -> Run:
     def grow(key: jax.Array):
         return body_of(random_graph(key, capacity, Ranges()), capacity)
 
-    bodies = jax.jit(jax.vmap(grow))(jax.random.split(jax.random.key(0), LANES))
+    bodies = jax.jit(jax.vmap(grow))(jax.random.split(key_of(0), LANES))
     tree = jax.tree.map(lambda leaf: jnp.moveaxis(leaf, 0, -1), bodies.tree)
     still = jnp.zeros((capacity.links + 5, LANES))
     qpos = jnp.zeros((capacity.links + 6, LANES)).at[2].set(0.4).at[3].set(1.0)

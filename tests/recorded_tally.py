@@ -90,6 +90,8 @@ def tally_of(frames: Frames, steps: int, half: int, clearance: float) -> dict[st
         "left": left[-1],
         "forward_half": forward[min(half, steps) - 1],
         "heading": np.arctan2(nose[1], nose[0]),
+        "loaded": (low < 0)[-1],
+        "touchdowns": (np.diff((low < 0).astype(int), axis=0, prepend=0) > 0).sum(0),
         "contact": down.sum(0),
         "slip": slid.sum(0),
         "airborne": (~down.any(1)).sum(),

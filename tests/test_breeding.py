@@ -12,6 +12,7 @@ import pytest
 from mjxgait.control.pose_variation import pose_variation
 from mjxgait.control.poses import Genome
 from mjxgait.search.breeding import Nursery
+from mjxgait.search.chance import key_of
 from mjxgait.search.variation import Box, first_occurrence
 from mjxgait.settings.config import Config
 from mjxgait.settings.evolution import EvolutionConfig
@@ -52,7 +53,7 @@ def born(poses: int = 3, seed: int = 0, **settings) -> tuple[Genome, Genome, jax
     adults = marked(config, poses)
     reach = float(config.population * poses)
     settings = traced(Config(evolution=config)).evolution
-    children, crossed = bear(settings, jax.random.key(seed), adults, jnp.float32(reach))
+    children, crossed = bear(settings, key_of(seed), adults, jnp.float32(reach))
     return adults, children, crossed
 
 

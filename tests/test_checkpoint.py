@@ -17,6 +17,7 @@ from test_evolution import advance, begin, inputs, toy
 
 from mjxgait.errors import UserError
 from mjxgait.runs.checkpoint import FOLDER, Checkpoints
+from mjxgait.search.chance import key_of
 from mjxgait.search.state import EvolutionState
 
 DIGEST = "0123456789abcdef"
@@ -31,7 +32,7 @@ def evolution():
 def states(evolution) -> list[EvolutionState]:
     """The states of generations 0 to 6."""
     given, found = inputs(evolution), []
-    state = begin(*given, jax.random.key(0))
+    state = begin(*given, key_of(0))
     for _ in range(7):
         state, *_ = advance(*given, state)
         found.append(state)
@@ -50,7 +51,7 @@ def run(tmp_path: Path, states: list[EvolutionState]) -> Path:
 
 def restore(run: Path, evolution, digest: str = DIGEST, **where) -> EvolutionState:
     return Checkpoints(run).restore(
-        jax.eval_shape(lambda: evolution.init(jax.random.key(0), 1, 1, 1)), digest, **where
+        jax.eval_shape(lambda: evolution.init(key_of(0), 1, 1, 1)), digest, **where
     )
 
 
@@ -203,8 +204,9 @@ import jax
 from test_evolution import begin, inputs, toy
 from mjxgait.errors import UserError
 from mjxgait.runs import checkpoint
+from mjxgait.search.chance import key_of
 
-begun = begin(*inputs(toy()), jax.random.key(0))
+begun = begin(*inputs(toy()), key_of(0))
 state, later = (dataclasses.replace(begun, generation=jax.numpy.int32(g)) for g in (0, 1))
 checkpoints = checkpoint.Checkpoints(Path(sys.argv[1]))
 checkpoints.save(state, "toy", "0" * 16)

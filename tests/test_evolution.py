@@ -13,6 +13,7 @@ import pytest
 from mjxgait.control.pose_variation import pose_variation
 from mjxgait.control.poses import Genome
 from mjxgait.search.breeding import parents, proportional_parents
+from mjxgait.search.chance import key_of
 from mjxgait.search.evolution import Evolution
 from mjxgait.search.families import families, place_in_family
 from mjxgait.search.state import NOBODY, EvolutionState, GenerationMetrics, Origin, stop_reason
@@ -109,7 +110,7 @@ def run(
     evolution: Toy, generations: int = 30, seed: int = 0, program: Callable[..., Any] = advance
 ) -> list[tuple[EvolutionState, GenerationMetrics]]:
     given = inputs(evolution)
-    state, history = begin(*given, jax.random.key(seed)), []
+    state, history = begin(*given, key_of(seed)), []
     while len(history) < generations:
         state, metrics, _ = jax.device_get(program(*given, state))
         if state.generation >= 0:
@@ -247,7 +248,7 @@ def test_what_a_genome_costs_is_taken_from_its_fitness():
         return 3.0 * jnp.sum(genomes.key_poses[:, :, 0] > 0, axis=1)
 
     dear = dataclasses.replace(plain, variation=dataclasses.replace(plain.variation, price=price))
-    state, step = dear.init(jax.random.key(0), 1, 1, 1), jax.jit(dear.step)
+    state, step = dear.init(key_of(0), 1, 1, 1), jax.jit(dear.step)
     for _ in range(12):
         state, _ = step(state)
         expected = near_zero(state.genomes) - price(state.genomes)
@@ -282,7 +283,7 @@ def test_duplicates_fill_the_population_when_they_may_stay():
 @pytest.mark.parametrize("growth", [1.2, 1.5, 2.0, 3.0])
 def test_everybody_of_the_initial_population_is_judged_before_generation_zero(growth: float):
     evolution = toy(growth=growth)
-    created = begin(*inputs(evolution), jax.random.key(0))
+    created = begin(*inputs(evolution), key_of(0))
     first = run(evolution, 1)[0][0]
     assert int(first.generation) == 0
     assert np.allclose(first.fitness, np.sort(near_zero(created.genomes))[::-1])
@@ -292,7 +293,7 @@ def test_everybody_of_the_initial_population_is_judged_before_generation_zero(gr
 @pytest.mark.parametrize("growth", [1.5, 2.0, 3.0])
 def test_the_first_generation_is_the_best_of_as_many_candidates_as_asked_for(growth: float):
     plain, choosy = toy(growth=growth), toy(growth=growth, initial_choice=4)
-    rounds, first = [], begin(*inputs(choosy), jax.random.key(0))
+    rounds, first = [], begin(*inputs(choosy), key_of(0))
     while int(first.generation) < 0:
         first, _, judged = advance(*inputs(choosy), first)
         rounds.append(near_zero(judged))
@@ -417,7 +418,7 @@ def test_a_run_stops_at_the_target_and_at_the_cap():
 
 @pytest.mark.parametrize("selection", ["uniform", "rank", "tournament"])
 def test_parents_are_two_and_the_better_are_drawn_more_often(selection: str):
-    mothers, fathers = parents(jax.random.key(0), 20_000, 10, selection)
+    mothers, fathers = parents(key_of(0), 20_000, 10, selection)
     assert (mothers != fathers).all()
     counts = np.bincount(np.asarray(mothers), minlength=10) / 20_000
     expected = np.full(10, 0.1) if selection == "uniform" else (19 - 2 * np.arange(10)) / 100
@@ -426,17 +427,17 @@ def test_parents_are_two_and_the_better_are_drawn_more_often(selection: str):
 
 def test_parents_may_be_drawn_in_proportion_to_their_fitness():
     fitness = jnp.array([6.0, 3.0, 1.0, 0.0, -4.0, -jnp.inf])
-    mothers, fathers = proportional_parents(jax.random.key(0), 20_000, fitness)
+    mothers, fathers = proportional_parents(key_of(0), 20_000, fitness)
     assert (mothers != fathers).all()
     counts = np.bincount(np.asarray(mothers), minlength=6) / 20_000
     assert counts == pytest.approx([0.6, 0.3, 0.1, 0, 0, 0], abs=0.01)
-    nobody, _ = proportional_parents(jax.random.key(0), 6_000, jnp.full(6, -1.0))
+    nobody, _ = proportional_parents(key_of(0), 6_000, jnp.full(6, -1.0))
     assert np.bincount(np.asarray(nobody), minlength=6) / 6_000 == pytest.approx(1 / 6, abs=0.03)
 
 
 @pytest.mark.parametrize("rivals", [1, 6])
 def test_the_best_of_more_rivals_is_better(rivals: int):
-    mothers, _ = parents(jax.random.key(0), 20_000, 10, "tournament", rivals)
+    mothers, _ = parents(key_of(0), 20_000, 10, "tournament", rivals)
     # The best of n is place k or worse if all n are.
     worse = (1 - np.arange(11) / 10) ** rivals
     assert np.bincount(mothers, minlength=10) / 20_000 == pytest.approx(-np.diff(worse), abs=0.015)

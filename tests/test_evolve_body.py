@@ -25,6 +25,7 @@ from mjxgait.physics.layout import sense_layout
 from mjxgait.physics.plain import mjx_plant
 from mjxgait.runs.folder import BODY, CHAMPION
 from mjxgait.runs.growth import SizeGrowth
+from mjxgait.search.chance import key_of
 from mjxgait.tasks.trials import draw_starts
 
 MOST = 1.3
@@ -112,7 +113,7 @@ def test_it_stands_as_high_above_the_floor(shipped: Creature):
     known, sizes = proportions(shipped), some_sizes(shipped, 4)
     plant = fast_plant(shipped.model, sense_layout(shipped), None)
     config = mjxgait.settings.config.RolloutConfig(starts=1)
-    start = jax.tree.map(lambda x: x[0], draw_starts(jax.random.key(0), shipped, config))
+    start = jax.tree.map(lambda x: x[0], draw_starts(key_of(0), shipped, config))
     # Compiled for the place alone, for the body's other numbers take the compiler ten seconds.
     place = jax.jit(lambda genome: SizeGrowth(known).body(plant, genome, start).qpos)
     other = grown(shipped, known.by_part(sizes))

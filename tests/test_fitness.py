@@ -41,6 +41,9 @@ CASES: list[tuple[str, float, dict]] = [
     ("duty", 0.5, {"contact": [900.0, 500, 500, 500]}),
     ("duty", 0.75, {"contact": [500.0, 100, 500, 800]}),
     ("airborne", 0.15, {"airborne": 150.0}),
+    # one to begin with, one after each swing, and of one foot three too many
+    ("patter", 0.75 / 4.75 / 4, {"swings": [4.0] * 4, "touchdowns": [5.0, 5, 8, 5]}),
+    ("patter", 0.0, {"swings": [4.0] * 4, "touchdowns": [5.0, 4, 5, 0]}),
     ("foot_height", 0.15, {"foot_height": 200.0}),
     ("foot_height", 0.0, {"foot_height": 100.0}),
     ("tilt", 0.12, {"tilt": 120.0}),

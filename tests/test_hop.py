@@ -18,6 +18,7 @@ from mjxgait.parts import resolve_config
 from mjxgait.parts.own import load
 from mjxgait.parts.settings import build_config
 from mjxgait.runs.experiment import Experiment, build_experiment
+from mjxgait.search.chance import key_of
 from mjxgait.settings.hop import GOALS, NOMINAL_GOAL, HopConfig, HopWeights
 from mjxgait.settings.rollout import RolloutConfig
 from mjxgait.settings.shipped import find_creature
@@ -60,7 +61,7 @@ def moment(creature: Creature, forward: float = 0.0, aside: float = 0.0, **other
 
 def trials(creature: Creature, count: int) -> tuple[Starts, Starts]:
     """Those of hopping, and those that every other task has with the same key."""
-    key, settings = jax.random.key(3), RolloutConfig(starts=count)
+    key, settings = key_of(3), RolloutConfig(starts=count)
     task = Hop(creature, STEP, HORIZON, creature.settings.termination)
     return task.trials(key, creature, settings), draw_starts(key, creature, settings)
 

@@ -27,6 +27,7 @@ from mjxgait.errors import UserError
 from mjxgait.parts.settings import build_config
 from mjxgait.runs.experiment import build_experiment
 from mjxgait.runs.generation import LEADERS, Row, climbed, next_starts
+from mjxgait.search.chance import key_of
 from mjxgait.search.state import EvolutionState
 from mjxgait.settings import limbo as evolution
 from mjxgait.settings.limbo import BAR_PLACE, LimboConfig
@@ -255,11 +256,11 @@ def test_the_bar_comes_down_a_step_when_most_of_the_best_have_mastered_it(
 
 def test_all_goals_lie_beyond_the_bar(luxo: Creature):
     task = Limbo(luxo, STEP, HORIZON, luxo.settings.termination)
-    goals = np.asarray(task.trials(jax.random.key(0), luxo, RolloutConfig(starts=100)).goal)
+    goals = np.asarray(task.trials(key_of(0), luxo, RolloutConfig(starts=100)).goal)
     assert goals[0] == np.float32(evolution.NOMINAL_GOAL)
     assert goals.min() > BAR_PLACE + luxo.frame.body_length
     with pytest.raises(UserError, match=r"slope:0.1.*flat"):
-        task.trials(jax.random.key(0), luxo, RolloutConfig(ground="slope:0.1"))
+        task.trials(key_of(0), luxo, RolloutConfig(ground="slope:0.1"))
 
 
 def test_a_lower_bar_is_a_setting_of_the_same_program(stool: Creature):

@@ -16,6 +16,7 @@ from mjxgait.control.poses import Genome
 from mjxgait.creature import Creature, load_creature
 from mjxgait.runs.experiment import Experiment, build_experiment
 from mjxgait.runs.generation import evolution_of
+from mjxgait.search.chance import key_of
 from mjxgait.search.variation import Box, uniform
 from mjxgait.settings.config import Config
 from mjxgait.settings.gaits import stride_limit
@@ -39,7 +40,7 @@ ENDS = (Reason.TIPPED, Reason.TOO_LOW, Reason.TOO_HIGH, Reason.TOUCHED)
 
 def genomes(experiment: Experiment, count: int, seed: int = 0) -> Genome:
     return uniform(
-        jax.random.key(seed),
+        key_of(seed),
         Box(*experiment.simulator.controller.bounds(experiment.config.controller)),
         count,
     )
@@ -230,7 +231,7 @@ def test_death_freezes_the_tally(experiment: Experiment, stool: Creature):
 
 def test_the_first_start_is_nominal_and_the_others_are_not(stool: Creature):
     config = small_config(rollout={"starts": 5, "seconds": 2.0})
-    starts = draw_starts(jax.random.key(3), stool, config.rollout)
+    starts = draw_starts(key_of(3), stool, config.rollout)
     assert np.allclose(starts.qpos[0], stool.stand_qpos)
     assert not starts.qvel[0].any()
     assert float(starts.friction[0]) == 1.0

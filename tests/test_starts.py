@@ -10,6 +10,7 @@ from helpers import small_config
 from mjxgait.creature import Creature
 from mjxgait.runs.experiment import build_experiment
 from mjxgait.runs.generation import next_starts
+from mjxgait.search.chance import key_of
 from mjxgait.settings.control import HOLDS
 from mjxgait.simulation.rollout import CHECK_EVERY
 from mjxgait.tasks.trials import NEVER, Starts, draw_starts
@@ -26,7 +27,7 @@ COUNT = 40
 
 def drawn(creature: Creature, **perturbation: object) -> Starts:
     config = small_config(rollout={**NONE, "starts": COUNT, "seconds": 2.0, **perturbation})
-    return jax.device_get(draw_starts(jax.random.key(5), creature, config.rollout))
+    return jax.device_get(draw_starts(key_of(5), creature, config.rollout))
 
 
 def differing(one: Starts, other: Starts) -> set[str]:

@@ -12,6 +12,7 @@ import pytest
 from mjxgait.control.pose_variation import pose_variation
 from mjxgait.control.poses import Genome
 from mjxgait.search import variation
+from mjxgait.search.chance import key_of
 from mjxgait.search.variation import Box, first_occurrence
 from mjxgait.settings.config import Config
 from mjxgait.settings.evolution import EvolutionConfig
@@ -25,7 +26,7 @@ BOX = Box(
 
 
 def keys(count: int) -> jax.Array:
-    return jax.random.split(jax.random.key(0), count)
+    return jax.random.split(key_of(0), count)
 
 
 def inside(genomes: Genome) -> bool:
@@ -42,7 +43,7 @@ def inputs(config: EvolutionConfig) -> EvolutionConfig:
 
 @partial(jax.jit, static_argnums=1)
 def creating(settings: EvolutionConfig, count: int) -> Genome:
-    return pose_variation(BOX, settings).create(jax.random.key(1), count)
+    return pose_variation(BOX, settings).create(key_of(1), count)
 
 
 def created(config: EvolutionConfig, count: int) -> Genome:
@@ -77,7 +78,7 @@ def test_initial_genomes_fill_the_box(initial: str):
 
 def test_a_latin_hypercube_has_one_value_in_each_slice():
     hypercube = jax.jit(variation.latin_hypercube, static_argnums=2)
-    genomes = hypercube(jax.random.key(1), BOX, 50)
+    genomes = hypercube(key_of(1), BOX, 50)
     share = (genomes.key_poses - BOX.low.key_poses) / (BOX.high.key_poses - BOX.low.key_poses)
     slices = np.sort(np.floor(np.asarray(share).reshape(50, -1) * 50), axis=0)
     assert (slices == np.arange(50)[:, None]).all()

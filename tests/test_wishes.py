@@ -23,6 +23,7 @@ from mjxgait.errors import UserError
 from mjxgait.parts.fit import check_fit
 from mjxgait.parts.wishes import Wishes, configured, hint, speed_of, wished
 from mjxgait.runs.experiment import build_batch
+from mjxgait.search.chance import key_of
 from mjxgait.settings.config import Config, UseConfig
 from mjxgait.settings.gaits import GAITS, animal_stride, gait_of, placed, stations_of
 from mjxgait.settings.shipped import data_folder
@@ -300,7 +301,7 @@ def test_stations_are_by_side_and_from_the_front():
 def test_who_turns_is_told_a_heading_that_turns(body: Creature):
     """And its way is what it goes along that heading."""
     task = asked(config_of(turn=30.0), body)
-    starts = task.trials(jax.random.key(0), body, small_config().rollout)
+    starts = task.trials(key_of(0), body, small_config().rollout)
     aim = task.aim(jax.tree.map(lambda leaf: leaf[0], starts))
     for _ in range(200):
         aim = task.onward(aim, None)
@@ -310,7 +311,7 @@ def test_who_turns_is_told_a_heading_that_turns(body: Creature):
 def test_who_is_steered_goes_straight_once_and_to_both_sides(body: Creature):
     task = asked(config_of(steer=40.0), body)
     rollout = dataclasses.replace(small_config().rollout, starts=5)
-    turn = np.degrees(task.trials(jax.random.key(0), body, rollout).turn)
+    turn = np.degrees(task.trials(key_of(0), body, rollout).turn)
     assert turn[0] == 0.0
     assert np.sign(turn[1:]).tolist() == [1.0, -1.0, 1.0, -1.0]
     assert ((abs(turn[1:]) >= 20.0) & (abs(turn[1:]) <= 40.0)).all()
@@ -377,6 +378,8 @@ def test_natural_is_the_gait_of_an_animal_at_this_speed(body: Creature):
         assert wish.gait == gait
         assert [wish.stride, wish.duty_factor, wish.reach, wish.pitch] == [1.0, 1.0, 0.0, 0.0]
     assert asked().fitness.wish.speed is None
+    assert asked().fitness.weights.patter == 6.0
+    assert wished(Config(), body, Wishes(gait="walk")).fitness.weights.patter == 0.0
     two, eight = (altered(body, feet={"names": tuple(map(str, range(n)))}) for n in (1, 8))
     for other in (two, eight):
         config = wished(Config(), other, Wishes(gait="natural"))

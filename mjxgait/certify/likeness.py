@@ -7,13 +7,14 @@ import numpy as np
 
 from mjxgait.certify.criteria import speed
 from mjxgait.certify.measure import Recording
-from mjxgait.certify.strides import stride_frequency
+from mjxgait.certify.strides import SWING, stride_frequency, swings
 from mjxgait.settings.gaits import animal_duty, animal_stride
 
 
 def likeness(window: Recording, clearance: float) -> dict[str, float]:
     """Stride length and duty factor over those of an animal with such legs at this speed; where feet
-    stand, in hip heights (`standing`); deg of the nose above the horizon, mean.
+    stand, in hip heights (`standing`); deg of the nose above the horizon, mean; how often a
+    foot loses the floor for a moment in each stride (`patter`), which an animal's does not.
 
     clearance: height in hip heights that makes a swing.
     """
@@ -24,6 +25,7 @@ def likeness(window: Recording, clearance: float) -> dict[str, float]:
         "duty_factor": float(window.contact.mean() / animal_duty(v, hip)),
         "reach": standing(window),
         "pitch": -float(np.degrees(window.pitch.mean())),
+        "patter": patter(window),
     }
 
 
@@ -33,7 +35,21 @@ def in_words(report: Mapping[str, Any]) -> str | None:
     stride, duty = found.get("stride"), found.get("duty_factor")
     if stride is None or duty is None or not np.isfinite([stride, duty]).all():
         return None
-    return f"Strides are {stride:.2f} and duty factors {duty:.2f} of an animal's at this speed."
+    told = f"Strides are {stride:.2f} and duty factors {duty:.2f} of an animal's at this speed"
+    if (often := found.get("patter") or 0.0) < 0.5:
+        return f"{told}."
+    return f"{told}; in each of them a foot loses the floor for a moment {often:.1f} times."
+
+
+def patter(window: Recording) -> float:
+    """How often a foot loses the floor for a moment in each stride, mean of the feet: touchdowns that
+    end no swing.
+    """
+    carries = window.contact
+    touchdowns = (carries[1:] & ~carries[:-1]).sum(0)
+    rise = SWING * window.dimensions.hip_height
+    swung = np.array([swings(height, rise) for height in window.foot_height.T])
+    return float((np.maximum(touchdowns - swung, 0) / np.maximum(swung, 1)).mean())
 
 
 def standing(window: Recording) -> float:

@@ -63,6 +63,8 @@ class Wishes:
 
 NATURAL = "natural"
 """The gait of an animal at this speed, whatever its name."""
+STEADY = 6.0
+"""What feet that lose the floor while they stand cost in a natural gait."""
 TURNS = ("turn", "steer")
 LEVELS = ("walks", "anywhere")
 WISHES = tuple(field.name for field in dataclasses.fields(Wishes))
@@ -183,9 +185,11 @@ def _speed(speed: float, creature: Creature) -> dict[str, Any]:
 
 
 def _natural(name: str) -> dict[str, Any]:
-    """Footfalls by name, an animal's strides and duty factor, feet below their hips, level."""
+    """Footfalls by name, an animal's strides and duty factor, feet below their hips and steady on the
+    floor, level.
+    """
     like = {"gait": name, "stride": 1.0, "duty_factor": 1.0, "reach": 0.0, "pitch": 0.0}
-    return {"fitness": {"wish": like}}
+    return {"fitness": {"wish": like, "weights": {"patter": STEADY}}}
 
 
 def _named(name: str, creature: Creature) -> dict[str, Any]:

@@ -28,6 +28,7 @@ from mjxgait.runs.stages import (
     lower_stages,
     lowered,
 )
+from mjxgait.search.chance import key_of
 from mjxgait.search.state import EvolutionState, GenerationMetrics
 from mjxgait.settings.config import Config
 from mjxgait.settings.traced import traced
@@ -84,7 +85,7 @@ class Experiment:
 
     def _origin(self, island: int = 0) -> tuple[Numbers | None, Config, jax.Array]:
         """What the first state follows from."""
-        key = jax.random.fold_in(jax.random.key(self.config.seed), 0)
+        key = jax.random.fold_in(key_of(self.config.seed), 0)
         known = (self.blueprint.numbers, self.row.settings)
         return *known, jax.random.fold_in(key, island) if island else key
 
@@ -273,7 +274,7 @@ def _filled_up(sources: Sequence[Sequence[int]]) -> list[list[int]]:
 
 def _experiment(blueprint: Plan, config: Config) -> Experiment:
     creature = blueprint.creature.on(config.rollout.ground)
-    key = jax.random.fold_in(jax.random.key(config.seed), 1)
+    key = jax.random.fold_in(key_of(config.seed), 1)
     rollout = config.rollout
     drawn = dataclasses.replace(rollout, starts=1 + (rollout.starts - 1) * rollout.variety)
     # Each run's own task: what is told in a trial is not the same for all rows of a program.

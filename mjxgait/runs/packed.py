@@ -8,6 +8,7 @@ import jax
 import numpy as np
 
 from mjxgait.errors import UserError
+from mjxgait.search.chance import key_from
 from mjxgait.search.state import EvolutionState
 
 
@@ -56,15 +57,14 @@ class Packed:
           where: it was found, for the error.
 
         Raises:
-          UserError: it is one of other settings.
+          UserError: it is one of other settings, or of another random generator.
         """
         wanted = _by_name(abstract)
         _check_shapes(self.arrays, wanted, where)
         place = jax.local_devices()[0]
         arrays = [jax.device_put(self.arrays[name], place) for name in wanted]
         state = jax.tree.unflatten(jax.tree.structure(abstract), arrays)
-        key = jax.random.wrap_key_data(state.key, impl=self.key_impl)
-        return dataclasses.replace(state, key=key)
+        return dataclasses.replace(state, key=key_from(state.key, self.key_impl, where))
 
 
 def side_by_side(rows: Sequence[Packed]) -> Packed:

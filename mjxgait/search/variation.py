@@ -14,6 +14,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from mjxgait.search.chance import key_of
 from mjxgait.settings.evolution import EvolutionConfig
 from mjxgait.settings.traced import chosen
 from mjxgait.types import pytree
@@ -152,7 +153,7 @@ def first_occurrence(genomes: Any) -> jax.Array:
     )
     # Elementwise product and sum, row by row alike: a matrix product may round equal rows
     # differently at different places.
-    projection = jnp.sum(rows * jax.random.normal(jax.random.key(0), (rows.shape[1],)), axis=1)
+    projection = jnp.sum(rows * jax.random.normal(key_of(0), (rows.shape[1],)), axis=1)
     order = jnp.argsort(projection, stable=True)
     in_order = rows[order]
     repeats = jnp.concatenate([jnp.array([False]), jnp.all(in_order[1:] == in_order[:-1], axis=1)])

@@ -31,6 +31,7 @@ class Weights:
       duty: feet that are on the floor for less than a quarter or more than four fifths of the
         time.
       airborne: share of the time with no foot on the floor.
+      patter: feet that lose the floor for moments while they stand.
       foot_height: feet held high without need.
       tilt: how far the trunk leans, in the mean.
       wobble: how much the trunk turns to and fro.
@@ -52,6 +53,7 @@ class Weights:
     frequency: Finite = 4.0
     duty: Finite = 2.0
     airborne: Finite = 3.0
+    patter: Finite = 0.0
     foot_height: Finite = 1.0
     tilt: Finite = 1.0
     wobble: Finite = 0.1

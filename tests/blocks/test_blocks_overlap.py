@@ -14,6 +14,7 @@ from mjxgait.champion.blocks.parts import Part, grow
 from mjxgait.creature.scale import load_files
 from mjxgait.physics.trees.plant import TreePlant
 from mjxgait.physics.trees.tree import Surroundings
+from mjxgait.search.chance import key_of
 from mjxgait.types import BodyState
 
 CAPACITY, COUNT = Capacity(), 80
@@ -48,7 +49,7 @@ def theirs(body: Body, parts: list[Part], bent: np.ndarray) -> float:
 @pytest.fixture(scope="module")
 def depths() -> tuple[np.ndarray, np.ndarray]:
     """Ours and MuJoCo's, of random bodies in random poses that have a hinge and two parts."""
-    keys = jax.random.split(jax.random.key(7), COUNT)
+    keys = jax.random.split(key_of(7), COUNT)
     make = jax.jit(jax.vmap(lambda key: random_graph(key, CAPACITY, Ranges())))
     graphs = make(keys)
     bodies = jax.jit(jax.vmap(lambda graph: body_of(graph, CAPACITY)))(graphs)

@@ -18,6 +18,7 @@ from mjxgait.champion.blocks.xml import body_xml
 from mjxgait.creature.geometry import DOWN, geom_reach, lowest
 from mjxgait.physics.trees.plant import TreePlant
 from mjxgait.physics.trees.tree import Surroundings
+from mjxgait.search.chance import key_of
 from mjxgait.tasks.blocks.follow import Following
 from mjxgait.types import BodyState
 
@@ -30,7 +31,7 @@ forward = jax.jit(TreePlant(ON_LAND).forward)
 @pytest.fixture(scope="module")
 def graphs() -> Graph:
     draw = jax.jit(jax.vmap(lambda key: random_graph(key, CAPACITY, Ranges())))
-    return draw(jax.random.split(jax.random.key(1), LANES))
+    return draw(jax.random.split(key_of(1), LANES))
 
 
 @pytest.fixture(scope="module")

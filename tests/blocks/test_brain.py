@@ -19,6 +19,7 @@ from mjxgait.champion.blocks.parts import grow
 from mjxgait.control.brains.neurons import fired
 from mjxgait.control.brains.thought import Perceived, blank, thought
 from mjxgait.runs.experiment import arrays_of
+from mjxgait.search.chance import key_of
 from mjxgait.viewing.brain import draw_brain, shape
 from mjxgait.viewing.network import READS, kind_of, network_of
 from mjxgait.viewing.style import figure
@@ -59,7 +60,7 @@ def test_a_brain_thinks_as_its_twin_does():
         body = body_of(genotype.graph, CAPACITY)
         return genotype, body, wired(genotype.nerves, genotype.centre, body, ROOM)
 
-    genotypes, bodies, brains = jax.jit(jax.vmap(make))(jax.random.split(jax.random.key(3), COUNT))
+    genotypes, bodies, brains = jax.jit(jax.vmap(make))(jax.random.split(key_of(3), COUNT))
     think = jax.jit(jax.vmap(lambda b, m, p: thought(b, m, p, STEP)))
     neurons = CAPACITY.parts * ROOM.local + ROOM.central
     minds = jax.vmap(lambda _: blank(neurons))(jnp.arange(COUNT))
@@ -101,7 +102,7 @@ def test_what_a_twin_keeps_of_two_kinds_is_kept_apart():
 @cache
 def some() -> Genotype:
     """Thirty drawn at random."""
-    return jax.vmap(KIN.create)(jax.random.split(jax.random.key(11), 30))
+    return jax.vmap(KIN.create)(jax.random.split(key_of(11), 30))
 
 
 def brain_of(genotype: Genotype) -> BrainTwin:
@@ -176,8 +177,8 @@ def test_a_mirror_image_pulls_the_other_way():
     @jax.jit
     def born(graph: Graph) -> tuple[Body, Brain]:
         body = body_of(graph, CAPACITY)
-        nerves = random_nerves(jax.random.key(5), CAPACITY.nodes, ROOM)
-        return body, wired(nerves, random_centre(jax.random.key(6), ROOM), body, ROOM)
+        nerves = random_nerves(key_of(5), CAPACITY.nodes, ROOM)
+        return body, wired(nerves, random_centre(key_of(6), ROOM), body, ROOM)
 
     body, brain = born(star(mirror=2, joint="universal"))
     sign, copies = np.asarray(body.sign), np.asarray(body.parts.copies)[np.asarray(body.part)]

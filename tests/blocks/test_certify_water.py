@@ -11,12 +11,13 @@ from mjxgait.blocks.phenotype import body_of
 from mjxgait.certify.water import Water
 from mjxgait.physics.trees.plant import TreePlant
 from mjxgait.physics.trees.tree import Surroundings
+from mjxgait.search.chance import key_of
 
 
 @pytest.fixture(scope="module")
 def graphs() -> Graph:
     draw = jax.jit(jax.vmap(lambda key: random_graph(key, CAPACITY, Ranges())))
-    return draw(jax.random.split(jax.random.key(11), LANES))
+    return draw(jax.random.split(key_of(11), LANES))
 
 
 def test_the_examiners_water_is_evolutions(graphs: Graph):

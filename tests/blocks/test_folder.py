@@ -12,6 +12,7 @@ from mjxgait.champion.blocks.folder import body_files
 from mjxgait.champion.blocks.parts import grow
 from mjxgait.creature.scale import load_files
 from mjxgait.errors import UserError
+from mjxgait.search.chance import key_of
 
 CAPACITY, COUNT = Capacity(), 60
 
@@ -19,7 +20,7 @@ CAPACITY, COUNT = Capacity(), 60
 @pytest.fixture(scope="module")
 def grown_parts() -> list:
     draw = jax.jit(jax.vmap(lambda key: random_graph(key, CAPACITY, Ranges())))
-    graphs = draw(jax.random.split(jax.random.key(8), COUNT))
+    graphs = draw(jax.random.split(key_of(8), COUNT))
     every = (genome_of(one(graphs, place)) for place in range(COUNT))
     return [grow(genome, CAPACITY.parts, CAPACITY.links) for genome in every]
 

@@ -16,6 +16,7 @@ from mjxgait.blocks.nerves import NerveRoom
 from mjxgait.blocks.variation import Genotype, Kin, Rates, reachable
 from mjxgait.champion.blocks.material import JOINTS, NEURONS
 from mjxgait.control.brains.controller import Brains
+from mjxgait.search.chance import key_of
 from mjxgait.settings.brains import BrainConfig
 from mjxgait.settings.evolution import EvolutionConfig
 
@@ -28,7 +29,7 @@ ALIVE = jax.jit(jax.vmap(reachable))
 @pytest.fixture(scope="module")
 def parents() -> tuple[Genotype, Genotype]:
     create = jax.jit(jax.vmap(KIN.create))
-    first, second = (create(jax.random.split(jax.random.key(seed), COUNT)) for seed in (0, 1))
+    first, second = (create(jax.random.split(key_of(seed), COUNT)) for seed in (0, 1))
     return first, second
 
 
@@ -39,7 +40,7 @@ def breeder(name: str) -> Callable[..., Genotype]:
 
 
 def children(name: str, parents: tuple[Genotype, Genotype], seed: int = 2) -> Genotype:
-    keys = jax.random.split(jax.random.key(seed), COUNT)
+    keys = jax.random.split(key_of(seed), COUNT)
     return breeder(name)(keys, *parents[: 1 if name == "mutate" else 2])
 
 
@@ -141,7 +142,7 @@ def test_what_is_grafted_is_connected_as_it_was(parents: tuple[Genotype, Genotyp
 
 def test_a_mutation_changes_a_few_values(parents: tuple[Genotype, Genotype]):
     calm = Kin(CAPACITY, ROOM, RANGES, Rates(value=4.0, connection=0.0, node=0.0))
-    keys = jax.random.split(jax.random.key(3), COUNT)
+    keys = jax.random.split(key_of(3), COUNT)
     child = jax.jit(jax.vmap(calm.mutate))(keys, parents[0])
     alive = np.asarray(ALIVE(parents[0].graph))
     changes = np.zeros(COUNT)
@@ -160,7 +161,7 @@ def test_as_many_central_neurons_as_nodes_change_nothing_of_a_graphs_mutation():
     graphs = []
     for central in (CAPACITY.nodes, CAPACITY.nodes + 1):
         kin = Kin(CAPACITY, NerveRoom(central=central), RANGES)
-        keys = jax.random.split(jax.random.key(4), 100)
+        keys = jax.random.split(key_of(4), 100)
         child = jax.jit(jax.vmap(lambda key, kin=kin: kin.mutate(key, kin.create(key))))(keys)
         graphs.append(child.graph)
     for a, b in zip(*map(jax.tree.leaves, graphs), strict=True):
@@ -182,7 +183,7 @@ def test_a_drawn_body_is_its_mothers(parents: tuple[Genotype, Genotype], drawn: 
     """Whatever befalls the child, and its brain still varies."""
     controller = Brains(0.01, BrainConfig())
     bred = controller.variation(BrainConfig(drawn=drawn), EvolutionConfig())
-    keys = jax.random.split(jax.random.key(3), 200)
+    keys = jax.random.split(key_of(3), 200)
     few = [jax.tree.map(lambda leaf: leaf[:200], parent) for parent in parents]
 
     @jax.jit

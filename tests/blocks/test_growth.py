@@ -20,6 +20,7 @@ from mjxgait.champion.blocks.material import JOINTS, ROOM
 from mjxgait.champion.blocks.parts import grow
 from mjxgait.champion.blocks.xml import body_xml
 from mjxgait.runs.growth import GraphGrowth
+from mjxgait.search.chance import key_of
 from mjxgait.tasks.trials import Starts
 
 CAPACITY, COUNT = Capacity(), 1000
@@ -29,7 +30,7 @@ EMBODY = jax.jit(lambda graph: body_of(graph, CAPACITY))
 
 
 def draw(count: int, seed: int = 0) -> Graph:
-    return CREATE(jax.random.split(jax.random.key(seed), count))
+    return CREATE(jax.random.split(key_of(seed), count))
 
 
 @pytest.fixture(scope="module")

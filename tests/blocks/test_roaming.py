@@ -22,6 +22,7 @@ from mjxgait.creature import Creature
 from mjxgait.library import load_creature
 from mjxgait.parts.settings import build_config
 from mjxgait.runs.experiment import Experiment, build_experiment
+from mjxgait.search.chance import key_of
 from mjxgait.search.state import EvolutionState
 from mjxgait.settings.blocks import JumpConfig, RoamConfig
 from mjxgait.settings.rollout import RolloutConfig
@@ -224,7 +225,7 @@ def test_lights_spread_in_so_many_steps_and_stay(task: Roam, follower: type):
     """From a cone ahead, all at once and each its own way, until they are where they belong."""
     following: Following = follower(task.creature, task.step, task.horizon, task.ends)
     rollout = RolloutConfig(starts=4)
-    trials = following.trials(jax.random.key(0), load_creature("blocks"), rollout)
+    trials = following.trials(key_of(0), load_creature("blocks"), rollout)
     behind = np.pi
 
     def aside(level: int, steps: int) -> np.ndarray:

@@ -4,7 +4,6 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
-import jax
 import numpy as np
 import pytest
 from certify_made_up import DOG, make_champion, walk
@@ -26,6 +25,7 @@ from mjxgait.certify.thresholds.goals import HopConfig
 from mjxgait.certify.watch import Watch
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
+from mjxgait.search.chance import key_of
 from mjxgait.settings import hop as evolution
 from mjxgait.settings.rollout import RolloutConfig
 from mjxgait.tasks.hop.task import Hop
@@ -284,7 +284,7 @@ def goals(creature: Creature, draw: draws.Draw) -> np.ndarray:
 def test_nobody_knows_the_goals_of_the_examination(tiny: Creature, trotter: Champion):
     """Not evolution, and not who has seen the goals by which champions are chosen."""
     task = Hop(tiny, STEP, 1000, tiny.settings.termination)
-    trials = task.trials(jax.random.key(0), tiny, RolloutConfig(starts=64)).goal[1:]
+    trials = task.trials(key_of(0), tiny, RolloutConfig(starts=64)).goal[1:]
     mine = goals(tiny, draws.own(trotter, CONFIG))
     assert len(set(mine.tolist())) == 64
     np.testing.assert_array_equal(mine, goals(tiny, draws.own(trotter, CONFIG)))

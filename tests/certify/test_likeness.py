@@ -41,10 +41,24 @@ def test_an_animal_is_like_one():
     assert found["pitch"] == pytest.approx(0.0, abs=0.05)
 
 
+def test_a_foot_that_loses_the_floor_for_a_moment_patters():
+    made = like_an_animal()
+    assert likeness(made, CONFIG.gait.clearance)["patter"] == 0.0
+    # One foot, once in each of its stances.
+    begins = np.flatnonzero(np.diff(made.contact[:, 0].astype(int)) > 0) + 1
+    force = made.foot_force.copy()
+    force[begins[:-1] + 5, 0] = 0.0
+    found = likeness(dataclasses.replace(made, foot_force=force), CONFIG.gait.clearance)
+    assert found["patter"] == pytest.approx(1 / 4, abs=0.03)
+
+
 def test_it_is_said_in_words():
     report = demands_of("walk").report(like_an_animal(stride=0.7, duty=0.8), CONFIG)
     assert "Strides are 0.7" in in_words(report)
     assert "duty factors 0.8" in in_words(report)
+    assert "loses the floor" not in in_words(report)
+    patters = report["likeness"] | {"patter": 2.34}
+    assert "a foot loses the floor for a moment 2.3 times" in in_words({"likeness": patters})
     for nothing in ({}, {"likeness": {"stride": None, "duty_factor": 0.5}}):
         assert in_words(nothing) is None
 

@@ -20,6 +20,7 @@ from mjxgait.ground.surface import (
     named_draws,
     normal,
 )
+from mjxgait.search.chance import key_of
 from mjxgait.tasks.trials import draw_starts
 
 TEXTS = (
@@ -71,7 +72,7 @@ def test_uneven_ground_is_rough_ground_on_slopes(stool: Creature):
 def test_perturbed_starts_have_uneven_ground_of_their_own(stool: Creature):
     """The nominal one has none, whatever the others have: no two the same, none too steep."""
     config = dataclasses.replace(small_config().rollout, starts=6, slope=10.0)
-    ground = draw_starts(jax.random.key(0), stool, config).ground
+    ground = draw_starts(key_of(0), stool, config).ground
     assert ground is not None
     far = 20 * stool.frame.body_length * jnp.array([[1.0, -1.0, 0.0, 0.0], [0.0, 0.0, 1.0, -1.0]])
     x, y = far + stool.frame.stand_pos[:2, None]
@@ -84,7 +85,7 @@ def test_perturbed_starts_have_uneven_ground_of_their_own(stool: Creature):
     for direction in heights[1:, [0, 2, 3]].T:
         assert direction.min() < 0 < direction.max()
     rough = dataclasses.replace(config, slope=0.0, rough=0.1)
-    ground = draw_starts(jax.random.key(0), stool, rough).ground
+    ground = draw_starts(key_of(0), stool, rough).ground
     heights = np.asarray(jax.vmap(lambda each: height(each, x, y))(ground))
     assert not heights[0].any()
     assert 0 < np.abs(heights).max() <= 0.1 * stool.frame.hip_height
@@ -132,19 +133,19 @@ def test_it_is_as_high_and_as_steep_as_asked(stool: Creature):
 
 def test_every_trial_has_ground_of_its_own_and_the_first_the_named_one(stool: Creature):
     config = small_config(rollout={"ground": "rough:0.1@5", "starts": 3}).rollout
-    ground = draw_starts(jax.random.key(0), stool, config).ground
+    ground = draw_starts(key_of(0), stool, config).ground
     x, y = places(stool, 20.0)
     heights = jax.vmap(lambda each: height(each, x, y))(ground)
     np.testing.assert_allclose(heights[0], height(laid(stool, "rough:0.1@5"), x, y), atol=1e-6)
     assert np.abs(heights[1] - heights[2]).max() > 0.01
-    again = draw_starts(jax.random.key(0), stool, config).ground
+    again = draw_starts(key_of(0), stool, config).ground
     for one, other in zip(jax.tree.leaves(ground), jax.tree.leaves(again), strict=True):
         np.testing.assert_array_equal(one, other)
 
 
 def test_other_draws_do_not_change_with_the_ground(stool: Creature):
     flat, rough = (
-        draw_starts(jax.random.key(0), stool, small_config(rollout={"ground": text}).rollout)
+        draw_starts(key_of(0), stool, small_config(rollout={"ground": text}).rollout)
         for text in ("flat", "rough:0.1")
     )
     assert flat.ground is None

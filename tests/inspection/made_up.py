@@ -1,11 +1,11 @@
 """A made-up evolution state of known values."""
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from helpers import weight_vector
 
 from mjxgait.control.poses import TUNING, Genome
+from mjxgait.search.chance import key_of
 from mjxgait.search.state import EvolutionState, Origin
 from mjxgait.tasks.score import score
 from mjxgait.tasks.walk.fitness import TERMS
@@ -53,7 +53,7 @@ def make_state(creature, config, generation):
             ],
             jnp.int32,
         ),
-        key=jax.random.key(7),
+        key=key_of(7),
         generation=jnp.int32(generation),
         seeded=jnp.int32(POPULATION),
         best_history=jnp.zeros(9),

@@ -5,7 +5,6 @@ import json
 import tomllib
 from pathlib import Path
 
-import jax
 import numpy as np
 import pytest
 from helpers import STOOL, small_config
@@ -25,6 +24,7 @@ from mjxgait.keys.own import Own
 from mjxgait.keys.refine import KEYS, Original, begin, read_original, refining
 from mjxgait.parts.fit import check_fit
 from mjxgait.runs.folder import CERTIFICATE, CHAMPION, open_run
+from mjxgait.search.chance import key_of
 from mjxgait.settings.control import TUNING
 from mjxgait.settings.evolution import EvolutionConfig
 from mjxgait.viewing.walk import record_walk
@@ -62,7 +62,7 @@ def test_poses_stay_as_near_as_they_are_kept(stool, brought, keep: float, within
 def test_the_first_that_is_made_is_the_one_that_was_drawn(stool, brought):
     config = refining(small_config(), brought, 0.5).controller
     variation = PoseTracker(stool, 0.005).variation(config, EvolutionConfig())
-    made = variation.create(jax.random.key(0), 4)
+    made = variation.create(key_of(0), 4)
     assert made.key_poses[0] == pytest.approx(brought.fit.key_poses, abs=1e-5)
     assert np.abs(made.key_poses[1] - brought.fit.key_poses).max() > 0.01
 

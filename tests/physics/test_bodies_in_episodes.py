@@ -13,6 +13,7 @@ from many_bodies import SLIM, stacked
 from mjxgait.control.poses import Genome
 from mjxgait.creature import Creature
 from mjxgait.runs.experiment import build_experiment
+from mjxgait.search.chance import key_of
 from mjxgait.search.variation import Box, uniform
 from mjxgait.settings.traced import traced
 from mjxgait.simulation.rollout import Lane, Simulator
@@ -48,7 +49,7 @@ def tallies(request: pytest.FixtureRequest, stool: Creature) -> tuple[Tally, lis
     arguments = jax.tree.map(
         lambda leaf: leaf[None],
         (
-            uniform(jax.random.key(0), box, 3),
+            uniform(key_of(0), box, 3),
             experiment.row.starts,
             traced(experiment.config),
         ),

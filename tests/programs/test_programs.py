@@ -32,6 +32,7 @@ from mjxgait.control.programs.grow import Words, half_and_half
 from mjxgait.control.programs.operators import crossed, mutated, program_variation, spliced
 from mjxgait.control.programs.trees import Trees, depths, subtree_sizes
 from mjxgait.errors import UserError
+from mjxgait.search.chance import key_of
 from mjxgait.settings.programs import FUNCTIONS, ProgramConfig
 
 MANY = 10_000
@@ -47,14 +48,14 @@ WORDS = Words(
 
 def first_programs(count: int, words: Words = WORDS, seed: int = 0) -> tuple[jax.Array, jax.Array]:
     make = partial(half_and_half, words=words, depth=(2, 5), constants=(-1.0, 1.0))
-    return jax.jit(jax.vmap(lambda key: make(key)))(jax.random.split(jax.random.key(seed), count))
+    return jax.jit(jax.vmap(lambda key: make(key)))(jax.random.split(key_of(seed), count))
 
 
 @pytest.fixture(scope="module")
 def programs() -> tuple[np.ndarray, np.ndarray]:
     """[MANY, NODES] that were crossed and mutated after they were made."""
     tree = first_programs(MANY)
-    keys = jax.random.split(jax.random.key(1), (2, MANY))
+    keys = jax.random.split(key_of(1), (2, MANY))
     other = jax.tree.map(lambda leaf: leaf[::-1], tree)
     cross = jax.jit(jax.vmap(lambda k, a, b: crossed(k, a, b, SETTINGS)))
     mutate = jax.jit(jax.vmap(lambda k, a: mutated(k, a, WORDS, SETTINGS)))
@@ -280,7 +281,7 @@ def test_crossing_prefers_functions():
     from mjxgait.control.programs.operators import chosen_node
 
     code = to_arrays("(+ (* a0 a1) a2)", KNOWN, NODES, "x")[0]
-    keys = jax.random.split(jax.random.key(0), 4000)
+    keys = jax.random.split(key_of(0), 4000)
     chosen = np.asarray(jax.vmap(lambda key: chosen_node(key, jnp.asarray(code), 0.9))(keys))
     shares = np.bincount(chosen, minlength=5) / len(chosen)
     assert shares[[0, 1]].sum() == pytest.approx(0.9, abs=0.02)
@@ -290,7 +291,7 @@ def test_crossing_prefers_functions():
 
 def test_each_mutation_does_its_own():
     tree = to_arrays("(+ (* a0 0.5) (ifltz a1 a2 a3))", KNOWN, NODES, "x")
-    keys = jax.random.split(jax.random.key(0), 64)
+    keys = jax.random.split(key_of(0), 64)
 
     def all_of(kind: str) -> set[str]:
         rows = zip(*mutants(keys, tree, jnp.array([one == kind for one in KINDS])), strict=True)
@@ -309,7 +310,7 @@ def test_each_mutation_does_its_own():
 def test_a_nudge_changes_little_and_often_very_little():
     """Of a single sense: `a0` and something, or times something near 1."""
     tree = to_arrays("a0", KNOWN, NODES, "x")
-    keys = jax.random.split(jax.random.key(0), 1000)
+    keys = jax.random.split(key_of(0), 1000)
 
     code, value = mutants(keys, tree, jnp.array([0, 0, 0, 0, 1]))
     sums, products = (code[:, 0] == FUNCTION_CODES[name] for name in "+*")

@@ -18,6 +18,8 @@ REWARDS = ("distance", "alive")
 STYLE = tuple(name for name in TERMS if name not in (*REWARDS, "foot_height", "fall"))
 """What makes a gait good to look at: counted in proportion to the walk that there is, and may ramp in over generations."""
 
+PATTER = 4.0
+"""Touchdowns too many in each stride at which a foot counts as pattering half as much as it can."""
 BEYOND = 0.02
 """What a body length counts that goes beyond the wanted speed."""
 
@@ -68,6 +70,7 @@ def plain_terms(
         "frequency": jnp.maximum(rate / stride_limit(creature.frame.mass) - config.frequency, 0.0),
         "duty": jnp.max(jnp.maximum(duty - 0.8, 0.0) + jnp.maximum(0.25 - duty, 0.0)) / 0.2,
         "airborne": tally.airborne / lived,
+        "patter": jnp.mean(_patter(tally)),
         "foot_height": jnp.maximum(
             tally.foot_height / lived / creature.frame.hip_height - 0.25, 0.0
         ),
@@ -81,6 +84,15 @@ def plain_terms(
         "fall": jnp.where(tally.reason == Reason.FINISHED, 0.0, 1.0),
     }
     return values, enough
+
+
+def _patter(tally: Tally) -> jax.Array:
+    """How much [F] each foot patters, 0 to 1: of its touchdowns neither the first nor those that end
+    a swing are due.
+    """
+    strides = jnp.maximum(tally.swings, 1.0)
+    repeats = jnp.maximum(tally.touchdowns - 1.0 - tally.swings, 0.0) / strides
+    return repeats / (repeats + PATTER)
 
 
 def _enough(speed: jax.Array | float, seconds: float) -> jax.Array:

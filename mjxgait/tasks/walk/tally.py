@@ -14,6 +14,18 @@ from mjxgait.types import Sensed, pytree
 
 SWING = 0.03
 """Hip heights; a foot that rises less has not left the floor, it has trembled. The certificate counts swings alike."""
+PER_FOOT = (
+    "swings",
+    "swinging",
+    "shortfall",
+    "peak",
+    "loaded",
+    "touchdowns",
+    "contact",
+    "slip",
+    "foot_down",
+)
+"""What a tally holds for each foot."""
 
 
 @pytree
@@ -26,6 +38,7 @@ class Tally(protocol.Tally):
       comes down to half of it; there it ends in a footfall.
     shortfall: [F] missing clearance, share of the wanted, summed over swings. peak: [F] m, highest
       since the latest footfall.
+    loaded: [F] whether it bore weight on the previous step. touchdowns: [F] how often it began to.
     contact: [F] steps in contact. slip: [F] m slid while in contact. airborne: [] steps without any foot on the floor.
     foot_height: [] m·steps, mean height of the feet. foot_pos: [F, 2], foot_down: [F] of the previous step.
     tilt: [] of 1 - up.z. wobble: [] (rad/s)² of the trunk. touch: [] steps on which another part touches.
@@ -40,6 +53,8 @@ class Tally(protocol.Tally):
     swinging: jax.Array
     shortfall: jax.Array
     peak: jax.Array
+    loaded: jax.Array
+    touchdowns: jax.Array
     contact: jax.Array
     slip: jax.Array
     airborne: jax.Array
@@ -70,8 +85,7 @@ class Judge:
         feet = len(self.creature.feet.names)
         values = {field.name: jnp.zeros(()) for field in dataclasses.fields(Tally)}
         counts = {name: jnp.zeros((), jnp.int32) for name in ("steps", "reason")}
-        names = ("swings", "swinging", "shortfall", "peak", "contact", "slip", "foot_down")
-        per_foot = {name: jnp.zeros(feet) for name in names}
+        per_foot = {name: jnp.zeros(feet) for name in PER_FOOT}
         return Tally(**(values | counts | per_foot | {"foot_pos": jnp.zeros((feet, 2))}))
 
     def update(
@@ -93,6 +107,8 @@ class Judge:
         up = (sensed.trunk_rot @ creature.frame.up.astype(np.float32))[2]
         low, pos = self._feet(sensed)
         down = (low < CONTACT_GAP).astype(jnp.float32)
+        # What bears weight is a little in the floor.
+        loaded = (low < 0.0).astype(jnp.float32)
         peak = jnp.maximum(tally.peak, low)
         missing = jnp.clip(1.0 - peak / jnp.maximum(clearance, 1e-6), 0.0, 1.0)
         slid = jnp.linalg.norm(pos - tally.foot_pos, axis=1) * down * tally.foot_down
@@ -115,6 +131,8 @@ class Judge:
             swinging=swinging,
             shortfall=tally.shortfall + fallen * missing,
             peak=jnp.where(fallen > 0, low, peak),
+            loaded=loaded,
+            touchdowns=tally.touchdowns + loaded * (1.0 - tally.loaded),
             contact=tally.contact + down,
             slip=tally.slip + slid,
             airborne=tally.airborne + (jnp.max(down) == 0.0),
