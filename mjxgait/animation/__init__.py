@@ -2,8 +2,8 @@
 
 from mjxgait.animation.bvh import build_bvh, export_bvh
 from mjxgait.animation.glb import build_clips, build_driven, build_glb, export_glb
-from mjxgait.animation.loop import RATES, WalkLoop, walk_loop, walk_take
-from mjxgait.animation.phase import standing_still, stride_in_phase
+from mjxgait.animation.loop import RATES, WalkLoop, resampled, walk_loop, walk_take
+from mjxgait.animation.phase import falls_of_first_foot, standing_still, stride_in_phase
 from mjxgait.animation.usd import export_usd
 
 __all__ = [
@@ -16,6 +16,8 @@ __all__ = [
     "export_bvh",
     "export_glb",
     "export_usd",
+    "falls_of_first_foot",
+    "resampled",
     "standing_still",
     "stride_in_phase",
     "walk_loop",

@@ -78,7 +78,7 @@ def walk_loop(walk: Walk, rate: int = 30, most: int = MOST_STRIDES) -> WalkLoop:
     first, last, strides, count = chosen
     share = np.linspace(0.0, 1.0, count + 1)
     model = walk.creature.model
-    qpos = np.array([_between(model, walk.qpos, first + s * (last - first)) for s in share])
+    qpos = resampled(model, walk.qpos, first + share * (last - first))
     seconds = (last - first) * walk.time_step
     rate_of_turn = np.radians(walk.champion.wish.get("turn", 0.0))
     if rate_of_turn:
@@ -102,7 +102,7 @@ def walk_take(walk: Walk, rate: int = 30) -> WalkLoop:
     """The whole walk as it was, also one that falls, in place and with a seam."""
     model, trunk = walk.creature.model, walk.creature.trunk
     count = max(int(walk.seconds * rate), 2)
-    qpos = np.array([_between(model, walk.qpos, i / rate / walk.time_step) for i in range(count)])
+    qpos = resampled(model, walk.qpos, np.arange(count) / rate / walk.time_step)
     place = int(model.jnt_qposadr[model.body_jntadr[trunk]])
     advance = float((qpos[-1, place : place + 2] - qpos[0, place : place + 2]) @ walk.forward)
     share = np.linspace(0.0, 1.0, count)[:, None]
@@ -111,6 +111,11 @@ def walk_take(walk: Walk, rate: int = 30) -> WalkLoop:
         -1, place : place + 2
     ]
     return WalkLoop(walk, qpos, rate, 0, advance, 1.0, (0, len(walk.qpos) - 1))
+
+
+def resampled(model: mujoco.MjModel, qpos: np.ndarray, frames: np.ndarray) -> np.ndarray:
+    """The poses [F, nq] at fractional frames [F] of poses [T, nq]."""
+    return np.array([_between(model, qpos, at) for at in frames])
 
 
 def _straightened(walk: Walk, qpos: np.ndarray, times: np.ndarray, rate: float) -> np.ndarray:

@@ -20,15 +20,19 @@ def stride_in_phase(walk: Walk, rate: int) -> WalkLoop:
     """
     loop = walk_loop(walk, rate, most=1)
     first, last = loop.frames
-    recording, count = walk.recording, len(loop.qpos) - 1
-    threshold = SWING * recording.dimensions.hip_height
-    falls = footfalls(recording.foot_height[:, 0], threshold)
+    falls, count = falls_of_first_foot(walk), len(loop.qpos) - 1
     within = falls[(falls >= first) & (falls < last)]
     if not len(within):
         return loop
     at = round((within[0] - first) / (last - first) * count)
     turned = np.roll(loop.qpos[:-1], -at, axis=0)
     return dataclasses.replace(loop, qpos=np.concatenate([turned, turned[:1]]))
+
+
+def falls_of_first_foot(walk: Walk) -> np.ndarray:
+    """Recorded frames at which the creature's first foot comes down."""
+    recording = walk.recording
+    return footfalls(recording.foot_height[:, 0], SWING * recording.dimensions.hip_height)
 
 
 def standing_still(like: WalkLoop) -> WalkLoop:

@@ -13,6 +13,7 @@ from mjxgait.certify.outcome import Fall, Outcome, Trajectory
 from mjxgait.certify.starts import Starts
 from mjxgait.certify.stepping import Stepping
 from mjxgait.certify.tasks import how_simulated
+from mjxgait.certify.twins import Twin
 from mjxgait.certify.watch import Watch
 from mjxgait.champion import Champion
 from mjxgait.cores import cores
@@ -30,6 +31,7 @@ def simulate(
     fall: Fall | None = None,
     threads: int = 0,
     watch: Watch | None = None,
+    twin: Twin | None = None,
 ) -> Outcome:
     """Simulates the champion from every start, to the task's nominal goal where that has none.
 
@@ -42,6 +44,8 @@ def simulate(
       threads: 0 takes the machine's cores. The result does not depend on it.
       watch: is told who is lost, and ends all as soon as that decides; how far they have come then
         does depend on threads.
+      twin: moves it in the place of the champion's own controller; one that tells simulations apart
+        wants a single thread.
     """
     threads = threads or cores()
     # Dealt out like cards, so that each thread gets its share of every kind of start.
@@ -56,7 +60,7 @@ def simulate(
 
     def run(share: np.ndarray) -> Outcome:
         mine, kept = starts.rows(share), int((share < record).sum())
-        stepping = Stepping(creature, champion, mine, kept, fall, task)
+        stepping = Stepping(creature, champion, mine, kept, fall, task, twin)
         tell = None if watch is None else partial(watch.tell, share)
         return stepping.to_the_end(steps, None if told is None else told[share], tell)
 

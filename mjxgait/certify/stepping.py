@@ -25,7 +25,7 @@ from mjxgait.certify.outcome import (
 from mjxgait.certify.starts import Starts
 from mjxgait.certify.state import State, sense
 from mjxgait.certify.terrain import grounded_model
-from mjxgait.certify.twins import twin_of
+from mjxgait.certify.twins import Twin, twin_of
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 
@@ -71,11 +71,12 @@ class Stepping:
         record: int,
         fall: Fall,
         task: Around,
+        twin: Twin | None = None,
     ) -> None:
         self.creature, self.starts, self.fall = creature, starts, fall
         self.record, self.goal, self.task = record, starts.goal.copy(), task
         step = float(creature.model.opt.timestep)
-        self.twin = twin_of(creature, champion, step)
+        self.twin = twin or twin_of(creature, champion, step)
         self.drive = Drive(creature, champion.drive, self.twin.command, step)
         model = examined_model(creature)
         self.bodies = Bodies(creature, model, starts, self.twin.reads, task.drag)

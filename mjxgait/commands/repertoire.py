@@ -156,6 +156,7 @@ def _leave(
     from mjxgait.repertoire.blends import blends
     from mjxgait.repertoire.clips import CLIPS, TABLE, clips_of, write_clips
     from mjxgait.repertoire.found import draw_map, found_in, table
+    from mjxgait.repertoire.transitions import transitions
     from mjxgait.viewing.style import figure
 
     found, console = found_in(folder, grid), screen.console
@@ -171,8 +172,12 @@ def _leave(
         walking = sum(blend.walks for blend in between)
         console.print(f"half way between neighbours {walking} of {len(between)} walk")
     if loops := clips_of(folder, found, options.rate):
-        write_clips(folder / CLIPS, folder / TABLE, loops, found, between, options.travelling)
-        console.print(f"{len(loops)} clips: {folder / CLIPS}, their places: {folder / TABLE}")
+        ways = transitions(folder, found, loops)
+        console.print(f"from standing, and to a stand: {sum(map(bool, ways))} of {len(ways)} found")
+        files = folder / CLIPS, folder / TABLE
+        write_clips(*files, loops, found, between, ways, options.travelling)
+        count = len(loops) + sum(map(bool, ways))
+        console.print(f"{count} clips: {files[0]}, their places: {files[1]}")
 
 
 class _Screen:

@@ -10,12 +10,12 @@ import numpy as np
 from mjxgait.animation import WalkLoop, build_clips, standing_still, stride_in_phase
 from mjxgait.repertoire.blends import Blend
 from mjxgait.repertoire.found import Found
+from mjxgait.repertoire.transitions import IDLE, Transition
 from mjxgait.runs.disk import disk_errors
 from mjxgait.viewing.cast import LOOP_SECONDS, champion_of
 
 SCHEMA = 1
 CLIPS, TABLE = "repertoire.glb", "repertoire.json"
-IDLE = "idle"
 
 
 def clips_of(folder: Path, found: Sequence[Found], rate: int) -> dict[str, WalkLoop]:
@@ -34,13 +34,16 @@ def write_clips(
     loops: dict[str, WalkLoop],
     found: Sequence[Found],
     between: Sequence[Blend],
+    ways: Sequence[Transition],
     travelling: bool,
 ) -> None:
     """Writes the GLB, and the JSON beside it."""
     document = table_of(file.name, loops, found, travelling)
     document["blends"] = [blend.entry for blend in between]
+    document["transitions"] = [way.entry for way in ways]
+    clips = loops | {way.name: way.loop for way in ways if way.loop is not None}
     with disk_errors(file.parent):
-        file.write_bytes(build_clips(loops, travelling))
+        file.write_bytes(build_clips(clips, travelling))
         table.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
 
 

@@ -96,7 +96,13 @@ def test_what_is_certified_becomes_clips_with_their_places(
     table = json.loads((folder / "repertoire.json").read_text())
     names = [cell.name for cell in CERTIFIED]
     document = gltf.GLTF2.load_from_bytes((folder / table["file"]).read_bytes())
-    assert [animation.name for animation in document.animations] == ["idle", *names]
+    ways = [f"{names[0]}_start", f"{names[0]}_stop"]
+    assert [animation.name for animation in document.animations] == ["idle", *names, *ways]
+    assert [(way["from"], way["to"]) for way in table["transitions"]] == [
+        ("idle", names[0]),
+        (names[0], "idle"),
+    ]
+    assert "2 of 2 found" in said
     idle, straight, turning = table["clips"]
     assert (idle["speed"], idle["turn"], idle["certified"]) == (0, 0, False)
     assert straight["asked"] == {"speed": 0.2, "turn": 0.0}

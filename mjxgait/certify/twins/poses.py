@@ -55,11 +55,15 @@ class PoseTwin:
         return (1 - f) * self.cycle[a] + f * self.cycle[(a + 1) % len(self.cycle)]
 
     def target(self, position: np.ndarray, senses: Mapping[str, np.ndarray]) -> np.ndarray:
-        """Target [S, J] in rad with steering and balance, within the joints' ranges."""
+        """Target [S, J] in rad at cycle positions [S]."""
+        return self.corrected(self.planned(position), senses)
+
+    def corrected(self, planned: np.ndarray, senses: Mapping[str, np.ndarray]) -> np.ndarray:
+        """A planned target [S, J] in rad with steering and balance, within the joints' ranges."""
         creature = self.creature
         steer, pitch, roll = (part[:, None] for part in self.corrections(senses))
         steer = steer * self.settings.steering
-        stretched = creature.joints.stand + (self.planned(position) - creature.joints.stand) * (
+        stretched = creature.joints.stand + (planned - creature.joints.stand) * (
             1 + steer * creature.corrections.steer_stride
         )
         target = (

@@ -1,0 +1,118 @@
+"""How a walk begins and ends: motions that physics has made, which fit the clips before and after them."""
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+from viewing.made_up import falling, treading
+
+from mjxgait.animation import WalkLoop, stride_in_phase
+from mjxgait.certify.simulate import simulate
+from mjxgait.certify.starts import nominal_starts
+from mjxgait.certify.twins.halting import HaltingTwin
+from mjxgait.creature import Creature
+from mjxgait.repertoire.found import Found
+from mjxgait.repertoire.grid import Cell
+from mjxgait.repertoire.transitions import (
+    FADES,
+    IDLE,
+    PLACES,
+    RESTS,
+    halted,
+    start_of,
+    stop_of,
+    transitions,
+)
+from mjxgait.viewing.walk import Walk, record_walk
+
+RATE = 60
+
+
+@pytest.fixture(scope="module")
+def walk(stool: Creature) -> Walk:
+    return record_walk(stool, treading(stool, degrees=35.0), 6.0)
+
+
+@pytest.fixture(scope="module")
+def loops(walk: Walk) -> dict[str, WalkLoop]:
+    return {"walk": stride_in_phase(walk, RATE)}
+
+
+def joints(walk: Walk, qpos: np.ndarray) -> np.ndarray:
+    return qpos[..., walk.creature.joints.qpos_adr]
+
+
+def test_a_start_leads_from_standing_into_the_stride(walk: Walk, loops: dict[str, WalkLoop]):
+    start = start_of(walk, "walk", loops)
+    assert (start.name, start.begins, start.ends) == ("walk_start", IDLE, "walk")
+    np.testing.assert_allclose(
+        joints(walk, start.loop.qpos[0]), walk.creature.joints.stand, atol=0.01
+    )
+    off = joints(walk, start.loop.qpos[-1]) - joints(walk, loops["walk"].qpos[0])
+    assert start.gap == pytest.approx(np.sqrt((off**2).mean()), abs=1e-3)
+    assert start.gap < 0.05
+
+
+def test_a_stop_leads_from_the_stride_to_a_stand(walk: Walk, loops: dict[str, WalkLoop]):
+    stop = stop_of(walk, "walk", loops)
+    assert (stop.name, stop.begins, stop.ends) == ("walk_stop", "walk", IDLE)
+    first, last = joints(walk, stop.loop.qpos[[0, -1]])
+    assert np.abs(first - joints(walk, loops["walk"].qpos[0])).max() < 0.1
+    assert np.sqrt(((last - walk.creature.joints.stand) ** 2).mean()) == pytest.approx(stop.gap)
+    rests = stop.loop.qpos[-round(RESTS * RATE) :]
+    assert np.abs(rests[:, :3] - rests[-1, :3]).max() < 0.02
+    np.testing.assert_array_equal(stop.loop.qpos[0, :2], 0.0)
+
+
+def test_it_moves_its_root_as_the_body_moved(walk: Walk, loops: dict[str, WalkLoop]):
+    start = start_of(walk, "walk", loops)
+    frames = round(start.loop.times[-1] / walk.time_step)
+    moved = (walk.qpos[frames, :2] - walk.qpos[0, :2]) @ walk.forward
+    assert start.way == pytest.approx(moved, abs=0.005)
+    assert start.loop.advance == 0.0
+
+
+def test_who_is_told_to_stop_walks_until_then_and_stands_after(walk: Walk):
+    """Each of several simulations at its own moment."""
+    stool, halts = walk.creature, np.array([1.0, 1.5, np.inf])
+    twin = HaltingTwin(stool, walk.champion, walk.time_step, halts, np.full(3, 0.2))
+    film = simulate(
+        stool, walk.champion, nominal_starts(stool, 3), 3.0, record=3, threads=1, twin=twin
+    ).trajectory
+    assert np.array_equal(film.target[2], walk.trajectory.target[0, : film.target.shape[1]])
+    for row, halt in enumerate(halts[:2]):
+        at, after = round(halt / walk.time_step), round((halt + 0.2) / walk.time_step) + 1
+        np.testing.assert_array_equal(film.target[row, : at + 1], film.target[2, : at + 1])
+        # Balance may go on correcting it; this body has none.
+        assert np.abs(film.target[row, after:] - stool.joints.stand).max() < 1e-9
+        assert np.ptp(film.phase[row, at + 1 :]) == 0
+
+
+def test_of_the_ways_to_stop_the_soonest_is_taken(walk: Walk, loops: dict[str, WalkLoop]):
+    moments = np.linspace(2.0, 2.4, PLACES)
+    motions = halted(walk, moments)
+    assert len(motions) == PLACES * len(FADES)
+    lasts = [len(motion) for motion in motions if len(motion)]
+    assert min(lasts) >= (moments[0] + min(FADES)) / walk.time_step
+    assert len(set(lasts)) > 1
+    stop = stop_of(walk, "walk", loops)
+    assert stop.loop.times[-1] < (max(lasts) - moments[0] / walk.time_step) * walk.time_step
+
+
+def test_who_falls_has_no_stop(stool: Creature, walk: Walk):
+    fallen = dataclasses.replace(walk, champion=falling(stool))
+    assert all(not len(motion) for motion in halted(fallen, np.linspace(2.0, 2.4, PLACES)))
+
+
+def test_whose_feet_stay_down_has_neither(stool: Creature, loops: dict[str, WalkLoop]):
+    still = record_walk(stool, treading(stool, degrees=4.0), 3.0)
+    for made in (start_of(still, "walk", loops), stop_of(still, "walk", loops)):
+        assert not made
+        assert made.entry["found"] is False
+
+
+def test_turns_need_none(tmp_path: Path, loops: dict[str, WalkLoop]):
+    cells = [Cell(0.2, 10.0), Cell(0.2, -10.0)]
+    found = [Found(cell, True, 0.2, 0.0, 0.5, "trot", 0.3, ()) for cell in cells]
+    assert transitions(tmp_path, found, loops) == []
