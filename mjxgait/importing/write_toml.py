@@ -35,13 +35,11 @@ def creature_toml(
       train: settings that are not the usual ones.
       body_length: m, None where the loader shall measure it.
     """
-    symmetric, pairs = mirror
     remark = {
         guess.what: f"  # {guess.confidence}: {one_line(guess.reason)}" for guess in notes.guesses
     }
-    kp, kd, torque, ranges = (
-        np.round(v, 4) for v in (drive.kp, drive.kd, drive.torque, drive.ranges)
-    )
+    symmetric, pairs = mirror
+    about = f"imported from {origin}: {len(joints)} joints"
     lines = [
         f"# Made by `mjxgait import` from {origin}. The words after each guess say how sure it is; "
         "change what is wrong.",
@@ -49,17 +47,27 @@ def creature_toml(
         f"those of {origin}.",
         "[creature]",
         f"name = {_quoted(name)}",
-        f"description = {_quoted(f'imported from {origin}: {len(joints)} joints')}",
+        f"description = {_quoted(about)}",
         f"trunk = {_quoted(trunk)}{remark.get('trunk', '')}",
         f"forward = {[round(float(v), 6) + 0.0 for v in forward]}{remark.get('forward', '')}",
         f"feet = [{', '.join(_quoted(foot) for foot in feet)}]{remark.get('feet', '')}",
         'keyframe = "stand"',
-        *(
-            []
-            if body_length is None
-            else [f"body_length = {body_length:.4g}{remark.get('body_length', '')}"]
-        ),
-        "",
+    ]
+    if body_length is not None:
+        lines.append(f"body_length = {body_length:.4g}{remark.get('body_length', '')}")
+    lines += ["", *_joints(joints, drive, remark), *_mirror(symmetric, pairs, remark)]
+    lines += [*_corrections(drive), "[termination]", "min_up = 0.5", "height = [0.5, 1.5]"]
+    lines += ["touch = true", "", f"[train]{remark.get('train', '')}"]
+    lines += [*(tomli_w.dumps({"train": train}).splitlines() if train else []), ""]
+    return "\n".join(lines)
+
+
+def _joints(joints: list[str], drive: Drive, remark: Mapping[str, str]) -> list[str]:
+    """What most joints have, and what each has of its own."""
+    kp, kd, torque, ranges = (
+        np.round(v, 4) for v in (drive.kp, drive.kd, drive.torque, drive.ranges)
+    )
+    lines = [
         "[joints]",
         f"kp = {_usual(kp)}{remark.get('kp, kd', '')}",
         f"kd = {_usual(kd)}",
@@ -79,19 +87,27 @@ def creature_toml(
         if kp[j] != _usual(kp) or kd[j] != _usual(kd):
             lines += [f"kp = {float(kp[j])}", f"kd = {float(kd[j])}"]
         lines.append("")
-    lines += ["[mirror]", f"symmetric = {str(symmetric).lower()}{remark.get('mirror', '')}"]
+    return lines
+
+
+def _mirror(
+    symmetric: bool, pairs: Mapping[str, tuple[str, int]], remark: Mapping[str, str]
+) -> list[str]:
+    lines = ["[mirror]", f"symmetric = {str(symmetric).lower()}{remark.get('mirror', '')}"]
     rows = [
         f"    {{ joint = {_quoted(a)}, partner = {_quoted(b)}, sign = {sign} }},"
         for a, (b, sign) in pairs.items()
     ]
-    lines += ["pairs = [", *rows, "]", ""] if rows else ["pairs = []", ""]
-    lines += [
+    return [*lines, *(["pairs = [", *rows, "]"] if rows else ["pairs = []"]), ""]
+
+
+def _corrections(drive: Drive) -> list[str]:
+    """How joints steer, keep it level and step under a fall."""
+    lines = [
         "[steering]  # low: from which way each joint moves its foot",
         f"bend = {_table(drive.bend)}",
         f"stride = {_table(drive.stride)}",
         "",
-    ]
-    lines += [
         "[balance]  # low: likewise",
         f"pitch = {_table(drive.pitch)}",
         f"roll = {_table(drive.roll)}",
@@ -104,17 +120,7 @@ def creature_toml(
             f"aside = {_table(drive.aside)}",
             "",
         ]
-    lines += [
-        "[termination]",
-        "min_up = 0.5",
-        "height = [0.5, 1.5]",
-        "touch = true",
-        "",
-        f"[train]{remark.get('train', '')}",
-        *(tomli_w.dumps({"train": train}).splitlines() if train else []),
-        "",
-    ]
-    return "\n".join(lines)
+    return lines
 
 
 def _usual(values: np.ndarray) -> float:
