@@ -87,6 +87,10 @@ class BodiedController:
         """See `Controller`."""
         return self.controller.prepare(genome.plan, settings)
 
+    def load(self, plan: Any) -> jax.Array | None:
+        """See `Controller`."""
+        return self.controller.load(plan)
+
     def init(self) -> Any:
         """See `Controller`."""
         return self.controller.init()

@@ -148,6 +148,9 @@ class PoseTracker:
             config.steering,
         )
 
+    def load(self, plan: PoseCycle) -> None:
+        """See `Controller`: the same for all."""
+
     def init(self) -> GaitState:
         """The state at the start of an episode."""
         return GaitState(position=jnp.zeros((), jnp.int32), steps=jnp.zeros((), jnp.int32))

@@ -57,6 +57,13 @@ class Controller(Protocol):
         """The plan: what an episode keeps of a genome under the settings, plain or traced."""
         ...
 
+    def load(self, plan: Any) -> jax.Array | None:
+        """How much [] a command takes under a plan, against others; None where all take the same.
+
+        Lanes wait for the slowest of them, so those that take as much are simulated side by side.
+        """
+        ...
+
     def init(self) -> Any:
         """The memory at the start of an episode."""
         ...

@@ -49,6 +49,10 @@ class RealController(abc.ABC):
         """See `Controller`."""
         return genome
 
+    def load(self, plan: Any) -> jax.Array | None:
+        """See `Controller`: the same for all."""
+        return None
+
     def init(self) -> Any:
         """See `Controller`."""
         return ()

@@ -95,7 +95,7 @@ class Simulator:
         shape = (*jax.tree.leaves(genomes)[0].shape[:2], starts.friction.shape[1])
         total, devices = int(np.prod(shape)), self.mesh.size
         queue = -(-total // devices)
-        jobs = jnp.arange(queue * devices, dtype=jnp.int32).reshape(queue, devices).T.reshape(-1)
+        dealt = jnp.arange(queue * devices, dtype=jnp.int32).reshape(queue, devices).T.reshape(-1)
         run = jax.shard_map(
             partial(self._run_queue, total=total),
             mesh=self.mesh,
@@ -104,17 +104,28 @@ class Simulator:
             check_vma=False,
         )
         plans = jax.vmap(jax.vmap(self.controller.prepare, (0, None)))(genomes, settings.controller)
+        turns = self._turns(plans, shape)
+        none = jnp.arange(total, len(dealt))
+        jobs = dealt if turns is None else jnp.concatenate([turns, none])[dealt]
         tally, computed = run(jobs, plans, starts, settings, self._own_starts(genomes, starts))
 
         def in_order(leaf: jax.Array) -> jax.Array:
             by_device = leaf.reshape(devices, queue, *leaf.shape[1:])
-            return (
-                jnp.swapaxes(by_device, 0, 1)
-                .reshape(-1, *leaf.shape[1:])[:total]
-                .reshape(*shape, *leaf.shape[1:])
-            )
+            by_turn = jnp.swapaxes(by_device, 0, 1).reshape(-1, *leaf.shape[1:])[:total]
+            found = by_turn if turns is None else jnp.zeros_like(by_turn).at[turns].set(by_turn)
+            return found.reshape(*shape, *leaf.shape[1:])
 
         return Episodes(jax.tree.map(in_order, tally), jnp.sum(computed))
+
+    def _turns(self, plans: Any, shape: tuple[int, ...]) -> jax.Array | None:
+        """The episodes [B * N * R] in the order in which they are simulated, those of plans [B, N, ...]
+        whose commands take longest first; None where all take the same.
+        """
+        loads = jax.vmap(jax.vmap(self.controller.load))(plans)
+        if loads is None:
+            return None
+        each = jnp.broadcast_to(loads[..., None], shape)
+        return jnp.argsort(-each.reshape(-1)).astype(jnp.int32)
 
     def _own_starts(self, genomes: Any, starts: Starts) -> Starts | None:
         """Leaves [B, N, R, ...]; None where they depend on nobody."""

@@ -1,10 +1,13 @@
 """A creature that is moved by expressions: evolved, written, edited by hand, examined again."""
 
+import dataclasses
 import json
 import re
 import shutil
 from pathlib import Path
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from helpers import SHORT, STOOL, said_by
@@ -14,8 +17,11 @@ from mjxgait.certify.simulate import simulate
 from mjxgait.certify.starts import nominal_starts
 from mjxgait.champion import codec_of, read_champion
 from mjxgait.champion.expressions import EMPTY
+from mjxgait.control.programs.trees import Trees
 from mjxgait.inspect import facts, read_snapshot
+from mjxgait.runs.experiment import build_experiment
 from mjxgait.runs.folder import CHAMPION, METRICS, read_metrics
+from mjxgait.settings.programs import ProgramConfig
 from mjxgait.viewing.plots import plot_run
 
 
@@ -68,6 +74,27 @@ def test_evolution_and_examiner_move_everybody_alike(run: mjxgait.Run):
     alike = abs(np.array(seen) - told) < 1e-5
     assert alike.sum() >= 3
     assert np.ptp(told[alike]) > 0.005
+
+
+def test_long_programs_are_simulated_beside_long_ones(run: mjxgait.Run):
+    """A batch's command takes as long as that of its longest program."""
+    simulator = build_experiment(run.creature, run.config).simulator
+    counts = np.array([[3, 9, 1, 4], [2, 9, 8, 0]])
+    plans = jax.eval_shape(jax.vmap(simulator.controller.prepare, (0, None)), *genomes_of(run))
+    plans = jax.tree.map(lambda leaf: jnp.zeros((2, 4, *leaf.shape[1:]), leaf.dtype), plans)
+    joints = plans.count.shape[-1]
+    longest = jnp.zeros((2, 4, joints), jnp.int32).at[..., 1].set(counts)
+    turns = np.asarray(simulator._turns(dataclasses.replace(plans, count=longest), (2, 4, 3)))
+    loads = np.repeat(counts.ravel(), 3)[turns]
+    assert sorted(turns) == list(range(24))
+    assert list(loads) == sorted(loads, reverse=True)
+
+
+def genomes_of(run: mjxgait.Run) -> tuple[Trees, ProgramConfig]:
+    """The population, and the settings of its controller."""
+    arrays = read_snapshot(run.folder).arrays
+    trees = Trees(jnp.asarray(arrays["genomes.code"]), jnp.asarray(arrays["genomes.value"]))
+    return trees, run.config.controller
 
 
 def test_an_expression_is_asked_every_fourth_step(run: mjxgait.Run, edited: Path):

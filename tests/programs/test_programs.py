@@ -27,7 +27,7 @@ from mjxgait.champion.expressions import (
     to_text,
 )
 from mjxgait.champion.simplify import simplified
-from mjxgait.control.programs.evaluate import evaluate, listed
+from mjxgait.control.programs.evaluate import evaluator, listed
 from mjxgait.control.programs.grow import Words, half_and_half
 from mjxgait.control.programs.operators import crossed, mutated, program_variation, spliced
 from mjxgait.control.programs.trees import Trees, depths, subtree_sizes
@@ -44,6 +44,7 @@ WORDS = Words(
     tuple(terminal.code for terminal in KNOWN),
     NODES,
 )
+evaluate = evaluator(WORDS.functions)
 
 
 def first_programs(count: int, words: Words = WORDS, seed: int = 0) -> tuple[jax.Array, jax.Array]:
@@ -291,7 +292,7 @@ def test_crossing_prefers_functions():
 
 def test_each_mutation_does_its_own():
     tree = to_arrays("(+ (* a0 0.5) (ifltz a1 a2 a3))", KNOWN, NODES, "x")
-    keys = jax.random.split(key_of(0), 64)
+    keys = jax.random.split(key_of(0), 256)
 
     def all_of(kind: str) -> set[str]:
         rows = zip(*mutants(keys, tree, jnp.array([one == kind for one in KINDS])), strict=True)

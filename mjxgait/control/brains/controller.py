@@ -103,6 +103,9 @@ class Brains:
         body = body_of(genome.graph, self.capacity)
         return wired(genome.nerves, genome.centre, body, self.room)
 
+    def load(self, plan: Brain) -> None:
+        """See `Controller`: the same for all."""
+
     def init(self) -> Mind:
         """See `Controller`."""
         return blank(self.capacity.parts * self.room.local + self.room.central)

@@ -15,7 +15,7 @@ from mjxgait.champion.expressions import (
     chosen_terminals,
     terminals,
 )
-from mjxgait.control.programs.evaluate import Listing, evaluate, listed
+from mjxgait.control.programs.evaluate import Listing, evaluator, listed
 from mjxgait.control.programs.grow import Words
 from mjxgait.control.programs.operators import program_variation
 from mjxgait.control.programs.trees import Trees
@@ -72,6 +72,10 @@ class Programs:
         """See `Controller`."""
         return listed(genome, self.words)
 
+    def load(self, plan: Listing) -> jax.Array:
+        """See `Controller`: the functions of its longest expression."""
+        return jnp.max(plan.count)
+
     def init(self) -> Any:
         """See `Controller`: a program has no memory."""
         return ()
@@ -81,6 +85,6 @@ class Programs:
         seen = [
             senses[t.sense] if t.index is None else senses[t.sense][t.index] for t in self.known
         ]
-        angle = evaluate(plan, jnp.stack(seen))
+        angle = evaluator(self.words.functions)(plan, jnp.stack(seen))
         low, high = self.creature.joints.pose_low, self.creature.joints.pose_high
         return jnp.clip(angle, low.astype(np.float32), high.astype(np.float32)), memory

@@ -9,6 +9,8 @@ Letters: `C` nodes, `Q` functions at most, `J` trees, `S` senses.
 """
 
 import dataclasses
+import functools
+from collections.abc import Callable
 
 import jax
 import jax.numpy as jnp
@@ -91,27 +93,37 @@ def _list_tree(code: jax.Array, words: Words) -> Listing:
     )
 
 
-@custom_vmap
-def evaluate(listing: Listing, senses: jax.Array) -> jax.Array:
-    """[J] what the programs give under the senses [S]."""
-    lone = jax.tree.map(lambda x: x[..., None], (listing, senses))
-    return _evaluate_lanes(*lone)[:, 0]
+Evaluate = Callable[[Listing, jax.Array], jax.Array]
 
 
-@evaluate.def_vmap
-def _over_lanes(
-    size: int, batched: tuple[Listing, bool], listing: Listing, senses: jax.Array
-) -> tuple[jax.Array, bool]:
-    def innermost(leaf: jax.Array, has_lanes: bool) -> jax.Array:
-        if has_lanes:
-            return jnp.moveaxis(leaf, 0, -1)
-        return jnp.broadcast_to(leaf[..., None], (*leaf.shape, size))
+@functools.cache
+def evaluator(functions: tuple[int, ...]) -> Evaluate:
+    """What gives the values [J] in rad of programs under the senses [S], of programs that have these
+    functions and no others.
+    """
 
-    lanes = jax.tree.map(innermost, (listing, senses), tuple(batched))
-    return jnp.moveaxis(_evaluate_lanes(*lanes), -1, 0), True
+    @custom_vmap
+    def evaluate(listing: Listing, senses: jax.Array) -> jax.Array:
+        lone = jax.tree.map(lambda x: x[..., None], (listing, senses))
+        return _evaluate_lanes(functions, *lone)[:, 0]
+
+    @evaluate.def_vmap
+    def over_lanes(
+        size: int, batched: tuple[Listing, bool], listing: Listing, senses: jax.Array
+    ) -> tuple[jax.Array, bool]:
+        def innermost(leaf: jax.Array, has_lanes: bool) -> jax.Array:
+            if has_lanes:
+                return jnp.moveaxis(leaf, 0, -1)
+            return jnp.broadcast_to(leaf[..., None], (*leaf.shape, size))
+
+        lanes = jax.tree.map(innermost, (listing, senses), tuple(batched))
+        return jnp.moveaxis(_evaluate_lanes(functions, *lanes), -1, 0), True
+
+    made: Evaluate = evaluate
+    return made
 
 
-def _evaluate_lanes(listing: Listing, senses: jax.Array) -> jax.Array:
+def _evaluate_lanes(functions: tuple[int, ...], listing: Listing, senses: jax.Array) -> jax.Array:
     """[J, L] with the lanes innermost everywhere: neighbours in memory are neighbours in work."""
     most, joints, lanes = listing.function.shape
     width = joints * lanes
@@ -122,27 +134,36 @@ def _evaluate_lanes(listing: Listing, senses: jax.Array) -> jax.Array:
 
     def step(k: jax.Array, table: jax.Array) -> jax.Array:
         arguments = (table[rows[k], lane] for rows in (flat.first, flat.second, flat.third))
-        return table.at[begin + k].set(_apply(flat.function[k], *arguments))
+        return table.at[begin + k].set(_apply(functions, flat.function[k], *arguments))
 
     table = jax.lax.fori_loop(0, jnp.max(flat.count), step, table)
     return table[flat.root, lane].reshape(joints, lanes)
 
 
-def _apply(function: jax.Array, a: jax.Array, b: jax.Array, c: jax.Array) -> jax.Array:
-    divides = jnp.abs(b) >= LEAST_DIVISOR
-    results = {
-        "+": a + b,
-        "-": a - b,
-        "*": a * b,
-        "/": jnp.where(divides, a / jnp.where(divides, b, 1.0), 1.0),
-        "ifltz": jnp.where(a < 0, b, c),
-        "min": jnp.minimum(a, b),
-        "max": jnp.maximum(a, b),
-        "abs": jnp.abs(a),
-        "sin": jnp.sin(a),
-        "cos": jnp.cos(a),
-    }
+def _apply(
+    known: tuple[int, ...], function: jax.Array, a: jax.Array, b: jax.Array, c: jax.Array
+) -> jax.Array:
     found = jnp.zeros_like(a)
-    for name, result in results.items():
-        found = jnp.where(function == FUNCTION_CODES[name], result, found)
+    for name, given in _GIVES.items():
+        if (code := FUNCTION_CODES[name]) in known:
+            found = jnp.where(function == code, given(a, b, c), found)
     return jnp.clip(found, -LARGEST, LARGEST)
+
+
+def _divided(a: jax.Array, b: jax.Array) -> jax.Array:
+    divides = jnp.abs(b) >= LEAST_DIVISOR
+    return jnp.where(divides, a / jnp.where(divides, b, 1.0), 1.0)
+
+
+_GIVES: dict[str, Callable[[jax.Array, jax.Array, jax.Array], jax.Array]] = {
+    "+": lambda a, b, c: a + b,
+    "-": lambda a, b, c: a - b,
+    "*": lambda a, b, c: a * b,
+    "/": lambda a, b, c: _divided(a, b),
+    "ifltz": lambda a, b, c: jnp.where(a < 0, b, c),
+    "min": lambda a, b, c: jnp.minimum(a, b),
+    "max": lambda a, b, c: jnp.maximum(a, b),
+    "abs": lambda a, b, c: jnp.abs(a),
+    "sin": lambda a, b, c: jnp.sin(a),
+    "cos": lambda a, b, c: jnp.cos(a),
+}
