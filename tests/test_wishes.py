@@ -378,8 +378,6 @@ def test_natural_is_the_gait_of_an_animal_at_this_speed(body: Creature):
         assert wish.gait == gait
         assert [wish.stride, wish.duty_factor, wish.reach, wish.pitch] == [1.0, 1.0, 0.0, 0.0]
     assert asked().fitness.wish.speed is None
-    assert asked().fitness.weights.patter == 6.0
-    assert wished(Config(), body, Wishes(gait="walk")).fitness.weights.patter == 0.0
     two, eight = (altered(body, feet={"names": tuple(map(str, range(n)))}) for n in (1, 8))
     for other in (two, eight):
         config = wished(Config(), other, Wishes(gait="natural"))

@@ -63,8 +63,6 @@ class Wishes:
 
 NATURAL = "natural"
 """The gait of an animal at this speed, whatever its name."""
-STEADY = 6.0
-"""What feet that lose the floor while they stand cost in a natural gait."""
 TURNS = ("turn", "steer")
 LEVELS = ("walks", "anywhere")
 WISHES = tuple(field.name for field in dataclasses.fields(Wishes))
@@ -185,11 +183,9 @@ def _speed(speed: float, creature: Creature) -> dict[str, Any]:
 
 
 def _natural(name: str) -> dict[str, Any]:
-    """Footfalls by name, an animal's strides and duty factor, feet below their hips and steady on the
-    floor, level.
-    """
+    """Footfalls by name, an animal's strides and duty factor, feet below their hips, level."""
     like = {"gait": name, "stride": 1.0, "duty_factor": 1.0, "reach": 0.0, "pitch": 0.0}
-    return {"fitness": {"wish": like, "weights": {"patter": STEADY}}}
+    return {"fitness": {"wish": like}}
 
 
 def _named(name: str, creature: Creature) -> dict[str, Any]:
