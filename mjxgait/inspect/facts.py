@@ -227,9 +227,18 @@ def task_of(snapshot: Snapshot) -> Task:
 def contributions(snapshot: Snapshot) -> np.ndarray:
     """[P, F] what each term gives to or takes from the fitness of each individual; a row's sum
     is its fitness.
+
+    Raises:
+      UserError: another version of the program evolved them, by other terms.
     """
     terms = np.asarray(snapshot.arrays["terms"], float)
     task = task_of(snapshot)
+    if terms.shape[-1] != len(task.terms):
+        raise UserError(
+            f"{snapshot.run}: evolved by {terms.shape[-1]} fitness terms where this version has "
+            f"{len(task.terms)}: another version did that, and inspects it; certify, plot, render "
+            "and export work here, for they read the champion"
+        )
     counted = task.weights(snapshot.config.fitness, jnp.int32(snapshot.generation))
     weights = np.array([float(counted[name]) for name in task.terms])
     worst = snapshot.config.rollout.worst

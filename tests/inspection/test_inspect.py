@@ -2,6 +2,7 @@
 one that is not whole.
 """
 
+import dataclasses
 import json
 import os
 import re
@@ -17,6 +18,7 @@ from mjxgait.certify.certificate import SCHEMA
 from mjxgait.certify.stress import Stress, StressConfig, Trial
 from mjxgait.champion import read_champion
 from mjxgait.cli import main
+from mjxgait.errors import UserError
 from mjxgait.inspect import facts, individual_facts, read_snapshot, text
 from mjxgait.runs.folder import CERTIFICATE, CHAMPION, STRESS
 
@@ -55,6 +57,14 @@ def test_tells_what_it_is(finished_run):
     assert found["ended"] == f"all {LAST} generations are done"
     assert found["checkpoints"][-1] == LAST
     assert found["bytes"] > 1000
+
+
+def test_a_run_of_another_version_is_told_so(finished_run):
+    """Whose fitness had a term less."""
+    snapshot = read_snapshot(finished_run)
+    older = {**snapshot.arrays, "terms": snapshot.arrays["terms"][..., 1:]}
+    with pytest.raises(UserError, match="another version did that"):
+        facts(dataclasses.replace(snapshot, arrays=older))
 
 
 def test_tells_whether_the_certificate_is_the_champions(run):
