@@ -1,6 +1,7 @@
 """The generator behind all draws: as even and as independent as chance is."""
 
 import itertools
+from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -94,6 +95,17 @@ def test_the_uses_of_a_key_are_apart():
     ]
     for a, b in itertools.combinations(draws, 2):
         assert not np.intersect1d(a, b).size
+
+
+@pytest.mark.parametrize("seed", [0, 5])
+def test_every_bit_of_a_seed_and_of_a_folded_number_counts(seed: int):
+    others = [seed ^ np.uint32(1 << bit) for bit in range(32)]
+    numbers = jnp.asarray([seed, *others], jnp.uint32).astype(jnp.int32)
+    for keys in (
+        jax.vmap(key_of)(numbers),
+        jax.vmap(partial(jax.random.fold_in, key_of(8)))(numbers),
+    ):
+        assert len(np.unique(jax.random.key_data(keys), axis=0)) == 33
 
 
 def test_a_lane_draws_what_it_draws_alone():

@@ -219,9 +219,13 @@ def _add_animations(
 def _tracks(
     loop: WalkLoop, skeleton: Skeleton, axes: np.ndarray, travelling: bool
 ) -> tuple[np.ndarray, np.ndarray]:
-    """See `local_poses`; travelling: the root moves on evenly, in a circle where the walk turns."""
+    """See `local_poses`; travelling: the root moves on evenly, in a circle where the walk turns. One
+    that has a path of its own follows that.
+    """
     pos, quat = local_poses(loop.walk.creature.model, skeleton, loop.qpos, axes)
-    if travelling:
+    if loop.path is not None:
+        pos[:, 0] = np.pad(loop.path, ((0, 0), (0, 1))) @ axes.T
+    elif travelling:
         pos[:, 0], turned = travel(loop)
         quat[:, 0, 1], quat[:, 0, 3] = np.sin(turned / 2), np.cos(turned / 2)
     return pos, quat

@@ -29,6 +29,7 @@ class WalkLoop:
     advance: m that the creature moves forward in one loop; the travelling walk adds it evenly.
     stretched: duration over the recorded one. frames: first and last recorded one. turned: rad to
     the left in one loop, likewise; in place the creature looks ahead all the time.
+    path: [F, 2] m in the world, where the root moves otherwise than evenly, in place too.
     """
 
     walk: Walk
@@ -39,6 +40,7 @@ class WalkLoop:
     stretched: float
     frames: tuple[int, int]
     turned: float = 0.0
+    path: np.ndarray | None = None
 
     @property
     def times(self) -> np.ndarray:

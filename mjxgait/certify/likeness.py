@@ -7,7 +7,7 @@ import numpy as np
 
 from mjxgait.certify.criteria import speed
 from mjxgait.certify.measure import Recording
-from mjxgait.certify.strides import SWING, stride_frequency, swings
+from mjxgait.certify.strides import SWING, footfalls, stride_frequency
 from mjxgait.settings.gaits import animal_duty, animal_stride
 
 
@@ -48,8 +48,9 @@ def patter(window: Recording) -> float:
     carries = window.contact
     touchdowns = (carries[1:] & ~carries[:-1]).sum(0)
     rise = SWING * window.dimensions.hip_height
-    swung = np.array([swings(height, rise) for height in window.foot_height.T])
-    return float((np.maximum(touchdowns - swung, 0) / np.maximum(swung, 1)).mean())
+    swung = np.array([len(footfalls(height, rise)) for height in window.foot_height.T])
+    strides = max(np.sort(swung)[len(swung) // 2], 1)
+    return float(np.maximum(touchdowns - swung, 0).mean() / strides)
 
 
 def standing(window: Recording) -> float:

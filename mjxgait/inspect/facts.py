@@ -224,21 +224,20 @@ def task_of(snapshot: Snapshot) -> Task:
     return make_task(creature, step, ends, config)
 
 
+def terms_of(snapshot: Snapshot) -> tuple[str, ...]:
+    """Names of the fitness terms; none where the task has others now than when it was evolved."""
+    names = task_of(snapshot).terms
+    return names if snapshot.arrays["terms"].shape[-1] == len(names) else ()
+
+
 def contributions(snapshot: Snapshot) -> np.ndarray:
     """[P, F] what each term gives to or takes from the fitness of each individual; a row's sum
-    is its fitness.
-
-    Raises:
-      UserError: another version of the program evolved them, by other terms.
+    is its fitness. [P, 0] where nobody knows the terms.
     """
     terms = np.asarray(snapshot.arrays["terms"], float)
+    if not terms_of(snapshot):
+        return terms[:, 0, :0]
     task = task_of(snapshot)
-    if terms.shape[-1] != len(task.terms):
-        raise UserError(
-            f"{snapshot.run}: evolved by {terms.shape[-1]} fitness terms where this version has "
-            f"{len(task.terms)}: another version did that, and inspects it; certify, plot, render "
-            "and export work here, for they read the champion"
-        )
     counted = task.weights(snapshot.config.fitness, jnp.int32(snapshot.generation))
     weights = np.array([float(counted[name]) for name in task.terms])
     worst = snapshot.config.rollout.worst
@@ -249,7 +248,7 @@ def contributions(snapshot: Snapshot) -> np.ndarray:
 
 def population(snapshot: Snapshot) -> list[dict[str, Any]]:
     """One row per individual, best first."""
-    parts, arrays, names = contributions(snapshot), snapshot.arrays, task_of(snapshot).terms
+    parts, arrays, names = contributions(snapshot), snapshot.arrays, terms_of(snapshot)
     return [
         {
             "rank": i + 1,
@@ -279,8 +278,8 @@ def individual_facts(snapshot: Snapshot, rank: int) -> dict[str, Any]:
       UserError: the population is smaller.
     """
     champion, i = snapshot.champion(rank), rank - 1
-    terms = np.asarray(snapshot.arrays["terms"][i], float)
-    names = task_of(snapshot).terms
+    names = terms_of(snapshot)
+    terms = np.asarray(snapshot.arrays["terms"][i], float)[:, : len(names)]
     return (
         population(snapshot)[i]
         | {

@@ -36,15 +36,14 @@ RESTS = 0.3
 class Transition:
     """From one clip into another.
 
-    loop: the motion; None where no way was found. gap: rad by which the joints are off those of the
-    clip that follows, root mean square. way: m ahead.
+    loop: the motion; None where no way was found. gaps: rad by which the joints are off those of the
+    clip before and the clip after, where these meet, root mean square.
     """
 
     begins: str
     ends: str
     loop: WalkLoop | None = None
-    gap: float = 0.0
-    way: float = 0.0
+    gaps: tuple[float, float] = (0.0, 0.0)
 
     @property
     def name(self) -> str:
@@ -59,14 +58,14 @@ class Transition:
     def entry(self) -> dict[str, Any]:
         """For the table."""
         ends = {"name": self.name, "from": self.begins, "to": self.ends}
-        if self.loop is None:
+        if self.loop is None or self.loop.path is None:
             return ends | {"found": False}
         return ends | {
             "found": True,
             "duration": round(float(self.loop.times[-1]), 6),
             "frames_per_s": self.loop.rate,
-            "way": round(self.way, 4),
-            "gap": round(self.gap, 4),
+            "way": round(float(self.loop.path[-1] @ self.loop.walk.forward), 4),
+            "gaps": [round(gap, 4) for gap in self.gaps],
         }
 
 
@@ -88,26 +87,32 @@ def start_of(walk: Walk, name: str, loops: dict[str, WalkLoop]) -> Transition:
     falls = falls[falls * walk.time_step <= BEGINS_BY]
     if not len(falls):
         return Transition(IDLE, name)
-    gaps = [_apart(walk, walk.qpos[fall], loops[name].qpos[0]) for fall in falls]
-    end = int(falls[int(np.argmin(gaps))])
-    loop, way = _motion(walk, walk.qpos[: end + 1], loops[name])
-    return Transition(IDLE, name, loop, min(gaps), way)
+    stand, after = walk.creature.stand_qpos, loops[name].qpos[0]
+    chosen = walk.qpos[: _likest(walk, falls, after) + 1]
+    gaps = (_apart(walk, chosen[0], stand), _apart(walk, chosen[-1], after))
+    places = np.zeros(2), after[_place(walk)]
+    return Transition(IDLE, name, _motion(walk, chosen, loops[name], places), gaps)
 
 
 def stop_of(walk: Walk, name: str, loops: dict[str, WalkLoop]) -> Transition:
-    """From the clip's begin to standing still, in the way that is soonest over of those that end up."""
+    """From that footfall which is most like the clip's begin to standing still, in the way that is
+    soonest over of those that end up.
+    """
     falls = falls_of_first_foot(walk)
     settled = falls[falls * walk.time_step >= WARMUP]
     if len(settled) < 2:
         return Transition(name, IDLE)
-    begin, stride = int(settled[0]), float(np.diff(settled).mean()) * walk.time_step
+    before, stand = loops[name].qpos[0], walk.creature.stand_qpos
+    begin = _likest(walk, settled, before)
+    stride = float(np.diff(settled).mean()) * walk.time_step
     motions = halted(walk, begin * walk.time_step + stride * np.arange(PLACES) / PLACES)
     ends = [(frames, row) for row, frames in enumerate(map(len, motions)) if frames]
     if not ends:
         return Transition(name, IDLE)
     chosen = motions[min(ends)[1]][begin:]
-    loop, way = _motion(walk, chosen, loops[name])
-    return Transition(name, IDLE, loop, _apart(walk, chosen[-1], walk.creature.stand_qpos), way)
+    gaps = (_apart(walk, chosen[0], before), _apart(walk, chosen[-1], stand))
+    places = before[_place(walk)], np.zeros(2)
+    return Transition(name, IDLE, _motion(walk, chosen, loops[name], places), gaps)
 
 
 def halted(walk: Walk, moments: np.ndarray) -> list[np.ndarray]:
@@ -134,16 +139,35 @@ def halted(walk: Walk, moments: np.ndarray) -> list[np.ndarray]:
     return motions
 
 
-def _motion(walk: Walk, qpos: np.ndarray, like: WalkLoop) -> tuple[WalkLoop, float]:
-    """Poses [T, nq] as a clip that begins above the origin, and how far ahead it leads in m."""
-    model, trunk = walk.creature.model, walk.creature.trunk
+def _motion(
+    walk: Walk, qpos: np.ndarray, like: WalkLoop, places: tuple[np.ndarray, np.ndarray]
+) -> WalkLoop:
+    """Poses [T, nq] as a clip whose root moves as the body moved.
+
+    places: [2] m, where the trunk is above the root as the clip begins and as it ends: where the
+    clips before and after have it.
+    """
     count = max(round((len(qpos) - 1) * walk.time_step * like.rate), 1)
-    frames = resampled(model, qpos, np.linspace(0.0, len(qpos) - 1.0, count + 1))
-    place = int(model.jnt_qposadr[model.body_jntadr[trunk]])
-    frames[:, place : place + 2] -= frames[0, place : place + 2].copy()
-    way = float(frames[-1, place : place + 2] @ walk.forward)
-    still = standing_still(like)
-    return dataclasses.replace(still, qpos=frames), way
+    share = np.linspace(0.0, 1.0, count + 1)[:, None]
+    frames = resampled(walk.creature.model, qpos, share[:, 0] * (len(qpos) - 1))
+    place = _place(walk)
+    frames[:, place.stop] -= walk.ground_heights(frames[:, place])
+    moved, above = frames[:, place] - frames[0, place], (1 - share) * places[0] + share * places[1]
+    frames[:, place] = above
+    path, spent = moved - (above - places[0]), (0, len(qpos) - 1)
+    return dataclasses.replace(standing_still(like), qpos=frames, path=path, frames=spent)
+
+
+def _place(walk: Walk) -> slice:
+    """Of the trunk in the world, among the numbers of a pose; its height comes after."""
+    model = walk.creature.model
+    first = int(model.jnt_qposadr[model.body_jntadr[walk.creature.trunk]])
+    return slice(first, first + 2)
+
+
+def _likest(walk: Walk, frames: np.ndarray, pose: np.ndarray) -> int:
+    """Of some frames that in which the walk is nearest to a pose [nq]."""
+    return int(min(frames, key=lambda frame: _apart(walk, walk.qpos[frame], pose)))
 
 
 def _apart(walk: Walk, one: np.ndarray, other: np.ndarray) -> float:

@@ -27,6 +27,7 @@ from mjxgait.runs.stored import (
     read_stored,
     stored_generations,
 )
+from mjxgait.search.chance import check_generator
 from mjxgait.search.state import EvolutionState
 
 OVERHEAD = 2**18
@@ -131,9 +132,10 @@ class Checkpoints:
         """The packed state of a generation, the latest by default, whatever its shapes.
 
         Raises:
-          UserError: no checkpoint, or a damaged or foreign one.
+          UserError: no checkpoint, a damaged or foreign one, or one of another random generator.
         """
         stored = read_stored(self._run, digest, generation)
+        check_generator(stored.manifest.key_impl, str(self._folder))
         return Packed(stored.arrays, stored.manifest.key_impl)
 
 

@@ -105,8 +105,8 @@ class Simulator:
         )
         plans = jax.vmap(jax.vmap(self.controller.prepare, (0, None)))(genomes, settings.controller)
         turns = self._turns(plans, shape)
-        none = jnp.arange(total, len(dealt))
-        jobs = dealt if turns is None else jnp.concatenate([turns, none])[dealt]
+        nobody = jnp.arange(total, len(dealt), dtype=jnp.int32)
+        jobs = dealt if turns is None else jnp.concatenate([turns, nobody])[dealt]
         tally, computed = run(jobs, plans, starts, settings, self._own_starts(genomes, starts))
 
         def in_order(leaf: jax.Array) -> jax.Array:

@@ -4,10 +4,11 @@ import dataclasses
 from pathlib import Path
 
 import numpy as np
+import pygltflib as gltf
 import pytest
 from viewing.made_up import falling, treading
 
-from mjxgait.animation import WalkLoop, stride_in_phase
+from mjxgait.animation import WalkLoop, build_clips, stride_in_phase
 from mjxgait.certify.simulate import simulate
 from mjxgait.certify.starts import nominal_starts
 from mjxgait.certify.twins.halting import HaltingTwin
@@ -46,31 +47,58 @@ def joints(walk: Walk, qpos: np.ndarray) -> np.ndarray:
 def test_a_start_leads_from_standing_into_the_stride(walk: Walk, loops: dict[str, WalkLoop]):
     start = start_of(walk, "walk", loops)
     assert (start.name, start.begins, start.ends) == ("walk_start", IDLE, "walk")
-    np.testing.assert_allclose(
-        joints(walk, start.loop.qpos[0]), walk.creature.joints.stand, atol=0.01
-    )
-    off = joints(walk, start.loop.qpos[-1]) - joints(walk, loops["walk"].qpos[0])
-    assert start.gap == pytest.approx(np.sqrt((off**2).mean()), abs=1e-3)
-    assert start.gap < 0.05
+    first, last = joints(walk, start.loop.qpos[[0, -1]])
+    np.testing.assert_allclose(first, walk.creature.joints.stand, atol=0.01)
+    off = last - joints(walk, loops["walk"].qpos[0])
+    assert start.gaps[1] == pytest.approx(np.sqrt((off**2).mean()), abs=1e-3)
+    assert max(start.gaps) < 0.05
 
 
 def test_a_stop_leads_from_the_stride_to_a_stand(walk: Walk, loops: dict[str, WalkLoop]):
     stop = stop_of(walk, "walk", loops)
     assert (stop.name, stop.begins, stop.ends) == ("walk_stop", "walk", IDLE)
     first, last = joints(walk, stop.loop.qpos[[0, -1]])
-    assert np.abs(first - joints(walk, loops["walk"].qpos[0])).max() < 0.1
-    assert np.sqrt(((last - walk.creature.joints.stand) ** 2).mean()) == pytest.approx(stop.gap)
-    rests = stop.loop.qpos[-round(RESTS * RATE) :]
-    assert np.abs(rests[:, :3] - rests[-1, :3]).max() < 0.02
-    np.testing.assert_array_equal(stop.loop.qpos[0, :2], 0.0)
+    off = first - joints(walk, loops["walk"].qpos[0])
+    assert stop.gaps[0] == pytest.approx(np.sqrt((off**2).mean()), abs=1e-3)
+    assert stop.gaps[0] < 0.05
+    assert np.sqrt(((last - walk.creature.joints.stand) ** 2).mean()) == pytest.approx(stop.gaps[1])
+    rests = stop.loop.path[-round(RESTS * RATE) :]
+    assert np.abs(rests - rests[-1]).max() < 0.02
 
 
-def test_it_moves_its_root_as_the_body_moved(walk: Walk, loops: dict[str, WalkLoop]):
+def test_where_clips_meet_the_trunk_is_in_the_same_place(walk: Walk, loops: dict[str, WalkLoop]):
+    """Above the root, which is where the other clip has ended or will begin."""
+    begins = loops["walk"].qpos[0, :2]
+    assert np.abs(begins).max() > 1e-3
+    start, stop = (of(walk, "walk", loops).loop.qpos[:, :2] for of in (start_of, stop_of))
+    for found, wanted in ((start[0], 0), (start[-1], begins), (stop[0], begins), (stop[-1], 0)):
+        np.testing.assert_allclose(found, wanted, atol=1e-12)
+
+
+def test_the_root_of_the_file_moves_as_the_body_moved(walk: Walk, loops: dict[str, WalkLoop]):
+    """In place too, where the walks have a root that stands."""
     start = start_of(walk, "walk", loops)
     frames = round(start.loop.times[-1] / walk.time_step)
-    moved = (walk.qpos[frames, :2] - walk.qpos[0, :2]) @ walk.forward
-    assert start.way == pytest.approx(moved, abs=0.005)
-    assert start.loop.advance == 0.0
+    moved = (walk.qpos[frames, :2] - walk.qpos[0, :2]) - loops["walk"].qpos[0, :2]
+    np.testing.assert_allclose(start.loop.path[-1], moved, atol=0.005)
+    document = gltf.GLTF2.load_from_bytes(build_clips({**loops, "walk_start": start.loop}))
+    still, moving = (root_of(document, number) for number in (0, 1))
+    assert np.abs(still).max() < 1e-6
+    np.testing.assert_allclose(moving[-1, 2], moved @ walk.forward, atol=0.005)
+    assert start.entry["way"] == pytest.approx(moved @ walk.forward, abs=0.005)
+
+
+def root_of(document: gltf.GLTF2, number: int) -> np.ndarray:
+    """Translations [F, 3] of the first joint in one of the animations."""
+    animation, root = document.animations[number], document.skins[0].joints[0]
+    channel = next(
+        c for c in animation.channels if (c.target.node, c.target.path) == (root, "translation")
+    )
+    accessor = document.accessors[animation.samplers[channel.sampler].output]
+    view = document.bufferViews[accessor.bufferView]
+    begin = (view.byteOffset or 0) + (accessor.byteOffset or 0)
+    data = document.binary_blob()[begin : begin + 12 * accessor.count]
+    return np.frombuffer(data, np.float32).reshape(-1, 3)
 
 
 def test_who_is_told_to_stop_walks_until_then_and_stands_after(walk: Walk):
