@@ -1,5 +1,6 @@
 """Episodes on lanes: the verdict on a genome depends on nothing but the genome and the start."""
 
+import copy
 import dataclasses
 from collections.abc import Callable
 from functools import cache
@@ -47,9 +48,13 @@ def genomes(experiment: Experiment, count: int, seed: int = 0) -> Genome:
 
 
 def with_lanes(experiment: Experiment, lanes: int, devices: int) -> Experiment:
+    """And in turns of their own, as if plans differed in how much a command takes."""
     mesh = jax.sharding.Mesh(np.array(jax.devices()[:devices]), ("lanes",))
-    other = dataclasses.replace(experiment)
-    simulator = dataclasses.replace(experiment.simulator, lanes=lanes, mesh=mesh)
+    other, controller = dataclasses.replace(experiment), copy.copy(experiment.simulator.controller)
+    vars(controller)["load"] = lambda plan: plan.tuning[0]
+    simulator = dataclasses.replace(
+        experiment.simulator, lanes=lanes, mesh=mesh, controller=controller
+    )
     vars(other)["simulator"] = simulator  # where the property keeps it
     return other
 
@@ -88,7 +93,7 @@ def test_every_genome_is_judged_on_every_start(experiment: Experiment, episodes:
 
 
 @pytest.mark.parametrize(("lanes", "devices"), [(5, 2), (16, 1)])
-def test_results_do_not_depend_on_lanes_or_devices(
+def test_results_do_not_depend_on_lanes_devices_or_turns(
     experiment: Experiment, episodes: Episodes, lanes: int, devices: int
 ):
     """Other batch sizes may round differently in float32; half a second of simulation keeps that below a tenth of a millimetre."""
