@@ -20,8 +20,10 @@ from mjxgait.viewing.cast import LOOP_SECONDS, champion_of
 from mjxgait.viewing.walk import WARMUP, Walk
 
 IDLE = "idle"
-BEGINS_BY = 4.0
-"""s by which a walk is in its stride."""
+BEGINS_BY, NEAR = 4.0, 0.03
+"""s by which a walk is in its stride, and rad by which its joints may be off where it is, root mean
+square.
+"""
 PLACES, FADES = 8, (0.2, 0.5, 1.0)
 """Ways to stop: moments of a stride at which it is told to, and s that its poses have to become the
 standing one."""
@@ -82,13 +84,16 @@ def transitions(
 
 
 def start_of(walk: Walk, name: str, loops: dict[str, WalkLoop]) -> Transition:
-    """From standing to that footfall of the first seconds in which it is most like the clip's begin."""
+    """From standing to the first footfall at which it is near to the clip's begin; to the nearest of
+    the first seconds where none is.
+    """
     falls = falls_of_first_foot(walk)
     falls = falls[falls * walk.time_step <= BEGINS_BY]
     if not len(falls):
         return Transition(IDLE, name)
     stand, after = walk.creature.stand_qpos, loops[name].qpos[0]
-    chosen = walk.qpos[: _likest(walk, falls, after) + 1]
+    near = [fall for fall in falls if _apart(walk, walk.qpos[fall], after) <= NEAR]
+    chosen = walk.qpos[: int(near[0] if near else _likest(walk, falls, after)) + 1]
     gaps = (_apart(walk, chosen[0], stand), _apart(walk, chosen[-1], after))
     places = np.zeros(2), after[_place(walk)]
     return Transition(IDLE, name, _motion(walk, chosen, loops[name], places), gaps)
