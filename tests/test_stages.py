@@ -2,6 +2,9 @@
 
 import pytest
 
+from mjxgait.creature import Creature
+from mjxgait.parts.settings import resolve_config
+from mjxgait.runs.experiment import build_experiment
 from mjxgait.runs.stages import compile_stages
 
 
@@ -12,12 +15,27 @@ class Written:
         return compiler_options
 
 
-def test_only_what_simulates_is_optimized(monkeypatch: pytest.MonkeyPatch):
+@pytest.mark.parametrize(("long", "level"), [(False, "0"), (True, "1")])
+def test_only_what_simulates_is_optimized(monkeypatch: pytest.MonkeyPatch, long: bool, level: str):
+    """And a little what takes long to propose."""
     monkeypatch.setattr("jax.default_backend", lambda: "cpu")
-    stages = compile_stages([(part, Written()) for part in ("propose", "judge", "absorb")])
+    written = [(part, Written()) for part in ("propose", "judge", "absorb")]
+    stages = compile_stages(written, long=long)
     assert stages.judge == {"xla_cpu_prefer_vector_width": "512"}
-    assert stages.propose == stages.absorb
-    assert stages.propose["xla_backend_optimization_level"] == "0"
+    assert stages.propose["xla_backend_optimization_level"] == level
+    assert stages.absorb["xla_backend_optimization_level"] == "0"
+
+
+def test_expressions_take_long_and_poses_do_not(stool: Creature):
+    variations = [
+        build_experiment(stool, resolve_config({}, "stool", use={"controller": name}))
+        for name in ("program", "poses")
+    ]
+    found = [
+        e.simulator.controller.variation(e.config.controller, e.config.evolution).long
+        for e in variations
+    ]
+    assert found == [True, False]
 
 
 def test_other_machines_have_their_own_compilers(monkeypatch: pytest.MonkeyPatch):

@@ -72,7 +72,7 @@ class BodiedController:
             sizes = jittered(key_sizes, genome.sizes, box.low, box.high, rate, sigma)
             return Bodied(own.mutate(key_plan, genome.plan), sizes)
 
-        return Variation(create, cross, mutate)
+        return Variation(create, cross, mutate, long=own.long)
 
     def genes(self, genomes: Bodied, settings: Any) -> np.ndarray:
         """See `Controller`."""

@@ -1,6 +1,7 @@
 """Devices: prepared, shared by a run's arrays, and compiled for."""
 
 import os
+from typing import Literal
 
 import jax
 from jax.sharding import NamedSharding, PartitionSpec
@@ -29,17 +30,22 @@ def everywhere(simulator: Simulator) -> NamedSharding:
     return NamedSharding(simulator.mesh, PartitionSpec())
 
 
-def compiled(lowered: jax.stages.Lowered, optimized: bool = True) -> jax.stages.Compiled:
-    """The program. optimized: not worth the compiler's time for what is a small part of a generation."""
-    return lowered.compile(compiler_options=compiler_options(optimized))
+Effort = Literal["best", "some", "least"]
+"""Of the compiler, for a part of a generation: what it is worth."""
 
 
-def compiler_options(optimized: bool) -> dict[str, str | bool]:
+def compiled(lowered: jax.stages.Lowered, effort: Effort = "best") -> jax.stages.Compiled:
+    """The program."""
+    return lowered.compile(compiler_options=compiler_options(effort))
+
+
+def compiler_options(effort: Effort) -> dict[str, str | bool]:
     """Those of this machine's compiler; the fast plant gains a third from the widest vectors, which
     XLA's CPU compiler does not use by itself.
     """
     if jax.default_backend() != "cpu":
         return {}
-    if optimized:
+    if effort == "best":
         return {"xla_cpu_prefer_vector_width": "512"}
-    return {"xla_backend_optimization_level": "0", "xla_llvm_disable_expensive_passes": True}
+    level = {"some": "1", "least": "0"}[effort]
+    return {"xla_backend_optimization_level": level, "xla_llvm_disable_expensive_passes": True}

@@ -196,7 +196,10 @@ class Batch:
 
     def stages(self, judges: bool = True, turn: Turn = at_once) -> Stages:
         """See `compile_stages`."""
-        return compile_stages(self.lower(judges), turn)
+        first = self.experiments[0]
+        settings = first.config.controller, first.config.evolution
+        long = first.simulator.controller.variation(*settings).long
+        return compile_stages(self.lower(judges), turn, long)
 
     def lower(self, judges: bool = True) -> Iterator[tuple[str, jax.stages.Lowered]]:
         """The programs of a generation, see `lower_stages`; the same for all settings of the same shape."""

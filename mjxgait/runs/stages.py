@@ -1,5 +1,5 @@
 """The one place that jits: a generation as three compiled programs in a row, of which only the middle
-one, which simulates, is worth the compiler's best.
+one, which simulates, is worth the compiler's best effort.
 """
 
 import contextlib
@@ -13,7 +13,7 @@ from typing import Any
 import jax
 
 from mjxgait.runs.blueprint import Numbers, Plan
-from mjxgait.runs.devices import compiled, compiler_options, everywhere
+from mjxgait.runs.devices import Effort, compiled, compiler_options, everywhere
 from mjxgait.runs.generation import Row, absorb, first_state, judge, propose
 from mjxgait.search.state import EvolutionState, GenerationMetrics
 from mjxgait.settings.config import Config
@@ -89,13 +89,18 @@ def lower_stages(
 
 
 def compile_stages(
-    programs: Iterable[tuple[str, jax.stages.Lowered]], turn: Turn = at_once
+    programs: Iterable[tuple[str, jax.stages.Lowered]], turn: Turn = at_once, long: bool = False
 ) -> Stages:
-    """Each compiled while the next is traced."""
+    """Each compiled while the next is traced.
+
+    long: whether it takes long to propose (`Variation`): expressions are crossed in half a second by
+    some effort of the compiler's and in three by the least, poses in a hundredth by either.
+    """
+    efforts: dict[str, Effort] = {"propose": "some" if long else "least", "judge": "best"}
 
     def in_turn(part: str, program: jax.stages.Lowered) -> jax.stages.Compiled:
         with turn(part):
-            return compiled(program, optimized=part == "judge")
+            return compiled(program, efforts.get(part, "least"))
 
     with ThreadPoolExecutor() as aside:
         found = {part: aside.submit(in_turn, part, program) for part, program in programs}
@@ -114,7 +119,7 @@ def begin(
 @functools.cache
 def _beginning() -> Callable[..., EvolutionState]:
     """Not at import: the options ask which machine this is."""
-    options = compiler_options(optimized=False)
+    options = compiler_options("least")
     return jax.jit(first_state, static_argnums=0, compiler_options=options)
 
 

@@ -34,12 +34,14 @@ class Variation:
 
     create: key, count -> genomes [count, ...]. cross: key, genome, genome -> genome. mutate: key,
     genome -> genome. price: genomes [N, ...] -> [N], by which fitness is less; None: free.
+    long: whether they walk along a genome place by place, and so are worth some of the compiler's time.
     """
 
     create: Callable[[jax.Array, int], Any]
     cross: Callable[[jax.Array, Any, Any], Any]
     mutate: Callable[[jax.Array, Any], Any]
     price: Callable[[Any], jax.Array] | None = None
+    long: bool = False
 
 
 def creation(box: Box, config: EvolutionConfig) -> Callable[[jax.Array, int], Any]:

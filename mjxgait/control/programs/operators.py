@@ -53,7 +53,7 @@ def program_variation(words: Words, joints: int, settings: Any) -> Variation:
     def price(genomes: Trees) -> jax.Array:
         return jnp.asarray(settings.parsimony * jnp.sum(genomes.code != EMPTY, axis=(1, 2)))
 
-    return Variation(create, cross, mutate, price)
+    return Variation(create, cross, mutate, price, long=True)
 
 
 def crossed(key: jax.Array, mother: Tree, father: Tree, settings: Any) -> Tree:
