@@ -302,9 +302,10 @@ def test_evolution_and_examiner_tell_a_controller_the_same_goals(stool: Creature
     tally = jax.device_get(jax.jit(experiment.simulate)(state.genomes).tally)
     starts = nominal_starts(stool, 3)
     starts.goal[:] = experiment.starts.goal
-    way = (tally.goal - tally.left)[0]
+    # The first two touch the floor a step earlier in one precision than in the other.
+    way = (tally.goal - tally.left)[2]
     # The tally has seen the state before the last step.
-    path = simulate(stool, experiment.champion(state, {}), starts, 0.4).path[:, -2]
+    path = simulate(stool, experiment.champion(state, {}, 2), starts, 0.4).path[:, -2]
     np.testing.assert_allclose(way, path, atol=1e-4)
     assert np.ptp(path) > 1e-2
 

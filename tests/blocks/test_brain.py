@@ -150,7 +150,8 @@ def test_what_a_picture_of_a_brain_leaves_out_moves_nothing(lit: bool):
             assert lit or not any("light" in cell.label for cell in network.cells.values())
         np.testing.assert_array_equal(pulled(brain, lit), before)
         for wire in network.wires:
-            assert network.cells[wire.source].depth >= network.cells[wire.target].depth - 1
+            # One wire farther from the hinges at most; nearer where a hinge's neuron feeds others.
+            assert network.cells[wire.source].depth <= network.cells[wire.target].depth + 1
         moving += bool(before.any())
     assert moving > 10
     assert left_out > 100
