@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 from mjxgait.animation.loop import WalkLoop, walk_loop
-from mjxgait.certify.strides import SWING, footfalls
+from mjxgait.certify.strides import falls_of_feet
 from mjxgait.creature import Creature
 from mjxgait.viewing.walk import Walk
 
@@ -31,8 +31,7 @@ def stride_in_phase(walk: Walk, rate: int) -> WalkLoop:
 
 def falls_of_first_foot(walk: Walk) -> np.ndarray:
     """Recorded frames at which the creature's first foot comes down."""
-    recording = walk.recording
-    return footfalls(recording.foot_height[:, 0], SWING * recording.dimensions.hip_height)
+    return falls_of_feet(walk.recording)[0]
 
 
 def standing_still(like: WalkLoop) -> WalkLoop:

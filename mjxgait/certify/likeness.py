@@ -7,7 +7,7 @@ import numpy as np
 
 from mjxgait.certify.criteria import speed
 from mjxgait.certify.measure import Recording
-from mjxgait.certify.strides import SWING, footfalls, stride_frequency
+from mjxgait.certify.strides import falls_of_feet, stride_frequency
 from mjxgait.settings.gaits import animal_duty, animal_stride
 
 
@@ -47,8 +47,7 @@ def patter(window: Recording) -> float:
     """
     carries = window.contact
     touchdowns = (carries[1:] & ~carries[:-1]).sum(0)
-    rise = SWING * window.dimensions.hip_height
-    swung = np.array([len(footfalls(height, rise)) for height in window.foot_height.T])
+    swung = np.array(list(map(len, falls_of_feet(window))))
     strides = max(np.sort(swung)[len(swung) // 2], 1)
     return float(np.maximum(touchdowns - swung, 0).mean() / strides)
 

@@ -19,11 +19,16 @@ def stride_starts(recording: Recording) -> np.ndarray:
     Of the feet that swing at least as often as the one in the middle it is the foot that falls most
     evenly: a foot that trembles or scuffs in one stride and not in the next tells no strides.
     """
-    threshold = SWING * recording.dimensions.hip_height
-    falls = [footfalls(height, threshold) for height in recording.foot_height.T]
+    falls = falls_of_feet(recording)
     usual = sorted(map(len, falls))[(len(falls) - 1) // 2]
     often = [foot for foot in falls if len(foot) >= max(usual, 2)]
     return min(often, key=_unevenness, default=np.zeros(0, dtype=int))
+
+
+def falls_of_feet(recording: Recording) -> list[np.ndarray]:
+    """Frames at which each foot [N] has come down from a swing."""
+    threshold = SWING * recording.dimensions.hip_height
+    return [footfalls(height, threshold) for height in recording.foot_height.T]
 
 
 def footfalls(height: np.ndarray, threshold: float) -> np.ndarray:

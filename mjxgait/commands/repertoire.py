@@ -172,7 +172,7 @@ def _leave(
         walking = sum(blend.walks for blend in between)
         console.print(f"half way between neighbours {walking} of {len(between)} walk")
     if loops := clips_of(folder, found, options.rate):
-        ways = transitions(folder, found, loops)
+        ways = transitions(found, loops)
         console.print(f"from standing, and to a stand: {sum(map(bool, ways))} of {len(ways)} found")
         files = folder / CLIPS, folder / TABLE
         write_clips(*files, loops, found, between, ways, options.travelling)

@@ -6,17 +6,16 @@ to stop, `T` frames, `J` actuated joints.
 
 import dataclasses
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from mjxgait.animation import WalkLoop, falls_of_first_foot, resampled, standing_still
+from mjxgait.certify.layout import Layout
 from mjxgait.certify.simulate import simulate
 from mjxgait.certify.starts import nominal_starts
 from mjxgait.certify.twins.halting import HaltingTwin
 from mjxgait.repertoire.found import Found
-from mjxgait.viewing.cast import LOOP_SECONDS, champion_of
 from mjxgait.viewing.walk import WARMUP, Walk
 
 IDLE = "idle"
@@ -71,16 +70,10 @@ class Transition:
         }
 
 
-def transitions(
-    folder: Path, found: Sequence[Found], loops: dict[str, WalkLoop]
-) -> list[Transition]:
-    """A start and a stop for each certified walk straight on."""
+def transitions(found: Sequence[Found], loops: dict[str, WalkLoop]) -> list[Transition]:
+    """A start and a stop for each certified walk straight on, made of the walk that its clip is of."""
     names = [one.cell.name for one in found if one.certified and not one.cell.turn]
-    made = []
-    for name in names:
-        walk = champion_of(folder / name, LOOP_SECONDS).walk
-        made += [start_of(walk, name, loops), stop_of(walk, name, loops)]
-    return made
+    return [of(loops[name].walk, name, loops) for name in names for of in (start_of, stop_of)]
 
 
 def start_of(walk: Walk, name: str, loops: dict[str, WalkLoop]) -> Transition:
@@ -134,7 +127,7 @@ def halted(walk: Walk, moments: np.ndarray) -> list[np.ndarray]:
         creature, walk.champion, starts, seconds, record=len(halts), threads=1, twin=twin
     )
     film = outcome.trajectory
-    root = int(creature.model.jnt_dofadr[creature.model.body_jntadr[creature.trunk]])
+    root = Layout(creature.model).root_dof
     fastest = STILL * np.sqrt(creature.gravity * creature.frame.hip_height)
     motions = []
     for row, up in enumerate(outcome.stayed_up):
@@ -165,8 +158,7 @@ def _motion(
 
 def _place(walk: Walk) -> slice:
     """Of the trunk in the world, among the numbers of a pose; its height comes after."""
-    model = walk.creature.model
-    first = int(model.jnt_qposadr[model.body_jntadr[walk.creature.trunk]])
+    first = Layout(walk.creature.model).root_qpos
     return slice(first, first + 2)
 
 

@@ -1,7 +1,6 @@
 """How a walk begins and ends: motions that physics has made, which fit the clips before and after them."""
 
 import dataclasses
-from pathlib import Path
 
 import numpy as np
 import pygltflib as gltf
@@ -140,7 +139,7 @@ def test_whose_feet_stay_down_has_neither(stool: Creature, loops: dict[str, Walk
         assert made.entry["found"] is False
 
 
-def test_turns_need_none(tmp_path: Path, loops: dict[str, WalkLoop]):
+def test_turns_need_none(loops: dict[str, WalkLoop]):
     cells = [Cell(0.2, 10.0), Cell(0.2, -10.0)]
     found = [Found(cell, True, 0.2, 0.0, 0.5, "trot", 0.3, ()) for cell in cells]
-    assert transitions(tmp_path, found, loops) == []
+    assert transitions(found, loops) == []
