@@ -97,6 +97,18 @@ class Judged:
     computed_steps: jax.Array
 
 
+@pytree
+class Asked:
+    """Which trials of some genomes are to be run, and what is known of the others.
+
+    wanted: [B, N, R]. known: leaves [B, N, R, ...], NaN where nothing is; its steps, [B], are those
+    that have been spent on them.
+    """
+
+    wanted: Number
+    known: Judged
+
+
 class Plant(Protocol):
     """Batched physics, one step split around the controller.
 

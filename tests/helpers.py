@@ -32,7 +32,7 @@ def small_config(**tables: dict) -> Config:
     """
     table = {
         "evolution": {"population": 6, "generations": 3},
-        "rollout": {"seconds": 0.4, "starts": 2, "lanes": 4},
+        "rollout": {"seconds": 0.4, "starts": 2, "promote": 1.0, "lanes": 4},
     }
     for name, values in tables.items():
         table[name] = {**table.get(name, {}), **values}

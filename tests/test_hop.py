@@ -251,7 +251,7 @@ def experiment(stool: Creature) -> Experiment:
     table = {
         "use": {"task": "hop"},
         "evolution": {"population": 6},
-        "rollout": {"seconds": 0.4, "starts": 3, "lanes": 4},
+        "rollout": {"seconds": 0.4, "starts": 3, "promote": 1.0, "lanes": 4},
     }
     return build_experiment(stool, build_config(table, "test"))
 
@@ -291,7 +291,7 @@ def reaching(stool: Creature, folder: Path, task: str, source: str = REACH) -> E
     table = {
         "use": {"task": task, "controller": name},
         "evolution": {"population": 6},
-        "rollout": {"seconds": 0.4, "starts": 3, "lanes": 4, **ALIKE},
+        "rollout": {"seconds": 0.4, "starts": 3, "promote": 1.0, "lanes": 4, **ALIKE},
     }
     return build_experiment(stool, build_config(table, "test"))
 

@@ -104,13 +104,14 @@ OTHERWISE = {
 
 
 def variant(tables: dict) -> Config:
-    """A config with the lanes of one that runs alone, so that rounding is the same.
+    """A config with the lanes of one that runs alone, so that rounding is the same, and of which half
+    are tried in one start only.
 
     On the fast step it is not: there it depends on the lane.
     """
     tables = dict(tables)
     seed = tables.pop("seed", 0)
-    tables["rollout"] = {"physics": "mjx"} | tables.get("rollout", {})
+    tables["rollout"] = {"physics": "mjx", "promote": 0.5} | tables.get("rollout", {})
     return dataclasses.replace(small_config(**tables), seed=seed)
 
 

@@ -16,7 +16,7 @@ from mjxgait.errors import UserError
 from mjxgait.runs.experiment import build_experiment
 
 SMALL = {
-    "rollout": {"seconds": 0.4, "starts": 2, "lanes": 4},
+    "rollout": {"seconds": 0.4, "starts": 2, "promote": 1.0, "lanes": 4},
     "examination": {"candidates": 1, "draws": 2},
 }
 

@@ -194,7 +194,7 @@ def test_to_run_through_the_bar_is_better_than_to_stay_before_it(luxo: Creature)
 def test_the_bar_comes_down_in_so_many_steps_and_stays(stool: Creature):
     """In the program that is run; the two rows come down by settings of their own."""
     common = {"use": {"task": "limbo"}, "evolution": {"population": 6}}
-    rollout = {"seconds": 0.2, "starts": 3, "lanes": 4}
+    rollout = {"seconds": 0.2, "starts": 3, "promote": 1.0, "lanes": 4}
     rows = [
         build_experiment(
             stool, build_config({**common, "fitness": fitness, "rollout": rollout}, "test")
@@ -266,7 +266,7 @@ def test_all_goals_lie_beyond_the_bar(luxo: Creature):
 def test_a_lower_bar_is_a_setting_of_the_same_program(stool: Creature):
     tables = [{"fitness": {"height": height}} for height in (0.1, 5.0)]
     common = {"use": {"task": "limbo"}, "evolution": {"population": 6}}
-    rollout = {"seconds": 0.2, "starts": 2, "lanes": 4}
+    rollout = {"seconds": 0.2, "starts": 2, "promote": 1.0, "lanes": 4}
     built = [
         build_experiment(stool, build_config({**common, **table, "rollout": rollout}, "test"))
         for table in tables

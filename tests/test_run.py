@@ -31,6 +31,8 @@ SMALL = [
     "0.4",
     "--rollout.starts",
     "2",
+    "--rollout.promote",
+    "1",
     "--rollout.lanes",
     "4",
 ]

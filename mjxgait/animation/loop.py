@@ -86,12 +86,12 @@ def walk_loop(walk: Walk, rate: int = 30, most: int = MOST_STRIDES) -> WalkLoop:
     if rate_of_turn:
         qpos = _straightened(walk, qpos, first * walk.time_step + share * seconds, rate_of_turn)
     gap = _difference(model, qpos[-1], qpos[0])
-    root = int(model.jnt_dofadr[model.body_jntadr[walk.creature.trunk]])
+    root = walk.creature.root_dof
     advance = float(-gap[root : root + 2] @ walk.forward)
     # What the end lacks to be the beginning is added little by little.
     qpos = np.array([_integrate(model, q, s * gap) for q, s in zip(qpos, share, strict=True)])
     qpos[-1] = qpos[0]
-    place = int(model.jnt_qposadr[model.body_jntadr[walk.creature.trunk]])
+    place = walk.creature.root_qpos
     # Shown where a viewer's own floor is, or none: on ground that is no plane at its mean height.
     below = walk.ground_heights(walk.qpos[first:last, place : place + 2])
     qpos[:, place + 2] -= below.mean() - 0.5 * (below[-1] - below[0])
@@ -102,10 +102,9 @@ def walk_loop(walk: Walk, rate: int = 30, most: int = MOST_STRIDES) -> WalkLoop:
 
 def walk_take(walk: Walk, rate: int = 30) -> WalkLoop:
     """The whole walk as it was, also one that falls, in place and with a seam."""
-    model, trunk = walk.creature.model, walk.creature.trunk
+    model, place = walk.creature.model, walk.creature.root_qpos
     count = max(int(walk.seconds * rate), 2)
     qpos = resampled(model, walk.qpos, np.arange(count) / rate / walk.time_step)
-    place = int(model.jnt_qposadr[model.body_jntadr[trunk]])
     advance = float((qpos[-1, place : place + 2] - qpos[0, place : place + 2]) @ walk.forward)
     share = np.linspace(0.0, 1.0, count)[:, None]
     qpos[:, place + 2] -= walk.ground_heights(qpos[:, place : place + 2])
@@ -126,8 +125,7 @@ def _straightened(walk: Walk, qpos: np.ndarray, times: np.ndarray, rate: float) 
     times: [F] s since the start. rate: rad/s to the left. Each step is turned back by the heading
     of its moment, and the whole so that it leads forward.
     """
-    body = walk.creature.model.body_jntadr[walk.creature.trunk]
-    place, straight = int(walk.creature.model.jnt_qposadr[body]), qpos.copy()
+    place, straight = walk.creature.root_qpos, qpos.copy()
     headings, steps = rate * times, np.diff(qpos[:, place : place + 2], axis=0)
     middles = (headings[1:] + headings[:-1]) / 2
     way = np.cumsum(np.array([_turned(s, -a) for s, a in zip(steps, middles, strict=True)]), axis=0)

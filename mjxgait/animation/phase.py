@@ -38,7 +38,7 @@ def standing_still(like: WalkLoop) -> WalkLoop:
     """A second of the standing pose: a pose and no motion that anybody has simulated."""
     creature: Creature = like.walk.creature
     stand = creature.stand_qpos.copy()
-    place = int(creature.model.jnt_qposadr[creature.model.body_jntadr[creature.trunk]])
+    place = creature.root_qpos
     stand[place : place + 2] = 0.0
     qpos = np.tile(stand, (like.rate + 1, 1))
     return dataclasses.replace(like, qpos=qpos, strides=0, advance=0.0, stretched=1.0, turned=0.0)

@@ -91,7 +91,7 @@ def resting(loop: WalkLoop) -> np.ndarray:
     """The rest pose [nq] above the origin."""
     creature = loop.walk.creature
     qpos = creature.rest_qpos.copy()
-    place = int(creature.model.jnt_qposadr[creature.model.body_jntadr[creature.trunk]])
+    place = creature.root_qpos
     qpos[place : place + 2] = 0.0
     return qpos
 

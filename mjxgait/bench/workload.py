@@ -19,7 +19,9 @@ from mjxgait.settings.config import Config, UseConfig
 def walking(settings: CreatureSettings) -> Config:
     """The settings in a contest: the rivals walk by key poses, whatever else the creature does."""
     use = dataclasses.asdict(UseConfig())
-    return resolve_config(settings.train, settings.creature.name, use=use)
+    config = resolve_config(settings.train, settings.creature.name, use=use)
+    # Rivals simulate everybody on all starts, and so do we.
+    return dataclasses.replace(config, rollout=dataclasses.replace(config.rollout, promote=1.0))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -1,5 +1,6 @@
 """One large population: the offspring of a generation, judged in blocks by everybody who is there."""
 
+import dataclasses
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -13,7 +14,7 @@ from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.settings.config import Config
 from mjxgait.tasks.trials import Starts
-from mjxgait.types import Judged
+from mjxgait.types import Asked, Judged
 
 
 class Blocks:
@@ -29,16 +30,36 @@ class Blocks:
         self._crew, self._recipe = crew, Recipe.of(creature, [config])
         self.size = block_size(config.evolution.offspring, config.rollout.block)
 
-    def judge(self, genomes: Any, trials: Starts, settings: Config) -> Judged:
+    def judge(
+        self, genomes: Any, trials: Starts, settings: Config, asked: Asked | None = None
+    ) -> Judged:
         """See `Evaluator`. One row; its settings are in the recipe."""
-        genomes, trials = jax.device_get((genomes, trials))
-        return together(self._crew.all(self._work(genomes, trials)) or ())
+        genomes, trials, asked = jax.device_get((genomes, trials, asked))
+        judged = together(self._crew.all(self._work(genomes, trials, asked)) or ())
+        return judged if asked is None else _spent(judged, asked.known)
 
-    def _work(self, genomes: Any, trials: Starts) -> Iterator[tuple[Recipe, Job]]:
+    def _work(
+        self, genomes: Any, trials: Starts, asked: Asked | None
+    ) -> Iterator[tuple[Recipe, Job]]:
         count = jax.tree.leaves(genomes)[0].shape[1]
         for first in range(0, count, self.size):
-            block = jax.tree.map(lambda leaf, i=first: leaf[:, i : i + self.size], genomes)
-            yield self._recipe, Judge(block, trials)
+
+            def cut(leaf: np.ndarray, first: int = first) -> np.ndarray:
+                # What has been spent is the whole generation's: it is counted once, in the end.
+                part = slice(first, first + self.size)
+                return leaf[:, part] if leaf.ndim > 1 else np.zeros_like(leaf)
+
+            block, known = jax.tree.map(cut, (genomes, asked))
+            yield self._recipe, Judge(block, trials, known)
+
+
+def _spent(judged: Judged, known: Judged) -> Judged:
+    """The verdict, which has cost the steps of what was known before too."""
+    return dataclasses.replace(
+        judged,
+        sim_steps=judged.sim_steps + known.sim_steps,
+        computed_steps=judged.computed_steps + known.computed_steps,
+    )
 
 
 def block_size(offspring: int, most: int) -> int:

@@ -16,7 +16,7 @@ from mjxgait.runs.loop import followed, metrics_line, versions
 from mjxgait.runs.packed import Packed, pack
 from mjxgait.search.state import EvolutionState, GenerationMetrics, stop_reason
 from mjxgait.tasks.trials import Starts
-from mjxgait.types import Judged
+from mjxgait.types import Asked, Judged
 
 Lines = list[dict[str, Any]]
 
@@ -102,14 +102,15 @@ class AdvanceIsland:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Judge:
-    """Genomes [1, N, ...] on starts [1, R], with leaves in NumPy."""
+    """Genomes [1, N, ...] on starts [1, R], with leaves in NumPy. asked: see `Evaluator`."""
 
     genomes: Any
     starts: Starts
+    asked: Asked | None = None
 
     def do(self, programs: Programs, recipe: Recipe) -> Judged:
         """See `Job`."""
-        judged: Judged = programs.judge(recipe, self.genomes, self.starts)
+        judged: Judged = programs.judge(recipe, self.genomes, self.starts, self.asked)
         return judged
 
 

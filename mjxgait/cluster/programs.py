@@ -14,7 +14,7 @@ from mjxgait.runs.experiment import Batch, Step, build_batch
 from mjxgait.runs.latest import Latest
 from mjxgait.runs.shape import Shape, shape_of
 from mjxgait.runs.stages import Stages, Turn, at_once
-from mjxgait.types import Judged
+from mjxgait.types import Asked, Judged
 
 KEPT = 8
 """Of each sort, those that were used last; a program takes some hundred MB."""
@@ -56,19 +56,22 @@ class Programs:
 
         return batch.bound(self._stages.find(shape, lambda: batch.stages(turn=turn)))
 
-    def judge(self, recipe: Recipe, genomes: Any, starts: Any) -> Judged:
+    def judge(
+        self, recipe: Recipe, genomes: Any, starts: Any, asked: Asked | None = None
+    ) -> Judged:
         """The verdict on genomes [1, N, ...], in NumPy."""
         shape, batch = self._known(recipe)
         count = jax.tree.leaves(genomes)[0].shape[1]
 
         def compile_it() -> jax.stages.Compiled:
-            program = batch.lower_judge(genomes, starts)
+            program = batch.lower_judge(genomes, starts, asked)
             with self._turn(shape.name("judge", count)):
                 return compiled(program)
 
         program = self._judges.find((shape, count), compile_it)
         numbers, rows = batch.known
-        judged: Judged = jax.device_get(program(numbers, rows.settings, starts, genomes))
+        given = (numbers, rows.settings, starts, genomes, *([] if asked is None else [asked]))
+        judged: Judged = jax.device_get(program(*given))
         return judged
 
     def _known(self, recipe: Recipe) -> tuple[BatchShape, Batch]:

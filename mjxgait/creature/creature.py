@@ -51,6 +51,16 @@ class Creature:
         return int(self.model.nv)
 
     @property
+    def root_qpos(self) -> int:
+        """Where the trunk's joints begin in qpos: of a free trunk x, y, z and its quaternion."""
+        return int(self.model.jnt_qposadr[self.model.body_jntadr[self.trunk]])
+
+    @property
+    def root_dof(self) -> int:
+        """Where they begin in qvel."""
+        return int(self.model.jnt_dofadr[self.model.body_jntadr[self.trunk]])
+
+    @property
     def gravity(self) -> float:
         """m/s², downwards."""
         return float(-self.model.opt.gravity[2])

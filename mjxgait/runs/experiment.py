@@ -35,6 +35,7 @@ from mjxgait.settings.traced import traced
 from mjxgait.simulation.evaluator import Evaluator
 from mjxgait.simulation.rollout import Episodes, Simulator
 from mjxgait.tasks.trials import Starts
+from mjxgait.types import Asked
 
 Step = Callable[[EvolutionState], tuple[EvolutionState, GenerationMetrics]]
 """A compiled generation."""
@@ -209,9 +210,12 @@ class Batch:
         """The generation of these rows by programs of their shape."""
         return partial(stages.step, *self.known, evaluator=evaluator)
 
-    def lower_judge(self, genomes: Any, starts: Starts) -> jax.stages.Lowered:
+    def lower_judge(
+        self, genomes: Any, starts: Starts, asked: Asked | None = None
+    ) -> jax.stages.Lowered:
         """The program that judges so many genomes [B, N, ...]; see `generation.judge`."""
-        return lowered(self._blueprint, judge, self.rows.settings, starts, genomes)
+        given = (self.rows.settings, starts, genomes)
+        return lowered(self._blueprint, judge, *given, *([] if asked is None else [asked]))
 
     @property
     def _blueprint(self) -> Plan:

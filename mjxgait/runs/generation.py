@@ -1,4 +1,4 @@
-"""The parts of a generation of evolution runs side by side: propose, judge, absorb.
+"""The parts of a generation of evolution runs side by side: propose, judge (and promote), absorb.
 
 Row by row but for the simulations, so that a row reads nothing of its neighbours, unless it is told
 to have theirs judged among its own.
@@ -10,6 +10,7 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from mjxgait.runs.blueprint import Numbers, Plan
 from mjxgait.search.evolution import Evolution
@@ -20,7 +21,7 @@ from mjxgait.simulation.rollout import Simulator
 from mjxgait.tasks.protocol import Task
 from mjxgait.tasks.score import in_order, score
 from mjxgait.tasks.trials import Starts
-from mjxgait.types import Judged, pytree
+from mjxgait.types import Asked, Judged, pytree
 
 LEADERS = 16
 """Of the best of a row, those that decide whether trials become harder."""
@@ -108,10 +109,49 @@ def with_guests(sources: jax.Array, states: EvolutionState, proposals: Proposal)
 
 
 def judge(
-    blueprint: Plan, numbers: Numbers | None, settings: Config, starts: Starts, genomes: object
+    blueprint: Plan,
+    numbers: Numbers | None,
+    settings: Config,
+    starts: Starts,
+    genomes: object,
+    asked: Asked | None = None,
 ) -> Judged:
     """The verdict on genomes [B, N, ...] as this machine gives it."""
-    return Local(blueprint.simulator(numbers)).judge(genomes, starts, settings)
+    return Local(blueprint.simulator(numbers)).judge(genomes, starts, settings, asked)
+
+
+def first_trials(states: EvolutionState, proposals: Proposal) -> Asked:
+    """Everybody's first trial, of whom nothing is known yet; reads nothing but shapes."""
+    shape = (*proposals.born.shape, states.terms.shape[2])
+
+    def nothing(values: jax.Array) -> Any:
+        return np.full((*shape, values.shape[-1]), np.nan, np.float32)
+
+    failed: Any = np.zeros(shape, bool)
+    spent: Any = np.zeros(shape[0], np.int32)
+    known = Judged(nothing(states.terms), nothing(states.outcome), failed, spent, spent)
+    return Asked(np.broadcast_to(np.arange(shape[2]) == 0, shape), known)
+
+
+def promote(
+    blueprint: Plan,
+    numbers: Numbers | None,
+    rows: Row,
+    states: EvolutionState,
+    proposals: Proposal,
+    judged: Judged,
+) -> Asked:
+    """The other trials of those who did best in the first, and of those who are judged once more."""
+    simulator = blueprint.simulator(numbers)
+
+    def of_row(given: tuple[Row, EvolutionState, Proposal, Judged]) -> jax.Array:
+        row, state, proposal, judged = given
+        share = row.settings.rollout.promote
+        return evolution_of(simulator, row.settings).promising(state, proposal, judged, share)
+
+    wanted = jax.lax.map(of_row, (rows, states, proposals, judged))
+    others = jnp.arange(states.terms.shape[2]) > 0
+    return Asked(wanted[..., None] & others, judged)
 
 
 def absorb(

@@ -1,5 +1,5 @@
-"""The one place that jits: a generation as three compiled programs in a row, of which only the middle
-one, which simulates, is worth the compiler's best effort.
+"""The one place that jits: a generation as a few compiled programs in a row, of which only the one
+that simulates is worth the compiler's best effort.
 """
 
 import contextlib
@@ -14,11 +14,20 @@ import jax
 
 from mjxgait.runs.blueprint import Numbers, Plan
 from mjxgait.runs.devices import Effort, compiled, compiler_options, everywhere
-from mjxgait.runs.generation import Row, absorb, first_state, judge, propose
+from mjxgait.runs.generation import (
+    Row,
+    absorb,
+    first_state,
+    first_trials,
+    judge,
+    promote,
+    propose,
+)
 from mjxgait.search.state import EvolutionState, GenerationMetrics
 from mjxgait.settings.config import Config
 from mjxgait.simulation.evaluator import Evaluator
 from mjxgait.tasks.trials import Starts
+from mjxgait.types import Asked, Judged
 
 Turn = Callable[[str], AbstractContextManager[object]]
 """Whose turn it is to compile a program, by its name, where several processes share a cache."""
@@ -31,11 +40,14 @@ def at_once(name: str) -> AbstractContextManager[object]:
 
 @dataclasses.dataclass(frozen=True)
 class Stages:
-    """The compiled programs of one shape; see `generation`. judge: None where others judge."""
+    """The compiled programs of one shape; see `generation`. judge: None where others judge. promote: None
+    where everybody is tried in all trials.
+    """
 
     propose: jax.stages.Compiled
     absorb: jax.stages.Compiled
     judge: jax.stages.Compiled | None = None
+    promote: jax.stages.Compiled | None = None
 
     def step(
         self,
@@ -46,11 +58,20 @@ class Stages:
     ) -> tuple[EvolutionState, GenerationMetrics]:
         """A generation of the rows [B]. evaluator: who judges instead of this machine's program."""
         proposals, starts = self.propose(numbers, rows, states)
-        if evaluator is not None:
-            judged = evaluator.judge(proposals.offspring, starts, rows.settings)
-        else:
+
+        def verdict(*asked: Asked) -> Judged:
+            if evaluator is not None:
+                return evaluator.judge(proposals.offspring, starts, rows.settings, *asked)
             assert self.judge is not None, "compiled for an evaluator elsewhere"
-            judged = self.judge(numbers, rows.settings, starts, proposals.offspring)
+            given = (numbers, rows.settings, starts, proposals.offspring)
+            found: Judged = self.judge(*given, *asked)
+            return found
+
+        if self.promote is None:
+            judged = verdict()
+        else:
+            first = verdict(first_trials(states, proposals))
+            judged = verdict(self.promote(numbers, rows, states, proposals, first))
         after: tuple[EvolutionState, GenerationMetrics] = self.absorb(
             numbers, rows, states, proposals, judged
         )
@@ -78,13 +99,17 @@ def lower_stages(
     first = lowered(blueprint, propose, rows, states)
     yield "propose", first
     proposals, starts = first.out_info
-    given = (rows.settings, starts, proposals.offspring)
+    promotes = rows.settings.rollout.promotes
+    asked = (first_trials(states, proposals),) if promotes else ()
+    given = (rows.settings, starts, proposals.offspring, *asked)
     if judges:
         middle = lowered(blueprint, judge, *given)
         yield "judge", middle
         judged = middle.out_info
     else:
         judged = jax.eval_shape(functools.partial(judge, blueprint), blueprint.numbers, *given)
+    if promotes:
+        yield "promote", lowered(blueprint, promote, rows, states, proposals, judged)
     yield "absorb", lowered(blueprint, absorb, rows, states, proposals, judged)
 
 

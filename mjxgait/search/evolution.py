@@ -94,6 +94,19 @@ class Evolution:
             return self.config.elites, jnp.ones((), bool)
         return min(self.config.population, self.config.offspring), state.stale
 
+    def promising(
+        self, state: EvolutionState, proposal: Proposal, judged: Judged, share: float
+    ) -> jax.Array:
+        """Who [M] is worth more trials than the first, which alone has been judged: that share of all,
+        and whoever is judged once more.
+        """
+        generation = jnp.maximum(state.generation + 1, 0)
+        worth = self._fitness(proposal.offspring, judged.terms[:, :1], generation)
+        place = jnp.argsort(jnp.argsort(-worth))
+        best = (place < round(share * len(place))) & jnp.isfinite(worth)
+        count, now = self._again(state)
+        return best | ((jnp.arange(len(place)) < count) & now & ~self._seeding(state))
+
     def absorb(
         self, state: EvolutionState, proposal: Proposal, judged: Judged
     ) -> tuple[EvolutionState, GenerationMetrics]:

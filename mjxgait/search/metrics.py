@@ -35,7 +35,7 @@ def metrics(
         spread=sum(spreads, jnp.zeros(())) / len(spreads),
         forced=forced,
         failures=jnp.sum(judged.failed),
-        episodes=jnp.int32(judged.failed.size),
+        episodes=jnp.sum(judged.failed | jnp.isfinite(judged.terms).all(-1)),
         evaluations=jnp.int32(config.offspring),
         sim_steps=judged.sim_steps,
         computed_steps=judged.computed_steps,

@@ -15,6 +15,7 @@ from mjxgait.settings.tables import (
     Fraction,
     NonNegative,
     Positive,
+    Share,
     Whole,
 )
 
@@ -51,6 +52,8 @@ class RolloutConfig:
       seconds: length of an episode.
       starts: R, episodes per individual; the first is nominal, the others are perturbed, the
         same for all.
+      promote: share of a generation, those who do best in the first start, that is tried in the
+        others too; the rest is dropped. 1 tries everybody in all.
       step: s of the simulation, of bodies that grow; 0 takes that of creature.xml.
       variety: so many times as many perturbed starts there are in all; each generation takes
         the next ones. With more than 1 everybody must be judged anew: `evolution.elite`.
@@ -86,6 +89,7 @@ class RolloutConfig:
     __pydantic_config__ = STRICT
     seconds: Annotated[Positive, SHAPE] = 8.0
     starts: Annotated[Count, SHAPE] = 3
+    promote: Annotated[Share, SHAPE] = 0.25
     step: Annotated[NonNegative, SHAPE] = 0.0
     variety: Annotated[Count, SHAPE] = 1
     joint_noise: NonNegative = 0.1
@@ -112,6 +116,11 @@ class RolloutConfig:
             raise ValueError(
                 f"ground = {self.ground}: all starts have it; slope and rough are for a flat one"
             )
+
+    @property
+    def promotes(self) -> bool:
+        """Whether not everybody is tried in all starts."""
+        return self.promote < 1 and self.starts > 1
 
     @property
     def uneven(self) -> bool:

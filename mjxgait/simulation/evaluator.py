@@ -12,16 +12,18 @@ from mjxgait.simulation.rollout import Episodes, Simulator
 from mjxgait.tasks.protocol import FINISHED, NONFINITE
 from mjxgait.tasks.score import in_order
 from mjxgait.tasks.trials import Starts
-from mjxgait.types import Judged
+from mjxgait.types import Asked, Judged
 
 
 class Evaluator(Protocol):
     """Judges the genomes of several evolution runs, the rows `B`."""
 
-    def judge(self, genomes: Any, trials: Starts, settings: Config) -> Judged:
+    def judge(
+        self, genomes: Any, trials: Starts, settings: Config, asked: Asked | None = None
+    ) -> Judged:
         """The verdict, leaves [B, N, ...], on genomes [B, N, ...] in the trials [B, R] of their row.
 
-        settings: traced, leaves [B, ...].
+        settings: traced, leaves [B, ...]. asked: which of the trials to run; None is all.
         """
         ...
 
@@ -32,9 +34,12 @@ class Local:
 
     simulator: Simulator
 
-    def judge(self, genomes: Any, trials: Starts, settings: Config) -> Judged:
+    def judge(
+        self, genomes: Any, trials: Starts, settings: Config, asked: Asked | None = None
+    ) -> Judged:
         """See `Evaluator`. Row by row but for the simulations: no row reads anything of its neighbours."""
-        episodes = self.simulator.simulate(genomes, trials, settings)
+        wanted = None if asked is None else jnp.asarray(asked.wanted)
+        episodes = self.simulator.simulate(genomes, trials, settings, wanted)
         lived = jnp.sum(episodes.tally.steps, axis=(1, 2))
         # Idle lanes are nobody's: each row bears a part in proportion to the steps that it lived.
         share = lived / jnp.maximum(jnp.sum(lived), 1)
@@ -44,7 +49,8 @@ class Local:
             settings, tally, computed = row
             return self.verdict(settings, Episodes(tally, computed))
 
-        return jax.lax.map(of_row, (settings, episodes.tally, computed))
+        judged = jax.lax.map(of_row, (settings, episodes.tally, computed))
+        return judged if asked is None else completed(judged, asked)
 
     def verdict(self, settings: Config, episodes: Episodes) -> Judged:
         """On one row's episodes, tally with leaves [N, R, ...]."""
@@ -61,3 +67,19 @@ class Local:
             sim_steps=jnp.sum(tally.steps),
             computed_steps=episodes.computed_steps,
         )
+
+
+def completed(judged: Judged, asked: Asked) -> Judged:
+    """The verdict with what is known of the trials that were not run; all leaves [B, ...]."""
+
+    def pick(new: jax.Array, known: jax.Array) -> jax.Array:
+        wanted = jnp.asarray(asked.wanted)
+        return jnp.where(wanted.reshape(*wanted.shape, *[1] * (new.ndim - wanted.ndim)), new, known)
+
+    return Judged(
+        terms=pick(judged.terms, asked.known.terms),
+        outcome=pick(judged.outcome, asked.known.outcome),
+        failed=pick(judged.failed, asked.known.failed),
+        sim_steps=judged.sim_steps + asked.known.sim_steps,
+        computed_steps=judged.computed_steps + asked.known.computed_steps,
+    )

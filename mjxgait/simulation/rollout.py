@@ -87,10 +87,13 @@ class Simulator:
     mesh: Mesh
     bodies: Callable[[Any, Starts], Starts] | None = None
 
-    def simulate(self, genomes: Any, starts: Starts, settings: Config) -> Episodes:
+    def simulate(
+        self, genomes: Any, starts: Starts, settings: Config, wanted: jax.Array | None = None
+    ) -> Episodes:
         """Every genome (leaves [B, N, ...]) on every start [B, R] of its row, under the row's traced settings, leaves [B, ...].
 
-        The order of results is the order of the genomes.
+        The order of results is the order of the genomes. wanted: [B, N, R] episodes to simulate; the
+        tallies of the others are all zero. None is all.
         """
         shape = (*jax.tree.leaves(genomes)[0].shape[:2], starts.friction.shape[1])
         total, devices = int(np.prod(shape)), self.mesh.size
@@ -104,9 +107,11 @@ class Simulator:
             check_vma=False,
         )
         plans = jax.vmap(jax.vmap(self.controller.prepare, (0, None)))(genomes, settings.controller)
-        turns = self._turns(plans, shape)
+        turns = self._turns(plans, shape, wanted)
         nobody = jnp.arange(total, len(dealt), dtype=jnp.int32)
         jobs = dealt if turns is None else jnp.concatenate([turns, nobody])[dealt]
+        if wanted is not None:
+            jobs = jnp.where(dealt < jnp.sum(wanted), jobs, total)
         tally, computed = run(jobs, plans, starts, settings, self._own_starts(genomes, starts))
 
         def in_order(leaf: jax.Array) -> jax.Array:
@@ -117,15 +122,18 @@ class Simulator:
 
         return Episodes(jax.tree.map(in_order, tally), jnp.sum(computed))
 
-    def _turns(self, plans: Any, shape: tuple[int, ...]) -> jax.Array | None:
+    def _turns(
+        self, plans: Any, shape: tuple[int, ...], wanted: jax.Array | None
+    ) -> jax.Array | None:
         """The episodes [B * N * R] in the order in which they are simulated, those of plans [B, N, ...]
-        whose commands take longest first; None where all take the same.
+        whose commands take longest first, and who is not wanted last; None where all are alike.
         """
         loads = jax.vmap(jax.vmap(self.controller.load))(plans)
-        if loads is None:
+        if loads is None and wanted is None:
             return None
-        each = jnp.broadcast_to(loads[..., None], shape)
-        return jnp.argsort(-each.reshape(-1)).astype(jnp.int32)
+        each = jnp.zeros(shape) if loads is None else jnp.broadcast_to(-loads[..., None], shape)
+        last = each if wanted is None else jnp.where(wanted, each, jnp.inf)
+        return jnp.argsort(last.reshape(-1)).astype(jnp.int32)
 
     def _own_starts(self, genomes: Any, starts: Starts) -> Starts | None:
         """Leaves [B, N, R, ...]; None where they depend on nobody."""

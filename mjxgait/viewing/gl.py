@@ -102,7 +102,7 @@ def scene_file(stage: Stage, frames: Sequence[int], path: Path) -> None:
     cameras = [stage.camera(frame) for frame in frames]
     first = cameras[0]
     into = first.axes[2]
-    place = int(creature.model.jnt_qposadr[creature.model.body_jntadr[creature.trunk]])
+    place = creature.root_qpos
     times = [frame * stage.time_step for frame in frames]
     poses = np.array([[one.walk.qpos[one.frame(time)] for one in stage.entrants] for time in times])
     poses[..., place : place + 3] += stage.lanes

@@ -17,13 +17,14 @@ from mjxgait.bench import contest
 from mjxgait.bench.flops import count_flops
 from mjxgait.bench.mujoco_peer import DampedSolve, Law, MujocoPeer
 from mjxgait.bench.scaling import draw
-from mjxgait.bench.workload import Lap, Workload
+from mjxgait.bench.workload import Lap, Workload, walking
 from mjxgait.certify.layout import start_frame
 from mjxgait.certify.state import State, sense
 from mjxgait.certify.twins.poses import READS, PoseTwin
 from mjxgait.commands import bench
 from mjxgait.creature import load_creature
 from mjxgait.errors import UserError
+from mjxgait.parts import resolve_config
 from mjxgait.settings.config import Config
 from mjxgait.settings.shipped import data_folder, find_creature
 
@@ -142,6 +143,13 @@ def test_dart_says_which_creature_it_cannot_rebuild(creature):
     check_supported(creature)
     with pytest.raises(Unsupported, match="two crossing ones"):
         check_supported(load_creature(find_creature("duck")))
+
+
+def test_in_a_contest_everybody_is_simulated_on_all_starts(creature):
+    """As the rivals do it; in a run the worse ones are dropped after the first."""
+    settings = creature.settings
+    assert resolve_config(settings.train, creature.name).rollout.promote < 1
+    assert walking(settings).rollout.promote == 1
 
 
 def test_ratios_are_medians_of_rounds():

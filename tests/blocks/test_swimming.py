@@ -35,7 +35,7 @@ TABLE = {
     "use": {"controller": "brain", "task": "swim"},
     "controller": {"nodes": 3, "parts": 4, "links": 4, "local": 2, "central": 1},
     "evolution": {"population": 60, "lineage": True},
-    "rollout": {"seconds": 1.6, "starts": 2, "lanes": 20, "joint_noise": 0.1},
+    "rollout": {"seconds": 1.6, "starts": 2, "promote": 1.0, "lanes": 20, "joint_noise": 0.1},
     "fitness": {"settle": 0.1, "weights": {"overlap": 0.0, "elsewhere": 0.0}},
 }
 

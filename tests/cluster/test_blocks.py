@@ -30,11 +30,13 @@ def test_what_cannot_be_cut_is_refused():
         block_size(251, 64)
 
 
-def test_a_generation_by_blocks_is_that_of_one_program(stool: Creature):
+@pytest.mark.parametrize("promote", [1.0, 0.5], ids=["all", "the better half goes on"])
+def test_a_generation_by_blocks_is_that_of_one_program(stool: Creature, promote: float):
     """Who was judged, in which order, and what it cost; terms to the rounding of another program."""
-    experiment = build_experiment(stool, CONFIG)
+    config = small_config(rollout={"block": 3, "promote": promote})
+    experiment = build_experiment(stool, config)
     alone = experiment.compile()
-    spread = experiment.compile(Blocks(Crew(Here()), stool, CONFIG))
+    spread = experiment.compile(Blocks(Crew(Here()), stool, config))
     state = experiment.place(experiment.init())
     (mine, counts), (theirs, others) = alone(state), spread(state)
     for one, other in zip(

@@ -28,7 +28,7 @@ pytestmark = pytest.mark.skipif(
 
 SMALL = {
     "evolution": {"population": 6},
-    "rollout": {"seconds": 0.4, "starts": 2, "lanes": 4},
+    "rollout": {"seconds": 0.4, "starts": 2, "promote": 1.0, "lanes": 4},
 }
 STUDY = Study(
     question="Does plain PD do as well?",
