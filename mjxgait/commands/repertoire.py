@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
 import tyro
 from rich.console import Console
 
@@ -47,7 +48,8 @@ class RepertoireOptions:
       seed: Of all randomness.
       rate: Key frames per second of the clips.
       travelling: The clips move their root; otherwise the creature walks in place.
-      blends: Try what lies half way between neighbours in C MuJoCo too.
+      blends: Try what lies half way between neighbours in C MuJoCo too, and whether it can go over
+        from one to the other while it walks.
       cluster: Have it evolved by a Ray cluster: HOST:PORT, or auto (docs/cluster.md).
     """
 
@@ -154,6 +156,7 @@ def _leave(
 ) -> None:
     """The map, and the clips where there are any."""
     from mjxgait.repertoire.blends import blends
+    from mjxgait.repertoire.changes import changes
     from mjxgait.repertoire.clips import CLIPS, TABLE, clips_of, write_clips
     from mjxgait.repertoire.found import draw_map, found_in, table
     from mjxgait.repertoire.transitions import transitions
@@ -171,11 +174,18 @@ def _leave(
     if between:
         walking = sum(blend.walks for blend in between)
         console.print(f"half way between neighbours {walking} of {len(between)} walk")
+    changed = changes(folder, creature, grid, found, screen.changed) if between else []
+    if changed:
+        told = sum(change.share == 1 for change in changed)
+        console.print(
+            f"told on the way to walk as a neighbour does, it always succeeds in {told} of "
+            f"{len(changed)} changes; from {np.mean([c.share for c in changed]):.0%} of the moments"
+        )
     if loops := clips_of(folder, found, options.rate):
         ways = transitions(found, loops)
         console.print(f"from standing, and to a stand: {sum(map(bool, ways))} of {len(ways)} found")
         files = folder / CLIPS, folder / TABLE
-        write_clips(*files, loops, found, between, ways, options.travelling)
+        write_clips(*files, loops, found, between, changed, ways, options.travelling)
         count = len(loops) + sum(map(bool, ways))
         console.print(f"{count} clips: {files[0]}, their places: {files[1]}")
 
@@ -200,6 +210,9 @@ class _Screen:
 
     def examined(self, count: int, of: int) -> None:
         self.console.print(f"examined in C MuJoCo: {count} of {of}")
+
+    def changed(self, count: int, of: int) -> None:
+        self.console.print(f"from one walk to another, in C MuJoCo: {count} of {of}")
 
     def blended(self, count: int, of: int) -> None:
         self.console.print(f"half way between neighbours, in C MuJoCo: {count} of {of}")

@@ -49,17 +49,8 @@ def blends(
     found: list[Found],
     tell: Callable[[int, int], object],
 ) -> list[Blend]:
-    """Of all neighbours that are both certified; of a symmetric body's turns those to the left,
-    whose mirror images the others are. tell: called with how many are done, and of how many.
-    """
-    known = {one.cell for one in found if one.certified}
-    lowest = 0.0 if has_mirror(creature) else -np.inf
-    pairs = [
-        pair
-        for pair in grid.pairs
-        if known.issuperset(pair) and min(cell.turn for cell in pair) >= lowest
-    ]
-    results = []
+    """Of all that `certified_pairs` has. tell: called with how many are done, and of how many."""
+    pairs, results = certified_pairs(creature, grid, found), []
     for number, pair in enumerate(pairs, 1):
         one, other = (open_champion(folder / cell.name)[1] for cell in pair)
         seen = glance(creature, half_way(one, other, creature))
@@ -68,6 +59,19 @@ def blends(
         results.append(Blend(pair, fails))
         tell(number, len(pairs))
     return results
+
+
+def certified_pairs(creature: Creature, grid: Grid, found: list[Found]) -> list[tuple[Cell, Cell]]:
+    """All neighbours that are both certified; of a symmetric body's turns those to the left, whose
+    mirror images the others are.
+    """
+    known = {one.cell for one in found if one.certified}
+    lowest = 0.0 if has_mirror(creature) else -np.inf
+    return [
+        pair
+        for pair in grid.pairs
+        if known.issuperset(pair) and min(cell.turn for cell in pair) >= lowest
+    ]
 
 
 def half_way(one: Champion, other: Champion, creature: Creature) -> Champion:

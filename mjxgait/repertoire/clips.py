@@ -9,6 +9,7 @@ import numpy as np
 
 from mjxgait.animation import WalkLoop, build_clips, standing_still, stride_in_phase
 from mjxgait.repertoire.blends import Blend
+from mjxgait.repertoire.changes import Change
 from mjxgait.repertoire.found import Found
 from mjxgait.repertoire.transitions import IDLE, Transition
 from mjxgait.runs.disk import disk_errors
@@ -34,12 +35,14 @@ def write_clips(
     loops: dict[str, WalkLoop],
     found: Sequence[Found],
     between: Sequence[Blend],
+    changed: Sequence[Change],
     ways: Sequence[Transition],
     travelling: bool,
 ) -> None:
     """Writes the GLB, and the JSON beside it."""
     document = table_of(file.name, loops, found, travelling)
     document["blends"] = [blend.entry for blend in between]
+    document["changes"] = [change.entry for change in changed]
     document["transitions"] = [way.entry for way in ways]
     clips = loops | {way.name: way.loop for way in ways if way.loop is not None}
     with disk_errors(file.parent):
