@@ -206,15 +206,14 @@ class _Body:
                     )
 
     def _parts(self, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Of the body that each joint moves: its place [J, 3] and rotation [J, 3, 3].
-
-        The place is that of its centre of mass, from the trunk's, in m.
+        """Of each joint its place [J, 3], from the trunk's, in m, and the rotation [J, 3, 3] of the body
+        that it moves. Masses may lie otherwise on one side than on the other.
         """
         qpos = self.stand.copy()
         qpos[[j.qposadr[0] for j in self.joints]] = pose
         self.pose(qpos)
         moved = [j.bodyid[0] for j in self.joints]
-        place = self.data.xipos[moved] - self.data.xpos[self.trunk.id]
+        place = self.data.xanchor[[j.id for j in self.joints]] - self.data.xpos[self.trunk.id]
         return place, self.data.xmat[moved].reshape(-1, 3, 3).copy()
 
     def setting(self, joint: str, key: str, default: Any = None) -> Any:

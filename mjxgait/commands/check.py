@@ -6,6 +6,7 @@ from pathlib import Path
 
 import tyro
 
+from mjxgait.certify.check_body import check_body
 from mjxgait.creature import load_creature
 from mjxgait.errors import UserError
 from mjxgait.parts.wishes import Wishes, configured
@@ -33,6 +34,8 @@ def check_command(arguments: Sequence[str]) -> int:
     folder = Path(options.env)
     creature = load_creature(folder if folder.is_dir() else find_creature(options.env))
     configured(creature, None, {}, Wishes())
+    if not creature.settings.creature.grows:
+        check_body(creature)
     from mjxgait.importing.portrait import facts, portrait, standing
 
     out = options.out or Path(f"{creature.name}-check.png")

@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+from mjxgait.certify.check_body import check_body
 from mjxgait.champion import Champion, read_champion
 from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import UserError
@@ -22,10 +23,12 @@ def create_run(folder: Path | None, creature: Creature, config: Config) -> Path:
     """Makes the run folder with the exact creature and settings; by default a new one under runs/.
 
     Raises:
-      UserError: the folder holds something already, or cannot be written; or who takes part does
-        not fit the creature.
+      UserError: the folder holds something already, or cannot be written; who takes part does not
+        fit the creature; or nothing that the creature does could be examined.
     """
     check_fit(creature, config)
+    if not creature.settings.creature.grows:
+        check_body(creature)
     folder = folder or new_run_folder(creature.name, config.seed)
     try:
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):

@@ -100,7 +100,7 @@ def test_a_row_is_the_run_that_train_makes(finished: tuple[Path, str], tmp_path:
     """
     folder, _ = finished
     train = "--seed 1 --population 6 --generations 3 --drive.law pd"
-    train += " --rollout.seconds 0.4 --rollout.starts 2 --rollout.promote 1 --rollout.physics mjx --rollout.lanes 4"
+    train += " --rollout.seconds 0.4 --rollout.starts 2 --rollout.physics mjx --rollout.lanes 4"
     train += " --evolution.forced.patience 0 --examination.candidates 0 --no-plots"
     out = tmp_path / "alone"
     mjxgait("train", "--env", STOOL, *train.split(), "--out", out)

@@ -9,6 +9,8 @@ from mjxgait.certify import glance
 from mjxgait.certify.check_body import check_body
 from mjxgait.creature import load_creature
 from mjxgait.errors import UserError
+from mjxgait.runs.folder import create_run
+from mjxgait.settings.config import Config
 
 
 def changed(values, index, value):
@@ -73,6 +75,27 @@ def test_nothing_is_examined_on_wrong_facts(tiny):
 
 def test_the_shipped_creatures_are_what_their_files_say(shipped):
     check_body(shipped)
+
+
+def test_masses_may_lie_otherwise_on_one_side(tiny, tmp_path):
+    """As in files that say where the middle of a part is as if all legs were left ones; nothing of how
+    joints mirror each other follows from it.
+    """
+    text, leg = tiny.files["creature.xml"], '<body name="front_left_upper"'
+    assert text.count(leg) == 1
+    place = text.index(">", text.index(leg)) + 1
+    heavy = '<inertial pos="0 0.1 0" mass="0.2" diaginertia="1e-3 1e-3 1e-3"/>'
+    (tmp_path / "creature.toml").write_text(tiny.files["creature.toml"])
+    (tmp_path / "creature.xml").write_text(text[:place] + heavy + text[place:])
+    check_body(load_creature(tmp_path))
+
+
+def test_a_body_that_cannot_be_examined_is_not_trained(tiny, tmp_path):
+    """Told at once instead of after the first generations."""
+    wrong = altered(tiny, mirror={"sign": changed(tiny.mirror.sign, 1, -1)})
+    with pytest.raises(UserError, match="does not mirror"):
+        create_run(tmp_path / "run", wrong, Config())
+    assert not (tmp_path / "run").exists()
 
 
 def test_exceptions_and_stated_partners_are_read_from_the_text(tiny, tmp_path):
