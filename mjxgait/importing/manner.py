@@ -30,7 +30,8 @@ def manner(
     if steps:
         hertz = BRISK * length / (STRIDE * hip)
         calm = min(WalkConfig().frequency, hertz / stride_limit(mass))
-        table["rollout"] = {"starts": STARTS, "latency": LATE}
+        # Undisturbed it tells little about who bears something: all are tried in all starts.
+        table["rollout"] = {"starts": STARTS, "promote": 1.0, "latency": LATE}
         table["fitness"] = {
             "speed": BRISK,
             "frequency": round(calm, 2),
