@@ -121,7 +121,7 @@ def draw(reports: dict[str, dict], path: Path) -> None:
     bars = {
         f"{env}, {kind}": of[f"{kind}_parts_s"] for env, of in reports.items() for kind in KINDS
     }
-    figure, axes = plt.subplots(figsize=(9, 0.6 + 0.45 * len(bars)), layout="constrained")
+    figure, axes = plt.subplots(figsize=(9, max(0.6 + 0.45 * len(bars), 2.4)), layout="constrained")
     ends = dict.fromkeys(bars, 0.0)
     for part in PARTS:
         widths = [parts[part] for parts in bars.values()]
