@@ -94,7 +94,7 @@ def test_a_start_that_is_not_wanted_is_not_simulated(stool: Creature):
     wanted = np.arange(18).reshape(1, 6, 3) % 4 == 1
     simulate = jax.jit(experiment.simulator.simulate)
     everything, some = jax.device_get(
-        [simulate(population, *rows), simulate(population, *rows, jnp.asarray(wanted))]
+        [simulate(population, *rows, jnp.asarray(mask)) for mask in (np.ones_like(wanted), wanted)]
     )
     assert (some.tally.steps[~wanted] == 0).all()
     assert (some.tally.steps[wanted] == everything.tally.steps[wanted]).all()

@@ -123,7 +123,7 @@ class Simulator:
         return Episodes(jax.tree.map(in_order, tally), jnp.sum(computed))
 
     def _turns(
-        self, plans: Any, shape: tuple[int, ...], wanted: jax.Array | None
+        self, plans: Any, shape: tuple[int, ...], wanted: jax.Array | None = None
     ) -> jax.Array | None:
         """The episodes [B * N * R] in the order in which they are simulated, those of plans [B, N, ...]
         whose commands take longest first, and who is not wanted last; None where all are alike.
