@@ -1,6 +1,5 @@
 """One large population: the offspring of a generation, judged in blocks by everybody who is there."""
 
-import dataclasses
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -35,8 +34,7 @@ class Blocks:
     ) -> Judged:
         """See `Evaluator`. One row; its settings are in the recipe."""
         genomes, trials, asked = jax.device_get((genomes, trials, asked))
-        judged = together(self._crew.all(self._work(genomes, trials, asked)) or ())
-        return judged if asked is None else _spent(judged, asked.known)
+        return together(self._crew.all(self._work(genomes, trials, asked)) or ())
 
     def _work(
         self, genomes: Any, trials: Starts, asked: Asked | None
@@ -45,21 +43,12 @@ class Blocks:
         for first in range(0, count, self.size):
 
             def cut(leaf: np.ndarray, first: int = first) -> np.ndarray:
-                # What has been spent is the whole generation's: it is counted once, in the end.
+                # What has been spent is the whole generation's: the first block counts it.
                 part = slice(first, first + self.size)
-                return leaf[:, part] if leaf.ndim > 1 else np.zeros_like(leaf)
+                return leaf[:, part] if leaf.ndim > 1 else leaf * (first == 0)
 
             block, known = jax.tree.map(cut, (genomes, asked))
             yield self._recipe, Judge(block, trials, known)
-
-
-def _spent(judged: Judged, known: Judged) -> Judged:
-    """The verdict, which has cost the steps of what was known before too."""
-    return dataclasses.replace(
-        judged,
-        sim_steps=judged.sim_steps + known.sim_steps,
-        computed_steps=judged.computed_steps + known.computed_steps,
-    )
 
 
 def block_size(offspring: int, most: int) -> int:

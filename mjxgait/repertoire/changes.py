@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from mjxgait.certify import CertificateConfig
-from mjxgait.certify.layout import Layout
 from mjxgait.certify.outcome import Outcome
 from mjxgait.certify.simulate import simulate
 from mjxgait.certify.starts import nominal_starts
@@ -105,7 +104,7 @@ def _as_told(creature: Creature, outcome: Outcome, speed: float) -> np.ndarray:
     """[S] over the last seconds: by chords of a second, and the mean heading."""
     limits, film = CertificateConfig().wishes, outcome.trajectory
     watched, second = round(WATCHED / film.time_step), round(1.0 / film.time_step)
-    root = Layout(creature.model).root_qpos
+    root = creature.root_qpos
     place = film.qpos[:, -watched:, root : root + 2]
     fast = np.linalg.norm(place[:, second:] - place[:, :-second], axis=2).mean(1)
     fine: np.ndarray = np.abs(fast / speed - 1) <= limits.speed

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from mjxgait.animation import WalkLoop, falls_of_first_foot, resampled, standing_still
-from mjxgait.certify.layout import Layout
 from mjxgait.certify.simulate import simulate
 from mjxgait.certify.starts import nominal_starts
 from mjxgait.certify.twins.halting import HaltingTwin
@@ -127,7 +126,7 @@ def halted(walk: Walk, moments: np.ndarray) -> list[np.ndarray]:
         creature, walk.champion, starts, seconds, record=len(halts), threads=1, twin=twin
     )
     film = outcome.trajectory
-    root = Layout(creature.model).root_dof
+    root = creature.root_dof
     fastest = STILL * np.sqrt(creature.gravity * creature.frame.hip_height)
     motions = []
     for row, up in enumerate(outcome.stayed_up):
@@ -158,7 +157,7 @@ def _motion(
 
 def _place(walk: Walk) -> slice:
     """Of the trunk in the world, among the numbers of a pose; its height comes after."""
-    first = Layout(walk.creature.model).root_qpos
+    first = walk.creature.root_qpos
     return slice(first, first + 2)
 
 
