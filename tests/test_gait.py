@@ -256,7 +256,9 @@ def test_who_is_to_turn_steers_more_as_the_examiner_has_it(stool: Creature):
         named = dict(zip(TUNING, map(float, genes), strict=True))
         twin = PoseTwin(creature, pose_champion(creature, poses, named, rules), 0.005)
         of_one = {name: np.asarray(value)[None] for name, value in felt.items()}
-        np.testing.assert_allclose(target, twin.target(np.zeros(1, int), of_one)[0], atol=1e-5)
+        np.testing.assert_allclose(
+            target, twin.target(np.zeros(1, int), of_one, np.zeros(1, int))[0], atol=1e-5
+        )
         targets.append(target - poses[0])
     np.testing.assert_allclose(targets[1], 2 * targets[0], atol=1e-5)
 

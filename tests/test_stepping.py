@@ -1,5 +1,7 @@
 """Stepping under a fall: what a body on two feet does that one on four need not."""
 
+import dataclasses
+import json
 from pathlib import Path
 
 import jax.numpy as jnp
@@ -13,7 +15,8 @@ from mjxgait.certify.layout import start_frame
 from mjxgait.certify.state import State
 from mjxgait.certify.state import sense as examiner_sense
 from mjxgait.certify.twins.poses import PoseTwin
-from mjxgait.control.poses import PoseTracker, stepping
+from mjxgait.champion.record import read_champion, write_champion
+from mjxgait.control.poses import Genome, PoseTracker, stepping
 from mjxgait.creature import Creature, load_creature
 from mjxgait.creature.scale import load_files
 from mjxgait.importing import ImportChoices, import_model
@@ -206,8 +209,47 @@ def test_the_examiner_steps_as_evolution_does(biped):
         felt = sense(creature, moment, jnp.zeros(()), reads)
         ours = stepping(creature, jnp.array([genes[name] for name in STEPPING]), felt)
         state = as_examined(creature, moment)
-        theirs = twin.target(np.zeros(1, int), examiner_sense(creature, state, twin.reads))
+        theirs = twin.target(
+            np.zeros(1, int), examiner_sense(creature, state, twin.reads), np.zeros(1, int)
+        )
         np.testing.assert_allclose(np.asarray(ours), theirs[0] - creature.joints.stand, atol=2e-5)
+
+
+@pytest.mark.parametrize("begin", [0.0, 0.5])
+def test_the_cycle_grows_out_of_the_standing_pose(biped: Creature, begin: float):
+    """In evolution and in the examination; and with no beginning, all of it is there at once."""
+    stand = biped.joints.stand
+    pose = np.clip(stand + 0.2, biped.joints.low, biped.joints.high)
+    champion = pose_champion(
+        biped, np.stack([pose] * 2), {"begin": begin}, PoseConfig(mirror=False)
+    )
+    control, twin = PoseTracker(biped, STEP), PoseTwin(biped, champion, STEP)
+    genome = Genome(*(jnp.asarray(champion.genome[name]) for name in ("key_poses", "tuning")))
+    cycle = control.prepare(genome, champion.settings)
+    moment = seen(biped)
+    felt = sense(biped, moment, jnp.zeros(()), control.reads)
+    examined = examiner_sense(biped, as_examined(biped, moment), twin.reads)
+    for steps in (0, 24, 49, 99, 500):
+        state = dataclasses.replace(control.init(), steps=jnp.int32(steps))
+        ours, _ = control.act(cycle, state, felt)
+        theirs = twin.target(np.zeros(1, int), examined, np.full(1, steps))[0]
+        share = min(1.0, (steps + 1) * STEP / begin) if begin else 1.0
+        expected = stand + share * (pose - stand)
+        np.testing.assert_allclose(ours, expected, atol=1e-6)
+        np.testing.assert_allclose(theirs, expected, atol=1e-12)
+
+
+def test_a_champion_of_before_begins_at_once(biped: Creature, tmp_path: Path):
+    """Its file has no such gene."""
+    champion = pose_champion(biped, np.stack([biped.joints.stand] * 2), {"begin": 0.7, "hold": 0.3})
+    file = tmp_path / "champion.json"
+    write_champion(champion, biped, file)
+    document = json.loads(file.read_text(encoding="utf-8"))
+    del document["genome"]["tuning"]["begin"]
+    file.write_text(json.dumps(document), encoding="utf-8")
+    genes = read_champion(file, biped).genome["tuning"]
+    found = dict(zip(gene_names(steps=True), genes, strict=True))
+    assert (found["begin"], found["hold"]) == (0.0, 0.3)
 
 
 def as_examined(creature: Creature, moment: Sensed) -> State:

@@ -11,6 +11,9 @@ from mjxgait.errors import UserError
 from mjxgait.settings.control import PoseConfig, gene_names
 from mjxgait.settings.tables import build
 
+LATER = {"begin": 0.0}
+"""Genes that came later, and what they were before."""
+
 
 class PoseCodec(PlainCodec):
     """Of genomes with `key_poses` [K, J] in rad and `tuning` [E] in the order of `gene_names`."""
@@ -32,7 +35,8 @@ class PoseCodec(PlainCodec):
     def genome(self, document: Mapping[str, Any], creature: Creature) -> dict[str, np.ndarray]:
         """See `Codec`."""
         poses = [[pose[name] for name in creature.joints.names] for pose in document["key_poses"]]
-        tuning = [document["tuning"][name] for name in gene_names(creature.corrections.steps)]
+        genes = LATER | document["tuning"]
+        tuning = [genes[name] for name in gene_names(creature.corrections.steps)]
         return {"key_poses": np.array(poses, float), "tuning": np.array(tuning, float)}
 
     def settings(self, table: Mapping[str, Any], where: str) -> PoseConfig:

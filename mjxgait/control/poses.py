@@ -161,6 +161,9 @@ class PoseTracker:
         """Target pose [J] of this moment, and the state of the next."""
         creature = self.creature
         target = interpolate(cycle.poses, state.position, cycle.interpolation, cycle.count)
+        if creature.corrections.steps:
+            stand = jnp.asarray(creature.joints.stand, jnp.float32)
+            target = stand + begun(cycle.tuning, state.steps, self.step) * (target - stand)
         target = target + corrections(creature, cycle.tuning, target, senses, cycle.steering)
         target = jnp.clip(
             target, creature.joints.low.astype(np.float32), creature.joints.high.astype(np.float32)
@@ -210,6 +213,12 @@ def interpolate(
     return jnp.sum(weight[:, None] * poses, axis=0)
 
 
+def begun(tuning: jax.Array, steps: jax.Array, step: float) -> jax.Array:
+    """Share [] of the cycle that has grown out of the standing pose after `steps` [] of `step` s."""
+    over = tuning[len(TUNING) + STEPPING.index("begin")]
+    return jnp.minimum(1.0, (steps + 1) * step / jnp.maximum(over, step))
+
+
 def corrections(
     creature: Body,
     tuning: jax.Array,
@@ -244,7 +253,7 @@ def corrections(
 
 
 def stepping(creature: Body, genes: jax.Array, senses: Senses) -> jax.Array:
-    """Change [J] of the target pose by stepping under a fall; genes: [8] in the order of
+    """Change [J] of the target pose by stepping under a fall; genes: [9] in the order of
     `STEPPING`.
 
     After SIMBICON (Yin, Loken & van de Panne 2007): the leg that swings goes on for where the trunk
@@ -253,7 +262,7 @@ def stepping(creature: Body, genes: jax.Array, senses: Senses) -> jax.Array:
     """
     weights, hip = creature.corrections.stepping, creature.frame.hip_height
     assert weights is not None
-    step, step_rate, side, side_rate, hold, hold_rate, sway, sway_rate = genes
+    step, step_rate, side, side_rate, hold, hold_rate, sway, sway_rate, _ = genes
     swing = jnp.clip(senses["foot_height"] / (LIFTED * hip), 0.0, 1.0)
     stance = 1.0 - swing
     moved = senses["foot_place"] - creature.feet.places.astype(np.float32)

@@ -18,6 +18,8 @@ from mjxgait.creature.creature import Creature
 
 NEAR = 0.1
 """Hip heights; joints nearer to each other are at one place, like the three of an Euler hip."""
+PARALLEL = 0.9999
+"""Cosine from which two axes count as parallel."""
 SAMPLES = 384
 BEYOND = 0.1
 """Share of a pose range by which joints may leave it: balance corrections and lag do that."""
@@ -113,7 +115,8 @@ def all_bars(model: mujoco.MjModel) -> tuple[np.ndarray, list[Bar]]:
 
 
 def neighbours(model: mujoco.MjModel, data: mujoco.MjData, near: float) -> np.ndarray:
-    """[nbody, nbody] whether two bodies are one, parent and child, or have all joints at one place.
+    """[nbody, nbody] whether two bodies are one, parent and child, have all joints at one place, or
+    are of two limbs that are drawn in one plane.
 
     near: m, how far apart joints at one place may be in the pose of `data`.
     """
@@ -125,8 +128,28 @@ def neighbours(model: mujoco.MjModel, data: mujoco.MjData, near: float) -> np.nd
             anchors = [_anchors(model, data, link) for link in links]
             spots = np.concatenate(anchors) if anchors else np.zeros((0, 3))
             spread = np.ptp(spots, axis=0) if len(spots) else np.zeros(3)
-            joined[a, b] = joined[b, a] = len(links) < 2 or np.linalg.norm(spread) < near
+            one_place = len(links) < 2 or np.linalg.norm(spread) < near
+            joined[a, b] = joined[b, a] = one_place or _in_one_plane(model, data, links, near)
     return joined
+
+
+def _in_one_plane(
+    model: mujoco.MjModel, data: mujoco.MjData, links: list[int], near: float
+) -> bool:
+    """Whether two limbs begin at one place and all their hinges are parallel: the legs of a body in
+    two dimensions, which can only pass through each other.
+
+    links: bodies of both limbs, as of `_links`.
+    """
+    tops = [
+        body for body in links if int(model.body_weldid[model.body_parentid[body]]) not in links
+    ]
+    joints = [j for j in range(model.njnt) if int(model.jnt_bodyid[j]) in links]
+    if len(tops) < 2 or (model.jnt_type[joints] != mujoco.mjtJoint.mjJNT_HINGE).any():
+        return False
+    begin = np.concatenate([_anchors(model, data, body) for body in tops])
+    along = np.abs(data.xaxis[joints] @ data.xaxis[joints[0]])
+    return bool(np.linalg.norm(np.ptp(begin, axis=0)) < near and (along > PARALLEL).all())
 
 
 def _links(model: mujoco.MjModel, a: int, b: int) -> list[int]:

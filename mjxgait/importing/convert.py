@@ -239,6 +239,11 @@ def _folder(
     )
     pairs = {} if mirror is None else _stated_pairs(puppet, best.q, mirror, planar)
     forward = rotation(puppet.bodies[0].quat).T @ [1.0, 0.0, 0.0]
+    if stopped := [joint.name for joint in puppet.joints if joint.stopped]:
+        notes.change(
+            f"limits act on {listed(stopped)} only",
+            "these stand at the end of their range and rest on it",
+        )
     length = _stated_length(best)
     train = _train(best, mirror is not None, length)
     toml = creature_toml(

@@ -25,7 +25,7 @@ class Joint:
     rad, the angle of the body as placed.
 
     effort: N·m, nan where the file states none. id: in the compiled model; a hinge made of a ball
-    joint has the ball's.
+    joint has the ball's. stopped: whether its limits act as they do in the file.
     """
 
     name: str
@@ -37,6 +37,7 @@ class Joint:
     ref: float
     armature: float
     effort: float
+    stopped: bool = False
 
 
 @dataclasses.dataclass(eq=False)

@@ -21,6 +21,8 @@ SINK = 0.0005
 """m that feet begin in the floor, about as far as they rest in it."""
 STRAIGHT = 0.97
 """Straightness from which legs count as straight."""
+AT_ITS_END = 0.05
+"""rad from an end of its range within which a joint rests on it."""
 
 
 @dataclasses.dataclass(eq=False)
@@ -141,6 +143,7 @@ def _try(
     trial = Puppet(bodies, [group[0] for group in puppet.feet])
     level(trial, q)
     drop(trial, q)
+    _keep_stops(trial, q)
     stance = stance_of(trial, q)
     drive = plan_drive(trial, q, stance, planar, notes)
     feet = lay_soles(bodies, trial.feet, stance, planar, notes)
@@ -154,6 +157,15 @@ def _try(
         model, qpos, drive.kp, drive.kd, drive.torque, {name for foot in feet for name in foot}
     )
     return Candidate(made, q, feet, drive, model, qpos, held, notes)
+
+
+def _keep_stops(puppet: Puppet, q: np.ndarray) -> None:
+    """Of joints that stand at an end of their range: their stop bears weight, as a straight knee's.
+
+    Elsewhere limits are left to the controller, for each costs a row of the solver.
+    """
+    for joint, angle in zip(puppet.joints, q, strict=True):
+        joint.stopped = bool(min(angle - joint.low, joint.high - angle) < AT_ITS_END)
 
 
 def _name_shapes(bodies: list[Body]) -> None:

@@ -97,6 +97,8 @@ def _body(parent: ET.Element, body: Body) -> ET.Element:
         )
         if np.isfinite(joint.low):
             made.set("range", _text((joint.low, joint.high)))
+        if joint.stopped:
+            made.set("limited", "true")
         if joint.ref:
             made.set("ref", repr(joint.ref))
         if joint.armature:

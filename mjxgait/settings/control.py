@@ -67,6 +67,7 @@ class SteppingRanges:
       hold_rate: s; likewise, for how fast it pitches.
       sway: how strongly the hip turns the trunk back that rolls.
       sway_rate: s; likewise, for how fast it rolls.
+      begin: s; over how long the cycle grows out of the standing pose.
     """
 
     __pydantic_config__ = STRICT
@@ -78,6 +79,7 @@ class SteppingRanges:
     hold_rate: StaticInterval = (0.0, 0.2)
     sway: StaticInterval = (0.0, 1.0)
     sway_rate: StaticInterval = (0.0, 0.2)
+    begin: StaticInterval = (0.0, 1.0)
 
 
 STEPPING = tuple(field.name for field in dataclasses.fields(SteppingRanges))

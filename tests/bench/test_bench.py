@@ -91,7 +91,9 @@ def test_the_law_is_the_examiners(creature, workload):
     position, genome = np.arange(count) * 7, np.full(count, 1)
     law, examiner = Law(creature, workload), PoseTwin(creature, champion, 0.005)
     target = law.target(genome, position, pos, rot, v)
-    np.testing.assert_allclose(target, examiner.target(position, senses), atol=1e-12)
+    np.testing.assert_allclose(
+        target, examiner.target(position, senses, np.zeros(1, int)), atol=1e-12
+    )
     expected = examiner.advance(position, target, state.joint_pos, np.ones(count, int))
     np.testing.assert_array_equal(
         law.advance(genome, position, target, state.joint_pos, position), expected

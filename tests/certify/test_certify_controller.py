@@ -151,7 +151,7 @@ def test_the_corrected_target_is_the_sum_on_the_page(tiny):
     control = twin(creature, key_poses, {"steer": 1.0, "pitch": 1.0, "roll": 1.0})
     rot = rotation("z", 0.1) @ rotation("y", 0.2)
     u, p, r = (float(part[0]) for part in control.corrections(felt(creature, rot)))
-    target = control.target(np.array([0]), felt(creature, rot))[0]
+    target = control.target(np.array([0]), felt(creature, rot), np.zeros(1, int))[0]
     for j in range(8):
         want = stand[j] + (key_poses[0, j] - stand[j]) * (
             1 + u * creature.corrections.steer_stride[j]
@@ -166,7 +166,9 @@ def test_the_corrected_target_is_the_sum_on_the_page(tiny):
 
 def test_the_target_keeps_to_the_joint_ranges(tiny):
     control = twin(tiny, np.full((2, 8), 3.0))
-    np.testing.assert_array_equal(control.target(np.array([0]), felt(tiny))[0], tiny.joints.high)
+    np.testing.assert_array_equal(
+        control.target(np.array([0]), felt(tiny), np.zeros(1, int))[0], tiny.joints.high
+    )
 
 
 @pytest.mark.parametrize("constraint_forces", [False, True])

@@ -10,6 +10,7 @@ from mjxgait.certify import CertificateConfig, criteria, glance, record
 from mjxgait.certify.describe import worst_overlap
 from mjxgait.certify.overlap import colliding_with_itself, neighbours, overlaps
 from mjxgait.creature import load_creature
+from mjxgait.creature.overlap import find_crossings
 from mjxgait.settings.tables import build
 
 SHORT = build(CertificateConfig, {"seconds": 2.0, "warmup": 0.5}, "test")
@@ -86,6 +87,29 @@ def test_joints_at_one_place_make_neighbours_of_all_parts_between(tmp_path, offs
     assert {("trunk", "front_left_yoke"), ("front_left_yoke", "front_left_upper")} <= pairs
     assert (("trunk", "front_left_upper") in pairs) == one_joint
     assert ("trunk", "front_left_lower") not in pairs
+
+
+@pytest.mark.parametrize(
+    ("y", "axis", "free"),
+    [(0.0, "0 1 0", True), (0.035, "0 1 0", False), (0.0, "0.1 1 0", False)],
+    ids=["in one plane", "beside each other", "one turns otherwise"],
+)
+def test_legs_in_one_plane_pass_each_other(tmp_path, y, axis, free):
+    """The two front legs hang on one place; each leg stays its own self's stranger."""
+    xml = XML.replace('pos="0.2 0.11 0"', 'pos="0.2 0 0"')
+    xml = xml.replace('pos="0.2 -0.11 0"', f'pos="0.2 {-y} 0"')
+    knee = 'name="front_right_knee" axis="'
+    xml = xml.replace(knee + "0 1 0", knee + axis)
+    creature = loaded(tmp_path, xml, TOML + "\n[mirror]\nsymmetric = false\n")
+    model = creature.model
+    pairs = {(model.body(a).name, model.body(b).name) for a, b in neighbours(model, creature)}
+    assert (("front_left_lower", "front_right_lower") in pairs) == free
+    assert ("trunk", "front_left_lower") not in pairs
+    assert ("front_left_upper", "hind_left_upper") not in pairs
+    one, other = (model.body(f"front_{side}_lower").id for side in ("left", "right"))
+    found = find_crossings(creature)
+    watched = {*zip(found.body[found.first], found.body[found.second], strict=True)}
+    assert ((one, other) not in watched) == free
 
 
 def test_what_is_built_in_counts_from_its_depth_when_standing(tmp_path):

@@ -190,24 +190,38 @@ def test_y_up_by_gravity_is_turned(tmp_path):
     assert (creature.frame.stand_rot @ creature.frame.up)[2] == pytest.approx(1, abs=0.01)
 
 
-def test_a_planar_walker_gets_wide_feet(tmp_path):
+def planar(hip: str = "-60 60", knee: str = "-90 90") -> str:
+    """Two legs in one plane, with ankles; ranges in degrees."""
     legs = "".join(
-        f'<body name="{n}_thigh"><joint name="{n}_hip" axis="0 1 0" range="-60 60"/>'
+        f'<body name="{n}_thigh"><joint name="{n}_hip" axis="0 1 0" range="{hip}"/>'
         '<geom type="capsule" fromto="0 0 0 0 0 -.3" size=".03"/>'
-        f'<body name="{n}_shin" pos="0 0 -.3"><joint name="{n}_knee" axis="0 1 0" range="-90 90"/>'
+        f'<body name="{n}_shin" pos="0 0 -.3"><joint name="{n}_knee" axis="0 1 0" range="{knee}"/>'
         '<geom type="capsule" fromto="0 0 0 0 0 -.3" size=".03"/><body pos="0 0 -.3">'
         f'<joint name="{n}_ankle" axis="0 1 0" range="-40 40"/>'
         '<geom type="capsule" fromto="-.06 0 0 .12 0 0" size=".03"/></body></body></body>'
         for n in ("left", "right")
     )
-    text = (
+    return (
         '<mujoco><worldbody><body name="torso" pos="0 0 .7"><joint name="rootx" type="slide" axis="1 0 0"/>'
         '<joint name="rootz" type="slide" axis="0 0 1"/><joint name="rooty" axis="0 1 0"/>'
         f'<geom type="capsule" fromto="0 0 0 0 0 .4" size=".05"/>{legs}</body></worldbody></mujoco>'
     )
-    creature, imported = bring(tmp_path, text)
+
+
+def test_a_joint_at_the_end_of_its_range_rests_on_it(tmp_path):
+    """Hips and knees that only bend backwards, as those of gym's walker: it stands straight."""
+    creature, imported = bring(tmp_path, planar(hip="0 90", knee="0 120"))
+    model = creature.model
+    limited = {model.joint(j).name for j in np.flatnonzero(model.jnt_limited)}
+    assert limited == {"left_hip", "left_knee", "right_hip", "right_knee"}
+    assert told(imported, "limits act on left_hip, left_knee, right_hip, right_knee only")
+
+
+def test_a_planar_walker_gets_wide_feet(tmp_path):
+    creature, imported = bring(tmp_path, planar())
     assert imported.stands
     assert told(imported, "widened across")
+    assert not creature.model.jnt_limited.any(), "it stands bent, and no limit bears it"
     assert creature.joints.names[creature.mirror.partner[0]] == "right_hip"
     assert creature.model.nv == 6 + 6
 

@@ -60,7 +60,8 @@ class ChangingTwin:
         since = memory["steps"] * self.step - memory["change"]
         share = np.clip(since / self.seconds, 0.0, 1.0)
         old, new = (
-            twin.target(self._position(twin, memory), senses) for twin in (self.before, self.after)
+            twin.target(self._position(twin, memory), senses, memory["steps"])
+            for twin in (self.before, self.after)
         )
         target = old + share[:, None] * (new - old)
         slow, fast = (

@@ -41,7 +41,8 @@ class HaltingTwin(PoseTwin):
         since = memory["steps"] * self.step - memory["halt"]
         share = np.clip(since / memory["fade"], 0.0, 1.0)[:, None]
         planned = self.planned(memory["position"])
-        target = self.corrected(planned + share * (self.creature.joints.stand - planned), senses)
+        halted = planned + share * (self.creature.joints.stand - planned)
+        target = self.corrected(halted, senses, memory["steps"])
         steps = memory["steps"] + 1
         onward = self.advance(memory["position"], target, senses["joint_pos"], steps)
         position = np.where(since < 0, onward, memory["position"])

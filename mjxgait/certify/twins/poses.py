@@ -43,7 +43,7 @@ class PoseTwin:
 
     def act(self, memory: Memory, senses: Mapping[str, np.ndarray]) -> tuple[np.ndarray, Memory]:
         """See `Twin`."""
-        target = self.target(memory["position"], senses)
+        target = self.target(memory["position"], senses, memory["steps"])
         steps = memory["steps"] + 1
         position = self.advance(memory["position"], target, senses["joint_pos"], steps)
         return target, {"position": position, "steps": steps}
@@ -54,13 +54,21 @@ class PoseTwin:
         f = (step / self.settings.interpolation)[:, None]
         return (1 - f) * self.cycle[a] + f * self.cycle[(a + 1) % len(self.cycle)]
 
-    def target(self, position: np.ndarray, senses: Mapping[str, np.ndarray]) -> np.ndarray:
-        """Target [S, J] in rad at cycle positions [S]."""
-        return self.corrected(self.planned(position), senses)
+    def target(
+        self, position: np.ndarray, senses: Mapping[str, np.ndarray], steps: np.ndarray
+    ) -> np.ndarray:
+        """Target [S, J] in rad at cycle positions [S], after so many steps [S]."""
+        return self.corrected(self.planned(position), senses, steps)
 
-    def corrected(self, planned: np.ndarray, senses: Mapping[str, np.ndarray]) -> np.ndarray:
-        """A planned target [S, J] in rad with steering and balance, within the joints' ranges."""
+    def corrected(
+        self, planned: np.ndarray, senses: Mapping[str, np.ndarray], steps: np.ndarray
+    ) -> np.ndarray:
+        """A planned target [S, J] in rad with its beginning, steering and balance, within the joints'
+        ranges; steps: [S] taken before.
+        """
         creature = self.creature
+        if creature.corrections.steps:
+            planned = self._begun(planned, steps)
         steer, pitch, roll = (part[:, None] for part in self.corrections(senses))
         steer = steer * self.settings.steering
         stretched = creature.joints.stand + (planned - creature.joints.stand) * (
@@ -75,6 +83,12 @@ class PoseTwin:
         if creature.corrections.stepping is not None:
             target = target + self.stepping(creature.corrections.stepping, senses)
         return np.clip(target, creature.joints.low, creature.joints.high)
+
+    def _begun(self, planned: np.ndarray, steps: np.ndarray) -> np.ndarray:
+        """Out of the standing pose, over as long as the genes say."""
+        passed, begin = (steps + 1) * self.step, max(self.tuning["begin"], self.step)
+        stand = self.creature.joints.stand
+        return stand + np.minimum(1, passed / begin)[:, None] * (planned - stand)
 
     def stepping(self, weights: Stepping, senses: Mapping[str, np.ndarray]) -> np.ndarray:
         """What stepping under a fall changes of the target, [S, J] rad."""
