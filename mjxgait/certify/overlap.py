@@ -68,7 +68,7 @@ def colliding_with_itself(creature: Creature) -> mujoco.MjModel:
 
 def neighbours(model: mujoco.MjModel, creature: Creature) -> list[tuple[int, int]]:
     """Pairs of bodies that one joint joins, or several at one place; those welded are one. And of
-    limbs that begin at one place and turn about parallel axes only, as two legs in one plane do.
+    two limbs of a body in a plane, whose axes are all parallel: they can only pass each other.
 
     MuJoCo leaves parent and child out by itself; they are listed all the same.
     """
@@ -79,21 +79,14 @@ def neighbours(model: mujoco.MjModel, creature: Creature) -> list[tuple[int, int
 
     def joined(one: int, other: int) -> bool:
         between = chains[one] ^ chains[other]
-        if len(between) < 2 or at_one_place(list(between)):
+        joints = np.isin(model.jnt_bodyid, list(between))
+        reach = np.linalg.norm(np.ptp(data.xanchor[joints], axis=0))
+        if len(between) < 2 or reach <= ONE_PLACE * creature.frame.hip_height:
             return True
-        limbs = [chains[one] - chains[other], chains[other] - chains[one]]
-        return all(limbs) and at_one_place([min(limb) for limb in limbs]) and flat(list(between))
-
-    def at_one_place(bodies: list[int]) -> bool:
-        anchors = data.xanchor[np.isin(model.jnt_bodyid, bodies)]
-        reach = np.linalg.norm(np.ptp(anchors, axis=0))
-        return bool(reach <= ONE_PLACE * creature.frame.hip_height)
-
-    def flat(bodies: list[int]) -> bool:
-        joints = np.isin(model.jnt_bodyid, bodies)
-        axes = data.xaxis[joints]
-        hinges = (model.jnt_type[joints] == mujoco.mjtJoint.mjJNT_HINGE).all()
-        return bool(hinges and np.linalg.matrix_rank(axes, tol=ONE_WAY) == 1)
+        passing = (
+            creature.settings.creature.planar and between - chains[one] and between - chains[other]
+        )
+        return bool(passing) and np.linalg.matrix_rank(data.xaxis[joints], tol=ONE_WAY) == 1
 
     moving = range(1, model.nbody)
     return [(a, b) for a, b in itertools.combinations(moving, 2) if joined(a, b)]

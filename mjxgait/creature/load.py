@@ -23,6 +23,8 @@ from mjxgait.settings.tables import build, read_toml
 NOT_ALONE = re.compile(
     r"<\s*(!DOCTYPE|!ENTITY|include|plugin|extension|replicate|composite|flexcomp|attach|model|size)\b|[\s\"'](file\w*|\w+dir)\s*="
 )
+PARALLEL = 0.999
+"""Cosine from which two axes count as parallel."""
 MOST_TEXT = 8_000_000
 """Characters of a file."""
 
@@ -102,6 +104,8 @@ def _assemble(
         feet=_feet(model, data, settings, trunk, axes),
     )
     _check(creature, data)
+    if settings.creature.planar:
+        _check_plane(creature, data)
     return creature
 
 
@@ -269,6 +273,18 @@ def _forbidden(model: mujoco.MjModel, feet: list[int], ground: list[int]) -> lis
         g for g in range(model.ngeom) if model.geom_contype[g] or model.geom_conaffinity[g]
     ]
     return [g for g in colliding if g not in {floor, *feet, *ground} and model.geom_bodyid[g] != 0]
+
+
+def _check_plane(creature: Creature, data: mujoco.MjData) -> None:
+    """Refuses a body in two dimensions that can leave its plane."""
+    names = creature.joints.names
+    axes = data.xaxis[[creature.model.joint(name).id for name in names]]
+    for name, along in zip(names, np.abs(axes @ axes[0]), strict=True):
+        if along < PARALLEL:
+            raise UserError(
+                f'creature.planar: joint "{name}" turns about another axis than "{names[0]}", so this '
+                "is no body in a plane; leave `planar` out"
+            )
 
 
 def _check(creature: Creature, data: mujoco.MjData) -> None:

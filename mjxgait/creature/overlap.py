@@ -18,8 +18,6 @@ from mjxgait.creature.creature import Creature
 
 NEAR = 0.1
 """Hip heights; joints nearer to each other are at one place, like the three of an Euler hip."""
-PARALLEL = 0.9999
-"""Cosine from which two axes count as parallel."""
 SAMPLES = 384
 BEYOND = 0.1
 """Share of a pose range by which joints may leave it: balance corrections and lag do that."""
@@ -96,7 +94,8 @@ def find_crossings(creature: Creature) -> Crossings:
     data.qpos[:] = creature.stand_qpos
     mujoco.mj_kinematics(model, data)
     geoms, bars = all_bars(model)
-    strangers = ~neighbours(model, data, NEAR * creature.frame.hip_height)
+    near = NEAR * creature.frame.hip_height
+    strangers = ~neighbours(model, data, near, creature.settings.creature.planar)
     body = model.geom_bodyid[geoms]
     first, second = np.nonzero(np.triu(strangers[body][:, body], 1))
     everything = _joined(model, geoms, bars, first, second)
@@ -114,9 +113,11 @@ def all_bars(model: mujoco.MjModel) -> tuple[np.ndarray, list[Bar]]:
     return np.array([g for g, _ in pairs], dtype=int), [bar for _, bar in pairs]
 
 
-def neighbours(model: mujoco.MjModel, data: mujoco.MjData, near: float) -> np.ndarray:
+def neighbours(
+    model: mujoco.MjModel, data: mujoco.MjData, near: float, planar: bool = False
+) -> np.ndarray:
     """[nbody, nbody] whether two bodies are one, parent and child, have all joints at one place, or
-    are of two limbs that are drawn in one plane.
+    are of two limbs of a body in a plane, which can only pass each other.
 
     near: m, how far apart joints at one place may be in the pose of `data`.
     """
@@ -129,27 +130,16 @@ def neighbours(model: mujoco.MjModel, data: mujoco.MjData, near: float) -> np.nd
             spots = np.concatenate(anchors) if anchors else np.zeros((0, 3))
             spread = np.ptp(spots, axis=0) if len(spots) else np.zeros(3)
             one_place = len(links) < 2 or np.linalg.norm(spread) < near
-            joined[a, b] = joined[b, a] = one_place or _in_one_plane(model, data, links, near)
+            joined[a, b] = joined[b, a] = one_place or (planar and _two_limbs(model, links))
     return joined
 
 
-def _in_one_plane(
-    model: mujoco.MjModel, data: mujoco.MjData, links: list[int], near: float
-) -> bool:
-    """Whether two limbs begin at one place and all their hinges are parallel: the legs of a body in
-    two dimensions, which can only pass through each other.
-
-    links: bodies of both limbs, as of `_links`.
-    """
+def _two_limbs(model: mujoco.MjModel, links: list[int]) -> bool:
+    """Whether the bodies between two others, as of `_links`, are of two limbs."""
     tops = [
         body for body in links if int(model.body_weldid[model.body_parentid[body]]) not in links
     ]
-    joints = [j for j in range(model.njnt) if int(model.jnt_bodyid[j]) in links]
-    if len(tops) < 2 or (model.jnt_type[joints] != mujoco.mjtJoint.mjJNT_HINGE).any():
-        return False
-    begin = np.concatenate([_anchors(model, data, body) for body in tops])
-    along = np.abs(data.xaxis[joints] @ data.xaxis[joints[0]])
-    return bool(np.linalg.norm(np.ptp(begin, axis=0)) < near and (along > PARALLEL).all())
+    return len(tops) == 2
 
 
 def _links(model: mujoco.MjModel, a: int, b: int) -> list[int]:

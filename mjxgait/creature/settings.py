@@ -13,7 +13,10 @@ Degrees = tuple[Finite, Finite]
 
 @dataclasses.dataclass(frozen=True)
 class Identity:
-    """The names of the parts. grows: whether it is a seed: what is simulated grows from genomes."""
+    """The names of the parts. grows: whether it is a seed: what is simulated grows from genomes.
+
+    planar: whether it is a body in two dimensions, whose limbs pass each other.
+    """
 
     __pydantic_config__ = STRICT
     name: str
@@ -25,6 +28,7 @@ class Identity:
     keyframe: str = "stand"
     body_length: Positive | None = None
     grows: bool = False
+    planar: bool = False
 
 
 @dataclasses.dataclass(frozen=True)

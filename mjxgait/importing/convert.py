@@ -256,6 +256,7 @@ def _folder(
         best.drive,
         (mirror is not None, pairs),
         length,
+        planar,
         train,
         notes,
     )

@@ -23,6 +23,7 @@ def creature_toml(
     drive: Drive,
     mirror: tuple[bool, dict[str, tuple[str, int]]],
     body_length: float | None,
+    planar: bool,
     train: Mapping[str, Any],
     notes: Notes,
 ) -> str:
@@ -32,7 +33,7 @@ def creature_toml(
       origin: the model file's name, in one line. forward: [3] in the trunk's frame. feet: names of
         geoms.
       mirror: whether it is symmetric, and stated pairs: joint to partner and sign.
-      train: settings that are not the usual ones.
+      planar: whether it lives in a plane. train: settings that are not the usual ones.
       body_length: m, None where the loader shall measure it.
     """
     remark = {
@@ -55,6 +56,8 @@ def creature_toml(
     ]
     if body_length is not None:
         lines.append(f"body_length = {body_length:.4g}{remark.get('body_length', '')}")
+    if planar:
+        lines.append("planar = true  # high: its legs are drawn in one plane, and pass each other")
     lines += ["", *_joints(joints, drive, remark), *_mirror(symmetric, pairs, remark)]
     lines += [*_corrections(drive), "[termination]", "min_up = 0.5", "height = [0.5, 1.5]"]
     lines += ["touch = true", "", f"[train]{remark.get('train', '')}"]

@@ -11,6 +11,7 @@ from mjxgait.certify.describe import worst_overlap
 from mjxgait.certify.overlap import colliding_with_itself, neighbours, overlaps
 from mjxgait.creature import load_creature
 from mjxgait.creature.overlap import find_crossings
+from mjxgait.errors import UserError
 from mjxgait.settings.tables import build
 
 SHORT = build(CertificateConfig, {"seconds": 2.0, "warmup": 0.5}, "test")
@@ -30,15 +31,17 @@ def standing(creature, count=1, **angles):
     return qpos
 
 
+def near_behind(xml):
+    """With the hind legs closer behind the front ones."""
+    for side in ("", "-"):
+        xml = xml.replace(f'pos="-0.2 {side}0.11 0"', f'pos="0.06 {side}0.11 0"')
+    return xml
+
+
 @pytest.fixture(scope="module")
 def short(tmp_path_factory):
     """The tiny quadruped with its legs so near behind each other that they meet when they swing."""
-    return loaded(
-        tmp_path_factory.mktemp("short"),
-        XML.replace('pos="-0.2 0.11 0"', 'pos="0.06 0.11 0"').replace(
-            'pos="-0.2 -0.11 0"', 'pos="0.06 -0.11 0"'
-        ),
-    )
+    return loaded(tmp_path_factory.mktemp("short"), near_behind(XML))
 
 
 def test_legs_that_cross_are_as_deep_in_each_other_as_they_are_thick(short):
@@ -89,27 +92,29 @@ def test_joints_at_one_place_make_neighbours_of_all_parts_between(tmp_path, offs
     assert ("trunk", "front_left_lower") not in pairs
 
 
-@pytest.mark.parametrize(
-    ("y", "axis", "free"),
-    [(0.0, "0 1 0", True), (0.035, "0 1 0", False), (0.0, "0.1 1 0", False)],
-    ids=["in one plane", "beside each other", "one turns otherwise"],
-)
-def test_legs_in_one_plane_pass_each_other(tmp_path, y, axis, free):
-    """The two front legs hang on one place; each leg stays its own self's stranger."""
-    xml = XML.replace('pos="0.2 0.11 0"', 'pos="0.2 0 0"')
-    xml = xml.replace('pos="0.2 -0.11 0"', f'pos="0.2 {-y} 0"')
-    knee = 'name="front_right_knee" axis="'
-    xml = xml.replace(knee + "0 1 0", knee + axis)
-    creature = loaded(tmp_path, xml, TOML + "\n[mirror]\nsymmetric = false\n")
+@pytest.mark.parametrize("planar", [True, False])
+def test_legs_of_a_body_in_a_plane_pass_each_other(tmp_path, planar):
+    """The parts of two limbs, in evolution and in the examination; no others."""
+    toml = TOML.replace("[creature]", f"[creature]\nplanar = {str(planar).lower()}", 1)
+    creature = loaded(tmp_path, near_behind(XML), toml)
     model = creature.model
     pairs = {(model.body(a).name, model.body(b).name) for a, b in neighbours(model, creature)}
-    assert (("front_left_lower", "front_right_lower") in pairs) == free
+    assert (("front_left_lower", "hind_left_lower") in pairs) == planar
+    assert (("front_left_upper", "hind_left_lower") in pairs) == planar
     assert ("trunk", "front_left_lower") not in pairs
-    assert ("front_left_upper", "hind_left_upper") not in pairs
-    one, other = (model.body(f"front_{side}_lower").id for side in ("left", "right"))
     found = find_crossings(creature)
+    body = model.body("front_left_lower").id, model.body("hind_left_lower").id
     watched = {*zip(found.body[found.first], found.body[found.second], strict=True)}
-    assert ((one, other) not in watched) == free
+    assert (body in watched) != planar
+    assert any(model.body("trunk").id in pair for pair in watched)
+
+
+def test_a_body_in_a_plane_has_parallel_hinges(tmp_path):
+    knee = 'name="hind_left_knee" axis="'
+    toml = TOML.replace("[creature]", "[creature]\nplanar = true", 1)
+    toml += "\n[mirror]\nsymmetric = false\n"
+    with pytest.raises(UserError, match='planar: joint "hind_left_knee" turns about another axis'):
+        loaded(tmp_path, XML.replace(knee + "0 1 0", knee + "0.2 1 0"), toml)
 
 
 def test_what_is_built_in_counts_from_its_depth_when_standing(tmp_path):

@@ -222,6 +222,7 @@ def test_a_planar_walker_gets_wide_feet(tmp_path):
     assert imported.stands
     assert told(imported, "widened across")
     assert not creature.model.jnt_limited.any(), "it stands bent, and no limit bears it"
+    assert creature.settings.creature.planar
     assert creature.joints.names[creature.mirror.partner[0]] == "right_hip"
     assert creature.model.nv == 6 + 6
 
