@@ -79,13 +79,14 @@ def neighbours(model: mujoco.MjModel, creature: Creature) -> list[tuple[int, int
 
     def joined(one: int, other: int) -> bool:
         between = chains[one] ^ chains[other]
+        if len(between) < 2:
+            return True
         joints = np.isin(model.jnt_bodyid, list(between))
         reach = np.linalg.norm(np.ptp(data.xanchor[joints], axis=0))
-        if len(between) < 2 or reach <= ONE_PLACE * creature.frame.hip_height:
+        if reach <= ONE_PLACE * creature.frame.hip_height:
             return True
-        passing = (
-            creature.settings.creature.planar and between - chains[one] and between - chains[other]
-        )
+        both = between - chains[one] and between - chains[other]
+        passing = creature.settings.creature.planar and both
         return bool(passing) and np.linalg.matrix_rank(data.xaxis[joints], tol=ONE_WAY) == 1
 
     moving = range(1, model.nbody)

@@ -68,6 +68,16 @@ def test_a_knee_that_folds_puts_no_part_into_its_neighbour(short):
     assert overlaps(short, standing(short, 2, front_left_knee=-1.2)).pairs == ()
 
 
+def test_what_is_welded_on_is_one_with_its_part(tmp_path):
+    """No joint lies between the two."""
+    plate = '<body name="plate"><geom size="0.03" pos="0.2 0 0" mass="0.01"/></body>'
+    creature = loaded(tmp_path, XML.replace("<freejoint/>", "<freejoint/>" + plate))
+    names = creature.model.body
+    pairs = {(names(a).name, names(b).name) for a, b in neighbours(creature.model, creature)}
+    assert {("trunk", "plate"), ("plate", "front_left_upper")} <= pairs
+    assert ("plate", "front_left_lower") not in pairs
+
+
 YOKE = (
     '<body name="front_left_yoke" pos="0.2 {y} 0"><joint name="front_left_yaw" axis="0 0 1"/>'
     '<geom type="sphere" size="0.001" mass="0.01" contype="0" conaffinity="0"/>'
