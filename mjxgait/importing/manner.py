@@ -17,6 +17,20 @@ BRISK = 1.2
 STRIDE = 0.7
 """Hip heights that its strides should be at that speed; the certificate asks for 0.5."""
 
+FRESH: dict[str, Any] = {"variety": 75, "caution": 1.0, "worst": 0.0}
+"""Other starts in each generation, so that nobody learns six by heart and falls in all others; who
+was lucky on few is believed less."""
+JUDGED_ANEW: dict[str, Any] = {
+    "survival": "children",
+    "elite": 0.125,
+    "remember": True,
+    "selection": "tournament",
+    "rivals": 4,
+    "forced": {"enabled": False},
+}
+"""Then only those compare that were judged together: parents die, but for some that are judged again
+and count by all their rounds. A best that is no better is no sign of a stall."""
+
 
 def manner(
     steps: bool, symmetric: bool, hip: float, length: float, mass: float, notes: Notes
@@ -31,7 +45,8 @@ def manner(
         hertz = BRISK * length / (STRIDE * hip)
         calm = min(WalkConfig().frequency, hertz / stride_limit(mass))
         # Undisturbed it tells little about who bears something: all are tried in all starts.
-        table["rollout"] = {"starts": STARTS, "promote": 1.0, "latency": LATE}
+        table["rollout"] = {"starts": STARTS, "promote": 1.0, "latency": LATE} | FRESH
+        table["evolution"] = JUDGED_ANEW
         table["fitness"] = {
             "speed": BRISK,
             "frequency": round(calm, 2),
@@ -39,8 +54,8 @@ def manner(
         }
         notes.guess(
             "train",
-            f"{STARTS} starts with torques up to {LATE} step late, staying up counts {ALIVE:g}, {BRISK:g} body lengths/s in strides of "
-            f"{STRIDE:g} hip heights",
+            f"{STARTS} starts, others in each generation, with torques up to {LATE} step late; staying up counts {ALIVE:g}, {BRISK:g} body "
+            f"lengths/s in strides of {STRIDE:g} hip heights",
             "medium",
             "on one foot or two it falls unless it walks: more disturbed starts, and first of all "
             "to stay up",
