@@ -32,7 +32,7 @@ def rich(stool: Creature) -> Creature:
         stool.settings,
         balance=Balance(table(), table()),
         steering=Steering(table(), table()),
-        stepping=Stepping(table(), table()),
+        stepping=Stepping(table(), table(), table()),
     )
     return dataclasses.replace(stool, settings=settings)
 

@@ -178,6 +178,44 @@ def test_the_hip_that_stands_turns_the_trunk_back(biped, axis, genes, joint, awa
     assert way(biped, f"left_{joint}", found[f"left_{joint}"]) @ away > 0
 
 
+@pytest.fixture(scope="module")
+def turner(tmp_path_factory: pytest.TempPathFactory) -> Creature:
+    """The biped whose hips turn about the vertical, the left one about its axis upside down."""
+    text = BIPED
+    for side, axis in (("left", "0 0 -1"), ("right", "0 0 1")):
+        begin = text.index(f'<joint name="{side}_hip_roll"')
+        text = text[:begin] + text[begin:].replace(
+            '<axis xyz="1 0 0"/>', f'<axis xyz="{axis}"/>', 1
+        )
+    file = tmp_path_factory.mktemp("turner") / "turner.urdf"
+    file.write_text(text, encoding="utf-8")
+    return load_files(import_model(file, ImportChoices(apart=False)).files)
+
+
+def test_who_looks_beside_the_way_turns_on_the_leg_that_stands(turner: Creature):
+    """The nose is to the left: the trunk turns right over its right foot, and the left one is put down
+    turned to the right.
+    """
+    angle = 0.2
+    rot = np.array(
+        [[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]]
+    )
+    found = change(turner, seen(turner, lifted=0, trunk_rot=rot), turn=1.0)
+    assert set(found) == {"left_hip_roll", "right_hip_roll"}
+    turned = {}
+    for side in ("left", "right"):
+        joint = turner.joints.names.index(f"{side}_hip_roll")
+        data = mujoco.MjData(turner.model)
+        data.qpos[:] = turner.stand_qpos
+        data.qpos[turner.joints.qpos_adr[joint]] += found[f"{side}_hip_roll"]
+        mujoco.mj_kinematics(turner.model, data)
+        toes = data.body(f"{side}_foot").xmat.reshape(3, 3)[:, 0]
+        turned[side] = np.arctan2(toes[1], toes[0])
+    assert np.abs(list(found.values())) == pytest.approx([angle] * 2, rel=1e-4)
+    # The trunk stands tipped a little, so that its hips' axes are not quite upright.
+    assert turned == pytest.approx({"right": angle, "left": -angle}, rel=0.2)
+
+
 def test_no_step_is_larger_than_a_correction_may_be(biped):
     fast = seen(biped, lifted=0, trunk_vel=np.array([50.0, 0, 0]))
     weights = biped.corrections.stepping
@@ -191,7 +229,13 @@ def test_the_examiner_steps_as_evolution_does(biped):
     rng = np.random.default_rng(0)
     reads = PoseTracker(biped, STEP).reads
     genes = {name: float(rng.uniform(0, 1)) for name in STEPPING}
-    creature = altered(biped, joints={"low": np.full(8, -9.0), "high": np.full(8, 9.0)})
+    swings = biped.corrections.stepping.ahead != 0
+    weights = dataclasses.replace(biped.corrections.stepping, turn=rng.normal(size=8) * swings)
+    creature = altered(
+        biped,
+        joints={"low": np.full(8, -9.0), "high": np.full(8, 9.0)},
+        corrections={"stepping": weights},
+    )
     values = dict.fromkeys(TUNING, 0.0) | {"threshold": 0.1, "period": 0.8} | genes
     champion = pose_champion(creature, np.stack([biped.joints.stand] * 2), values)
     twin = PoseTwin(creature, champion, STEP)

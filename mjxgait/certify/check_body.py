@@ -115,7 +115,7 @@ class _Body:
             weights = np.array([self.weight(name, group, key) for name in self.names])
             yield f"{group} weight ({key})", (getattr(creature.corrections, field), weights)
         if stepping := creature.corrections.stepping:
-            for key in ("ahead", "aside"):
+            for key in ("ahead", "aside", "turn"):
                 weights = np.array([self.weight(name, "stepping", key) for name in self.names])
                 yield f"stepping weight ({key})", (getattr(stepping, key), weights)
 

@@ -11,7 +11,7 @@ from mjxgait.errors import UserError
 from mjxgait.settings.control import PoseConfig, gene_names
 from mjxgait.settings.tables import build
 
-LATER = {"begin": 0.0}
+LATER = {"begin": 0.0, "turn": 0.0}
 """Genes that came later, and what they were before."""
 
 

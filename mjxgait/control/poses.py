@@ -253,16 +253,16 @@ def corrections(
 
 
 def stepping(creature: Body, genes: jax.Array, senses: Senses) -> jax.Array:
-    """Change [J] of the target pose by stepping under a fall; genes: [9] in the order of
+    """Change [J] of the target pose by stepping under a fall; genes: [10] in the order of
     `STEPPING`.
 
     After SIMBICON (Yin, Loken & van de Panne 2007): the leg that swings goes on for where the trunk
     is over its support and how fast it goes there, the hip of the leg that stands turns the trunk
-    back.
+    back, and to its way.
     """
     weights, hip = creature.corrections.stepping, creature.frame.hip_height
     assert weights is not None
-    step, step_rate, side, side_rate, hold, hold_rate, sway, sway_rate, _ = genes
+    step, step_rate, side, side_rate, hold, hold_rate, sway, sway_rate, _, turn = genes
     swing = jnp.clip(senses["foot_height"] / (LIFTED * hip), 0.0, 1.0)
     stance = 1.0 - swing
     moved = senses["foot_place"] - creature.feet.places.astype(np.float32)
@@ -273,10 +273,14 @@ def stepping(creature: Body, genes: jax.Array, senses: Senses) -> jax.Array:
     aside = _clip(side * over[1] + side_rate * speed[1])
     pitch = _clip(hold * senses["pitch"] + hold_rate * senses["pitch_rate"])
     roll = _clip(sway * senses["roll"] + sway_rate * senses["roll_rate"])
-    to_ahead, to_aside = swing * ahead - stance * pitch, swing * aside + stance * roll
-    by_joint = (jnp.stack([feet[leg] for leg in weights.legs]) for feet in (to_ahead, to_aside))
-    ahead_of, aside_of = by_joint
-    return ahead_of * weights.ahead.astype(np.float32) + aside_of * weights.aside.astype(np.float32)
+    yaw = _clip(turn * (senses["heading"] + senses["aside"] / (2 * creature.frame.body_length)))
+    asked = (
+        (swing * ahead - stance * pitch, weights.ahead),
+        (swing * aside + stance * roll, weights.aside),
+        ((stance - swing) * yaw, weights.turn),
+    )
+    by_joint = ((jnp.stack([feet[leg] for leg in weights.legs]), by) for feet, by in asked)
+    return sum((of * by.astype(np.float32) for of, by in by_joint), start=jnp.zeros(()))
 
 
 def _clip(correction: jax.Array) -> jax.Array:

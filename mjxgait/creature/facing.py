@@ -52,7 +52,7 @@ def _turned(settings: CreatureSettings, way: str, axis: np.ndarray) -> CreatureS
     if way == "back":
         steering = Steering(_times(steering.bend, -1), _times(steering.stride, -1))
         balance = Balance(_times(balance.pitch, -1), _times(balance.roll, -1))
-        stepping = Stepping(_times(stepping.ahead, -1), _times(stepping.aside, -1))
+        stepping = Stepping(_times(stepping.ahead, -1), _times(stepping.aside, -1), stepping.turn)
         return dataclasses.replace(
             settings, creature=identity, steering=steering, balance=balance, stepping=stepping
         )
@@ -64,7 +64,9 @@ def _turned(settings: CreatureSettings, way: str, axis: np.ndarray) -> CreatureS
         mirror=dataclasses.replace(settings.mirror, symmetric=False, pairs=()),
         steering=Steering(),
         balance=Balance(_times(balance.roll, sign), _times(balance.pitch, -sign)),
-        stepping=Stepping(_times(stepping.aside, -sign), _times(stepping.ahead, sign)),
+        stepping=Stepping(
+            _times(stepping.aside, -sign), _times(stepping.ahead, sign), stepping.turn
+        ),
     )
 
 

@@ -97,6 +97,7 @@ def _assemble(
                 model,
                 _weights(settings.stepping.ahead, names, "stepping.ahead"),
                 _weights(settings.stepping.aside, names, "stepping.aside"),
+                _weights(settings.stepping.turn, names, "stepping.turn"),
                 found,
                 _foot_bodies(model, settings.creature.feet)[0],
             ),

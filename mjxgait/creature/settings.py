@@ -98,12 +98,13 @@ class Balance:
 @dataclasses.dataclass(frozen=True)
 class Stepping:
     """Weights per joint pattern, in rad per hip height, by which joints take their foot ahead, and
-    to the left; of the corrections that step under a fall.
+    to the left, and in rad per rad turn it to the left; of the corrections that step under a fall.
     """
 
     __pydantic_config__ = STRICT
     ahead: dict[Pattern, Finite] = dataclasses.field(default_factory=dict)
     aside: dict[Pattern, Finite] = dataclasses.field(default_factory=dict)
+    turn: dict[Pattern, Finite] = dataclasses.field(default_factory=dict)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -12,6 +12,7 @@ def stepping_of(
     model: mujoco.MjModel,
     ahead: np.ndarray,
     aside: np.ndarray,
+    turn: np.ndarray,
     joints: list[int],
     feet: list[int],
 ) -> Stepping | None:
@@ -23,11 +24,12 @@ def stepping_of(
     Raises:
       UserError: names a joint that has a weight and moves no foot, or several.
     """
-    if not (ahead.any() or aside.any()):
+    weights = (ahead != 0) | (aside != 0) | (turn != 0)
+    if not weights.any():
         return None
     chains = [geometry.ancestors(model, body) for body in feet]
     legs = []
-    for joint, weighs in zip(joints, (ahead != 0) | (aside != 0), strict=True):
+    for joint, weighs in zip(joints, weights, strict=True):
         moved = [f for f, chain in enumerate(chains) if int(model.jnt_bodyid[joint]) in chain]
         if weighs and len(moved) != 1:
             raise UserError(
@@ -35,4 +37,4 @@ def stepping_of(
                 "to joints that move one"
             )
         legs.append(moved[0] if moved else 0)
-    return Stepping(ahead, aside, tuple(legs))
+    return Stepping(ahead, aside, turn, tuple(legs))

@@ -57,6 +57,8 @@ ENDLESS = 6.0
 """rad, width of a range from which it is none."""
 LEAST_BEND = 3.0
 """deg that a knee stays away from straight."""
+UPRIGHT = 0.7
+"""Cosine to the vertical from which a joint turns what hangs on it."""
 ROLES = ("stride", "side", "lift")
 
 
@@ -79,6 +81,7 @@ class Drive:
     roll: dict[str, float] = dataclasses.field(default_factory=dict)
     ahead: dict[str, float] = dataclasses.field(default_factory=dict)
     aside: dict[str, float] = dataclasses.field(default_factory=dict)
+    turn: dict[str, float] = dataclasses.field(default_factory=dict)
 
 
 def plan_drive(puppet: Puppet, q: np.ndarray, stance: Stance, planar: bool, notes: Notes) -> Drive:
@@ -224,7 +227,7 @@ def _steering(puppet: Puppet, stance: Stance, drive: Drive, moves: np.ndarray) -
     spine = [
         j
         for j, role in enumerate(drive.role)
-        if role == "spine" and abs(puppet.data.xaxis[j + 1][2]) > 0.7
+        if role == "spine" and abs(puppet.data.xaxis[j + 1][2]) > UPRIGHT
     ]
     behind = [j for j in spine if puppet.data.xanchor[j + 1][0] < puppet.data.xpos[1][0]]
     if behind:
@@ -244,7 +247,9 @@ def _must_step(puppet: Puppet, stance: Stance) -> bool:
 def _stepping(
     puppet: Puppet, stance: Stance, drive: Drive, moves: np.ndarray, planar: bool
 ) -> None:
-    """The highest joints that swing a foot forward, and to the side, take it under the fall."""
+    """The highest joints that swing a foot forward, and to the side, take it under the fall; the
+    highest upright one turns it.
+    """
     for f in range(len(puppet.feet)):
         for role, axis, table in (("stride", 0, drive.ahead), ("side", 1, drive.aside)):
             if role == "side" and planar:
@@ -253,6 +258,9 @@ def _stepping(
             own = [j for j in way if drive.role[j] == role and abs(way[j]) > WEAKEST]
             if own:
                 table[puppet.names[own[0]]] = round(1 / way[own[0]], 3)
+        upright = {j: float(puppet.data.xaxis[j + 1][2]) for j in puppet.leg(f)}
+        if turns := [j for j in upright if abs(upright[j]) > UPRIGHT]:
+            drive.turn[puppet.names[turns[0]]] = float(np.sign(upright[turns[0]]))
 
 
 def _balance(puppet: Puppet, stance: Stance, drive: Drive, moves: np.ndarray, planar: bool) -> None:

@@ -121,6 +121,7 @@ def _corrections(drive: Drive) -> list[str]:
             "[stepping]  # low: likewise; two feet and less must step under a fall",
             f"ahead = {_table(drive.ahead)}",
             f"aside = {_table(drive.aside)}",
+            f"turn = {_table(drive.turn)}",
             "",
         ]
     return lines

@@ -68,6 +68,8 @@ class SteppingRanges:
       sway: how strongly the hip turns the trunk back that rolls.
       sway_rate: s; likewise, for how fast it rolls.
       begin: s; over how long the cycle grows out of the standing pose.
+      turn: how strongly the hip turns the trunk back, and the foot that swings, that turn away from
+        the way.
     """
 
     __pydantic_config__ = STRICT
@@ -80,6 +82,7 @@ class SteppingRanges:
     sway: StaticInterval = (0.0, 1.0)
     sway_rate: StaticInterval = (0.0, 0.2)
     begin: StaticInterval = (0.0, 1.0)
+    turn: StaticInterval = (0.0, 1.0)
 
 
 STEPPING = tuple(field.name for field in dataclasses.fields(SteppingRanges))

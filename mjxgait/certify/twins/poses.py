@@ -107,13 +107,18 @@ class PoseTwin:
         left = clipped(over_left, "side", fast_left, "side_rate")
         pitch = clipped(senses["pitch"], "hold", senses["pitch_rate"], "hold_rate")
         roll = clipped(senses["roll"], "sway", senses["roll_rate"], "sway_rate")
+        wrong = senses["heading"] + senses["aside"] / (2 * self.creature.frame.body_length)
+        yaw = np.clip(gain["turn"] * wrong, -0.5, 0.5)[:, None]
         legs = np.array(weights.legs)
-        by_foot_ahead, by_foot_left = (
+        by_foot_ahead, by_foot_left, turned_left = (
             swings * ahead - stands * pitch,
             swings * left + stands * roll,
+            stands * yaw - swings * yaw,
         )
         found: np.ndarray = (
-            weights.ahead * by_foot_ahead[:, legs] + weights.aside * by_foot_left[:, legs]
+            weights.ahead * by_foot_ahead[:, legs]
+            + weights.aside * by_foot_left[:, legs]
+            + weights.turn * turned_left[:, legs]
         )
         return found
 
