@@ -258,7 +258,8 @@ def _stepping(
             own = [j for j in way if drive.role[j] == role and abs(way[j]) > WEAKEST]
             if own:
                 table[puppet.names[own[0]]] = round(1 / way[own[0]], 3)
-        upright = {j: float(puppet.data.xaxis[j + 1][2]) for j in puppet.leg(f)}
+        shared = {j for other in range(len(puppet.feet)) if other != f for j in puppet.leg(other)}
+        upright = {j: float(puppet.data.xaxis[j + 1][2]) for j in puppet.leg(f) if j not in shared}
         if turns := [j for j in upright if abs(upright[j]) > UPRIGHT]:
             drive.turn[puppet.names[turns[0]]] = float(np.sign(upright[turns[0]]))
 
