@@ -82,7 +82,7 @@ class SteppingRanges:
     sway: StaticInterval = (0.0, 1.0)
     sway_rate: StaticInterval = (0.0, 0.2)
     begin: StaticInterval = (0.0, 1.0)
-    turn: StaticInterval = (0.0, 1.0)
+    turn: StaticInterval = (0.0, 0.4)
 
 
 STEPPING = tuple(field.name for field in dataclasses.fields(SteppingRanges))
