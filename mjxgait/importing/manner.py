@@ -31,6 +31,9 @@ JUDGED_ANEW: dict[str, Any] = {
 """Then only those compare that were judged together: parents die, but for some that are judged again
 and count by all their rounds. A best that is no better is no sign of a stall."""
 
+TRIED_OUT: dict[str, Any] = {"candidates": 24, "tryout": 64}
+"""Before one is looked at: the first of a generation was often only lucky in its starts."""
+
 
 def manner(
     steps: bool, symmetric: bool, hip: float, length: float, mass: float, notes: Notes
@@ -46,7 +49,7 @@ def manner(
         calm = min(WalkConfig().frequency, hertz / stride_limit(mass))
         # Undisturbed it tells little about who bears something: all are tried in all starts.
         table["rollout"] = {"starts": STARTS, "promote": 1.0, "latency": LATE} | FRESH
-        table["evolution"] = JUDGED_ANEW
+        table["evolution"], table["examination"] = JUDGED_ANEW, TRIED_OUT
         table["fitness"] = {
             "speed": BRISK,
             "frequency": round(calm, 2),
