@@ -14,7 +14,7 @@ LATE, HASTY = 1, 8.0
 examination; and what it costs to be hasty, twice the usual."""
 BRISK = 1.2
 """Body lengths per second that such a body should walk: slower it has to stand on one foot."""
-STRIDE = 0.7
+STRIDE = 0.8
 """Hip heights that its strides should be at that speed; the certificate asks for 0.5."""
 
 FRESH: dict[str, Any] = {"variety": 75, "caution": 1.0, "worst": 0.0}
