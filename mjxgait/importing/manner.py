@@ -14,7 +14,7 @@ LATE, HASTY = 1, 8.0
 examination; and what it costs to be hasty, twice the usual."""
 BRISK = 1.2
 """Body lengths per second that such a body should walk: slower it has to stand on one foot."""
-STRIDE = 0.8
+STRIDE = 0.7
 """Hip heights that its strides should be at that speed; the certificate asks for 0.5."""
 
 FRESH: dict[str, Any] = {"variety": 75, "caution": 1.0, "worst": 0.0}
@@ -31,9 +31,6 @@ JUDGED_ANEW: dict[str, Any] = {
 """Then only those compare that were judged together: parents die, but for some that are judged again
 and count by all their rounds. A best that is no better is no sign of a stall."""
 
-TRIED_OUT: dict[str, Any] = {"candidates": 24, "tryout": 64}
-"""Before one is looked at: the first of a generation was often only lucky in its starts."""
-
 
 def manner(
     steps: bool, symmetric: bool, hip: float, length: float, mass: float, notes: Notes
@@ -49,7 +46,7 @@ def manner(
         calm = min(WalkConfig().frequency, hertz / stride_limit(mass))
         # Undisturbed it tells little about who bears something: all are tried in all starts.
         table["rollout"] = {"starts": STARTS, "promote": 1.0, "latency": LATE} | FRESH
-        table["evolution"], table["examination"] = JUDGED_ANEW, TRIED_OUT
+        table["evolution"] = JUDGED_ANEW
         table["fitness"] = {
             "speed": BRISK,
             "frequency": round(calm, 2),
