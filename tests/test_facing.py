@@ -85,11 +85,18 @@ def test_backwards_it_steers_the_other_way_and_has_its_mirror(rich: Creature):
     for table in ("bend", "stride"):
         mine, its = (getattr(c.settings.steering, table) for c in (rich, back))
         np.testing.assert_allclose(weights(back, its), -weights(rich, mine))
+    assert back.settings.stepping.turn == rich.settings.stepping.turn, "its hips turn as they did"
     np.testing.assert_array_equal(back.mirror.partner, rich.mirror.partner)
     np.testing.assert_array_equal(back.mirror.sign, rich.mirror.sign)
     again = facing(back, "back")
     np.testing.assert_allclose(again.frame.forward, rich.frame.forward, atol=1e-9)
     assert again.settings.balance == rich.settings.balance
+
+
+@pytest.mark.parametrize("way", ["left", "right"])
+def test_aside_its_hips_turn_it_as_they_did(rich: Creature, way: str):
+    """Left of the way is left of it, wherever the way leads."""
+    assert facing(rich, way).settings.stepping.turn == rich.settings.stepping.turn
 
 
 def test_aside_it_is_as_long_as_it_was_wide(stool: Creature):

@@ -11,14 +11,19 @@ import pytest
 from helpers import STOOL, altered, pose_champion
 from importing.models import BIPED, QUADRUPED
 
+from mjxgait.certify.check_body import check_body
 from mjxgait.certify.layout import start_frame
 from mjxgait.certify.state import State
 from mjxgait.certify.state import sense as examiner_sense
+from mjxgait.certify.twins.changing import ChangingTwin
+from mjxgait.certify.twins.halting import HaltingTwin
 from mjxgait.certify.twins.poses import PoseTwin
+from mjxgait.certify.twins.protocol import Twin
 from mjxgait.champion.record import read_champion, write_champion
 from mjxgait.control.poses import Genome, PoseTracker, stepping
 from mjxgait.creature import Creature, load_creature
 from mjxgait.creature.scale import load_files
+from mjxgait.errors import UserError
 from mjxgait.importing import ImportChoices, import_model
 from mjxgait.parts import resolve_config
 from mjxgait.senses import sense
@@ -285,17 +290,45 @@ def test_the_cycle_grows_out_of_the_standing_pose(biped: Creature, begin: float)
         np.testing.assert_allclose(theirs, expected, atol=1e-12)
 
 
+@pytest.mark.parametrize("told", ["to stop", "to change"])
+def test_who_is_told_something_later_begins_as_it_always_does(biped: Creature, told: str):
+    pose = np.clip(biped.joints.stand + 0.2, biped.joints.low, biped.joints.high)
+    champion = pose_champion(biped, np.stack([pose] * 2), {"begin": 0.5}, PoseConfig(mirror=False))
+    usual, later, once = PoseTwin(biped, champion, STEP), np.array([9.0]), np.ones(1)
+    if told == "to stop":
+        other: Twin = HaltingTwin(biped, champion, STEP, later, once)
+    else:
+        other = ChangingTwin(biped, champion, champion, STEP, later, 1.0)
+    felt = examiner_sense(biped, as_examined(biped, seen(biped)), usual.reads)
+    known, memory = usual.init(1), other.init(1)
+    for _ in range(150):
+        expected, known = usual.act(known, felt)
+        target, memory = other.act(memory, felt)
+        np.testing.assert_allclose(target, expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("key", ["ahead", "aside", "turn"])
+def test_the_examiner_reads_the_weights_for_itself(biped: Creature, turner: Creature, key: str):
+    creature = turner if key == "turn" else biped
+    check_body(creature)
+    weights = creature.corrections.stepping
+    wrong = dataclasses.replace(weights, **{key: -getattr(weights, key)})
+    with pytest.raises(UserError, match=f"stepping weight \\({key}\\)"):
+        check_body(altered(creature, corrections={"stepping": wrong}))
+
+
 def test_a_champion_of_before_begins_at_once(biped: Creature, tmp_path: Path):
-    """Its file has no such gene."""
-    champion = pose_champion(biped, np.stack([biped.joints.stand] * 2), {"begin": 0.7, "hold": 0.3})
+    """And does not turn with its hips: its file has no such genes."""
+    genes = {"begin": 0.7, "turn": 0.2, "hold": 0.3}
+    champion = pose_champion(biped, np.stack([biped.joints.stand] * 2), genes)
     file = tmp_path / "champion.json"
     write_champion(champion, biped, file)
     document = json.loads(file.read_text(encoding="utf-8"))
-    del document["genome"]["tuning"]["begin"]
+    del document["genome"]["tuning"]["begin"], document["genome"]["tuning"]["turn"]
     file.write_text(json.dumps(document), encoding="utf-8")
-    genes = read_champion(file, biped).genome["tuning"]
-    found = dict(zip(gene_names(steps=True), genes, strict=True))
-    assert (found["begin"], found["hold"]) == (0.0, 0.3)
+    read = read_champion(file, biped).genome["tuning"]
+    found = dict(zip(gene_names(steps=True), read, strict=True))
+    assert (found["begin"], found["turn"], found["hold"]) == (0.0, 0.0, 0.3)
 
 
 def as_examined(creature: Creature, moment: Sensed) -> State:
@@ -321,8 +354,6 @@ def as_examined(creature: Creature, moment: Sensed) -> State:
 
 
 def test_a_joint_that_moves_no_foot_cannot_step(tmp_path: Path):
-    from mjxgait.errors import UserError
-
     folder = tmp_path / "duck"
     folder.mkdir()
     shipped = Path(__file__).parents[1] / "envs" / "duck"

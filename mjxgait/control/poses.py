@@ -230,8 +230,8 @@ def corrections(
 
     steering: factor on the creature's weights of steering.
     """
-    aside = senses["aside"] / (2 * creature.frame.body_length)
-    steer = _clip(tuning[STEER] * (senses["heading"] + aside))
+    wrong = off_the_way(creature, senses)
+    steer = _clip(tuning[STEER] * wrong)
     pitch, roll = (
         _clip(tuning[angle] * senses[name] + tuning[rate] * senses[f"{name}_rate"])
         for name, angle, rate in (("pitch", PITCH, PITCH_RATE), ("roll", ROLL, ROLL_RATE))
@@ -273,7 +273,7 @@ def stepping(creature: Body, genes: jax.Array, senses: Senses) -> jax.Array:
     aside = _clip(side * over[1] + side_rate * speed[1])
     pitch = _clip(hold * senses["pitch"] + hold_rate * senses["pitch_rate"])
     roll = _clip(sway * senses["roll"] + sway_rate * senses["roll_rate"])
-    yaw = _clip(turn * (senses["heading"] + senses["aside"] / (2 * creature.frame.body_length)))
+    yaw = _clip(turn * off_the_way(creature, senses))
     asked = (
         (swing * ahead - stance * pitch, weights.ahead),
         (swing * aside + stance * roll, weights.aside),
@@ -281,6 +281,12 @@ def stepping(creature: Body, genes: jax.Array, senses: Senses) -> jax.Array:
     )
     by_joint = ((jnp.stack([feet[leg] for leg in weights.legs]), by) for feet, by in asked)
     return sum((of * by.astype(np.float32) for of, by in by_joint), start=jnp.zeros(()))
+
+
+def off_the_way(creature: Body, senses: Senses) -> jax.Array:
+    """rad [] by which it looks to the left of its way, and more for how far it is to the left of it."""
+    aside = senses["aside"] / (2 * creature.frame.body_length)
+    return senses["heading"] + aside
 
 
 def _clip(correction: jax.Array) -> jax.Array:

@@ -104,7 +104,8 @@ class Mirror:
 class Stepping:
     """Weights [J], rad per hip height, with which joints take their foot ahead, and to the left.
 
-    turn: [J] rad per rad by which they turn it to the left. legs: [J] the foot that each joint moves; of joints without a weight any.
+    turn: [J] rad per rad by which they turn it to the left. legs: [J] the foot that each joint moves;
+    of joints without a weight any.
     """
 
     ahead: np.ndarray

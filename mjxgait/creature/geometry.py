@@ -7,6 +7,10 @@ from mjxgait.errors import UserError
 
 GEOM = mujoco.mjtGeom
 DOWN = np.array([0.0, 0.0, -1.0])
+PARALLEL = 0.99999
+"""Cosine from which two axes count as parallel. Those of twenty joints that differ no more are of rank
+one to within 0.01, by which the examiner goes.
+"""
 
 
 def support_extents(geom_type: int, size: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
@@ -103,6 +107,12 @@ def leg_lengths(
         heights = [data.xanchor[j][2] for j in own] or [data.xpos[foot][2]]
         lengths.append(max(heights))
     return np.array(lengths)
+
+
+def parallel(axes: np.ndarray) -> np.ndarray:
+    """[J] whether each axis is parallel to the first. axes: [J, 3] of length 1."""
+    found: np.ndarray = np.abs(axes @ axes[0]) >= PARALLEL
+    return found
 
 
 def mirror_map(

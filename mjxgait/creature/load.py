@@ -23,8 +23,6 @@ from mjxgait.settings.tables import build, read_toml
 NOT_ALONE = re.compile(
     r"<\s*(!DOCTYPE|!ENTITY|include|plugin|extension|replicate|composite|flexcomp|attach|model|size)\b|[\s\"'](file\w*|\w+dir)\s*="
 )
-PARALLEL = 0.999
-"""Cosine from which two axes count as parallel."""
 MOST_TEXT = 8_000_000
 """Characters of a file."""
 
@@ -280,8 +278,8 @@ def _check_plane(creature: Creature, data: mujoco.MjData) -> None:
     """Refuses a body in two dimensions that can leave its plane."""
     names = creature.joints.names
     axes = data.xaxis[[creature.model.joint(name).id for name in names]]
-    for name, along in zip(names, np.abs(axes @ axes[0]), strict=True):
-        if along < PARALLEL:
+    for name, alike in zip(names, geometry.parallel(axes), strict=True):
+        if not alike:
             raise UserError(
                 f'creature.planar: joint "{name}" turns about another axis than "{names[0]}", so this '
                 "is no body in a plane; leave `planar` out"

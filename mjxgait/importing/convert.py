@@ -244,6 +244,8 @@ def _folder(
             f"limits act on {listed(stopped)} only",
             "these stand at the end of their range and rest on it",
         )
+    puppet.pose(best.q)
+    passing = planar and bool(geometry.parallel(puppet.data.xaxis[1:]).all())
     length = _stated_length(best)
     train = _train(best, mirror is not None, length)
     toml = creature_toml(
@@ -256,7 +258,7 @@ def _folder(
         best.drive,
         (mirror is not None, pairs),
         length,
-        planar,
+        passing,
         train,
         notes,
     )

@@ -17,7 +17,7 @@ BRISK = 1.2
 STRIDE = 0.7
 """Hip heights that its strides should be at that speed; the certificate asks for 0.5."""
 
-FRESH: dict[str, Any] = {"variety": 75, "caution": 1.0, "worst": 0.0}
+FRESH: dict[str, Any] = {"variety": Config().evolution.generations, "caution": 1.0, "worst": 0.0}
 """Other starts in each generation, so that nobody learns six by heart and falls in all others; who
 was lucky on few is believed less."""
 JUDGED_ANEW: dict[str, Any] = {

@@ -33,7 +33,7 @@ def creature_toml(
       origin: the model file's name, in one line. forward: [3] in the trunk's frame. feet: names of
         geoms.
       mirror: whether it is symmetric, and stated pairs: joint to partner and sign.
-      planar: whether it lives in a plane. train: settings that are not the usual ones.
+      planar: whether its legs are in one plane and pass each other. train: settings that are not the usual ones.
       body_length: m, None where the loader shall measure it.
     """
     remark = {

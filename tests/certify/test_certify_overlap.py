@@ -119,6 +119,19 @@ def test_legs_of_a_body_in_a_plane_pass_each_other(tmp_path, planar):
     assert any(model.body("trunk").id in pair for pair in watched)
 
 
+def test_the_examiner_sees_for_itself_that_hinges_are_parallel(tmp_path):
+    """Whatever the shared loader lets pass: who turns otherwise could have kept its legs apart."""
+    knee = 'name="front_left_knee" axis="'
+    xml = near_behind(XML).replace(knee + "0 1 0", knee + "0.2 1 0")
+    creature = loaded(tmp_path, xml, TOML + "\n[mirror]\nsymmetric = false\n")
+    stated = dataclasses.replace(creature.settings.creature, planar=True)
+    settings = dataclasses.replace(creature.settings, creature=stated)
+    planar, names = dataclasses.replace(creature, settings=settings), creature.model.body
+    pairs = {(names(a).name, names(b).name) for a, b in neighbours(planar.model, planar)}
+    assert ("front_left_lower", "hind_left_lower") not in pairs
+    assert ("front_right_lower", "hind_right_lower") in pairs
+
+
 def test_a_body_in_a_plane_has_parallel_hinges(tmp_path):
     knee = 'name="hind_left_knee" axis="'
     toml = TOML.replace("[creature]", "[creature]\nplanar = true", 1)

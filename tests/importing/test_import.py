@@ -190,14 +190,14 @@ def test_y_up_by_gravity_is_turned(tmp_path):
     assert (creature.frame.stand_rot @ creature.frame.up)[2] == pytest.approx(1, abs=0.01)
 
 
-def planar(hip: str = "-60 60", knee: str = "-90 90") -> str:
-    """Two legs in one plane, with ankles; ranges in degrees."""
+def planar(hip: str = "-60 60", knee: str = "-90 90", ankle: str = "0 1 0") -> str:
+    """Two legs in one plane, with ankles; ranges in degrees, and the ankles' axis."""
     legs = "".join(
         f'<body name="{n}_thigh"><joint name="{n}_hip" axis="0 1 0" range="{hip}"/>'
         '<geom type="capsule" fromto="0 0 0 0 0 -.3" size=".03"/>'
         f'<body name="{n}_shin" pos="0 0 -.3"><joint name="{n}_knee" axis="0 1 0" range="{knee}"/>'
         '<geom type="capsule" fromto="0 0 0 0 0 -.3" size=".03"/><body pos="0 0 -.3">'
-        f'<joint name="{n}_ankle" axis="0 1 0" range="-40 40"/>'
+        f'<joint name="{n}_ankle" axis="{ankle}" range="-40 40"/>'
         '<geom type="capsule" fromto="-.06 0 0 .12 0 0" size=".03"/></body></body></body>'
         for n in ("left", "right")
     )
@@ -225,6 +225,12 @@ def test_a_planar_walker_gets_wide_feet(tmp_path):
     assert creature.settings.creature.planar
     assert creature.joints.names[creature.mirror.partner[0]] == "right_hip"
     assert creature.model.nv == 6 + 6
+
+
+def test_legs_that_leave_their_plane_do_not_pass_each_other(tmp_path):
+    """Ankles that turn 4 degrees askew: it loads all the same, and says nothing of a plane."""
+    creature, _ = bring(tmp_path, planar(ankle="0.07 1 0"))
+    assert not creature.settings.creature.planar
 
 
 LOOP = '<equality><connect body1="fl_shin" body2="fr_shin" anchor="0 0 0" name="rod"/></equality>'

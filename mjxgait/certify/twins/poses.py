@@ -107,8 +107,7 @@ class PoseTwin:
         left = clipped(over_left, "side", fast_left, "side_rate")
         pitch = clipped(senses["pitch"], "hold", senses["pitch_rate"], "hold_rate")
         roll = clipped(senses["roll"], "sway", senses["roll_rate"], "sway_rate")
-        wrong = senses["heading"] + senses["aside"] / (2 * self.creature.frame.body_length)
-        yaw = np.clip(gain["turn"] * wrong, -0.5, 0.5)[:, None]
+        yaw = np.clip(gain["turn"] * self._wrong(senses), -0.5, 0.5)[:, None]
         legs = np.array(weights.legs)
         by_foot_ahead, by_foot_left, turned_left = (
             swings * ahead - stands * pitch,
@@ -127,14 +126,20 @@ class PoseTwin:
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """`u`, `p` and `r` of docs/controller.md, [S] each."""
         gain = self.tuning
-        wrong = senses["heading"] + senses["aside"] / (2 * self.creature.frame.body_length)
         pitch = gain["pitch"] * senses["pitch"] + gain["pitch_rate"] * senses["pitch_rate"]
         roll = gain["roll"] * senses["roll"] + gain["roll_rate"] * senses["roll_rate"]
         return (
-            np.clip(gain["steer"] * wrong, -0.5, 0.5),
+            np.clip(gain["steer"] * self._wrong(senses), -0.5, 0.5),
             np.clip(pitch, -0.5, 0.5),
             np.clip(roll, -0.5, 0.5),
         )
+
+    def _wrong(self, senses: Mapping[str, np.ndarray]) -> np.ndarray:
+        """[S] rad of the heading, and of the place beside the way."""
+        wrong: np.ndarray = senses["heading"] + senses["aside"] / (
+            2 * self.creature.frame.body_length
+        )
+        return wrong
 
     def advance(
         self, position: np.ndarray, target: np.ndarray, joint_pos: np.ndarray, steps: np.ndarray
