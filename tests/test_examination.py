@@ -1,9 +1,11 @@
 """When a run looks at its best, and when that ends it."""
 
+import concurrent.futures
 import dataclasses
 import io
 import json
 import shutil
+import time
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -17,13 +19,16 @@ from rich.console import Console
 from mjxgait.certify import Certificate, CertificateConfig, Criterion, Measure
 from mjxgait.certify.stress import Stress, StressConfig, Trial
 from mjxgait.creature import load_creature
+from mjxgait.errors import UserError
 from mjxgait.inspect.snapshot import read_snapshot
 from mjxgait.runs import examination, loop
 from mjxgait.runs.examination import Examiner, due
 from mjxgait.runs.exams import Exams
 from mjxgait.runs.experiment import Experiment, build_experiment
 from mjxgait.runs.folder import CERTIFICATE, EXAMS, create_run, read_metrics
+from mjxgait.runs.looks import Looks as Runner
 from mjxgait.runs.screen import Screen
+from mjxgait.runs.stored import stored_generations
 from mjxgait.search.state import EvolutionState
 from mjxgait.settings.config import ExaminationConfig
 
@@ -412,6 +417,66 @@ def test_a_certified_run_ends_early_and_stays_ended(
     before = (folder / "champion.json").read_text(), (folder / CERTIFICATE).read_text()
     assert "in generation 3" in trained(folder, experiment, resume=True)
     assert before == ((folder / "champion.json").read_text(), (folder / CERTIFICATE).read_text())
+
+
+def files_of(folder: Path) -> dict[str, str]:
+    """What a run has found; how fast it was is not among it."""
+    names = ("champion.json", CERTIFICATE, EXAMS)
+    found = {name: (folder / name).read_text() for name in names}
+    clock = ("steps_per_second", "wall_s")
+    lines = read_metrics(folder / "metrics.jsonl")
+    told = [{key: value for key, value in line.items() if key not in clock} for line in lines]
+    return found | {"log": json.dumps(told), "checkpoints": str(stored_generations(folder))}
+
+
+def test_evolution_goes_on_beside_a_look_and_forgets_it_when_that_ends_the_run(
+    tmp_path: Path,
+    experiment: Experiment,
+    promising: None,
+    looks: Looks,
+    monkeypatch: pytest.MonkeyPatch,
+):
+    """Whatever the machine does first, the folder is the one of a run that waited."""
+    waited, beside = tmp_path / "waited", tmp_path / "beside"
+    seen: list[int] = []
+    soon = examination.certify
+
+    def late(*arguments: object, **settings: object) -> Certificate:
+        until = time.monotonic() + 60
+        while not seen and time.monotonic() < until:
+            lines = read_metrics(beside / "metrics.jsonl")
+            # By then a checkpoint is due, which must wait.
+            seen.extend(line["generation"] for line in lines if line["generation"] > 4)
+            time.sleep(0.01)
+        return soon(*arguments, **settings)
+
+    def never_beside(self: Runner, state: EvolutionState) -> None:
+        begin(self, state)
+        if self.pending:
+            concurrent.futures.wait([self._seen])
+
+    for folder in (waited, beside):
+        create_run(folder, experiment.creature, experiment.config)
+    begin = Runner.begin
+    with monkeypatch.context() as patch:
+        patch.setattr(Runner, "begin", never_beside)
+        trained(waited, experiment)
+    monkeypatch.setattr(examination, "certify", late)
+    assert "in generation 3" in trained(beside, experiment)
+    assert seen, "the look had ended before a further generation had"
+    assert files_of(beside) == files_of(waited)
+
+
+def test_what_goes_wrong_in_a_look_ends_the_run_as_it_would_have(
+    tmp_path: Path, experiment: Experiment, promising: None, monkeypatch: pytest.MonkeyPatch
+):
+    def full(*_: object, **__: object) -> Certificate:
+        raise UserError("the disk is full")
+
+    monkeypatch.setattr(examination, "certify", full)
+    create_run(tmp_path / "run", experiment.creature, experiment.config)
+    with pytest.raises(UserError, match="the disk is full"):
+        trained(tmp_path / "run", experiment)
 
 
 def test_one_that_never_passes_goes_on_to_the_end(

@@ -14,9 +14,10 @@ import numpy as np
 from mjxgait.certify import glance
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
-from mjxgait.repertoire.cells import has_mirror, mirrored
+from mjxgait.repertoire.cells import mirrored
 from mjxgait.repertoire.found import Found
 from mjxgait.repertoire.grid import Cell, Grid
+from mjxgait.repertoire.pairs import Pair, certified_pairs, of_each
 from mjxgait.runs.folder import open_champion
 
 WALKS = (1, 2, 3)
@@ -50,28 +51,15 @@ def blends(
     tell: Callable[[int, int], object],
 ) -> list[Blend]:
     """Of all that `certified_pairs` has. tell: called with how many are done, and of how many."""
-    pairs, results = certified_pairs(creature, grid, found), []
-    for number, pair in enumerate(pairs, 1):
-        one, other = (open_champion(folder / cell.name)[1] for cell in pair)
-        seen = glance(creature, half_way(one, other, creature))
-        judged = [criterion for criterion in seen.criteria if criterion.number in WALKS]
-        fails = tuple(criterion.name for criterion in judged if not criterion.passed)
-        results.append(Blend(pair, fails))
-        tell(number, len(pairs))
-    return results
+    return of_each(_blended, folder, certified_pairs(creature, grid, found), tell)
 
 
-def certified_pairs(creature: Creature, grid: Grid, found: list[Found]) -> list[tuple[Cell, Cell]]:
-    """All neighbours that are both certified; of a symmetric body's turns those to the left, whose
-    mirror images the others are.
-    """
-    known = {one.cell for one in found if one.certified}
-    lowest = 0.0 if has_mirror(creature) else -np.inf
-    return [
-        pair
-        for pair in grid.pairs
-        if known.issuperset(pair) and min(cell.turn for cell in pair) >= lowest
-    ]
+def _blended(folder: Path, pair: Pair) -> Blend:
+    """In a process of its own: all that is sent is where the walks are."""
+    (creature, one), (_, other) = (open_champion(folder / cell.name) for cell in pair)
+    seen = glance(creature, half_way(one, other, creature))
+    judged = [criterion for criterion in seen.criteria if criterion.number in WALKS]
+    return Blend(pair, tuple(criterion.name for criterion in judged if not criterion.passed))
 
 
 def half_way(one: Champion, other: Champion, creature: Creature) -> Champion:

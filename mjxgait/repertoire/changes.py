@@ -17,9 +17,9 @@ from mjxgait.certify.starts import nominal_starts
 from mjxgait.certify.twins.changing import ChangingTwin
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
-from mjxgait.repertoire.blends import certified_pairs
 from mjxgait.repertoire.found import Found
 from mjxgait.repertoire.grid import Cell, Grid
+from mjxgait.repertoire.pairs import Pair, certified_pairs, of_each
 from mjxgait.runs.folder import open_champion
 from mjxgait.viewing.walk import WARMUP
 
@@ -60,12 +60,13 @@ def changes(
     """Of all certified neighbours, there and back. tell: as of `blends`."""
     pairs = certified_pairs(creature, grid, found)
     ways = [way for one, other in pairs for way in ((one, other), (other, one))]
-    results = []
-    for number, way in enumerate(ways, 1):
-        before, after = (open_champion(folder / cell.name)[1] for cell in way)
-        results.append(Change(*way, float(succeeds(creature, before, after).mean())))
-        tell(number, len(ways))
-    return results
+    return of_each(_changed, folder, ways, tell)
+
+
+def _changed(folder: Path, way: Pair) -> Change:
+    """In a process of its own: all that is sent is where the walks are."""
+    (creature, before), (_, after) = (open_champion(folder / cell.name) for cell in way)
+    return Change(*way, float(succeeds(creature, before, after).mean()))
 
 
 def succeeds(creature: Creature, before: Champion, after: Champion) -> np.ndarray:

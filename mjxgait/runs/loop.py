@@ -37,6 +37,7 @@ from mjxgait.runs.folder import (
 )
 from mjxgait.runs.latest import Latest
 from mjxgait.runs.lineage import MOTHERS
+from mjxgait.runs.looks import Looks
 from mjxgait.runs.screen import Screen
 from mjxgait.runs.stages import Stages
 from mjxgait.runs.tryout import tryout_of
@@ -159,32 +160,55 @@ def _evolve(
     """Generation after generation; returns the last state, why it ended (None when the user
     interrupted it), and who ended it.
     """
-    experiment, examined, saved = examiner.experiment, None, int(state.generation)
-    config, creature = experiment.config, experiment.creature
-    while (reason := stop_reason(state, config.evolution)) is None and not interrupted.is_set():
-        if examined := examiner.early(state):
-            reason = why_ended(int(state.generation), examined.certificate.margin)
-            break
-        began = time.perf_counter()
-        state, metrics = step(state)
-        metrics = jax.device_get(metrics)
-        if metrics.generation < 0:
-            continue
-        line = metrics_line(metrics, time.perf_counter() - began, experiment.simulator.task)
-        line |= followed(experiment.simulator.controller.numbers(state.genomes))
-        # The log first: a kill before the checkpoint leaves a line too many, which a resumed run takes out.
-        with disk_errors(folder), (folder / METRICS).open("a", encoding="utf-8") as log:
-            log.write(json.dumps(line) + "\n")
-        if np.isfinite(metrics.best):
+    config, creature = examiner.experiment.config, examiner.experiment.creature
+    looks, saved, examined = Looks(examiner), int(state.generation), None
+    while True:
+        reason, generation = stop_reason(state, config.evolution), int(state.generation)
+        over = reason is not None or interrupted.is_set()
+        saves = generation > saved and generation % config.checkpoint_every == 0
+        # A checkpoint must not be of a generation that may yet be forgotten.
+        if found := looks.found(wait=over or saves or looks.due(state)):
+            examined, state = found
+            generation = int(state.generation)
             with disk_errors(folder):
-                write_champion(experiment.champion(state, versions()), creature, folder / CHAMPION)
-        if int(metrics.generation) % config.checkpoint_every == 0:
+                truncate_metrics(folder / METRICS, generation)
+            reason = why_ended(generation, examined.certificate.margin)
+            break
+        if saves:
             checkpoints.save(state, creature.name, creature.digest)
-            saved = int(metrics.generation)
-        screen.generation(line, config.evolution.generations)
-    if int(state.generation) > saved:
+            saved = generation
+        if over:
+            break
+        looks.begin(state)
+        state = _generation(folder, examiner.experiment, step, state, screen)
+    if generation > saved:
         checkpoints.save(state, creature.name, creature.digest)
     return state, reason, examined
+
+
+def _generation(
+    folder: Path, experiment: Experiment, step: Step, state: EvolutionState, screen: Screen
+) -> EvolutionState:
+    """One more, written into the log with its best as champion; before all of the first population
+    have been judged there is none yet.
+    """
+    began = time.perf_counter()
+    state, metrics = step(state)
+    metrics = jax.device_get(metrics)
+    if metrics.generation < 0:
+        return state
+    line = metrics_line(metrics, time.perf_counter() - began, experiment.simulator.task)
+    line |= followed(experiment.simulator.controller.numbers(state.genomes))
+    # The log first: a kill before the checkpoint leaves a line too many, which a resumed run takes out.
+    with disk_errors(folder), (folder / METRICS).open("a", encoding="utf-8") as log:
+        log.write(json.dumps(line) + "\n")
+    if np.isfinite(metrics.best):
+        with disk_errors(folder):
+            write_champion(
+                experiment.champion(state, versions()), experiment.creature, folder / CHAMPION
+            )
+    screen.generation(line, experiment.config.evolution.generations)
+    return state
 
 
 def metrics_line(metrics: GenerationMetrics, seconds: float, task: Task) -> dict[str, Any]:

@@ -1,0 +1,58 @@
+"""Neighbours of a repertoire that are certified, and what is tried of each two of them."""
+
+import concurrent.futures
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+
+from mjxgait.cores import process_per_core, survivable
+from mjxgait.creature import Creature
+from mjxgait.repertoire.cells import has_mirror
+from mjxgait.repertoire.found import Found
+from mjxgait.repertoire.grid import Cell, Grid
+
+Pair = tuple[Cell, Cell]
+Tried = TypeVar("Tried")
+
+
+def certified_pairs(creature: Creature, grid: Grid, found: list[Found]) -> list[Pair]:
+    """All neighbours that are both certified; of a symmetric body's turns those to the left, whose
+    mirror images the others are.
+    """
+    known = {one.cell for one in found if one.certified}
+    lowest = 0.0 if has_mirror(creature) else -np.inf
+    return [
+        pair
+        for pair in grid.pairs
+        if known.issuperset(pair) and min(cell.turn for cell in pair) >= lowest
+    ]
+
+
+def of_each(
+    work: Callable[[Path, Pair], Tried],
+    folder: Path,
+    pairs: Sequence[Pair],
+    tell: Callable[[int, int], object],
+) -> list[Tried]:
+    """What comes of each pair, in their order, one per core.
+
+    tell: called with how many are done, and of how many.
+
+    Raises:
+      UserError: a process was killed from outside.
+    """
+    if not pairs:
+        return []
+    again = f"mjxgait repertoire --resume {folder}"
+    with survivable(folder, again), process_per_core(len(pairs)) as pool:
+        futures = [pool.submit(work, folder, pair) for pair in pairs]
+        try:
+            for number, done in enumerate(concurrent.futures.as_completed(futures), 1):
+                done.result()
+                tell(number, len(pairs))
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+        return [done.result() for done in futures]
