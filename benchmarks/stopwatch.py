@@ -47,16 +47,17 @@ class Stopwatch:
 def main() -> None:
     path, *arguments = sys.argv[1:]
     from mjxgait.cli import main as command
-    from mjxgait.runs import checkpoint, examination, experiment, loop, stages
+    from mjxgait.runs import checkpoint, examination, experiment, looks, loop, stages
 
     watch = Stopwatch()
     watch.add("imports", time.perf_counter() - BEGAN)
     watch.watch(loop, "build_experiment", "body and starts")
     watch.watch(stages, "lowered", "tracing")
     watch.watch(experiment, "compile_stages", "compiling")
-    for look in ("glance", "rehearse"):
-        watch.watch(examination, look, "looks on the way")
-    watch.watch(examination, "certify", "examination")
+    watch.watch(loop, "_generation", "evolution")
+    # What goes on beside evolution holds it up only where it is waited for.
+    watch.watch(looks.Looks, "found", "waiting for looks")
+    watch.watch(examination.Examiner, "best", "examination at the end")
     watch.watch(checkpoint.Checkpoints, "save", "checkpoints")
     watch.watch(checkpoint.Checkpoints, "close", "checkpoints")
     code = 0
@@ -65,10 +66,6 @@ def main() -> None:
     except SystemExit as end:
         code = int(end.code or 0)
     whole = time.perf_counter() - BEGAN
-    if "--out" in arguments:
-        folder = Path(arguments[arguments.index("--out") + 1])
-        lines = (folder / "metrics.jsonl").read_text(encoding="utf-8").splitlines()
-        watch.add("evolution", sum(json.loads(line)["wall_s"] for line in lines))
     # What is traced meanwhile holds up nobody twice.
     watch.add("compiling", -watch.seconds.get("tracing", 0.0))
     watch.add("rest", whole - sum(watch.seconds.values()))

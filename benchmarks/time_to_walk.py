@@ -26,8 +26,8 @@ PARTS = (
     "tracing",
     "compiling",
     "evolution",
-    "looks on the way",
-    "examination",
+    "waiting for looks",
+    "examination at the end",
     "checkpoints",
     "rest",
 )
@@ -109,7 +109,9 @@ def report(runs: dict[str, list[dict]]) -> dict:
         if entries
     }
     medians |= {
-        f"{kind}_parts_s": {part: mean(entry["parts"][part] for entry in entries) for part in PARTS}
+        f"{kind}_parts_s": {
+            part: mean(entry["parts"].get(part, 0.0) for entry in entries) for part in PARTS
+        }
         for kind, entries in runs.items()
         if entries
     }

@@ -38,11 +38,6 @@ CASES: list[tuple[str, float, dict]] = [
     ("frequency", 6 / 3.5344 - 0.7, {"swings": [30.0] * 4}),
     ("frequency", 8 / 3.5344 - 0.7, {"swings": [80.0, 0.0, 80.0, 0.0]}),
     ("frequency", 0.0, {"swings": [12.0] * 4}),
-    # 2 m in 10 strides of the foot in the middle are 0.4 hip heights each, where 0.5 are wanted
-    ("stride_length", 0.1, {"swings": [10.0, 4.0, 10.0, 20.0]}),
-    ("stride_length", 0.0, {"swings": [5.0] * 4}),
-    ("stride_length", 0.5, {"swings": [0.0, 9.0, 0.0, 0.0]}),
-    ("stride_length", 0.5, {"swings": [4.0] * 4, "forward": -1.0}),
     ("duty", 0.5, {"contact": [900.0, 500, 500, 500]}),
     ("duty", 0.75, {"contact": [500.0, 100, 500, 800]}),
     ("airborne", 0.15, {"airborne": 150.0}),
@@ -97,7 +92,7 @@ def test_every_term_has_a_case_that_is_not_zero(name: str):
 
 def test_a_case_changes_no_other_penalty(body: Creature):
     """What is counted for one term is not counted for a second one."""
-    shared = {"distance", "alive", "fade", "clearance", "stride_length", "duty"}
+    shared = {"distance", "alive", "fade", "clearance", "duty"}
     for name, _, tally in CASES:
         if set(tally) & {"steps", "forward"}:
             continue

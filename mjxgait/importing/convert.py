@@ -299,7 +299,8 @@ def _train(best: Candidate, symmetric: bool, stated_length: float | None) -> dic
     length = stated_length or geometry.body_length(model, data, np.array([1.0, 0.0, 0.0]))
     hip = stance_of(best.puppet, best.qpos[7:]).hip
     steps = bool(best.drive.ahead or best.drive.aside)
-    return manner(steps, symmetric, hip, length, best.puppet.mass, best.notes)
+    step = float(model.opt.timestep)
+    return manner(steps, symmetric, hip, length, best.puppet.mass, step, best.notes)
 
 
 def _stated_length(best: Candidate) -> float | None:

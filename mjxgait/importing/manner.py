@@ -15,7 +15,9 @@ examination; and what it costs to be hasty, twice the usual."""
 BRISK = 1.2
 """Body lengths per second that such a body should walk: slower it has to stand on one foot."""
 STRIDE = 0.7
-"""Hip heights that its strides should be at that speed; the certificate asks for 0.5."""
+"""Hip heights that its strides should be at that speed."""
+LEAST = 0.5
+"""Those that the certificate asks for: a cycle that leads through shorter ones is a buzz."""
 
 FRESH: dict[str, Any] = {"variety": Config().evolution.generations, "caution": 1.0, "worst": 0.0}
 """Other starts in each generation, so that nobody learns six by heart and falls in all others; who
@@ -26,24 +28,38 @@ JUDGED_ANEW: dict[str, Any] = {
     "remember": True,
     "selection": "tournament",
     "rivals": 4,
+    "mutation": "gaussian",
+    "sigma": 0.06,
     "forced": {"enabled": False},
 }
 """Then only those compare that were judged together: parents die, but for some that are judged again
-and count by all their rounds. A best that is no better is no sign of a stall."""
+and count by all their rounds. A best that is no better is no sign of a stall. Steps are small: to
+draw two joints anew fells nearly every child of a parent that stands on one foot."""
 
 
 def manner(
-    steps: bool, symmetric: bool, hip: float, length: float, mass: float, notes: Notes
+    steps: bool,
+    symmetric: bool,
+    hip: float,
+    length: float,
+    mass: float,
+    time_step: float,
+    notes: Notes,
 ) -> dict[str, Any]:
     """The table `[train]` of an imported creature, each reason told.
 
     Args:
       steps: whether it must step under its fall. hip: m, its height. length: m, of the body. mass: kg.
+      time_step: s.
     """
     table: dict[str, Any] = {}
+    plain = Config().controller
     if steps:
         hertz = BRISK * length / (STRIDE * hip)
         calm = min(WalkConfig().frequency, hertz / stride_limit(mass))
+        # A cycle moves on by a step at most every control step.
+        shortest = LEAST * hip / (BRISK * length) / time_step / (2 * plain.key_poses)
+        table["controller"] = {"interpolation": max(round(shortest), plain.interpolation)}
         # Undisturbed it tells little about who bears something: all are tried in all starts.
         table["rollout"] = {"starts": STARTS, "promote": 1.0, "latency": LATE} | FRESH
         table["evolution"] = JUDGED_ANEW
@@ -61,5 +77,5 @@ def manner(
             "to stay up",
         )
     if not symmetric:
-        table["controller"] = {"key_poses": 2 * Config().controller.key_poses}
+        table.setdefault("controller", {})["key_poses"] = 2 * plain.key_poses
     return table

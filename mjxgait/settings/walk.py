@@ -28,7 +28,6 @@ class Weights:
       slip: way that the worst foot slides while it carries weight, per way walked.
       clearance: how far feet stay below the wanted height in their swings.
       frequency: strides per second beyond what an animal of this mass makes.
-      stride_length: hip heights that strides are shorter than they should be.
       duty: feet that are on the floor for less than a quarter or more than four fifths of the
         time.
       airborne: share of the time with no foot on the floor.
@@ -52,7 +51,6 @@ class Weights:
     slip: Finite = 10.0
     clearance: Finite = 3.0
     frequency: Finite = 4.0
-    stride_length: Finite = 0.0
     duty: Finite = 2.0
     airborne: Finite = 3.0
     patter: Finite = 0.0
@@ -158,7 +156,6 @@ class WalkConfig:
       clearance: height in hip heights that each foot should reach in each stride.
       frequency: share of the highest stride frequency of an animal of this mass up to which a
         gait is not hasty.
-      stride_length: hip heights that a stride should measure.
       style_ramp: generations over which the style terms (all but distance, alive, foot_height
         and fall) grow to their full weight.
       weights: what each term counts.
@@ -169,7 +166,6 @@ class WalkConfig:
     speed: NonNegative = 0.9
     clearance: NonNegative = 0.12
     frequency: NonNegative = 0.7
-    stride_length: NonNegative = 0.5
     style_ramp: Whole = 0
     wish: WishConfig = dataclasses.field(default_factory=WishConfig)
     weights: Weights = dataclasses.field(default_factory=Weights)

@@ -55,7 +55,6 @@ def plain_terms(
     rate = jnp.mean(tally.swings) / lived / step
     # As often as the foot in the middle; one that swings less often has not left the floor.
     strides = jnp.sort(tally.swings)[tally.swings.shape[0] // 2]
-    long = jnp.where(strides > 0, tally.forward / jnp.maximum(strides, 1.0), 0.0)
     dragged = tally.shortfall + jnp.maximum(strides - tally.swings, 0.0)
     low_feet = jnp.mean(dragged / jnp.maximum(jnp.maximum(tally.swings, strides), 1.0))
     duty = tally.contact / lived
@@ -69,9 +68,6 @@ def plain_terms(
         "slip": jnp.max(tally.slip) / moved,
         "clearance": jnp.where(strides > 0, low_feet, 1.0),
         "frequency": jnp.maximum(rate / stride_limit(creature.frame.mass) - config.frequency, 0.0),
-        "stride_length": jnp.maximum(
-            config.stride_length - jnp.maximum(long, 0.0) / creature.frame.hip_height, 0.0
-        ),
         "duty": jnp.max(jnp.maximum(duty - 0.8, 0.0) + jnp.maximum(0.25 - duty, 0.0)) / 0.2,
         "airborne": tally.airborne / lived,
         "patter": jnp.mean(_patter(tally)),

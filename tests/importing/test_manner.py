@@ -1,0 +1,64 @@
+"""How a body of its class is to be evolved, by what an import knows of it."""
+
+from typing import Any
+
+import pytest
+
+from mjxgait.importing.manner import manner
+from mjxgait.importing.notes import Notes
+from mjxgait.settings.config import Config
+from mjxgait.settings.tables import build
+
+STEP = 0.005
+
+
+def told(hip: float = 0.8, length: float = 0.8, **facts: Any) -> tuple[Config, Notes]:
+    notes = Notes()
+    settled = {"steps": True, "symmetric": True, "mass": 30.0, "time_step": STEP} | facts
+    table = manner(hip=hip, length=length, notes=notes, **settled)
+    return build(Config, table, "the table"), notes
+
+
+def test_a_body_on_four_feet_is_evolved_as_the_shipped_ones():
+    config, notes = told(steps=False)
+    assert config == Config()
+    assert not notes.guesses
+
+
+def test_one_that_steps_meets_other_starts_in_each_generation_and_parents_die():
+    config, notes = told()
+    assert config.rollout.variety == config.evolution.generations
+    assert (config.evolution.survival, config.evolution.remember) == ("children", True)
+    assert config.evolution.elites > 1
+    assert not config.evolution.forced.enabled
+    assert [guess.what for guess in notes.guesses] == ["train"]
+
+
+def test_its_children_differ_little():
+    """Two joints drawn anew, as others have it, fell nearly every child of one that stays up."""
+    config, _ = told()
+    assert config.evolution.mutation == "gaussian"
+    assert config.evolution.sigma < Config().evolution.sigma
+
+
+@pytest.mark.parametrize("hip", [0.4, 0.8, 1.6])
+def test_its_cycle_leads_through_no_strides_that_the_certificate_calls_too_short(hip: float):
+    """At the speed that is wanted of it, however fast its poses follow each other."""
+    config, _ = told(hip=hip, length=0.8)
+    poses = 2 * config.controller.key_poses
+    shortest = poses * config.controller.interpolation * STEP
+    stride = config.fitness.speed * 0.8 * shortest
+    assert stride == pytest.approx(0.5 * hip, rel=0.05)
+
+
+def test_a_low_one_may_hurry_as_much_as_the_others():
+    config, _ = told(hip=0.05)
+    assert config.controller.interpolation == Config().controller.interpolation
+
+
+@pytest.mark.parametrize("steps", [True, False])
+def test_without_a_left_and_a_right_the_whole_cycle_is_evolved(steps: bool):
+    config, _ = told(steps=steps, symmetric=False)
+    assert config.controller.key_poses == 2 * Config().controller.key_poses
+    # Two poses and their images, or four: a cycle takes as long.
+    assert told(steps=steps)[0].controller.interpolation == config.controller.interpolation
