@@ -102,13 +102,20 @@ def test_a_case_changes_no_other_penalty(body: Creature):
 
 
 def test_style_counts_by_the_share_of_the_wanted_walk(body: Creature):
-    """2 m are four ninths of 5 s at 0.9 lengths a second; distance and posture are no style."""
+    """2 m are four ninths of 5 s at 0.9 lengths a second; distance and a foot's height are no style."""
     tally = {"tilt": 120.0, "foot_height": 200.0, "airborne": 150.0}
     terms = terms_of(body, tally, speed=0.9)
     assert terms["tilt"] == pytest.approx(0.12 * 4 / 9, rel=1e-4)
     assert terms["airborne"] == pytest.approx(0.15 * 4 / 9, rel=1e-4)
     assert terms["foot_height"] == pytest.approx(0.15, rel=1e-4)
-    assert (terms["distance"], terms["alive"]) == (pytest.approx(2.0), 1.0)
+    assert terms["distance"] == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize(("forward", "counts"), [(0.0, 0.25), (2.0, 0.25 + 0.75 * 4 / 9), (9.0, 1)])
+def test_staying_up_counts_for_more_the_farther_one_walks(body, forward, counts):
+    """Where the wanted way is 4.5 m: who stands still must not be better than who walks."""
+    tally = {"steps": 500, "forward": forward}
+    assert terms_of(body, tally, speed=0.9)["alive"] == pytest.approx(0.5 * counts, rel=1e-4)
 
 
 def test_each_weight_meets_its_own_term_with_its_own_sign():

@@ -19,10 +19,13 @@ STRIDE = 0.7
 LEAST = 0.5
 """Those that the certificate asks for: a cycle that leads through shorter ones is a buzz."""
 
-FRESH: dict[str, Any] = {"variety": Config().evolution.generations, "caution": 1.0, "worst": 0.0}
+GENERATIONS = 150
+"""Most of them, twice as many as usual."""
+FRESH: dict[str, Any] = {"variety": GENERATIONS, "caution": 1.0, "worst": 0.0}
 """Other starts in each generation, so that nobody learns six by heart and falls in all others; who
 was lucky on few is believed less."""
 JUDGED_ANEW: dict[str, Any] = {
+    "generations": GENERATIONS,
     "survival": "children",
     "elite": 0.125,
     "remember": True,

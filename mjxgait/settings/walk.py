@@ -22,7 +22,7 @@ class Weights:
 
     Attributes:
       distance: body lengths walked forward.
-      alive: share of the episode until it fell.
+      alive: share of the episode until it fell; a quarter of that for who goes nowhere.
       drift: way to the side, and turning away.
       fade: how much less far the second half of the time led than the first.
       slip: way that the worst foot slides while it carries weight, per way walked.

@@ -20,6 +20,9 @@ STYLE = tuple(name for name in TERMS if name not in (*REWARDS, "foot_height", "f
 
 PATTER = 4.0
 """Touchdowns too many in each stride at which a foot counts as pattering half as much as it can."""
+STANDING = 0.25
+"""What it counts to stay up for who goes nowhere, as a share of what it counts for who walks all of the
+way: it teaches balance, and must not be the best there is."""
 BEYOND = 0.02
 """What a body length counts that goes beyond the wanted speed."""
 
@@ -40,6 +43,7 @@ def fitness_terms(
     walked = jnp.where(
         jnp.isfinite(enough), jnp.clip(tally.forward / length / enough, 0.0, 1.0), 1.0
     )
+    values["alive"] *= STANDING + (1 - STANDING) * walked
     return {name: values[name] * (walked if name in STYLE else 1.0) for name in TERMS}
 
 
