@@ -32,7 +32,7 @@ JUDGED_ANEW: dict[str, Any] = {
     "selection": "tournament",
     "rivals": 4,
     "mutation": "gaussian",
-    "sigma": 0.06,
+    "sigma": 0.03,
     "forced": {"enabled": False},
 }
 """Then only those compare that were judged together: parents die, but for some that are judged again
