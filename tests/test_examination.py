@@ -439,16 +439,16 @@ def test_evolution_goes_on_beside_a_look_and_forgets_it_when_that_ends_the_run(
     """Whatever the machine does first, the folder is the one of a run that waited."""
     waited, beside = tmp_path / "waited", tmp_path / "beside"
     seen: list[int] = []
-    soon = examination.certify
+    soon = examination.glance
 
-    def late(*arguments: object, **settings: object) -> Certificate:
+    def late(*arguments: object) -> SimpleNamespace:
         until = time.monotonic() + 60
         while not seen and time.monotonic() < until:
             lines = read_metrics(beside / "metrics.jsonl")
             # By then a checkpoint is due, which must wait.
             seen.extend(line["generation"] for line in lines if line["generation"] > 4)
             time.sleep(0.01)
-        return soon(*arguments, **settings)
+        return soon(*arguments)
 
     def never_beside(self: Runner, state: EvolutionState) -> None:
         begin(self, state)
@@ -461,10 +461,28 @@ def test_evolution_goes_on_beside_a_look_and_forgets_it_when_that_ends_the_run(
     with monkeypatch.context() as patch:
         patch.setattr(Runner, "begin", never_beside)
         trained(waited, experiment)
-    monkeypatch.setattr(examination, "certify", late)
+    monkeypatch.setattr(examination, "glance", late)
     assert "in generation 3" in trained(beside, experiment)
     assert seen, "the look had ended before a further generation had"
     assert files_of(beside) == files_of(waited)
+
+
+def test_hardly_anything_evolves_beside_an_examination(
+    tmp_path: Path, experiment: Experiment, promising: None, monkeypatch: pytest.MonkeyPatch
+):
+    """It takes all cores; only the generation that has begun is ended."""
+    folder, latest, soon = tmp_path / "run", [], examination.certify
+
+    def slow(*arguments: object, **settings: object) -> Certificate:
+        for _ in range(2):
+            latest.append(read_metrics(folder / "metrics.jsonl")[-1]["generation"])
+            time.sleep(0.5)
+        return soon(*arguments, **settings)
+
+    monkeypatch.setattr(examination, "certify", slow)
+    create_run(folder, experiment.creature, experiment.config)
+    assert "in generation 3" in trained(folder, experiment)
+    assert latest[1] - latest[0] <= 1
 
 
 def test_what_goes_wrong_in_a_look_ends_the_run_as_it_would_have(

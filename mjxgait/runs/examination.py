@@ -1,6 +1,7 @@
 """Who of a population walks: looks at the best few in C MuJoCo and has one of them examined."""
 
 import dataclasses
+import threading
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -68,6 +69,8 @@ class Examiner:
     tell: Callable[[str], None]
     exams: Exams
     tryout: Tryout | None = None
+    examines: threading.Event = dataclasses.field(default_factory=threading.Event)
+    """Set once a look has become an examination, which takes all cores."""
     _margins: dict[str, float] = dataclasses.field(default_factory=dict)
     """Of the champions that did not do on the way, by fingerprint, at most: another look would say the same."""
 
@@ -181,6 +184,7 @@ class Examiner:
             f"Generation {generation}: examining the champion in C MuJoCo, attempt {attempt}…"
         )
         body = seen.champion.embodied(self.experiment.creature)
+        self.examines.set()
         certificate = certify(body, seen.champion, seen=seen.glance, attempts=attempt)
         beyond = None
         if certificate.passed and self.experiment.config.examination.level == "anywhere":

@@ -34,6 +34,7 @@ class Looks:
         if not self.due(state):
             return
         self._state, self._seen = state, Future()
+        self._examiner.examines.clear()
         # Two programs of all devices at once wait for each other.
         if self._examiner.tryout is not None:
             self._look(self._seen, state)
@@ -45,9 +46,12 @@ class Looks:
         """Who was certified, and the state of that generation, once that is known.
 
         Args:
-          wait: until it is.
+          wait: until it is. Where somebody is being examined it waits anyway: what evolved
+            meanwhile would take the cores of the examination, and be forgotten if that ends well.
         """
-        if self._seen is None or self._state is None or not (wait or self._seen.done()):
+        if self._seen is None or self._state is None:
+            return None
+        if not (wait or self._seen.done() or self._examiner.examines.is_set()):
             return None
         examined, self._seen = self._seen.result(), None
         return None if examined is None else (examined, self._state)
