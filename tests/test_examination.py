@@ -26,7 +26,7 @@ from mjxgait.runs.examination import Examiner, due
 from mjxgait.runs.exams import Exams
 from mjxgait.runs.experiment import Experiment, build_experiment
 from mjxgait.runs.folder import CERTIFICATE, EXAMS, create_run, read_metrics
-from mjxgait.runs.looks import Looks as Runner
+from mjxgait.runs.looks import Looks as RunLooks
 from mjxgait.runs.screen import Screen
 from mjxgait.runs.stored import stored_generations
 from mjxgait.search.state import EvolutionState
@@ -450,16 +450,16 @@ def test_evolution_goes_on_beside_a_look_and_forgets_it_when_that_ends_the_run(
             time.sleep(0.01)
         return soon(*arguments)
 
-    def never_beside(self: Runner, state: EvolutionState) -> None:
+    def never_beside(self: RunLooks, state: EvolutionState) -> None:
         begin(self, state)
-        if self.pending:
+        if self._seen is not None:
             concurrent.futures.wait([self._seen])
 
     for folder in (waited, beside):
         create_run(folder, experiment.creature, experiment.config)
-    begin = Runner.begin
+    begin = RunLooks.begin
     with monkeypatch.context() as patch:
-        patch.setattr(Runner, "begin", never_beside)
+        patch.setattr(RunLooks, "begin", never_beside)
         trained(waited, experiment)
     monkeypatch.setattr(examination, "glance", late)
     assert "in generation 3" in trained(beside, experiment)

@@ -4,6 +4,7 @@ from typing import Any
 
 from mjxgait.importing.notes import Notes
 from mjxgait.settings.config import Config
+from mjxgait.settings.control import unhurried
 from mjxgait.settings.gaits import stride_limit
 from mjxgait.settings.walk import WalkConfig
 
@@ -58,13 +59,11 @@ def manner(
       time_step: s.
     """
     table: dict[str, Any] = {}
-    plain = Config().controller
     if steps:
         hertz = BRISK * length / (STRIDE * hip)
         calm = min(WalkConfig().frequency, hertz / stride_limit(mass))
-        # A cycle moves on by a step at most every control step.
-        shortest = LEAST * hip / (BRISK * length) / time_step / (2 * plain.key_poses)
-        table["controller"] = {"interpolation": max(round(shortest), plain.interpolation)}
+        shortest = LEAST * hip / (BRISK * length)
+        table["controller"] = {"interpolation": unhurried(shortest, time_step)}
         # Undisturbed it tells little about who bears something: all are tried in all starts.
         table["rollout"] = {"starts": STARTS, "promote": 1.0, "latency": LATE} | FRESH
         table["evolution"] = JUDGED_ANEW
@@ -76,12 +75,13 @@ def manner(
         }
         notes.guess(
             "train",
-            f"{STARTS} starts, others in each generation, with torques up to {LATE} step late; staying up counts {ALIVE:g}, {BRISK:g} body "
-            f"lengths/s in strides of {STRIDE:g} hip heights",
+            f"{STARTS} starts, others in each of {GENERATIONS} generations at most, with torques up to {LATE} "
+            f"step late; small mutations; staying up counts {ALIVE:g}, {BRISK:g} body lengths/s in strides "
+            f"of {STRIDE:g} hip heights",
             "medium",
             "on one foot or two it falls unless it walks: more disturbed starts, and first of all "
             "to stay up",
         )
     if not symmetric:
-        table.setdefault("controller", {})["key_poses"] = 2 * plain.key_poses
+        table.setdefault("controller", {})["key_poses"] = 2 * Config().controller.key_poses
     return table

@@ -13,6 +13,7 @@ from mjxgait.errors import UserError, did_you_mean
 from mjxgait.parts.drawn import drawn, natural_gait, top_speed
 from mjxgait.parts.settings import resolve_config
 from mjxgait.settings.config import Config
+from mjxgait.settings.control import unhurried
 from mjxgait.settings.gaits import AUTO, SHORTEST, animal_stride, gait_of
 from mjxgait.settings.shipped import data_folder
 from mjxgait.settings.tables import build, merge, read_toml
@@ -170,16 +171,12 @@ def _speed(speed: float, creature: Creature) -> dict[str, Any]:
     """A speed in m/s, and a cycle of at least as many steps as the shortest strides there may be at
     that speed.
 
-    A cycle moves on by a step at most every control step: ten steps from pose to pose, a fifth of
-    a second for all four, let whoever moves little run through them far too often.
+    Ten steps from pose to pose, a fifth of a second for all four, let whoever moves little run
+    through them far too often.
     """
-    hip, step = creature.frame.hip_height, float(creature.model.opt.timestep)
-    poses = 4
-    steps = round(SHORTEST * animal_stride(speed, hip) / speed / step / poses)
-    return {
-        "fitness": {"wish": {"speed": speed}},
-        "controller": {"interpolation": max(steps, 10)},
-    }
+    shortest = SHORTEST * animal_stride(speed, creature.frame.hip_height) / speed
+    steps = unhurried(shortest, float(creature.model.opt.timestep))
+    return {"fitness": {"wish": {"speed": speed}}, "controller": {"interpolation": steps}}
 
 
 def _natural(name: str) -> dict[str, Any]:

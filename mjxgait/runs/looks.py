@@ -19,11 +19,6 @@ class Looks:
         self._seen: Future[Examined | None] | None = None
         self._state: EvolutionState | None = None
 
-    @property
-    def pending(self) -> bool:
-        """Whether somebody is being looked at, or has been and nobody has asked what came of it."""
-        return self._seen is not None
-
     def due(self, state: EvolutionState) -> bool:
         """Whether it is time to look at the best of a generation that has not been looked at."""
         settings = self._examiner.experiment.config.examination

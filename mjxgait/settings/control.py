@@ -125,6 +125,14 @@ class PoseConfig:
     stepping: SteppingRanges = dataclasses.field(default_factory=SteppingRanges)
 
 
+def unhurried(seconds: float, time_step: float) -> int:
+    """Steps between poses, the usual ones at least, with which no cycle takes less than these s: it
+    moves on by a step at most every control step, of `time_step` s.
+    """
+    plain = PoseConfig()
+    return max(round(seconds / time_step / (2 * plain.key_poses)), plain.interpolation)
+
+
 @dataclasses.dataclass(frozen=True)
 class DriveConfig:
     """How the joints' motors follow what a controller sends.

@@ -4,6 +4,7 @@ from typing import Any
 
 import pytest
 
+from mjxgait.certify import CertificateConfig
 from mjxgait.importing.manner import manner
 from mjxgait.importing.notes import Notes
 from mjxgait.settings.config import Config
@@ -48,6 +49,7 @@ def test_its_cycle_leads_through_no_strides_that_the_certificate_calls_too_short
     poses = 2 * config.controller.key_poses
     shortest = poses * config.controller.interpolation * STEP
     stride = config.fitness.speed * 0.8 * shortest
+    assert CertificateConfig().gait.stride_length == 0.5
     assert stride == pytest.approx(0.5 * hip, rel=0.05)
 
 
