@@ -462,7 +462,9 @@ def test_evolution_goes_on_beside_a_look_and_forgets_it_when_that_ends_the_run(
         patch.setattr(RunLooks, "begin", never_beside)
         trained(waited, experiment)
     monkeypatch.setattr(examination, "glance", late)
-    assert "in generation 3" in trained(beside, experiment)
+    said = trained(beside, experiment)
+    assert "up to generation 5, is forgotten" in said
+    assert "Certified with a margin of 0.30 in generation 3" in said
     assert seen, "the look had ended before a further generation had"
     assert files_of(beside) == files_of(waited)
 

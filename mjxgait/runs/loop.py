@@ -169,7 +169,12 @@ def _evolve(
         # A checkpoint must not be of a generation that may yet be forgotten.
         if found := looks.found(wait=over or saves or looks.due(state)):
             examined, state = found
-            generation = int(state.generation)
+            later, generation = generation, int(state.generation)
+            if later > generation:
+                screen.say(
+                    f"Generation {generation} is what the run ends with; what evolved beside its "
+                    f"examination, up to generation {later}, is forgotten."
+                )
             with disk_errors(folder):
                 truncate_metrics(folder / METRICS, generation)
             reason = why_ended(generation, examined.certificate.margin)
