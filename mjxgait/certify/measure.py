@@ -8,19 +8,12 @@ import dataclasses
 import mujoco
 import numpy as np
 
-from mjxgait.certify.bar import Clearance
 from mjxgait.certify.grown import Grown, seen_grown
-from mjxgait.certify.layout import (
-    LowestPoint,
-    foot_middles,
-    level_nose,
-    per_foot,
-    start_frame,
-)
+from mjxgait.certify.layout import foot_middles, level_nose, start_frame
 from mjxgait.certify.outcome import Trajectory
 from mjxgait.certify.overlap import overlaps
+from mjxgait.certify.sight import Sight
 from mjxgait.certify.starts import Starts
-from mjxgait.certify.stepping import examined_model
 from mjxgait.certify.terrain import terrain_of
 from mjxgait.creature import Creature
 
@@ -167,7 +160,7 @@ def measure(
     qpos, qvel, torque = trajectory.qpos[row], trajectory.qvel[row], trajectory.torque[row]
     bar = None if aimed is None or np.isinf(aimed.bar[row, 0]) else aimed.bar[row]
     lit = aimed is not None and aimed.light[row].any()
-    sight = _Sight(creature, len(qpos), bar)
+    sight = Sight(creature, len(qpos), bar)
     for k in range(len(qpos)):
         if not (np.isfinite(qpos[k]).all() and np.isfinite(qvel[k]).all()):
             break
@@ -208,104 +201,8 @@ def measure(
     )
 
 
-def _ahead(sight: "_Sight") -> np.ndarray:
+def _ahead(sight: Sight) -> np.ndarray:
     """[T, N] m from the trunk to each foot, along the level direction of its nose."""
     apart = foot_middles(sight.creature, sight.geom_xpos) - sight.trunk_pos[:, None]
     found: np.ndarray = np.einsum("tnx,tx->tn", apart, level_nose(sight.creature, sight.trunk_rot))
     return found
-
-
-class _Sight:
-    """Reads frames from an MjData; NaN (or a touch) where it has not looked."""
-
-    def __init__(self, creature: Creature, frames: int, bar: np.ndarray | None) -> None:
-        self.creature, self.model = creature, examined_model(creature)
-        self.data = mujoco.MjData(self.model)
-        feet = len(creature.feet.names)
-        foot_geoms = creature.feet.watched[: len(creature.feet.foot_of)]
-        self.reach = LowestPoint(self.model, foot_geoms, terrain_of(creature))
-        self.foot_of_geom = np.full(self.model.ngeom, -1)
-        self.foot_of_geom[foot_geoms] = creature.feet.foot_of
-        self.may_touch = np.isin(np.arange(self.model.ngeom), [*foot_geoms, *creature.feet.ground])
-        self.floor = self.model.geom("floor").id
-        self.trunk_pos, self.trunk_rot = (
-            np.full((frames, 3), np.nan),
-            np.full((frames, 3, 3), np.nan),
-        )
-        self.foot_force, self.foot_slip, self.foot_height = (
-            np.full((frames, feet), np.nan) for _ in range(3)
-        )
-        self.bar, self.over = bar, None if bar is None else Clearance(creature)
-        self.clearance = np.full(frames, np.nan)
-        # What is reckoned at the end, of all frames at once.
-        model, self.seen = self.model, 0
-        self.geom_xpos, self.geom_xmat = (
-            np.empty((frames, model.ngeom, 3)),
-            np.empty((frames, model.ngeom, 9)),
-        )
-        self.spun, self.arm = np.empty((frames, model.nbody, 6)), np.empty((frames, model.nbody, 3))
-        self.touch, self.penetration, self.body_speed = (
-            np.ones(frames, bool),
-            np.full(frames, np.nan),
-            np.full(frames, np.nan),
-        )
-
-    def look(self, k: int, qpos: np.ndarray, qvel: np.ndarray, torque: np.ndarray) -> None:
-        data, creature = self.data, self.creature
-        data.qpos[:], data.qvel[:] = qpos, qvel
-        data.qfrc_applied[creature.joints.dof_adr] = torque
-        mujoco.mj_forward(self.model, data)
-        self.trunk_pos[k], self.trunk_rot[k] = (
-            data.xpos[creature.trunk],
-            data.xmat[creature.trunk].reshape(3, 3),
-        )
-        self.geom_xpos[k], self.geom_xmat[k] = data.geom_xpos, data.geom_xmat
-        self.spun[k] = data.cvel
-        self.arm[k] = data.xipos - data.subtree_com[self.model.body_rootid]
-        self._contacts(k)
-        self.seen = k + 1
-
-    def finish(self) -> None:
-        """What follows from the poses of all frames that were looked at."""
-        seen = slice(self.seen)
-        poses = self.geom_xpos[seen], self.geom_xmat[seen]
-        self.foot_height[seen] = per_foot(self.creature, self.reach.heights(*poses))
-        speed = np.linalg.norm(_moving(self.spun[seen], self.arm[seen])[:, 1:], axis=2)
-        self.body_speed[seen] = speed.max(1)
-        if self.bar is not None and self.over is not None:
-            self.clearance[seen] = self.over.of(*poses, self.bar[None])
-
-    def _contacts(self, k: int) -> None:
-        data, contact = self.data, self.data.contact
-        self.foot_force[k] = self.foot_slip[k] = self.touch[k] = self.penetration[k] = 0
-        on_floor = (contact.geom == self.floor).any(1)
-        if not on_floor.any():
-            return
-        geom = contact.geom[on_floor].sum(1) - self.floor
-        self.penetration[k] = max(0.0, -contact.dist[on_floor].min())
-        self.touch[k] = (~self.may_touch[geom]).any()
-        body = self.model.geom_bodyid[geom]
-        arm = contact.pos[on_floor] - data.subtree_com[self.model.body_rootid[body]]
-        velocity = _moving(data.cvel[body], arm)
-        first, second = np.moveaxis(contact.frame[on_floor].reshape(-1, 3, 3)[:, 1:], 1, 0)
-        slip = np.hypot((velocity * first).sum(1), (velocity * second).sum(1))
-        force = np.zeros(6)
-        for i, foot, speed in zip(
-            np.flatnonzero(on_floor), self.foot_of_geom[geom], slip, strict=True
-        ):
-            if foot >= 0:
-                mujoco.mj_contactForce(self.model, data, i, force)
-                self.foot_force[k, foot] += force[0]
-                self.foot_slip[k, foot] += force[0] * speed
-        carrying = self.foot_force[k] > 0
-        self.foot_slip[k, carrying] /= self.foot_force[k, carrying]
-
-
-def _moving(spun: np.ndarray, arm: np.ndarray) -> np.ndarray:
-    """World velocities [..., 3] of material points at arms [..., 3] m from their tree's centre of
-    mass, where the spatial velocities `cvel` [..., 6] are.
-    """
-    spin, slide = spun[..., :3], spun[..., 3:]
-    # np.cross takes five times as long for so few points.
-    turn = spin[..., [1, 2, 0]] * arm[..., [2, 0, 1]] - spin[..., [2, 0, 1]] * arm[..., [1, 2, 0]]
-    return slide + turn

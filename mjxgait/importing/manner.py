@@ -22,8 +22,9 @@ LEAST = 0.5
 
 GENERATIONS = 150
 """Most of them, twice as many as usual."""
-ENOUGH = 0.1
-"""Margin with which such a run may end in its first half; hasty as they all are, few ever get to 0.2."""
+EXAMINATION = {"enough": 0.1, "draws": 64}
+"""Margin with which such a run may end in its first half; hasty as they all are, few ever get to 0.2.
+Starts to choose on, as many as the examination has: who bears 32 often has no room for 64 others."""
 FRESH: dict[str, Any] = {"variety": GENERATIONS, "caution": 1.0, "worst": 0.0}
 """Other starts in each generation, so that nobody learns six by heart and falls in all others; who
 was lucky on few is believed less."""
@@ -67,7 +68,7 @@ def manner(
         # Undisturbed it tells little about who bears something: all are tried in all starts.
         table["rollout"] = {"starts": STARTS, "promote": 1.0, "latency": LATE} | FRESH
         table["evolution"] = JUDGED_ANEW
-        table["examination"] = {"enough": ENOUGH}
+        table["examination"] = EXAMINATION
         table["fitness"] = {
             "speed": BRISK,
             "frequency": round(calm, 2),

@@ -42,6 +42,12 @@ def test_its_children_differ_little():
     assert config.evolution.sigma < Config().evolution.sigma
 
 
+def test_it_is_chosen_on_as_many_starts_as_it_is_examined_on():
+    """Who bears the few that it was chosen on may have no room for those that it never saw."""
+    config, _ = told()
+    assert config.examination.draws == CertificateConfig().starts.count
+
+
 @pytest.mark.parametrize("hip", [0.4, 0.8, 1.6])
 def test_its_cycle_leads_through_no_strides_that_the_certificate_calls_too_short(hip: float):
     """At the speed that is wanted of it, however fast its poses follow each other."""
