@@ -4,12 +4,16 @@ import concurrent.futures
 import multiprocessing
 import os
 import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TypeVar
 
 from mjxgait.errors import UserError
+
+Item = TypeVar("Item")
+Done = TypeVar("Done")
 
 SINGLE_THREADED = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 """One process per core leaves no core for the threads of a linear algebra library."""
@@ -75,6 +79,41 @@ def survivable(folder: Path, again: str) -> Iterator[None]:
             f"{folder}: a process that examined champions was killed from outside, perhaps for "
             f"want of memory; what was examined before is kept: go on with {again}"
         ) from None
+
+
+def one_per_core(
+    work: Callable[[Item], Done],
+    items: Sequence[Item],
+    tell: Callable[[int, int], object],
+    *,
+    folder: Path,
+    again: str,
+    prepare: Callable[[], object] | None = None,
+    stopped: Callable[[], bool] = lambda: False,
+) -> list[Done] | None:
+    """What comes of each, in their order; None if it was stopped before all were done.
+
+    tell: called with how many are done, and of how many. folder, again: see `survivable`. prepare:
+    see `process_per_core`.
+
+    Raises:
+      UserError: a process was killed from outside.
+    """
+    if not items:
+        return []
+    with survivable(folder, again), process_per_core(len(items), prepare) as pool:
+        futures = [pool.submit(work, item) for item in items]
+        try:
+            for number, done in enumerate(concurrent.futures.as_completed(futures), 1):
+                done.result()
+                tell(number, len(items))
+                if number < len(items) and stopped():
+                    pool.shutdown(cancel_futures=True)
+                    return None
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+        return [done.result() for done in futures]
 
 
 def _start(pool: concurrent.futures.Executor, count: int) -> None:

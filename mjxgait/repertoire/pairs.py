@@ -1,13 +1,13 @@
 """Neighbours of a repertoire that are certified, and what is tried of each two of them."""
 
-import concurrent.futures
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
 
-from mjxgait.cores import process_per_core, survivable
+from mjxgait.cores import one_per_core
 from mjxgait.creature import Creature
 from mjxgait.repertoire.cells import has_mirror
 from mjxgait.repertoire.found import Found
@@ -43,16 +43,6 @@ def of_each(
     Raises:
       UserError: a process was killed from outside.
     """
-    if not pairs:
-        return []
     again = f"mjxgait repertoire --resume {folder}"
-    with survivable(folder, again), process_per_core(len(pairs)) as pool:
-        futures = [pool.submit(work, folder, pair) for pair in pairs]
-        try:
-            for number, done in enumerate(concurrent.futures.as_completed(futures), 1):
-                done.result()
-                tell(number, len(pairs))
-        except BaseException:
-            pool.shutdown(cancel_futures=True)
-            raise
-        return [done.result() for done in futures]
+    tried = one_per_core(partial(work, folder), pairs, tell, folder=folder, again=again)
+    return tried or []

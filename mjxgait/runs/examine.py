@@ -1,13 +1,12 @@
 """Runs that have come to their last generation: one of the best few of each with its certificate."""
 
-import concurrent.futures
 import io
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from rich.console import Console
 
-from mjxgait.cores import process_per_core, survivable
+from mjxgait.cores import one_per_core
 from mjxgait.runs.checkpoint import Checkpoints
 from mjxgait.runs.devices import prepare_devices
 from mjxgait.runs.examination import Examiner
@@ -36,17 +35,16 @@ def examine(
       UserError: a process was killed from outside, or the folder cannot be written.
     """
     left = [run for run in runs if not (run / CERTIFICATE).is_file()]
-    if not left:
-        return True
-    with survivable(folder, again), process_per_core(len(left), prepare_devices) as pool:
-        work = [pool.submit(_examine, place) for place in left]
-        for number, done in enumerate(concurrent.futures.as_completed(work), 1):
-            done.result()
-            tell(number, len(left))
-            if stopped():
-                pool.shutdown(cancel_futures=True)
-                return number == len(left)
-    return True
+    done = one_per_core(
+        _examine,
+        left,
+        tell,
+        folder=folder,
+        again=again,
+        prepare=prepare_devices,
+        stopped=stopped,
+    )
+    return done is not None
 
 
 def _examine(folder: Path) -> None:
