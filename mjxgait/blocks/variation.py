@@ -31,13 +31,17 @@ class Rates:
 
     value: chance of each number, kind and flag of what grows, divided by how many there are, so
     that it is how many change on average. sigma: of a number's change, as a share of its range.
-    connection: chance of one more or one less. node: of a new node.
+    connection: chance of one more or one less. node: of a new node. strength: from and to which
+    factor each mutation draws one of its own, all magnitudes alike, by which more or less changes;
+    the chances of connections and nodes are never larger than told (Doerr et al. 2017, "Fast genetic
+    algorithms", for why few large changes among many small ones).
     """
 
     value: float = BrainConfig.values
     sigma: float = BrainConfig.sigma
     connection: float = BrainConfig.connect
     node: float = BrainConfig.grow
+    strength: tuple[float, float] = BrainConfig.strength
 
 
 @dataclasses.dataclass(frozen=True)
@@ -61,12 +65,12 @@ class Kin:
     def mutate(self, key: jax.Array, genotype: Genotype) -> Genotype:
         """Values change, connections come and go, an unconnected node is drawn anew."""
         value, fresh, connect, node = jax.random.split(key, 4)
-        other = self.create(fresh)
-        changed = _with_new_node(node, genotype, other, self.rates.node)
-        changed = dataclasses.replace(
-            changed, graph=_reconnected(connect, changed.graph, other.graph, self.rates.connection)
-        )
-        return self._moved(value, changed, other)
+        other, strength = self.create(fresh), self._strength(jax.random.fold_in(key, 4))
+        often = jnp.minimum(strength, 1.0)
+        changed = _with_new_node(node, genotype, other, often * self.rates.node)
+        graph = _reconnected(connect, changed.graph, other.graph, often * self.rates.connection)
+        changed = dataclasses.replace(changed, graph=graph)
+        return self._moved(value, changed, other, strength)
 
     def cross(self, key: jax.Array, mother: Genotype, father: Genotype) -> Genotype:
         """The first nodes of one, the others of the other, up to two points of crossing over."""
@@ -100,14 +104,23 @@ class Kin:
         grafted = dataclasses.replace(hung, graph=joined)
         return jax.tree.map(lambda a, b: jnp.where(free.any(), a, b), grafted, mother)
 
-    def _moved(self, key: jax.Array, genotype: Genotype, other: Genotype) -> Genotype:
+    def _strength(self, key: jax.Array) -> jax.Array:
+        """The factor [] of one mutation."""
+        least, most = self.rates.strength
+        share: jax.Array = least * (most / least) ** jax.random.uniform(key)
+        return share
+
+    def _moved(
+        self, key: jax.Array, genotype: Genotype, other: Genotype, strength: jax.Array
+    ) -> Genotype:
         """Numbers shifted by a normal step, kinds and flags drawn anew, a few of each."""
         alive = reachable(genotype.graph)
         varied = _without_used(genotype)
         leaves, shape = jax.tree.flatten(varied)
         fresh = jax.tree.leaves(_without_used(other))
         of_nodes = jax.tree.leaves((varied.graph, varied.nerves))
-        chance = self.rates.value / (jnp.sum(alive) * sum(leaf[0].size for leaf in of_nodes))
+        size = jnp.sum(alive) * sum(leaf[0].size for leaf in of_nodes)
+        chance = strength * self.rates.value / size
         places = range(len(leaves))
         drawn = numbers(
             key, {(use, i): leaves[i].shape for i in places for use in ("which", "how")}
@@ -156,7 +169,9 @@ def _one_of(chance: jax.Array, allowed: jax.Array) -> tuple[jax.Array, jax.Array
     return choice // chance.shape[1], choice % chance.shape[1]
 
 
-def _with_new_node(key: jax.Array, genotype: Genotype, other: Genotype, chance: float) -> Genotype:
+def _with_new_node(
+    key: jax.Array, genotype: Genotype, other: Genotype, chance: jax.Array
+) -> Genotype:
     """One node that is not connected, drawn anew, and a connection to it."""
     alive = reachable(genotype.graph)
     nodes, connections = genotype.graph.target.shape
@@ -176,7 +191,7 @@ def _with_new_node(key: jax.Array, genotype: Genotype, other: Genotype, chance: 
     return jax.tree.map(lambda a, b: jnp.where(ok, a, b), new, genotype)
 
 
-def _reconnected(key: jax.Array, graph: Graph, other: Graph, chance: float) -> Graph:
+def _reconnected(key: jax.Array, graph: Graph, other: Graph, chance: jax.Array) -> Graph:
     """One connection more or less, the new one drawn at random between nodes that are connected."""
     alive = reachable(graph)
     nodes, connections = graph.target.shape

@@ -15,6 +15,10 @@ from mjxgait.creature import Creature
 ONE_PLACE = 0.02
 """Hip heights within which the joints between two parts count as one, as a ball joint's three."""
 
+FALSE = 2.0
+"""Times the least way out that a contact is deep at most; corners of boxes are, up to 1.4 times. Of two
+cylinders that cross MuJoCo may tell a depth as large as a radius where they hardly touch."""
+
 ONE_WAY = 0.01
 """rad by which axes may differ that count as parallel, about."""
 
@@ -105,7 +109,9 @@ def _chain(model: mujoco.MjModel, body: int) -> frozenset[int]:
 def _depths(
     model: mujoco.MjModel, data: mujoco.MjData, qpos: np.ndarray
 ) -> dict[tuple[int, int], float]:
-    """How deep each pair of geoms is in each other, m."""
+    """How deep each pair of geoms is in each other, m: as deep as the deepest contact, unless that
+    is false.
+    """
     data.qpos[:] = qpos
     mujoco.mj_kinematics(model, data)
     mujoco.mj_collision(model, data)
@@ -114,4 +120,12 @@ def _depths(
         data.contact.geom.tolist(), data.contact.dist.tolist(), strict=True
     ):
         depths[a, b] = max(depths.get((a, b), 0.0), -distance)
-    return depths
+    return {pair: _true(model, data, pair, depth) for pair, depth in depths.items()}
+
+
+def _true(
+    model: mujoco.MjModel, data: mujoco.MjData, pair: tuple[int, int], depth: float
+) -> float:
+    """The least way out instead of a depth that it contradicts, m."""
+    least = -mujoco.mj_geomDistance(model, data, *pair, model.stat.extent, None)
+    return least if 0 < FALSE * least < depth else depth

@@ -28,6 +28,9 @@ class BrainConfig:
       sigma: by how much, as a share of their ranges.
       connect: chance of a connection more or less.
       grow: chance of a new node.
+      strength: from and to which factor each mutation draws one of its own, all magnitudes alike:
+        so many times as many values change, and so much as often, at most as told, a connection
+        or a node.
       crossover: share of the offspring of two parents whose nodes are crossed over.
       grafting: share that has a graft of its second parent; the others have one parent.
       drawn: whether bodies stay as they were drawn, and brains alone evolve.
@@ -45,6 +48,7 @@ class BrainConfig:
     sigma: Positive = 0.2
     connect: Fraction = 0.5
     grow: Fraction = 0.25
+    strength: tuple[Positive, Positive] = (1.0, 1.0)
     crossover: Fraction = 0.3
     grafting: Fraction = 0.3
     drawn: bool = False

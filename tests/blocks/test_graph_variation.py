@@ -140,20 +140,41 @@ def test_what_is_grafted_is_connected_as_it_was(parents: tuple[Genotype, Genotyp
     assert dropped > COUNT / 10
 
 
+def changed(child: Genotype, parent: Genotype) -> np.ndarray:
+    """How many [COUNT] values of connected nodes differ."""
+    alive = np.asarray(ALIVE(parent.graph))
+    changes = np.zeros(COUNT)
+    for name in ("graph", "nerves"):
+        leaves = zip(*(jax.tree.leaves(getattr(g, name)) for g in (child, parent)), strict=True)
+        for mine, hers in leaves:
+            differs = np.asarray(mine != hers).reshape(COUNT, CAPACITY.nodes, -1).sum(2)
+            changes += (differs * alive).sum(1)
+    return changes
+
+
 def test_a_mutation_changes_a_few_values(parents: tuple[Genotype, Genotype]):
     calm = Kin(CAPACITY, ROOM, RANGES, Rates(value=4.0, connection=0.0, node=0.0))
     keys = jax.random.split(key_of(3), COUNT)
     child = jax.jit(jax.vmap(calm.mutate))(keys, parents[0])
-    alive = np.asarray(ALIVE(parents[0].graph))
-    changes = np.zeros(COUNT)
-    for name in ("graph", "nerves"):
-        leaves = zip(*(jax.tree.leaves(getattr(g, name)) for g in (child, parents[0])), strict=True)
-        for mine, hers in leaves:
-            differs = np.asarray(mine != hers).reshape(COUNT, CAPACITY.nodes, -1).sum(2)
-            changes += (differs * alive).sum(1)
+    changes = changed(child, parents[0])
     # A kind that is drawn anew may be what it was.
     assert 2.5 < changes.mean() < 4.2
     assert jnp.array_equal(child.graph.used, parents[0].graph.used)
+
+
+def test_of_mutations_with_strengths_of_their_own_most_are_mild_and_few_are_strong(
+    parents: tuple[Genotype, Genotype],
+):
+    rates = Rates(value=8.0, connection=0.8, node=0.0, strength=(1 / 16, 2.0))
+    keys = jax.random.split(key_of(3), COUNT)
+    child = jax.jit(jax.vmap(Kin(CAPACITY, ROOM, RANGES, rates).mutate))(keys, parents[0])
+    # Connections apart, which take values with them.
+    same = np.asarray((child.graph.used == parents[0].graph.used).all((1, 2)))
+    changes = changed(child, parents[0])[same]
+    assert (changes <= 1).mean() > 0.3
+    assert (changes >= 9).mean() > 0.03
+    # Of min(strength, 1), log-uniform between them, the mean is (1 - 1/16 + ln 2) / ln 32.
+    assert 1 - same.mean() == pytest.approx(0.8 * 0.47, abs=0.05)
 
 
 def test_as_many_central_neurons_as_nodes_change_nothing_of_a_graphs_mutation():

@@ -2,6 +2,7 @@
 
 import dataclasses
 
+import mujoco
 import numpy as np
 import pytest
 from certify_made_up import LEGS, TOML, XML, make_champion
@@ -53,6 +54,29 @@ def test_legs_that_cross_are_as_deep_in_each_other_as_they_are_thick(short):
     assert found.depth[:2].max() == 0
     assert found.depth[2, thighs] == pytest.approx(2 * 0.02, abs=1e-6)
     assert not any("right" in name for pair in found.pairs for name in pair)
+
+
+def test_cylinders_that_hardly_touch_are_not_deep_in_each_other(tmp_path):
+    """Of two that cross MuJoCo 3.17 may tell contacts as deep as a radius, from one frame to the next.
+
+    One is on the trunk, about the hip's axis. The other turns with the leg, 2.59 mm in its end.
+    """
+    ahead, aside = np.sqrt([0.5, 0.5]), [-0.0022, -0.0359, 0.1135]
+    upright, place, turned = np.array([ahead[0], -ahead[1], 0, 0]), np.zeros(3), np.zeros(4)
+    mujoco.mju_rotVecQuat(place, np.array(aside), upright)
+    place[2] += 0.14
+    mujoco.mju_mulQuat(turned, upright, np.array([-0.44833, 0.55145, 0.44344, 0.54613]))
+    placed = [" ".join(map(str, values)) for values in (upright, place, turned)]
+    still = '<geom type="cylinder" size="0.05 0.05" pos="0.2 0.11 0" quat="{}" mass="0.01"/>'
+    turns = '<geom type="cylinder" size="0.066 0.06" pos="{}" quat="{}" mass="0.01"/>'
+    leg = '<joint name="front_left_knee"'
+    xml = XML.replace("<freejoint/>", "<freejoint/>" + still.format(placed[0]))
+    creature = loaded(tmp_path, xml.replace(leg, turns.format(*placed[1:]) + leg))
+    hips = np.linspace(-0.15, 0.15, 121)
+    qpos = np.concatenate([standing(creature, front_left_hip=angle) for angle in hips])
+    found = overlaps(creature, qpos, excused=False)
+    both = found.depth[:, found.pairs.index(("trunk", "front_left_lower"))]
+    np.testing.assert_allclose(both, 0.00259, atol=1e-4)
 
 
 def test_every_shape_counts_but_the_floor(short):

@@ -51,7 +51,9 @@ class Brains:
 
     def variation(self, settings: BrainConfig, evolution: EvolutionConfig) -> Variation:
         """See `Controller`: of the offspring some have one parent, some are crossed, some grafted."""
-        rates = Rates(settings.values, settings.sigma, settings.connect, settings.grow)
+        rates = Rates(
+            settings.values, settings.sigma, settings.connect, settings.grow, settings.strength
+        )
         kin = Kin(self.capacity, self.room, Ranges(), rates)
 
         def create(key: jax.Array, count: int) -> Genotype:
