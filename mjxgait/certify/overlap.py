@@ -123,9 +123,7 @@ def _depths(
     return {pair: _true(model, data, pair, depth) for pair, depth in depths.items()}
 
 
-def _true(
-    model: mujoco.MjModel, data: mujoco.MjData, pair: tuple[int, int], depth: float
-) -> float:
+def _true(model: mujoco.MjModel, data: mujoco.MjData, pair: tuple[int, int], depth: float) -> float:
     """The least way out instead of a depth that it contradicts, m."""
     least = -mujoco.mj_geomDistance(model, data, *pair, model.stat.extent, None)
     return least if 0 < FALSE * least < depth else depth

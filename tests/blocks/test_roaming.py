@@ -1,6 +1,7 @@
 """Bodies of blocks that walk towards a light, through the same run as everybody's."""
 
 import dataclasses
+import types
 
 import jax
 import jax.numpy as jnp
@@ -249,7 +250,7 @@ def test_lights_spread_in_so_many_steps_and_stay(task: Roam, follower: type):
 
 def test_who_gets_nearer_is_ready_for_wider_lights(task: Roam):
     following = FollowOnLand(task.creature, task.step, task.horizon, task.ends)
-    for speed, lost, ready in ((0.11, 0.0, True), (0.3, 0.25, False), (0.09, 0.0, False)):
+    for speed, lost, ready in ((0.06, 0.0, True), (0.3, 0.26, False), (0.04, 0.0, False)):
         terms = {"speed": speed, "overlap": lost, "balance": 0.0}
         assert bool(following.mastered(terms)) == ready
     assert FollowInWater.climbs
@@ -272,6 +273,20 @@ def test_how_far_aside_a_light_is_can_be_seen(task: Roam):
         assert promising(demands, outcome, 10.0, creature) == looked_at
         slow = {**outcome, "way": np.array([2.0, 0.9])}
         assert not promising(demands, slow, 10.0, creature)
+
+
+def test_what_a_follower_promised_counts_from_when_evolution_counted(task: Roam):
+    following = FollowOnLand(task.creature, task.step, task.horizon, task.ends)
+    settings, still = following.Settings(settle=0.5), jnp.zeros(3)
+    standards = following.standards(settings)
+    tally = following.update(following.init(), CALM, still, standards, jnp.ones(3))
+    assert float(following.outcome(tally)["since"]) == pytest.approx(0.5, abs=task.step)
+    demands, config = demands_of("follow-on-land"), CertificateConfig()
+    for told, since in (({"since": 4.0}, 4.0), ({}, config.warmup)):
+        nominal = {"way": 1.2, "seconds": 10.0, **told}
+        champion = types.SimpleNamespace(origin={"nominal": nominal})
+        assert demands.since(champion, config) == since
+        assert demands.promise(champion, 10.0, config) == pytest.approx(1.2 / (10.0 - since))
 
 
 def test_lights_are_all_around():

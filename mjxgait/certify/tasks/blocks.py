@@ -58,6 +58,10 @@ class BlocksDemands(StaysUp, abc.ABC):
         demanded.
         """
 
+    def since(self, champion: Champion, config: CertificateConfig) -> float:
+        """s from which on evolution counted what was done."""
+        return config.warmup
+
     def managed(
         self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
     ) -> np.ndarray:
@@ -102,7 +106,7 @@ class BlocksDemands(StaysUp, abc.ABC):
         """See `Demands`: 10, as much as evolution said, in as many seconds as it saw."""
         seconds = champion.origin.get("nominal", {}).get("seconds", np.inf)
         told = self.promise(champion, seconds, config)
-        done = self.done(whole.window(config.warmup, seconds))
+        done = self.done(whole.window(self.since(champion, config), seconds))
         change = abs(done / told - 1) if told > 0 else np.nan
         again = at_most("change", change, self.wanted(config).again)
         return (Criterion(10, "as in evolution", (again,)),)

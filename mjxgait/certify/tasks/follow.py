@@ -58,7 +58,11 @@ class FollowDemands(BlocksDemands):
     def promise(self, champion: Champion, seconds: float, config: CertificateConfig) -> float:
         """See `BlocksDemands`: of the light that it is recorded with, not of all."""
         way = champion.origin.get("nominal", {}).get("way", np.nan)
-        return float(way / (seconds - config.warmup))
+        return float(way / (seconds - self.since(champion, config)))
+
+    def since(self, champion: Champion, config: CertificateConfig) -> float:
+        """See `BlocksDemands`."""
+        return float(champion.origin.get("nominal", {}).get("since", config.warmup))
 
     def aimed(
         self, starts: Starts, config: CertificateConfig, rng: np.random.Generator | None = None

@@ -30,12 +30,14 @@ FASTEST_HINGE, FASTEST, FURTHEST = 20.0, 5.0, 0.08
 @pytree
 class Tally(protocol.Tally):
     """See `protocol.Tally`. settled, place: [3] m of the middle of all mass when counting began, and
-    now. light: [3] m where it is; None where there is none.
+    now. light: [3] m where it is, and since: [] the step from which on it counts; None where there is
+    none.
     """
 
     settled: jax.Array
     place: jax.Array
     light: jax.Array | None
+    since: jax.Array | None
 
 
 class BlocksTask(PlainTask):
@@ -104,6 +106,7 @@ class GoingTask(BlocksTask):
             "settled": nowhere,
             "place": nowhere,
             "light": None if self.dark is None else jnp.asarray(self.dark),
+            "since": None if self.dark is None else none,
         }
 
     def update(

@@ -25,8 +25,9 @@ from mjxgait.types import Sensed
 GOLDEN = np.pi * (3 - np.sqrt(5.0))
 """rad; so turned one after another, directions are spread evenly about an axis."""
 
-READY = 0.1
-"""m/s by which lights come nearer, mean over the trials: who does it is ready for wider ones."""
+READY = 0.05
+"""m/s by which lights come nearer, mean over the trials: who does it is ready for wider ones. Who is
+faster by then has become one family, and learns to turn no more."""
 
 
 class Following(GoingTask):
@@ -35,7 +36,7 @@ class Following(GoingTask):
     """
 
     adds: ClassVar[tuple[str, ...]] = ("light",)
-    outcomes = (*GoingTask.outcomes, "aside")
+    outcomes = (*GoingTask.outcomes, "aside", "since")
     climbs = True
     dark = np.zeros(3, np.float32)
 
@@ -79,7 +80,7 @@ class Following(GoingTask):
     ) -> Any:
         """See `Task`."""
         after = super().update(tally, sensed, torque, standards, aim)
-        return dataclasses.replace(after, light=aim)
+        return dataclasses.replace(after, light=aim, since=standards)
 
     def way(self, tally: Any) -> jax.Array:
         """See `GoingTask`."""
@@ -89,9 +90,12 @@ class Following(GoingTask):
         return before - now
 
     def outcome(self, tally: Any) -> Mapping[str, jax.Array]:
-        """See `Task`: of those that get on, and rad from ahead to the light."""
-        ahead, *aside = (tally.light[axis] for axis in range(self.axes))
-        return {**super().outcome(tally), "aside": jnp.arctan2(length(jnp.stack(aside)), ahead)}
+        """See `Task`: of those that get on, rad from ahead to the light, and s from which on the way
+        counted.
+        """
+        ahead, *others = (tally.light[axis] for axis in range(self.axes))
+        aside = jnp.arctan2(length(jnp.stack(others)), ahead)
+        return {**super().outcome(tally), "aside": aside, "since": tally.since * self.step}
 
 
 class FollowInWater(Following, Swim):
