@@ -12,15 +12,15 @@ import numpy as np
 from mjxgait.clips.clip import ELSEWHERE
 from mjxgait.creature import geometry
 from mjxgait.errors import UserError
-from mjxgait.importing.anatomy import Anatomy
 from mjxgait.importing.balance import steady_balance
 from mjxgait.importing.body import Puppet
 from mjxgait.importing.find import find_anatomy
+from mjxgait.importing.left_out import tell_dropped, tell_left_out
 from mjxgait.importing.manner import manner
 from mjxgait.importing.mjcf import clean_mjcf
 from mjxgait.importing.notes import Notes, listed
 from mjxgait.importing.orient import find_forward, find_mirror, is_planar, yaw_to
-from mjxgait.importing.parts import HINGE, one_line, plain_names, rotation
+from mjxgait.importing.parts import one_line, plain_names, rotation
 from mjxgait.importing.rigged import RIGS, model_of
 from mjxgait.importing.root import in_plane
 from mjxgait.importing.same import check_same
@@ -98,12 +98,12 @@ def _import(path: Path, choices: ImportChoices, notes: Notes) -> Imported:
     model, changes = compiled(source.tree, source.assets, source.missing)
     for what, why in changes:
         notes.change(what, why)
-    _tell_dropped(model, notes)
+    tell_dropped(model, notes)
     up = source.up.value if source.up else choices.up
     anatomy = find_anatomy(model, source.coupled, choices.keep, choices.freeze, up, notes)
     if source.up:
         notes.guess("up", source.up.value, source.up.confidence, source.up.reason)
-    _tell_left_out(model, anatomy, notes)
+    tell_left_out(model, anatomy, notes)
     bodies = build_bodies(model, anatomy, source.efforts, notes)
     puppet = Puppet(
         bodies, [anatomy.bodies.index(b) for b in anatomy.feet], in_plane(model, anatomy.root)
@@ -163,59 +163,6 @@ def read_source(path: Path, search: Sequence[Path], notes: Notes) -> Source:
                 f"{path}: begins with <{other[:40]}>; a model file begins with <mujoco> (MJCF) or <robot> (URDF)"
             )
     return source
-
-
-def _tell_dropped(model: mujoco.MjModel, notes: Notes) -> None:
-    for count, what, why in (
-        (model.nu, "actuators", "joint torques are applied directly; their limits were read"),
-        (model.ntendon, "tendons", "joint torques are applied directly"),
-        (
-            int((model.jnt_stiffness != 0).sum() + (model.dof_damping != 0).sum()),
-            "springs and dampers",
-            "the controller has its own",
-        ),
-        (
-            int((model.dof_frictionloss != 0).sum()),
-            "dry joint frictions",
-            "the fast physics has none",
-        ),
-        (
-            model.npair + model.nexclude,
-            "contact pairs and exclusions",
-            "shapes touch the floor only, not each other",
-        ),
-    ):
-        if count:
-            notes.change(f"{count} {what} dropped", why)
-    notes.change(
-        "the floor and all options replaced",
-        "a flat floor; time step 5 ms, Newton solver, pyramidal friction: what every physics here "
-        "can do",
-    )
-
-
-def _tell_left_out(model: mujoco.MjModel, anatomy: Anatomy, notes: Notes) -> None:
-    """Tells what else is in the file's world: other bodies, geoms that can be touched."""
-    own = {*anatomy.bodies, *geometry.ancestors(model, anatomy.root)}
-    others = [b for b in range(1, model.nbody) if b not in own and model.body_parentid[b] == 0]
-    touchable = (model.geom_contype | model.geom_conaffinity) != 0
-    things = [
-        g
-        for g in np.flatnonzero(touchable & (model.geom_bodyid == 0))
-        if int(model.geom_type[g]) != mujoco.mjtGeom.mjGEOM_PLANE
-    ]
-    names = [f'body "{model.body(b).name}" ({_content(model, b)})' for b in others]
-    names += [f'geom "{model.geom(g).name or g}"' for g in things]
-    if names:
-        notes.change(f"left out: {listed(names)}", "a walk is evolved on a flat floor, alone")
-
-
-def _content(model: mujoco.MjModel, top: int) -> str:
-    """Mass and hinges of the tree below a body, in words."""
-    inside = [b for b in range(1, model.nbody) if top in geometry.ancestors(model, b)]
-    hinges = int(np.isin(model.jnt_bodyid[model.jnt_type == HINGE], inside).sum())
-    mass = f"{model.body_subtreemass[top]:.3g} kg"
-    return f"{mass}, {hinges} joints: a creature of its own" if hinges > 1 else mass
 
 
 def _folder(
