@@ -119,7 +119,7 @@ def test_a_biped_is_judged_on_more_starts_and_first_of_all_by_staying_up(biped: 
     assert "on one foot or two it falls unless it walks" in biped.files["creature.toml"]
 
 
-def test_a_quadruped_and_one_foot_behind_the_other_are_trained_as_usual(tmp_path: Path):
+def test_a_quadruped_and_one_foot_behind_the_other_are_asked_for_what_is_usual(tmp_path: Path):
     bound = BIPED.replace('xyz="0 0.09 0"', 'xyz="0.4 0 0"').replace(
         'xyz="0 -0.09 0"', 'xyz="-0.4 0 0"'
     )
@@ -130,7 +130,13 @@ def test_a_quadruped_and_one_foot_behind_the_other_are_trained_as_usual(tmp_path
         choices = ImportChoices(apart=False, forward="x")
         creature = load_files(import_model(file, choices).files)
         assert not creature.corrections.steps
-        assert "rollout" not in creature.settings.train
+        usual, own = Config(), resolve_config(creature.settings.train, creature.name)
+        assert own.fitness == usual.fitness
+        assert own.controller.interpolation == usual.controller.interpolation
+        assert own.evolution.generations == usual.evolution.generations
+        assert own.rollout.starts == usual.rollout.starts
+        assert own.rollout.latency == usual.rollout.latency
+        assert own.rollout.promote == usual.rollout.promote
 
 
 def test_bodies_without_weights_have_neither_the_genes_nor_the_senses():
