@@ -22,6 +22,8 @@ COMPILER = {
 TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 LEAST_MASS = 1e-6
 """kg, below which a link counts as massless."""
+LEAST_INERTIA = 1e-12
+"""kg·m², a principal moment below which MuJoCo takes an inertia for none."""
 
 
 def clean_urdf(source: Source, path: Path, places: Places, notes: Notes) -> None:
@@ -55,8 +57,7 @@ def clean_urdf(source: Source, path: Path, places: Places, notes: Notes) -> None
                 element.set(key, " ".join(map(repr, values)))
                 notes.change(f"an origin's {key} read as {values}", "it has not three numbers")
     for link in robot.findall("link"):
-        _inertial(link, notes)
-        _shapes(source, link, places, notes)
+        _shapes(source, link, _inertial(link, notes), places, notes)
     for joint in robot.findall("joint"):
         _joint(source, joint, notes)
     if source.coupled:
@@ -68,7 +69,12 @@ def clean_urdf(source: Source, path: Path, places: Places, notes: Notes) -> None
     robot.insert(0, extension)
 
 
-def _shapes(source: Source, link: ET.Element, places: Places, notes: Notes) -> None:
+def _shapes(source: Source, link: ET.Element, stated: bool, places: Places, notes: Notes) -> None:
+    """Loads a link's meshes, and drops those that are missing.
+
+    Args:
+      stated: whether its mass is; if not, that of a mesh counts.
+    """
     for kind in ("visual", "collision"):
         for shape in link.findall(kind):
             shape.attrib.pop("name", None)
@@ -82,7 +88,7 @@ def _shapes(source: Source, link: ET.Element, places: Places, notes: Notes) -> N
             reference = mesh.get("filename", "")
             key = load_mesh(source, places, reference, [""], notes)
             if key is None:
-                if kind == "collision" and link.find("inertial") is None:
+                if kind == "collision" and not stated:
                     raise lost("", link.get("name", ""), reference)
                 link.remove(shape)
             else:
@@ -103,21 +109,21 @@ def _empty_shape(shape: ET.Element) -> bool:
     return not sizes or any(not size or min(size) <= 0 for size in sizes)
 
 
-def _inertial(link: ET.Element, notes: Notes) -> None:
-    """Mends an inertia that no body can have; the mass stays."""
+def _inertial(link: ET.Element, notes: Notes) -> bool:
+    """Mends an inertia that no body can have; the mass stays. Whether one is stated, if as none."""
     inertial = link.find("inertial")
     if inertial is None:
-        return
+        return False
     name = link.get("name", "")
     stated = inertial.find("mass")
     mass = numbers(stated.get("value")) if stated is not None else None
     if not mass or mass[0] < 0:
         link.remove(inertial)
         notes.change(f'inertia of link "{name}" dropped', "its mass is missing or negative")
-        return
+        return False
     if mass[0] < LEAST_MASS:
         link.remove(inertial)
-        return
+        return True
     inertia = inertial.find("inertia")
     values = [
         numbers((inertia.attrib if inertia is not None else {}).get(key, "0")) or [0.0]
@@ -126,9 +132,10 @@ def _inertial(link: ET.Element, notes: Notes) -> None:
     xx, xy, xz, yy, yz, zz = (v[0] for v in values)
     tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     moments, axes = np.linalg.eigh(tensor)
-    if moments[0] > 0 and moments[2] <= moments[0] + moments[1] + 1e-12:
-        return
-    mended = _possible(moments, mass[0]) if moments[2] > 0 else np.full(3, _ball_inertia(mass[0]))
+    if moments[0] > LEAST_INERTIA and moments[2] <= moments[0] + moments[1] + 1e-12:
+        return True
+    some = moments[2] > LEAST_INERTIA
+    mended = _possible(moments, mass[0]) if some else np.full(3, _ball_inertia(mass[0]))
     tensor = axes @ np.diag(mended) @ axes.T
     inertia = inertia if inertia is not None else ET.SubElement(inertial, "inertia")
     for key, (i, j) in zip(TENSOR, ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)), strict=True):
@@ -138,6 +145,7 @@ def _inertial(link: ET.Element, notes: Notes) -> None:
         f"{np.array2string(mended, precision=3)}",
         f"no body has the stated ones, {np.array2string(moments, precision=3)} kg m²",
     )
+    return True
 
 
 def _ball_inertia(mass: float) -> float:

@@ -162,11 +162,15 @@ def test_a_urdf_biped_stands_without_its_meshes(tmp_path):
     assert creature.corrections.balance_roll[hip] != 0
 
 
-@pytest.mark.parametrize("missing", ["mass", "inertia"])
+@pytest.mark.parametrize("missing", ["mass", "inertia", "all inertia"])
 def test_a_broken_inertia_is_mended_and_named(tmp_path, missing):
     broken = {
         "mass": ('<mass value="1.2"/>', '<mass value="-1"/>'),
         "inertia": ('ixx="0.008"', 'ixx="9.0"'),
+        "all inertia": (
+            'ixx="0.008" ixy="0" ixz="0" iyy="0.008"',
+            'ixx="1e-20" ixy="0" ixz="0" iyy="1e-20"',
+        ),
     }[missing]
     _, imported = bring(tmp_path, BIPED.replace(*broken), "urdf")
     assert told(imported, 'inertia of link "left_thigh"')

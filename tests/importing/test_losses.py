@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from importing.models import QUADRUPED
+from importing.models import BIPED, QUADRUPED
 
 from mjxgait.cli import main
 from mjxgait.errors import UserError
@@ -78,6 +78,20 @@ def test_a_link_that_only_its_mesh_gives_a_mass_is_refused(tmp_path):
     )
     with pytest.raises(UserError, match='body "base" has a mass that only its mesh tells'):
         import_model(file, ImportChoices(apart=False))
+
+
+def test_a_link_of_a_urdf_that_states_no_mass_may_miss_its_mesh(tmp_path):
+    mesh = '<collision><geometry><mesh filename="hull.stl"/></geometry></collision>'
+    weightless = f'<inertial><mass value="0"/></inertial>{mesh}'
+    file = tmp_path / "robot.urdf"
+    file.write_text(
+        BIPED.replace(
+            "</robot>",
+            f'<link name="nail">{weightless}</link><joint name="n" type="fixed">'
+            '<parent link="left_thigh"/><child link="nail"/></joint></robot>',
+        )
+    )
+    import_model(file, ImportChoices(apart=False))
 
 
 def test_who_else_is_in_the_file_is_told_with_its_weight(tmp_path):
