@@ -13,6 +13,7 @@ from mjxgait.parts import resolve_config
 from mjxgait.parts.registry import SHIPPED
 from mjxgait.parts.settings import build_config, config_class
 from mjxgait.settings.config import Config, UseConfig
+from mjxgait.settings.layers import over_base
 from mjxgait.settings.shipped import data_folder, find_creature
 from mjxgait.settings.tables import build, dump_toml, read_toml
 
@@ -21,7 +22,7 @@ from mjxgait.settings.tables import build, dump_toml, read_toml
     "path", sorted(data_folder("configs").glob("*.toml")), ids=lambda path: path.stem
 )
 def test_every_shipped_config_loads(path: Path):
-    table = read_toml(path)
+    table = over_base(read_toml(path), str(path))
     own = {
         key: table.pop(key, default) for key, default in (("standalone", False), ("creature", {}))
     }
@@ -70,6 +71,25 @@ def test_layers_creature_over_default_and_file_over_creature(tmp_path: Path):
     assert resolve_config({"rollout": {"starts": 7, "seconds": 3.0}}, "x").rollout.starts == 7
     both = resolve_config({"rollout": {"starts": 7, "seconds": 3.0}}, "x", file)
     assert (both.rollout.starts, both.rollout.seconds) == (9, 3.0)
+
+
+def test_a_table_lies_over_the_shipped_config_that_is_its_base(tmp_path: Path):
+    shipped = resolve_config({}, "x", Path("other_starts"))
+    over = resolve_config({"base": "other_starts", "rollout": {"starts": 7}}, "x")
+    assert (over.rollout.starts, shipped.rollout.starts) == (7, 3)
+    assert over.evolution == shipped.evolution != Config().evolution
+    file = tmp_path / "mine.toml"
+    file.write_text('base = "other_starts"\n[evolution]\nsigma = 0.5\n')
+    own = resolve_config({"evolution": {"sigma": 0.4}, "rollout": {"starts": 7}}, "x", file)
+    assert (own.evolution.sigma, own.rollout) == (0.5, over.rollout)
+
+
+@pytest.mark.parametrize("base", ['"other_start"', "3", '"styles/calm"', "[1]"])
+def test_a_base_that_is_none_is_named_with_those_that_there_are(tmp_path: Path, base: str):
+    file = tmp_path / "mine.toml"
+    file.write_text(f"base = {base}\n")
+    with pytest.raises(UserError, match=r"mine\.toml: base = .*other_starts"):
+        resolve_config({}, "x", file)
 
 
 MINE = """

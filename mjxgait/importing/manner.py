@@ -22,12 +22,10 @@ LEAST = 0.5
 
 GENERATIONS = 150
 """Most of them, twice as many as usual."""
-SMALL, SMALLER = 0.06, 0.03
-"""Step of a mutation, as a share of a joint's range: on four feet, and on less. To draw two joints
-anew fells nearly every child of a parent that stands on one foot, and most of a dog's."""
-EXAMINATION = {"enough": 0.1, "draws": 64}
-"""Margin with which a run may end in its first half; hasty as they all are, few ever get to 0.2.
-Starts to choose on, as many as the examination has: who bears 32 often has no room for 64 others."""
+SMALLER = 0.03
+"""Step of a mutation, as a share of a joint's range: half of that on four feet."""
+ENOUGH = 0.1
+"""Margin with which a run may end in its first half; hasty as they all are, few ever get to 0.2."""
 
 
 def manner(
@@ -45,16 +43,9 @@ def manner(
       steps: whether it must step under its fall. hip: m, its height. length: m, of the body. mass: kg.
       time_step: s.
     """
-    generations = GENERATIONS if steps else Config().evolution.generations
-    table: dict[str, Any] = {
-        # Nobody learns a few starts by heart and falls in all others; who was lucky is believed less.
-        "rollout": {"variety": generations, "caution": 1.0, "worst": 0.0},
-        "evolution": judged_anew(generations, SMALLER if steps else SMALL),
-        "examination": EXAMINATION,
-    }
+    table: dict[str, Any] = {"base": "other_starts", "examination": {"enough": ENOUGH}}
     if steps:
-        few = few_feet(hip, length, mass, time_step)
-        table |= few | {"rollout": table["rollout"] | few["rollout"]}
+        table |= few_feet(hip, length, mass, time_step)
         notes.guess(
             "train",
             f"{STARTS} starts, others in each of {GENERATIONS} generations at most, with torques up to {LATE} "
@@ -84,29 +75,11 @@ def few_feet(hip: float, length: float, mass: float, time_step: float) -> dict[s
     return {
         "controller": {"interpolation": unhurried(shortest, time_step)},
         # Undisturbed it tells little about who bears something: all are tried in all starts.
-        "rollout": {"starts": STARTS, "promote": 1.0, "latency": LATE},
+        "rollout": {"variety": GENERATIONS, "starts": STARTS, "promote": 1.0, "latency": LATE},
+        "evolution": {"generations": GENERATIONS, "sigma": SMALLER},
         "fitness": {
             "speed": BRISK,
             "frequency": round(calm, 2),
             "weights": {"alive": ALIVE, "frequency": HASTY},
         },
-    }
-
-
-def judged_anew(generations: int, sigma: float) -> dict[str, Any]:
-    """The table `[evolution]` of who meets other starts in each generation.
-
-    Then only those compare that were judged together: parents die, but for some that are judged again
-    and count by all their rounds. A best that is no better is no sign of a stall.
-    """
-    return {
-        "generations": generations,
-        "survival": "children",
-        "elite": 0.125,
-        "remember": True,
-        "selection": "tournament",
-        "rivals": 4,
-        "mutation": "gaussian",
-        "sigma": sigma,
-        "forced": {"enabled": False},
     }

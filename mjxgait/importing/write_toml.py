@@ -60,8 +60,8 @@ def creature_toml(
         lines.append("planar = true  # high: its legs are drawn in one plane, and pass each other")
     lines += ["", *_joints(joints, drive, remark), *_mirror(symmetric, pairs, remark)]
     lines += [*_corrections(drive), "[termination]", "min_up = 0.5", "height = [0.5, 1.5]"]
-    lines += ["touch = true", "", f"[train]{remark.get('train', '')}"]
-    lines += [*(tomli_w.dumps({"train": train}).splitlines() if train else []), ""]
+    heading, *settings = tomli_w.dumps({"train": train}).splitlines()
+    lines += ["touch = true", "", heading + remark.get("train", ""), *settings, ""]
     return "\n".join(lines)
 
 

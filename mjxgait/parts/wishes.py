@@ -15,6 +15,7 @@ from mjxgait.parts.settings import resolve_config
 from mjxgait.settings.config import Config
 from mjxgait.settings.control import unhurried
 from mjxgait.settings.gaits import AUTO, SHORTEST, animal_stride, gait_of
+from mjxgait.settings.layers import over_base
 from mjxgait.settings.shipped import data_folder
 from mjxgait.settings.tables import build, merge, read_toml
 
@@ -229,4 +230,5 @@ def _demanded(config: Config, level: str) -> Config:
     if level == "walks":
         return config
     path = data_folder("configs") / f"{level}.toml"
-    return build(type(config), merge(dataclasses.asdict(config), read_toml(path)), str(path))
+    table = over_base(read_toml(path), str(path))
+    return build(type(config), merge(dataclasses.asdict(config), table), str(path))

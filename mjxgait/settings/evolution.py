@@ -147,7 +147,9 @@ class EvolutionConfig:
             which = "proportional" if self.proportional else "lineage or family"
             raise ValueError(f"{which} is for children that are born all at once")
         if self.elite and self.survival == "best":
-            raise ValueError('elite is for survival = "children": of the best all live on anyway')
+            raise ValueError(
+                'elite is for survival = "children": of the best all live on anyway; set it to 0'
+            )
         if self.remember and not self.elite:
             raise ValueError("remember is for an elite: nobody else is judged more than once")
         if self.elites >= self.offspring:

@@ -7,7 +7,7 @@ from typing import Any
 
 from mjxgait.errors import UserError, did_you_mean
 from mjxgait.settings.config import Config, UseConfig
-from mjxgait.settings.shipped import data_folder, shipped_creatures
+from mjxgait.settings.shipped import data_folder, shipped_configs, shipped_creatures
 from mjxgait.settings.tables import build, merge, read_toml
 
 
@@ -22,6 +22,7 @@ def resolve_config(
     """The layers, each over the one before: `configs/default.toml`, the creature's `[train]`, the user's file.
 
     A file may begin with `standalone = true`: then nothing but the built-in defaults lies under it.
+    A file or `[train]` may name a `base`, see `over_base`.
     Its tables `[creature.NAME]` hold keys for the creature of that name, laid over the rest of it.
     What the first two say to a controller or a task that takes no part is left out. The creature's
     tables `[train.task.NAME]` hold keys for the task of that name, laid over the rest of it.
@@ -36,11 +37,12 @@ def resolve_config(
     default = data_folder("configs") / "default.toml"
     standalone, mine = _file_layers(file, creature_name) if file is not None else (False, [])
     given: list[tuple[str, Mapping[str, Any]]] = []
-    general, of_tasks = dict(creature_table), creature_table.get("task", {})
+    own = f"{creature_name}/creature.toml: [train]"
+    general, of_tasks = over_base(creature_table, own), creature_table.get("task", {})
     general.pop("task", None)
     if not standalone:
         given.append((str(default), read_toml(default)))
-        given.append((f"{creature_name}/creature.toml: [train]", general))
+        given.append((own, general))
     chosen = meant(_chosen([*given, *mine], use or {}))
     if not standalone and chosen.task in of_tasks:
         where = f"{creature_name}/creature.toml: [train.task.{chosen.task}]"
@@ -55,6 +57,22 @@ def resolve_config(
         build(cls, table, where)
     table = merge(table, {"use": dataclasses.asdict(chosen)})
     return build(cls, table, "the settings taken together")
+
+
+def over_base(table: Mapping[str, Any], where: str) -> dict[str, Any]:
+    """A table of settings laid over the shipped config that its key `base` names, if it has one.
+
+    Raises:
+      UserError: there is no such config.
+    """
+    rest = dict(table)
+    base = rest.pop("base", None)
+    if base is None:
+        return rest
+    known = shipped_configs()
+    if base not in known:
+        raise UserError(f"{where}: base = {base!r}: {did_you_mean(str(base), known)}")
+    return merge(read_toml(data_folder("configs") / f"{base}.toml"), rest)
 
 
 def _chosen(layers: Sequence[tuple[str, Mapping[str, Any]]], use: Mapping[str, str]) -> UseConfig:
@@ -91,7 +109,7 @@ def _file_layers(
     The tables of other creatures are checked too: a mistake shows whoever is trained.
     """
     path = _find_config(file)
-    general = read_toml(path)
+    general = over_base(read_toml(path), str(path))
     standalone, creatures = general.pop("standalone", False), general.pop("creature", {})
     if not isinstance(standalone, bool):
         raise UserError(f"{path}: standalone = {standalone!r}: give true or false")
@@ -118,8 +136,8 @@ def _find_config(file: Path) -> Path:
     if not file.exists() and shipped.exists():
         return shipped
     if not file.exists():
-        known = [path.stem for path in data_folder("configs").glob("*.toml")]
         raise UserError(
-            f"{file}: no such file and no shipped config of that name; {did_you_mean(str(file), known)}"
+            f"{file}: no such file and no shipped config of that name; "
+            f"{did_you_mean(str(file), shipped_configs())}"
         )
     return file

@@ -19,6 +19,11 @@ def shipped_creatures() -> list[str]:
     return sorted(path.parent.name for path in data_folder("envs").glob("*/creature.toml"))
 
 
+def shipped_configs() -> list[str]:
+    """Names of the configs that come with the program."""
+    return sorted(path.stem for path in data_folder("configs").glob("*.toml"))
+
+
 def find_creature(name: str) -> Path:
     """The folder of a shipped creature, or the folder at a path.
 

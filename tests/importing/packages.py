@@ -22,6 +22,7 @@ VERSIONS = {
     "pybullet": "3.2.7",
 }
 ERD = "cmeel.prefix/share/example-robot-data"
+PLAY = "mujoco_playground/_src/locomotion"
 MODELS = {
     # name: (package, path inside it, whether its packages are searched for meshes)
     "gym ant": ("gymnasium", "gymnasium/envs/mujoco/assets/ant.xml", ""),
@@ -53,12 +54,33 @@ MODELS = {
     "dm humanoid": ("dm_control", "dm_control/suite/humanoid.xml", ""),
     "dm dog": ("dm_control", "dm_control/suite/dog.xml", ""),
     "dm swimmer": ("dm_control", "dm_control/suite/swimmer.xml", ""),
-    "spot": ("playground", "mujoco_playground/_src/locomotion/spot/xmls/spot_mjx_feetonly.xml", ""),
-    "op3": ("playground", "mujoco_playground/_src/locomotion/op3/xmls/op3_mjx_feetonly.xml", ""),
+    "spot": ("playground", f"{PLAY}/spot/xmls/spot_mjx_feetonly.xml", ""),
+    "op3": ("playground", f"{PLAY}/op3/xmls/op3_mjx_feetonly.xml", ""),
     "laikago": ("pybullet", "pybullet_data/laikago/laikago.urdf", ""),
     "mini cheetah": ("pybullet", "pybullet_data/mini_cheetah/mini_cheetah.urdf", ""),
     "minitaur": ("pybullet", "pybullet_data/quadruped/minitaur.urdf", ""),
     "r2d2": ("pybullet", "pybullet_data/r2d2.urdf", ""),
+    "go1": ("example-robot-data", f"{ERD}/robots/go1_description/urdf/go1.urdf", ERD),
+    "anymal c": (
+        "example-robot-data",
+        f"{ERD}/robots/anymal_c_simple_description/urdf/anymal.urdf",
+        ERD,
+    ),
+    "b1": ("example-robot-data", f"{ERD}/robots/b1_description/urdf/b1.urdf", ERD),
+    "solo8": ("example-robot-data", f"{ERD}/robots/solo_description/robots/solo.urdf", ERD),
+    "hyq": ("example-robot-data", f"{ERD}/robots/hyq_description/robots/hyq_no_sensors.urdf", ERD),
+    "romeo": ("example-robot-data", f"{ERD}/robots/romeo_description/urdf/romeo.urdf", ERD),
+    "icub": ("example-robot-data", f"{ERD}/robots/icub_description/robots/icub.urdf", ERD),
+    "spirit40": ("pybullet", "pybullet_data/quadruped/spirit40.urdf", ""),
+    "vision60": ("pybullet", "pybullet_data/quadruped/vision60.urdf", ""),
+    "berkeley": (
+        "playground",
+        f"{PLAY}/berkeley_humanoid/xmls/berkeley_humanoid_mjx_feetonly.xml",
+        "",
+    ),
+    "h1": ("playground", f"{PLAY}/h1/xmls/h1_mjx_feetonly.xml", ""),
+    "t1": ("playground", f"{PLAY}/t1/xmls/t1_mjx_feetonly.xml", ""),
+    "apollo": ("playground", f"{PLAY}/apollo/xmls/apollo_mjx_feetonly.xml", ""),
 }
 
 

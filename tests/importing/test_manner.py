@@ -8,6 +8,7 @@ from mjxgait.certify import CertificateConfig
 from mjxgait.importing.manner import manner
 from mjxgait.importing.notes import Notes
 from mjxgait.settings.config import Config
+from mjxgait.settings.layers import over_base
 from mjxgait.settings.tables import build
 
 STEP = 0.005
@@ -17,7 +18,7 @@ def told(hip: float = 0.8, length: float = 0.8, **facts: Any) -> tuple[Config, N
     notes = Notes()
     settled = {"steps": True, "symmetric": True, "mass": 30.0, "time_step": STEP} | facts
     table = manner(hip=hip, length=length, notes=notes, **settled)
-    return build(Config, table, "the table"), notes
+    return build(Config, over_base(table, "the table"), "the table"), notes
 
 
 def test_a_body_on_four_feet_is_to_do_what_the_shipped_ones_are():

@@ -30,8 +30,8 @@ REFUSED = {
     "panda arm": "no limb reaches the floor",
     "dm swimmer": "no hinge joint below it",
 }
-FALLS = {"bolt"}
-"""Point feet on two legs: nothing stands on those without stepping."""
+FALLS = {"bolt", "apollo", "icub"}
+"""Point feet on two legs, or soles in files that are not there: nothing stands on those without stepping."""
 FEET = {
     "gym ant": 4,
     "gym half_cheetah": 2,
