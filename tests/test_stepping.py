@@ -26,7 +26,6 @@ from mjxgait.creature.scale import load_files
 from mjxgait.errors import UserError
 from mjxgait.importing import ImportChoices, import_model
 from mjxgait.parts import resolve_config
-from mjxgait.parts.wishes import Wishes, wished
 from mjxgait.senses import sense
 from mjxgait.settings.config import Config
 from mjxgait.settings.control import STEPPING, TUNING, PoseConfig, gene_names
@@ -104,12 +103,6 @@ def test_the_importer_gives_the_weights_to_what_takes_a_foot_ahead_and_aside(bip
         small = 0.02
         moved = way(biped, joint, small * table[names.index(joint)])
         assert moved[axis] == pytest.approx(small * hip, rel=0.15)
-
-
-def test_a_biped_that_is_asked_for_footfalls_keeps_its_small_mutations(biped: Creature):
-    own = resolve_config(biped.settings.train, biped.name)
-    asked = wished(own, biped, Wishes(gait="walk"))
-    assert (asked.evolution.mutation, asked.evolution.sigma) == ("gaussian", own.evolution.sigma)
 
 
 def test_a_biped_is_judged_on_more_starts_and_first_of_all_by_staying_up(biped: Creature):

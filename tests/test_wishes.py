@@ -446,16 +446,6 @@ def test_a_gait_by_name_begins_with_its_own_footfalls(body: Creature):
     assert wished(Config(), body, Wishes(turn=20.0)).controller.around == ()
 
 
-@pytest.mark.parametrize(
-    ("gait", "varied"), [("natural", ("gaussian", 0.06)), ("walk", ("mixed", 0.12))]
-)
-def test_who_is_asked_for_footfalls_alone_is_varied_by_leaps(gait: str, varied: tuple):
-    """By small steps two of nine dogs came to hop on all feet instead, and stayed there."""
-    creature = load_creature(data_folder("envs") / "tall_quadruped")
-    evolution = usually(creature, gait=gait).evolution
-    assert (evolution.mutation, evolution.sigma) == varied
-
-
 @pytest.mark.parametrize("name", ["walk", "amble", "trot", "pace"])
 def test_a_drawn_gait_is_what_its_name_says(dog_sizes, name: str):
     """By the examiner, from which feet stand in each pose of the cycle."""

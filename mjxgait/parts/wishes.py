@@ -14,17 +14,12 @@ from mjxgait.parts.drawn import drawn, natural_gait, top_speed
 from mjxgait.parts.settings import resolve_config
 from mjxgait.settings.config import Config
 from mjxgait.settings.control import unhurried
-from mjxgait.settings.evolution import EvolutionConfig
 from mjxgait.settings.gaits import AUTO, SHORTEST, animal_stride, gait_of
 from mjxgait.settings.layers import over_base
 from mjxgait.settings.shipped import data_folder
 from mjxgait.settings.tables import build, merge, read_toml
 
 SPEED = re.compile(r"(?:fr)?[0-9]*\.?[0-9]+(?:e-?[0-9]+)?(?:bl/s|m/s)?")
-
-LEAPS = {"mutation": EvolutionConfig.mutation, "sigma": EvolutionConfig.sigma}
-"""Of who is asked for footfalls and no strides: beside them lies hopping on all feet, and from there no
-small step leads back. Not of who steps under its fall, whom large ones fell."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -200,8 +195,7 @@ def _named(name: str, creature: Creature) -> dict[str, Any]:
         raise UserError(f"--gait {name}: {creature.name}: {error}, and {NATURAL}") from None
     whole: dict[str, Any] = {"mirror": False, "key_poses": 4}
     wish = {"gait": name} | ({} if gait.sway is None else {"sway": gait.sway})
-    table = {"fitness": {"wish": wish}} | ({} if gait.twice else {"controller": whole})
-    return table if creature.corrections.steps else table | {"evolution": LEAPS}
+    return {"fitness": {"wish": wish}} | ({} if gait.twice else {"controller": whole})
 
 
 def _turn(name: str, rate: float | None) -> dict[str, Any]:
