@@ -20,7 +20,7 @@ class Anatomy:
 
     root: body id. bodies: ids of the creature's bodies, parents first. active: ids of joints that
     move. feet: ids of the last moving body of each leg. scale: m per unit of length. shapes: of
-    each body, scaled.
+    each body, scaled. lowered: whether qpos is not the file's zero pose, but its limbs let down.
     """
 
     qpos: np.ndarray
@@ -32,6 +32,7 @@ class Anatomy:
     feet: list[int]
     scale: float
     shapes: dict[int, list[Shape]]
+    lowered: bool = False
 
     def low(self, model: mujoco.MjModel, bodies: Sequence[int]) -> float:
         """Lowest point in m of some bodies; their frames and centres of mass where they have no

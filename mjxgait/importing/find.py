@@ -49,6 +49,7 @@ def find_anatomy(
         anatomy.feet = find_feet(model, anatomy, movable)
     except NoLegs as error:
         anatomy = measured(model, lowered_limbs(model, anatomy, movable), axis, root, bodies, scale)
+        anatomy.lowered = True
         anatomy.feet = find_feet(model, anatomy, movable)
         if len(anatomy.feet) < 2:  # an arm on its base can reach down too
             raise UserError(str(error)) from None

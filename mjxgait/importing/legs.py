@@ -2,7 +2,7 @@
 
 import fnmatch
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import mujoco
 import numpy as np
@@ -20,6 +20,10 @@ NO_LEGS = re.compile(
     "(?<![a-z])(wing|haltere|antenna|mouth|jaw|mandible|proboscis|rostrum|haustellum|labrum|palp)"
 )
 """In names of limbs that no animal walks on, however low they hang."""
+
+DRAWS, STEPS, TINY = 300, (0.3, 0.1, 0.03, 0.01, 0.003, 0.001), 1e-5
+"""Random poses of a limb that is to hang down, rad by which each joint then goes on, and m by which it must
+hang lower for that."""
 
 
 class NoLegs(UserError):
@@ -129,9 +133,7 @@ def _below(model: mujoco.MjModel, anatomy: Anatomy, body: int) -> list[int]:
 
 
 def lowered_limbs(model: mujoco.MjModel, anatomy: Anatomy, movable: list[int]) -> np.ndarray:
-    """[nq]: each limb as low as it gets, of some hundred poses; for files whose zero pose has
-    the legs folded or stretched out.
-    """
+    """[nq]: each limb as low as it gets; for files whose zero pose has the legs folded or stretched out."""
     data, rng = mujoco.MjData(model), np.random.default_rng(0)
     data.qpos[:] = anatomy.qpos
     up = anatomy.xrot[anatomy.root] @ _world_rotation(model, anatomy.qpos, anatomy.root).T
@@ -143,30 +145,51 @@ def lowered_limbs(model: mujoco.MjModel, anatomy: Anatomy, movable: list[int]) -
             if int(model.jnt_bodyid[j]) in ancestors(model, end) and int(model.jnt_type[j]) == HINGE
         ]
         adr = model.jnt_qposadr[joints]
-        limits = np.array(
-            [
-                model.jnt_range[j] if model.jnt_range[j][0] < model.jnt_range[j][1] else (-1.6, 1.6)
-                for j in joints
-            ]
-        )
-        low, high = (
-            np.maximum(limits[:, 0], data.qpos[adr] - 2.0),
-            np.minimum(limits[:, 1], data.qpos[adr] + 2.0),
-        )
-        best, lowest = data.qpos[adr].copy(), np.inf
-        for _ in range(300):
-            data.qpos[adr] = rng.uniform(np.minimum(low, high), np.maximum(low, high))
+        low, high = _reach(model, joints, data.qpos[adr])
+
+        def height(q: np.ndarray, end: int = end, adr: np.ndarray = adr) -> float:
+            data.qpos[adr] = q
             mujoco.mj_kinematics(model, data)
             clouds = [(b, s) for b in _below(model, anatomy, end) for s in anatomy.shapes[b]]
             points = [
                 data.xpos[b] + (s.points / anatomy.scale) @ data.xmat[b].reshape(3, 3).T
                 for b, s in clouds
             ] or [data.xpos[[end]]]
-            height = float((np.concatenate(points) @ up.T)[:, 2].min())
-            if height < lowest:
-                best, lowest = data.qpos[adr].copy(), height
-        data.qpos[adr] = best
+            return float((np.concatenate(points) @ up.T)[:, 2].min())
+
+        best = min((rng.uniform(low, high) for _ in range(DRAWS)), key=height)
+        data.qpos[adr] = _descended(height, best, low, high)
     return data.qpos.copy()
+
+
+def _reach(
+    model: mujoco.MjModel, joints: list[int], q: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """[2 x J] rad, between which joints are tried, from where they are."""
+    limits = np.array(
+        [
+            model.jnt_range[j] if model.jnt_range[j][0] < model.jnt_range[j][1] else (-1.6, 1.6)
+            for j in joints
+        ]
+    )
+    ends = np.maximum(limits[:, 0], q - 2.0), np.minimum(limits[:, 1], q + 2.0)
+    return np.minimum(*ends), np.maximum(*ends)
+
+
+def _descended(
+    height: Callable[[np.ndarray], float], q: np.ndarray, low: np.ndarray, high: np.ndarray
+) -> np.ndarray:
+    """[J] from `q` downhill to where no joint alone leads lower, so that legs that are alike end alike."""
+    lowest = height(q)
+    for step in STEPS:
+        moved = True
+        while moved:
+            moved = False
+            for way in step * np.concatenate([np.eye(len(q)), -np.eye(len(q))]):
+                tried = np.clip(q + way, low, high)
+                if (found := height(tried)) < lowest - TINY:
+                    q, lowest, moved = tried, found, True
+    return q
 
 
 def _world_rotation(model: mujoco.MjModel, qpos: np.ndarray, body: int) -> np.ndarray:

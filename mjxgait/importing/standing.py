@@ -65,7 +65,7 @@ def offered_poses(
         for p in source.poses
         if len(p) == model.nq
     ]
-    poses.append(("the file's zero pose", start))
+    poses.append(("limbs let down" if anatomy.lowered else "the file's zero pose", start))
     return [(what, q) for what, q in poses if np.isfinite(q).all()]
 
 

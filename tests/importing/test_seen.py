@@ -165,6 +165,28 @@ def test_a_swing_is_no_wing(tmp_path):
     assert len(creature.feet.names) == 4
 
 
+def folded(name: str, x: float, y: float) -> str:
+    """A leg whose thigh points back and whose shin lies along it."""
+    return (
+        f'<body name="{name}" pos="{x} {y} 0"><joint name="{name}_roll" axis="1 0 0" range="-40 40"/>'
+        f'<joint name="{name}_hip" axis="0 -1 0" range="-360 360"/>'
+        f'<geom type="capsule" fromto="0 0 0 -.15 0 0" size=".02"/><body name="{name}_shin" pos="-.15 0 0">'
+        f'<joint name="{name}_knee" axis="0 1 0" range="0 180"/>'
+        f'<geom type="capsule" fromto="0 0 0 .15 0 0" size=".02"/></body></body>'
+    )
+
+
+def test_legs_that_the_file_folds_are_let_down_alike(tmp_path):
+    legs = {"FL": (0.2, 0.12), "FR": (0.2, -0.12), "BL": (-0.2, 0.12), "BR": (-0.2, -0.12)}
+    creature, imported = bring(tmp_path, animal("".join(folded(n, *at) for n, at in legs.items())))
+    assert imported.stands
+    assert "mirror = symmetric" in imported.notes.text()
+    angles = dict(zip(creature.joints.names, creature.joints.stand, strict=True))
+    for joint in ("hip", "knee"):
+        alike = [angles[f"{leg}_{joint}"] for leg in legs]
+        np.testing.assert_allclose(alike, alike[0], atol=0.03)
+
+
 def test_a_knee_without_limits_bends_to_the_side_it_stands_on(tmp_path):
     """The knees of the file are a little bent; without limits they could bend through."""
     limits = '_knee" type="hinge" axis="0 1 0" range="-70 70"/>'
