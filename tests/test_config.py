@@ -84,6 +84,12 @@ def test_a_table_lies_over_the_shipped_config_that_is_its_base(tmp_path: Path):
     assert (own.evolution.sigma, own.rollout) == (0.5, over.rollout)
 
 
+def test_a_base_may_have_a_base(tmp_path: Path):
+    file = tmp_path / "mine.toml"
+    file.write_text('base = "anywhere"\n')
+    assert resolve_config({}, "x", file) == resolve_config({}, "x", Path("anywhere"))
+
+
 @pytest.mark.parametrize("base", ['"other_start"', "3", '"styles/calm"', "[1]"])
 def test_a_base_that_is_none_is_named_with_those_that_there_are(tmp_path: Path, base: str):
     file = tmp_path / "mine.toml"

@@ -3,6 +3,7 @@
 import fnmatch
 import re
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -146,11 +147,13 @@ def lowered_limbs(model: mujoco.MjModel, anatomy: Anatomy, movable: list[int]) -
         ]
         adr = model.jnt_qposadr[joints]
         low, high = _reach(model, joints, data.qpos[adr])
+        clouds = [(b, s) for b in _below(model, anatomy, end) for s in anatomy.shapes[b]]
 
-        def height(q: np.ndarray, end: int = end, adr: np.ndarray = adr) -> float:
+        def height(
+            q: np.ndarray, end: int = end, adr: np.ndarray = adr, clouds: list[Any] = clouds
+        ) -> float:
             data.qpos[adr] = q
             mujoco.mj_kinematics(model, data)
-            clouds = [(b, s) for b in _below(model, anatomy, end) for s in anatomy.shapes[b]]
             points = [
                 data.xpos[b] + (s.points / anatomy.scale) @ data.xmat[b].reshape(3, 3).T
                 for b, s in clouds

@@ -229,6 +229,6 @@ def _demanded(config: Config, level: str) -> Config:
         raise UserError(f"--certificate {level}: {did_you_mean(level, LEVELS)}")
     if level == "walks":
         return config
-    path = data_folder("configs") / f"{level}.toml"
-    table = over_base(read_toml(path), str(path))
-    return build(type(config), merge(dataclasses.asdict(config), table), str(path))
+    where = f"--certificate {level}"
+    table = over_base({"base": level}, where)
+    return build(type(config), merge(dataclasses.asdict(config), table), where)

@@ -72,7 +72,8 @@ def over_base(table: Mapping[str, Any], where: str) -> dict[str, Any]:
     known = shipped_configs()
     if base not in known:
         raise UserError(f"{where}: base = {base!r}: {did_you_mean(str(base), known)}")
-    return merge(read_toml(data_folder("configs") / f"{base}.toml"), rest)
+    under = data_folder("configs") / f"{base}.toml"
+    return merge(over_base(read_toml(under), str(under)), rest)
 
 
 def _chosen(layers: Sequence[tuple[str, Mapping[str, Any]]], use: Mapping[str, str]) -> UseConfig:
