@@ -82,7 +82,8 @@ def tally_of(frames: Frames, steps: int, half: int, clearance: float) -> dict[st
     forward, left = frames.trunk_pos[:steps, :2].T - creature.frame.stand_pos[:2, None]
     nose = frames.trunk_rot[steps - 1] @ creature.frame.forward
     down = low < CONTACT_GAP
-    slid = np.linalg.norm(np.diff(place, axis=0), axis=2) * (down[1:] & down[:-1])
+    hurried = np.linalg.norm(np.diff(place, axis=0), axis=2)
+    slid = hurried * (down[1:] & down[:-1])
     outside = (joints < creature.joints.pose_low) | (joints > creature.joints.pose_high)
     return {
         "steps": steps,
@@ -96,6 +97,7 @@ def tally_of(frames: Frames, steps: int, half: int, clearance: float) -> dict[st
         "slip": slid.sum(0),
         "airborne": (~down.any(1)).sum(),
         "foot_height": low.mean(1).sum(),
+        "foot_speed": hurried.max() / creature.model.opt.timestep,
         "foot_pos": place[-1],
         "foot_down": down[-1],
         "tilt": (1 - frames.up[:steps]).sum(),

@@ -8,9 +8,10 @@ import pytest
 from helpers import altered, small_config, weight_vector
 
 from mjxgait.creature import Creature
+from mjxgait.settings.walk import Weights
 from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.score import score
-from mjxgait.tasks.walk.fitness import REWARDS, TERMS, fitness_terms
+from mjxgait.tasks.walk.fitness import REWARDS, TERMS, fitness_terms, terms_under
 from mjxgait.tasks.walk.tally import Judge
 
 STEP, HORIZON = 0.005, 1000
@@ -58,6 +59,9 @@ CASES: list[tuple[str, float, dict]] = [
     ("overlap", 0.5, {"overlap": 0.055 * 0.5}),
     ("overlap", 0.0, {"overlap": 0.004 * 0.5}),
     ("fall", 1.0, {"reason": int(Reason.TIPPED)}),
+    # √(g·h) is 2.2147 m/s
+    ("foot_speed", 0.75, {"foot_speed": 3.0 * 2.21472}),
+    ("foot_speed", 0.0, {"foot_speed": 2.2 * 2.21472}),
 ]
 
 
@@ -124,6 +128,12 @@ def test_each_weight_meets_its_own_term_with_its_own_sign():
     expected = [weights[name] if name in REWARDS else -weights[name] for name in TERMS]
     assert np.allclose(vector, expected)
     assert {"distance", "alive"} == set(REWARDS)
+
+
+def test_how_fast_a_foot_swings_is_a_term_only_where_it_costs_something():
+    """So a run that was begun before there was this term goes on."""
+    assert terms_under(Weights()) == tuple(name for name in TERMS if name != "foot_speed")
+    assert terms_under(Weights(foot_speed=4.0)) == TERMS
 
 
 def test_the_score_is_the_weighted_sum_of_each_start():

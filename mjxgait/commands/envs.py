@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import tyro
 
 from mjxgait.creature import load_creature
-from mjxgait.settings.shipped import data_folder
+from mjxgait.settings.shipped import data_folder, shipped_configs, shipped_creatures
 
 
 @dataclasses.dataclass(frozen=True)
@@ -17,10 +17,10 @@ class EnvsOptions:
 def envs_command(arguments: Sequence[str]) -> int:
     """Returns the exit code."""
     tyro.cli(EnvsOptions, args=list(arguments), prog="mjxgait envs")
-    for folder in sorted(data_folder("envs").glob("*/creature.toml")):
-        print(
-            f"{folder.parent.name:20} {load_creature(folder.parent).settings.creature.description}"
-        )
-    for file in sorted(data_folder("configs").glob("*.toml")):
-        print(f"{file.stem:20} {file.read_text(encoding='utf-8').splitlines()[0].lstrip('# ')}")
+    for name in shipped_creatures():
+        creature = load_creature(data_folder("envs") / name)
+        print(f"{name:20} {creature.settings.creature.description}")
+    for name in shipped_configs():
+        text = (data_folder("configs") / f"{name}.toml").read_text(encoding="utf-8")
+        print(f"{name:20} {text.splitlines()[0].lstrip('# ')}")
     return 0

@@ -41,6 +41,7 @@ class Weights:
       limits: share of the joints beyond their pose ranges, in the mean.
       overlap: how deep parts are in each other.
       fall: 1 for an episode that ended with a fall.
+      foot_speed: how much faster than 2.25 √(g·h) a foot ever swings; 0: it is no term.
     """
 
     __pydantic_config__ = STRICT
@@ -63,6 +64,7 @@ class Weights:
     limits: Finite = 0.5
     overlap: Finite = 4.0
     fall: Finite = 0.0
+    foot_speed: Annotated[Finite, SHAPE] = 0.0
 
 
 @dataclasses.dataclass(frozen=True)

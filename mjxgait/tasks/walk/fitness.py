@@ -1,6 +1,7 @@
 """From the tally of a walk to named fitness terms, and what each of them counts."""
 
 import dataclasses
+import math
 
 import jax
 import jax.numpy as jnp
@@ -15,6 +16,8 @@ from mjxgait.tasks.walk.tally import Tally
 
 TERMS = tuple(field.name for field in dataclasses.fields(Weights))
 REWARDS = ("distance", "alive")
+UNASKED = "foot_speed"
+"""A term only where it has a weight."""
 STYLE = tuple(name for name in TERMS if name not in (*REWARDS, "foot_height", "fall"))
 """What makes a gait good to look at: counted in proportion to the walk that there is, and may ramp in over generations."""
 
@@ -23,6 +26,9 @@ PATTER = 4.0
 STANDING = 0.25
 """What it counts to stay up for who goes nowhere, as a share of what it counts for who walks all of the
 way: it teaches balance, and must not be the best there is."""
+WHIPPING = 2.25
+"""√(g·h) that a foot may reach in its swing. The certificate allows any body 3, and asks for room to
+spare; the fastest is a foot nearly always."""
 BEYOND = 0.02
 """What a body length counts that goes beyond the wanted speed."""
 
@@ -45,6 +51,11 @@ def fitness_terms(
     )
     values["alive"] *= STANDING + (1 - STANDING) * walked
     return {name: values[name] * (walked if name in STYLE else 1.0) for name in TERMS}
+
+
+def terms_under(weights: Weights) -> tuple[str, ...]:
+    """Names of the terms that there are under these weights."""
+    return tuple(name for name in TERMS if name != UNASKED or getattr(weights, name))
 
 
 def plain_terms(
@@ -86,8 +97,14 @@ def plain_terms(
         "limits": tally.limits / lived,
         "overlap": crossed(creature, tally.overlap),
         "fall": jnp.where(tally.reason == Reason.FINISHED, 0.0, 1.0),
+        "foot_speed": jnp.maximum(_froude(creature, tally.foot_speed) - WHIPPING, 0.0),
     }
     return values, enough
+
+
+def _froude(creature: Body, speed: jax.Array) -> jax.Array:
+    """A speed [] m/s in √(g·h) of this body's hip height."""
+    return speed / math.sqrt(9.81 * creature.frame.hip_height)
 
 
 def _patter(tally: Tally) -> jax.Array:

@@ -40,7 +40,8 @@ class Tally(protocol.Tally):
       since the latest footfall.
     loaded: [F] whether it bore weight on the previous step. touchdowns: [F] how often it began to.
     contact: [F] steps in contact. slip: [F] m slid while in contact. airborne: [] steps without any foot on the floor.
-    foot_height: [] m·steps, mean height of the feet. foot_pos: [F, 2], foot_down: [F] of the previous step.
+    foot_height: [] m·steps, mean height of the feet. foot_speed: [] m/s, level, of the fastest foot
+      at its fastest. foot_pos: [F, 2], foot_down: [F] of the previous step.
     tilt: [] of 1 - up.z. wobble: [] (rad/s)² of the trunk. touch: [] steps on which another part touches.
     work: [] J, positive. saturation, limits: [] share of joints at their torque limit, beyond their pose range.
     """
@@ -59,6 +60,7 @@ class Tally(protocol.Tally):
     slip: jax.Array
     airborne: jax.Array
     foot_height: jax.Array
+    foot_speed: jax.Array
     foot_pos: jax.Array
     foot_down: jax.Array
     tilt: jax.Array
@@ -111,7 +113,9 @@ class Judge:
         loaded = (low < 0.0).astype(jnp.float32)
         peak = jnp.maximum(tally.peak, low)
         missing = jnp.clip(1.0 - peak / jnp.maximum(clearance, 1e-6), 0.0, 1.0)
-        slid = jnp.linalg.norm(pos - tally.foot_pos, axis=1) * down * tally.foot_down
+        went = jnp.linalg.norm(pos - tally.foot_pos, axis=1)
+        slid = went * down * tally.foot_down
+        speed = jnp.where(tally.steps > 0, jnp.max(went) / self.step, 0.0)
         rise = SWING * creature.frame.hip_height
         swinging = jnp.where(low > rise, 1.0, jnp.where(low < 0.5 * rise, 0.0, tally.swinging))
         fallen = jnp.maximum(tally.swinging - swinging, 0.0)
@@ -137,6 +141,7 @@ class Judge:
             slip=tally.slip + slid,
             airborne=tally.airborne + (jnp.max(down) == 0.0),
             foot_height=tally.foot_height + jnp.mean(low),
+            foot_speed=jnp.maximum(tally.foot_speed, speed),
             foot_pos=pos,
             foot_down=down,
             tilt=tally.tilt + 1.0 - up,

@@ -14,7 +14,7 @@ from mjxgait.settings.rollout import RolloutConfig
 from mjxgait.settings.walk import WalkConfig, WishConfig
 from mjxgait.tasks.plain import PlainTask
 from mjxgait.tasks.trials import Starts, draw_starts
-from mjxgait.tasks.walk.fitness import TERMS, fitness_terms, signed_weights
+from mjxgait.tasks.walk.fitness import fitness_terms, signed_weights, terms_under
 from mjxgait.tasks.walk.tally import Judge, Tally
 from mjxgait.tasks.walk.wish import wish_weights, wished_terms
 from mjxgait.tasks.walk.wish_tally import WishTally, along, wish_tally, wish_updated, wrapped
@@ -25,8 +25,23 @@ class Walk(PlainTask):
     """One creature's walk; see `PlainTask`."""
 
     Settings = WalkConfig
-    terms: tuple[str, ...] = TERMS
     outcomes = ("forward", "aside", "seconds")
+
+    def __init__(
+        self,
+        body: Body,
+        step: float,
+        horizon: int,
+        ends: Termination | Ends,
+        settings: WalkConfig,
+    ) -> None:
+        super().__init__(body, step, horizon, ends)
+        self.asked = settings
+
+    @property
+    def terms(self) -> tuple[str, ...]:
+        """See `Task`."""
+        return terms_under(self.asked.weights)
 
     @classmethod
     def told(
@@ -34,8 +49,8 @@ class Walk(PlainTask):
     ) -> "Walk":
         """The task with these settings: with a wish more is looked at, without one nothing is."""
         if settings.wish.asked and cls is Walk:
-            return AskedWalk(body, step, horizon, ends, settings.wish)
-        return cls(body, step, horizon, ends)
+            return AskedWalk(body, step, horizon, ends, settings)
+        return cls(body, step, horizon, ends, settings)
 
     @property
     def _keeper(self) -> Judge:
@@ -79,12 +94,15 @@ class AskedWalk(Walk):
     and to the left of where it should be looking at each moment.
     """
 
-    def __init__(
-        self, body: Body, step: float, horizon: int, ends: Termination | Ends, wish: WishConfig
-    ) -> None:
-        super().__init__(body, step, horizon, ends)
-        self.wish = wish
-        self.terms = (*TERMS, *wish_weights(wish))
+    @property
+    def wish(self) -> WishConfig:
+        """What is asked."""
+        return self.asked.wish
+
+    @property
+    def terms(self) -> tuple[str, ...]:
+        """See `Task`."""
+        return (*super().terms, *wish_weights(self.wish))
 
     def trials(self, key: jax.Array, creature: Creature, settings: RolloutConfig) -> Starts:
         """See `Task`: everybody's starts, and how they are told to turn: as asked, or the first
