@@ -1,6 +1,7 @@
 """Bars (capsules) inside a shape: spheres and capsules are their own, others are filled."""
 
 import dataclasses
+import itertools
 
 import mujoco
 import numpy as np
@@ -12,6 +13,8 @@ STATIONS = 65
 REST = 0.1
 """Share of a shape's length from which an end that no bar reaches gets one of its own."""
 RINGS = 24
+SHARP = 0.25
+"""Half thicknesses of a box, radius of the bars along its edges."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -44,7 +47,7 @@ def _own_frame(model: mujoco.MjModel, geom: int) -> list[Bar]:
         case GEOM.mjGEOM_CAPSULE:
             return [Bar(np.zeros(3), np.array([0.0, 0.0, size[1]]), float(size[0]))]
         case GEOM.mjGEOM_BOX:
-            return _fill(_SIGNS * size)
+            return _fill(_SIGNS * size) + _edges(size)
         case GEOM.mjGEOM_ELLIPSOID:
             return _fill(_BALL * size)
         case GEOM.mjGEOM_CYLINDER:
@@ -104,6 +107,20 @@ def _fill(points: np.ndarray) -> list[Bar]:
         inside = -(line @ faces[:, :3].T + faces[:, 3]).max(1)
         if inside.max() > 0:
             bars += _along(line, inside)
+    return bars
+
+
+def _edges(size: np.ndarray) -> list[Bar]:
+    """Thin bars along the four longest edges of a box, which the thick ones inside leave bare."""
+    thin, broad, long = np.argsort(size)
+    radius = SHARP * size[thin]
+    half = np.zeros(3)
+    half[long] = size[long] - radius
+    bars = []
+    for side in itertools.product((-1.0, 1.0), repeat=2):
+        centre = np.zeros(3)
+        centre[[thin, broad]] = side * (size[[thin, broad]] - radius)
+        bars.append(Bar(centre, half, float(radius)))
     return bars
 
 

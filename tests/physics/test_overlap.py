@@ -1,6 +1,7 @@
 """The depth of parts in each other is C MuJoCo's, for no neighbours, beyond the standing pose."""
 
 import dataclasses
+import itertools
 import shutil
 from pathlib import Path
 from types import SimpleNamespace
@@ -239,6 +240,27 @@ def test_the_bars_of_a_shape_lie_inside_it_and_fill_it(shape: str, least: int):
     ends = [bar.centre + sign * bar.half for bar in bars for sign in (-1, 1)]
     size = 2 * model.geom_aabb[0, 3:].max()
     assert np.ptp(ends, axis=0).max() + 2 * min(bar.radius for bar in bars) > 0.65 * size
+
+
+@pytest.mark.parametrize("size", ["0.3 0.2 0.05", "0.04 0.3 0.05", "0.2 0.03 0.02"])
+def test_the_long_edges_of_a_box_are_hardly_bare(size: str):
+    """Round bars as thick as the box leave two fifths of its half thickness there, and a trunk's
+    sides are where legs hang.
+    """
+    model = mujoco.MjModel.from_xml_string(
+        f'<mujoco><worldbody><body><geom type="box" size="{size}"/></body></worldbody></mujoco>'
+    )
+    half, bars = model.geom_size[0], bars_of(model, 0)
+    for side in itertools.product((-1.0, 1.0), repeat=3):
+        edge = np.array(side) * half
+        edge[half.argmax()] *= 0.5
+        apart = [tuple(edge - bar.centre) for bar in bars]
+        points = (0.0, 0.0, 0.0)
+        bare = [
+            bar_distance(to, points, tuple(bar.half), (0.0, bar.half @ bar.half)) - bar.radius
+            for to, bar in zip(apart, bars, strict=True)
+        ]
+        assert -1e-9 < min(bare) < 0.12 * half.min()
 
 
 def test_the_tally_keeps_the_deepest_of_the_time_that_counts(stool: Creature):
