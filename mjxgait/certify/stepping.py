@@ -154,13 +154,14 @@ class Stepping:
 
         Nothing tells them apart before, so a quarter of all steps need not be taken.
         """
-        alike, goal = np.flatnonzero(self.starts.undisturbed), self.starts.goal
+        starts, alike = self.starts, np.flatnonzero(self.starts.undisturbed)
+        aims = np.column_stack([starts.goal, starts.bar, starts.light])
         if heading is not None and np.ptp(heading, axis=0).any():
             alike = alike[:0]
         if not len(alike):
             return 0, alike
-        alike = alike[goal[alike] == goal[alike[0]]]
-        leader = int(alike[self.starts.push_time[alike].argmax()])
+        alike = alike[(aims[alike] == aims[alike[0]]).all(1)]
+        leader = int(alike[starts.push_time[alike].argmax()])
         return leader, alike[(alike != leader) & (alike >= self.record)]
 
     def _follow(self, rows: np.ndarray, leader: int) -> None:

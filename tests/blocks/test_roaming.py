@@ -103,6 +103,17 @@ def test_the_examiner_shows_the_light_in_each_blocks_own_axes(experiment: Experi
         np.testing.assert_allclose(seen[part], there / np.linalg.norm(there), atol=1e-9)
 
 
+def test_who_has_a_light_of_its_own_is_simulated_for_itself(experiment: Experiment, evolved):
+    """Undisturbed it is like those with the same light, and like nobody else."""
+    champion = experiment.champion(evolved[0], {})
+    body, task = champion.embodied(experiment.creature), demands_of("follow-on-land")
+    lights = np.array([[10.0, 0, 0], [0, 10.0, 0], [10.0, 0, 0]])
+    start = dataclasses.replace(nominal_starts(body, 3), light=lights)
+    stepping = Stepping(body, champion, start, 0, task.fall(CertificateConfig()), task)
+    leader, waiting = stepping._alike(None)
+    assert {leader, *waiting} == {0, 2}
+
+
 def nearer(body: Creature, outcome: Outcome) -> float:
     """m to what was ahead, from 0.1 s on; the tally has seen what was before the last step."""
     film = outcome.trajectory
@@ -246,6 +257,25 @@ def test_lights_spread_in_so_many_steps_and_stay(task: Roam, follower: type):
         following.harder(trials, following.Settings(widening=0), jnp.int32(0)).light,
         atol=1e-5,
     )
+
+
+@pytest.mark.parametrize("follower", [FollowInWater, FollowOnLand])
+def test_each_round_has_lights_of_its_own(task: Roam, follower: type):
+    """Whoever always meets the same learns these by heart. One is ahead in all rounds."""
+    following: Following = follower(task.creature, task.step, task.horizon, task.ends)
+    rollout = RolloutConfig(starts=1 + 3 * 40, variety=40)
+    lights = np.asarray(following.trials(key_of(0), load_creature("blocks"), rollout).light)
+    np.testing.assert_allclose(np.linalg.norm(lights, axis=1), LIGHT, rtol=1e-5)
+    assert lights[0] == pytest.approx([LIGHT, 0, 0])
+    others = lights[1:].reshape(40, 3, 3)
+    assert np.ptp(others[..., 1], axis=0).min() > LIGHT
+    angles = np.arccos(others[..., 0] / LIGHT)
+    usual = np.arccos(np.clip(directions(4, following.axes)[1:, 0], -1, 1))
+    assert np.all((angles > 0.69 * usual) & (angles <= usual + 1e-3))
+    assert np.ptp(angles, axis=0).min() > 0.25 * usual.min()
+    # As many to the left as to the right, and in water above as below.
+    assert np.abs(others[..., 1:].mean((0, 1))).max() < 0.2 * LIGHT
+    assert (np.abs(others[..., 2]).max() > 0.01) == (following.axes == 3)
 
 
 def test_who_gets_nearer_is_ready_for_wider_lights(task: Roam):

@@ -25,6 +25,8 @@ from mjxgait.types import Sensed
 GOLDEN = np.pi * (3 - np.sqrt(5.0))
 """rad; so turned one after another, directions are spread evenly about an axis."""
 
+LEAST = 0.7
+"""Share of its angle from ahead at which a light may be that is another in each round."""
 READY = 0.05
 """m/s by which lights come nearer, mean over the trials: who does it is ready for wider ones. Who is
 faster by then has become one family, and learns to turn no more."""
@@ -41,10 +43,27 @@ class Following(GoingTask):
     dark = np.zeros(3, np.float32)
 
     def trials(self, key: jax.Array, creature: Creature, settings: RolloutConfig) -> Starts:
-        """See `Task`: the first light is ahead, the others are spread evenly around."""
-        lights = LIGHT * directions(settings.starts, self.axes)
+        """See `Task`: the first light is ahead, the others are spread evenly around; where there are
+        several rounds of them, each is turned about that axis, and they are a little nearer to it.
+        """
+        rounds = settings.variety
+        ahead, *others = LIGHT * directions(1 + (settings.starts - 1) // rounds, self.axes)
+        lights = jnp.tile(jnp.array(others).reshape(-1, 3), (rounds, 1))
+        if rounds > 1:
+            lights = self._moved(jax.random.fold_in(key, 6), lights, rounds)
         plain = super().trials(key, creature, settings)
-        return dataclasses.replace(plain, light=jnp.asarray(lights, jnp.float32))
+        return dataclasses.replace(plain, light=jnp.vstack([ahead, lights]).astype(jnp.float32))
+
+    def _moved(self, key: jax.Array, lights: jax.Array, rounds: int) -> jax.Array:
+        """The lights [n, 3] of several rounds, as far from ahead as chance has it; all of a round
+        turned together, in the plane to the one side or to the other.
+        """
+        key_share, key_turn = jax.random.split(key)
+        turn = jax.random.uniform(key_turn, (rounds,), maxval=2 * jnp.pi)
+        if self.axes == 2:
+            turn = jnp.pi * jnp.round(turn / (2 * jnp.pi))
+        share = jax.random.uniform(key_share, (len(lights),), minval=LEAST)
+        return _aside(lights, share, jnp.repeat(turn, len(lights) // rounds))
 
     def levels(self, settings: Any) -> jax.Array | int:
         """See `Task`."""
@@ -55,8 +74,8 @@ class Following(GoingTask):
         """See `Task`: lights spread, so that whoever gets on learns to turn little by little."""
         steps = settings.widening
         spread = jnp.where(level < steps, (level + 1) / (steps + 1), 1.0)
-        lights = LIGHT * directions(trials.friction.shape[0], self.axes, spread)
-        return dataclasses.replace(trials, light=lights.astype(jnp.float32))
+        assert trials.light is not None
+        return dataclasses.replace(trials, light=_aside(trials.light, spread, 0.0))
 
     def mastered(self, terms: Mapping[str, jax.Array]) -> jax.Array:
         """See `Task`."""
@@ -110,16 +129,23 @@ class FollowOnLand(Following, Roam):
     Settings: ClassVar[type] = FollowOnLandConfig
 
 
-def directions(count: int, axes: int, spread: jax.Array | float = 1.0) -> jax.Array:
-    """[count, 3] of length 1, the first along x: all around in the plane, or on the sphere; with a
-    smaller spread than 1 that share of the angle from x.
-    """
+def directions(count: int, axes: int) -> np.ndarray:
+    """[count, 3] of length 1, the first along x: all around in the plane, or on the sphere."""
     place = np.arange(count)
     if axes == 2:
         turn = 2 * np.pi * place / count
-        angle = spread * np.where(turn > np.pi, turn - 2 * np.pi, turn)
-        return jnp.stack([jnp.cos(angle), jnp.sin(angle), jnp.zeros(count)], axis=1)
-    angle = spread * np.arccos(1 - 2 * place / max(count - 1, 1))
+        return np.stack([np.cos(turn), np.sin(turn), np.zeros(count)], axis=1)
+    angle = np.arccos(1 - 2 * place / max(count - 1, 1))
     about = GOLDEN * place
+    aside = np.sin(angle)
+    return np.stack([np.cos(angle), aside * np.cos(about), aside * np.sin(about)], axis=1)
+
+
+def _aside(lights: jax.Array, share: jax.Array, turn: jax.Array | float) -> jax.Array:
+    """Lights [n, 3] at a share [n] of their angles from ahead, turned about that axis by rad [n]."""
+    left, up = lights[:, 1], lights[:, 2]
+    angle = share * jnp.arctan2(jnp.hypot(left, up), lights[:, 0])
+    about = jnp.arctan2(up, left) + turn
     aside = jnp.sin(angle)
-    return jnp.stack([jnp.cos(angle), aside * np.cos(about), aside * np.sin(about)], axis=1)
+    found = [jnp.cos(angle), aside * jnp.cos(about), aside * jnp.sin(about)]
+    return jnp.linalg.norm(lights, axis=1, keepdims=True) * jnp.stack(found, axis=1)
