@@ -1,5 +1,7 @@
 """The running sums of an episode, and its end, against the same from whole recordings."""
 
+import dataclasses
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -91,6 +93,18 @@ def test_the_running_sum_is_the_sum(
         theirs = np.asarray(tally[name], float)
         most = tolerance(name, theirs)
         np.testing.assert_allclose(ours, theirs, rtol=0, atol=most, err_msg=str(episode))
+
+
+@pytest.mark.parametrize(("contact", "down"), [(CONTACT_GAP, 1), (0.0, 0)])
+def test_a_foot_that_only_touches_is_down_unless_it_must_bear_weight(
+    body: Creature, recordings: list[Frames], contact: float, down: int
+):
+    sensed = jax.tree.map(lambda leaf: leaf[0], sensed_of(recordings[0]))
+    near = dataclasses.replace(sensed, geom_low=jnp.full_like(sensed.geom_low, 0.5 * CONTACT_GAP))
+    judge = Judge(body, STEP, STEPS // 2, contact)
+    tally = judge.update(judge.init(), near, jnp.zeros(len(body.joints.names)), jnp.float32(0.1))
+    assert np.all(tally.contact == down)
+    assert tally.airborne == 1 - down
 
 
 def test_bearing_is_summed_from_the_same_moments(

@@ -59,12 +59,13 @@ def manner(
             "to stay up",
         )
     else:
-        table["fitness"] = {"weights": {"foot_speed": WHIPPED}}
+        table["fitness"] = {"contact": 0.0, "weights": {"foot_speed": WHIPPED}}
         notes.guess(
             "train",
-            "other starts in each generation; small mutations; feet that swing too fast cost",
+            "other starts in each generation; small mutations; feet are down that bear weight, and "
+            "those that swing too fast cost",
             "high",
-            "of what robots' joints do at random little stands, and much of it whips",
+            "of what robots' joints do at random little stands, and much of it bounces and whips",
         )
     if not symmetric:
         table.setdefault("controller", {})["key_poses"] = 2 * Config().controller.key_poses

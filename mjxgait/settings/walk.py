@@ -158,6 +158,8 @@ class WalkConfig:
       clearance: height in hip heights that each foot should reach in each stride.
       frequency: share of the highest stride frequency of an animal of this mass up to which a
         gait is not hasty.
+      contact: m above the floor below which a foot counts as down; 0: only one that bears weight
+        does, as in the examination.
       style_ramp: generations over which the style terms (all but distance, alive, foot_height
         and fall) grow to their full weight.
       weights: what each term counts.
@@ -168,6 +170,7 @@ class WalkConfig:
     speed: NonNegative = 0.9
     clearance: NonNegative = 0.12
     frequency: NonNegative = 0.7
+    contact: Annotated[NonNegative, SHAPE] = 0.002
     style_ramp: Whole = 0
     wish: WishConfig = dataclasses.field(default_factory=WishConfig)
     weights: Weights = dataclasses.field(default_factory=Weights)

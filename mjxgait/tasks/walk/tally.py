@@ -75,12 +75,13 @@ class Tally(protocol.Tally):
 class Judge:
     """Keeps the tally of one creature's episodes.
 
-    half_time: step.
+    half_time: step. contact: m above the floor below which a foot is down.
     """
 
     creature: Body
     step: float
     half_time: int
+    contact: float = CONTACT_GAP
 
     def init(self) -> Tally:
         """The empty tally."""
@@ -108,7 +109,7 @@ class Judge:
         forward_axis = sensed.trunk_rot @ creature.frame.forward.astype(np.float32)
         up = (sensed.trunk_rot @ creature.frame.up.astype(np.float32))[2]
         low, pos = self._feet(sensed)
-        down = (low < CONTACT_GAP).astype(jnp.float32)
+        down = (low < self.contact).astype(jnp.float32)
         # What bears weight is a little in the floor.
         loaded = (low < 0.0).astype(jnp.float32)
         peak = jnp.maximum(tally.peak, low)

@@ -54,7 +54,7 @@ class Walk(PlainTask):
 
     @property
     def _keeper(self) -> Judge:
-        return Judge(self.creature, self.step, self.horizon // 2)
+        return Judge(self.creature, self.step, self.horizon // 2, self.asked.contact)
 
     def standards(self, settings: WalkConfig) -> jax.Array:
         """See `Task`: the clearance [] in m that is wanted of each swing."""
