@@ -13,14 +13,13 @@ class BlocksConfig:
       settle: s from the start that do not count.
       overlap: how deep blocks are in each other or in the ground, of the smaller one's size, of
         which half counts of what was done.
-      apart: generations until that counts in full: whoever is fast learns to keep its blocks apart
-        more easily than the other way round. 0: from the first on.
+      apart: generations until that counts in full; 0: from the first on.
     """
 
     __pydantic_config__ = STRICT
     settle: NonNegative = 2.0
     overlap: Positive = 0.05
-    apart: NonNegative = 30.0
+    apart: NonNegative = 0.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -81,7 +80,6 @@ class RoamConfig(BlocksConfig):
     """
 
     __pydantic_config__ = STRICT
-    apart: NonNegative = 10.0
     tilt: Positive = 45.0
     weights: RoamWeights = dataclasses.field(default_factory=RoamWeights)
 
@@ -139,5 +137,4 @@ class JumpConfig(BlocksConfig):
 
     __pydantic_config__ = STRICT
     overlap: Positive = 0.035
-    apart: NonNegative = 0.0
     weights: JumpWeights = dataclasses.field(default_factory=JumpWeights)
