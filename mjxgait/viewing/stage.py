@@ -124,11 +124,15 @@ class Stage:
         self.way = smooth(front, round(SMOOTH_SECONDS / self.time_step))
 
     def _path(self, entrant: Entrant) -> np.ndarray:
-        """[frames, 3] m: ahead of the start, to its left, and the ground's height there."""
+        """[frames, 3] m: ahead of the start, to its left, and the ground's height there; of who is
+        afloat how far it has risen.
+        """
         steps = [entrant.frame(frame * self.time_step) for frame in range(self.frames)]
-        places = entrant.placed(entrant.walk.trunk_pos[steps])[:, :2]
+        trunk = entrant.walk.trunk_pos[steps]
+        places = entrant.placed(trunk)[:, :2]
         moved = places - self.origin
-        level = entrant.ground_heights(places)
+        afloat = entrant.walk.afloat
+        level = trunk[:, 2] - trunk[0, 2] if afloat else entrant.ground_heights(places)
         return np.column_stack([moved @ self.forward, moved @ self.left[:2], level])
 
 

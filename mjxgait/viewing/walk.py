@@ -100,6 +100,11 @@ class Walk:
         """[T, 3] m in the world."""
         return self.body_poses()[0][:, self.creature.trunk]
 
+    @property
+    def afloat(self) -> bool:
+        """Whether it is in water, where nothing holds it at a height."""
+        return how_simulated(self.champion.task, self.champion.wish).drag > 0
+
     @cached_property
     def ground(self) -> Ground | None:
         """What it walks on; None for the plane z = 0."""

@@ -46,6 +46,21 @@ def test_the_camera_goes_up_with_the_ground(climb):
     assert rows[1] == pytest.approx(rows[0], abs=40)
 
 
+@pytest.mark.parametrize(("task", "follows"), [("swim", True), ("walk", False)])
+def test_the_camera_goes_up_with_a_swimmer(stool_walk, task: str, follows: bool):
+    """Who leaps from a floor is seen to leap; who is afloat would leave the picture."""
+    qpos = stool_walk.trajectory.qpos.copy()
+    qpos[0, :, 2] += np.linspace(0, 2, qpos.shape[1])
+    risen = dataclasses.replace(
+        stool_walk,
+        champion=dataclasses.replace(stool_walk.champion, task=task),
+        trajectory=dataclasses.replace(stool_walk.trajectory, qpos=qpos),
+    )
+    stage, ends = Stage([risen], 320, 180), (0, len(risen.qpos) - 1)
+    rows = [stage.camera(frame).pixels(risen.trunk_pos[frame])[1] for frame in ends]
+    assert (abs(rows[1] - rows[0]) < 40) == follows
+
+
 def test_pictures_differ_from_those_of_a_floor(climb):
     stage = Stage([climb], 320, 180)
     camera = stage.camera(len(climb.qpos) - 1)
