@@ -80,6 +80,7 @@ class RoamConfig(BlocksConfig):
     """
 
     __pydantic_config__ = STRICT
+    apart: NonNegative = 10.0
     tilt: Positive = 45.0
     weights: RoamWeights = dataclasses.field(default_factory=RoamWeights)
 
