@@ -247,7 +247,8 @@ def _train(best: Candidate, symmetric: bool, stated_length: float | None) -> dic
     hip = stance_of(best.puppet, best.qpos[7:]).hip
     steps = bool(best.drive.ahead or best.drive.aside)
     step = float(model.opt.timestep)
-    return manner(steps, symmetric, hip, length, best.puppet.mass, step, best.notes)
+    rotor = float(np.median([joint.armature for joint in best.puppet.joints]))
+    return manner(steps, symmetric, hip, length, best.puppet.mass, step, rotor, best.notes)
 
 
 def _stated_length(best: Candidate) -> float | None:

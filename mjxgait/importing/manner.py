@@ -38,13 +38,14 @@ def manner(
     length: float,
     mass: float,
     time_step: float,
+    rotor: float,
     notes: Notes,
 ) -> dict[str, Any]:
     """The table `[train]` of an imported creature, each reason told.
 
     Args:
       steps: whether it must step under its fall. hip: m, its height. length: m, of the body. mass: kg.
-      time_step: s.
+      time_step: s. rotor: kg m², the inertia of its usual motor.
     """
     table: dict[str, Any] = {"base": "other_starts", "examination": {"enough": ENOUGH}}
     if steps:
@@ -59,13 +60,18 @@ def manner(
             "to stay up",
         )
     else:
-        table["fitness"] = {"contact": 0.0, "weights": {"foot_speed": WHIPPED}}
+        table["fitness"] = {"weights": {"foot_speed": WHIPPED}}
+        # It bounces: what is near the floor need not bear weight, which others learn more slowly by.
+        bounces = rotor > mass * hip**2
+        if bounces:
+            table["fitness"]["contact"] = 0.0
         notes.guess(
             "train",
-            "other starts in each generation; small mutations; feet are down that bear weight, and "
-            "those that swing too fast cost",
+            "other starts in each generation; small mutations; feet that swing too fast cost"
+            + ("; feet are down that bear weight" if bounces else ""),
             "high",
-            "of what robots' joints do at random little stands, and much of it bounces and whips",
+            "of what robots' joints do at random little stands, and much of it whips"
+            + (": its motors are heavier to turn than all of it" if bounces else ""),
         )
     if not symmetric:
         table.setdefault("controller", {})["key_poses"] = 2 * Config().controller.key_poses

@@ -17,23 +17,31 @@ STEP = 0.005
 
 def told(hip: float = 0.8, length: float = 0.8, **facts: Any) -> tuple[Config, Notes]:
     notes = Notes()
-    settled = {"steps": True, "symmetric": True, "mass": 30.0, "time_step": STEP} | facts
+    settled = {"steps": True, "symmetric": True, "mass": 30.0, "time_step": STEP, "rotor": 0.01}
+    settled |= facts
     table = manner(hip=hip, length=length, notes=notes, **settled)
     return build(Config, over_base(table, "the table"), "the table"), notes
 
 
 def test_a_body_on_four_feet_is_to_do_what_the_shipped_ones_are():
     """How it is varied and chosen differs; what is asked of it, and by which body, does not, but
-    that its feet may not whip, and that one that only touches the floor is not down.
+    that its feet may not whip.
     """
     config, usual = told(steps=False)[0], Config()
     calm = dataclasses.replace(usual.fitness.weights, foot_speed=config.fitness.weights.foot_speed)
-    assert config.fitness == dataclasses.replace(usual.fitness, weights=calm, contact=0.0)
+    assert config.fitness == dataclasses.replace(usual.fitness, weights=calm)
     assert config.fitness.weights.foot_speed > usual.fitness.weights.foot_speed == 0
     assert config.controller == usual.controller
     assert config.evolution.generations == usual.evolution.generations
     for key in ("starts", "promote", "latency", "push", "joint_noise"):
         assert getattr(config.rollout, key) == getattr(usual.rollout, key)
+
+
+def test_a_foot_of_one_that_bounces_is_down_where_it_bears_weight():
+    """As both ants do, whose motors are heavier to turn than all of them."""
+    calm, bouncing = (told(steps=False, rotor=rotor)[0] for rotor in (0.1, 30.0))
+    assert bouncing.fitness.contact == 0.0 < calm.fitness.contact
+    assert told(steps=True, rotor=30.0)[0].fitness.contact == calm.fitness.contact
 
 
 @pytest.mark.parametrize("steps", [True, False])
