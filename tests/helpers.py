@@ -20,7 +20,7 @@ from mjxgait.settings.control import STEPPING, TUNING, DriveConfig, PoseConfig, 
 from mjxgait.settings.tables import build
 from mjxgait.settings.walk import WalkConfig
 from mjxgait.tasks.score import in_order
-from mjxgait.tasks.walk.fitness import TERMS, signed_weights
+from mjxgait.tasks.walk.fitness import signed_weights, terms_under
 
 STOOL = Path(__file__).parent / "data" / "stool"
 
@@ -57,7 +57,7 @@ def altered(creature: Creature, **facts: Any) -> Creature:
 
 def weight_vector(config: WalkConfig, generation: jax.Array) -> jax.Array:
     """The weights [F] of walking in the order of its terms."""
-    return in_order(signed_weights(config, generation), TERMS)
+    return in_order(signed_weights(config, generation), terms_under(config.weights))
 
 
 STILL = dict.fromkeys((*TUNING, *STEPPING), 0.0) | {"threshold": 0.12, "period": 0.8}

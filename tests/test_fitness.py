@@ -2,17 +2,20 @@
 
 import dataclasses
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from helpers import altered, small_config, weight_vector
 
 from mjxgait.creature import Creature
-from mjxgait.settings.walk import Weights
+from mjxgait.settings.walk import WalkConfig, Weights
 from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.score import score
 from mjxgait.tasks.walk.fitness import REWARDS, TERMS, fitness_terms, terms_under
 from mjxgait.tasks.walk.tally import Judge
+from mjxgait.tasks.walk.task import Walk
+from mjxgait.types import Sensed
 
 STEP, HORIZON = 0.005, 1000
 LIVED = {"steps": 1000, "forward": 2.0}
@@ -79,6 +82,22 @@ def terms_of(body: Creature, tally: dict, **fitness: float) -> dict[str, float]:
     return {name: float(value) for name, value in terms.items()}
 
 
+def at_rest(body: Creature, low: jax.Array) -> Sensed:
+    """One moment of standing still, the watched shapes so far [G] above the floor."""
+    joints, still = jnp.zeros(len(body.joints.names)), jnp.zeros(3)
+    return Sensed(
+        joint_pos=joints,
+        joint_vel=joints,
+        bias=joints,
+        trunk_pos=still,
+        trunk_rot=jnp.eye(3),
+        trunk_vel=still,
+        trunk_angvel=still,
+        geom_pos=jnp.zeros((len(low), 3)),
+        geom_low=low,
+    )
+
+
 IDS = [f"{name} of {' and '.join(tally) or 'a whole walk'}" for name, _, tally in CASES]
 
 
@@ -134,6 +153,19 @@ def test_how_fast_a_foot_swings_is_a_term_only_where_it_costs_something():
     """So a run that was begun before there was this term goes on."""
     assert terms_under(Weights()) == tuple(name for name in TERMS if name != "foot_speed")
     assert terms_under(Weights(foot_speed=4.0)) == TERMS
+
+
+def test_a_task_counts_what_its_settings_say(body: Creature):
+    """The terms by their weights, and a foot as down from the height that they say."""
+    for contact, whip, down in ((0.002, 0.0, 1.0), (0.0, 4.0, 0.0)):
+        settings = WalkConfig(contact=contact, weights=Weights(foot_speed=whip))
+        task = Walk.told(body, STEP, HORIZON, body.settings.termination, settings)
+        assert ("foot_speed" in task.terms) == bool(whip)
+        touching = jnp.full(len(body.feet.watched), 0.001)
+        tally = task.update(
+            task.init(), at_rest(body, touching), jnp.zeros(len(body.joints.names)), 0.1, ()
+        )
+        assert np.all(tally.contact == down)
 
 
 def test_the_score_is_the_weighted_sum_of_each_start():

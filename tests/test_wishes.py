@@ -30,7 +30,7 @@ from mjxgait.settings.shipped import data_folder
 from mjxgait.settings.traced import traced
 from mjxgait.settings.walk import WalkConfig, Weights, WishWeights
 from mjxgait.tasks.score import in_order, score
-from mjxgait.tasks.walk.fitness import REWARDS, TERMS
+from mjxgait.tasks.walk.fitness import REWARDS, TERMS, terms_under
 from mjxgait.tasks.walk.footfalls import Footfalls, gait_missed, no_footfalls, stepped
 from mjxgait.tasks.walk.tally import Tally
 from mjxgait.tasks.walk.task import AskedWalk, Walk
@@ -44,6 +44,9 @@ STANDS = FINISHED | {"contact": [1000.0] * 4, "height": 500.0, "height_squared":
 """For the whole episode, on all feet."""
 DIES = {"steps": 40, "reason": 1, "tilt": 20.0, "touch": 1.0}
 MISSES = ("tilt", "wobble", "work", "saturation", "limits", "airborne", "foot_height", "touch")
+MISSES += ("foot_speed",)
+WHIP = {"foot_speed": 4.0}
+"""A weight that is compiled in."""
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +72,7 @@ def config_of(weights: dict | None = None, **wish) -> WalkConfig:
 @pytest.fixture(scope="module")
 def fitness_of(body: Creature):
     """Fitness of one episode by its tally, whatever the settings; compiled once."""
-    task = asked(config_of(gait="trot", height=0.9, bounce=0.02, sway=6.0), body)
+    task = asked(config_of(WHIP, gait="trot", height=0.9, bounce=0.02, sway=6.0), body)
 
     @jax.jit
     def judged(tally, config: WalkConfig) -> jax.Array:
@@ -96,7 +99,7 @@ everything = st.fixed_dictionaries(dict.fromkeys(MISSES, amount))
 
 @settings(max_examples=60, deadline=None)
 @given(
-    weights=st.fixed_dictionaries({name: amount for name in TERMS if name != "distance"}),
+    weights=st.fixed_dictionaries({n: amount for n in TERMS if n not in ("distance", *WHIP)}),
     worth=st.floats(0.0078125, 128.0, width=32),
     wishes=st.fixed_dictionaries({f.name: amount for f in dataclasses.fields(WishWeights)}),
     spoilt=everything,
@@ -107,7 +110,7 @@ everything = st.fixed_dictionaries(dict.fromkeys(MISSES, amount))
 def test_a_walk_however_bad_beats_none_at_any_weights(
     fitness_of, weights, worth, wishes, spoilt, way, steps, left
 ):
-    own = Weights(**(weights | {"distance": worth}))
+    own = Weights(**(weights | WHIP | {"distance": worth}))
     base = config_of(gait="trot", height=0.9, bounce=0.02, sway=6.0)
     wish = dataclasses.replace(base.wish, weights=WishWeights(**wishes))
     config = traced_fitness(dataclasses.replace(base, weights=own, wish=wish))
@@ -149,7 +152,7 @@ def test_who_lunges_and_falls_is_no_walker(fitness_of):
 
 @pytest.mark.parametrize("name", MISSES)
 def test_less_of_a_penalty_is_better(fitness_of, name: str):
-    config = traced_fitness(config_of(gait="trot", height=0.9, bounce=0.02, sway=6.0))
+    config = traced_fitness(config_of(WHIP, gait="trot", height=0.9, bounce=0.02, sway=6.0))
     worth = [fitness_of(walking() | {name: value}, config) for value in (200.0, 400.0, 800.0)]
     assert worth[0] > worth[1] > worth[2]
 
@@ -173,7 +176,7 @@ def test_without_a_wish_nothing_is_looked_at(body: Creature):
     free = small_config().fitness
     task = Walk.told(body, STEP, HORIZON, body.settings.termination, free)
     assert type(task) is Walk
-    assert task.terms == TERMS
+    assert task.terms == terms_under(free.weights)
     assert type(task.init()) is Tally
     asks = traced_fitness(config_of()).wish
     assert len(jax.tree.leaves(asks)) == len(jax.tree.leaves(traced_fitness(free).wish)) + 1

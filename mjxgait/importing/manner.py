@@ -21,8 +21,8 @@ LEAST = 0.5
 """Those that the certificate asks for: a cycle that leads through shorter ones is a buzz."""
 
 WHIPPED = 4.0
-"""What it costs to swing a foot too fast: of robots that fail by one criterion alone most do by the
-speed of their fastest part, which is a foot."""
+"""What it costs to swing a foot too fast, in body lengths per √(g·h): of robots that fail by one
+criterion alone most do by the speed of their fastest part, which is a foot."""
 GENERATIONS = 150
 """Most of them, twice as many as usual."""
 SMALLER = 0.03

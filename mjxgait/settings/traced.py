@@ -1,7 +1,8 @@
 """The config as the compiled program reads it: a pytree whose leaves are its numbers and choices.
 
 Its structure is what decides the shape of the program: two configs of the same structure run in the same compiled program, and many of
-them can be stacked and run side by side. Nothing is compiled anew because a weight or a rate has changed.
+them can be stacked and run side by side. Nothing is compiled anew because a weight or a rate has changed, but for a weight
+by which there is a term or none.
 """
 
 import dataclasses

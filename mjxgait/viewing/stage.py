@@ -76,7 +76,8 @@ class Stage:
         trunk = entrant.trunk(frame * self.time_step) + self.lanes[place]
         point = trunk[:2] + entrant.back * self.forward
         level = float(self.relief(*point)) if self.relief else 0.0
-        return self.camera(frame).pixels(np.append(point, 0.5 * entrant.top + level))
+        middle = trunk[2] if entrant.walk.afloat else 0.5 * entrant.top + level
+        return self.camera(frame).pixels(np.append(point, middle))
 
     @property
     def relief(self) -> Relief | None:

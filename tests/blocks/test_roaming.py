@@ -112,6 +112,10 @@ def test_who_has_a_light_of_its_own_is_simulated_for_itself(experiment: Experime
     stepping = Stepping(body, champion, start, 0, task.fall(CertificateConfig()), task)
     leader, waiting = stepping._alike(None)
     assert {leader, *waiting} == {0, 2}
+    stepping.starts = dataclasses.replace(
+        start, bar=np.array([[1.0, 0.2], [np.inf] * 2, [1.0, 0.3]])
+    )
+    assert not len(stepping._alike(None)[1]), "nor like who has another bar"
 
 
 def nearer(body: Creature, outcome: Outcome) -> float:

@@ -8,7 +8,7 @@ from mjxgait.control.poses import TUNING, Genome
 from mjxgait.search.chance import key_of
 from mjxgait.search.state import EvolutionState, Origin
 from mjxgait.tasks.score import score
-from mjxgait.tasks.walk.fitness import TERMS
+from mjxgait.tasks.walk.fitness import terms_under
 from mjxgait.tasks.walk.task import Walk
 
 POPULATION = 6
@@ -26,11 +26,12 @@ def make_state(creature, config, generation):
         np.broadcast_to(creature.joints.stand, (POPULATION, 2, len(creature.joints.names)))
         + np.radians(ranks + generation)[:, None, None]
     )
-    terms = np.zeros((POPULATION, config.rollout.starts, len(TERMS)), np.float32)
-    terms[..., TERMS.index("distance")] = (
+    names = terms_under(config.fitness.weights)
+    terms = np.zeros((POPULATION, config.rollout.starts, len(names)), np.float32)
+    terms[..., names.index("distance")] = (
         5.0 + generation - ranks[:, None] + 0.1 * np.arange(config.rollout.starts)
     )
-    terms[..., TERMS.index("drift")] = 0.5
+    terms[..., names.index("drift")] = 0.5
     integer = jnp.int32(0)
     return EvolutionState(
         genomes=Genome(

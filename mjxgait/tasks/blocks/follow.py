@@ -26,7 +26,7 @@ GOLDEN = np.pi * (3 - np.sqrt(5.0))
 """rad; so turned one after another, directions are spread evenly about an axis."""
 
 LEAST = 0.7
-"""Share of its angle from ahead at which a light may be that is another in each round."""
+"""With several rounds a light is at 0.7 to 1 of its usual angle from ahead."""
 READY = 0.05
 """m/s by which lights come nearer, mean over the trials: who does it is ready for wider ones. Who is
 faster by then has become one family, and learns to turn no more."""
@@ -44,7 +44,7 @@ class Following(GoingTask):
 
     def trials(self, key: jax.Array, creature: Creature, settings: RolloutConfig) -> Starts:
         """See `Task`: the first light is ahead, the others are spread evenly around; where there are
-        several rounds of them, each is turned about that axis, and they are a little nearer to it.
+        several rounds of them, each is turned about the way ahead, and they are nearer to it.
         """
         rounds = settings.variety
         ahead, *others = LIGHT * directions(1 + (settings.starts - 1) // rounds, self.axes)

@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 
 from mjxgait.body import Body
-from mjxgait.settings.gaits import stride_limit
+from mjxgait.settings.gaits import GRAVITY, stride_limit
 from mjxgait.settings.walk import WalkConfig, Weights
 from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.overlap import crossed
@@ -16,7 +16,7 @@ from mjxgait.tasks.walk.tally import Tally
 
 TERMS = tuple(field.name for field in dataclasses.fields(Weights))
 REWARDS = ("distance", "alive")
-UNASKED = "foot_speed"
+OPTIONAL = "foot_speed"
 """A term only where it has a weight."""
 STYLE = tuple(name for name in TERMS if name not in (*REWARDS, "foot_height", "fall"))
 """What makes a gait good to look at: counted in proportion to the walk that there is, and may ramp in over generations."""
@@ -55,7 +55,7 @@ def fitness_terms(
 
 def terms_under(weights: Weights) -> tuple[str, ...]:
     """Names of the terms that there are under these weights."""
-    return tuple(name for name in TERMS if name != UNASKED or getattr(weights, name))
+    return tuple(name for name in TERMS if name != OPTIONAL or getattr(weights, name))
 
 
 def plain_terms(
@@ -97,14 +97,14 @@ def plain_terms(
         "limits": tally.limits / lived,
         "overlap": crossed(creature, tally.overlap),
         "fall": jnp.where(tally.reason == Reason.FINISHED, 0.0, 1.0),
-        "foot_speed": jnp.maximum(_froude(creature, tally.foot_speed) - WHIPPING, 0.0),
+        "foot_speed": jnp.maximum(_in_hip_speeds(creature, tally.foot_speed) - WHIPPING, 0.0),
     }
     return values, enough
 
 
-def _froude(creature: Body, speed: jax.Array) -> jax.Array:
+def _in_hip_speeds(creature: Body, speed: jax.Array) -> jax.Array:
     """A speed [] m/s in √(g·h) of this body's hip height."""
-    return speed / math.sqrt(9.81 * creature.frame.hip_height)
+    return speed / math.sqrt(GRAVITY * creature.frame.hip_height)
 
 
 def _patter(tally: Tally) -> jax.Array:

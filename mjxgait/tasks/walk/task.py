@@ -36,12 +36,12 @@ class Walk(PlainTask):
         settings: WalkConfig,
     ) -> None:
         super().__init__(body, step, horizon, ends)
-        self.asked = settings
+        self.settings = settings
 
     @property
     def terms(self) -> tuple[str, ...]:
         """See `Task`."""
-        return terms_under(self.asked.weights)
+        return terms_under(self.settings.weights)
 
     @classmethod
     def told(
@@ -54,7 +54,7 @@ class Walk(PlainTask):
 
     @property
     def _keeper(self) -> Judge:
-        return Judge(self.creature, self.step, self.horizon // 2, self.asked.contact)
+        return Judge(self.creature, self.step, self.horizon // 2, self.settings.contact)
 
     def standards(self, settings: WalkConfig) -> jax.Array:
         """See `Task`: the clearance [] in m that is wanted of each swing."""
@@ -97,7 +97,7 @@ class AskedWalk(Walk):
     @property
     def wish(self) -> WishConfig:
         """What is asked."""
-        return self.asked.wish
+        return self.settings.wish
 
     @property
     def terms(self) -> tuple[str, ...]:
