@@ -33,6 +33,7 @@ from mjxgait.tasks.walk.fitness import (
     REWARDS,
     TERMS,
     fitness_terms,
+    terms_under,
 )
 from mjxgait.types import BodyState, Judged, Sensed
 
@@ -323,7 +324,8 @@ def test_a_fall_scores_below_everybody_who_stays_up(experiment: Experiment, stoo
             reason=jnp.int32(reason),
             forward=jnp.float32(forward),
         )
-        terms = in_order(fitness_terms(stool, config.fitness, 0.005, steps, tally), TERMS)
+        named = fitness_terms(stool, config.fitness, 0.005, steps, tally)
+        terms = in_order(named, terms_under(config.fitness.weights))
         return float(score(terms[None], weight_vector(config.fitness, jnp.int32(0)), 0.0))
 
     fallen = {reason: fitness(thesis, 50.0, reason, steps - 1) for reason in ENDS}
@@ -346,10 +348,11 @@ def test_penalties_are_negative_and_style_ramps_in():
         generation: np.asarray(weight_vector(config, jnp.int32(generation))).tolist()
         for generation in (0, 5, 10)
     }
+    terms = terms_under(config.weights)
     at = {
-        generation: dict(zip(TERMS, vector, strict=True)) for generation, vector in vectors.items()
+        generation: dict(zip(terms, vector, strict=True)) for generation, vector in vectors.items()
     }
-    assert all(at[10][name] <= 0 for name in TERMS if name not in REWARDS)
+    assert all(at[10][name] <= 0 for name in terms if name not in REWARDS)
     assert at[0]["slip"] == 0.0
     assert at[5]["slip"] == pytest.approx(0.5 * at[10]["slip"])
     assert at[0]["distance"] == at[10]["distance"] > 0

@@ -1,7 +1,6 @@
 """From the tally of a walk to named fitness terms, and what each of them counts."""
 
 import dataclasses
-import math
 
 import jax
 import jax.numpy as jnp
@@ -104,7 +103,7 @@ def plain_terms(
 
 def _in_hip_speeds(creature: Body, speed: jax.Array) -> jax.Array:
     """A speed [] m/s in √(g·h) of this body's hip height."""
-    return speed / math.sqrt(GRAVITY * creature.frame.hip_height)
+    return speed / jnp.sqrt(GRAVITY * creature.frame.hip_height)
 
 
 def _patter(tally: Tally) -> jax.Array:

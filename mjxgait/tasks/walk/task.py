@@ -33,10 +33,10 @@ class Walk(PlainTask):
         step: float,
         horizon: int,
         ends: Termination | Ends,
-        settings: WalkConfig,
+        settings: WalkConfig | None = None,
     ) -> None:
         super().__init__(body, step, horizon, ends)
-        self.settings = settings
+        self.settings = settings or WalkConfig()
 
     @property
     def terms(self) -> tuple[str, ...]:
