@@ -103,7 +103,7 @@ def plain_terms(
 
 def _in_hip_speeds(creature: Body, speed: jax.Array) -> jax.Array:
     """A speed [] m/s in √(g·h) of this body's hip height."""
-    return speed / jnp.sqrt(GRAVITY * creature.frame.hip_height)
+    return speed / (GRAVITY * creature.frame.hip_height) ** 0.5
 
 
 def _patter(tally: Tally) -> jax.Array:
