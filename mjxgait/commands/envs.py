@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import tyro
 
 from mjxgait.creature import load_creature
-from mjxgait.settings.shipped import data_folder, shipped_configs, shipped_creatures
+from mjxgait.settings.shipped import data_folder, find_creature, shipped_configs, shipped_creatures
 
 
 @dataclasses.dataclass(frozen=True)
@@ -18,7 +18,7 @@ def envs_command(arguments: Sequence[str]) -> int:
     """Returns the exit code."""
     tyro.cli(EnvsOptions, args=list(arguments), prog="mjxgait envs")
     for name in shipped_creatures():
-        creature = load_creature(data_folder("envs") / name)
+        creature = load_creature(find_creature(name))
         print(f"{name:20} {creature.settings.creature.description}")
     for name in shipped_configs():
         text = (data_folder("configs") / f"{name}.toml").read_text(encoding="utf-8")

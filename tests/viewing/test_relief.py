@@ -59,6 +59,7 @@ def test_the_camera_goes_up_with_a_swimmer(stool_walk, task: str, follows: bool)
     stage, ends = Stage([risen], 320, 180), (0, len(risen.qpos) - 1)
     rows = [stage.camera(frame).pixels(risen.trunk_pos[frame])[1] for frame in ends]
     assert (abs(rows[1] - rows[0]) < 40) == follows
+    assert 0 < stage.behind(ends[1], 0)[1] < 180, "its label stays in the picture"
 
 
 def test_pictures_differ_from_those_of_a_floor(climb):
