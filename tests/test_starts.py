@@ -3,6 +3,7 @@
 import dataclasses
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from helpers import small_config
@@ -145,3 +146,40 @@ def test_each_generation_has_other_starts_until_all_have_had_their_turn(stool: C
     assert {friction[0] for friction in rounds} == {1.0}
     assert len({friction for one in rounds[:4] for friction in one[1:]}) == 8
     assert rounds[4] == rounds[0]
+
+
+def test_disturbances_grow_in_so_many_steps_to_their_full_size(stool: Creature):
+    """In the program that is run; without steps trials are as hard as they will be, and never harder."""
+    rollout = {"seconds": 0.4, "starts": 5, "latency": 4, "promote": 1.0}
+    row, plain = (
+        build_experiment(stool, small_config(rollout=rollout, fitness={"hardening": steps}))
+        for steps in (3, 0)
+    )
+    full, state = row.row.starts, row.init()
+    assert state.level == 0
+    assert plain.init().level is None
+    assert not differing(jax.device_get(plain.row.starts), jax.device_get(full))
+    for level, share in ((0, 0.25), (2, 0.75), (3, 1.0), (9, 1.0)):
+        now = next_starts(
+            row.simulator.task, row.row, dataclasses.replace(state, level=jnp.int32(level))
+        )
+        for field, usual in (
+            ("qpos", full.qpos[0]),
+            ("qvel", 0.0),
+            ("friction", 1.0),
+            ("push", 0.0),
+            ("stiffness", 1.0),
+            ("damping", 1.0),
+        ):
+            of_all = usual + share * (np.asarray(getattr(full, field)) - usual)
+            assert np.allclose(getattr(now, field), of_all, atol=1e-6), field
+        assert np.array_equal(now.delay, np.floor(share * np.asarray(full.delay)))
+        assert np.array_equal(now.push_step, full.push_step)
+
+
+@pytest.mark.parametrize(("fallen", "ready"), [(0.0, True), (0.2, True), (0.4, False)])
+def test_who_hardly_falls_is_ready_for_harder_trials(stool: Creature, fallen: float, ready: bool):
+    task = build_experiment(stool, small_config(fitness={"hardening": 3})).simulator.task
+    assert task.climbs
+    assert task.levels(task.settings) == 3
+    assert bool(task.mastered({"fall": jnp.float32(fallen)})) == ready

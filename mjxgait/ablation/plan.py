@@ -12,6 +12,7 @@ from mjxgait.creature import Creature
 from mjxgait.errors import UserError, did_you_mean
 from mjxgait.ground.spec import FLAT
 from mjxgait.parts import resolve_config
+from mjxgait.parts.wishes import Wishes, wished
 from mjxgait.settings.config import Config
 from mjxgait.settings.rollout import GroundText
 from mjxgait.settings.shipped import data_folder
@@ -26,6 +27,7 @@ class VariantTable:
     generations where it needs one.
 
     config: file or name of a shipped config that it runs instead of the study's config and base.
+    gait: that it is asked for, as `train --gait` asks.
     """
 
     __pydantic_config__ = STRICT
@@ -33,6 +35,7 @@ class VariantTable:
     settings: dict[str, Any] = dataclasses.field(default_factory=dict)
     generations: Count | None = None
     config: str | None = None
+    gait: str | None = None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -160,7 +163,7 @@ def make_plan(study: Study, creature: Creature, where: str) -> Plan:
         own = _config(table.config or study.config, creature, here, use)
         if not table.config:
             own = _lay(own, study.base, f"{where}: [base]")
-        new = _settled(_lay(own, table.settings, here))
+        new = _settled(_asked(_lay(own, table.settings, here), table.gait, creature, here))
         new = dataclasses.replace(
             new,
             evolution=dataclasses.replace(
@@ -189,6 +192,13 @@ def make_plan(study: Study, creature: Creature, where: str) -> Plan:
                 )
             )
     return Plan(study, tuple(configs), tuple(runs))
+
+
+def _asked(config: Config, gait: str | None, creature: Creature, where: str) -> Config:
+    try:
+        return wished(config, creature, Wishes(gait=gait))
+    except UserError as error:
+        raise UserError(f"{where}: {error}") from None
 
 
 def _config(

@@ -160,6 +160,8 @@ class WalkConfig:
         gait is not hasty.
       contact: m above the floor below which a foot counts as down; 0: only one that bears weight
         does, as in the examination.
+      hardening: steps in which the disturbances of the trials grow to their full size, one after
+        each generation whose best stay up; 0: in full from the first on.
       style_ramp: generations over which the style terms (all but distance, alive, foot_height
         and fall) grow to their full weight.
       weights: what each term counts.
@@ -171,6 +173,7 @@ class WalkConfig:
     clearance: NonNegative = 0.12
     frequency: NonNegative = 0.7
     contact: Annotated[NonNegative, SHAPE] = 0.002
+    hardening: Annotated[Whole, SHAPE] = 0
     style_ramp: Whole = 0
     wish: WishConfig = dataclasses.field(default_factory=WishConfig)
     weights: Weights = dataclasses.field(default_factory=Weights)

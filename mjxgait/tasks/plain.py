@@ -31,7 +31,6 @@ class PlainTask(abc.ABC):
     counts: ClassVar[Mapping[str, float]] = {}
     outcomes: ClassVar[tuple[str, ...]] = ("seconds",)
     adds: ClassVar[tuple[str, ...]] = ()
-    climbs: ClassVar[bool] = False
 
     def __init__(self, creature: Body, step: float, horizon: int, ends: Termination | Ends) -> None:
         self.creature, self.step, self.horizon, self.ends = creature, step, horizon, ends
@@ -44,6 +43,11 @@ class PlainTask(abc.ABC):
     def trials(self, key: jax.Array, creature: Creature, settings: RolloutConfig) -> Starts:
         """See `Task`: the first start is nominal, the others are perturbed and pushed."""
         return draw_starts(key, creature, settings)
+
+    @property
+    def climbs(self) -> bool:
+        """See `Task`."""
+        return False
 
     def levels(self, settings: Any) -> jax.Array | int:
         """See `Task`."""

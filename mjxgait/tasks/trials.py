@@ -1,5 +1,6 @@
 """The starts on which every individual is judged: the first nominal, the others perturbed."""
 
+import dataclasses
 from typing import Any
 
 import jax
@@ -92,6 +93,27 @@ def draw_starts(key: jax.Array, creature: Creature, config: RolloutConfig) -> St
         heaviness=_heaviness(jax.random.fold_in(key, 3), creature, config),
         ground=draw_grounds(jax.random.fold_in(key, 2), creature, config),
         delay=_delay(jax.random.fold_in(key, 6), config),
+    )
+
+
+def milder(starts: Starts, share: jax.Array) -> Starts:
+    """The starts with this share [] of their disturbances; bodies, ground and what is asked of each
+    stay.
+    """
+
+    def part(leaf: jax.Array, usual: jax.Array | float) -> jax.Array:
+        return usual + share * (leaf - usual)
+
+    late = starts.delay
+    return dataclasses.replace(
+        starts,
+        qpos=part(starts.qpos, starts.qpos[:1]),
+        qvel=share * starts.qvel,
+        friction=part(starts.friction, 1.0),
+        push=share * starts.push,
+        stiffness=part(starts.stiffness, 1.0),
+        damping=part(starts.damping, 1.0),
+        delay=late if late is None else jnp.floor(share * late).astype(late.dtype),
     )
 
 

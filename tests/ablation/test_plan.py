@@ -10,6 +10,7 @@ from mjxgait.ablation.plan import Plan, Study, make_plan, read_study
 from mjxgait.ablation.rows import groups
 from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import UserError
+from mjxgait.parts.wishes import Wishes, wished
 from mjxgait.settings.layers import resolve_config
 from mjxgait.settings.shipped import data_folder
 from mjxgait.settings.tables import build
@@ -66,6 +67,19 @@ def test_a_variant_may_run_a_config_of_its_own_and_nothing_else(stool: Creature)
         wanted["rollout"] |= {"seconds": seconds}
         assert table == wanted
     assert found.of("base")[0].config.rollout.starts == 5
+
+
+def test_a_variant_may_be_asked_for_a_gait_as_a_walk_is(stool: Creature):
+    """Where a gait means nothing the study says of which variant that is."""
+    found = plan(stool, variant=[{"name": "base"}, {"name": "animal", "gait": "natural"}])
+    assert found.of("base")[0].config.fitness.wish.asked == ()
+    asked = found.of("animal")[0].config
+    walk = wished(resolve_config({}, stool.name, None), stool, Wishes(gait="natural"))
+    assert asked.fitness.wish == walk.fitness.wish
+    assert asked.fitness.wish.stride == 1.0
+    assert asked.controller == walk.controller
+    with pytest.raises(UserError, match='variant "animal": --gait flight'):
+        plan(stool, variant=[{"name": "base"}, {"name": "animal", "gait": "flight"}])
 
 
 def test_a_grid_is_the_base_and_every_combination(stool: Creature):

@@ -1,6 +1,7 @@
 """Walking as a task: forward, upright, in the manner that the settings ask for."""
 
 import dataclasses
+from collections.abc import Mapping
 from typing import Any
 
 import jax
@@ -13,12 +14,15 @@ from mjxgait.senses import sense
 from mjxgait.settings.rollout import RolloutConfig
 from mjxgait.settings.walk import WalkConfig, WishConfig
 from mjxgait.tasks.plain import PlainTask
-from mjxgait.tasks.trials import Starts, draw_starts
+from mjxgait.tasks.trials import Starts, draw_starts, milder
 from mjxgait.tasks.walk.fitness import fitness_terms, signed_weights, terms_under
 from mjxgait.tasks.walk.tally import Judge, Tally
 from mjxgait.tasks.walk.wish import wish_weights, wished_terms
 from mjxgait.tasks.walk.wish_tally import WishTally, along, wish_tally, wish_updated, wrapped
 from mjxgait.types import Sensed
+
+FALLEN = 0.2
+"""Share of its trials in which one may fall who is ready for harder ones."""
 
 
 class Walk(PlainTask):
@@ -51,6 +55,24 @@ class Walk(PlainTask):
         if settings.wish.asked and cls is Walk:
             return AskedWalk(body, step, horizon, ends, settings)
         return cls(body, step, horizon, ends, settings)
+
+    @property
+    def climbs(self) -> bool:
+        """See `Task`."""
+        return self.settings.hardening > 0
+
+    def levels(self, settings: WalkConfig) -> int:
+        """See `Task`."""
+        return settings.hardening
+
+    def harder(self, trials: Starts, settings: WalkConfig, level: jax.Array) -> Starts:
+        """See `Task`: disturbances grow, so that whoever stays up learns to bear them little by little."""
+        steps = settings.hardening
+        return milder(trials, (jnp.minimum(level, steps) + 1) / (steps + 1))
+
+    def mastered(self, terms: Mapping[str, jax.Array]) -> jax.Array:
+        """See `Task`: who hardly ever falls."""
+        return terms["fall"] <= FALLEN
 
     @property
     def _keeper(self) -> Judge:
