@@ -16,8 +16,9 @@ ONE_PLACE = 0.02
 """Hip heights within which the joints between two parts count as one, as a ball joint's three."""
 
 FALSE = 2.0
-"""Times the least way out that a contact is deep at most; corners of boxes are, up to 1.4 times. Of two
-cylinders that cross MuJoCo may tell a depth as large as a radius where they hardly touch."""
+"""Times the least way out that a contact is deep at most, and it may be at least; corners of boxes are up
+to 1.4 times. Of two cylinders that cross MuJoCo may tell a depth as large as a radius where they hardly
+touch, and of a disc in a box an eighth of the depth that there is."""
 
 ONE_WAY = 0.01
 """rad by which axes may differ that count as parallel, about."""
@@ -126,4 +127,5 @@ def _depths(
 def _true(model: mujoco.MjModel, data: mujoco.MjData, pair: tuple[int, int], depth: float) -> float:
     """The least way out instead of a depth that it contradicts, m."""
     least = -mujoco.mj_geomDistance(model, data, *pair, model.stat.extent, None)
-    return least if 0 < FALSE * least < depth else depth
+    believed = depth / FALSE <= least <= FALSE * depth
+    return depth if believed or least <= 0 else least

@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 from certify_made_up import LEGS, TOML, XML, make_champion
+from scipy.optimize import minimize
 
 from mjxgait.certify import CertificateConfig, criteria, glance, record
 from mjxgait.certify.describe import worst_overlap
@@ -77,6 +78,64 @@ def test_cylinders_that_hardly_touch_are_not_deep_in_each_other(tmp_path):
     found = overlaps(creature, qpos, excused=False)
     both = found.depth[:, found.pairs.index(("trunk", "front_left_lower"))]
     np.testing.assert_allclose(both, 0.00259, atol=1e-4)
+
+
+def least_way_out(box, disc, place, axes):
+    """m by which a disc must be moved to be out of a box, whose frame this is.
+
+    Two convex shapes are apart along a direction where the one ends before the other begins.
+    place: [3] m, of the disc. axes: [3, 3], its own as columns, the last across it.
+    """
+
+    def shared(way):
+        way = way / np.linalg.norm(way)
+        along = axes.T @ way
+        reach = np.hypot(*along[:2]) * disc[0] + abs(along[2]) * disc[1]
+        return np.abs(way) @ box - place @ way + reach
+
+    ways = np.vstack([np.random.default_rng(0).normal(size=(2000, 3)), np.eye(3), axes.T])
+    ways = np.concatenate([ways, -ways])
+    best = sorted(ways, key=shared)[:3]
+    return min(minimize(shared, way, method="Nelder-Mead").fun for way in best)
+
+
+def test_a_disc_in_a_box_is_as_deep_as_the_least_way_out(tmp_path):
+    """A motor's disc in a trunk: while it turns MuJoCo's contacts tell from 3 to 28 mm of it, so a robot was
+    refused for 25 mm more than in its standing pose.
+    """
+    box, disc = np.array([0.3235, 0.15, 0.075]), (0.05, 0.01)
+    beside = np.array([0.3455, -0.1455, 0.0142])
+    tilted = np.array([[0.8241, 0.5664, 0], [-0.1076, 0.1566, -0.9818], [-0.5561, 0.8091, 0.19]])
+    tilted, _ = np.linalg.qr(tilted)
+    tilted[:, 2] *= np.sign(np.linalg.det(tilted))
+    quat = np.zeros(4)
+    mujoco.mju_mat2Quat(quat, tilted.ravel())
+    # On the lower leg, half a metre to the left of it, where nothing else is.
+    aside, knee = np.array([0.0, 0.5, 0.0]), np.array([0.2, 0.11, -0.14])
+    middle = knee + aside - beside
+    at, by, turned = (" ".join(map(str, values)) for values in (middle, aside, quat))
+    shape = f'<geom type="box" size="0.3235 0.15 0.075" pos="{at}" mass="0.01"/>'
+    wheel = f'<geom type="cylinder" size="0.05 0.01" pos="{by}" quat="{turned}" mass="0.01"/>'
+    leg = '<joint name="front_left_knee"'
+    xml = XML.replace("<freejoint/>", "<freejoint/>" + shape).replace(leg, wheel + leg)
+    creature = loaded(tmp_path, xml)
+    swings = np.linspace(-0.15, 0.15, 31)
+    qpos = np.concatenate([standing(creature, front_left_hip=angle) for angle in swings])
+    found = overlaps(creature, qpos, excused=False)
+    both = found.depth[:, found.pairs.index(("trunk", "front_left_lower"))]
+    model, data, deep = creature.model, mujoco.MjData(creature.model), []
+    trunk = model.body("trunk").id
+    for pose in qpos:
+        data.qpos[:] = pose
+        mujoco.mj_kinematics(model, data)
+        wheel_geom = next(g for g in range(model.ngeom) if tuple(model.geom_size[g, :2]) == disc)
+        base, turn = data.xpos[trunk], data.xmat[trunk].reshape(3, 3)
+        place = turn.T @ (data.geom_xpos[wheel_geom] - base) - middle
+        axes = turn.T @ data.geom_xmat[wheel_geom].reshape(3, 3)
+        deep.append(least_way_out(box, disc, place, axes))
+    assert min(deep) > 0.005
+    assert (both > 0.9 * np.array(deep)).all()
+    assert (both < 2 * np.array(deep)).all()
 
 
 def test_every_shape_counts_but_the_floor(short):
