@@ -20,6 +20,7 @@ import numpy as np
 
 import mjxgait
 from mjxgait.runs.folder import CERTIFICATE
+from mjxgait.search.state import NOBODY
 
 HEADER = ("run", "certified", "speed", "blocks", "hinges", "mass", "families", "one from")
 
@@ -85,7 +86,9 @@ def families(mothers: np.ndarray) -> list[int]:
     ancestors = np.arange(mothers.shape[1])
     counts = [len(ancestors)]
     for of_generation in mothers[1:].astype(int):
-        ancestors = ancestors[of_generation]
+        # Who has no mother is the first of a family.
+        first = ancestors.max() + 1 + np.arange(len(ancestors))
+        ancestors = np.where(of_generation == NOBODY, first, ancestors[of_generation])
         counts.append(len(set(ancestors.tolist())))
     return counts
 

@@ -239,11 +239,14 @@ def test_the_bar_comes_down_a_step_when_most_of_the_best_have_mastered_it(
     rounds, fitness = jnp.full(len(terms), 3.0), -jnp.arange(float(len(terms)))
     state = EvolutionState(**names | {"terms": jnp.asarray(terms), "rounds": rounds})
     state = at(dataclasses.replace(state, fitness=fitness), level=4, generation=7)
+    state = at(state, quiet=6, barren=2, spell_best=3.0)
     settings = LimboConfig(lowering=5)
     after = climbed(task, settings, state)
     assert int(after.level) == 4 + climbs
     assert bool(after.stale) == climbs
     assert (np.asarray(after.rounds) == (0.0 if climbs else 3.0)).all()
+    spells = (int(after.quiet), int(after.barren), float(after.spell_best))
+    assert spells == ((-1, 0, -np.inf) if climbs else (6, 2, 3.0))
     nobody = (at(state, generation=-1), at(state, fitness=np.full(len(terms), -np.inf)))
     assert all(int(climbed(task, settings, unjudged).level) == 4 for unjudged in nobody)
     assert climbed(task, settings, dataclasses.replace(state, level=None)).level is None

@@ -9,7 +9,7 @@ import pytest
 from helpers import small_config
 
 from mjxgait.creature import Creature
-from mjxgait.runs.experiment import build_experiment
+from mjxgait.runs.experiment import Experiment, build_experiment
 from mjxgait.runs.generation import next_starts
 from mjxgait.search.chance import key_of
 from mjxgait.settings.control import HOLDS
@@ -149,20 +149,26 @@ def test_each_generation_has_other_starts_until_all_have_had_their_turn(stool: C
 
 
 def test_disturbances_grow_in_so_many_steps_to_their_full_size(stool: Creature):
-    """In the program that is run; without steps trials are as hard as they will be, and never harder."""
+    """As compiled, as it is run; without steps trials are as hard as they will be, and never harder."""
     rollout = {"seconds": 0.4, "starts": 5, "latency": 4, "promote": 1.0}
-    row, plain = (
+    row, plain, long = (
         build_experiment(stool, small_config(rollout=rollout, fitness={"hardening": steps}))
-        for steps in (3, 0)
+        for steps in (3, 0, 40)
     )
-    full, state = row.row.starts, row.init()
-    assert state.level == 0
+    full = row.row.starts
+    assert row.init().level == 0
     assert plain.init().level is None
     assert not differing(jax.device_get(plain.row.starts), jax.device_get(full))
-    for level, share in ((0, 0.25), (2, 0.75), (3, 1.0), (9, 1.0)):
-        now = next_starts(
-            row.simulator.task, row.row, dataclasses.replace(state, level=jnp.int32(level))
+
+    def at(experiment: Experiment, level: int) -> Starts:
+        now = dataclasses.replace(experiment.init(), level=jnp.int32(level))
+        return jax.jit(next_starts, static_argnums=0)(
+            experiment.simulator.task, experiment.row, now
         )
+
+    assert np.array_equal(at(long, 40).delay, full.delay)
+    for level, share in ((0, 0.25), (2, 0.75), (3, 1.0), (9, 1.0)):
+        now = at(row, level)
         for field, usual in (
             ("qpos", full.qpos[0]),
             ("qvel", 0.0),

@@ -17,16 +17,27 @@ MEANS = ("mean", "median", "lower_quartile", "upper_quartile", "spread")
 
 
 def exchanged(states: Sequence[Packed], config: IslandsConfig) -> list[Packed]:
-    """The states after the best of each have been copied over the worst of others; all have come as far."""
+    """The states after the best of each have been copied over the worst of others; all have come as far.
+
+    Who was judged on milder trials than those of an island does not come to it.
+    """
     found = [_individuals(state.arrays) for state in states]
-    return [
-        _taken_in(state, [_first(found[i], config.migrants) for i in config.sources(island)])
-        for island, state in enumerate(states)
-    ]
+
+    def come(island: int) -> list[dict[str, np.ndarray]]:
+        least = _level(states[island])
+        sources = [i for i in config.sources(island) if _level(states[i]) >= least]
+        return [_first(found[i], config.migrants) for i in sources]
+
+    return [_taken_in(state, come(island)) for island, state in enumerate(states)]
 
 
 def gathered(states: Sequence[Packed]) -> Packed:
-    """The best of all islands as one population of the same size; all else is of the best island."""
+    """The best of all islands as one population of the same size; all else is of the best island.
+
+    Of islands whose trials differ in how hard they are, those with the hardest.
+    """
+    hardest = max(map(_level, states))
+    states = [state for state in states if _level(state) == hardest]
     leader = int(np.nanargmax([_comparable(state.arrays["fitness"])[0] for state in states]))
     size = len(states[leader].arrays["fitness"])
     found = [_individuals(state.arrays) for state in states]
@@ -58,10 +69,17 @@ def together(lines: Sequence[Mapping[str, Any]], seconds: float) -> dict[str, An
 
 def _taken_in(state: Packed, migrants: Sequence[Mapping[str, np.ndarray]]) -> Packed:
     """A population, sorted best first, with migrants in the place of its worst, half of it at most."""
+    if not migrants:
+        return state
     size = len(state.arrays["fitness"])
     come = _sorted(_joined(migrants), size // 2)
     stay = _first(_individuals(state.arrays), size - len(come["fitness"]))
     return state.with_arrays(_sorted(_joined([stay, come]), size))
+
+
+def _level(state: Packed) -> int:
+    """How often its trials have become harder."""
+    return int(state.arrays.get("level", 0))
 
 
 def _individuals(arrays: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:

@@ -19,11 +19,6 @@ STRIDE = 0.7
 """Hip heights that its strides should be at that speed."""
 LEAST = 0.5
 """Those that the certificate asks for: a cycle that leads through shorter ones is a buzz."""
-HARDENING = 8
-"""Steps in which its disturbances grow to their full size. In full from the first generation on nearly
-all fall, and who falls a little later is no nearer to a walk."""
-BY_LOAD = 0.0
-"""`fitness.contact` by which a foot is down that bears weight, as the certificate has it."""
 
 WHIPPED = 4.0
 """What it costs to swing a foot too fast, in body lengths per √(g·h): of robots that fail by one
@@ -58,8 +53,8 @@ def manner(
         notes.guess(
             "train",
             f"{STARTS} starts, others in each of {GENERATIONS} generations at most, with torques up to {LATE} "
-            f"step late, disturbed more and more; small mutations; feet are down that bear weight; staying up "
-            f"counts {ALIVE:g}, {BRISK:g} body lengths/s in strides of {STRIDE:g} hip heights",
+            f"step late; small mutations; staying up counts {ALIVE:g}, {BRISK:g} body lengths/s in strides "
+            f"of {STRIDE:g} hip heights",
             "medium",
             "on one foot or two it falls unless it walks: more disturbed starts, and first of all "
             "to stay up",
@@ -69,7 +64,7 @@ def manner(
         # It bounces: what is near the floor need not bear weight, which others learn more slowly by.
         bounces = rotor > mass * hip**2
         if bounces:
-            table["fitness"]["contact"] = BY_LOAD
+            table["fitness"]["contact"] = 0.0
         notes.guess(
             "train",
             "other starts in each generation; small mutations; feet that swing too fast cost"
@@ -95,8 +90,6 @@ def few_feet(hip: float, length: float, mass: float, time_step: float) -> dict[s
         "evolution": {"generations": GENERATIONS, "sigma": SMALLER},
         "fitness": {
             "speed": BRISK,
-            "hardening": HARDENING,
-            "contact": BY_LOAD,
             "frequency": round(calm, 2),
             "weights": {"alive": ALIVE, "frequency": HASTY},
         },

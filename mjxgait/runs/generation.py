@@ -181,7 +181,7 @@ def climbed(task: Task, settings: Any, state: EvolutionState) -> EvolutionState:
     there is a higher one.
 
     What they were worth at the old level is then forgotten, for it was easier: of those that live
-    on all are judged again.
+    on all are judged again, and that they are worth less is no stall.
     """
     if state.level is None:
         return state
@@ -190,7 +190,15 @@ def climbed(task: Task, settings: Any, state: EvolutionState) -> EvolutionState:
     ready = jnp.mean(jax.vmap(task.mastered)(best) & known) > 0.5
     higher = ready & (state.level < task.levels(settings))
     rounds = None if state.rounds is None else jnp.where(higher, 0.0, state.rounds)
-    return dataclasses.replace(state, level=state.level + higher, stale=higher, rounds=rounds)
+    return dataclasses.replace(
+        state,
+        level=state.level + higher,
+        stale=higher,
+        rounds=rounds,
+        quiet=jnp.where(higher, -1, state.quiet),
+        barren=jnp.where(higher, 0, state.barren),
+        spell_best=jnp.where(higher, -jnp.inf, state.spell_best),
+    )
 
 
 def next_starts(task: Task, row: Row, state: EvolutionState) -> Starts:

@@ -58,6 +58,24 @@ def test_who_could_not_be_judged_is_the_worst():
     assert fitness(went) == [[3, 1], [3, 1]]
 
 
+def at(level: int, state: Packed) -> Packed:
+    return state.with_arrays({"level": np.int32(level)})
+
+
+def test_nobody_comes_who_was_judged_on_milder_trials():
+    ahead, behind = at(3, island(2, 1)), at(2, island(9, 8))
+    went = exchanged([ahead, behind], IslandsConfig(count=2, migrants=1))
+    assert fitness(went) == [[2, 1], [9, 2]]
+    same = exchanged([ahead, at(3, island(9, 8))], IslandsConfig(count=2, migrants=1))
+    assert fitness(same) == [[9, 2], [9, 2]]
+
+
+def test_together_those_count_whose_trials_are_the_hardest():
+    best = gathered([at(3, island(2, 1)), at(2, island(9, 8))])
+    assert best.arrays["fitness"].tolist() == [2, 1]
+    assert best.arrays["level"] == 3
+
+
 def test_together_they_are_one_population_of_the_best():
     best = gathered(THREE)
     assert best.arrays["fitness"].tolist() == [9, 8, 7, 6]

@@ -66,9 +66,10 @@ class Walk(PlainTask):
         return settings.hardening
 
     def harder(self, trials: Starts, settings: WalkConfig, level: jax.Array) -> Starts:
-        """See `Task`: disturbances grow, so that whoever stays up learns to bear them little by little."""
+        """See `Task`: disturbances grow, so that whoever stays up learns to bear them bit by bit."""
         steps = settings.hardening
-        return milder(trials, (jnp.minimum(level, steps) + 1) / (steps + 1))
+        # Compiled, the quotient need not be 1 to the bit, and a torque is late by whole steps.
+        return milder(trials, jnp.where(level < steps, (level + 1) / (steps + 1), 1.0))
 
     def mastered(self, terms: Mapping[str, jax.Array]) -> jax.Array:
         """See `Task`: who hardly ever falls."""
