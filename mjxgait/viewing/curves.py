@@ -29,16 +29,12 @@ def plot_fitness(lines: Lines, path: Path) -> None:
 
 
 def draw_fitness(axes: Axes, lines: Lines) -> None:
-    """Best, mean and quartiles, spells of forced evolution shaded."""
+    """Best, mean, and quartiles where everybody was judged; spells of forced evolution shaded."""
     column = columns(lines)
     generation = column["generation"]
-    axes.fill_between(
-        generation,
-        column["lower_quartile"],
-        column["upper_quartile"],
-        color=PALE,
-        label="middle half",
-    )
+    lower, upper = column["lower_quartile"], column["upper_quartile"]
+    if np.isfinite(lower).any():
+        axes.fill_between(generation, lower, upper, color=PALE, label="middle half")
     axes.plot(generation, column["best"], "-", color=DARK, linewidth=2, label="best")
     axes.plot(generation, column["mean"], "--", color=DARK, linewidth=1.2, label="mean")
     shade_forced(axes, column)

@@ -10,10 +10,11 @@ from viewing.made_up import falling, metrics_line, treading, write_run
 
 from mjxgait.errors import UserError
 from mjxgait.runs.folder import METRICS
-from mjxgait.viewing.curves import columns, plot_fitness
+from mjxgait.viewing.curves import columns, draw_fitness, plot_fitness
 from mjxgait.viewing.filmstrip import filmstrip
 from mjxgait.viewing.gaitplots import gait_window
 from mjxgait.viewing.plots import plot_run
+from mjxgait.viewing.style import figure
 from mjxgait.viewing.walk import record_walk
 
 PROGRESS = {"fitness", "terms", "diversity"}
@@ -42,6 +43,19 @@ def test_all_plots_of_a_run(stool_run, tmp_path):
 def test_a_run_without_a_champion_has_its_curves(stool, tmp_path):
     files = plot_run(write_run(tmp_path / "run", stool), formats=("png",))
     assert {file.stem for file in files} == PROGRESS
+
+
+@pytest.mark.parametrize("judged", [True, False])
+def test_a_curve_tells_of_a_middle_half_only_where_all_were_judged(judged):
+    lines = [metrics_line(generation) for generation in range(3)]
+    if not judged:
+        lines = [line | {"lower_quartile": None, "upper_quartile": None} for line in lines]
+    with figure((4, 3)) as drawing:
+        axes = drawing.subplots()
+        draw_fitness(axes, lines)
+        told = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert ("middle half" in told) == judged
+    assert {"best", "mean"} <= set(told)
 
 
 def test_a_champion_that_falls_can_be_plotted(tmp_path):
