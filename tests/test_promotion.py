@@ -86,6 +86,17 @@ def test_only_what_was_run_is_counted(everybody: Any, half: Any):
     assert int(counted.computed_steps) >= int(counted.sim_steps)
 
 
+def test_quartiles_are_of_those_who_were_judged(half: Any):
+    """As the mean is; half of the population has no fitness. Between two of them it is either."""
+    _, state, told = half
+    judged = state.fitness[np.isfinite(state.fitness)]
+    assert 0 < len(judged) < len(state.fitness)
+    either = [np.percentile(judged, [25, 50, 75], method=side) for side in ("lower", "higher")]
+    found = (told.lower_quartile, told.median, told.upper_quartile)
+    assert all(one in pair for one, *pair in zip(found, *either, strict=True))
+    assert told.mean == pytest.approx(judged.mean(), rel=1e-5)
+
+
 def test_a_start_that_is_not_wanted_is_not_simulated(stool: Creature):
     """Its tally is untouched, and those of the others are what they are when all are wanted."""
     experiment = build_experiment(stool, small_config(rollout=STARTS))

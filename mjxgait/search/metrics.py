@@ -17,7 +17,7 @@ def metrics(
     mothers: jax.Array | None,
 ) -> GenerationMetrics:
     """Of a state that is sorted, and the verdict that led to it. forced: [] whether it was."""
-    quartiles = jnp.percentile(
+    quartiles = jnp.nanpercentile(
         jnp.where(jnp.isfinite(state.fitness), state.fitness, jnp.nan),
         jnp.array([25, 50, 75]),
         method="nearest",

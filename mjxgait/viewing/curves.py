@@ -29,7 +29,7 @@ def plot_fitness(lines: Lines, path: Path) -> None:
 
 
 def draw_fitness(axes: Axes, lines: Lines) -> None:
-    """Best, mean, and quartiles where everybody was judged; spells of forced evolution shaded."""
+    """Best, mean, and quartiles where the log tells of them; spells of forced evolution shaded."""
     column = columns(lines)
     generation = column["generation"]
     lower, upper = column["lower_quartile"], column["upper_quartile"]

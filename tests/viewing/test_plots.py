@@ -46,7 +46,7 @@ def test_a_run_without_a_champion_has_its_curves(stool, tmp_path):
 
 
 @pytest.mark.parametrize("judged", [True, False])
-def test_a_curve_tells_of_a_middle_half_only_where_all_were_judged(judged):
+def test_a_curve_tells_of_a_middle_half_only_where_the_log_does(judged):
     lines = [metrics_line(generation) for generation in range(3)]
     if not judged:
         lines = [line | {"lower_quartile": None, "upper_quartile": None} for line in lines]
