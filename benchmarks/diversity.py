@@ -2,10 +2,11 @@
 
     python benchmarks/diversity.py runs/zoo/seed* --picture diversity.png
 
-Prints a row per run: families and spread in the end, and what its champion is. The picture has,
-per run, of how many of the first generation anybody is descended, mother by mother; and the
-champions by what can be counted of a body: blocks, hinges, and how fast it goes.
-For those that go somewhere: swim, walk, follow.
+Prints a row per run: what its champion is, how many families its population has in the end, and from
+which generation on it is one. A family is whoever is descended, mother by mother, from one that had
+no mother: of the first generation, or drawn anew. The picture has the families by generation, and
+the champions by blocks, hinges and speed. For bodies of blocks that go somewhere (swim, walk,
+follow), whose runs tell of mothers (`evolution.lineage`).
 """
 
 import argparse
@@ -82,7 +83,7 @@ def animal(folder: Path) -> Animal:
 
 
 def families(mothers: np.ndarray) -> list[int]:
-    """How many of the first generation have anybody living, by generation. mothers: [G, P]."""
+    """How many there are in each generation. mothers: [G, P] places in the one before."""
     ancestors = np.arange(mothers.shape[1])
     counts = [len(ancestors)]
     for of_generation in mothers[1:].astype(int):
@@ -97,7 +98,7 @@ def draw(animals: list[Animal], path: Path) -> None:
     figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4), layout="constrained")
     for one in animals:
         left.plot(one.families, color="C0", alpha=0.4, linewidth=1)
-    left.set(xlabel="generation", ylabel="families of the first generation", yscale="log")
+    left.set(xlabel="generation", ylabel="families", yscale="log")
     for certified, color, label in ((True, "C2", "certified"), (False, "C7", "not certified")):
         of_kind = [one for one in animals if one.certified == certified]
         right.scatter(

@@ -1,8 +1,9 @@
 """What a study compares: its file, checked, as variants with the full config of every run."""
 
+import contextlib
 import dataclasses
 import itertools
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -158,18 +159,7 @@ def make_plan(study: Study, creature: Creature, where: str) -> Plan:
     for table in tables:
         if table.name in configs:
             raise UserError(f'{where}: two variants are called "{table.name}"; name them apart')
-        here = f'{where}: variant "{table.name}"'
-        use = {**study.base.get("use", {}), **table.settings.get("use", {})}
-        own = _config(table.config or study.config, creature, here, use)
-        if not table.config:
-            own = _lay(own, study.base, f"{where}: [base]")
-        new = _settled(_asked(_lay(own, table.settings, here), table.gait, creature, here))
-        new = dataclasses.replace(
-            new,
-            evolution=dataclasses.replace(
-                new.evolution, generations=table.generations or study.generations
-            ),
-        )
+        new = _config(study, table, creature, where)
         equal = next((name for name, other in configs.items() if other == new), None)
         if equal is not None and not study.allow_equal:
             raise UserError(
@@ -194,31 +184,43 @@ def make_plan(study: Study, creature: Creature, where: str) -> Plan:
     return Plan(study, tuple(configs), tuple(runs))
 
 
-def _asked(config: Config, gait: str | None, creature: Creature, where: str) -> Config:
+def _config(study: Study, table: VariantTable, creature: Creature, where: str) -> Config:
+    """What all runs of a variant have, but for their seeds."""
+    here = f'{where}: variant "{table.name}"'
+    use = {**study.base.get("use", {}), **table.settings.get("use", {})}
+    file = table.config or study.config
+    with _told_of(here):
+        config = resolve_config(
+            creature.settings.train, creature.name, Path(file) if file else None, use
+        )
+    if not table.config:
+        config = _lay(config, study.base, f"{where}: [base]")
+    config = _lay(config, table.settings, here)
+    with _told_of(here):
+        config = wished(config, creature, Wishes(gait=table.gait))
+    return _settled(config, table.generations or study.generations)
+
+
+@contextlib.contextmanager
+def _told_of(where: str) -> Iterator[None]:
+    """A mistake that is found here is told with where it is."""
     try:
-        return wished(config, creature, Wishes(gait=gait))
+        yield
     except UserError as error:
         raise UserError(f"{where}: {error}") from None
 
 
-def _config(
-    file: str | None, creature: Creature, where: str, use: Mapping[str, str] | None
-) -> Config:
-    path = Path(file) if file else None
-    try:
-        return resolve_config(creature.settings.train, creature.name, path, use)
-    except UserError as error:
-        raise UserError(f"{where}: {error}") from None
-
-
-def _settled(config: Config) -> Config:
+def _settled(config: Config, generations: int) -> Config:
     """All runs go on for all their generations: one that stopped early would be compared with
     others that had more.
     """
-    forced = dataclasses.replace(config.evolution.forced, patience=0)
-    return dataclasses.replace(
-        config, evolution=dataclasses.replace(config.evolution, target=None, forced=forced)
+    evolution = dataclasses.replace(
+        config.evolution,
+        target=None,
+        generations=generations,
+        forced=dataclasses.replace(config.evolution.forced, patience=0),
     )
+    return dataclasses.replace(config, evolution=evolution)
 
 
 def _lay(config: Config, table: Mapping[str, Any], where: str) -> Config:

@@ -14,6 +14,7 @@ import numpy as np
 
 from mjxgait.runs.blueprint import Numbers, Plan
 from mjxgait.search.evolution import Evolution
+from mjxgait.search.forced import begun_anew
 from mjxgait.search.state import NOBODY, EvolutionState, GenerationMetrics, Proposal
 from mjxgait.settings.config import Config
 from mjxgait.simulation.evaluator import Local
@@ -190,15 +191,8 @@ def climbed(task: Task, settings: Any, state: EvolutionState) -> EvolutionState:
     ready = jnp.mean(jax.vmap(task.mastered)(best) & known) > 0.5
     higher = ready & (state.level < task.levels(settings))
     rounds = None if state.rounds is None else jnp.where(higher, 0.0, state.rounds)
-    return dataclasses.replace(
-        state,
-        level=state.level + higher,
-        stale=higher,
-        rounds=rounds,
-        quiet=jnp.where(higher, -1, state.quiet),
-        barren=jnp.where(higher, 0, state.barren),
-        spell_best=jnp.where(higher, -jnp.inf, state.spell_best),
-    )
+    after = begun_anew(state, higher)
+    return dataclasses.replace(after, level=state.level + higher, stale=higher, rounds=rounds)
 
 
 def next_starts(task: Task, row: Row, state: EvolutionState) -> Starts:

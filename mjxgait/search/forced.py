@@ -66,5 +66,18 @@ def decided(whole: EvolutionConfig, state: EvolutionState) -> EvolutionState:
     )
 
 
+def begun_anew(state: EvolutionState, now: jax.Array) -> EvolutionState:
+    """Where now [], what growth was before counts no more: everybody is worth something else.
+
+    The window then begins with the next generation, for this one's best was still worth the old.
+    """
+    return dataclasses.replace(
+        state,
+        quiet=jnp.where(now, -1, state.quiet),
+        barren=jnp.where(now, 0, state.barren),
+        spell_best=jnp.where(now, -jnp.inf, state.spell_best),
+    )
+
+
 def _grown(history: jax.Array, gain: jax.Array | float) -> jax.Array:
     return history[-1] - history[0] > gain * jnp.maximum(jnp.abs(history[0]), 1.0)

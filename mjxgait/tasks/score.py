@@ -34,3 +34,11 @@ def ramped(generations: jax.Array | int, generation: jax.Array) -> jax.Array:
     """
     grown = optax.linear_schedule(0.0, 1.0, 1)(generation / jnp.maximum(generations, 1))
     return jnp.where(jnp.asarray(generations) > 0, grown, 1.0)
+
+
+def hardness(steps: jax.Array | int, level: jax.Array) -> jax.Array:
+    """Up to 1, the share [] of what trials will ask for that they ask for at a level [], if that grows in
+    so many steps; all of it if in none.
+    """
+    # Compiled, the quotient need not be 1 to the bit, and what is cut to whole numbers would never be all.
+    return jnp.where(level < steps, (level + 1) / (steps + 1), 1.0)

@@ -19,6 +19,7 @@ from mjxgait.settings.rollout import RolloutConfig
 from mjxgait.tasks.blocks.alive import GoingTask, length
 from mjxgait.tasks.blocks.roam import Roam
 from mjxgait.tasks.blocks.swim import Swim
+from mjxgait.tasks.score import hardness
 from mjxgait.tasks.trials import Starts
 from mjxgait.types import Sensed
 
@@ -72,8 +73,7 @@ class Following(GoingTask):
 
     def harder(self, trials: Starts, settings: Any, level: jax.Array) -> Starts:
         """See `Task`: lights spread, so that whoever gets on learns to turn little by little."""
-        steps = settings.widening
-        spread = jnp.where(level < steps, (level + 1) / (steps + 1), 1.0)
+        spread = hardness(settings.widening, level)
         assert trials.light is not None
         return dataclasses.replace(trials, light=_aside(trials.light, spread, 0.0))
 

@@ -14,6 +14,7 @@ from mjxgait.senses import sense
 from mjxgait.settings.rollout import RolloutConfig
 from mjxgait.settings.walk import WalkConfig, WishConfig
 from mjxgait.tasks.plain import PlainTask
+from mjxgait.tasks.score import hardness
 from mjxgait.tasks.trials import Starts, draw_starts, milder
 from mjxgait.tasks.walk.fitness import fitness_terms, signed_weights, terms_under
 from mjxgait.tasks.walk.tally import Judge, Tally
@@ -67,9 +68,7 @@ class Walk(PlainTask):
 
     def harder(self, trials: Starts, settings: WalkConfig, level: jax.Array) -> Starts:
         """See `Task`: disturbances grow, so that whoever stays up learns to bear them bit by bit."""
-        steps = settings.hardening
-        # Compiled, the quotient need not be 1 to the bit, and a torque is late by whole steps.
-        return milder(trials, jnp.where(level < steps, (level + 1) / (steps + 1), 1.0))
+        return milder(trials, hardness(settings.hardening, level))
 
     def mastered(self, terms: Mapping[str, jax.Array]) -> jax.Array:
         """See `Task`: who hardly ever falls."""
