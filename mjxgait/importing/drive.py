@@ -45,7 +45,8 @@ RANGES = {
     "other": 20.0,
 }
 """deg to both sides of the standing angle, by what a joint does. Distal is what swings a foot below two
-joints that do, as hocks and pasterns: limbs flail that swing widely in all of them."""
+joints that do, as hocks and pasterns: limbs flail that swing widely in all of them. Who has one leg hops with all
+of it."""
 SWINGING = 2
 """Joints of a leg that swing it widely."""
 STEPPERS, APART = 2, 0.5
@@ -170,7 +171,7 @@ def _roles(puppet: Puppet, q: np.ndarray, stance: Stance) -> tuple[list[str], np
             roles.append(
                 ROLES[int((np.abs(mean[j]) * [1.3, 1.0, 1.0]).argmax())]
             )  # a tie is a stride
-    for f in range(len(puppet.feet)):
+    for f in range(len(puppet.feet)) if len(puppet.feet) > 1 else ():
         for j in [j for j in puppet.leg(f) if roles[j] in ("stride", "lift")][SWINGING:]:
             roles[j] = "distal"
     return roles, mean

@@ -20,6 +20,10 @@ STRIDE = 0.7
 LEAST = 0.5
 """Those that the certificate asks for: a cycle that leads through shorter ones is a buzz."""
 
+LEAPING, RISES = 1.6, 8
+"""Body lengths per second that who has one leg should hop, and in how many steps disturbances grow as it
+learns to bear them: at two legs' speed its hops are short, and with all of them at once it falls."""
+
 WHIPPED = 4.0
 """What it costs to swing a foot too fast, in body lengths per √(g·h): of robots that fail by one
 criterion alone most do by the speed of their fastest part, which is a foot."""
@@ -33,6 +37,7 @@ ENOUGH = 0.1
 
 def manner(
     steps: bool,
+    legs: int,
     symmetric: bool,
     hip: float,
     length: float,
@@ -44,17 +49,21 @@ def manner(
     """The table `[train]` of an imported creature, each reason told.
 
     Args:
-      steps: whether it must step under its fall. hip: m, its height. length: m, of the body. mass: kg.
+      steps: whether it must step under its fall. legs: how many. hip: m, its height. length: m, of the body. mass: kg.
       time_step: s. rotor: kg m², the inertia of its usual motor.
     """
     table: dict[str, Any] = {"base": "other_starts", "examination": {"enough": ENOUGH}}
     if steps:
         table |= few_feet(hip, length, mass, time_step)
+        speed = f"{BRISK:g} body lengths/s in strides of {STRIDE:g} hip heights"
+        if legs == 1:
+            table["fitness"] |= {"speed": LEAPING, "hardening": RISES}
+            table["fitness"]["weights"]["airborne"] = 0.0
+            speed = f"{LEAPING:g} body lengths/s, in the air for free; disturbances that grow"
         notes.guess(
             "train",
             f"{STARTS} starts, others in each of {GENERATIONS} generations at most, with torques up to {LATE} "
-            f"step late; small mutations; staying up counts {ALIVE:g}, {BRISK:g} body lengths/s in strides "
-            f"of {STRIDE:g} hip heights",
+            f"step late; small mutations; staying up counts {ALIVE:g}, {speed}",
             "medium",
             "on one foot or two it falls unless it walks: more disturbed starts, and first of all "
             "to stay up",

@@ -78,6 +78,13 @@ def _leg_length(puppet: Puppet, foot: int) -> float:
     return max(float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum()), 1e-3)
 
 
+def across(sole: np.ndarray) -> np.ndarray:
+    """[3] the way up from a sole [n, 3] that lies nearly flat: at right angles to its longest side."""
+    along = np.linalg.svd(sole - sole.mean(0))[2][0]
+    up = np.array([0.0, 0.0, 1.0]) - along[2] * along
+    return np.asarray(up / np.linalg.norm(up))
+
+
 def straightness(path: np.ndarray) -> float:
     """Of thigh and shank, the two longest parts in a row of a path [n, 3] from joint to joint to
     the sole: 1 is a straight leg.
@@ -103,23 +110,35 @@ class Search:
         self.start = symmetric(np.clip(start, puppet.low, puppet.high), mirror)
         stance = stance_of(puppet, self.start)
         self.hip = 0.85 * float(np.mean([_leg_length(puppet, f) for f in range(len(puppet.feet))]))
-        self.flat = [
-            i
-            for i, sole in enumerate(puppet.sole_points(stance.xpos, stance.xrot))
-            if self._is_flat(i, sole)
-        ]
-        self.ups = [stance.xrot[puppet.feet[f][0]].T @ [0.0, 0.0, 1.0] for f in self.flat]
         self.segments = [
             s for s in puppet.segments() if not any(set(s) & set(group) for group in puppet.feet)
         ]
+        lying = self._lying(stance, straight=False)
+        if not lying and len(puppet.feet) == 1:
+            # Who has one foot to stand on needs all of it, though the shank reach down to the floor.
+            lying = self._lying(stance_of(puppet, self._straightest()), straight=True)
+            above = {puppet.bodies[puppet.feet[f][0]].parent for f in lying}
+            self.segments = [s for s in self.segments if not set(s) & above]
+        self.flat, self.ups = list(lying), list(lying.values())
         self.legs = [puppet.leg(f) for f in range(len(puppet.feet))]
 
-    def _is_flat(self, foot: int, sole: np.ndarray) -> bool:
-        """Whether the file's pose has this foot lie on a broad sole, below an ankle."""
-        if not all(tip.far.all() for tip in self.puppet.tips[foot]):
-            return False
-        low = sole[sole[:, 2] < sole[:, 2].min() + 0.03 * self.hip]
-        return bool(len(low) > 1 and np.ptp(low[:, :2], axis=0).max() > 0.12 * self.hip)
+    def _straightest(self) -> np.ndarray:
+        """[J] the pose with all joints as near to 0 as they come."""
+        nearest = np.clip(np.zeros_like(self.start), self.puppet.low, self.puppet.high)
+        return symmetric(nearest, self.mirror)
+
+    def _lying(self, stance: Stance, straight: bool) -> dict[int, np.ndarray]:
+        """Which feet lie on a broad sole, below an ankle, and the way up [3] in their own axes;
+        straight: across the sole, which may be a little tilted there.
+        """
+        up = np.array([0.0, 0.0, 1.0])
+        found = {}
+        for f, sole in enumerate(self.puppet.sole_points(stance.xpos, stance.xrot)):
+            low = sole[sole[:, 2] < sole[:, 2].min() + 0.03 * self.hip]
+            broad = len(low) > 1 and np.ptp(low[:, :2], axis=0).max() > 0.12 * self.hip
+            if broad and all(tip.far.all() for tip in self.puppet.tips[f]):
+                found[f] = stance.xrot[self.puppet.feet[f][0]].T @ (across(low) if straight else up)
+        return found
 
     def run(self, spread: float, seed: int) -> tuple[np.ndarray, float]:
         """The best pose [J] found, and its cost."""

@@ -17,7 +17,14 @@ STEP = 0.005
 
 def told(hip: float = 0.8, length: float = 0.8, **facts: Any) -> tuple[Config, Notes]:
     notes = Notes()
-    settled = {"steps": True, "symmetric": True, "mass": 30.0, "time_step": STEP, "rotor": 0.01}
+    settled = {
+        "steps": True,
+        "legs": 2,
+        "symmetric": True,
+        "mass": 30.0,
+        "time_step": STEP,
+        "rotor": 0.01,
+    }
     settled |= facts
     table = manner(hip=hip, length=length, notes=notes, **settled)
     return build(Config, over_base(table, "the table"), "the table"), notes
@@ -90,3 +97,14 @@ def test_without_a_left_and_a_right_the_whole_cycle_is_evolved(steps: bool):
     assert config.controller.key_poses == 2 * Config().controller.key_poses
     # Two poses and their images, or four: a cycle takes as long.
     assert told(steps=steps)[0].controller.interpolation == config.controller.interpolation
+
+
+def test_who_has_one_leg_hops():
+    """It is in the air between its hops, which lead far enough only if it is to be fast; and it
+    meets disturbances little by little.
+    """
+    one, two = (told(legs=legs)[0].fitness for legs in (1, 2))
+    assert one.weights.airborne == 0 < two.weights.airborne
+    assert one.speed > two.speed
+    assert one.hardening > 0
+    assert one.weights == dataclasses.replace(two.weights, airborne=0.0)

@@ -204,3 +204,34 @@ def test_a_knee_without_limits_bends_to_the_side_it_stands_on(tmp_path):
         above = data.xpos[shin] - data.xpos[thigh]
         below = data.geom_xpos[creature.feet.stepping[0]] - data.xpos[shin]
         assert np.cross(above, below)[1] > 0
+
+
+HOPPER = """<mujoco><compiler angle="degree"/><default><joint type="hinge" axis="0 1 0"/>
+<geom type="capsule" size=".04"/></default><worldbody><body name="torso" pos="0 0 1">
+<joint name="x" type="slide" axis="1 0 0"/><joint name="z" type="slide" axis="0 0 1"/><joint name="tip"/>
+<geom fromto="0 0 0 0 0 .2" size=".07"/>
+<body name="pelvis" pos="0 0 -.05"><joint name="waist" range="-30 30"/><geom fromto="0 0 0 0 0 -.15" size=".06"/>
+<body name="thigh" pos="0 0 -.2"><joint name="hip" range="-170 10"/><geom fromto="0 0 0 0 0 -.33"/>
+<body name="calf" pos="0 0 -.33"><joint name="knee" range="5 150"/><geom fromto="0 0 0 0 0 -.32" size=".03"/>
+<body name="foot" pos="0 0 -.32"><joint name="ankle" range="-45 45"/><geom fromto="-.08 0 0 .17 0 0"/>
+</body></body></body></body></body></worldbody></mujoco>"""
+"""On one foot; its knee never comes to 0, and by halves of its ranges it would stand on its toe."""
+
+
+def test_who_has_one_foot_stands_on_all_of_it(tmp_path):
+    hopper, imported = bring(tmp_path, HOPPER)
+    assert imported.stands
+    data = mujoco.MjData(hopper.model)
+    data.qpos[:] = hopper.stand_qpos
+    mujoco.mj_kinematics(hopper.model, data)
+    heel, toe = (data.geom(f"foot_foot_{end}").xpos for end in (1, 2))
+    assert abs(toe[2] - heel[2]) < 0.01 * hopper.frame.hip_height
+
+
+def test_one_leg_swings_widely_in_all_of_its_joints(tmp_path):
+    """Of several a hock and a pastern do not; but who hops on one leg bends all of it."""
+    hopper, _ = bring(tmp_path, HOPPER)
+    span = dict(
+        zip(hopper.joints.names, hopper.joints.pose_high - hopper.joints.pose_low, strict=True)
+    )
+    assert span["knee"] > np.radians(70) > span["waist"]
