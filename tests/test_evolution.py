@@ -222,11 +222,28 @@ def test_no_family_takes_more_than_its_share():
     assert len(np.unique(ancestors)) < len(np.unique(history[-1][0].family)) >= 4
 
 
+@pytest.mark.parametrize("elite", [0.0, 0.25])
+def test_no_family_takes_more_than_its_share_where_parents_die(elite: float):
+    """Where others have too few children, their old ones stay."""
+    sparing = toy(
+        growth=3.0,
+        forced=ForcedConfig(enabled=False),
+        family=0.25,
+        survival="children",
+        elite=elite,
+        selection="tournament",
+        rivals=4,
+    )
+    for state, _ in run(sparing, 25):
+        assert np.bincount(state.family).max() <= 5
+        assert np.isfinite(state.fitness).all()
+
+
 def test_of_a_family_the_best_come_first():
     family = jnp.array([7, 7, 3, 7, 3, 7])
-    fitness = jnp.array([1.0, 5.0, 2.0, 5.0, 2.0, 9.0])
+    rank = jnp.array([5, 1, 3, 2, 4, 0])
     counts = jnp.array([True, True, True, True, True, False])
-    assert place_in_family(family, fitness, counts).tolist() == [2, 0, 0, 1, 1, 0]
+    assert place_in_family(family, rank, counts).tolist() == [2, 0, 0, 1, 1, 0]
 
 
 def test_newcomers_begin_families_of_their_own():

@@ -286,12 +286,18 @@ class Evolution:
         first = first_occurrence(pool[0])
         again, now = self._again(state)
         if again:  # one that is judged once more is like its old self
-            young = jnp.append(jnp.zeros(count, bool), first_occurrence(proposal.offspring))
+            others = jnp.arange(count) >= again
+            young = jnp.append(others, first_occurrence(proposal.offspring))
             first = jnp.where(now, young, first)
         distinct = first | jnp.logical_not(self.config.remove_duplicates)
         admitted = forced.admitted(self.config, state, fitness, fresh & distinct)
-        if again:  # nobody has judged the old in this round
-            fitness = jnp.where(fresh | ~now, fitness, -jnp.inf)
+        spared = (
+            jnp.logical_not(fresh) & distinct & bool(self.config.elites and self.config.family < 1)
+        )
+        if (
+            again
+        ):  # nobody has judged the old in this round, but a family's may be worth what they were
+            fitness = jnp.where(fresh | spared | ~now, fitness, -jnp.inf)
         lives = distinct & (fresh | chosen(self.config.survival, "best"))
         tier = jnp.where(state.forced & fresh, jnp.where(admitted, 2, 0), jnp.where(lives, 1, 0))
         if not self.config.elites:  # the best is never lost, whatever the tiers say
@@ -300,7 +306,9 @@ class Evolution:
         family = families(state, proposal.mothers)
         if family is not None:
             most = max(round(self.config.family * count), 1)
-            tier = 2 * tier + (place_in_family(family, fitness, distinct) < most)
+            rank = jnp.argsort(jnp.lexsort((-fitness, -tier)))
+            # Sooner an old one of another family than one more of a family that has its share.
+            tier = tier + 2 * (distinct & (place_in_family(family, rank, distinct) < most))
         kept = jnp.lexsort((-fitness, -tier))[:count]
         kept = kept[jnp.argsort(-fitness[kept], stable=True)]
         genomes, terms, outcome, born, origin, rounds = jax.tree.map(lambda leaf: leaf[kept], pool)

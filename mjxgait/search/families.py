@@ -22,9 +22,7 @@ def families(state: EvolutionState, mothers: jax.Array | None) -> jax.Array | No
     return jnp.append(state.family, jnp.where(mothers == NOBODY, own, theirs))
 
 
-def place_in_family(family: jax.Array, fitness: jax.Array, counts: jax.Array) -> jax.Array:
-    """[N] how many of its family that count are better than each; of equals the first is."""
-    order = jnp.arange(len(fitness))
-    equal = (fitness[:, None] == fitness) & (order[:, None] > order)
-    better = (fitness[:, None] < fitness) | equal
-    return jnp.sum(better & (family[:, None] == family) & counts, axis=1)
+def place_in_family(family: jax.Array, rank: jax.Array, counts: jax.Array) -> jax.Array:
+    """[N] how many of its family that count are before each, by their rank [N] among all."""
+    before = rank[:, None] > rank
+    return jnp.sum(before & (family[:, None] == family) & counts, axis=1)
