@@ -233,10 +233,11 @@ def test_no_family_takes_more_than_its_share_where_parents_die(elite: float):
         elite=elite,
         selection="tournament",
         rivals=4,
+        mutation_rate=0.3,
     )
     for state, _ in run(sparing, 25):
         assert np.bincount(state.family).max() <= 5
-        assert np.isfinite(state.fitness).all()
+        assert len(np.unique(state.genomes.key_poses, axis=0)) == 20
 
 
 def test_of_a_family_the_best_come_first():

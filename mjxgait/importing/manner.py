@@ -21,8 +21,8 @@ LEAST = 0.5
 """Those that the certificate asks for: a cycle that leads through shorter ones is a buzz."""
 
 LEAPING, RISES = 1.6, 8
-"""Body lengths per second that who has one leg should hop, and in how many steps disturbances grow as it
-learns to bear them: at two legs' speed its hops are short, and with all of them at once it falls."""
+"""Body lengths per second that who has one leg should hop, in the rhythm of who has two, and in how many steps
+disturbances grow as it learns to bear them: at two legs' speed its hops are short, and with all at once it falls."""
 
 WHIPPED = 4.0
 """What it costs to swing a foot too fast, in body lengths per √(g·h): of robots that fail by one

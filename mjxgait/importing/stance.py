@@ -117,7 +117,7 @@ class Search:
         if not lying and len(puppet.feet) == 1:
             # Who has one foot to stand on needs all of it, though the shank reach down to the floor.
             lying = self._lying(stance_of(puppet, self._straightest()), straight=True)
-            above = {puppet.bodies[puppet.feet[f][0]].parent for f in lying}
+            above = {puppet.bodies[puppet.feet[f][0]].parent for f in lying} - {0}
             self.segments = [s for s in self.segments if not set(s) & above]
         self.flat, self.ups = list(lying), list(lying.values())
         self.legs = [puppet.leg(f) for f in range(len(puppet.feet))]

@@ -14,7 +14,7 @@ import jax.numpy as jnp
 
 from mjxgait.search import forced
 from mjxgait.search.breeding import Nursery, parents, proportional_parents
-from mjxgait.search.families import families, place_in_family
+from mjxgait.search.families import families, with_share
 from mjxgait.search.metrics import metrics
 from mjxgait.search.state import NOBODY, EvolutionState, GenerationMetrics, Origin, Proposal
 from mjxgait.search.variation import Variation, first_occurrence
@@ -286,18 +286,14 @@ class Evolution:
         first = first_occurrence(pool[0])
         again, now = self._again(state)
         if again:  # one that is judged once more is like its old self
-            others = jnp.arange(count) >= again
-            young = jnp.append(others, first_occurrence(proposal.offspring))
-            first = jnp.where(now, young, first)
+            anew = jax.tree.map(
+                lambda a, b: jnp.concatenate([a, b]), proposal.offspring, state.genomes
+            )
+            first = jnp.where(now, jnp.roll(first_occurrence(anew), count), first)
         distinct = first | jnp.logical_not(self.config.remove_duplicates)
         admitted = forced.admitted(self.config, state, fitness, fresh & distinct)
-        spared = (
-            jnp.logical_not(fresh) & distinct & bool(self.config.elites and self.config.family < 1)
-        )
-        if (
-            again
-        ):  # nobody has judged the old in this round, but a family's may be worth what they were
-            fitness = jnp.where(fresh | spared | ~now, fitness, -jnp.inf)
+        if again:  # nobody has judged the old in this round
+            fitness = jnp.where(fresh | ~now, fitness, -jnp.inf)
         lives = distinct & (fresh | chosen(self.config.survival, "best"))
         tier = jnp.where(state.forced & fresh, jnp.where(admitted, 2, 0), jnp.where(lives, 1, 0))
         if not self.config.elites:  # the best is never lost, whatever the tiers say
@@ -306,13 +302,12 @@ class Evolution:
         family = families(state, proposal.mothers)
         if family is not None:
             most = max(round(self.config.family * count), 1)
-            rank = jnp.argsort(jnp.lexsort((-fitness, -tier)))
-            # Sooner an old one of another family than one more of a family that has its share.
-            tier = tier + 2 * (distinct & (place_in_family(family, rank, distinct) < most))
+            fit = distinct & (admitted | ~(state.forced & fresh))
+            tier = with_share(family, most, tier, fitness, fit)
         kept = jnp.lexsort((-fitness, -tier))[:count]
         kept = kept[jnp.argsort(-fitness[kept], stable=True)]
         genomes, terms, outcome, born, origin, rounds = jax.tree.map(lambda leaf: leaf[kept], pool)
-        refreshed = state.refreshed + jnp.where(state.forced, jnp.sum(admitted), 0)
+        refreshed = state.refreshed + jnp.where(state.forced, jnp.sum(admitted[kept]), 0)
         mothers = proposal.mothers
         if mothers is not None:
             mothers = jnp.append(_own(state), mothers)[kept]

@@ -26,3 +26,13 @@ def place_in_family(family: jax.Array, rank: jax.Array, counts: jax.Array) -> ja
     """[N] how many of its family that count are before each, by their rank [N] among all."""
     before = rank[:, None] > rank
     return jnp.sum(before & (family[:, None] == family) & counts, axis=1)
+
+
+def with_share(
+    family: jax.Array, most: int, tier: jax.Array, fitness: jax.Array, counts: jax.Array
+) -> jax.Array:
+    """The tiers [N], above all others those who count and are among the first so many of their
+    family: sooner an old one of another family lives than one more of a family that has its share.
+    """
+    rank = jnp.argsort(jnp.lexsort((-fitness, -tier)))
+    return tier + 2 * (counts & (place_in_family(family, rank, counts) < most))

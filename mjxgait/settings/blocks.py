@@ -86,33 +86,6 @@ class RoamConfig(BlocksConfig):
 
 
 @dataclasses.dataclass(frozen=True)
-class FollowConfig:
-    """What followers have besides.
-
-    Attributes:
-      widening: steps in which the lights spread from a narrow cone ahead to all around, one after
-        each generation whose best have mastered the step before; 0: all around from the first on.
-    """
-
-    __pydantic_config__ = STRICT
-    widening: NonNegative = 12.0
-
-
-@dataclasses.dataclass(frozen=True)
-class FollowInWaterConfig(FollowConfig, SwimConfig):
-    """The fitness of followers in water."""
-
-    __pydantic_config__ = STRICT
-
-
-@dataclasses.dataclass(frozen=True)
-class FollowOnLandConfig(FollowConfig, RoamConfig):
-    """The fitness of followers on land."""
-
-    __pydantic_config__ = STRICT
-
-
-@dataclasses.dataclass(frozen=True)
 class JumpWeights:
     """What each term counts; all but `height` are penalties.
 

@@ -1,7 +1,6 @@
 """What is demanded of followers: to get nearer to lights that nobody has seen."""
 
 import dataclasses
-from collections.abc import Mapping
 
 import numpy as np
 
@@ -16,10 +15,6 @@ from mjxgait.certify.tasks.swim import by_water
 from mjxgait.certify.thresholds.blocks import FollowConfig
 from mjxgait.champion import Champion
 from mjxgait.champion.blocks.material import LIGHT
-from mjxgait.creature import Creature
-
-WIDE = 2.0
-"""rad from ahead to the light that is farthest aside: who has seen less is not looked at yet."""
 
 
 class FollowDemands(BlocksDemands):
@@ -84,14 +79,6 @@ class FollowDemands(BlocksDemands):
             apart, axis=1
         )
         return outcome.stayed_up & (nearer >= config.follow.speed * seconds)
-
-    def managed(
-        self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
-    ) -> np.ndarray:
-        """See `Demands`: none, unless lights aside are among its trials."""
-        wide = outcome["aside"].max() >= WIDE
-        managed: np.ndarray = super().managed(outcome, seconds, creature) & wide
-        return managed
 
     def enough(self, seconds: float, config: CertificateConfig) -> float:
         """See `BlocksDemands`: m in the seconds that count, as much nearer as it must get in all."""
