@@ -171,8 +171,8 @@ def _roles(puppet: Puppet, q: np.ndarray, stance: Stance) -> tuple[list[str], np
             roles.append(
                 ROLES[int((np.abs(mean[j]) * [1.3, 1.0, 1.0]).argmax())]
             )  # a tie is a stride
-    legs = [puppet.leg(f) for f in range(len(puppet.feet))]
-    for leg in legs if len(legs) > 1 else []:
+    chains = [puppet.leg(f) for f in range(len(puppet.feet))]
+    for leg in chains if len(chains) > 1 else []:
         for j in [j for j in leg if roles[j] in ("stride", "lift")][SWINGING:]:
             roles[j] = "distal"
     return roles, mean
