@@ -86,9 +86,9 @@ class FollowOnLand(Following, Roam):
 def balanced(key: jax.Array, count: int, axes: int) -> jax.Array:
     """Directions [count, 3] that cancel out together with the one ahead, along so many axes.
 
-    One is behind, or two, or in space three, are a ring about the way; what is left are opposite ones
-    in any direction. In space the ring is turned anyhow, and three are as often one behind and two
-    square to the way.
+    Up to two, in space up to three, are a ring about the way, as far behind as balances it (one alone
+    is behind); what is left are opposite ones in any direction. In space the ring is turned anyhow,
+    and three are as often one behind and two square to the way.
     """
     key_turn, key_which = jax.random.split(key)
     most = 3 if axes == 3 else 1
