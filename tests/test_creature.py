@@ -76,10 +76,21 @@ def test_mirror_signs_of_single_joints():
     """
     axes = np.array([[0, 1, 0], [1, 0, 0], [0, 0, 1]], float)
     partner, sign = mirror_map(
-        np.zeros((3, 3)), axes, np.zeros(3, bool), ["pitch", "roll", "yaw"], 0.01
+        np.zeros((3, 3)), axes, np.zeros(3, bool), np.zeros((3, 3)), ["pitch", "roll", "yaw"], 0.01
     )
     assert partner.tolist() == [0, 1, 2]
     assert sign.tolist() == [1, -1, -1]
+
+
+def test_a_left_and_a_right_joint_about_one_axis_are_each_others_image():
+    """Shoulder blades that roll about the middle of the chest: what they carry tells them apart."""
+    chest, ahead = np.zeros((3, 3)), np.tile([1.0, 0, 0], (3, 1))
+    blades = np.array([[0.1, 0.08, -0.1], [0.1, -0.08, -0.1], [0.2, 0, 0.1]])
+    partner, sign = mirror_map(
+        chest, ahead, np.zeros(3, bool), blades, ["scapula_L", "scapula_R", "neck"], 0.01
+    )
+    assert partner.tolist() == [1, 0, 2]
+    assert sign.tolist() == [-1, -1, -1]
 
 
 def test_a_joint_without_partner_is_named():
@@ -88,6 +99,7 @@ def test_a_joint_without_partner_is_named():
             np.array([[0, 0, 0], [0, 0.5, 0]]),
             np.array([[0, 1.0, 0], [0, 1.0, 0]]),
             np.zeros(2, bool),
+            np.zeros((2, 3)),
             ["a", "b"],
             0.01,
         )

@@ -30,19 +30,23 @@ BOX = Box(Genome(-jnp.ones((K, J)), jnp.zeros(1)), Genome(jnp.ones((K, J)), jnp.
 
 @pytree
 class Problem:
-    """The centre is the best, the higher the slope the more; no value where the first gene is out of the limits."""
+    """The centre is the best, the higher the slope the more; no value where the first gene is out of
+    the limits. Of a silent genome only the first gene does anything.
+    """
 
     slope: float = 1.0
+    silent: bool = False
     lowest: float = -2.0
     highest: float = 2.0
 
     def value(self, genomes: Genome) -> jax.Array:
         first = genomes.key_poses[:, 0, 0]
         inside = (first >= self.lowest) & (first <= self.highest)
-        return jnp.where(inside, self.slope * near_zero(genomes), jnp.nan)
+        worth = jnp.where(self.silent, -(first**2), near_zero(genomes))
+        return jnp.where(inside, self.slope * worth, jnp.nan)
 
 
-CENTRE, FLAT = Problem(), Problem(slope=0.0)
+CENTRE, FLAT, SILENT = Problem(), Problem(slope=0.0), Problem(silent=True)
 
 
 def near_zero(genomes: Genome) -> jax.Array:
@@ -291,6 +295,47 @@ def test_the_population_is_sorted_and_without_duplicates():
         assert np.all(np.diff(state.fitness) <= 0)
         assert np.allclose(near_zero(state.genomes), state.fitness)
         assert int(metrics.unique) == 20
+
+
+def test_of_a_verdict_only_one_survives_if_that_makes_a_duplicate():
+    """Genomes of which much does nothing are copies of each other that no look at them finds."""
+    crowd = {"growth": 6.0, "forced": ForcedConfig(enabled=False)}
+    plain, _ = run(toy(SILENT, **crowd), 12)[-1]
+    state, told = run(toy(SILENT, **crowd, same="verdict"), 12)[-1]
+    assert int(told.unique) == 20
+    assert len(np.unique(plain.fitness)) < 10
+    assert len(np.unique(state.fitness)) == 20
+
+
+def test_of_a_verdict_the_youngest_survives():
+    """So what does nothing drifts, and may do something one day."""
+    drifting = toy(SILENT, forced=ForcedConfig(enabled=False), same="verdict")
+    before = run(drifting, 4)[-1][0]
+    after, _, births = jax.device_get(advance(*inputs(drifting), before))
+    born = SILENT.value(births)
+    known = np.isin(after.fitness, before.fitness) & np.isin(after.fitness, born)
+    assert known.any()
+    assert (after.born[known] == after.generation).all()
+
+
+def test_the_same_verdict_is_that_of_one_round():
+    """One of the elite has the mean of all of its rounds, and its copies have not: only one of them
+    survives all the same.
+    """
+    keeping = toy(
+        SILENT,
+        growth=6.0,
+        survival="children",
+        elite=0.15,
+        remember=True,
+        forced=ForcedConfig(enabled=False),
+        same="verdict",
+    )
+    before, settings = run(keeping, 4)[-1][0], inputs(keeping)[0]
+    after, _, _ = jax.device_get(advance(settings, Problem(slope=6.0, silent=True), before))
+    firsts = np.abs(after.genomes.key_poses[:, 0, 0])
+    assert (after.born < after.generation).any()
+    assert len(np.unique(firsts)) == 20
 
 
 def test_duplicates_fill_the_population_when_they_may_stay():

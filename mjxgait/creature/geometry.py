@@ -116,7 +116,12 @@ def parallel(axes: np.ndarray) -> np.ndarray:
 
 
 def mirror_map(
-    anchors: np.ndarray, axes: np.ndarray, slides: np.ndarray, names: list[str], tolerance: float
+    anchors: np.ndarray,
+    axes: np.ndarray,
+    slides: np.ndarray,
+    carried: np.ndarray,
+    names: list[str],
+    tolerance: float,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Partner joint and sign of every joint under reflection in the vertical plane through the
     trunk.
@@ -127,6 +132,8 @@ def mirror_map(
     Args:
       anchors, axes: [J, 3] in the creature's frame (forward, left, up) in the standing pose, m.
       slides: [J] whether the joint is a slide.
+      carried: [J, 3] m, likewise, the centre of mass of all that hangs on the joint: it tells apart
+        a left joint and a right one that have the same anchor and axis.
       tolerance: m, how far a mirrored anchor may be from its partner's.
 
     Returns:
@@ -135,7 +142,7 @@ def mirror_map(
     Raises:
       UserError: names the joint that has no partner.
     """
-    partner, sign = mirror_images(anchors, axes, slides, tolerance)
+    partner, sign = mirror_images(anchors, axes, slides, carried, tolerance)
     for j, name in enumerate(names):
         if partner[j] < 0:
             raise UserError(
@@ -149,6 +156,7 @@ def mirror_images(
     anchors: np.ndarray,
     axes: np.ndarray,
     slides: np.ndarray,
+    carried: np.ndarray,
     tolerance: float,
     slack: float = 1.0,
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -156,16 +164,19 @@ def mirror_images(
 
     slack: how far axes may be off, in units of what they usually may.
     """
-    image = anchors * [1, -1, 1]
+    mirror = [1, -1, 1]
     turned = axes * np.where(slides[:, None], [1.0, -1.0, 1.0], [-1.0, 1.0, -1.0])
-    distance = np.linalg.norm(image[:, None] - anchors[None], axis=-1)
+    distance, load = (
+        np.linalg.norm((places * mirror)[:, None] - places[None], axis=-1)
+        for places in (anchors, carried)
+    )
     parallel = turned @ axes.T
     fits = (
         (distance < tolerance)
         & (np.abs(parallel) > 1 - 0.01 * slack)
         & (slides[:, None] == slides[None])
     )
-    score = np.where(fits, distance + (1 - np.abs(parallel)), np.inf)
+    score = np.where(fits, distance + (1 - np.abs(parallel)) + load, np.inf)
     partner, places = score.argmin(axis=1), np.arange(len(anchors))
     mutual = fits.any(axis=1) & (partner[partner] == places)
     sign = np.sign(parallel[places, partner]).astype(int)

@@ -43,13 +43,20 @@ def mirrored(
     if len(free):
         trunk, chosen = model.body(settings.creature.trunk).id, [joints[i] for i in free]
         frame = axes @ data.xmat[trunk].reshape(3, 3).T
-        anchors, directions = (
+        carried = data.subtree_com[model.jnt_bodyid[chosen]]
+        anchors, directions, carried = (
             (data.xanchor[chosen] - data.xpos[trunk]) @ frame.T,
             data.xaxis[chosen] @ frame.T,
+            (carried - data.xpos[trunk]) @ frame.T,
         )
         near = 0.02 * float(np.ptp(data.xanchor[joints], axis=0).max() + 0.05)
         found, sign[free] = geometry.mirror_map(
-            anchors, directions, model.jnt_type[chosen] == SLIDE, [names[i] for i in free], near
+            anchors,
+            directions,
+            model.jnt_type[chosen] == SLIDE,
+            carried,
+            [names[i] for i in free],
+            near,
         )
         partner[free] = free[found]
     _check_names(names, partner)

@@ -117,15 +117,17 @@ class Puppet:
         slack: how far images may be off, in units of what a creature's folder allows.
         """
         self.pose(q)
+        mujoco.mj_comPos(self.model, self.data)
         left = np.cross([0.0, 0.0, 1.0], forward)
         frame = np.stack([forward, left, [0.0, 0.0, 1.0]])
-        anchors, axes = (
+        anchors, axes, carried = (
             (self.data.xanchor[1:] - self.data.xpos[1]) @ frame.T,
             self.data.xaxis[1:] @ frame.T,
+            (self.data.subtree_com[self.model.jnt_bodyid[1:]] - self.data.xpos[1]) @ frame.T,
         )
         near = 0.02 * float(np.ptp(self.data.xanchor[1:], axis=0).max() + 0.05)
         slides = np.zeros(len(self.joints), bool)
-        return geometry.mirror_images(anchors, axes, slides, slack * near, slack)
+        return geometry.mirror_images(anchors, axes, slides, carried, slack * near, slack)
 
     def turn(self, matrix: np.ndarray) -> None:
         """Turns the trunk, and everything on it, about the world's origin. matrix: [3, 3]."""

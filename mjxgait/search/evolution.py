@@ -114,7 +114,9 @@ class Evolution:
         seeding = self._seeding(state)
         recalled, rounds = self._recalled(state, judged)
         generation = jnp.where(seeding, jnp.where(self._filled(state), 0, -1), state.generation + 1)
-        grown, mothers = self._survive(state, proposal, recalled, rounds, generation)
+        grown, mothers = self._survive(
+            state, proposal, recalled, judged.terms, rounds, generation
+        )
         planted = self._plant(state, proposal, judged, generation)
         state = jax.tree.map(
             lambda a, b: jnp.where(seeding, a, b), _without_key(planted), _without_key(grown)
@@ -257,16 +259,32 @@ class Evolution:
             seeded=seeded.astype(jnp.int32),
         )
 
+    def _first(
+        self, state: EvolutionState, proposal: Proposal, terms: jax.Array, anew: jax.Array
+    ) -> jax.Array:
+        """Whether each of the old and the offspring [P + M] is the first of its kind. Of one verdict
+        the youngest is, and so is who is judged `anew`, of itself.
+        """
+        same = self.config.same == "verdict"
+        old, new = (state.terms, terms) if same else (state.genomes, proposal.offspring)
+
+        def first(a: Any, b: Any) -> jax.Array:
+            return first_occurrence(jax.tree.map(lambda x, y: jnp.concatenate([x, y]), a, b))
+
+        young = jnp.roll(first(new, old), self.config.population)
+        return young if same else jnp.where(anew, young, first(old, new))
+
     def _survive(
         self,
         state: EvolutionState,
         proposal: Proposal,
         judged: Judged,
+        terms: jax.Array,
         rounds: jax.Array | None,
         generation: jax.Array,
     ) -> tuple[EvolutionState, jax.Array | None]:
         """The P best of the grown population, without duplicates, and the places of their mothers;
-        in a forced generation what was fit enough goes before the old.
+        in a forced generation what was fit enough goes before the old. terms: of this round alone.
         """
         count = self.config.population
         pool = jax.tree.map(
@@ -283,13 +301,8 @@ class Evolution:
         )
         fitness = self._fitness(pool[0], pool[1], generation)
         fresh = jnp.arange(fitness.shape[0]) >= count
-        first = first_occurrence(pool[0])
         again, now = self._again(state)
-        if again:  # one that is judged once more is like its old self
-            anew = jax.tree.map(
-                lambda a, b: jnp.concatenate([a, b]), proposal.offspring, state.genomes
-            )
-            first = jnp.where(now, jnp.roll(first_occurrence(anew), count), first)
+        first = self._first(state, proposal, terms, now if again else jnp.zeros((), bool))
         distinct = first | jnp.logical_not(self.config.remove_duplicates)
         admitted = forced.admitted(self.config, state, fitness, fresh & distinct)
         if again:  # nobody has judged the old in this round

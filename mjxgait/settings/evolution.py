@@ -95,6 +95,8 @@ class EvolutionConfig:
         body's.
       tuning_sigma: by how much it changes, in units of its range; likewise a body's.
       remove_duplicates: of individuals with the same genome only one survives.
+      same: what makes a duplicate: the same `genome`, or the same `verdict` to the bit, where much of
+        a genome may do nothing: the youngest survives.
       lineage: whether a run's metrics tell whose child each is, not of islands.
       family: of the population, the largest share that descends, mother by mother, from one of the
         first generation: so that not all become one family.
@@ -129,6 +131,7 @@ class EvolutionConfig:
     tuning_rate: Fraction = 0.3
     tuning_sigma: Positive = 0.1
     remove_duplicates: bool = True
+    same: Annotated[Literal["genome", "verdict"], SHAPE] = "genome"
     lineage: Annotated[bool, SHAPE] = False
     family: Annotated[Fraction, SHAPE] = 1.0
     forced: ForcedConfig = dataclasses.field(default_factory=ForcedConfig)
