@@ -98,6 +98,25 @@ def test_a_base_that_is_none_is_named_with_those_that_there_are(tmp_path: Path, 
         resolve_config({}, "x", file)
 
 
+def test_the_table_of_a_task_lies_over_that_of_the_task_that_it_is_like():
+    swim = {"rollout": {"starts": 4, "seconds": 20.0}, "evolution": {"rivals": 3}}
+    tables = {"swim": swim, "jump": {"like": "swim", "rollout": {"starts": 2}}}
+    creature = {"use": {"controller": "brain"}, "task": tables}
+    config = resolve_config(creature, "x", use={"task": "jump"})
+    assert (config.rollout.starts, config.rollout.seconds) == (2, 20.0)
+    assert config.evolution.rivals == 3
+
+
+@pytest.mark.parametrize("like", ["swin", "jump", 3, [1]])
+def test_a_task_that_is_like_none_is_named(like: object):
+    """Nor is one like itself, by however many steps."""
+    tables = {"swim": {"like": "jump"}, "jump": {"like": like}}
+    creature = {"use": {"controller": "brain"}, "task": tables}
+    for task in ("jump", "swim"):
+        with pytest.raises(UserError, match=rf"\[train\.task\.{task}\]: like = "):
+            resolve_config(creature, "x", use={"task": task})
+
+
 MINE = """
 [rollout]
 starts = 9

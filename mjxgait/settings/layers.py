@@ -25,7 +25,8 @@ def resolve_config(
     A file or `[train]` may name a `base`, see `over_base`.
     Its tables `[creature.NAME]` hold keys for the creature of that name, laid over the rest of it.
     What the first two say to a controller or a task that takes no part is left out. The creature's
-    tables `[train.task.NAME]` hold keys for the task of that name, laid over the rest of it.
+    tables `[train.task.NAME]` hold keys for the task of that name, laid over the rest of it, and
+    over the table of the task that `like` names.
 
     Args:
       use: who takes part, over what the layers say. config_class: the settings of those.
@@ -46,7 +47,8 @@ def resolve_config(
     chosen = meant(_chosen([*given, *mine], use or {}))
     if not standalone and chosen.task in of_tasks:
         where = f"{creature_name}/creature.toml: [train.task.{chosen.task}]"
-        given.append((where, {**of_tasks[chosen.task], "use": dataclasses.asdict(chosen)}))
+        keys = _of_task(of_tasks, chosen.task, where)
+        given.append((where, {**keys, "use": dataclasses.asdict(chosen)}))
     cls = config_class(chosen)
     table: dict[str, Any] = {}
     for where, layer in [
@@ -74,6 +76,22 @@ def over_base(table: Mapping[str, Any], where: str) -> dict[str, Any]:
         raise UserError(f"{where}: base = {base!r}: {did_you_mean(str(base), known)}")
     under = data_folder("configs") / f"{base}.toml"
     return merge(over_base(read_toml(under), str(under)), rest)
+
+
+def _of_task(tables: Mapping[str, Any], task: str, where: str) -> dict[str, Any]:
+    """The table of a task, laid over that of another one that its key `like` names, if it has one.
+
+    Raises:
+      UserError: there is no such table.
+    """
+    rest = dict(tables[task])
+    like = rest.pop("like", None)
+    if like is None:
+        return rest
+    others = {name: table for name, table in tables.items() if name != task}
+    if like not in list(others):
+        raise UserError(f"{where}: like = {like!r}: {did_you_mean(str(like), list(others))}")
+    return merge(_of_task(others, like, where), rest)
 
 
 def _chosen(layers: Sequence[tuple[str, Mapping[str, Any]]], use: Mapping[str, str]) -> UseConfig:
