@@ -248,8 +248,8 @@ def _train(best: Candidate, symmetric: bool, stated_length: float | None) -> dic
     steps = bool(best.drive.ahead or best.drive.aside)
     step = float(model.opt.timestep)
     rotor = float(np.median([joint.armature for joint in best.puppet.joints]))
-    legs, mass = len(best.puppet.feet), best.puppet.mass
-    return manner(steps, legs, symmetric, hip, length, mass, step, rotor, best.notes)
+    legs, hinges, mass = len(best.puppet.feet), len(best.puppet.joints), best.puppet.mass
+    return manner(steps, legs, hinges, symmetric, hip, length, mass, step, rotor, best.notes)
 
 
 def _stated_length(best: Candidate) -> float | None:

@@ -114,9 +114,7 @@ class Evolution:
         seeding = self._seeding(state)
         recalled, rounds = self._recalled(state, judged)
         generation = jnp.where(seeding, jnp.where(self._filled(state), 0, -1), state.generation + 1)
-        grown, mothers = self._survive(
-            state, proposal, recalled, judged.terms, rounds, generation
-        )
+        grown, mothers = self._survive(state, proposal, recalled, judged.terms, rounds, generation)
         planted = self._plant(state, proposal, judged, generation)
         state = jax.tree.map(
             lambda a, b: jnp.where(seeding, a, b), _without_key(planted), _without_key(grown)
