@@ -113,8 +113,19 @@ def test_a_task_that_is_like_none_is_named(like: object):
     tables = {"swim": {"like": "jump"}, "jump": {"like": like}}
     creature = {"use": {"controller": "brain"}, "task": tables}
     for task in ("jump", "swim"):
-        with pytest.raises(UserError, match=rf"\[train\.task\.{task}\]: like = "):
+        with pytest.raises(UserError, match=r"\[train\.task\.jump\]: like = "):
             resolve_config(creature, "x", use={"task": task})
+
+
+def test_a_mistake_in_the_table_of_a_task_is_named_with_its_place():
+    for tables, where in (
+        ({"swim": 3, "jump": {"like": "swim"}}, r"\[train\.task\.swim\] = 3: give a table"),
+        ({"swim": {"evolution": {"rival": 3}}, "jump": {"like": "swim"}}, r"swim\]: .*rivals"),
+    ):
+        with pytest.raises(UserError, match=where):
+            resolve_config(
+                {"use": {"controller": "brain"}, "task": tables}, "x", use={"task": "jump"}
+            )
 
 
 MINE = """

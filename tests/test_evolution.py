@@ -14,10 +14,11 @@ from mjxgait.control.pose_variation import pose_variation
 from mjxgait.control.poses import Genome
 from mjxgait.search.breeding import parents, proportional_parents
 from mjxgait.search.chance import key_of
+from mjxgait.search.copies import first_of_kind
 from mjxgait.search.evolution import Evolution
 from mjxgait.search.families import families, place_in_family
 from mjxgait.search.state import NOBODY, EvolutionState, GenerationMetrics, Origin, stop_reason
-from mjxgait.search.variation import Box, first_occurrence
+from mjxgait.search.variation import Box, Variation, first_occurrence
 from mjxgait.settings.config import Config
 from mjxgait.settings.evolution import EvolutionConfig, ForcedConfig
 from mjxgait.settings.traced import traced
@@ -336,6 +337,39 @@ def test_the_same_verdict_is_that_of_one_round():
     firsts = np.abs(after.genomes.key_poses[:, 0, 0])
     assert (after.born < after.generation).any()
     assert len(np.unique(firsts)) == 20
+
+
+@pytest.mark.parametrize("stale", [True, False])
+def test_by_verdict_too_nobody_lives_on_by_an_old_one(stale: bool):
+    """Trials have become harder, and too few come to different verdicts to fill the population."""
+    climbing = toy(SILENT, forced=ForcedConfig(enabled=False), same="verdict")
+    (before, _), settings = run(climbing, 4)[-1], inputs(climbing)[0]
+    before = dataclasses.replace(before, level=jnp.int32(1), stale=jnp.asarray(stale))
+    after, _, _ = jax.device_get(advance(settings, Problem(slope=2.0, silent=True), before))
+    old = after.born < after.generation
+    assert old.any()
+    terms = np.where(old & ~np.asarray(stale), 1, 2) * SILENT.value(after.genomes)
+    np.testing.assert_allclose(after.terms[:, 0, 0], terms, rtol=1e-6)
+
+
+def test_of_a_verdict_who_costs_the_same_comes_first_and_who_has_none_never_does():
+    """Two old ones and two children, that all do the same; a child that is dearer is another kind."""
+    plain, poses = toy().variation, jnp.zeros((2, K, J))
+    state = run(toy(), 1)[0][0]
+    proposal = dataclasses.replace(toy().propose(state), offspring=Genome(poses, jnp.ones((2, 1))))
+    state = dataclasses.replace(
+        state, genomes=Genome(poses, jnp.zeros((2, 1))), terms=jnp.zeros((2, 1, 1))
+    )
+
+    def first(variation: Variation, verdict: float) -> list[bool]:
+        verdicts, anew = jnp.full((2, 1, 1), verdict), jnp.zeros((), bool)
+        found = first_of_kind("verdict", variation, state, proposal, verdicts, anew)
+        return found.tolist()
+
+    dear = dataclasses.replace(plain, price=lambda genomes: genomes.tuning[:, 0])
+    assert first(plain, 0.0) == [False, False, True, False]
+    assert first(dear, 0.0) == [True, False, True, False]
+    assert first(plain, jnp.nan) == [True, False, False, False]
 
 
 def test_duplicates_fill_the_population_when_they_may_stay():

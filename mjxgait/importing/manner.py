@@ -58,12 +58,13 @@ def manner(
       steps: whether it must step under its fall. legs, hinges: how many. hip: m, its height. length: m, of the body.
       mass: kg. time_step: s. rotor: kg m², the inertia of its usual motor.
     """
+    bounces = rotor > mass * hip**2
     if steps:
         settings, told = few_feet(legs, hip, length, mass, time_step)
     elif hinges > MANY * legs:
-        settings, told = many_hinges(hip, length, time_step)
+        settings, told = many_hinges(bounces, hip, length, time_step)
     else:
-        settings, told = four_feet(bounces=rotor > mass * hip**2)
+        settings, told = four_feet(bounces)
     notes.guess("train", *told)
     table = {"base": "other_starts", "examination": {"enough": ENOUGH}} | settings
     if not symmetric:
@@ -85,19 +86,17 @@ def four_feet(bounces: bool) -> tuple[dict[str, Any], Told]:
     return {"fitness": fitness}, (what, "high", why)
 
 
-def many_hinges(hip: float, length: float, time_step: float) -> tuple[dict[str, Any], Told]:
+def many_hinges(
+    bounces: bool, hip: float, length: float, time_step: float
+) -> tuple[dict[str, Any], Told]:
     """What is different for who stands on its feet, but in few poses of many; see `manner`."""
-    settings, _ = four_feet(bounces=False)
+    settings, (what, _, _) = four_feet(bounces)
     settings["fitness"]["weights"] |= {"alive": ALIVE, "frequency": HASTY}
     settings["controller"] = {
         "interpolation": _unhurried(WalkConfig().speed, hip, length, time_step)
     }
-    settings["rollout"] = {"variety": GENERATIONS}
-    settings["evolution"] = {"generations": GENERATIONS, "sigma": SMALLER}
-    what = (
-        f"other starts in each of {GENERATIONS} generations at most; smaller mutations; feet that swing too fast cost, "
-        f"and haste; staying up counts {ALIVE:g}"
-    )
+    settings["evolution"] = {"sigma": SMALLER}
+    what += f"; smaller ones, no haste; staying up counts {ALIVE:g}"
     why = f"with more than {MANY} hinges for each leg it falls in most poses, and learns to fall ahead"
     return settings, (what, "medium", why)
 

@@ -14,10 +14,11 @@ import jax.numpy as jnp
 
 from mjxgait.search import forced
 from mjxgait.search.breeding import Nursery, parents, proportional_parents
+from mjxgait.search.copies import first_of_kind
 from mjxgait.search.families import families, with_share
 from mjxgait.search.metrics import metrics
 from mjxgait.search.state import NOBODY, EvolutionState, GenerationMetrics, Origin, Proposal
-from mjxgait.search.variation import Variation, first_occurrence
+from mjxgait.search.variation import Variation
 from mjxgait.settings.evolution import EvolutionConfig
 from mjxgait.settings.traced import chosen
 from mjxgait.types import Judged
@@ -257,32 +258,18 @@ class Evolution:
             seeded=seeded.astype(jnp.int32),
         )
 
-    def _first(
-        self, state: EvolutionState, proposal: Proposal, terms: jax.Array, anew: jax.Array
-    ) -> jax.Array:
-        """Whether each of the old and the offspring [P + M] is the first of its kind. Of one verdict
-        the youngest is, and so is who is judged `anew`, of itself.
-        """
-        same = self.config.same == "verdict"
-        old, new = (state.terms, terms) if same else (state.genomes, proposal.offspring)
-
-        def first(a: Any, b: Any) -> jax.Array:
-            return first_occurrence(jax.tree.map(lambda x, y: jnp.concatenate([x, y]), a, b))
-
-        young = jnp.roll(first(new, old), self.config.population)
-        return young if same else jnp.where(anew, young, first(old, new))
-
     def _survive(
         self,
         state: EvolutionState,
         proposal: Proposal,
         judged: Judged,
-        terms: jax.Array,
+        verdicts: jax.Array,
         rounds: jax.Array | None,
         generation: jax.Array,
     ) -> tuple[EvolutionState, jax.Array | None]:
         """The P best of the grown population, without duplicates, and the places of their mothers;
-        in a forced generation what was fit enough goes before the old. terms: of this round alone.
+        in a forced generation what was fit enough goes before the old. verdicts: [M, R, F] of this
+        round alone.
         """
         count = self.config.population
         pool = jax.tree.map(
@@ -300,7 +287,8 @@ class Evolution:
         fitness = self._fitness(pool[0], pool[1], generation)
         fresh = jnp.arange(fitness.shape[0]) >= count
         again, now = self._again(state)
-        first = self._first(state, proposal, terms, now if again else jnp.zeros((), bool))
+        anew = now if again else jnp.zeros((), bool)
+        first = first_of_kind(self.config.same, self.variation, state, proposal, verdicts, anew)
         distinct = first | jnp.logical_not(self.config.remove_duplicates)
         admitted = forced.admitted(self.config, state, fitness, fresh & distinct)
         if again:  # nobody has judged the old in this round

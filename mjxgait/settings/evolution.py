@@ -95,8 +95,8 @@ class EvolutionConfig:
         body's.
       tuning_sigma: by how much it changes, in units of its range; likewise a body's.
       remove_duplicates: of individuals with the same genome only one survives.
-      same: what makes a duplicate: the same `genome`, or the same `verdict` to the bit, where much of
-        a genome may do nothing: the youngest survives.
+      same: what makes a duplicate: the same `genome`, or the same `verdict` to the bit, for those of
+        which much may do nothing: a child lives in its parent's place. By genome in a spell.
       lineage: whether a run's metrics tell whose child each is, not of islands.
       family: of the population, the largest share that descends, mother by mother, from one of the
         first generation: so that not all become one family.

@@ -46,9 +46,8 @@ def resolve_config(
         given.append((own, general))
     chosen = meant(_chosen([*given, *mine], use or {}))
     if not standalone and chosen.task in of_tasks:
-        where = f"{creature_name}/creature.toml: [train.task.{chosen.task}]"
-        keys = _of_task(of_tasks, chosen.task, where)
-        given.append((where, {**keys, "use": dataclasses.asdict(chosen)}))
+        tables = _tables_of(of_tasks, chosen.task, f"{creature_name}/creature.toml")
+        given += [(w, {**table, "use": dataclasses.asdict(chosen)}) for w, table in tables]
     cls = config_class(chosen)
     table: dict[str, Any] = {}
     for where, layer in [
@@ -78,20 +77,25 @@ def over_base(table: Mapping[str, Any], where: str) -> dict[str, Any]:
     return merge(over_base(read_toml(under), str(under)), rest)
 
 
-def _of_task(tables: Mapping[str, Any], task: str, where: str) -> dict[str, Any]:
-    """The table of a task, laid over that of another one that its key `like` names, if it has one.
+def _tables_of(
+    tables: Mapping[str, Any], task: str, where: str
+) -> list[tuple[str, dict[str, Any]]]:
+    """The layers of a task: its table, over that of the one which its key `like` names, if any.
 
     Raises:
-      UserError: there is no such table.
+      UserError: there is no such table, or it is none.
     """
-    rest = dict(tables[task])
-    like = rest.pop("like", None)
+    place = f"{where}: [train.task.{task}]"
+    if not isinstance(tables[task], Mapping):
+        raise UserError(f"{place} = {tables[task]!r}: give a table")
+    own = dict(tables[task])
+    like = own.pop("like", None)
     if like is None:
-        return rest
+        return [(place, own)]
     others = {name: table for name, table in tables.items() if name != task}
     if like not in list(others):
-        raise UserError(f"{where}: like = {like!r}: {did_you_mean(str(like), list(others))}")
-    return merge(_of_task(others, like, where), rest)
+        raise UserError(f"{place}: like = {like!r}: {did_you_mean(str(like), list(others))}")
+    return [*_tables_of(others, like, where), (place, own)]
 
 
 def _chosen(layers: Sequence[tuple[str, Mapping[str, Any]]], use: Mapping[str, str]) -> UseConfig:
