@@ -30,22 +30,22 @@ def first_of_kind(
     """
     old, new = state.genomes, proposal.offspring
     itself = _new_first(old, new)
-    by_genome = jnp.where(anew, itself, first_occurrence(_together(old, new)))
+    by_genome = jnp.where(anew, itself, first_occurrence(together(old, new)))
     if same == "genome":
         return by_genome
     of_old, of_new = state.terms, verdicts
     worth: Any = of_old, of_new
     if variation.price is not None:
         worth = (of_old, variation.price(old)), (of_new, variation.price(new))
-    judged = jnp.isfinite(_together(of_old, of_new)).all((1, 2))
+    judged = jnp.isfinite(together(of_old, of_new)).all((1, 2))
     return jnp.where(state.forced, by_genome, _new_first(*worth) & judged & (itself | ~anew))
 
 
-def _together(old: Any, new: Any) -> Any:
+def together(old: Any, new: Any) -> Any:
     """One after the other: leaves [P + M, ...] of leaves [P, ...] and [M, ...]."""
     return jax.tree.map(lambda a, b: jnp.concatenate([a, b]), old, new)
 
 
 def _new_first(old: Any, new: Any) -> jax.Array:
     """Whether each of both [P + M] is the first of its kind, the new before the old."""
-    return jnp.roll(first_occurrence(_together(new, old)), len(jax.tree.leaves(old)[0]))
+    return jnp.roll(first_occurrence(together(new, old)), len(jax.tree.leaves(old)[0]))

@@ -14,7 +14,7 @@ import jax.numpy as jnp
 
 from mjxgait.search import forced
 from mjxgait.search.breeding import Nursery, parents, proportional_parents
-from mjxgait.search.copies import first_of_kind
+from mjxgait.search.copies import first_of_kind, together
 from mjxgait.search.families import families, with_share
 from mjxgait.search.metrics import metrics
 from mjxgait.search.state import NOBODY, EvolutionState, GenerationMetrics, Origin, Proposal
@@ -235,8 +235,7 @@ class Evolution:
     ) -> EvolutionState:
         """The best P of the judged candidates, then those that nobody has judged yet, in order."""
         count = self.config.population
-        pool = jax.tree.map(
-            lambda a, b: jnp.concatenate([a, b]),
+        pool = together(
             (state.genomes, state.terms, state.outcome),
             (proposal.offspring, judged.terms, judged.outcome),
         )
@@ -272,8 +271,7 @@ class Evolution:
         round alone.
         """
         count = self.config.population
-        pool = jax.tree.map(
-            lambda a, b: jnp.concatenate([a, b]),
+        pool = together(
             (state.genomes, state.terms, state.outcome, state.born, state.origin, state.rounds),
             (
                 proposal.offspring,
