@@ -105,6 +105,26 @@ def test_every_pose_of_a_child_is_one_of_a_parent(crossing: str):
     assert np.all((children.tuning == mother.tuning) | (children.tuning == father.tuning))
 
 
+@pytest.mark.parametrize("share", [0.25, 0.75])
+def test_mixed_crossover_permutes_the_stated_share_of_children(share: float):
+    """An aligned child has every pose in its place; of permuted ones with K = 3 one in 15 has."""
+    mother, father = (
+        jax.tree.map(lambda leaf: leaf[0], variation.uniform(key, BOX, 1)) for key in keys(2)
+    )
+    settings = inputs(EvolutionConfig(crossing="mixed", permuted=share))
+    children = crossed(settings, keys(1000), mother, father).key_poses
+    in_place = ((children == mother.key_poses) | (children == father.key_poses)).all(axis=(1, 2))
+    assert abs(1 - float(in_place.mean()) - share * 14 / 15) < 0.05
+
+
+@pytest.mark.parametrize("share", [0.25, 0.75])
+def test_mixed_mutation_redraws_the_stated_share_of_mutants(share: float):
+    genome = Genome(jnp.zeros((K, J)), jnp.zeros(E))
+    settings = EvolutionConfig(mutation="mixed", redrawn=share, tuning_rate=0.0)
+    changed = (mutated(settings, genome).key_poses != 0).sum(axis=(1, 2))
+    assert abs(float((changed == 2).mean()) - share) < 0.1
+
+
 @pytest.mark.parametrize(
     ("mutation", "changed"), [("redraw", 2), ("single", 1), ("pose", J), ("gaussian", J)]
 )

@@ -32,9 +32,12 @@ def pose_variation(box: Box, config: EvolutionConfig) -> Variation:
             for f in (permuted_poses, aligned_poses)
         )
         from_mother = jax.random.bernoulli(key_tuning, 0.5, mother.tuning.shape)
+        key_which = jax.random.fold_in(key_poses, 1)
+        mixes = chosen(config.crossing, "mixed") & jax.random.bernoulli(key_which, config.permuted)
+        permutes = chosen(config.crossing, "permute") | mixes
         return dataclasses.replace(
             mother,
-            key_poses=jnp.where(chosen(config.crossing, "permute"), permuted, aligned),
+            key_poses=jnp.where(permutes, permuted, aligned),
             tuning=jnp.where(from_mother, mother.tuning, father.tuning),
         )
 
@@ -48,6 +51,7 @@ def pose_variation(box: Box, config: EvolutionConfig) -> Variation:
             high.key_poses,
             config.mutation,
             config.sigma,
+            config.redrawn,
         )
         tuning = jittered(
             key_tuning,
@@ -80,13 +84,18 @@ def mutated_poses(
     high: jax.Array,
     kind: Any,
     sigma: jax.Array | float,
+    redrawn: jax.Array | float = 0.5,
 ) -> jax.Array:
-    """Key poses [K, J] with a change in one of them; see `EvolutionConfig.mutation` for the kinds. Never leaves the box."""
+    """Key poses [K, J] with a change in one of them, within the box.
+
+    kind, sigma, redrawn: see `mutation`, `sigma` and `redrawn` of `EvolutionConfig`.
+    """
     key_pose, key_joint, key_value, key_kind = jax.random.split(key, 4)
     count, joints = poses.shape
     here = jnp.arange(count) == jax.random.randint(key_pose, (), 0, count)
     order = jax.random.permutation(key_joint, jnp.arange(joints))
-    moves = chosen(kind, "gaussian") | (chosen(kind, "mixed") & jax.random.bernoulli(key_kind))
+    steps = jax.random.bernoulli(key_kind, 1 - redrawn)
+    moves = chosen(kind, "gaussian") | (chosen(kind, "mixed") & steps)
     coded, code = chosen(kind, "bit") | chosen(kind, "byte"), eight_bits(poses, low, high)
     flipped = code ^ jnp.where(
         chosen(kind, "bit"),

@@ -71,8 +71,9 @@ class EvolutionConfig:
       rivals: of a tournament.
       proportional: parents are drawn in proportion to their fitness instead.
       crossover: share of offspring with two parents, the others have one.
-      crossing: `permute` draws K poses from the parents' 2K in any order; `align` leaves each
-        pose in its place.
+      crossing: `permute` draws K poses from the parents' 2K in any order (Wilson); `align` leaves
+        each pose in its place; `mixed` is one or the other for each child.
+      permuted: share of `mixed` crossovers that permute.
       pool: whom parents are drawn from: last generation's survivors, or `growing`, which also
         holds the children born so far (they rank last).
       unique_children: a child that equals somebody of the pool or a sibling is drawn anew
@@ -87,6 +88,7 @@ class EvolutionConfig:
         pose, `gaussian` moves every joint of one pose by sigma, `mixed` is one or the other
         of the first and the last. `bit` and `byte` read the value of one joint as 8 bits over
         its range and flip one of them, or re-draw all eight, as classic GAs do.
+      redrawn: share of `mixed` mutations that re-draw.
       mutation_rate: share of offspring mutated.
       sigma: of the gaussian mutation, in units of the range of each joint.
       body: how many times larger or smaller the parts below the trunk may become, each
@@ -118,13 +120,15 @@ class EvolutionConfig:
     rivals: Annotated[Count, SHAPE] = 2
     proportional: Annotated[bool, SHAPE] = False
     crossover: Fraction = 0.7
-    crossing: Literal["permute", "align"] = "align"
+    crossing: Literal["permute", "align", "mixed"] = "align"
+    permuted: Fraction = 0.5
     pool: Annotated[Literal["parents", "growing"], SHAPE] = "parents"
     unique_children: Annotated[bool, SHAPE] = False
     survival: Literal["best", "children"] = "best"
     elite: Annotated[Fraction, SHAPE] = 0.0
     remember: Annotated[bool, SHAPE] = False
     mutation: Literal["redraw", "single", "pose", "gaussian", "mixed", "bit", "byte"] = "mixed"
+    redrawn: Fraction = 0.5
     mutation_rate: Fraction = 0.8
     sigma: Positive = 0.12
     body: Annotated[float, pydantic.Field(ge=1, le=2), SHAPE] = 1.0
