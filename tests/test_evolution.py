@@ -497,6 +497,20 @@ def test_unfit_newcomers_are_not_taken_in():
             assert (np.asarray(after.fitness)[taken] >= float(before.fitness[0])).all()
 
 
+def test_a_forced_generation_keeps_the_parents_that_die_otherwise():
+    forced = ForcedConfig(window=2, gain=10.0, refresh=0.5, limit=1, patience=0)
+    history = run(toy(survival="children", elite=0.15, forced=forced), 12)
+    old = {
+        bool(metrics.forced): int((state.born < state.generation).sum())
+        for state, metrics in history[1:]
+    }
+    assert old[False] <= 3
+    assert old[True] >= 10
+    for (before, _), (after, metrics) in itertools.pairwise(history):
+        if metrics.forced:
+            assert np.isin(np.sort(before.fitness)[10:], after.fitness).all()
+
+
 def test_a_run_stops_when_forced_evolution_no_longer_pays():
     forced = ForcedConfig(window=2, limit=1, patience=2)
     evolution = toy(FLAT, forced=forced)

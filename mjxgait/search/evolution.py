@@ -95,6 +95,16 @@ class Evolution:
             return self.config.elites, jnp.ones((), bool)
         return min(self.config.population, self.config.offspring), state.stale
 
+    def _stay(self, state: EvolutionState) -> jax.Array:
+        """Whether [] parents live on although only children survive otherwise.
+
+        A forced generation replaces the worst of the population and no more. Its parents keep the
+        fitness of the generation before.
+        """
+        if not self.config.elites:
+            return jnp.zeros((), bool)
+        return state.forced if state.stale is None else state.forced & ~state.stale
+
     def promising(
         self, state: EvolutionState, proposal: Proposal, judged: Judged, share: float
     ) -> jax.Array:
@@ -288,11 +298,13 @@ class Evolution:
         anew = now if again else jnp.zeros((), bool)
         first = first_of_kind(self.config.same, self.variation, state, proposal, verdicts, anew)
         distinct = first | jnp.logical_not(self.config.remove_duplicates)
-        admitted = forced.admitted(self.config, state, fitness, fresh & distinct)
-        if again:  # nobody has judged the old in this round
-            fitness = jnp.where(fresh | ~now, fitness, -jnp.inf)
-        lives = distinct & (fresh | chosen(self.config.survival, "best"))
-        tier = jnp.where(state.forced & fresh, jnp.where(admitted, 2, 0), jnp.where(lives, 1, 0))
+        children = jnp.arange(fitness.shape[0]) >= count + self.config.elites
+        admitted = forced.admitted(self.config, state, fitness, children & distinct)
+        stay = self._stay(state)
+        if again:  # The old were not simulated in this round.
+            fitness = jnp.where(fresh | stay | ~now, fitness, -jnp.inf)
+        lives = distinct & (fresh | stay | chosen(self.config.survival, "best"))
+        tier = jnp.where(state.forced & children, jnp.where(admitted, 2, 0), jnp.where(lives, 1, 0))
         if not self.config.elites:  # the best is never lost, whatever the tiers say
             best = jnp.arange(fitness.shape[0]) == jnp.argmax(fitness)
             tier = jnp.where(best & distinct, 3, tier)
