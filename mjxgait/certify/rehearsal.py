@@ -1,5 +1,6 @@
 """The rehearsal: one draw that is the same for all champions, on which one of them is chosen."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -24,6 +25,7 @@ def rehearse(
     config: CertificateConfig | None = None,
     threads: int = 0,
     wanted: float = -np.inf,
+    caution: float = 0.0,
 ) -> float:
     """The worst margin of criteria 4 and 5 on the draw that is the same for all champions.
 
@@ -35,6 +37,8 @@ def rehearse(
       count: perturbed starts, and as many pushes where those decide.
       wanted: as soon as this margin is out of reach nobody is simulated any further; returned is
         then what it would be at most.
+      caution: standard errors by which the measured shares count less. A champion that was chosen
+        by a share has been lucky more often than not.
     """
     config = config or CertificateConfig()
     draw, demands = draws.common(config), demands_of(champion.task, champion.wish)
@@ -49,8 +53,8 @@ def rehearse(
     starts = demands.aimed(join(disturbed, *pushes), config)
 
     def margin(well: np.ndarray) -> float:
-        pushed = float(well[count:].mean()) if pushes else np.nan
-        return _worst(demands.disturbed(float(well[:count].mean()), pushed, config))
+        pushed = _cautious(well[count:], caution) if pushes else np.nan
+        return _worst(demands.disturbed(_cautious(well[:count], caution), pushed, config))
 
     watch = Watch(len(starts), lambda lost: margin(~lost) < wanted)
     fall = demands.fall(config)
@@ -62,6 +66,12 @@ def rehearse(
     if reached < wanted:
         return reached
     return min(reached, _worst(told_to_turn(creature, champion, config, draw, threads)))
+
+
+def _cautious(well: np.ndarray, caution: float) -> float:
+    """Share of successes [S], less so many of its standard errors."""
+    share = float(well.mean())
+    return share - caution * math.sqrt(share * (1 - share) / len(well))
 
 
 def _worst(criteria: Sequence[Criterion]) -> float:

@@ -173,8 +173,10 @@ class Examiner:
         seen = glance(creature, champion)
         margin = seen.margin
         if margin >= wanted:
-            count = self.experiment.config.examination.draws
-            margin = min(margin, rehearse(creature, champion, count, wanted=beaten))
+            settings = self.experiment.config.examination
+            draw, caution = settings.draws, settings.caution
+            rehearsed = rehearse(creature, champion, draw, wanted=beaten, caution=caution)
+            margin = min(margin, rehearsed)
         return Seen(champion, seen, margin)
 
     def _examine(self, seen: Seen, hasty: bool = False) -> Examined:

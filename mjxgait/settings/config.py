@@ -20,6 +20,8 @@ class ExaminationConfig:
       enough: margin on the draw to choose on that leads to an examination in the first half of the
         generations; in the second any pass does.
       draws: perturbed starts, and as many pushes, to choose on; the examination draws others.
+      caution: standard errors by which the shares on that draw count less: the champion that is
+        chosen by them is often a lucky one.
       attempts: examinations of a run, the one at its end included.
       candidates: so many of the best, different from each other, are looked at in the end, until
         one has enough margin; 0 leaves all examinations out.
@@ -36,6 +38,7 @@ class ExaminationConfig:
     every: Annotated[Whole, HOST] = 5
     enough: Annotated[Finite, HOST] = 0.2
     draws: Annotated[Count, HOST] = 32
+    caution: Annotated[NonNegative, HOST] = 0.0
     attempts: Annotated[Count, HOST] = 3
     candidates: Annotated[Whole, HOST] = 12
     on_the_way: Annotated[Count, HOST] = 1
