@@ -83,6 +83,7 @@ class Looks:
         self.glances, self.rehearsals, self.certificates = [0.3], [0.3], [0.3]
         self.asked: list[str] = []
         self.wanted: list[float] = []
+        self.cautions: list[float] = []
 
     def answer(self, kind: str, answers: list[float]) -> float:
         self.asked.append(kind)
@@ -101,8 +102,9 @@ def looks(monkeypatch: pytest.MonkeyPatch) -> Looks:
 
     monkeypatch.setattr(examination, "glance", glance)
 
-    def rehearse(*_: object, wanted: float) -> float:
+    def rehearse(*_: object, wanted: float, caution: float) -> float:
         said.wanted.append(wanted)
+        said.cautions.append(caution)
         return said.answer("rehearsal", said.rehearsals)
 
     monkeypatch.setattr(examination, "rehearse", rehearse)
@@ -120,6 +122,13 @@ def test_it_looks_every_few_generations_and_not_at_the_first():
     assert [g for g in range(-1, 21) if due(settings, g)] == [5, 10, 15, 20]
     assert not any(due(ExaminationConfig(every=0), g) for g in range(20))
     assert not any(due(ExaminationConfig(candidates=0), g) for g in range(20))
+
+
+def test_the_draw_to_choose_on_counts_with_the_caution_of_the_settings(
+    experiment: Experiment, looks: Looks, exams: Exams
+):
+    examiner(experiment, exams, caution=1.5).best(ranked(experiment))
+    assert set(looks.cautions) == {1.5}
 
 
 def examiner(experiment: Experiment, exams: Exams, **settings: float | str) -> Examiner:

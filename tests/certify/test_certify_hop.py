@@ -202,6 +202,11 @@ def test_nobody_is_tried_further_than_what_is_wanted_is_in_reach(
     hopper = dataclasses.replace(make_champion(tiny), task="hop")
     assert rehearse(tiny, hopper, 64, wanted=wanted) == pytest.approx(margin)
     assert told == ([] if ended is None else [ended])
+    share = 1 - failing / 64
+    error = (share * (1 - share) / 64) ** 0.5
+    if ended is None:
+        cautious = rehearse(tiny, hopper, 64, wanted=-10.0, caution=2.0)
+        assert cautious == pytest.approx(margin - 2 * error / 0.1)
 
 
 @pytest.mark.parametrize("task", ["hop", "limbo"])
