@@ -154,8 +154,19 @@ def test_under_a_file_that_stands_alone_lies_nothing(tmp_path: Path):
     assert found == build(Config, {"rollout": {"starts": 9}}, "test")
 
 
-def test_the_built_in_defaults_are_those_of_the_file():
-    assert resolve_config({}, "x") == Config()
+@pytest.mark.parametrize(
+    "name", ["tall_quadruped", "short_quadruped", "crab", "duck", "alien", "mine"]
+)
+def test_the_default_search_has_the_operators_of_the_thesis(name: str):
+    train = {} if name == "mine" else read_toml(find_creature(name) / "creature.toml")
+    evolution = resolve_config(train.get("train", {}), name).evolution
+    assert evolution.crossing == evolution.mutation == "mixed"
+    assert evolution.crossover * evolution.permuted > 0.1
+    assert evolution.mutation_rate * evolution.redrawn > 0.1
+    assert evolution.remove_duplicates
+    assert evolution.forced.enabled
+    assert resolve_config(train.get("train", {}), name).controller.advance == "error"
+    assert resolve_config(train.get("train", {}), name).controller.around == ()
 
 
 @pytest.mark.parametrize(

@@ -20,13 +20,14 @@ from mjxgait.creature import Creature, load_creature
 from mjxgait.creature.facing import facing
 from mjxgait.creature.scale import SETTINGS, load_files
 from mjxgait.errors import UserError
+from mjxgait.parts import resolve_config
 from mjxgait.parts.fit import check_fit
 from mjxgait.parts.wishes import Wishes, configured, hint, speed_of, wished
 from mjxgait.runs.experiment import build_batch
 from mjxgait.search.chance import key_of
 from mjxgait.settings.config import Config, UseConfig
 from mjxgait.settings.gaits import GAITS, animal_stride, gait_of, placed, stations_of
-from mjxgait.settings.shipped import data_folder
+from mjxgait.settings.shipped import data_folder, shipped_creatures
 from mjxgait.settings.traced import traced
 from mjxgait.settings.walk import WalkConfig, Weights, WishWeights
 from mjxgait.tasks.score import in_order, score
@@ -392,15 +393,27 @@ def usually(creature: Creature, file: Path | None = None, **asked) -> Config:
     return configured(creature, file, {}, Wishes(**asked))
 
 
-@pytest.mark.parametrize("dog", ["tall_quadruped", "short_quadruped"])
-def test_of_whom_nobody_asks_anything_its_usual_gait_is_asked(dog: str):
-    creature = load_creature(data_folder("envs") / dog)
+def natural_dog() -> Creature:
+    """A dog that walks as an animal of its size does where nothing is requested."""
+    files = load_creature(data_folder("envs") / "tall_quadruped").files
+    return load_files({**files, SETTINGS: files[SETTINGS] + '[usual]\ngait = "natural"\n'})
+
+
+def test_a_creature_may_have_a_usual_gait():
+    creature = natural_dog()
     assert usually(creature) == usually(creature, gait="natural")
     assert usually(creature).fitness.wish.stride == 1.0
 
 
+@pytest.mark.parametrize("name", shipped_creatures())
+def test_no_shipped_creature_has_a_usual_gait(name: str):
+    """Its search begins with random poses, as the thesis has it; a drawn cycle must be requested."""
+    creature = load_creature(data_folder("envs") / name)
+    assert creature.settings.usual.gait == "auto"
+
+
 def test_what_is_asked_or_written_in_a_file_is_all_that_is_asked(tmp_path: Path):
-    creature = load_creature(data_folder("envs") / "tall_quadruped")
+    creature = natural_dog()
     (tmp_path / "mine.toml").write_text("[evolution]\npopulation = 40\n")
     nothing = Config().fitness.wish
     assert usually(creature, gait="auto").fitness.wish == nothing
@@ -435,6 +448,16 @@ def test_natural_begins_with_a_drawn_cycle_in_an_animals_time(body: Creature):
     natural = wished(other, body, Wishes(gait="natural"))
     assert natural.controller == other.controller
     assert natural.evolution == other.evolution
+
+
+@pytest.mark.parametrize("wish", [{"gait": "natural"}, {"gait": "canter"}, {"speed": "0.4"}])
+def test_a_requested_gait_or_speed_keeps_the_order_of_the_poses(body: Creature, wish: dict):
+    default = resolve_config({}, "x")
+    assert (default.evolution.crossing, default.evolution.mutation) == ("mixed", "mixed")
+    found = wished(default, body, Wishes(**wish)).evolution
+    assert (found.crossing, found.mutation) == ("align", "gaussian")
+    assert not found.forced.enabled
+    assert wished(default, body, Wishes(turn=20.0)).evolution == default.evolution
 
 
 def test_a_gait_by_name_begins_with_its_own_footfalls(body: Creature):

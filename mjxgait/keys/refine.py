@@ -12,6 +12,7 @@ from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.keys.bring import Brought
 from mjxgait.parts import resolve_config
+from mjxgait.parts.drawn import ORDERED
 from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.folder import create_run
 from mjxgait.settings.config import Config
@@ -60,7 +61,8 @@ def base_settings(
     Raises:
       UserError: they are wrong, or for another controller.
     """
-    resolved = resolve_config(creature.settings.train, creature.name, config)
+    ordered = merge(creature.settings.train, {"evolution": ORDERED})
+    resolved = resolve_config(ordered, creature.name, config)
     short = {"population": population, "generations": generations}
     evolution = {key: value for key, value in short.items() if value is not None}
     table = merge(dataclasses.asdict(resolved), {"seed": seed, "evolution": evolution})

@@ -10,7 +10,7 @@ from mjxgait.certify import CertificateConfig
 from mjxgait.certify.tasks.walk import SPARE
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError, did_you_mean
-from mjxgait.parts.drawn import drawn, natural_gait, top_speed
+from mjxgait.parts.drawn import ORDERED, drawn, natural_gait, top_speed
 from mjxgait.parts.settings import resolve_config
 from mjxgait.settings.config import Config
 from mjxgait.settings.control import unhurried
@@ -165,7 +165,7 @@ def _pace(wishes: Wishes, creature: Creature, config: Config) -> dict[str, Any]:
     if asked is not None:
         wish = merge(wish, _speed(round(speed, 6), creature))
     begins = drawn(usual if name in (AUTO, NATURAL) else name, speed, creature, config)
-    return merge(wish, begins)
+    return merge(merge(wish, {"evolution": ORDERED}), begins)
 
 
 def _speed(speed: float, creature: Creature) -> dict[str, Any]:
