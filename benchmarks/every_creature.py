@@ -21,8 +21,7 @@ import time
 from pathlib import Path
 
 from mjxgait.certify import distance, outdated, read_certificate, survival
-from mjxgait.champion import read_champion
-from mjxgait.runs.folder import CERTIFICATE, CHAMPION, METRICS, open_run, read_metrics
+from mjxgait.runs.folder import CERTIFICATE, METRICS, open_champion, open_run, read_metrics
 
 HEADER = (
     "creature",
@@ -92,8 +91,7 @@ def train(folder: Path, name: str, seed: int, more: list[str]) -> float:
 
 def row(folder: Path, seed: int, wall: float) -> list[str]:
     """What the run folder and two more looks in C MuJoCo say."""
-    creature, config = open_run(folder)
-    champion = read_champion(folder / CHAMPION, creature)
+    (creature, champion), (_, config) = open_champion(folder), open_run(folder)
     certificate = read_certificate(folder / CERTIFICATE) or sys.exit(
         f"{folder}: no certificate; delete it, and it is made again"
     )

@@ -14,10 +14,9 @@ import numpy as np
 
 from mjxgait.certify.simulate import simulate
 from mjxgait.certify.starts import nominal_starts
-from mjxgait.champion import read_champion
 from mjxgait.creature import Creature
 from mjxgait.creature.overlap import NEAR, neighbours
-from mjxgait.runs.folder import CERTIFICATE, CHAMPION, open_run
+from mjxgait.runs.folder import CERTIFICATE, open_champion
 
 SECONDS = 20.0
 EVERY = 2
@@ -65,8 +64,7 @@ class Depths:
 
 def walk_of(folder: Path) -> tuple[Creature, np.ndarray]:
     """The creature of a run, and its champion's undisturbed walk [T, nq]."""
-    creature, _ = open_run(folder)
-    champion = read_champion(folder / CHAMPION, creature)
+    creature, champion = open_champion(folder)
     walk = simulate(creature, champion, nominal_starts(creature, 1), SECONDS, record=1).trajectory
     return creature, walk.qpos[0]
 

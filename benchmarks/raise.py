@@ -40,9 +40,9 @@ from mjxgait.certify.outcome import Fall, Outcome
 from mjxgait.certify.simulate import simulate
 from mjxgait.certify.starts import Starts, join, nominal_starts, perturbed_starts
 from mjxgait.certify.worlds import slippery, sloping
-from mjxgait.champion import Champion, read_champion
+from mjxgait.champion import Champion
 from mjxgait.creature import Creature
-from mjxgait.runs.folder import CHAMPION, open_run
+from mjxgait.runs.folder import open_champion
 
 SECONDS = 22.0
 SEED = 7
@@ -85,12 +85,8 @@ def main() -> None:
     print_row(["---"] * len(HEADER))
     found = []
     for run in options.runs:
-        creature, _ = open_run(run)
         found.append(
-            {"run": run.name}
-            | examine(
-                creature, read_champion(run / CHAMPION, creature), options.starts, note(run.name)
-            )
+            {"run": run.name} | examine(*open_champion(run), options.starts, note(run.name))
         )
         print_row(cells(found[-1]))
         if options.json:

@@ -14,8 +14,7 @@ import numpy as np
 
 from mjxgait.certify import CertificateConfig, certify, record
 from mjxgait.certify.measure import Recording
-from mjxgait.champion import read_champion
-from mjxgait.runs.folder import CERTIFICATE, CHAMPION, open_run
+from mjxgait.runs.folder import CERTIFICATE, CHAMPION, open_champion
 
 
 def main() -> None:
@@ -26,8 +25,7 @@ def main() -> None:
     parser.add_argument("run", type=Path)
     parser.add_argument("folder", type=Path)
     options = parser.parse_args()
-    creature, _ = open_run(options.run)
-    champion = read_champion(options.run / CHAMPION, creature)
+    creature, champion = open_champion(options.run)
     config = CertificateConfig()
     options.folder.mkdir(parents=True, exist_ok=True)
     shutil.copy(options.run / CHAMPION, options.folder / CHAMPION)

@@ -24,10 +24,15 @@ from mjxgait.settings.tables import build, dump_toml, read_toml
 def test_every_shipped_config_loads(path: Path):
     table = over_base(read_toml(path), str(path))
     own = {
-        key: table.pop(key, default) for key, default in (("standalone", False), ("creature", {}))
+        key: table.pop(key, default)
+        for key, default in (("standalone", False), ("creature", {}), ("task", {}))
     }
     for name, part in (("", table), *own["creature"].items()):
         assert isinstance(build_config(part, f"{path}: {name}"), Config)
+    for task, part in own["task"].items():
+        part.pop("like", None)
+        use = {**table.get("use", {}), "task": task}
+        assert isinstance(build_config({**part, "use": use}, f"{path}: [task.{task}]"), Config)
 
 
 def test_a_config_survives_its_own_file(tmp_path: Path):
@@ -147,6 +152,80 @@ def test_a_file_may_say_something_else_to_one_creature(tmp_path: Path):
     assert (other.starts, other.seconds, other.termination.min_up) == (9, 3.0, None)
 
 
+OF_TASKS = """
+[rollout]
+starts = 9
+seconds = 4.0
+
+[task.hop.rollout]
+starts = 5
+
+[task.limbo]
+like = "hop"
+
+[task.limbo.rollout]
+seconds = 6.0
+
+[creature.luxo.rollout]
+seconds = 7.0
+"""
+
+
+def test_a_file_may_say_something_else_to_one_task(tmp_path: Path):
+    """Over the rest of the file, and below what it says to one creature."""
+    file = tmp_path / "mine.toml"
+    file.write_text(OF_TASKS)
+    rollouts = [
+        resolve_config({}, name, file, {"task": task, "controller": "program"}).rollout
+        for name, task in (("x", "walk"), ("x", "hop"), ("x", "limbo"), ("luxo", "limbo"))
+    ]
+    assert [(r.starts, r.seconds) for r in rollouts] == [(9, 4.0), (5, 4.0), (5, 6.0), (5, 7.0)]
+
+
+def test_the_task_that_a_name_means_has_the_table(tmp_path: Path):
+    """A body that grows walks by the task `roam`."""
+    file = tmp_path / "mine.toml"
+    file.write_text("standalone = true\n[task.walk.rollout]\nseconds = 4.5\n")
+    use = {"controller": "brain", "task": "walk"}
+    assert resolve_config({}, "blocks", file, use).rollout.seconds == 4.5
+
+
+def test_a_table_of_another_task_may_need_what_the_rest_of_the_file_says(tmp_path: Path):
+    file = tmp_path / "mine.toml"
+    file.write_text('[evolution]\nsurvival = "children"\n[task.hop.evolution]\nelite = 0.25\n')
+    assert resolve_config({}, "x", file).evolution.elite == Config().evolution.elite
+
+
+def test_tables_of_tasks_come_with_the_base(tmp_path: Path):
+    file = tmp_path / "mine.toml"
+    file.write_text('base = "sims"\n[task.jump.rollout]\nstarts = 3\n')
+    found = [
+        resolve_config({}, "blocks", file, {"task": task}).rollout.starts
+        for task in ("swim", "follow", "jump")
+    ]
+    assert found == [1, 4, 3]
+
+
+SIMS = ("swim", "walk", "jump", "follow", "follow-on-land")
+
+
+@pytest.mark.parametrize("task", SIMS)
+def test_the_blocks_of_the_paper_are_the_same_for_every_task(task: str):
+    """Nothing of the creature's own [train] is under them; lights alone differ."""
+    train = read_toml(find_creature("blocks") / "creature.toml")["train"]
+    config = resolve_config(train, "blocks", Path("sims"), {"task": task})
+    swims = resolve_config(train, "blocks", Path("sims"))
+    assert (swims.use.task, swims.use.controller) == ("swim", "brain")
+    assert config == resolve_config({}, "blocks", Path("sims"), {"task": task})
+    assert config.evolution == swims.evolution
+    assert config.controller == swims.controller
+    assert config.rollout == dataclasses.replace(
+        swims.rollout, starts=4 if task.startswith("follow") else 1
+    )
+    assert config.rollout.worst == 0.0
+    assert config.examination == swims.examination
+
+
 def test_under_a_file_that_stands_alone_lies_nothing(tmp_path: Path):
     file = tmp_path / "mine.toml"
     file.write_text("standalone = true\n[rollout]\nstarts = 9\n")
@@ -177,6 +256,14 @@ def test_the_default_search_has_the_operators_of_the_thesis(name: str):
         ("[creature.crab.rollout]\nstart = 2", "[creature.crab]: unknown key"),
         ("[creature]\ncrab = 3", "creature.crab = 3: give a table"),
         ("creature = 3", "creature = 3: give tables"),
+        ("task = 3", "task = 3: give tables such as [task.follow]"),
+        ("[task]\nhop = 3", "[task.hop] = 3: give a table"),
+        ("[task.hopp.rollout]\nstarts = 2", '[task.hopp]: there is no task "hopp"'),
+        ("[task.hop.rollout]\nstart = 2", '[task.hop]: unknown key "rollout.start"'),
+        ("[task.hop.fitness.weights]\nslip = 2", '[task.hop]: unknown key "fitness.weights.slip"'),
+        ("[task.walk.rollout]\nstart = 2", '[task.walk]: unknown key "rollout.start"'),
+        ('[task.hop]\nuse = { task = "walk" }', "[task.hop]: use: a table of a task chooses"),
+        ('[task.hop]\nlike = "lim"', "[task.hop]: like = 'lim'"),
         ('standalone = "yes"', "standalone = 'yes': give true or false"),
         ("[rollout.termination]\nheight = [2.0, 1.0]", "the first must be the smaller"),
     ],

@@ -63,7 +63,7 @@ def contest(
     say(f"evolving {generations} generations for the workload")
     early = ours.useful_share()
     ours.take(half_and_half(ours, generations))
-    work = as_workload(folder, ours.experiment, ours.first.genomes)
+    work = as_workload(folder, ours.experiment, ours.first)
     say("starting the other contestants")
     peers, left_out = _peers(work)
     try:

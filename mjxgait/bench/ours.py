@@ -15,6 +15,7 @@ from mjxgait.control.poses import TUNING, Genome
 from mjxgait.creature import load_creature
 from mjxgait.runs.devices import prepare_devices
 from mjxgait.runs.experiment import Experiment, build_experiment
+from mjxgait.runs.generation import next_starts
 from mjxgait.search.state import EvolutionState
 from mjxgait.settings.config import Config
 
@@ -84,9 +85,14 @@ def half_and_half(ours: Ours, generations: int) -> Genome:
     )
 
 
-def as_workload(folder: Path, experiment: Experiment, genomes: Genome) -> Workload:
-    """The same genomes and starts in NumPy."""
-    starts, tuning = jax.device_get(experiment.starts), np.asarray(genomes.tuning, float)
+def as_workload(folder: Path, experiment: Experiment, state: EvolutionState) -> Workload:
+    """Return in NumPy what the next generation of this state judges: its genomes on its starts.
+
+    Where starts vary (`rollout.variety`) a run has many more; each generation takes some of them.
+    """
+    genomes = state.genomes
+    starts = jax.device_get(next_starts(experiment.simulator.task, experiment.row, state))
+    tuning = np.asarray(genomes.tuning, float)
     return Workload(
         folder=folder,
         config=experiment.config,

@@ -20,7 +20,7 @@ def walking(settings: CreatureSettings) -> Config:
     """The settings in a contest: the rivals walk by key poses, whatever else the creature does."""
     use = dataclasses.asdict(UseConfig())
     config = resolve_config(settings.train, settings.creature.name, use=use)
-    # Rivals simulate everybody on all starts, and so do we.
+    # The rivals simulate every genome on all starts of a generation, and so does our side.
     return dataclasses.replace(config, rollout=dataclasses.replace(config.rollout, promote=1.0))
 
 

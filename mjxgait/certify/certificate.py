@@ -122,7 +122,7 @@ def glance(
       UserError: the creature's facts contradict its own files, or the champion is not finite.
     """
     config = config or CertificateConfig()
-    check_body(creature)
+    check_body(creature, champion.pose_span)
     demands = demands_of(champion.task, champion.wish)
     start = demands.aimed(nominal_starts(creature, 1), config)
     both = dataclasses.replace(join(start, start), refine=np.array([1, 2]))

@@ -24,13 +24,17 @@ SWING = 0.6
 """rad, of the random poses that are mirrored."""
 
 
-def check_body(creature: Creature) -> None:
-    """Compares every fact that decides about a certificate.
+def check_body(creature: Creature, pose_span: float = 0.0) -> None:
+    """Compare every fact that decides about a certificate with a second derivation of it.
+
+    Args:
+      pose_span: degrees, `evolution.pose_span` of the run; with 0 the pose ranges are those of
+        creature.toml.
 
     Raises:
-      UserError: names the first that differs from what the files say, and both values.
+      UserError: names the first fact that differs from what the files say, and both values.
     """
-    body = _Body(creature.files)
+    body = _Body(creature.files, pose_span)
     for name, value, expected in body.facts(creature):
         same = np.shape(value) == np.shape(expected) and np.allclose(
             value, expected, rtol=EXACT, atol=EXACT
@@ -48,7 +52,8 @@ def check_body(creature: Creature) -> None:
 class _Body:
     """What the files say, standing in C MuJoCo."""
 
-    def __init__(self, files: Mapping[str, str]) -> None:
+    def __init__(self, files: Mapping[str, str], pose_span: float) -> None:
+        self.pose_span = np.radians(pose_span)
         self.table: dict[str, Any] = tomllib.loads(files["creature.toml"])
         self.identity = self.table["creature"]
         self.symmetric = bool(self.table.get("mirror", {}).get("symmetric", True))
@@ -97,11 +102,11 @@ class _Body:
     ) -> Iterator[tuple[str, tuple[np.ndarray, np.ndarray]]]:
         """Gains, limits and weights [J] of the creature, and by its files."""
         low, high = np.array([self._range(j) for j in self.joints]).T
-        pose = np.radians([self.setting(name, "range", [-45.0, 45.0]) for name in self.names])
+        lowest, highest = self.pose_ranges(stand, low, high)
         yield "lower limit", (creature.joints.low, low)
         yield "upper limit", (creature.joints.high, high)
-        yield "lowest pose", (creature.joints.pose_low, np.maximum(stand + pose[:, 0], low))
-        yield "highest pose", (creature.joints.pose_high, np.minimum(stand + pose[:, 1], high))
+        yield "lowest pose", (creature.joints.pose_low, lowest)
+        yield "highest pose", (creature.joints.pose_high, highest)
         for key in ("kp", "kd", "torque_limit"):
             values = np.array([self.setting(name, key) for name in self.names], float)
             yield key, (getattr(creature.gains, key), values)
@@ -118,6 +123,25 @@ class _Body:
             for key in ("ahead", "aside", "turn"):
                 weights = np.array([self.weight(name, "stepping", key) for name in self.names])
                 yield f"stepping weight ({key})", (getattr(stepping, key), weights)
+
+    def pose_ranges(
+        self, stand: np.ndarray, low: np.ndarray, high: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Lowest and highest pose [J] in rad, of creature.toml or of the pose span.
+
+        low, high: [J] rad, the joints' own ranges. A pose span replaces the width of each hinge's
+        range; the range is then shifted until it lies within the joint's own.
+        """
+        given = np.radians([self.setting(name, "range", [-45.0, 45.0]) for name in self.names])
+        lowest = np.maximum(stand + given[:, 0], low)
+        highest = np.minimum(stand + given[:, 1], high)
+        if not self.pose_span:
+            return lowest, highest
+        width = np.minimum(self.pose_span, high - low)
+        first = (lowest + highest - width) / 2
+        first += np.maximum(low - first, 0) - np.maximum(first + width - high, 0)
+        hinge = np.array([j.type[0] == mujoco.mjtJoint.mjJNT_HINGE for j in self.joints])
+        return np.where(hinge, first, lowest), np.where(hinge, first + width, highest)
 
     def axes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Forward, left and up in the trunk's frame, from cross products in the world."""

@@ -34,6 +34,7 @@ class Champion:
     controller's. task: that it was evolved for. fitness and terms: as evolution scored it.
     origin: where it comes from (generation, seed, versions). sizes: factors of the parts that are
     not as the creature has them, where bodies evolve. wish: what was asked of its walk, by name.
+    pose_span: degrees, `evolution.pose_span` of its run; 0 leaves the pose ranges of creature.toml.
     """
 
     creature: str
@@ -48,6 +49,7 @@ class Champion:
     origin: Mapping[str, Any]
     sizes: Mapping[str, float] = dataclasses.field(default_factory=dict)
     wish: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    pose_span: float = 0.0
 
     @classmethod
     def of(cls, creature: Creature, config: Config, genome: Genome, **scored: Any) -> "Champion":
@@ -63,17 +65,19 @@ class Champion:
             task=config.use.task,
             sizes={} if sizes is None else proportions(creature).by_part(sizes),
             wish=config.wish,
+            pose_span=config.evolution.pose_span,
             **scored,
         )
 
     def embodied(self, creature: Creature) -> Creature:
-        """Its own body, from the creature that was evolved on.
+        """Return its own body, from the creature as its files have it.
 
         Raises:
           UserError: its sizes are those of another creature.
         """
         codec = codec_of(self.controller)
-        return grown(codec.embodied(self.genome, self.settings, self.task, creature), self.sizes)
+        body = codec.embodied(self.genome, self.settings, self.task, creature)
+        return grown(body, self.sizes).spanned(self.pose_span)
 
     @property
     def fingerprint(self) -> str:
@@ -97,6 +101,8 @@ class Champion:
             moves["sizes"] = dict(self.sizes)
         if self.wish:
             moves["wish"] = dict(self.wish)
+        if self.pose_span:
+            moves["pose_span"] = self.pose_span
         return hashlib.sha256(json.dumps(moves, sort_keys=True).encode()).hexdigest()[:16]
 
     def check_finite(self, creature: Creature) -> None:
@@ -148,6 +154,7 @@ def write_champion(champion: Champion, creature: Creature, path: Path) -> None:
         "fitness": champion.fitness,
         **({"sizes": dict(champion.sizes)} if champion.sizes else {}),
         **({"wish": dict(champion.wish)} if champion.wish else {}),
+        **({"pose_span": champion.pose_span} if champion.pose_span else {}),
         "terms": dict(champion.terms),
         "origin": dict(champion.origin),
     }
@@ -200,4 +207,5 @@ def _champion(document: Mapping[str, Any], creature: Creature, path: Path) -> Ch
         origin=document["origin"],
         sizes={name: float(factor) for name, factor in document.get("sizes", {}).items()},
         wish=document.get("wish", {}),
+        pose_span=float(document.get("pose_span", 0.0)),
     )

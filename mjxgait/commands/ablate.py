@@ -65,7 +65,7 @@ def ablate_command(arguments: Sequence[str]) -> int:
     """Returns the exit code."""
     options = tyro.cli(AblateOptions, args=list(arguments), prog="mjxgait ablate")
     from mjxgait.ablation.measures import measure, read_logs
-    from mjxgait.ablation.plan import make_plan, read_study
+    from mjxgait.ablation.plan import check_plan, make_plan, read_study
     from mjxgait.ablation.report import write_report
 
     folder = (
@@ -86,8 +86,11 @@ def ablate_command(arguments: Sequence[str]) -> int:
         if options.cluster and not study.rows:
             study = dataclasses.replace(study, rows=ROWS)
         creature = load_creature(find_creature(study.env))
-    plan = make_plan(study, creature, str(options.study or folder / STUDY))
+    where = str(options.study or folder / STUDY)
+    plan = make_plan(study, creature, where)
     creature = at_step(creature, plan.runs[0].config.rollout.step)
+    if not options.resume:
+        check_plan(plan, creature, where)
     # JAX takes a second to import: only once the study is known to be good.
     from mjxgait.ablation.rows import groups
     from mjxgait.runs.devices import prepare_devices

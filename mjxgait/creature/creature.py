@@ -95,13 +95,16 @@ class Creature:
         return dataclasses.replace(self, terrain=parse_ground(ground))
 
     def spanned(self, degrees: float) -> "Creature":
-        """The creature with every hinge's pose range so wide, about its middle; 0 changes nothing.
+        """Return the creature with pose ranges of this width for every hinge; 0 returns it as it is.
 
-        A range that would reach beyond the joint's own is moved inwards, or cut where it is wider.
+        Each range keeps the middle that creature.toml gives it. A range that would reach beyond the
+        joint's own range is moved inwards, and cut where it is wider.
         """
+        if not degrees:
+            return self
         joints = self.joints
         kinds = np.array([self.model.joint(name).type[0] for name in joints.names])
-        changes = (kinds == HINGE) & (degrees > 0)
+        changes = kinds == HINGE
         half = np.minimum(np.radians(degrees), joints.high - joints.low) / 2
         middle = (joints.pose_low + joints.pose_high) / 2
         middle = np.clip(middle, joints.low + half, joints.high - half)

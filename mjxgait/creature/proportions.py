@@ -74,23 +74,24 @@ def grown(creature: Creature, sizes: Mapping[str, float]) -> Creature:
     return dataclasses.replace(load_files(files), terrain=creature.terrain)
 
 
-def check_sizes(creature: Creature, most: float) -> None:
-    """Refuses sizes whose smallest or largest body cannot be had.
+def extreme_bodies(creature: Creature, most: float) -> list[Creature]:
+    """Return the smallest and the largest body that evolution may try; none where `most` is 1.
 
     Raises:
-      UserError: says why.
+      UserError: one of them cannot be had; says why.
     """
+    if most == 1.0:
+        return []
     parts = [name for names in proportions(creature).names for name in names]
     if not all(parts):
         raise UserError(
             "--evolve-body: a part of creature.xml has no name, by which the run would keep its "
             "size; give every body one"
         )
-    for factor in (1 / most, most):
-        try:
-            grown(creature, dict.fromkeys(parts, factor))
-        except UserError as error:
-            raise UserError(f"--evolve-body {most:g}: {error}") from None
+    try:
+        return [grown(creature, dict.fromkeys(parts, factor)) for factor in (1 / most, most)]
+    except UserError as error:
+        raise UserError(f"--evolve-body {most:g}: {error}") from None
 
 
 def _jointed(model: mujoco.MjModel, body: int) -> int:

@@ -72,6 +72,7 @@ def _check_settings(name: str, config: Config) -> None:
     rollout = config.rollout
     needs = {
         "evolution.body": config.evolution.body != 1.0,
+        "evolution.pose_span": config.evolution.pose_span != 0.0,
         "rollout.ground": rollout.ground != FLAT,
         "rollout.slope or rollout.rough": rollout.uneven,
         "rollout.masses": rollout.masses != 0.0,

@@ -43,7 +43,11 @@ Step = Callable[[EvolutionState], tuple[EvolutionState, GenerationMetrics]]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Experiment:
-    """One creature under one config: the pure functions of a run. The starts follow from the seed."""
+    """One creature under one config: the pure functions of a run. The starts follow from the seed.
+
+    creature: as its files have it, on the ground of the run. `blueprint.creature` also has the pose
+    ranges that the settings state.
+    """
 
     creature: Creature
     config: Config
@@ -241,7 +245,7 @@ def build_experiment(creature: Creature, config: Config) -> Experiment:
     Raises:
       UserError: the physics does not support the creature's model.
     """
-    return _experiment(draw_up(creature, config), config)
+    return _experiment(creature, draw_up(creature, config), config)
 
 
 def build_batch(
@@ -264,7 +268,7 @@ def build_batch(
             "these settings need programs of different shapes: run them in batches of their own"
         )
     blueprint = blueprint or draw_up(creature, configs[0])
-    experiments = [_experiment(blueprint, config) for config in configs]
+    experiments = [_experiment(creature, blueprint, config) for config in configs]
     if any(sources):
         experiments = [
             dataclasses.replace(one, row=dataclasses.replace(one.row, sources=jnp.int32(rows)))
@@ -279,8 +283,8 @@ def _filled_up(sources: Sequence[Sequence[int]]) -> list[list[int]]:
     return [[*rows, *[own] * (most - len(rows))] for own, rows in enumerate(sources)]
 
 
-def _experiment(blueprint: Plan, config: Config) -> Experiment:
-    creature = blueprint.creature.on(config.rollout.ground)
+def _experiment(creature: Creature, blueprint: Plan, config: Config) -> Experiment:
+    creature = creature.on(config.rollout.ground)
     key = jax.random.fold_in(key_of(config.seed), 1)
     rollout = config.rollout
     drawn = dataclasses.replace(rollout, starts=1 + (rollout.starts - 1) * rollout.variety)

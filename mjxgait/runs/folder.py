@@ -7,6 +7,7 @@ from typing import Any
 from mjxgait.certify.check_body import check_body
 from mjxgait.champion import Champion, read_champion
 from mjxgait.creature import Creature, load_creature
+from mjxgait.creature.proportions import extreme_bodies
 from mjxgait.errors import UserError
 from mjxgait.parts import build_config
 from mjxgait.parts.fit import check_fit
@@ -19,16 +20,31 @@ PLOT, PLOTS, BODY = "fitness.png", "plots", "body"
 ISLANDS, MIGRATIONS = "islands", "migrations.jsonl"
 
 
-def create_run(folder: Path | None, creature: Creature, config: Config) -> Path:
-    """Makes the run folder with the exact creature and settings; by default a new one under runs/.
+def check_run(creature: Creature, config: Config) -> None:
+    """Refuse a run that cannot come to its examination, before anything is computed or written.
+
+    Bodies that grow are checked one by one when they are examined. Of bodies whose sizes evolve the
+    smallest and the largest are checked.
 
     Raises:
-      UserError: the folder holds something already, or cannot be written; who takes part does not
-        fit the creature; or nothing that the creature does could be examined.
+      UserError: what takes part does not fit the creature, or a fact of a body that the run may
+        examine contradicts its files.
     """
     check_fit(creature, config)
-    if not creature.settings.creature.grows:
-        check_body(creature)
+    if creature.settings.creature.grows:
+        return
+    pose_span = config.evolution.pose_span
+    for body in (creature, *extreme_bodies(creature, config.evolution.body)):
+        check_body(body.spanned(pose_span), pose_span)
+
+
+def create_run(folder: Path | None, creature: Creature, config: Config) -> Path:
+    """Make the run folder with the exact creature and settings; by default a new one under runs/.
+
+    Raises:
+      UserError: the folder holds something already, or cannot be written; see also `check_run`.
+    """
+    check_run(creature, config)
     folder = folder or new_run_folder(creature.name, config.seed)
     try:
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):

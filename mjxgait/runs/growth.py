@@ -12,7 +12,7 @@ from mjxgait.blocks.phenotype import body_of
 from mjxgait.blocks.variation import Genotype
 from mjxgait.control.bodied import Bodied
 from mjxgait.creature import Creature
-from mjxgait.creature.proportions import Proportions, check_sizes, proportions
+from mjxgait.creature.proportions import Proportions, extreme_bodies, proportions
 from mjxgait.physics.trees.plant import TreePlant
 from mjxgait.settings.config import Config
 from mjxgait.tasks.trials import Starts
@@ -73,8 +73,6 @@ def growth_of(creature: Creature, config: Config) -> SizeGrowth | None:
     Raises:
       UserError: the smallest or the largest body cannot be had.
     """
-    most = config.evolution.body
-    if most == 1.0:
+    if not extreme_bodies(creature, config.evolution.body):
         return None
-    check_sizes(creature, most)
     return SizeGrowth(proportions(creature))

@@ -131,7 +131,7 @@ def conclude(folder: Path, creature: Creature, screen: Screen, examined: Examine
     with disk_errors(folder):
         write_champion(examined.champion, creature, folder / CHAMPION)
         body = examined.champion.embodied(creature)
-        if body is not creature:
+        if body.digest != creature.digest:
             keep_body(folder / BODY, body)
         (folder / CERTIFICATE).write_text(examined.certificate.to_json(), encoding="utf-8")
         if examined.beyond:

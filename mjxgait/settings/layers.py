@@ -10,6 +10,10 @@ from mjxgait.settings.config import Config, UseConfig
 from mjxgait.settings.shipped import data_folder, shipped_configs, shipped_creatures
 from mjxgait.settings.tables import build, merge, read_toml
 
+Layer = tuple[str, Mapping[str, Any]]
+"""The name of a source of settings in errors, and its table."""
+Meant = Callable[[UseConfig], UseConfig]
+
 
 def resolve_config(
     creature_table: Mapping[str, Any],
@@ -17,47 +21,51 @@ def resolve_config(
     file: Path | None = None,
     use: Mapping[str, str] | None = None,
     config_class: Callable[[UseConfig], type[Config]] = lambda use: Config,
-    meant: Callable[[UseConfig], UseConfig] = lambda use: use,
+    meant: Meant = lambda use: use,
 ) -> Config:
-    """The layers, each over the one before: `configs/default.toml`, the creature's `[train]`, the user's file.
+    """Resolve the layers: `configs/default.toml`, then the creature's `[train]`, then the file.
 
     A file may begin with `standalone = true`: then nothing but the built-in defaults lies under it.
     A file or `[train]` may name a `base`, see `over_base`.
-    Its tables `[creature.NAME]` hold keys for the creature of that name, laid over the rest of it.
-    What the first two say to a controller or a task that takes no part is left out. The creature's
-    tables `[train.task.NAME]` hold keys for the task of that name, laid over the rest of it, and
-    over the table of the task that `like` names.
+    Tables `[train.task.NAME]` of the creature and `[task.NAME]` of the file hold keys for the task of
+    that name. Each lies over the rest of its layer, and over the table of the task that `like` names.
+    Tables `[creature.NAME]` of the file hold keys for the creature of that name; they lie on top.
+    What default.toml and `[train]` say to a controller or a task that takes no part is left out.
 
     Args:
-      use: who takes part, over what the layers say. config_class: the settings of those.
-      meant: who takes part, by other names than those given.
+      use: controller and task, over what the layers say. config_class: the class with their settings.
+      meant: controller and task under the names that the program uses.
 
     Raises:
       UserError: names the layer and the key.
     """
     default = data_folder("configs") / "default.toml"
-    standalone, mine = _file_layers(file, creature_name) if file is not None else (False, [])
-    given: list[tuple[str, Mapping[str, Any]]] = []
+    mine = _FileLayers() if file is None else _file_layers(file, creature_name)
+    given: list[Layer] = []
     own = f"{creature_name}/creature.toml: [train]"
-    general, of_tasks = over_base(creature_table, own), creature_table.get("task", {})
-    general.pop("task", None)
-    if not standalone:
+    general = over_base(creature_table, own)
+    of_tasks = general.pop("task", {})
+    if not mine.standalone:
         given.append((str(default), read_toml(default)))
         given.append((own, general))
-    chosen = meant(_chosen([*given, *mine], use or {}))
-    if not standalone and chosen.task in of_tasks:
-        tables = _tables_of(of_tasks, chosen.task, f"{creature_name}/creature.toml")
+    chosen = meant(_chosen([*given, *mine.general, *mine.creature], use or {}))
+    if not mine.standalone:
+        tables = _layers_of(of_tasks, chosen, meant, f"{creature_name}/creature.toml: [train.task")
         given += [(w, {**table, "use": dataclasses.asdict(chosen)}) for w, table in tables]
     cls = config_class(chosen)
     table: dict[str, Any] = {}
     for where, layer in [
         *((w, _without_absent(given_one, chosen, meant)) for w, given_one in given),
-        *mine,
+        *mine.general,
+        *_layers_of(mine.tasks, chosen, meant, mine.where),
+        *mine.creature,
     ]:
         table = merge(table, layer)
         build(cls, table, where)
     table = merge(table, {"use": dataclasses.asdict(chosen)})
-    return build(cls, table, "the settings taken together")
+    config = build(cls, table, "the settings taken together")
+    _check_other_tasks(mine, config, config_class, meant)
+    return config
 
 
 def over_base(table: Mapping[str, Any], where: str) -> dict[str, Any]:
@@ -77,18 +85,53 @@ def over_base(table: Mapping[str, Any], where: str) -> dict[str, Any]:
     return merge(over_base(read_toml(under), str(under)), rest)
 
 
-def _tables_of(
-    tables: Mapping[str, Any], task: str, where: str
-) -> list[tuple[str, dict[str, Any]]]:
-    """The layers of a task: its table, over that of the one which its key `like` names, if any.
+def _layers_of(tables: Mapping[str, Any], use: UseConfig, meant: Meant, where: str) -> list[Layer]:
+    """Return the layers of the task in `use`: those of each table whose name means this task."""
+    names = [n for n in tables if meant(dataclasses.replace(use, task=n)).task == use.task]
+    return [layer for name in names for layer in _tables_of(tables, name, where)]
+
+
+def _check_other_tasks(
+    mine: "_FileLayers",
+    config: Config,
+    config_class: Callable[[UseConfig], type[Config]],
+    meant: Meant,
+) -> None:
+    """Check a file's tables of the tasks that take no part, so that a mistake shows in every run.
+
+    A task of the user's own is known only where it takes part.
 
     Raises:
-      UserError: there is no such table, or it is none.
+      UserError: names the table and the key.
     """
-    place = f"{where}: [train.task.{task}]"
+    known = dataclasses.asdict(config)
+    base = {key: value for key, value in known.items() if key not in ("use", "fitness")}
+    for name in mine.tasks:
+        use = meant(dataclasses.replace(config.use, task=name))
+        if ":" in name or use.task == config.use.task:
+            continue
+        for place, table in _tables_of(mine.tasks, name, mine.where):
+            try:
+                cls = config_class(use)
+            except UserError as error:
+                raise UserError(f"{place}: {error}") from None
+            build(cls, merge(base, table), place)
+
+
+def _tables_of(tables: Mapping[str, Any], task: str, where: str) -> list[Layer]:
+    """Return the layers of a task: its table, over the table of the task that `like` names.
+
+    where: how the name of each table begins, such as `mine.toml: [task`.
+
+    Raises:
+      UserError: there is no such table, it is not a table, or it chooses controller or task.
+    """
+    place = f"{where}.{task}]"
     if not isinstance(tables[task], Mapping):
         raise UserError(f"{place} = {tables[task]!r}: give a table")
     own = dict(tables[task])
+    if "use" in own:
+        raise UserError(f"{place}: use: a table of a task chooses neither controller nor task")
     like = own.pop("like", None)
     if like is None:
         return [(place, own)]
@@ -109,9 +152,7 @@ def _chosen(layers: Sequence[tuple[str, Mapping[str, Any]]], use: Mapping[str, s
     return build(UseConfig, merge(table, use), "the options")
 
 
-def _without_absent(
-    layer: Mapping[str, Any], use: UseConfig, meant: Callable[[UseConfig], UseConfig]
-) -> dict[str, Any]:
+def _without_absent(layer: Mapping[str, Any], use: UseConfig, meant: Meant) -> dict[str, Any]:
     """A layer without what it says to a controller or a task that takes no part.
 
     It was written for those that it names itself, and else for those of the default.
@@ -124,20 +165,36 @@ def _without_absent(
     return {key: value for key, value in layer.items() if not absent.get(key)}
 
 
-def _file_layers(
-    file: Path, creature_name: str
-) -> tuple[bool, list[tuple[str, Mapping[str, Any]]]]:
-    """Whether a user's file stands alone, and its layers: what it says to all, then to this creature.
+@dataclasses.dataclass(frozen=True)
+class _FileLayers:
+    """What a user's file holds.
 
-    The tables of other creatures are checked too: a mistake shows whoever is trained.
+    general: the layer for all. creature: the layer for the creature at hand. tasks: the tables by
+    task. where: how the names of these tables begin in an error.
+    """
+
+    standalone: bool = False
+    general: tuple[Layer, ...] = ()
+    creature: tuple[Layer, ...] = ()
+    tasks: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    where: str = ""
+
+
+def _file_layers(file: Path, creature_name: str) -> _FileLayers:
+    """Read a user's file.
+
+    The tables of other creatures are checked too, so that a mistake shows in every run.
     """
     path = _find_config(file)
     general = over_base(read_toml(path), str(path))
     standalone, creatures = general.pop("standalone", False), general.pop("creature", {})
+    tasks = general.pop("task", {})
     if not isinstance(standalone, bool):
         raise UserError(f"{path}: standalone = {standalone!r}: give true or false")
     if not isinstance(creatures, Mapping):
         raise UserError(f"{path}: creature = {creatures!r}: give tables such as [creature.crab]")
+    if not isinstance(tasks, Mapping):
+        raise UserError(f"{path}: task = {tasks!r}: give tables such as [task.follow]")
     known = {creature_name, *shipped_creatures()}
     for name, own in creatures.items():
         if name not in known:
@@ -150,8 +207,8 @@ def _file_layers(
         # That of the creature at hand is read below, for whoever takes part.
         if name != creature_name and "use" not in {**general, **own}:
             build(Config, own, f"{path}: [creature.{name}]")
-    mine = creatures.get(creature_name, {})
-    return standalone, [(str(path), general), (f"{path}: [creature.{creature_name}]", mine)]
+    mine = (f"{path}: [creature.{creature_name}]", creatures.get(creature_name, {}))
+    return _FileLayers(standalone, ((str(path), general),), (mine,), tasks, f"{path}: [task")
 
 
 def _find_config(file: Path) -> Path:

@@ -3,6 +3,7 @@
 import dataclasses
 import importlib.util
 import json
+import shutil
 import subprocess
 import sys
 
@@ -11,11 +12,12 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
-from helpers import STOOL, pose_champion
+from helpers import STOOL, pose_champion, small_config
 
 from mjxgait.bench import contest
 from mjxgait.bench.flops import count_flops
 from mjxgait.bench.mujoco_peer import DampedSolve, Law, MujocoPeer
+from mjxgait.bench.ours import as_workload
 from mjxgait.bench.scaling import draw
 from mjxgait.bench.workload import Lap, Workload, walking
 from mjxgait.certify.layout import start_frame
@@ -25,6 +27,8 @@ from mjxgait.commands import bench
 from mjxgait.creature import load_creature
 from mjxgait.errors import UserError
 from mjxgait.parts import resolve_config
+from mjxgait.runs.experiment import build_experiment
+from mjxgait.runs.generation import next_starts
 from mjxgait.settings.config import Config
 from mjxgait.settings.shipped import data_folder, find_creature
 
@@ -154,6 +158,24 @@ def test_in_a_contest_everybody_is_simulated_on_all_starts(creature):
     assert walking(settings).rollout.promote == 1
 
 
+@pytest.mark.parametrize("generation", [-1, 2])
+def test_the_rivals_have_the_starts_that_a_lap_judges(stool, generation):
+    """Where starts vary a run has many more than a generation takes."""
+    config = small_config(
+        rollout={"starts": 3, "variety": 5}, evolution={"survival": "children", "elite": 0.25}
+    )
+    experiment = build_experiment(stool, config)
+    assert len(experiment.starts.friction) == 11
+    state = dataclasses.replace(experiment.init(), generation=jnp.int32(generation))
+    work = as_workload(STOOL, experiment, state)
+    judged = next_starts(experiment.simulator.task, experiment.row, state)
+    assert work.episodes == len(work.key_poses) * 3
+    for name in ("qpos", "qvel", "friction", "push", "push_step"):
+        np.testing.assert_array_equal(getattr(work, name), np.asarray(getattr(judged, name)))
+    later = 1 + 2 * (generation + 1)
+    np.testing.assert_array_equal(work.qpos[1:], experiment.starts.qpos[later : later + 2])
+
+
 def test_ratios_are_medians_of_rounds():
     laps = {
         "ours": [Lap(1.0, n, 0.0, 2.0) for n in (10, 20, 60)],
@@ -277,13 +299,17 @@ def test_the_curves_are_of_one_creature(tmp_path):
 
 @pytest.mark.slow
 def test_the_command_writes_the_ratios(tmp_path):
-    file = tmp_path / "bench.json"
+    """On a body whose starts vary by generation, as those of the shipped ones do."""
+    file, body = tmp_path / "bench.json", tmp_path / "body"
+    shutil.copytree(STOOL, body)
+    with (body / "creature.toml").open("a", encoding="utf-8") as settings:
+        settings.write('\n[train]\nbase = "other_starts"\n')
     arguments = [
         "bench",
         "--json",
         str(file),
         "--env",
-        str(STOOL),
+        str(body),
         "--rounds",
         "1",
         "--generations",
@@ -294,6 +320,7 @@ def test_the_command_writes_the_ratios(tmp_path):
     subprocess.run([sys.executable, "-m", "mjxgait", *arguments], check=True, capture_output=True)
     found = json.loads(file.read_text(encoding="utf-8"))
     assert found["ratio_over_mujoco_c"] > 0
+    assert found["workload"]["starts"] == walking(load_creature(body).settings).rollout.starts
     assert (found["ratio_over_c"] is None) == ("c" in found["left_out"])
     assert found["laps"]["ours"][0]["steps"] == pytest.approx(
         found["laps"]["mujoco_c"][0]["steps"], rel=0.1

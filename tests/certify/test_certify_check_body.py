@@ -1,16 +1,22 @@
 """Every fact that decides about a certificate is derived twice: each planted error is caught."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from certify_made_up import make_champion
-from helpers import altered
+from helpers import altered, short_examination
 
 from mjxgait.certify import glance
 from mjxgait.certify.check_body import check_body
+from mjxgait.champion import read_champion, write_champion
 from mjxgait.creature import load_creature
+from mjxgait.creature.scale import load_files
 from mjxgait.errors import UserError
+from mjxgait.runs import folder
 from mjxgait.runs.folder import create_run
 from mjxgait.settings.config import Config
+from mjxgait.settings.tables import build
 
 
 def changed(values, index, value):
@@ -95,6 +101,62 @@ def test_a_body_that_cannot_be_examined_is_not_trained(tiny, tmp_path):
     wrong = altered(tiny, mirror={"sign": changed(tiny.mirror.sign, 1, -1)})
     with pytest.raises(UserError, match="does not mirror"):
         create_run(tmp_path / "run", wrong, Config())
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize("degrees", [20.0, 90.0, 300.0])
+def test_the_pose_ranges_of_a_span_are_derived_a_second_time(shipped, degrees):
+    check_body(shipped.spanned(degrees), degrees)
+
+
+@pytest.mark.parametrize(
+    ("has", "stated"), [(0.0, 70.0), (70.0, 0.0), (60.0, 70.0)], ids=["none", "unstated", "other"]
+)
+def test_a_pose_range_of_another_span_is_named(tiny, has, stated):
+    """The range decides what a champion may hold, so the run's own number is the only one."""
+    with pytest.raises(UserError, match='lowest pose of joint "front_left_hip"'):
+        check_body(tiny.spanned(has), stated)
+
+
+def test_a_champion_has_the_pose_ranges_of_its_run(tiny, tmp_path):
+    """Also when it comes from its file; its walk is then looked at."""
+    champion = dataclasses.replace(make_champion(tiny), pose_span=60.0)
+    write_champion(champion, tiny, tmp_path / "champion.json")
+    again = read_champion(tmp_path / "champion.json", tiny)
+    assert again.fingerprint == champion.fingerprint != make_champion(tiny).fingerprint
+    body = again.embodied(tiny)
+    assert np.allclose(body.joints.pose_high - body.joints.pose_low, np.radians(60.0))
+    assert glance(body, again, short_examination()).whole.trunk_pos.size
+    with pytest.raises(UserError, match="lowest pose"):
+        glance(tiny, again, short_examination())
+
+
+def test_a_champion_without_a_span_is_written_as_ever(tiny, tmp_path):
+    write_champion(make_champion(tiny), tiny, tmp_path / "champion.json")
+    assert "pose_span" not in (tmp_path / "champion.json").read_text()
+
+
+def test_a_body_that_sizes_could_grow_into_is_checked_before(tiny, tmp_path, monkeypatch):
+    """The smallest and the largest, each with the run's pose span."""
+    seen = []
+    monkeypatch.setattr(folder, "check_body", lambda body, span: seen.append((body, span)))
+    settings = build(Config, {"evolution": {"body": 1.25, "pose_span": 60.0}}, "test")
+    create_run(tmp_path / "run", tiny, settings)
+    assert [span for _, span in seen] == [60.0] * 3
+    hips = [body.frame.hip_height for body, _ in seen]
+    assert hips[1] < hips[0] < hips[2]
+
+
+def test_sizes_that_cannot_be_had_leave_no_folder(tiny, tmp_path):
+    nameless = load_files(
+        {
+            **tiny.files,
+            "creature.xml": tiny.files["creature.xml"].replace(' name="hind_left_lower"', ""),
+        }
+    )
+    settings = build(Config, {"evolution": {"body": 1.25}}, "test")
+    with pytest.raises(UserError, match="has no name"):
+        create_run(tmp_path / "run", nameless, settings)
     assert not (tmp_path / "run").exists()
 
 
