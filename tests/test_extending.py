@@ -157,3 +157,4 @@ def test_a_mistake_is_one_sentence(folder: Path, arguments, words, capfd, monkey
     said = capfd.readouterr().err
     assert words in said
     assert "Traceback" not in said
+    assert not (folder / "runs" / "none").exists()

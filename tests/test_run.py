@@ -239,7 +239,7 @@ def test_what_comes_next_is_said_before_plots_are_drawn_which_may_be_interrupted
     def interrupted(run: Path):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("mjxgait.cluster.evolve.evolve", lambda *_: True)
+    monkeypatch.setattr("mjxgait.cluster.evolve.evolve", lambda *given: given[-1]() is None)
     monkeypatch.setattr("mjxgait.viewing.plots.plot_run", interrupted)
     said = said_by(capsys, "train", "--env", STOOL, "--out", tmp_path / "run", code=130)
     assert said.index("Next:") < said.index("Drawing") < said.index("mjxgait plot")

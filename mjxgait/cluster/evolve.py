@@ -1,5 +1,6 @@
 """A run of one population or of several, by this machine or by a cluster."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 from mjxgait.cluster import islands
@@ -20,12 +21,14 @@ def evolve(
     resume: bool = False,
     generation: int | None = None,
     cluster: str | None = None,
+    begin: Callable[[], object] = lambda: None,
 ) -> bool:
-    """Runs, or goes on with, the evolution in a run folder; returns whether it came to its end.
+    """Run, or go on with, the evolution in a run folder; returns whether it came to its end.
 
     Args:
       resume: go on from a checkpoint, the latest or that of `generation`.
-      cluster: address of the one that does it, if not this machine.
+      cluster: address of the cluster that computes it, if not this machine.
+      begin: makes the folder of a new run; called after the last check that can refuse the run.
 
     Raises:
       UserError: see `connected`; or a single checkpoint was named, and there are islands.
@@ -35,6 +38,6 @@ def evolve(
         raise UserError(f"{folder}: islands go on from their latest checkpoints, not --generation")
     with crew_at(cluster, screen.console) as crew:
         if several:
-            return islands.train(folder, creature, config, screen, crew, resume)
+            return islands.train(folder, creature, config, screen, crew, resume, begin)
         evaluator = Blocks(crew, creature, config) if cluster else None
-        return loop.train(folder, creature, config, screen, resume, generation, evaluator)
+        return loop.train(folder, creature, config, screen, resume, generation, evaluator, begin)

@@ -5,6 +5,7 @@ import contextlib
 import dataclasses
 import shlex
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -24,13 +25,14 @@ from mjxgait.runs.folder import (
     METRICS,
     PLOT,
     PLOTS,
+    check_run,
     create_run,
     open_run,
     read_metrics,
 )
 from mjxgait.settings.config import Config, ExaminationConfig
 from mjxgait.settings.tables import build, merge
-from mjxgait.zoo.seeds import create_zoo, folders_of, is_zoo
+from mjxgait.zoo.seeds import check_zoo, create_zoo, folders_of, is_zoo
 
 if TYPE_CHECKING:  # JAX takes a second to import
     from mjxgait.runs.screen import Screen
@@ -124,6 +126,8 @@ def train_command(arguments: Sequence[str]) -> int:
     from mjxgait.runs.devices import prepare_devices
     from mjxgait.runs.screen import Screen
 
+    if options.generation is not None and options.resume is None:
+        raise UserError("--generation: names a checkpoint to go on from, so it needs --resume")
     if options.resume:
         if options.scale or options.way != "forward":
             raise UserError(
@@ -136,14 +140,19 @@ def train_command(arguments: Sequence[str]) -> int:
             )
         folder = options.resume
     else:
-        folder = create_run(options.out, creature, config)
+        folder = check_run(options.out, creature, config)
     prepare_devices(1 if options.cluster else None)
-    screen = Screen()
-    with following(folder) if options.view else contextlib.nullcontext():
-        resumed = options.resume is not None
-        ended = evolve(
-            folder, creature, config, screen, resumed, options.generation, options.cluster
-        )
+    screen, resumed = Screen(), options.resume is not None
+    with contextlib.ExitStack() as beside:
+
+        def begin() -> None:
+            if not resumed:
+                create_run(folder, creature, config)
+            if options.view:
+                beside.enter_context(following(folder))
+
+        at = options.generation, options.cluster
+        ended = evolve(folder, creature, config, screen, resumed, *at, begin)
     if ended:
         screen.next_steps(folder, Run(folder).certified)
     drawn = _draw(folder, screen, all_plots=ended and options.plots)
@@ -158,8 +167,9 @@ def _several(options: TrainOptions, creature: Creature, config: Config, default:
         assert options.runs is not None
         # On a cluster each run is a piece of work, so all machines have some.
         together = 1 if options.cluster else 0
-        zoo = create_zoo(options.out, creature, config, options.runs, together)
-        return evolve_zoo(zoo, options.cluster)
+        zoo = check_zoo(options.out, creature, config, options.runs)
+        begin = partial(create_zoo, zoo, creature, config, options.runs, together)
+        return evolve_zoo(zoo, options.cluster, begin)
     other = options.scale or options.way != "forward"
     if options.runs is not None or other or config != default:
         raise UserError(

@@ -19,24 +19,55 @@ PLOT, PLOTS, BODY = "fitness.png", "plots", "body"
 ISLANDS, MIGRATIONS = "islands", "migrations.jsonl"
 
 
-def create_run(folder: Path | None, creature: Creature, config: Config) -> Path:
-    """Makes the run folder with the exact creature and settings; by default a new one under runs/.
+def check_run(folder: Path | None, creature: Creature, config: Config) -> Path:
+    """Return the folder that a new run may have; by default a new one under runs/. Writes nothing.
 
     Raises:
-      UserError: the folder holds something already, or cannot be written; who takes part does not
-        fit the creature; or nothing that the creature does could be examined.
+      UserError: the folder holds something already; controller or task does not fit the creature;
+        or the creature's body cannot be examined.
+    """
+    check_parts(creature, config)
+    folder = folder or new_run_folder(creature.name, config.seed)
+    if is_taken(folder):
+        holds = "another run" if (folder / CONFIG).exists() else "something else"
+        raise UserError(
+            f"{folder}: holds {holds}; name another folder with --out, or go on with --resume "
+            f"{folder}"
+        )
+    return folder
+
+
+def check_parts(creature: Creature, config: Config) -> None:
+    """Refuse a controller or task that does not fit the creature, and a body that cannot be examined.
+
+    Raises:
+      UserError: says which, and the way out.
     """
     check_fit(creature, config)
     if not creature.settings.creature.grows:
         check_body(creature)
-    folder = folder or new_run_folder(creature.name, config.seed)
+
+
+def is_taken(folder: Path) -> bool:
+    """Return whether a folder holds something, or is a file.
+
+    Raises:
+      UserError: it cannot be read.
+    """
     try:
-        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-            holds = "another run" if (folder / CONFIG).exists() else "something else"
-            raise UserError(
-                f"{folder}: holds {holds}; name another folder with --out, or go on with --resume "
-                f"{folder}"
-            )
+        return folder.exists() and (not folder.is_dir() or any(folder.iterdir()))
+    except OSError as error:
+        raise UserError(f"{folder}: cannot be read ({error.strerror})") from None
+
+
+def create_run(folder: Path | None, creature: Creature, config: Config) -> Path:
+    """Make the run folder with the exact creature and settings; by default a new one under runs/.
+
+    Raises:
+      UserError: see `check_run`; or the folder cannot be written.
+    """
+    folder = check_run(folder, creature, config)
+    try:
         keep_body(folder / CREATURE, creature)
         (folder / CONFIG).write_text(dump_toml(config), encoding="utf-8")
     except OSError as error:

@@ -8,7 +8,7 @@ import platform
 import signal
 import threading
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
@@ -55,14 +55,17 @@ def train(
     resume: bool = False,
     generation: int | None = None,
     evaluator: Evaluator | None = None,
+    begin: Callable[[], object] = lambda: None,
 ) -> bool:
-    """Runs, or goes on with, the evolution in a run folder; returns whether it came to its end.
+    """Run, or go on with, the evolution in a run folder; returns whether it came to its end.
 
     Args:
       resume: go on from a checkpoint, the latest or that of `generation`.
-      evaluator: who judges, if not this machine.
+      evaluator: what evaluates the individuals, if not this machine.
+      begin: makes the folder of a new run; called after the last check.
     """
     experiment = build_experiment(creature, config)
+    begin()
     checkpoints = Checkpoints(folder, config.keep_every)
     # A run that was killed before its first checkpoint begins anew: it will do what it would have
     # done.
