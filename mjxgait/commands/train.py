@@ -3,7 +3,6 @@
 import argparse
 import contextlib
 import dataclasses
-import shlex
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
@@ -30,6 +29,7 @@ from mjxgait.runs.folder import (
     open_run,
     read_metrics,
 )
+from mjxgait.runs.own import command
 from mjxgait.settings.config import Config, ExaminationConfig
 from mjxgait.settings.tables import build, merge
 from mjxgait.zoo.seeds import check_zoo, create_zoo, folders_of, is_zoo
@@ -208,7 +208,7 @@ def _draw(folder: Path, screen: "Screen", all_plots: bool) -> bool:
 
             plot_run(folder)
     except KeyboardInterrupt:
-        screen.say(f"Not all is drawn; mjxgait plot {shlex.quote(str(folder))} draws it.")
+        screen.say(f"Not all is drawn; {command('plot', folder, run=folder)} draws it.")
         return False
     return True
 
@@ -219,7 +219,9 @@ def _plot_fitness(folder: Path) -> None:
         from mjxgait.viewing.curves import plot_fitness
 
         with disk_errors(
-            folder / PLOT, "the run itself is safe", f"draw it with mjxgait plot {folder}"
+            folder / PLOT,
+            "the run itself is safe",
+            f"draw it with {command('plot', folder, run=folder)}",
         ):
             plot_fitness(lines, folder / PLOT)
 

@@ -10,6 +10,7 @@ from rich.console import Console
 from mjxgait.errors import INTERRUPTED
 from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.folder import open_run
+from mjxgait.runs.own import command
 from mjxgait.zoo.seeds import read_seeds
 
 PICTURE = "zoo.png"
@@ -31,7 +32,6 @@ def evolve_zoo(
     from mjxgait.runs.loop import interruptible
 
     prepare_devices(1 if cluster else None)
-    again = f"mjxgait train --resume {zoo}"
     console, began = Console(highlight=False, soft_wrap=True), time.perf_counter()
     screen = _Screen(console)
     with interruptible() as interrupted, crew_at(cluster, console) as crew:
@@ -39,6 +39,7 @@ def evolve_zoo(
         told, seeds = interrupted.is_set, read_seeds(zoo)
         folders = seeds.folders(zoo)
         creature, config = open_run(folders[0])
+        again = command("train", "--resume", zoo, run=folders[0])
         rows = Rows(creature, folders, keep_every=config.keep_every, together=seeds.together)
         ended = rows.to_the_end(None, crew, screen.evolved, told) is not None
         ended = ended and examine(zoo, folders, again, screen.examined, told)
@@ -46,7 +47,10 @@ def evolve_zoo(
         console.print(f"interrupted; go on with: {again}")
         return INTERRUPTED
     _leave(zoo, creature.name, folders, console)
-    console.print(f"{time.perf_counter() - began:.0f} s; each is a run: mjxgait inspect {zoo}")
+    console.print(
+        f"{time.perf_counter() - began:.0f} s; each is a run: "
+        f"{command('inspect', zoo, run=folders[0])}"
+    )
     return 0
 
 

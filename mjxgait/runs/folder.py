@@ -7,13 +7,14 @@ from typing import Any
 from mjxgait.certify.check_body import check_body
 from mjxgait.champion import Champion, read_champion
 from mjxgait.creature import Creature, load_creature
-from mjxgait.errors import UserError
+from mjxgait.errors import NotLoaded, UserError
 from mjxgait.parts import build_config
 from mjxgait.parts.fit import check_fit
+from mjxgait.runs.own import CONFIG, keep_places, with_options
 from mjxgait.settings.config import Config
 from mjxgait.settings.tables import dump_toml, read_toml
 
-CONFIG, CREATURE, METRICS, CHAMPION = "config.toml", "creature", "metrics.jsonl", "champion.json"
+CREATURE, METRICS, CHAMPION = "creature", "metrics.jsonl", "champion.json"
 CERTIFICATE, STRESS, EXAMS = "certificate.json", "stress.json", "exams.jsonl"
 PLOT, PLOTS, BODY = "fitness.png", "plots", "body"
 ISLANDS, MIGRATIONS = "islands", "migrations.jsonl"
@@ -69,6 +70,7 @@ def create_run(folder: Path | None, creature: Creature, config: Config) -> Path:
     folder = check_run(folder, creature, config)
     try:
         keep_body(folder / CREATURE, creature)
+        keep_places(folder, config.use)
         (folder / CONFIG).write_text(dump_toml(config), encoding="utf-8")
     except OSError as error:
         raise UserError(f"{folder}: cannot be written ({error.strerror})") from None
@@ -94,11 +96,14 @@ def open_run(folder: Path) -> tuple[Creature, Config]:
     """The creature, on the ground of the run, and the settings of a run folder.
 
     Raises:
-      UserError: it is not a run folder.
+      UserError: it is not a run folder, or its controller or task was not named.
     """
     if not (folder / CONFIG).is_file():
         raise UserError(f"{folder}: not a run folder (it has no {CONFIG})")
-    config = build_config(read_toml(folder / CONFIG), str(folder / CONFIG))
+    try:
+        config = build_config(read_toml(folder / CONFIG), str(folder / CONFIG))
+    except NotLoaded as error:
+        raise with_options(error, folder) from None
     return load_creature(folder / CREATURE).on(config.rollout.ground), config
 
 

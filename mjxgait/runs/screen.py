@@ -2,7 +2,6 @@
 elsewhere.
 """
 
-import shlex
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -20,6 +19,7 @@ from mjxgait.certify.tasks import demands_of
 from mjxgait.certify.tasks.wishes import in_the_way
 from mjxgait.ground.spec import FLAT
 from mjxgait.runs.folder import CHAMPION, CONFIG, CREATURE, METRICS, PLOT
+from mjxgait.runs.own import command
 
 
 class Screen:
@@ -143,23 +143,21 @@ class Screen:
             table.add_row(name, value)
         self.console.print(table)
         if interrupted:
-            self.console.print(f"To go on: mjxgait train --resume {folder}")
+            again = command("train", "--resume", folder, run=folder)
+            self.console.print(f"To go on: {again}", markup=False)
 
     def next_steps(self, folder: Path, certified: bool) -> None:
-        """Commands that lead on from a run that has ended."""
-        run = shlex.quote(str(folder))
+        """Print commands that lead on from a run that has ended."""
         steps = {
-            f"mjxgait render {run} --out walk.webp": "films it",
-            f"mjxgait share {run} --out walk.html": "makes a page to give away",
-            f"mjxgait export {run} --out walk.glb": "writes it for animation tools",
+            ("render", folder, "--out", "walk.webp"): "films it",
+            ("share", folder, "--out", "walk.html"): "makes a page to give away",
+            ("export", folder, "--out", "walk.glb"): "writes it for animation tools",
         }
         if not certified:
-            steps[f"mjxgait inspect {run}"] = (
-                "tells how evolution went; another --seed may do better"
-            )
+            steps["inspect", folder] = "tells how evolution went; another --seed may do better"
         self.console.print("Next:")
-        for command, what in steps.items():
-            self.console.print(f"  {command}   {what}", markup=False)
+        for words, what in steps.items():
+            self.console.print(f"  {command(*words, run=folder)}   {what}", markup=False)
 
 
 def _best(last: Mapping[str, Any]) -> str:
