@@ -47,6 +47,6 @@ def test_the_extras_that_are_named_exist():
 
 def test_usd_without_the_extra_is_one_sentence(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setitem(sys.modules, "pxr", None)
-    with pytest.raises(UserError, match="walk.usda: USD needs an extra: pip install") as said:
+    with pytest.raises(UserError, match=r"walk\.usda: USD needs an extra: pip install") as said:
         export_usd(None, Path("walk.usda"))
     assert install_command("usd") in str(said.value)

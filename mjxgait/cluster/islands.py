@@ -67,7 +67,7 @@ def train(
                 if not found:
                     break
                 for line in islands.keep(found, time.perf_counter() - start):
-                    screen.generation(line, config.evolution.generations)
+                    screen.generation(line, islands.config)
                 reason, examined = _over(islands, examiner)
     finally:
         screen.close()

@@ -215,7 +215,7 @@ def _generation(
             write_champion(
                 experiment.champion(state, versions()), experiment.creature, folder / CHAMPION
             )
-    screen.generation(line, experiment.config.evolution.generations)
+    screen.generation(line, experiment.config)
     return state
 
 
