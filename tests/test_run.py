@@ -2,6 +2,7 @@
 one sentence.
 """
 
+import dataclasses
 import json
 import os
 import re
@@ -18,7 +19,10 @@ from helpers import STOOL, said_by
 
 from mjxgait.champion import read_champion
 from mjxgait.creature import load_creature
+from mjxgait.runs.checkpoint import Checkpoints
+from mjxgait.runs.experiment import build_experiment
 from mjxgait.runs.folder import open_run, read_metrics
+from mjxgait.runs.loop import mend_champion
 
 SMALL = [
     "--env",
@@ -205,6 +209,21 @@ def test_twice_interrupted_is_the_same_too(
     for last in ("4", "7"):
         said_by(capsys, "train", "--resume", folder, "--generations", last, "--no-plots", code=0)
     assert result(folder) == result(finished[0])
+
+
+def test_a_damaged_champion_is_written_anew_from_the_checkpoint(
+    finished: tuple[Path, str], tmp_path: Path
+):
+    folder = tmp_path / "damaged"
+    shutil.copytree(finished[0], folder)
+    (folder / "champion.json").write_text("[]")
+    creature, config = open_run(folder)
+    experiment = build_experiment(creature, config)
+    state = Checkpoints(folder).restore(experiment.abstract(), creature.digest)
+    mend_champion(folder, experiment, state)
+    assert result(folder) == result(finished[0])
+    mend_champion(folder, experiment, dataclasses.replace(state, fitness=state.fitness + 1.0))
+    assert result(folder) == result(finished[0]), "one that can be read is left as it is"
 
 
 def test_ctrl_c_finishes_the_generation_saves_and_says_how_to_go_on(

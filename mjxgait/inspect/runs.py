@@ -33,6 +33,7 @@ def list_runs(runs: Sequence[Path]) -> list[dict[str, Any]]:
         "fitness",
         "ended",
         "written",
+        "trouble",
         "verdict",
     )
     lines = []
@@ -71,8 +72,8 @@ def print_runs(lines: Sequence[Mapping[str, Any]], console: Console) -> None:
         )
     console.print(table)
     for line in lines:
-        if line["problem"]:
-            console.print(f"  {line['problem']}")
+        if said := line["problem"] or line["trouble"]:
+            console.print(f"  {said}", markup=False)
 
 
 def _rounded(value: float | None) -> str:
@@ -80,7 +81,9 @@ def _rounded(value: float | None) -> str:
 
 
 def _state(line: Mapping[str, Any]) -> str:
-    """What became of a run, in two words or three."""
+    """Return what became of a run, in two words or three."""
+    if line["trouble"]:
+        return "champion unreadable"
     if not line["ended"]:
         return "not finished"
     if line["verdict"] is None:

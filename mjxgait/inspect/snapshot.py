@@ -7,6 +7,7 @@ Letters: `P` individuals, `R` starts, `F` fitness terms.
 import dataclasses
 import json
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -14,11 +15,19 @@ from typing import Any, cast
 import numpy as np
 
 from mjxgait.certify import outdated, read_certificate
-from mjxgait.champion import Champion, codec_of, read_champion, split_genome
+from mjxgait.champion import Champion, codec_of, split_genome
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.runs.examination import due, why_ended
-from mjxgait.runs.folder import CERTIFICATE, CHAMPION, CONFIG, METRICS, open_run, read_metrics
+from mjxgait.runs.folder import (
+    CERTIFICATE,
+    CHAMPION,
+    CONFIG,
+    METRICS,
+    kept_champion,
+    open_run,
+    read_metrics,
+)
 from mjxgait.runs.stored import FOLDER, Manifest, read_stored, stored_generations
 from mjxgait.search.state import EvolutionState, stop_reason
 from mjxgait.settings.config import Config
@@ -98,6 +107,17 @@ class Snapshot:
         state = cast(EvolutionState, SimpleNamespace(**self.arrays))
         return stop_reason(state, self.config.evolution) or self._certified()
 
+    @cached_property
+    def trouble(self) -> str | None:
+        """Why the run's champion cannot be read; None where it can, or there is none yet."""
+        if not (self.run / CHAMPION).exists():
+            return None
+        try:
+            kept_champion(self.run, self.creature)
+        except UserError as error:
+            return str(error)
+        return None
+
     def _certified(self) -> str | None:
         """What an early examination that ended the run here would have said."""
         if self.generation != self.generations[-1] or not due(
@@ -106,9 +126,7 @@ class Snapshot:
             return None
         try:
             document = read_certificate(self.run / CERTIFICATE)
-            if document is None or outdated(
-                document, read_champion(self.run / CHAMPION, self.creature)
-            ):
+            if document is None or outdated(document, kept_champion(self.run, self.creature)):
                 return None
         except UserError:
             return None

@@ -5,12 +5,12 @@ from pathlib import Path
 from typing import Any
 
 from mjxgait.certify.check_body import check_body
-from mjxgait.champion import Champion, read_champion
+from mjxgait.champion import Champion, DamagedChampion, read_champion
 from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import NotLoaded, UserError
 from mjxgait.parts import build_config
 from mjxgait.parts.fit import check_fit
-from mjxgait.runs.own import CONFIG, keep_places, with_options
+from mjxgait.runs.own import CONFIG, command, keep_places, with_options
 from mjxgait.settings.config import Config
 from mjxgait.settings.tables import dump_toml, read_toml
 
@@ -114,8 +114,21 @@ def open_champion(folder: Path) -> tuple[Creature, Champion]:
       UserError: it is not a run folder, or has no champion yet.
     """
     creature, _ = open_run(folder)
-    champion = read_champion(folder / CHAMPION, creature)
+    champion = kept_champion(folder, creature)
     return champion.embodied(creature), champion
+
+
+def kept_champion(folder: Path, creature: Creature) -> Champion:
+    """Return what `champion.json` of a run folder holds.
+
+    Raises:
+      UserError: there is none, it is damaged, or it is of another body.
+    """
+    try:
+        return read_champion(folder / CHAMPION, creature)
+    except DamagedChampion as error:
+        again = command("train", "--resume", folder, run=folder)
+        raise UserError(f"{error}; write it anew with: {again}") from None
 
 
 def read_metrics(path: Path) -> list[dict[str, Any]]:

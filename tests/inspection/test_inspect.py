@@ -12,6 +12,7 @@ import sys
 
 import numpy as np
 import pytest
+from helpers import said_by
 from inspection.made_up import FORCED, LAST, POPULATION
 
 from mjxgait.certify.certificate import SCHEMA
@@ -95,6 +96,34 @@ def test_tells_whether_the_certificate_is_the_champions(run):
     assert said().endswith("it was given under other rules than today's.")
     (run / CERTIFICATE).write_text("[]")
     assert "not a certificate" in said()
+
+
+@pytest.mark.parametrize("text", ['{"schema": 1', "[]", "{}"], ids=["cut off", "a list", "empty"])
+def test_a_damaged_champion_gets_one_sentence_everywhere(run, capsys, tmp_path, text):
+    (run / CHAMPION).write_text(text)
+    one = facts(read_snapshot(run))
+    sentence = one["trouble"]
+    assert sentence.startswith(f"{run / CHAMPION}: damaged, or not a champion file (")
+    assert sentence.endswith(f"; write it anew with: mjxgait train --resume {run}")
+    assert one["certificate"] == sentence
+    said = tell(capsys, run)[1]
+    assert said.count(sentence) == 1
+    assert "no champion" not in said
+    assert "not been examined" not in said
+    several = tell(capsys, run.parent)[1]
+    assert several.count(sentence) == 1
+    assert "champion unreadable" in several
+    assert "not examined" not in several
+    for command in (["share", "--out", tmp_path / "a.html"], ["certify"]):
+        assert sentence in said_by(capsys, command[0], run, *command[1:], code=2)
+
+
+def test_of_a_damaged_champion_it_is_not_said_whether_a_certificate_ended_the_run(run, capsys):
+    config = run / "config.toml"
+    config.write_text(config.read_text().replace(f"generations = {LAST}", "generations = 99"))
+    assert "not finished" in tell(capsys, run)[1]
+    (run / CHAMPION).write_text("[]")
+    assert "not known without the champion" in tell(capsys, run)[1]
 
 
 def test_tells_whether_the_champion_walks_anywhere(run):
