@@ -20,6 +20,10 @@ generations = 1
 
 [[variant]]
 name = "usual"
+
+[[variant]]
+name = "plain PD"
+settings = {{ drive = {{ law = "pd" }} }}
 """
 WALKS = ("--env", STOOL, "--speeds", "0.2", "--turns", "10")
 
