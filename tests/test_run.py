@@ -226,6 +226,22 @@ def test_a_damaged_champion_is_written_anew_from_the_checkpoint(
     assert result(folder) == result(finished[0]), "one that can be read is left as it is"
 
 
+def test_a_run_that_is_over_says_how_to_go_on_and_does_nothing(
+    finished: tuple[Path, str], tmp_path: Path, capsys, monkeypatch
+):
+    folder = tmp_path / "over"
+    shutil.copytree(finished[0], folder)
+    before = {path: path.stat().st_mtime_ns for path in folder.rglob("*")}
+    with monkeypatch.context() as patch:
+        patch.setattr("mjxgait.cluster.evolve.evolve", None)
+        said = said_by(capsys, "train", "--resume", folder, code=0)
+    assert said == (
+        f"{folder}: nothing is left to do: all 7 generations are done. "
+        f"To go on: mjxgait train --resume {folder} --generations 14\n"
+    )
+    assert {path: path.stat().st_mtime_ns for path in folder.rglob("*")} == before
+
+
 def test_ctrl_c_finishes_the_generation_saves_and_says_how_to_go_on(
     finished: tuple[Path, str], tmp_path: Path
 ):

@@ -124,9 +124,14 @@ def _front(out: Path, runs: Sequence[Path]) -> int:
 def _resumed(folder: Path) -> int:
     """Go on with a run; see `_run`."""
     from mjxgait.keys.refine import read_original
+    from mjxgait.runs.ended import nothing_left
 
     creature, config = open_run(folder)
     read_original(folder, creature)  # a run of another kind is refused before the work
+    if over := nothing_left(folder, creature, config, config):
+        print(over)
+        _tell(folder, creature)
+        return 0
     return _run(folder, creature, config)
 
 
@@ -141,8 +146,6 @@ def _run(
     write: makes the folder of a new run.
     """
     from mjxgait.cluster.evolve import evolve
-    from mjxgait.keys.departure import departure_of
-    from mjxgait.keys.refine import read_original
     from mjxgait.runs.devices import prepare_devices
     from mjxgait.runs.screen import Screen
 
@@ -151,13 +154,21 @@ def _run(
     begin = write or (lambda: None)
     if not evolve(folder, creature, config, screen, write is None, begin=begin):
         return INTERRUPTED
-    original, found = read_original(folder, creature), departure_of(folder)
-    moved = "" if found.moved is None else f", as moved {found.moved:.1f}"
-    screen.say(f"From {original.source}: key poses {found.poses:.1f} degrees{moved} (r.m.s.)")
-    for sentence in found.words:
-        screen.say(f"  {sentence}")
+    _tell(folder, creature)
     certified = Run(folder).certified
     if not certified:
         screen.say("With less of the original it may walk: a smaller --keep")
     screen.next_steps(folder, certified)
     return 0
+
+
+def _tell(folder: Path, creature: Creature) -> None:
+    """Print how far the champion of a run departs from the cycle that it stays near."""
+    from mjxgait.keys.departure import departure_of
+    from mjxgait.keys.refine import read_original
+
+    original, found = read_original(folder, creature), departure_of(folder)
+    moved = "" if found.moved is None else f", as moved {found.moved:.1f}"
+    print(f"From {original.source}: key poses {found.poses:.1f} degrees{moved} (r.m.s.)")
+    for sentence in found.words:
+        print(f"  {sentence}")

@@ -120,27 +120,41 @@ def train_command(arguments: Sequence[str]) -> int:
         print(said)
     if options.runs is not None or _is_zoo(options.resume):
         return _several(options, creature, config, default)
+    if options.generation is not None and options.resume is None:
+        raise UserError("--generation: names a checkpoint to go on from, so it needs --resume")
+    if options.resume is None:
+        return _evolve(options, check_run(options.out, creature, config), creature, config)
+    _check_resumed(options, config, default)
+    from mjxgait.runs.ended import nothing_left  # leads to JAX
+
+    over = options.generation is None and nothing_left(options.resume, creature, config, default)
+    if over:
+        print(over)
+        return 0
+    return _evolve(options, options.resume, creature, config)
+
+
+def _check_resumed(options: TrainOptions, config: Config, default: Config) -> None:
+    """Refuse what a resumed run cannot change. default: the settings of its folder."""
+    if options.scale or options.way != "forward":
+        raise UserError(
+            f"{options.resume}: a resumed run keeps its body; --scale and --way need a new run"
+        )
+    if _without_ends(config) != _without_ends(default):
+        raise UserError(
+            f"{options.resume}: a resumed run keeps its settings; only --generations, "
+            "--evolution.target and --examination may differ"
+        )
+
+
+def _evolve(options: TrainOptions, folder: Path, creature: Creature, config: Config) -> int:
+    """Evolve a new run, or go on with one, and draw it; return the exit code."""
     # JAX takes a second to import: only once the options are known to be good.
     from mjxgait.cluster.evolve import evolve
     from mjxgait.commands.view import following
     from mjxgait.runs.devices import prepare_devices
     from mjxgait.runs.screen import Screen
 
-    if options.generation is not None and options.resume is None:
-        raise UserError("--generation: names a checkpoint to go on from, so it needs --resume")
-    if options.resume:
-        if options.scale or options.way != "forward":
-            raise UserError(
-                f"{options.resume}: a resumed run keeps its body; --scale and --way need a new run"
-            )
-        if _without_ends(config) != _without_ends(default):
-            raise UserError(
-                f"{options.resume}: a resumed run keeps its settings; only --generations, "
-                "--evolution.target and --examination may differ"
-            )
-        folder = options.resume
-    else:
-        folder = check_run(options.out, creature, config)
     prepare_devices(1 if options.cluster else None)
     screen, resumed = Screen(), options.resume is not None
     with contextlib.ExitStack() as beside:
