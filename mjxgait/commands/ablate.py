@@ -13,6 +13,7 @@ from mjxgait.creature import Creature, load_creature
 from mjxgait.creature.step import at_step
 from mjxgait.errors import INTERRUPTED, UserError
 from mjxgait.runs.folder import CREATURE, is_taken
+from mjxgait.runs.lock import locked
 from mjxgait.settings.shipped import find_creature
 from mjxgait.settings.tables import build, dump_toml, read_toml
 
@@ -145,7 +146,8 @@ def _run(
     with crew_at(cluster) as crew:
         if begin is not None:
             begin()
-        return run_study(folder, creature, plan, tell, crew, stride)
+        with locked(folder):
+            return run_study(folder, creature, plan, tell, crew, stride)
 
 
 class _Progress:

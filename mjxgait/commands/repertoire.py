@@ -18,6 +18,7 @@ from mjxgait.parts.wishes import Wishes, speed_of, wished
 from mjxgait.repertoire.grid import GRID, Cell, Grid
 from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.folder import check_parts, create_run, is_taken, open_run
+from mjxgait.runs.lock import locked
 from mjxgait.settings.config import Config
 from mjxgait.settings.tables import build, merge
 
@@ -88,11 +89,12 @@ def repertoire_command(arguments: Sequence[str]) -> int:
     with interruptible() as interrupted, crew_at(options.cluster, console) as crew:
         if plan is not None:
             begin(plan)
-        creature, told = open_run(folder / grid.cells[0].name)[0], interrupted.is_set
-        ended = evolve(folder, creature, grid, crew, screen.evolved, told)
-        walks = [folder / cell.name for cell in grid.cells]
-        again = f"mjxgait repertoire --resume {folder}"
-        ended = ended and examine(folder, walks, again, screen.examined, told)
+        with locked(folder):
+            creature, told = open_run(folder / grid.cells[0].name)[0], interrupted.is_set
+            ended = evolve(folder, creature, grid, crew, screen.evolved, told)
+            walks = [folder / cell.name for cell in grid.cells]
+            again = f"mjxgait repertoire --resume {folder}"
+            ended = ended and examine(folder, walks, again, screen.examined, told)
     if not ended:
         console.print(f"interrupted; go on with: mjxgait repertoire --resume {folder}")
         return INTERRUPTED

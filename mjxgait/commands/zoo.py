@@ -10,6 +10,7 @@ from rich.console import Console
 from mjxgait.errors import INTERRUPTED
 from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.folder import open_run
+from mjxgait.runs.lock import locked
 from mjxgait.runs.own import command
 from mjxgait.zoo.seeds import read_seeds
 
@@ -36,13 +37,14 @@ def evolve_zoo(
     screen = _Screen(console)
     with interruptible() as interrupted, crew_at(cluster, console) as crew:
         begin()
-        told, seeds = interrupted.is_set, read_seeds(zoo)
-        folders = seeds.folders(zoo)
-        creature, config = open_run(folders[0])
-        again = command("train", "--resume", zoo, run=folders[0])
-        rows = Rows(creature, folders, keep_every=config.keep_every, together=seeds.together)
-        ended = rows.to_the_end(None, crew, screen.evolved, told) is not None
-        ended = ended and examine(zoo, folders, again, screen.examined, told)
+        with locked(zoo):
+            told, seeds = interrupted.is_set, read_seeds(zoo)
+            folders = seeds.folders(zoo)
+            creature, config = open_run(folders[0])
+            again = command("train", "--resume", zoo, run=folders[0])
+            rows = Rows(creature, folders, keep_every=config.keep_every, together=seeds.together)
+            ended = rows.to_the_end(None, crew, screen.evolved, told) is not None
+            ended = ended and examine(zoo, folders, again, screen.examined, told)
     if not ended:
         console.print(f"interrupted; go on with: {again}")
         return INTERRUPTED

@@ -21,6 +21,7 @@ from mjxgait.inspect.snapshot import Snapshot
 from mjxgait.parts import make_task, resolve_config
 from mjxgait.parts.registry import what_ends
 from mjxgait.runs.folder import CERTIFICATE, STRESS, kept_champion
+from mjxgait.runs.lock import running
 from mjxgait.search.state import Origin
 from mjxgait.tasks.protocol import Task
 
@@ -42,6 +43,7 @@ def facts(snapshot: Snapshot) -> dict[str, Any]:
         "creature_digest": snapshot.creature.digest,
         "generation": snapshot.generation,
         "generations": snapshot.config.evolution.generations,
+        "running": running(snapshot.run),
         "ended": snapshot.ended,
         "checkpoints": list(snapshot.generations),
         "intact": True,

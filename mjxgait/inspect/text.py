@@ -82,7 +82,10 @@ def ago(written: str) -> str:
 def _print_identity(facts: Mapping[str, Any], console: Console) -> None:
     going = "not finished: `mjxgait train --resume` goes on from the latest checkpoint"
     # A certificate ends a run too, if it is the champion's.
-    state = facts["ended"] or ("not known without the champion" if facts["trouble"] else going)
+    alive = facts["running"] and f"runs now: {facts['running']}"
+    state = (
+        alive or facts["ended"] or ("not known without the champion" if facts["trouble"] else going)
+    )
     versions = ", ".join(f"{name} {version}" for name, version in facts["versions"].items())
     size, key = (
         f"{facts['bytes'] / 1024:,.0f} KiB",

@@ -21,6 +21,7 @@ from mjxgait.champion import read_champion
 from mjxgait.cli import main
 from mjxgait.inspect import facts, individual_facts, read_snapshot, text
 from mjxgait.runs.folder import CERTIFICATE, CHAMPION, STRESS
+from mjxgait.runs.lock import locked
 
 
 def tell(capsys, *arguments):
@@ -347,3 +348,11 @@ def test_a_folder_that_is_nothing_of_ours(tmp_path, capsys):
     code, said = tell(capsys, tmp_path / "missing")
     assert code == 2
     assert "no such folder" in said
+
+
+def test_a_run_that_is_alive_is_shown_as_running(run, capsys):
+    pytest.importorskip("fcntl", reason="this system has no flock")
+    with locked(run):
+        assert f"runs now: process {os.getpid()} on" in tell(capsys, run)[1]
+        assert re.search(r"walk .* running$", tell(capsys, run.parent)[1], re.MULTILINE)
+    assert "runs now" not in tell(capsys, run)[1]
