@@ -50,7 +50,7 @@ def test_a_cluster_that_is_none_is_refused_first(
     assert not out.exists()
 
 
-def refuse(*_: object) -> None:
+def refuse(*_: object, **__: object) -> None:
     raise UserError("MJX has no such thing")
 
 
