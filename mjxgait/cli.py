@@ -3,10 +3,11 @@
 import importlib
 import keyword
 import os
+import shlex
 import sys
 from collections.abc import Sequence
 
-from mjxgait.errors import INTERRUPTED, UserError, did_you_mean
+from mjxgait.errors import INTERRUPTED, NotLoaded, UserError, did_you_mean
 
 COMMANDS = {
     "train": "evolve a walk: mjxgait train --env tall_quadruped",
@@ -31,6 +32,9 @@ COMMANDS = {
 imported only when it is called.
 """
 
+OWN_PARTS = ("--controller", "--task")
+"""Options of every subcommand that name code of the user's own."""
+
 USAGE = """usage: mjxgait SUBCOMMAND [options]
 
 Evolve a stable walk for any creature.
@@ -46,14 +50,25 @@ def _with_own_parts(given: Sequence[str]) -> list[str]:
     Only here: no run folder, model or settings file can have code loaded.
     """
     command, *rest = given
-    flags = ("--controller", "--task")
-    if not any(argument.partition("=")[0] in flags for argument in rest):
+    if not any(argument.partition("=")[0] in OWN_PARTS for argument in rest):
         return rest
     from mjxgait.parts.own import take_own
 
     rest, named = take_own(rest)
     if command == "train":
         rest += [word for kind, name in named.items() for word in (f"--use.{kind}", name)]
+    return rest
+
+
+def _without_own_parts(given: Sequence[str]) -> list[str]:
+    """Return the words of a command less what names the user's own code."""
+    rest, waiting = [], list(given)
+    while waiting:
+        word = waiting.pop(0)
+        if word.partition("=")[0] not in OWN_PARTS:
+            rest.append(word)
+        elif "=" not in word:
+            del waiting[:1]
     return rest
 
 
@@ -74,6 +89,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
             f"mjxgait.commands.{given[0] + '_' * keyword.iskeyword(given[0])}"
         )
         sys.exit(getattr(module, f"{given[0]}_command")(_with_own_parts(given)))
+    except NotLoaded as error:
+        print(f"mjxgait: {error}", file=sys.stderr)
+        if error.options:
+            words = ["mjxgait", *_without_own_parts(given), *error.options]
+            print(f"The whole command: {shlex.join(words)}", file=sys.stderr)
+        sys.exit(2)
     except UserError as error:
         print(f"mjxgait: {error}", file=sys.stderr)
         sys.exit(2)

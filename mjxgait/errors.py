@@ -1,7 +1,7 @@
 """The one error that a user's mistake raises, and the words it is made of."""
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 INTERRUPTED = 130
 """Exit code of a run that the user interrupted."""
@@ -14,9 +14,20 @@ class UserError(Exception):
     """
 
 
-def not_loaded(kind: str, name: str) -> UserError:
-    """Of a controller or a task that is code of the user's own and was not named."""
-    return UserError(
+class NotLoaded(UserError):
+    """A controller or a task that is code of the user's own and was not named on the command line.
+
+    options: words that name all such code of a run; empty where no run is known.
+    """
+
+    def __init__(self, said: str, options: Sequence[str] = ()) -> None:
+        super().__init__(said)
+        self.options = tuple(options)
+
+
+def not_loaded(kind: str, name: str) -> NotLoaded:
+    """Return the error of a controller or a task that was not named."""
+    return NotLoaded(
         f'the {kind} is "{name}", which is no part of this program; code is never loaded from a '
         f"run folder or a settings file: name it with --{kind} FILE.py:CLASS"
     )

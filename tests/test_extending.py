@@ -1,15 +1,22 @@
 """docs/extending.md does what it says."""
 
 import csv
+import io
 import json
 import re
 import shlex
+import shutil
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from helpers import SHORT, STOOL
+from rich.console import Console
 
 from mjxgait.cli import main
+from mjxgait.commands.view import following
+from mjxgait.runs.own import own_options
+from mjxgait.runs.screen import Screen
 
 PAGE = Path(__file__).parents[1] / "docs" / "extending.md"
 SMALL = (
@@ -121,8 +128,56 @@ def test_no_code_is_loaded_from_a_run(trained: Path, capfd, monkeypatch):
     from mjxgait.parts import registry
 
     monkeypatch.setattr(registry, "_OWN", {})
-    assert call(f"inspect {trained}") == 2
-    assert "never loaded from a run folder" in capfd.readouterr().err
+    monkeypatch.chdir(trained.parents[1])
+    assert call(f"inspect {trained} --task=my.py:Stand") == 2
+    said, whole = capfd.readouterr().err.splitlines()
+    assert said.startswith(f"mjxgait: {trained}: ")
+    assert "never loaded from a run folder" in said
+    assert whole == (
+        f"The whole command: mjxgait inspect {trained} --controller my.py:Spin --task my.py:Stand"
+    )
+    assert call(whole.partition("mjxgait ")[2]) == 0
+
+
+def test_what_comes_next_is_said_with_the_users_own_code(trained: Path, monkeypatch):
+    """The place of the file is right wherever the user is."""
+    out = io.StringIO()
+    screen = Screen(Console(file=out, width=300))
+    monkeypatch.chdir(trained.parents[1])
+    screen.next_steps(trained, certified=False)
+    *_, last = out.getvalue().splitlines()
+    command = last.split("   ")[0].strip().removeprefix("mjxgait ")
+    assert command == f"inspect {trained} --controller my.py:Spin --task my.py:Stand"
+    assert call(command) == 0
+    monkeypatch.chdir(trained)
+    file = trained.parents[1] / "my.py"
+    assert own_options(trained)[1::2] == [f"{file}:Spin", f"{file}:Stand"]
+
+
+def test_a_run_that_does_not_say_where_its_code_lies_gives_its_name(trained: Path, tmp_path: Path):
+    """As those of earlier versions; what is no plain text is not printed."""
+    for name in ("config.toml", "own.toml"):
+        shutil.copy(trained / name, tmp_path)
+    (tmp_path / "own.toml").write_text('controller = "\\u001b[2J"\ntask = 3\n')
+    named = ["--controller", "my.py:Spin", "--task", "my.py:Stand"]
+    assert own_options(tmp_path) == named
+    (tmp_path / "own.toml").unlink()
+    assert own_options(tmp_path) == named
+
+
+def test_the_page_that_follows_a_run_is_given_the_same_code(folder: Path, trained, monkeypatch):
+    """What was named on the command line, whatever the run folder says."""
+    started: list[list[str]] = []
+
+    def start(words: list[str], **_: object) -> SimpleNamespace:
+        started.append(words)
+        return SimpleNamespace(terminate=lambda: None, wait=lambda: None)
+
+    monkeypatch.setattr("subprocess.Popen", start)
+    with following(trained):
+        pass
+    own = {*started[0][5:]}
+    assert own >= {"--controller", f"{folder / 'my.py'}:Spin", f"{folder / 'my.py'}:Stand"}
 
 
 @pytest.mark.parametrize(
@@ -157,3 +212,4 @@ def test_a_mistake_is_one_sentence(folder: Path, arguments, words, capfd, monkey
     said = capfd.readouterr().err
     assert words in said
     assert "Traceback" not in said
+    assert not (folder / "runs" / "none").exists()

@@ -2,6 +2,7 @@
 one sentence.
 """
 
+import dataclasses
 import json
 import os
 import re
@@ -18,7 +19,10 @@ from helpers import STOOL, said_by
 
 from mjxgait.champion import read_champion
 from mjxgait.creature import load_creature
+from mjxgait.runs.checkpoint import Checkpoints
+from mjxgait.runs.experiment import build_experiment
 from mjxgait.runs.folder import open_run, read_metrics
+from mjxgait.runs.loop import mend_champion
 
 SMALL = [
     "--env",
@@ -109,7 +113,7 @@ def test_one_plain_line_per_generation_where_there_is_no_terminal(finished: tupl
     lines = [line for line in finished[1].splitlines() if line.startswith("generation")]
     assert len(lines) == 8
     assert all(
-        re.search(r"best \S+  mean \S+  alive +\d+%  .* steps/s +\d+ s left", line)
+        re.search(r"best \S+  mean \S+  alive +\d+%  .* steps/s +at most \d+ (s|min) left", line)
         for line in lines
     )
 
@@ -207,6 +211,37 @@ def test_twice_interrupted_is_the_same_too(
     assert result(folder) == result(finished[0])
 
 
+def test_a_damaged_champion_is_written_anew_from_the_checkpoint(
+    finished: tuple[Path, str], tmp_path: Path
+):
+    folder = tmp_path / "damaged"
+    shutil.copytree(finished[0], folder)
+    (folder / "champion.json").write_text("[]")
+    creature, config = open_run(folder)
+    experiment = build_experiment(creature, config)
+    state = Checkpoints(folder).restore(experiment.abstract(), creature.digest)
+    mend_champion(folder, experiment, state)
+    assert result(folder) == result(finished[0])
+    mend_champion(folder, experiment, dataclasses.replace(state, fitness=state.fitness + 1.0))
+    assert result(folder) == result(finished[0]), "one that can be read is left as it is"
+
+
+def test_a_run_that_is_over_says_how_to_go_on_and_does_nothing(
+    finished: tuple[Path, str], tmp_path: Path, capsys, monkeypatch
+):
+    folder = tmp_path / "over"
+    shutil.copytree(finished[0], folder)
+    before = {path: path.stat().st_mtime_ns for path in folder.rglob("*")}
+    with monkeypatch.context() as patch:
+        patch.setattr("mjxgait.cluster.evolve.evolve", None)
+        said = said_by(capsys, "train", "--resume", folder, code=0)
+    assert said == (
+        f"{folder}: nothing is left to do: all 7 generations are done. "
+        f"To go on: mjxgait train --resume {folder} --generations 14\n"
+    )
+    assert {path: path.stat().st_mtime_ns for path in folder.rglob("*")} == before
+
+
 def test_ctrl_c_finishes_the_generation_saves_and_says_how_to_go_on(
     finished: tuple[Path, str], tmp_path: Path
 ):
@@ -239,7 +274,7 @@ def test_what_comes_next_is_said_before_plots_are_drawn_which_may_be_interrupted
     def interrupted(run: Path):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("mjxgait.cluster.evolve.evolve", lambda *_: True)
+    monkeypatch.setattr("mjxgait.cluster.evolve.evolve", lambda *given: given[-1]() is None)
     monkeypatch.setattr("mjxgait.viewing.plots.plot_run", interrupted)
     said = said_by(capsys, "train", "--env", STOOL, "--out", tmp_path / "run", code=130)
     assert said.index("Next:") < said.index("Drawing") < said.index("mjxgait plot")

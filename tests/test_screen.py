@@ -2,13 +2,15 @@
 
 import io
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
+from helpers import small_config
 from rich.console import Console
 
 from mjxgait.certify import Certificate, CertificateConfig
 from mjxgait.certify.criteria import Criterion, Measure
-from mjxgait.runs.screen import Screen
+from mjxgait.runs.screen import Screen, duration
 
 
 @pytest.mark.parametrize(
@@ -61,9 +63,54 @@ def test_the_words_of_a_line_are_explained_once():
     screen = Screen(Console(file=out, width=300))
     line = {"best": 1.0, "mean": 0.5, "episodes": 8, "failures": 2, "forced": False}
     for generation in range(2):
-        screen.generation(
-            line | {"generation": generation, "wall_s": 1.0, "steps_per_second": 9}, 3
-        )
+        shown = line | {"generation": generation, "wall_s": 1.0, "steps_per_second": 9}
+        screen.generation(shown, small_config())
     told = out.getvalue()
     assert told.count("alive: the share of the episodes that end without a fall") == 1
     assert told.count("alive  75%") == 2
+
+
+def time_left(**tables: dict) -> list[str]:
+    """What is said of the time that is left after generation 0, which took 1.5 s."""
+    out = io.StringIO()
+    line = {"generation": 0, "wall_s": 1.5, "steps_per_second": 9, "episodes": 8, "failures": 2}
+    scores = {"best": 1.0, "mean": 0.5, "forced": False}
+    Screen(Console(file=out, width=300)).generation(line | scores, small_config(**tables))
+    return [text for text in out.getvalue().splitlines() if "left" in text]
+
+
+def test_the_time_left_is_a_bound_where_a_run_may_end_sooner():
+    patient = {"forced": {"patience": 0}, "generations": 60}
+    said, line = time_left(evolution=patient, examination={"every": 5})
+    assert "time left: up to generation 60; the run ends sooner once a look at its best" in said
+    assert line.endswith("at most 90 s left")
+    (line,) = time_left(evolution=patient, examination={"every": 0})
+    assert line.endswith("steps/s  90 s left")
+    reached, _ = time_left(evolution=patient | {"target": 3.5}, examination={"candidates": 0})
+    assert reached.endswith("ends sooner at a fitness of 3.5")
+    tried, _ = time_left(examination={"every": 0})
+    assert tried.endswith("ends sooner when forced evolution no longer pays")
+
+
+def test_the_time_left_counts_what_lies_between_generations(monkeypatch: pytest.MonkeyPatch):
+    """Examinations, of which the log of a generation says nothing."""
+    clock = iter((100.0, 100.0, 109.0))
+    stopped = SimpleNamespace(perf_counter=lambda: next(clock))
+    monkeypatch.setattr("mjxgait.runs.screen.time", stopped)
+    out = io.StringIO()
+    screen = Screen(Console(file=out, width=300))
+    line = {"best": 1.0, "mean": 0.5, "episodes": 8, "failures": 2, "forced": False}
+    for generation in range(3):
+        shown = line | {"generation": generation, "wall_s": 0.5, "steps_per_second": 9}
+        screen.generation(shown, small_config(evolution={"generations": 12}))
+    assert "at most 45 s left" in out.getvalue().splitlines()[-1]
+
+
+def test_times_are_in_a_unit_that_suits_them():
+    assert [duration(s) for s in (0.4, 119, 150, 7100, 9000)] == [
+        "0 s",
+        "119 s",
+        "2 min",
+        "118 min",
+        "2.5 h",
+    ]

@@ -14,7 +14,7 @@ from mjxgait.errors import UserError, did_you_mean
 from mjxgait.ground.spec import FLAT
 from mjxgait.parts import resolve_config
 from mjxgait.parts.wishes import Wishes, wished
-from mjxgait.runs.folder import check_run
+from mjxgait.runs.folder import check_parts
 from mjxgait.settings.config import Config
 from mjxgait.settings.rollout import GroundText
 from mjxgait.settings.shipped import data_folder
@@ -189,11 +189,11 @@ def check_plan(plan: Plan, creature: Creature, where: str) -> None:
     """Refuse a study with a variant whose runs could not be examined in the end.
 
     Raises:
-      UserError: names the variant and says why; see `check_run`.
+      UserError: names the variant and says why; see `check_parts`.
     """
     for variant in plan.variants:
         with _told_of(f'{where}: variant "{variant}"'):
-            check_run(creature, plan.of(variant)[0].config)
+            check_parts(creature, plan.of(variant)[0].config)
 
 
 def _config(study: Study, table: VariantTable, creature: Creature, where: str) -> Config:

@@ -22,6 +22,7 @@ from mjxgait.animation.skeleton import (
     world_poses,
 )
 from mjxgait.errors import UserError
+from mjxgait.settings.shipped import install_command
 
 
 def export_usd(loop: WalkLoop, path: Path, travelling: bool = False) -> None:
@@ -35,7 +36,7 @@ def export_usd(loop: WalkLoop, path: Path, travelling: bool = False) -> None:
     try:
         from pxr import Tf, Usd, UsdGeom, UsdSkel
     except ImportError:
-        raise UserError(f'{path}: USD needs the extra: pip install "mjxgait[usd]"') from None
+        raise UserError(f"{path}: USD needs an extra: {install_command('usd')}") from None
     creature = loop.walk.creature
     model, rest, axes = creature.model, resting(loop), gltf_axes(loop.walk.forward)
     skeleton = along_limbs(model, skeleton_of(model, creature.trunk), rest, axes)

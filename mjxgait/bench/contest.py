@@ -26,6 +26,7 @@ from mjxgait.bench.workers import Workers
 from mjxgait.bench.workload import Lap, Workload
 from mjxgait.cores import cores
 from mjxgait.settings.config import Config
+from mjxgait.settings.shipped import install_command
 
 DART_STRIDE = 4
 """DART is so much slower that it is given every fourth genome only."""
@@ -137,7 +138,7 @@ def _peers(work: Workload) -> tuple[dict[str, Workers], dict[str, str]]:
             peers["c"] = Workers(partial(CPeer, library=library), work)
     peers["mujoco_c"] = Workers(MujocoPeer, work)
     if importlib.util.find_spec("dartpy") is None:
-        left_out["dart"] = "dartpy is not installed; install the extra mjxgait[peers]"
+        left_out["dart"] = f"dartpy is not installed: {install_command('peers')}"
         return peers, left_out
     from mjxgait.bench.dart_peer import DartPeer, Unsupported, check_supported
 

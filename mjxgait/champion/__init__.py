@@ -1,12 +1,19 @@
 """One individual, complete and readable without JAX: `champion.json`."""
 
 from mjxgait.champion.codecs import CODECS, Codec, codec_of
-from mjxgait.champion.record import Champion, read_champion, split_genome, write_champion
+from mjxgait.champion.record import (
+    Champion,
+    DamagedChampion,
+    read_champion,
+    split_genome,
+    write_champion,
+)
 
 __all__ = [
     "CODECS",
     "Champion",
     "Codec",
+    "DamagedChampion",
     "codec_of",
     "read_champion",
     "split_genome",

@@ -163,11 +163,15 @@ def write_champion(champion: Champion, creature: Creature, path: Path) -> None:
     scratch.replace(path)
 
 
+class DamagedChampion(UserError):
+    """A file that is there and holds no champion."""
+
+
 def read_champion(path: Path, creature: Creature) -> Champion:
-    """The individual in a file, for the creature it was evolved on.
+    """Return the individual in a file, for the creature it was evolved on.
 
     Raises:
-      UserError: the file is missing, not a champion, or of another creature.
+      UserError: the file is missing, damaged (`DamagedChampion`), or of another creature.
     """
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
@@ -179,7 +183,7 @@ def read_champion(path: Path, creature: Creature) -> Champion:
     except FileNotFoundError:
         raise UserError(f"{path}: no such file; the run has no champion yet") from None
     except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise UserError(f"{path}: not a champion file ({error!r})") from None
+        raise DamagedChampion(f"{path}: damaged, or not a champion file ({error!r})") from None
     return champion
 
 

@@ -10,6 +10,7 @@ from typing import Any
 
 from mjxgait.cluster.crew import Crew
 from mjxgait.errors import UserError
+from mjxgait.settings.shipped import install_command
 
 LOOPBACK = ("127.0.0.1", "localhost")
 AUTO = "auto"
@@ -63,7 +64,7 @@ def _ray() -> Any:
         import ray
     except ImportError:
         raise UserError(
-            '--cluster needs Ray: pip install "mjxgait[cluster]", on every machine of the cluster'
+            f"--cluster needs Ray: {install_command('cluster')}, on every machine of the cluster"
         ) from None
     # What its threads say of lost machines is said in a sentence of ours.
     logging.getLogger("ray").setLevel(logging.CRITICAL)

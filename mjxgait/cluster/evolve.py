@@ -1,5 +1,7 @@
 """A run of one population or of several, by this machine or by a cluster."""
 
+import contextlib
+from collections.abc import Callable
 from pathlib import Path
 
 from mjxgait.cluster import islands
@@ -8,6 +10,7 @@ from mjxgait.cluster.board import crew_at
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.runs import loop
+from mjxgait.runs.lock import locked
 from mjxgait.runs.screen import Screen
 from mjxgait.settings.config import Config
 
@@ -20,21 +23,35 @@ def evolve(
     resume: bool = False,
     generation: int | None = None,
     cluster: str | None = None,
+    begin: Callable[[], object] = lambda: None,
 ) -> bool:
-    """Runs, or goes on with, the evolution in a run folder; returns whether it came to its end.
+    """Run, or go on with, the evolution in a run folder; returns whether it came to its end.
 
     Args:
       resume: go on from a checkpoint, the latest or that of `generation`.
-      cluster: address of the one that does it, if not this machine.
+      cluster: address of the cluster that computes it, if not this machine.
+      begin: makes the folder of a new run; called after the last check that can refuse the run.
 
     Raises:
-      UserError: see `connected`; or a single checkpoint was named, and there are islands.
+      UserError: see `connected`; a single checkpoint was named, and there are islands; or another
+        process works on the run.
     """
     several = config.evolution.islands.count > 1
     if several and generation is not None:
         raise UserError(f"{folder}: islands go on from their latest checkpoints, not --generation")
-    with crew_at(cluster, screen.console) as crew:
+    with contextlib.ExitStack() as held:
+        if resume:
+            held.enter_context(locked(folder))
+
+        def begin_new() -> None:
+            begin()
+            if not resume:
+                held.enter_context(locked(folder))
+
+        crew = held.enter_context(crew_at(cluster, screen.console))
         if several:
-            return islands.train(folder, creature, config, screen, crew, resume)
+            return islands.train(folder, creature, config, screen, crew, resume, begin_new)
         evaluator = Blocks(crew, creature, config) if cluster else None
-        return loop.train(folder, creature, config, screen, resume, generation, evaluator)
+        return loop.train(
+            folder, creature, config, screen, resume, generation, evaluator, begin_new
+        )

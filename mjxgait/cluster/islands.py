@@ -35,10 +35,20 @@ from mjxgait.settings.config import Config
 
 
 def train(
-    folder: Path, creature: Creature, config: Config, screen: Screen, crew: Crew, resume: bool
+    folder: Path,
+    creature: Creature,
+    config: Config,
+    screen: Screen,
+    crew: Crew,
+    resume: bool,
+    begin: Callable[[], object] = lambda: None,
 ) -> bool:
-    """Runs, or goes on with, the islands in a run folder; returns whether they came to their end."""
+    """Run, or go on with, the islands in a run folder; returns whether they came to their end.
+
+    begin: makes the folder of new islands; called after the last check.
+    """
     experiment = build_experiment(creature, config)
+    begin()
     if experiment.plant_note:
         screen.say(experiment.plant_note)
     islands = _Islands(folder, creature, config, resume)
@@ -57,7 +67,7 @@ def train(
                 if not found:
                     break
                 for line in islands.keep(found, time.perf_counter() - start):
-                    screen.generation(line, config.evolution.generations)
+                    screen.generation(line, islands.config)
                 reason, examined = _over(islands, examiner)
     finally:
         screen.close()

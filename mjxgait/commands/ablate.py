@@ -2,7 +2,8 @@
 
 import dataclasses
 import shlex
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,8 @@ import tyro
 from mjxgait.creature import Creature, load_creature
 from mjxgait.creature.step import at_step
 from mjxgait.errors import INTERRUPTED, UserError
-from mjxgait.runs.folder import CREATURE
+from mjxgait.runs.folder import CREATURE, is_taken
+from mjxgait.runs.lock import locked
 from mjxgait.settings.shipped import find_creature
 from mjxgait.settings.tables import build, dump_toml, read_toml
 
@@ -93,6 +95,7 @@ def ablate_command(arguments: Sequence[str]) -> int:
         check_plan(plan, creature, where)
     # JAX takes a second to import: only once the study is known to be good.
     from mjxgait.ablation.rows import groups
+    from mjxgait.runs.blueprint import check_plan
     from mjxgait.runs.devices import prepare_devices
 
     prepare_devices()
@@ -110,10 +113,13 @@ def ablate_command(arguments: Sequence[str]) -> int:
         )
     if options.dry_run:
         return 0
+    screen, begin = _Progress(), None
     if not options.resume:
-        _create(folder, study, creature)
-    screen = _Progress()
-    if not _run(folder, creature, plan, screen, options.cluster):
+        _check_new(folder)
+        for runs in parts:
+            check_plan(creature, runs[0].config)
+        begin = partial(_create, folder, study, creature)
+    if not _run(folder, creature, plan, screen, options.cluster, begin):
         print(f"interrupted; go on with: mjxgait ablate --resume {folder}")
         return INTERRUPTED
     results = measure(folder, plan, screen.measuring)
@@ -125,15 +131,26 @@ def ablate_command(arguments: Sequence[str]) -> int:
 
 
 def _run(
-    folder: Path, creature: Creature, plan: Any, screen: "_Progress", cluster: str | None
+    folder: Path,
+    creature: Creature,
+    plan: Any,
+    screen: "_Progress",
+    cluster: str | None,
+    begin: Callable[[], object] | None,
 ) -> bool:
-    """Whether the study came to its end; here, or on a cluster."""
+    """Run a study here or on a cluster; return whether it came to its end.
+
+    begin: makes the folder of a new study; called after the last check.
+    """
     from mjxgait.ablation.rows import run_study
     from mjxgait.cluster.board import crew_at
 
     tell, stride = (screen.part, STRIDE) if cluster else (screen.generation, 1)
     with crew_at(cluster) as crew:
-        return run_study(folder, creature, plan, tell, crew, stride)
+        if begin is not None:
+            begin()
+        with locked(folder):
+            return run_study(folder, creature, plan, tell, crew, stride)
 
 
 class _Progress:
@@ -168,14 +185,18 @@ class _Progress:
         print(f"{number} of {count} champions examined in C MuJoCo", flush=True)
 
 
+def _check_new(folder: Path) -> None:
+    """Refuse a folder that holds something."""
+    if is_taken(folder):
+        raise UserError(
+            f"{folder}: holds something already; name another folder with --out, or go on with "
+            f"--resume {folder}"
+        )
+
+
 def _create(folder: Path, study: Any, creature: Creature) -> None:
-    """Makes the folder of a study with its exact file and creature."""
+    """Make the folder of a study with its exact file and creature."""
     try:
-        if folder.exists() and any(folder.iterdir()):
-            raise UserError(
-                f"{folder}: holds something already; name another folder with --out, or go on with "
-                f"--resume {folder}"
-            )
         (folder / CREATURE).mkdir(parents=True, exist_ok=True)
         for name, text in creature.files.items():
             (folder / CREATURE / name).write_text(text, encoding="utf-8")

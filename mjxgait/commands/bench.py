@@ -19,7 +19,7 @@ class BenchOptions:
 
     The contestants are a program in C around MuJoCo's functions, NumPy between batched steps of C
     MuJoCo, and DART (docs/performance.md). C is left out where there is no compiler, DART unless
-    dartpy is installed (mjxgait[peers]). Leave the machine alone meanwhile: the ratios stand some
+    dartpy is installed (the extra peers). Leave the machine alone meanwhile: the ratios stand some
     load, the rates do not.
 
     Attributes:

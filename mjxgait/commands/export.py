@@ -34,6 +34,7 @@ def export_command(arguments: Sequence[str]) -> int:
     from mjxgait.animation import export_bvh, export_glb, export_usd, walk_loop
     from mjxgait.runs.disk import require_writable
     from mjxgait.viewing.cast import LOOP_SECONDS, champion_of
+    from mjxgait.viewing.doubt import doubt
 
     writers = {".glb": export_glb, ".bvh": export_bvh, ".usda": export_usd, ".usdc": export_usd}
     if (kind := options.out.suffix.lower()) not in writers:
@@ -42,7 +43,8 @@ def export_command(arguments: Sequence[str]) -> int:
             f"{', '.join(writers)}"
         )
     require_writable(options.out)
-    loop = walk_loop(champion_of(options.run, LOOP_SECONDS).walk, options.rate)
+    walk = champion_of(options.run, LOOP_SECONDS).walk
+    loop = walk_loop(walk, options.rate)
     writers[kind](loop, options.out, options.travelling)
     size = options.out.stat().st_size / 1024
     strides = "1 stride" if loop.strides == 1 else f"{loop.strides} strides"
@@ -50,4 +52,6 @@ def export_command(arguments: Sequence[str]) -> int:
         f"{options.out} ({size:,.0f} KiB): {strides}, {loop.times[-1]:.2f} s at {loop.rate} "
         f"frames/s, {loop.speed:.2f} m/s"
     )
+    if said := doubt(options.run, walk):
+        print(said)
     return 0

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from mjxgait.creature import load_creature
+from mjxgait.creature.scale import load_files
 from mjxgait.errors import UserError
 from mjxgait.importing import TOML, WRITTEN, ImportChoices, Imported, import_model
 
@@ -99,15 +99,15 @@ def check_folder(folder: Path, read: Sequence[Path], model: Path, force: bool) -
 
 
 def write_folder(folder: Path, imported: Imported) -> None:
-    """Writes the creature folder and loads it once.
+    """Write the creature folder, once its texts have been loaded.
 
     Raises:
-      UserError: it cannot be written.
+      UserError: the texts are no creature, or the folder cannot be written.
     """
+    load_files(imported.files)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for name, text in imported.files.items():
             (folder / name).write_text(text, encoding="utf-8")
     except OSError as error:
         raise UserError(f"{folder}: cannot be written ({error.strerror})") from None
-    load_creature(folder)

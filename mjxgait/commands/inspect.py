@@ -76,6 +76,8 @@ def inspect_command(arguments: Sequence[str]) -> int:
         )
     if runs := inspect.runs_in(options.path):
         return tell(inspect.list_runs(runs), inspect.print_runs)
+    if begun := inspect.just_begun(options.path):
+        return tell(begun, inspect.print_just_begun)
     snapshot = inspect.read_snapshot(options.path, options.generation)
     if options.individual is not None:
         return tell(

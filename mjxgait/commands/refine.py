@@ -1,16 +1,19 @@
 """`mjxgait refine`: a hand-made cycle in, the nearest one that physics lets walk out."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
 import tyro
 
+from mjxgait.creature import Creature
 from mjxgait.errors import INTERRUPTED, UserError
 from mjxgait.library import Run, load_creature
-from mjxgait.runs.folder import new_run_folder, open_run
+from mjxgait.runs.folder import check_parts, check_run, new_run_folder, open_run
+from mjxgait.settings.config import Config
 from mjxgait.settings.tables import read_toml
 
 
@@ -64,7 +67,7 @@ def refine_command(arguments: Sequence[str]) -> int:
 
     if options.resume:
         runs = front.runs_in(options.resume)
-        return _front(options.resume, runs) if runs else _run(options.resume, resume=True)
+        return _front(options.resume, runs) if runs else _resumed(options.resume)
     if options.keys is None:
         raise UserError("name the file with the cycle: mjxgait refine --env duck --keys walk.glb")
     creature = load_creature(options.env)
@@ -84,13 +87,25 @@ def refine_command(arguments: Sequence[str]) -> int:
     if options.only_show:
         return 0
     if len(configs) == 1:
-        folder = begin(options.out, creature, configs[0], options.keys, brought)
-        return _run(folder, resume=False)
+        folder = check_run(options.out, creature, configs[0])
+        write = partial(begin, folder, creature, configs[0], options.keys, brought)
+        return _run(folder, creature, configs[0], write)
     out = options.out or new_run_folder(creature.name, options.seed)
     front.check_front(out, options.keep)
+    _check(creature, configs[0])
     for keep, config in zip(options.keep, configs, strict=True):
         begin(front.folder_of(out, keep), creature, config, options.keys, brought)
     return _front(out, front.runs_in(out))
+
+
+def _check(creature: Creature, config: Config) -> None:
+    """Refuse what no run can be made of, before anything is written."""
+    from mjxgait.runs.blueprint import check_plan
+    from mjxgait.runs.devices import prepare_devices
+
+    check_parts(creature, config)
+    prepare_devices()
+    check_plan(creature, config)
 
 
 def _front(out: Path, runs: Sequence[Path]) -> int:
@@ -99,34 +114,61 @@ def _front(out: Path, runs: Sequence[Path]) -> int:
 
     for run in runs:
         print(f"{run}:")
-        if not front.finished(run) and _run(run, resume=True) == INTERRUPTED:
+        if not front.finished(run) and _resumed(run) == INTERRUPTED:
             print(f"To go on: mjxgait refine --resume {out}")
             return INTERRUPTED
     print(f"Side by side: {front.draw(out)}")
     return 0
 
 
-def _run(folder: Path, resume: bool) -> int:
-    """Evolves near the cycle, has the champion examined, and tells how far it departs."""
-    from mjxgait.cluster.evolve import evolve
-    from mjxgait.keys.departure import departure_of
+def _resumed(folder: Path) -> int:
+    """Go on with a run; see `_run`."""
     from mjxgait.keys.refine import read_original
+    from mjxgait.runs.ended import nothing_left
+
+    creature, config = open_run(folder)
+    read_original(folder, creature)  # a run of another kind is refused before the work
+    if over := nothing_left(folder, creature, config, config):
+        print(over)
+        _tell(folder, creature)
+        return 0
+    return _run(folder, creature, config)
+
+
+def _run(
+    folder: Path,
+    creature: Creature,
+    config: Config,
+    write: Callable[[], object] | None = None,
+) -> int:
+    """Evolve near the cycle, examine the champion, and print how far it departs.
+
+    write: makes the folder of a new run.
+    """
+    from mjxgait.cluster.evolve import evolve
     from mjxgait.runs.devices import prepare_devices
     from mjxgait.runs.screen import Screen
 
-    creature, config = open_run(folder)
-    original = read_original(folder, creature)
     prepare_devices()
     screen = Screen()
-    if not evolve(folder, creature, config, screen, resume):
+    begin = write or (lambda: None)
+    if not evolve(folder, creature, config, screen, write is None, begin=begin):
         return INTERRUPTED
-    found = departure_of(folder)
-    moved = "" if found.moved is None else f", as moved {found.moved:.1f}"
-    screen.say(f"From {original.source}: key poses {found.poses:.1f} degrees{moved} (r.m.s.)")
-    for sentence in found.words:
-        screen.say(f"  {sentence}")
+    _tell(folder, creature)
     certified = Run(folder).certified
     if not certified:
         screen.say("With less of the original it may walk: a smaller --keep")
     screen.next_steps(folder, certified)
     return 0
+
+
+def _tell(folder: Path, creature: Creature) -> None:
+    """Print how far the champion of a run departs from the cycle that it stays near."""
+    from mjxgait.keys.departure import departure_of
+    from mjxgait.keys.refine import read_original
+
+    original, found = read_original(folder, creature), departure_of(folder)
+    moved = "" if found.moved is None else f", as moved {found.moved:.1f}"
+    print(f"From {original.source}: key poses {found.poses:.1f} degrees{moved} (r.m.s.)")
+    for sentence in found.words:
+        print(f"  {sentence}")

@@ -57,6 +57,7 @@ def render_command(arguments: Sequence[str]) -> int:
     # may see the variable.
     wanted = os.environ.pop("MUJOCO_GL", None)
     from mjxgait.viewing import cast, video
+    from mjxgait.viewing.doubt import doubt
     from mjxgait.viewing.stage import Stage
 
     generations = _check(options)
@@ -83,6 +84,10 @@ def render_command(arguments: Sequence[str]) -> int:
             options.fps,
         )
     print(f"{options.out} ({options.out.stat().st_size / 1024:,.0f} KiB)")
+    if not (options.top or generations):
+        for run, runner in zip(options.runs, runners, strict=True):
+            if said := doubt(run, runner.walk):
+                print(f"{runner.label}: {said}" if runner.label else said)
     return 0
 
 

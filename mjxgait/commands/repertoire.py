@@ -2,7 +2,7 @@
 
 import dataclasses
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
@@ -15,9 +15,10 @@ from mjxgait.errors import INTERRUPTED, UserError
 from mjxgait.library import load_creature
 from mjxgait.parts import resolve_config
 from mjxgait.parts.wishes import Wishes, speed_of, wished
-from mjxgait.repertoire.grid import GRID, Grid
+from mjxgait.repertoire.grid import GRID, Cell, Grid
 from mjxgait.runs.disk import disk_errors
-from mjxgait.runs.folder import create_run, open_run
+from mjxgait.runs.folder import check_parts, create_run, is_taken, open_run
+from mjxgait.runs.lock import locked
 from mjxgait.settings.config import Config
 from mjxgait.settings.tables import build, merge
 
@@ -73,7 +74,8 @@ class RepertoireOptions:
 def repertoire_command(arguments: Sequence[str]) -> int:
     """Returns the exit code."""
     options = tyro.cli(RepertoireOptions, args=list(arguments), prog="mjxgait repertoire")
-    folder, creature, grid = _resumed(options) if options.resume else begun(options)
+    plan = None if options.resume else planned(options)
+    folder, grid = _resumed(options) if plan is None else (plan.folder, plan.grid)
     # JAX takes a second to import: only once the options are known to be good.
     from mjxgait.cluster.board import crew_at
     from mjxgait.repertoire.evolve import evolve
@@ -85,11 +87,14 @@ def repertoire_command(arguments: Sequence[str]) -> int:
     console, began = Console(highlight=False, soft_wrap=True), time.perf_counter()
     screen = _Screen(console)
     with interruptible() as interrupted, crew_at(options.cluster, console) as crew:
-        told = interrupted.is_set
-        ended = evolve(folder, creature, grid, crew, screen.evolved, told)
-        walks = [folder / cell.name for cell in grid.cells]
-        again = f"mjxgait repertoire --resume {folder}"
-        ended = ended and examine(folder, walks, again, screen.examined, told)
+        if plan is not None:
+            begin(plan)
+        with locked(folder):
+            creature, told = open_run(folder / grid.cells[0].name)[0], interrupted.is_set
+            ended = evolve(folder, creature, grid, crew, screen.evolved, told)
+            walks = [folder / cell.name for cell in grid.cells]
+            again = f"mjxgait repertoire --resume {folder}"
+            ended = ended and examine(folder, walks, again, screen.examined, told)
     if not ended:
         console.print(f"interrupted; go on with: mjxgait repertoire --resume {folder}")
         return INTERRUPTED
@@ -100,8 +105,18 @@ def repertoire_command(arguments: Sequence[str]) -> int:
     return 0
 
 
-def begun(options: RepertoireOptions) -> tuple[Path, Creature, Grid]:
-    """Makes the folder, with a run folder for each cell.
+@dataclasses.dataclass(frozen=True, eq=False)
+class Planned:
+    """A repertoire of which nothing is written yet. configs: of each cell's run."""
+
+    folder: Path
+    creature: Creature
+    grid: Grid
+    configs: Mapping[Cell, Config]
+
+
+def planned(options: RepertoireOptions) -> Planned:
+    """Read the options and check them. Writes nothing.
 
     Raises:
       UserError: the options mean nothing, or the folder holds something already.
@@ -114,21 +129,34 @@ def begun(options: RepertoireOptions) -> tuple[Path, Creature, Grid]:
     check(base)
     folder = options.out or Path("runs") / f"repertoire-{creature.name}"
     configs = {cell: settings_of(cell, grid, creature, base) for cell in grid.cells}
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+    check_parts(creature, base)
+    if is_taken(folder):
         raise UserError(
             f"{folder}: holds something already; name another folder with --out, or go on with "
             f"--resume {folder}"
         )
+    return Planned(folder, creature, grid, configs)
+
+
+def begin(plan: Planned) -> None:
+    """Make the folder, with a run folder for each cell.
+
+    Raises:
+      UserError: see `check_plan`; or the folder cannot be written.
+    """
+    from mjxgait.runs.blueprint import check_plan
+
+    folder, cells = plan.folder, plan.grid.cells
+    check_plan(plan.creature, plan.configs[cells[0]])
     with disk_errors(folder):
         folder.mkdir(parents=True, exist_ok=True)
-    for cell, config in configs.items():
-        create_run(folder / cell.name, creature, config)
+    for cell in cells:
+        create_run(folder / cell.name, plan.creature, plan.configs[cell])
     with disk_errors(folder):
-        (folder / GRID).write_text(grid.text, encoding="utf-8")
-    return folder, open_run(folder / grid.cells[0].name)[0], grid
+        (folder / GRID).write_text(plan.grid.text, encoding="utf-8")
 
 
-def _resumed(options: RepertoireOptions) -> tuple[Path, Creature, Grid]:
+def _resumed(options: RepertoireOptions) -> tuple[Path, Grid]:
     folder = options.resume
     assert folder is not None
     grid, plain = Grid.read(folder), RepertoireOptions()
@@ -138,7 +166,7 @@ def _resumed(options: RepertoireOptions) -> tuple[Path, Creature, Grid]:
             f"{folder}: a resumed repertoire keeps its walks and their settings; only "
             f"--{', --'.join(OF_FILES)} may be given"
         )
-    return folder, open_run(folder / grid.cells[0].name)[0], grid
+    return folder, grid
 
 
 def _settings(options: RepertoireOptions, creature: Creature) -> Config:

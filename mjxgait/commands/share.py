@@ -37,6 +37,8 @@ def share_command(arguments: Sequence[str]) -> int:
 
     require_writable(options.out)
     write = write_driven if (options.run / GRID).is_file() else write_page
-    write(options.run, options.out)
+    said = write(options.run, options.out)
     print(f"{options.out} ({options.out.stat().st_size / 1024:,.0f} KiB)")
+    if said:
+        print(said)
     return 0

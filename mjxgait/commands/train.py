@@ -3,8 +3,8 @@
 import argparse
 import contextlib
 import dataclasses
-import shlex
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -24,13 +24,15 @@ from mjxgait.runs.folder import (
     METRICS,
     PLOT,
     PLOTS,
+    check_run,
     create_run,
     open_run,
     read_metrics,
 )
+from mjxgait.runs.own import command
 from mjxgait.settings.config import Config, ExaminationConfig
 from mjxgait.settings.tables import build, merge
-from mjxgait.zoo.seeds import create_zoo, folders_of, is_zoo
+from mjxgait.zoo.seeds import check_zoo, create_zoo, folders_of, is_zoo
 
 if TYPE_CHECKING:  # JAX takes a second to import
     from mjxgait.runs.screen import Screen
@@ -118,32 +120,53 @@ def train_command(arguments: Sequence[str]) -> int:
         print(said)
     if options.runs is not None or _is_zoo(options.resume):
         return _several(options, creature, config, default)
+    if options.generation is not None and options.resume is None:
+        raise UserError("--generation: names a checkpoint to go on from, so it needs --resume")
+    if options.resume is None:
+        return _evolve(options, check_run(options.out, creature, config), creature, config)
+    _check_resumed(options, config, default)
+    from mjxgait.runs.ended import nothing_left  # leads to JAX
+
+    over = options.generation is None and nothing_left(options.resume, creature, config, default)
+    if over:
+        print(over)
+        return 0
+    return _evolve(options, options.resume, creature, config)
+
+
+def _check_resumed(options: TrainOptions, config: Config, default: Config) -> None:
+    """Refuse what a resumed run cannot change. default: the settings of its folder."""
+    if options.scale or options.way != "forward":
+        raise UserError(
+            f"{options.resume}: a resumed run keeps its body; --scale and --way need a new run"
+        )
+    if _without_ends(config) != _without_ends(default):
+        raise UserError(
+            f"{options.resume}: a resumed run keeps its settings; only --generations, "
+            "--evolution.target and --examination may differ"
+        )
+
+
+def _evolve(options: TrainOptions, folder: Path, creature: Creature, config: Config) -> int:
+    """Evolve a new run, or go on with one, and draw it; return the exit code."""
     # JAX takes a second to import: only once the options are known to be good.
     from mjxgait.cluster.evolve import evolve
     from mjxgait.commands.view import following
     from mjxgait.runs.devices import prepare_devices
     from mjxgait.runs.screen import Screen
 
-    if options.resume:
-        if options.scale or options.way != "forward":
-            raise UserError(
-                f"{options.resume}: a resumed run keeps its body; --scale and --way need a new run"
-            )
-        if _without_ends(config) != _without_ends(default):
-            raise UserError(
-                f"{options.resume}: a resumed run keeps its settings; only --generations, "
-                "--evolution.target and --examination may differ"
-            )
-        folder = options.resume
-    else:
-        folder = create_run(options.out, creature, config)
     prepare_devices(1 if options.cluster else None)
-    screen = Screen()
-    with following(folder) if options.view else contextlib.nullcontext():
-        resumed = options.resume is not None
-        ended = evolve(
-            folder, creature, config, screen, resumed, options.generation, options.cluster
-        )
+    screen, resumed = Screen(), options.resume is not None
+    with contextlib.ExitStack() as beside:
+
+        def begin() -> None:
+            if not resumed:
+                create_run(folder, creature, config)
+            if options.view:
+                beside.enter_context(following(folder))
+
+        at = options.generation, options.cluster
+        ended = evolve(folder, creature, config, screen, resumed, *at, begin)
     if ended:
         screen.next_steps(folder, Run(folder).certified)
     drawn = _draw(folder, screen, all_plots=ended and options.plots)
@@ -158,8 +181,9 @@ def _several(options: TrainOptions, creature: Creature, config: Config, default:
         assert options.runs is not None
         # On a cluster each run is a piece of work, so all machines have some.
         together = 1 if options.cluster else 0
-        zoo = create_zoo(options.out, creature, config, options.runs, together)
-        return evolve_zoo(zoo, options.cluster)
+        zoo = check_zoo(options.out, creature, config, options.runs)
+        begin = partial(create_zoo, zoo, creature, config, options.runs, together)
+        return evolve_zoo(zoo, options.cluster, begin)
     other = options.scale or options.way != "forward"
     if options.runs is not None or other or config != default:
         raise UserError(
@@ -198,7 +222,7 @@ def _draw(folder: Path, screen: "Screen", all_plots: bool) -> bool:
 
             plot_run(folder)
     except KeyboardInterrupt:
-        screen.say(f"Not all is drawn; mjxgait plot {shlex.quote(str(folder))} draws it.")
+        screen.say(f"Not all is drawn; {command('plot', folder, run=folder)} draws it.")
         return False
     return True
 
@@ -209,7 +233,9 @@ def _plot_fitness(folder: Path) -> None:
         from mjxgait.viewing.curves import plot_fitness
 
         with disk_errors(
-            folder / PLOT, "the run itself is safe", f"draw it with mjxgait plot {folder}"
+            folder / PLOT,
+            "the run itself is safe",
+            f"draw it with {command('plot', folder, run=folder)}",
         ):
             plot_fitness(lines, folder / PLOT)
 

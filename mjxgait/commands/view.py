@@ -10,6 +10,8 @@ from pathlib import Path
 
 import tyro
 
+from mjxgait.parts.own import loaded
+
 
 @dataclasses.dataclass(frozen=True)
 class ViewOptions:
@@ -44,12 +46,13 @@ def view_command(arguments: Sequence[str]) -> int:
 
 @contextlib.contextmanager
 def following(run: Path) -> Iterator[None]:
-    """Shows a run as long as the block lasts, in a process of its own that prints its address;
+    """Show a run as long as the block lasts, in a process of its own that prints its address;
     if it fails, the block goes on.
     """
-    viewer = subprocess.Popen(
-        [sys.executable, "-m", "mjxgait", "view", str(run)], stdin=subprocess.DEVNULL
-    )
+    # What was named on this command line, not what the run folder says.
+    own = [word for kind, place in loaded() for word in (f"--{kind}", place)]
+    command = [sys.executable, "-m", "mjxgait", "view", str(run), *own]
+    viewer = subprocess.Popen(command, stdin=subprocess.DEVNULL)
     try:
         yield
     finally:

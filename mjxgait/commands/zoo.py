@@ -1,6 +1,7 @@
 """`mjxgait train --runs`: several runs side by side."""
 
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -9,16 +10,21 @@ from rich.console import Console
 from mjxgait.errors import INTERRUPTED
 from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.folder import open_run
+from mjxgait.runs.lock import locked
+from mjxgait.runs.own import command
 from mjxgait.zoo.seeds import read_seeds
 
 PICTURE = "zoo.png"
 
 
-def evolve_zoo(zoo: Path, cluster: str | None = None) -> int:
-    """Evolves the runs of a folder, or goes on with them, and shows who came of it; returns the exit
+def evolve_zoo(
+    zoo: Path, cluster: str | None = None, begin: Callable[[], object] = lambda: None
+) -> int:
+    """Evolve the runs of a folder, or go on with them, and show what came of it; returns the exit
     code.
 
-    cluster: address of the one that does it, if not this machine.
+    cluster: address of the cluster that computes it, if not this machine. begin: makes the folder of
+    new runs; called after the last check.
     """
     from mjxgait.cluster.board import crew_at
     from mjxgait.cluster.rows import Rows
@@ -27,22 +33,26 @@ def evolve_zoo(zoo: Path, cluster: str | None = None) -> int:
     from mjxgait.runs.loop import interruptible
 
     prepare_devices(1 if cluster else None)
-    seeds = read_seeds(zoo)
-    folders = seeds.folders(zoo)
-    creature, config = open_run(folders[0])
-    again = f"mjxgait train --resume {zoo}"
     console, began = Console(highlight=False, soft_wrap=True), time.perf_counter()
     screen = _Screen(console)
     with interruptible() as interrupted, crew_at(cluster, console) as crew:
-        told = interrupted.is_set
-        rows = Rows(creature, folders, keep_every=config.keep_every, together=seeds.together)
-        ended = rows.to_the_end(None, crew, screen.evolved, told) is not None
-        ended = ended and examine(zoo, folders, again, screen.examined, told)
+        begin()
+        with locked(zoo):
+            told, seeds = interrupted.is_set, read_seeds(zoo)
+            folders = seeds.folders(zoo)
+            creature, config = open_run(folders[0])
+            again = command("train", "--resume", zoo, run=folders[0])
+            rows = Rows(creature, folders, keep_every=config.keep_every, together=seeds.together)
+            ended = rows.to_the_end(None, crew, screen.evolved, told) is not None
+            ended = ended and examine(zoo, folders, again, screen.examined, told)
     if not ended:
         console.print(f"interrupted; go on with: {again}")
         return INTERRUPTED
     _leave(zoo, creature.name, folders, console)
-    console.print(f"{time.perf_counter() - began:.0f} s; each is a run: mjxgait inspect {zoo}")
+    console.print(
+        f"{time.perf_counter() - began:.0f} s; each is a run: "
+        f"{command('inspect', zoo, run=folders[0])}"
+    )
     return 0
 
 

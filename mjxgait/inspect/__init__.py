@@ -2,7 +2,7 @@
 
 from mjxgait.inspect.difference import differences, print_differences
 from mjxgait.inspect.facts import facts, individual_facts
-from mjxgait.inspect.runs import list_runs, print_runs, runs_in
+from mjxgait.inspect.runs import just_begun, list_runs, print_just_begun, print_runs, runs_in
 from mjxgait.inspect.snapshot import Snapshot, read_snapshot
 from mjxgait.inspect.text import print_facts, print_individual
 
@@ -11,10 +11,12 @@ __all__ = [
     "differences",
     "facts",
     "individual_facts",
+    "just_begun",
     "list_runs",
     "print_differences",
     "print_facts",
     "print_individual",
+    "print_just_begun",
     "print_runs",
     "read_snapshot",
     "runs_in",

@@ -14,14 +14,14 @@ import numpy as np
 
 from mjxgait.certify import outdated, read_certificate, read_stress
 from mjxgait.certify.likeness import in_words
-from mjxgait.champion import read_champion
 from mjxgait.errors import UserError
 from mjxgait.inspect.genomes import view_of
 from mjxgait.inspect.islands import island_facts
 from mjxgait.inspect.snapshot import Snapshot
 from mjxgait.parts import make_task, resolve_config
 from mjxgait.parts.registry import what_ends
-from mjxgait.runs.folder import CERTIFICATE, CHAMPION, STRESS
+from mjxgait.runs.folder import CERTIFICATE, STRESS, kept_champion
+from mjxgait.runs.lock import running
 from mjxgait.search.state import Origin
 from mjxgait.tasks.protocol import Task
 
@@ -43,6 +43,7 @@ def facts(snapshot: Snapshot) -> dict[str, Any]:
         "creature_digest": snapshot.creature.digest,
         "generation": snapshot.generation,
         "generations": snapshot.config.evolution.generations,
+        "running": running(snapshot.run),
         "ended": snapshot.ended,
         "checkpoints": list(snapshot.generations),
         "intact": True,
@@ -54,6 +55,7 @@ def facts(snapshot: Snapshot) -> dict[str, Any]:
         ),
         "bytes": snapshot.size,
         "versions": dict(snapshot.versions),
+        "trouble": snapshot.trouble,
         "certificate": certificate(snapshot),
         "verdict": verdict(snapshot),
         "settings_changed": settings_changed(snapshot),
@@ -119,12 +121,14 @@ def verdict(snapshot: Snapshot) -> dict[str, Any] | None:
 
 
 def _certificate(snapshot: Snapshot) -> dict[str, Any] | str:
-    """What the examiner wrote of the run's champion, or why there is nothing that counts."""
+    """Return what the examiner wrote of the run's champion, or why there is nothing that counts."""
+    if snapshot.trouble:
+        return snapshot.trouble
     try:
         document = read_certificate(snapshot.run / CERTIFICATE)
         if document is None:
             return "The champion has not been examined."
-        champion = read_champion(snapshot.run / CHAMPION, snapshot.creature)
+        champion = kept_champion(snapshot.run, snapshot.creature)
         return outdated(document, champion) or document
     except UserError as error:
         return str(error)
@@ -133,7 +137,7 @@ def _certificate(snapshot: Snapshot) -> dict[str, Any] | str:
 def _stress(snapshot: Snapshot) -> dict[str, Any] | None:
     """What is known of the champion's second level; None where that is nothing."""
     try:
-        champion = read_champion(snapshot.run / CHAMPION, snapshot.creature)
+        champion = kept_champion(snapshot.run, snapshot.creature)
         return read_stress(snapshot.run / STRESS, champion)
     except UserError:
         return None

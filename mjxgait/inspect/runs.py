@@ -12,6 +12,8 @@ from mjxgait.inspect.facts import facts
 from mjxgait.inspect.snapshot import read_snapshot
 from mjxgait.inspect.text import ago, show
 from mjxgait.runs.folder import CONFIG
+from mjxgait.runs.lock import running, why_empty
+from mjxgait.runs.stored import stored_generations
 
 
 def runs_in(folder: Path) -> list[Path]:
@@ -23,9 +25,25 @@ def runs_in(folder: Path) -> list[Path]:
     return sorted(entry for entry in folder.iterdir() if (entry / CONFIG).is_file())
 
 
+def just_begun(path: Path) -> dict[str, Any] | None:
+    """Return what there is to say of a run that runs now and has no checkpoint yet; None of others."""
+    who = None if stored_generations(path) else running(path)
+    return {"run": str(path), "problem": None, "running": who} if who else None
+
+
+def print_just_begun(line: Mapping[str, Any], console: Console) -> None:
+    """Print one sentence; see `just_begun`."""
+    console.print(f"{line['run']}: {why_empty(Path(line['run']))}", markup=False)
+
+
 def list_runs(runs: Sequence[Path]) -> list[dict[str, Any]]:
-    """What there is to say of each run; one that cannot be read has the reason under `problem`."""
+    """Return what there is to say of each run.
+
+    One that cannot be read has the reason under `problem`; `running` names the process that writes
+    it now.
+    """
     kept = (
+        "running",
         "creature",
         "generation",
         "generations",
@@ -33,15 +51,19 @@ def list_runs(runs: Sequence[Path]) -> list[dict[str, Any]]:
         "fitness",
         "ended",
         "written",
+        "trouble",
         "verdict",
     )
     lines = []
     for run in runs:
+        if begun := just_begun(run):
+            lines.append(begun)
+            continue
         try:
             found = facts(read_snapshot(run))
             lines.append({"run": str(run), "problem": None} | {key: found[key] for key in kept})
         except UserError as error:
-            lines.append({"run": str(run), "problem": str(error)})
+            lines.append({"run": str(run), "problem": str(error), "running": None})
     return lines
 
 
@@ -55,6 +77,9 @@ def print_runs(lines: Sequence[Mapping[str, Any]], console: Console) -> None:
         name = Path(line["run"]).name
         if line["problem"]:
             table.add_row(name, *[""] * 8, "cannot be read")
+            continue
+        if "creature" not in line:
+            table.add_row(name, *[""] * 8, "running")
             continue
         verdict = line["verdict"] or {}
         table.add_row(
@@ -71,8 +96,8 @@ def print_runs(lines: Sequence[Mapping[str, Any]], console: Console) -> None:
         )
     console.print(table)
     for line in lines:
-        if line["problem"]:
-            console.print(f"  {line['problem']}")
+        if said := line["problem"] or line.get("trouble"):
+            console.print(f"  {said}", markup=False)
 
 
 def _rounded(value: float | None) -> str:
@@ -80,7 +105,11 @@ def _rounded(value: float | None) -> str:
 
 
 def _state(line: Mapping[str, Any]) -> str:
-    """What became of a run, in two words or three."""
+    """Return what became of a run, in two words or three."""
+    if line["running"]:
+        return "running"
+    if line["trouble"]:
+        return "champion unreadable"
     if not line["ended"]:
         return "not finished"
     if line["verdict"] is None:

@@ -7,20 +7,25 @@ Letters: `P` individuals, `R` starts, `F` fitness terms.
 import dataclasses
 import json
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
-from mjxgait.certify import outdated, read_certificate
-from mjxgait.champion import Champion, codec_of, read_champion, split_genome
+from mjxgait.champion import Champion, codec_of, split_genome
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
-from mjxgait.runs.examination import due, why_ended
-from mjxgait.runs.folder import CERTIFICATE, CHAMPION, CONFIG, METRICS, open_run, read_metrics
-from mjxgait.runs.stored import FOLDER, Manifest, read_stored, stored_generations
-from mjxgait.search.state import EvolutionState, stop_reason
+from mjxgait.runs.ended import end_of
+from mjxgait.runs.folder import (
+    CHAMPION,
+    CONFIG,
+    METRICS,
+    kept_champion,
+    open_run,
+    read_metrics,
+)
+from mjxgait.runs.stored import FOLDER, Manifest, Stored, read_stored, stored_generations
 from mjxgait.settings.config import Config
 
 
@@ -95,25 +100,18 @@ class Snapshot:
     @property
     def ended(self) -> str | None:
         """Why the run is over at this checkpoint; None when it was to go on."""
-        state = cast(EvolutionState, SimpleNamespace(**self.arrays))
-        return stop_reason(state, self.config.evolution) or self._certified()
+        return end_of(self.run, self.creature, self.config, Stored(self.manifest, self.arrays))
 
-    def _certified(self) -> str | None:
-        """What an early examination that ended the run here would have said."""
-        if self.generation != self.generations[-1] or not due(
-            self.config.examination, self.generation
-        ):
+    @cached_property
+    def trouble(self) -> str | None:
+        """Why the run's champion cannot be read; None where it can, or there is none yet."""
+        if not (self.run / CHAMPION).exists():
             return None
         try:
-            document = read_certificate(self.run / CERTIFICATE)
-            if document is None or outdated(
-                document, read_champion(self.run / CHAMPION, self.creature)
-            ):
-                return None
-        except UserError:
-            return None
-        passed = document["passed"]
-        return why_ended(self.generation, document["margin"]) if passed else None
+            kept_champion(self.run, self.creature)
+        except UserError as error:
+            return str(error)
+        return None
 
 
 def read_snapshot(path: Path, generation: int | None = None) -> Snapshot:

@@ -80,9 +80,11 @@ def ago(written: str) -> str:
 
 
 def _print_identity(facts: Mapping[str, Any], console: Console) -> None:
+    going = "not finished: `mjxgait train --resume` goes on from the latest checkpoint"
+    # A certificate ends a run too, if it is the champion's.
+    alive = facts["running"] and f"runs now: {facts['running']}"
     state = (
-        facts["ended"]
-        or "not finished: `mjxgait train --resume` goes on from the latest checkpoint"
+        alive or facts["ended"] or ("not known without the champion" if facts["trouble"] else going)
     )
     versions = ", ".join(f"{name} {version}" for name, version in facts["versions"].items())
     size, key = (
@@ -102,7 +104,8 @@ def _print_identity(facts: Mapping[str, Any], console: Console) -> None:
         "seed": f"{facts['seed']} ({facts['random_key']['kind']} key now {key})",
         "controller, task": f"{facts['controller']}, {facts['task']}",
         "body": facts["creature_digest"],
-        "versions": versions or "unknown: the run has no champion.json",
+        "versions": versions
+        or ("unknown" if facts["trouble"] else "unknown: no champion.json yet"),
         "certificate": facts["certificate"],
         "fitness": ", ".join(
             f"{name.replace('_', ' ')} {show(value)}"

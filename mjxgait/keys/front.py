@@ -8,7 +8,7 @@ from mjxgait.errors import UserError
 from mjxgait.keys.departure import departure
 from mjxgait.keys.refine import FARTHEST, KEYS, read_original
 from mjxgait.runs.disk import disk_errors
-from mjxgait.runs.folder import CERTIFICATE, open_run
+from mjxgait.runs.folder import CERTIFICATE, is_taken, open_run
 from mjxgait.viewing.cast import LOOP_SECONDS, champion_of
 from mjxgait.viewing.front import Kept, draw_front, shape
 from mjxgait.viewing.style import figure, save
@@ -35,12 +35,12 @@ def kept_by(run: Path) -> float:
 
 
 def check_front(out: Path, keeps: Sequence[float]) -> None:
-    """Refuses to begin where something lies.
+    """Refuse to begin where something lies.
 
     Raises:
       UserError: the folder is not empty, or a share is there twice.
     """
-    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+    if is_taken(out):
         raise UserError(
             f"{out}: holds something already; name another folder with --out, or go on with "
             f"mjxgait refine --resume {out}"

@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from mjxgait.creature.facing import facing
 from mjxgait.creature.scale import load_files, scaled
 from mjxgait.creature.step import at_step
 from mjxgait.library.run import Place, Run
-from mjxgait.runs.folder import create_run
+from mjxgait.runs.folder import check_run, create_run
 from mjxgait.settings.config import Config
 from mjxgait.settings.shipped import find_creature
 from mjxgait.settings.tables import build, merge, read_toml
@@ -109,8 +110,9 @@ def train(
     table = merge(dataclasses.asdict(resolved), {"seed": seed, "evolution": evolution})
     chosen = build(type(resolved), merge(table, settings or {}), "the settings given to train")
     creature = at_step(creature, chosen.rollout.step)
-    folder = create_run(Path(out) if out else None, creature, chosen)
-    return _evolved(folder, creature, chosen, quiet)
+    folder = check_run(Path(out) if out else None, creature, chosen)
+    begin = partial(create_run, folder, creature, chosen)
+    return _evolved(folder, creature, chosen, quiet, begin)
 
 
 def refine(
@@ -160,12 +162,15 @@ def refine(
     tell: Callable[[str], object] = (lambda said: None) if quiet else print
     brought = bring(creature, source, table, (begin, end), np.radians(tolerance), forward, tell)
     chosen = near.refining(base, brought, keep)
-    folder = near.begin(Path(out) if out else None, creature, chosen, source, brought)
-    return _evolved(folder, creature, chosen, quiet)
+    folder = check_run(Path(out) if out else None, creature, chosen)
+    begins = partial(near.begin, folder, creature, chosen, source, brought)
+    return _evolved(folder, creature, chosen, quiet, begins)
 
 
-def _evolved(folder: Path, creature: Creature, config: Config, quiet: bool) -> Run:
-    """The run in a new folder, evolved and examined."""
+def _evolved(
+    folder: Path, creature: Creature, config: Config, quiet: bool, begin: Callable[[], object]
+) -> Run:
+    """Return the run in a new folder, evolved and examined. begin: makes the folder."""
     from rich.console import Console
 
     from mjxgait.cluster.evolve import evolve
@@ -173,7 +178,8 @@ def _evolved(folder: Path, creature: Creature, config: Config, quiet: bool) -> R
     from mjxgait.runs.screen import Screen
 
     prepare_devices()
-    evolve(folder, creature, config, Screen(Console(quiet=True)) if quiet else Screen())
+    screen = Screen(Console(quiet=True)) if quiet else Screen()
+    evolve(folder, creature, config, screen, begin=begin)
     return Run(folder)
 
 

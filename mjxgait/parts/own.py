@@ -13,6 +13,7 @@ from mjxgait.certify.tasks.plain import HasCriteria
 from mjxgait.certify.twins import register_twin
 from mjxgait.errors import UserError, did_you_mean
 from mjxgait.parts.registry import SHIPPED, add_own
+from mjxgait.settings.config import UseConfig
 from mjxgait.settings.control import holds
 
 KINDS = ("controller", "task")
@@ -71,7 +72,7 @@ def load(kind: str, text: str) -> str:
         raise UserError(f"{path}: {name}.every = {every}: {error}") from None
     known = f"{path.name}:{name}"
     add_own(kind, known, cls)
-    _LOADED[kind, known] = text
+    _LOADED[kind, known] = f"{path.resolve()}:{name}"
     if kind == "controller":
         from mjxgait.parts.same_code import SameCode
 
@@ -84,6 +85,12 @@ def load(kind: str, text: str) -> str:
 def loaded() -> tuple[tuple[str, str], ...]:
     """Kind and `FILE.py:CLASS` of all that has been loaded, for other processes to do the same."""
     return tuple((kind, text) for (kind, _), text in _LOADED.items())
+
+
+def places_of(use: UseConfig) -> dict[str, str]:
+    """Return by kind the `FILE.py:CLASS` of the loaded code that takes part; paths are absolute."""
+    named = {kind: (kind, getattr(use, kind)) for kind in KINDS}
+    return {kind: _LOADED[key] for kind, key in named.items() if key in _LOADED}
 
 
 def is_loaded(kind: str, known: str) -> bool:

@@ -13,8 +13,8 @@ from mjxgait.web.page import write_text
 RATE = 60
 
 
-def write_driven(folder: Path, out: Path) -> None:
-    """Writes the page of a repertoire's certified walks.
+def write_driven(folder: Path, out: Path) -> str:
+    """Write the page of a repertoire's certified walks; return that nothing is to be said of it.
 
     Raises:
       UserError: no repertoire, none of its walks is certified, or the file cannot be written.
@@ -28,6 +28,7 @@ def write_driven(folder: Path, out: Path) -> None:
         )
     clips = table_of("", loops, found, travelling=False)["clips"]
     write_text(out, driven_page(loops, clips, len(found), _blends(folder)))
+    return ""
 
 
 def _blends(folder: Path) -> str:

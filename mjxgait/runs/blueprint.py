@@ -213,6 +213,15 @@ def draw_up(creature: Creature, config: Config) -> Plan:
     return _of_model(creature, config)
 
 
+def check_plan(creature: Creature, config: Config) -> None:
+    """Refuse what a program for these settings cannot be made of. Compiles and writes nothing.
+
+    Raises:
+      UserError: see `draw_up`; or the controller reads an observation that the body does not have.
+    """
+    draw_up(creature, config).simulator()
+
+
 def _of_model(creature: Creature, config: Config) -> Blueprint:
     creature = creature.spanned(config.evolution.pose_span)
     touch = what_ends(creature, config.rollout).touch

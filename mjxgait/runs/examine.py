@@ -2,11 +2,13 @@
 
 import io
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 from rich.console import Console
 
 from mjxgait.cores import one_per_core
+from mjxgait.parts.own import load_all, loaded
 from mjxgait.runs.checkpoint import Checkpoints
 from mjxgait.runs.devices import prepare_devices
 from mjxgait.runs.examination import Examiner
@@ -41,10 +43,16 @@ def examine(
         tell,
         folder=folder,
         again=again,
-        prepare=prepare_devices,
+        prepare=partial(_prepare, loaded()),
         stopped=stopped,
     )
     return done is not None
+
+
+def _prepare(own: Sequence[tuple[str, str]]) -> None:
+    """Make a process ready: devices, and the code that was loaded in this one."""
+    prepare_devices()
+    load_all(own)
 
 
 def _examine(folder: Path) -> None:

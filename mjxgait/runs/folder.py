@@ -5,30 +5,48 @@ from pathlib import Path
 from typing import Any
 
 from mjxgait.certify.check_body import check_body
-from mjxgait.champion import Champion, read_champion
+from mjxgait.champion import Champion, DamagedChampion, read_champion
 from mjxgait.creature import Creature, load_creature
 from mjxgait.creature.proportions import extreme_bodies
-from mjxgait.errors import UserError
+from mjxgait.errors import NotLoaded, UserError
 from mjxgait.parts import build_config
 from mjxgait.parts.fit import check_fit
+from mjxgait.runs.own import CONFIG, command, keep_places, with_options
 from mjxgait.settings.config import Config
 from mjxgait.settings.tables import dump_toml, read_toml
 
-CONFIG, CREATURE, METRICS, CHAMPION = "config.toml", "creature", "metrics.jsonl", "champion.json"
+CREATURE, METRICS, CHAMPION = "creature", "metrics.jsonl", "champion.json"
 CERTIFICATE, STRESS, EXAMS = "certificate.json", "stress.json", "exams.jsonl"
 PLOT, PLOTS, BODY = "fitness.png", "plots", "body"
 ISLANDS, MIGRATIONS = "islands", "migrations.jsonl"
 
 
-def check_run(creature: Creature, config: Config) -> None:
-    """Refuse a run that cannot come to its examination, before anything is computed or written.
+def check_run(folder: Path | None, creature: Creature, config: Config) -> Path:
+    """Return the folder that a new run may have; by default a new one under runs/. Writes nothing.
+
+    Raises:
+      UserError: the folder holds something already; controller or task does not fit the creature;
+        or the creature's body cannot be examined.
+    """
+    check_parts(creature, config)
+    folder = folder or new_run_folder(creature.name, config.seed)
+    if is_taken(folder):
+        holds = "another run" if (folder / CONFIG).exists() else "something else"
+        raise UserError(
+            f"{folder}: holds {holds}; name another folder with --out, or go on with --resume "
+            f"{folder}"
+        )
+    return folder
+
+
+def check_parts(creature: Creature, config: Config) -> None:
+    """Refuse a controller or task that does not fit the creature, and a body that cannot be examined.
 
     Bodies that grow are checked one by one when they are examined. Of bodies whose sizes evolve the
     smallest and the largest are checked.
 
     Raises:
-      UserError: what takes part does not fit the creature, or a fact of a body that the run may
-        examine contradicts its files.
+      UserError: says which, and the way out.
     """
     check_fit(creature, config)
     if creature.settings.creature.grows:
@@ -38,22 +56,28 @@ def check_run(creature: Creature, config: Config) -> None:
         check_body(body.spanned(pose_span), pose_span)
 
 
+def is_taken(folder: Path) -> bool:
+    """Return whether a folder holds something, or is a file.
+
+    Raises:
+      UserError: it cannot be read.
+    """
+    try:
+        return folder.exists() and (not folder.is_dir() or any(folder.iterdir()))
+    except OSError as error:
+        raise UserError(f"{folder}: cannot be read ({error.strerror})") from None
+
+
 def create_run(folder: Path | None, creature: Creature, config: Config) -> Path:
     """Make the run folder with the exact creature and settings; by default a new one under runs/.
 
     Raises:
-      UserError: the folder holds something already, or cannot be written; see also `check_run`.
+      UserError: see `check_run`; or the folder cannot be written.
     """
-    check_run(creature, config)
-    folder = folder or new_run_folder(creature.name, config.seed)
+    folder = check_run(folder, creature, config)
     try:
-        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-            holds = "another run" if (folder / CONFIG).exists() else "something else"
-            raise UserError(
-                f"{folder}: holds {holds}; name another folder with --out, or go on with --resume "
-                f"{folder}"
-            )
         keep_body(folder / CREATURE, creature)
+        keep_places(folder, config.use)
         (folder / CONFIG).write_text(dump_toml(config), encoding="utf-8")
     except OSError as error:
         raise UserError(f"{folder}: cannot be written ({error.strerror})") from None
@@ -79,11 +103,14 @@ def open_run(folder: Path) -> tuple[Creature, Config]:
     """The creature, on the ground of the run, and the settings of a run folder.
 
     Raises:
-      UserError: it is not a run folder.
+      UserError: it is not a run folder, or its controller or task was not named.
     """
     if not (folder / CONFIG).is_file():
         raise UserError(f"{folder}: not a run folder (it has no {CONFIG})")
-    config = build_config(read_toml(folder / CONFIG), str(folder / CONFIG))
+    try:
+        config = build_config(read_toml(folder / CONFIG), str(folder / CONFIG))
+    except NotLoaded as error:
+        raise with_options(error, folder) from None
     return load_creature(folder / CREATURE).on(config.rollout.ground), config
 
 
@@ -94,8 +121,21 @@ def open_champion(folder: Path) -> tuple[Creature, Champion]:
       UserError: it is not a run folder, or has no champion yet.
     """
     creature, _ = open_run(folder)
-    champion = read_champion(folder / CHAMPION, creature)
+    champion = kept_champion(folder, creature)
     return champion.embodied(creature), champion
+
+
+def kept_champion(folder: Path, creature: Creature) -> Champion:
+    """Return what `champion.json` of a run folder holds.
+
+    Raises:
+      UserError: there is none, it is damaged, or it is of another body.
+    """
+    try:
+        return read_champion(folder / CHAMPION, creature)
+    except DamagedChampion as error:
+        again = command("train", "--resume", folder, run=folder)
+        raise UserError(f"{error}; write it anew with: {again}") from None
 
 
 def read_metrics(path: Path) -> list[dict[str, Any]]:

@@ -8,7 +8,7 @@ import platform
 import signal
 import threading
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,6 +19,7 @@ import numpy as np
 
 from mjxgait.champion import write_champion
 from mjxgait.creature import Creature
+from mjxgait.errors import UserError
 from mjxgait.runs.checkpoint import Checkpoints
 from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.examination import Examined, Examiner, why_ended
@@ -32,6 +33,7 @@ from mjxgait.runs.folder import (
     METRICS,
     STRESS,
     keep_body,
+    kept_champion,
     read_metrics,
     truncate_metrics,
 )
@@ -55,14 +57,17 @@ def train(
     resume: bool = False,
     generation: int | None = None,
     evaluator: Evaluator | None = None,
+    begin: Callable[[], object] = lambda: None,
 ) -> bool:
-    """Runs, or goes on with, the evolution in a run folder; returns whether it came to its end.
+    """Run, or go on with, the evolution in a run folder; returns whether it came to its end.
 
     Args:
       resume: go on from a checkpoint, the latest or that of `generation`.
-      evaluator: who judges, if not this machine.
+      evaluator: what evaluates the individuals, if not this machine.
+      begin: makes the folder of a new run; called after the last check.
     """
     experiment = build_experiment(creature, config)
+    begin()
     checkpoints = Checkpoints(folder, config.keep_every)
     # A run that was killed before its first checkpoint begins anew: it will do what it would have
     # done.
@@ -71,6 +76,7 @@ def train(
         abstract = experiment.abstract()
         restored = checkpoints.restore(abstract, creature.digest, generation)
         begun = int(restored.generation)
+        mend_champion(folder, experiment, restored)
     # First the checkpoints: a kill in between leaves lines too many, never a log with a gap.
     if later := checkpoints.drop_after(begun):
         names = ", ".join(map(str, later))
@@ -97,6 +103,17 @@ def train(
         conclude(folder, creature, screen, examined or examiner.best(state))
     report(folder, screen, reason, time.perf_counter() - began)
     return reason is not None
+
+
+def mend_champion(folder: Path, experiment: Experiment, state: EvolutionState) -> None:
+    """Write the best of a state as the run's champion where the run has none that can be read."""
+    try:
+        kept_champion(folder, experiment.creature)
+    except UserError:
+        if np.isfinite(state.fitness[0]):
+            with disk_errors(folder):
+                champion = experiment.champion(state, versions())
+                write_champion(champion, experiment.creature, folder / CHAMPION)
 
 
 def _compiled(
@@ -212,7 +229,7 @@ def _generation(
             write_champion(
                 experiment.champion(state, versions()), experiment.creature, folder / CHAMPION
             )
-    screen.generation(line, experiment.config.evolution.generations)
+    screen.generation(line, experiment.config)
     return state
 
 

@@ -2,7 +2,6 @@
 elsewhere.
 """
 
-import shlex
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -20,6 +19,8 @@ from mjxgait.certify.tasks import demands_of
 from mjxgait.certify.tasks.wishes import in_the_way
 from mjxgait.ground.spec import FLAT
 from mjxgait.runs.folder import CHAMPION, CONFIG, CREATURE, METRICS, PLOT
+from mjxgait.runs.own import command
+from mjxgait.settings.config import Config
 
 
 class Screen:
@@ -29,6 +30,7 @@ class Screen:
         self.console = console or Console(highlight=False, soft_wrap=True)
         self._status: Status | None = None
         self._walls: list[float] = []
+        self._first: tuple[float, int] | None = None
 
     @contextmanager
     def compiling(self, what: str, experiment: Any) -> Iterator[None]:
@@ -53,17 +55,16 @@ class Screen:
         """A line of its own."""
         self.console.print(text)
 
-    def generation(self, line: Mapping[str, Any], last: int) -> None:
-        """Shows a generation; see `metrics_line`.
-
-        last: the generation at which the run ends at the latest.
-        """
+    def generation(self, line: Mapping[str, Any], config: Config) -> None:
+        """Show a generation of a run with these settings; see `metrics_line`."""
+        last, sooner = config.evolution.generations, what_ends_sooner(config)
         if not self._walls:
             self.say(
                 "best, mean: fitness; alive: the share of the episodes that end without a fall"
             )
-        self._walls = [*self._walls[-4:], line["wall_s"]]
-        left = (last - line["generation"]) * sum(self._walls) / len(self._walls)
+            if sooner:
+                self.say(f"time left: up to generation {last}; the run ends sooner {sooner}")
+        left = duration((last - line["generation"]) * self._seconds(line))
         best, mean = (
             f"{line[key]:.3f}" if line[key] is not None else "none" for key in ("best", "mean")
         )
@@ -71,7 +72,8 @@ class Screen:
         text = (
             f"generation {line['generation']:>3}/{last}  best {best}  mean {mean}  "
             f"alive {1 - line['failures'] / episodes:>4.0%}  {line['steps_per_second']:>7,} "
-            f"steps/s  {left:>3.0f} s left" + ("  forced evolution" if line["forced"] else "")
+            f"steps/s  {'at most ' if sooner else ''}{left} left"
+            + ("  forced evolution" if line["forced"] else "")
         )
         if self.console.is_terminal:
             if self._status is None:
@@ -80,6 +82,16 @@ class Screen:
             self._status.update(text)
         else:
             self.console.print(text)
+
+    def _seconds(self, line: Mapping[str, Any]) -> float:
+        """Return what a generation takes: as the latest ones did, and with the examinations between
+        them, which the log does not count.
+        """
+        self._walls = [*self._walls[-4:], line["wall_s"]]
+        now = time.perf_counter(), int(line["generation"])
+        self._first = self._first or now
+        since = (now[0] - self._first[0]) / max(now[1] - self._first[1], 1)
+        return max(since, sum(self._walls) / len(self._walls))
 
     def close(self) -> None:
         """Ends the live line, if there is one."""
@@ -143,23 +155,42 @@ class Screen:
             table.add_row(name, value)
         self.console.print(table)
         if interrupted:
-            self.console.print(f"To go on: mjxgait train --resume {folder}")
+            again = command("train", "--resume", folder, run=folder)
+            self.console.print(f"To go on: {again}", markup=False)
 
     def next_steps(self, folder: Path, certified: bool) -> None:
-        """Commands that lead on from a run that has ended."""
-        run = shlex.quote(str(folder))
+        """Print commands that lead on from a run that has ended."""
         steps = {
-            f"mjxgait render {run} --out walk.webp": "films it",
-            f"mjxgait share {run} --out walk.html": "makes a page to give away",
-            f"mjxgait export {run} --out walk.glb": "writes it for animation tools",
+            ("render", folder, "--out", "walk.webp"): "films it",
+            ("share", folder, "--out", "walk.html"): "makes a page to give away",
+            ("export", folder, "--out", "walk.glb"): "writes it for animation tools",
         }
         if not certified:
-            steps[f"mjxgait inspect {run}"] = (
-                "tells how evolution went; another --seed may do better"
-            )
+            steps["inspect", folder] = "tells how evolution went; another --seed may do better"
         self.console.print("Next:")
-        for command, what in steps.items():
-            self.console.print(f"  {command}   {what}", markup=False)
+        for words, what in steps.items():
+            self.console.print(f"  {command(*words, run=folder)}   {what}", markup=False)
+
+
+def what_ends_sooner(config: Config) -> str:
+    """Return what can end a run before its last generation, in words; empty where nothing can."""
+    evolution, look = config.evolution, config.examination
+    reasons = {
+        f"once a look at its best, every {look.every} generations, leads to a certificate": bool(
+            look.every and look.candidates
+        ),
+        f"at a fitness of {evolution.target}": evolution.target is not None,
+        "when forced evolution no longer pays": evolution.forced.enabled
+        and bool(evolution.forced.patience),
+    }
+    return ", or ".join(reason for reason, holds in reasons.items() if holds)
+
+
+def duration(seconds: float) -> str:
+    """Return a time in the unit that suits it."""
+    if seconds < 120:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"
 
 
 def _best(last: Mapping[str, Any]) -> str:

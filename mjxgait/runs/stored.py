@@ -11,6 +11,7 @@ import numpy as np
 import tensorstore
 
 from mjxgait.errors import UserError
+from mjxgait.runs.lock import why_empty
 
 SCHEMA = 2
 FOLDER = "checkpoints"
@@ -68,9 +69,7 @@ def read_stored(run: Path, digest: str, generation: int | None = None) -> Stored
     """
     known = stored_generations(run)
     if not known:
-        raise UserError(
-            f"{run}: no checkpoint yet; the run ended before its first generation was done"
-        )
+        raise UserError(f"{run}: no checkpoint yet; {why_empty(run)}")
     wanted = known[-1] if generation is None else generation
     if wanted not in known:
         raise UserError(

@@ -14,6 +14,16 @@ def data_folder(kind: Literal["envs", "configs"]) -> Path:
     return packaged if packaged.is_dir() else package.parent / kind
 
 
+def install_command(extra: str) -> str:
+    """Return the command that installs an extra, of the package or of the checkout that runs."""
+    checkout = Path(str(resources.files("mjxgait"))).parent
+    if not (checkout / "pyproject.toml").is_file():
+        return f'pip install "mjxgait[{extra}]"'
+    # Editable: a plain install would put a copy of the package in the place of the checkout.
+    place = "." if checkout.resolve() == Path.cwd().resolve() else checkout
+    return f'pip install -e "{place}[{extra}]"'
+
+
 def shipped_creatures() -> list[str]:
     """Names of the creatures that come with the program."""
     return sorted(path.parent.name for path in data_folder("envs").glob("*/creature.toml"))

@@ -17,6 +17,8 @@ from mjxgait.parts import make_task
 from mjxgait.parts.registry import what_ends
 from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.folder import CHAMPION, METRICS, PLOTS, open_run, read_metrics
+from mjxgait.runs.lock import why_empty
+from mjxgait.runs.own import command
 from mjxgait.settings.config import Config
 from mjxgait.viewing import brain, grown, strobe, trees
 from mjxgait.viewing.cast import LOOP_SECONDS, champion_of
@@ -38,9 +40,7 @@ def plot_run(run: Path, out: Path | None = None, formats: Sequence[str] = FORMAT
     creature, config = open_run(run)
     lines = read_metrics(run / METRICS)
     if not lines:
-        raise UserError(
-            f"{run}: nothing to plot; the run ended before its first generation was done"
-        )
+        raise UserError(f"{run}: nothing to plot; {why_empty(run)}")
     out = out or run / PLOTS
     with disk_errors(out, "the run itself is safe", "draw again"):
         out.mkdir(parents=True, exist_ok=True)
@@ -52,7 +52,9 @@ def plot_run(run: Path, out: Path | None = None, formats: Sequence[str] = FORMAT
         }
         figures |= {**_of_goals(walk), **_of_programs(walk), **_of_grown(run, walk)}
     files = []
-    with disk_errors(out, "the run itself is safe", f"draw it with mjxgait plot {run}"):
+    with disk_errors(
+        out, "the run itself is safe", f"draw it with {command('plot', run, run=run)}"
+    ):
         for name, (size, compose) in figures.items():
             with figure(size) as drawing:
                 compose(drawing)

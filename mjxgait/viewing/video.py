@@ -11,6 +11,7 @@ from PIL import Image, ImageDraw
 
 from mjxgait.errors import UserError
 from mjxgait.runs.disk import require_writable
+from mjxgait.settings.shipped import install_command
 from mjxgait.viewing.floor import DARK_INK, font
 from mjxgait.viewing.gl import gl_pictures
 from mjxgait.viewing.stage import Stage
@@ -183,6 +184,6 @@ def _import_av(path: Path) -> Any:
         import av
     except ImportError:
         raise UserError(
-            f'{path}: MP4 needs the extra: pip install "mjxgait[video]"; WebP and GIF need nothing'
+            f"{path}: MP4 needs an extra: {install_command('video')}; WebP and GIF need none"
         ) from None
     return av

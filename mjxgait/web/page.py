@@ -20,6 +20,7 @@ from mjxgait.errors import UserError
 from mjxgait.runs.folder import CERTIFICATE, METRICS, STRESS, open_champion, read_metrics
 from mjxgait.viewing.cast import LOOP_SECONDS
 from mjxgait.viewing.curves import draw_fitness
+from mjxgait.viewing.doubt import doubt
 from mjxgait.viewing.gaitplots import gait_figures
 from mjxgait.viewing.style import Figures, figure
 from mjxgait.viewing.walk import Walk, record_walk
@@ -29,8 +30,8 @@ FAR = 1.7
 """Of the camera, in units of the creature's size."""
 
 
-def write_page(run: Path, out: Path) -> None:
-    """Writes the page of a run's champion.
+def write_page(run: Path, out: Path) -> str:
+    """Write the page of a run's champion; return what is to be said of it, see `doubt`.
 
     Raises:
       UserError: no run, no champion, no steady stride, or the file cannot be written.
@@ -39,6 +40,7 @@ def write_page(run: Path, out: Path) -> None:
     walk = record_walk(creature, champion, LOOP_SECONDS)
     page = build_page(walk, walk_loop(walk, RATE), _sections(run, creature, champion, walk))
     write_text(out, page)
+    return doubt(run, walk)
 
 
 def write_text(out: Path, page: str) -> None:

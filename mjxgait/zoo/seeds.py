@@ -5,9 +5,8 @@ from pathlib import Path
 
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
-from mjxgait.parts.fit import check_fit
 from mjxgait.runs.disk import disk_errors
-from mjxgait.runs.folder import create_run, new_run_folder
+from mjxgait.runs.folder import check_parts, create_run, is_taken, new_run_folder
 from mjxgait.settings.config import Config
 from mjxgait.settings.tables import STRICT, Whole, build, dump_toml, read_toml
 
@@ -52,14 +51,12 @@ def folders_of(zoo: Path) -> list[Path]:
     return read_seeds(zoo).folders(zoo)
 
 
-def create_zoo(
-    zoo: Path | None, creature: Creature, config: Config, runs: int, together: int = 0
-) -> Path:
-    """Makes a folder with a run folder for each seed, from the config's on; by default a new one
-    under runs/. together: see `Seeds`.
+def check_zoo(zoo: Path | None, creature: Creature, config: Config, runs: int) -> Path:
+    """Return the folder that several new runs may have; by default a new one under runs/. Writes
+    nothing.
 
     Raises:
-      UserError: fewer than two runs, or islands, which have rows of their own; see `create_run`.
+      UserError: fewer than two runs, or islands, which have rows of their own; see `check_parts`.
     """
     if runs < 2:
         raise UserError(f"--runs {runs}: give 2 or more, or leave it out for a single run")
@@ -68,13 +65,29 @@ def create_zoo(
             "--runs: runs with islands do not go side by side; start them one by one,"
             " or give --evolution.islands.count 1"
         )
-    check_fit(creature, config)
+    check_parts(creature, config)
     zoo = zoo or new_run_folder(f"{creature.name}-zoo", config.seed)
-    if zoo.exists() and (not zoo.is_dir() or any(zoo.iterdir())):
+    if is_taken(zoo):
         raise UserError(
             f"{zoo}: holds something already; name another folder with --out, or go on with "
             f"--resume {zoo}"
         )
+    return zoo
+
+
+def create_zoo(
+    zoo: Path | None, creature: Creature, config: Config, runs: int, together: int = 0
+) -> Path:
+    """Make a folder with a run folder for each seed, from the config's on; by default a new one
+    under runs/. together: see `Seeds`.
+
+    Raises:
+      UserError: see `check_zoo` and `check_plan`; or the folder cannot be written.
+    """
+    from mjxgait.runs.blueprint import check_plan  # JAX takes a second to import
+
+    zoo = check_zoo(zoo, creature, config, runs)
+    check_plan(creature, config)
     seeds = Seeds(tuple(range(config.seed, config.seed + runs)), together)
     for seed, folder in zip(seeds.seeds, seeds.folders(zoo), strict=True):
         create_run(folder, creature, to_the_last(dataclasses.replace(config, seed=seed)))

@@ -76,7 +76,7 @@ def test_a_run_has_the_step_of_its_task(task: str, step: float, monkeypatch: pyt
         raise UserError("that is enough")
 
     for caller in ("mjxgait.commands.train", "mjxgait.library.make"):
-        monkeypatch.setattr(f"{caller}.create_run", only_look)
+        monkeypatch.setattr(f"{caller}.check_run", only_look)
     with pytest.raises(UserError, match="enough"):
         train_command(["--env", "blocks", "--use.task", task])
     with pytest.raises(UserError, match="enough"):

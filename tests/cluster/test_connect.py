@@ -10,6 +10,7 @@ from helpers import STOOL
 
 from mjxgait.cluster.connect import connected
 from mjxgait.errors import UserError
+from mjxgait.settings.shipped import install_command
 
 
 def refusal(address: str) -> str:
@@ -44,7 +45,7 @@ def test_without_ray_it_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch):
         head.bind(("127.0.0.1", 0))
         head.listen()
         said = refusal(f"127.0.0.1:{head.getsockname()[1]}")
-    assert 'pip install "mjxgait[cluster]"' in said
+    assert f"--cluster needs Ray: {install_command('cluster')}, on every machine" in said
 
 
 WITHOUT = """

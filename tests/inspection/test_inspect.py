@@ -12,6 +12,7 @@ import sys
 
 import numpy as np
 import pytest
+from helpers import said_by
 from inspection.made_up import FORCED, LAST, POPULATION
 
 from mjxgait.certify.certificate import SCHEMA
@@ -20,6 +21,7 @@ from mjxgait.champion import read_champion
 from mjxgait.cli import main
 from mjxgait.inspect import facts, individual_facts, read_snapshot, text
 from mjxgait.runs.folder import CERTIFICATE, CHAMPION, STRESS
+from mjxgait.runs.lock import locked
 
 
 def tell(capsys, *arguments):
@@ -95,6 +97,35 @@ def test_tells_whether_the_certificate_is_the_champions(run):
     assert said().endswith("it was given under other rules than today's.")
     (run / CERTIFICATE).write_text("[]")
     assert "not a certificate" in said()
+
+
+@pytest.mark.parametrize("text", ['{"schema": 1', "[]", "{}"], ids=["cut off", "a list", "empty"])
+def test_a_damaged_champion_gets_one_sentence_everywhere(run, capsys, tmp_path, text):
+    (run / CHAMPION).write_text(text)
+    one = facts(read_snapshot(run))
+    sentence = one["trouble"]
+    assert sentence.startswith(f"{run / CHAMPION}: damaged, or not a champion file (")
+    assert sentence.endswith(f"; write it anew with: mjxgait train --resume {run}")
+    assert one["certificate"] == sentence
+    whole = "".join(sentence.split())  # as a table wraps it
+    said = tell(capsys, run)[1]
+    assert "".join(said.split()).count(whole) == 1
+    assert "no champion" not in said
+    assert "not been examined" not in said
+    several = tell(capsys, run.parent)[1]
+    assert "".join(several.split()).count(whole) == 1
+    assert "champion unreadable" in several
+    assert "not examined" not in several
+    for command in (["share", "--out", tmp_path / "a.html"], ["certify"]):
+        assert sentence in said_by(capsys, command[0], run, *command[1:], code=2)
+
+
+def test_of_a_damaged_champion_it_is_not_said_whether_a_certificate_ended_the_run(run, capsys):
+    config = run / "config.toml"
+    config.write_text(config.read_text().replace(f"generations = {LAST}", "generations = 99"))
+    assert "not finished" in tell(capsys, run)[1]
+    (run / CHAMPION).write_text("[]")
+    assert "not known without the champion" in tell(capsys, run)[1]
 
 
 def test_tells_whether_the_champion_walks_anywhere(run):
@@ -318,3 +349,11 @@ def test_a_folder_that_is_nothing_of_ours(tmp_path, capsys):
     code, said = tell(capsys, tmp_path / "missing")
     assert code == 2
     assert "no such folder" in said
+
+
+def test_a_run_that_is_alive_is_shown_as_running(run, capsys):
+    pytest.importorskip("fcntl", reason="this system has no flock")
+    with locked(run):
+        assert f"runs now: process {os.getpid()} on" in tell(capsys, run)[1]
+        assert re.search(r"walk .* running$", tell(capsys, run.parent)[1], re.MULTILINE)
+    assert "runs now" not in tell(capsys, run)[1]

@@ -8,10 +8,11 @@ from viewing.made_up import treading
 
 from mjxgait.certify import Certificate, CertificateConfig, Criterion, Measure
 from mjxgait.champion import write_champion
-from mjxgait.commands.repertoire import RepertoireOptions, begun
+from mjxgait.commands.repertoire import RepertoireOptions, planned
+from mjxgait.commands.repertoire import begin as begin_repertoire
 from mjxgait.creature import Creature
 from mjxgait.repertoire.grid import Cell, Grid
-from mjxgait.runs.folder import CERTIFICATE, CHAMPION
+from mjxgait.runs.folder import CERTIFICATE, CHAMPION, open_run
 
 SMALL = """
 checkpoint_every = 1
@@ -29,7 +30,7 @@ CERTIFIED = (Cell(0.2, 0.0), Cell(0.2, 10.0))
 def begin(folder: Path) -> tuple[Path, Creature, Grid]:
     settings = folder.with_suffix(".toml")
     settings.write_text(SMALL)
-    return begun(
+    plan = planned(
         RepertoireOptions(
             env=str(STOOL),
             speeds=("0.2", "0.4"),
@@ -40,6 +41,8 @@ def begin(folder: Path) -> tuple[Path, Creature, Grid]:
             generations=GENERATIONS,
         )
     )
+    begin_repertoire(plan)
+    return folder, open_run(folder / plan.grid.cells[0].name)[0], plan.grid
 
 
 def certificate(creature: Creature, passed: bool) -> str:

@@ -9,7 +9,7 @@ from viewing.made_up import falling
 
 from mjxgait.cli import main
 from mjxgait.creature import load_creature
-from mjxgait.settings.shipped import find_creature
+from mjxgait.settings.shipped import find_creature, install_command
 from mjxgait.viewing.camera import VIEWS
 from mjxgait.viewing.stage import Stage, smooth
 from mjxgait.viewing.video import Runner, condition, moving_pictures
@@ -51,7 +51,7 @@ def test_mp4_without_the_extra_is_one_sentence(stool_run, tmp_path, capsys, monk
     monkeypatch.setitem(sys.modules, "av", None)
     code, said = render(capsys, stool_run, "--out", tmp_path / "walk.mp4")
     assert code == 2
-    assert 'pip install "mjxgait[video]"' in said
+    assert f"MP4 needs an extra: {install_command('video')};" in said
 
 
 def test_a_png_is_the_filmstrip(stool_run, tmp_path, capsys):

@@ -1,0 +1,122 @@
+"""A run that is over is known as such from its folder, with what would go on with it."""
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+from inspection.made_up import LAST
+
+from mjxgait.certify.certificate import SCHEMA
+from mjxgait.inspect import read_snapshot
+from mjxgait.runs.ended import nothing_left
+from mjxgait.runs.folder import CERTIFICATE, CHAMPION, kept_champion, open_run
+
+ALL = f"all {LAST} generations are done"
+
+
+def certify(run, passed=True, **others):
+    creature, _ = open_run(run)
+    document = {
+        "schema": SCHEMA,
+        "passed": passed,
+        "margin": 0.5,
+        "champion": kept_champion(run, creature).fingerprint,
+        "criteria": [],
+    }
+    (run / CERTIFICATE).write_text(json.dumps(document | others))
+
+
+def said(run, evolution=None, examination=None, kept=None):
+    """Of a run that is gone on with by these settings."""
+    creature, config = open_run(run)
+    config = dataclasses.replace(
+        config,
+        evolution=dataclasses.replace(config.evolution, **(evolution or {})),
+        examination=dataclasses.replace(config.examination, **(examination or {})),
+    )
+    return nothing_left(run, creature, config, config if kept is None else open_run(run)[1])
+
+
+def onward(run, *options):
+    return f"To go on: mjxgait train --resume {run} {' '.join(map(str, options))}"
+
+
+def test_all_generations_are_done(run):
+    certify(run, passed=False)
+    told = said(run)
+    assert told == f"{run}: nothing is left to do: {ALL}. {onward(run, '--generations', 2 * LAST)}"
+    assert said(run, {"generations": LAST + 1}, {"every": 0}) is None
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lambda run: (run / CERTIFICATE).unlink(),
+        lambda run: certify(run, champion="another"),
+        lambda run: (run / CERTIFICATE).write_text("[]"),
+        lambda run: (run / CHAMPION).write_text("[]"),
+        lambda run: (run / CHAMPION).unlink(),
+    ],
+    ids=["no certificate", "of another", "a damaged one", "a damaged champion", "no champion"],
+)
+def test_without_a_champion_and_its_certificate_something_is_left_to_do(run, spoil):
+    certify(run)
+    assert said(run)
+    spoil(run)
+    assert said(run) is None
+
+
+def test_where_nobody_is_examined_nothing_waits_for_a_certificate(run):
+    assert said(run) is None
+    assert ALL in said(run, examination={"candidates": 0})
+
+
+def test_another_examination_goes_on(run):
+    certify(run)
+    assert said(run, examination={"level": "anywhere"}, kept="as it was") is None
+
+
+def test_a_certificate_ended_it(run):
+    certify(run)
+    early = {"generations": 9}, {"every": LAST}
+    told = said(run, *early)
+    assert f"certified with a margin of 0.50 in generation {LAST}. " in told
+    assert told.endswith(onward(run, "--examination.every", 0))
+    certify(run, passed=False)
+    assert said(run, *early) is None
+
+
+def test_the_target_is_reached(run):
+    certify(run)
+    told = said(run, {"generations": 9, "target": 1.0})
+    assert "the target fitness of 1 is reached" in told
+    assert told.endswith(onward(run, "--evolution.target", None))
+    both = said(run, {"target": 1.0})
+    assert both.endswith(onward(run, "--evolution.target", None, "--generations", 2 * LAST))
+
+
+def test_what_forced_evolution_ended_does_not_go_on(run):
+    certify(run)
+    _, config = open_run(run)
+    forced = dataclasses.replace(config.evolution.forced, patience=1)
+    snapshot = read_snapshot(run)
+    assert "forced evolution" not in snapshot.ended
+    snapshot = dataclasses.replace(snapshot, arrays={**snapshot.arrays, "barren": np.int32(1)})
+    patient = dataclasses.replace(
+        config, evolution=dataclasses.replace(config.evolution, forced=forced, generations=9)
+    )
+    ended = dataclasses.replace(snapshot, config=patient).ended
+    assert ended == "forced evolution no longer pays: 1 spells in a row without growth"
+    islands = dataclasses.replace(patient.evolution.islands, count=2)
+    several = dataclasses.replace(
+        patient, evolution=dataclasses.replace(patient.evolution, islands=islands)
+    )
+    assert dataclasses.replace(snapshot, config=several).ended is None
+
+
+def test_no_checkpoint_is_no_end(run):
+    certify(run)
+    for folder in (run / "checkpoints").iterdir():
+        folder.rename(folder.with_name(f"{folder.name}.tmp"))
+    assert said(run) is None
