@@ -19,6 +19,7 @@ from mjxgait.repertoire.grid import GRID, Grid
 from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.folder import create_run, open_run
 from mjxgait.settings.config import Config
+from mjxgait.settings.rollout import Physics
 from mjxgait.settings.tables import build, merge
 
 MAP = "map.png"
@@ -46,6 +47,7 @@ class RepertoireOptions:
       population: Of each walk.
       generations: Of each walk, straight on and turning.
       seed: Of all randomness.
+      physics: mjx simulates with MJX itself instead of this program's faster step.
       rate: Key frames per second of the clips.
       travelling: The clips move their root; otherwise the creature walks in place.
       blends: Try what lies half way between neighbours in C MuJoCo too, and whether it can go over
@@ -64,6 +66,7 @@ class RepertoireOptions:
     population: int | None = None
     generations: int | None = None
     seed: int | None = None
+    physics: Physics | None = None
     rate: Literal[24, 30, 60] = 60
     travelling: bool = False
     blends: bool = True
@@ -148,6 +151,7 @@ def _settings(options: RepertoireOptions, creature: Creature) -> Config:
     short = {"population": options.population, "generations": options.generations}
     table: dict[str, Any] = {"evolution": {k: v for k, v in short.items() if v is not None}}
     table |= {} if options.seed is None else {"seed": options.seed}
+    table |= {} if options.physics is None else {"rollout": {"physics": options.physics}}
     return build(type(config), merge(dataclasses.asdict(config), table), "the options")
 
 
