@@ -1,20 +1,35 @@
-"""Stores a champion's undisturbed walk as the certificate sees it, for docs/worked-example.md.
+"""Stores a champion's undisturbed walk as the certificate sees it, and writes docs/worked-example.md anew.
 
-    python scripts/store_walk.py runs/every/tall_quadruped-0 docs/data/tall_quadruped-0
+    python scripts/store_walk.py RUN
 
-Writes into the second folder the champion, its certificate, made anew, and `walk.npz`: integers,
-millionths of m, rad, N and m/s.
+Into docs/data/walk go the run's creature, settings and champion, a certificate made anew, and
+`walk.npz`: integers, millionths of m, rad, N and m/s. Then the code on the page runs on them, and
+everything on the page between the marks "numbers" is written from what it finds.
 """
 
 import argparse
+import contextlib
+import io
+import json
+import re
 import shutil
+import sys
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from mjxgait.certify import CertificateConfig, certify, record
 from mjxgait.certify.measure import Recording
-from mjxgait.runs.folder import CERTIFICATE, CHAMPION, open_champion
+from mjxgait.runs.folder import CERTIFICATE, CHAMPION, CONFIG, CREATURE, open_champion
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGE, FOLDER = ROOT / "docs" / "worked-example.md", ROOT / "docs" / "data" / "walk"
+CODE = re.compile(r"```python\n(.*?)```", re.DOTALL)
+NUMBERS = re.compile(r"(<!-- numbers: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
+BY_HAND = (2, 3, 7)
+"""The criteria whose numbers the page works out."""
 
 
 def main() -> None:
@@ -23,21 +38,24 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("run", type=Path)
-    parser.add_argument("folder", type=Path)
-    options = parser.parse_args()
-    creature, champion = open_champion(options.run)
+    run = parser.parse_args().run
+    creature, champion = open_champion(run)
     config = CertificateConfig()
-    options.folder.mkdir(parents=True, exist_ok=True)
-    shutil.copy(options.run / CHAMPION, options.folder / CHAMPION)
-    (options.folder / CERTIFICATE).write_text(
-        certify(creature, champion, config).to_json(), encoding="utf-8"
-    )
+    certificate = certify(creature, champion, config)
+    if not certificate.passed:
+        sys.exit(f"{run}: its champion is not certified; nothing was stored")
     window = record(creature, champion, config.seconds).window(config.warmup)
-    np.savez_compressed(options.folder / "walk.npz", allow_pickle=False, **arrays(window))
+    shutil.rmtree(FOLDER, ignore_errors=True)
+    shutil.copytree(run / CREATURE, FOLDER / CREATURE)
+    for name in (CONFIG, CHAMPION):
+        shutil.copy(run / name, FOLDER / name)
+    (FOLDER / CERTIFICATE).write_text(certificate.to_json(), encoding="utf-8")
+    np.savez_compressed(FOLDER / "walk.npz", allow_pickle=False, **arrays(window))
+    PAGE.write_text(page_of(PAGE.read_text(encoding="utf-8"), FOLDER), encoding="utf-8")
 
 
 def arrays(window: Recording) -> dict[str, np.ndarray]:
-    """What lies in the file: sizes as they are, and per frame [T, ...] integers in millionths."""
+    """Contents of the file: sizes as they are, and per frame [T, ...] integers in millionths."""
     size = window.dimensions
     return {
         "time_step": np.array(window.time_step),
@@ -59,6 +77,65 @@ def arrays(window: Recording) -> dict[str, np.ndarray]:
 def millionths(values: np.ndarray) -> np.ndarray:
     """As integers, which take a third of the room of float64 when compressed."""
     return np.round(values * 1e6).astype(np.int32)
+
+
+def page_of(page: str, folder: Path) -> str:
+    """The page with all numbers from a stored walk."""
+    found = worked_out(page)
+    certificate = json.loads((folder / CERTIFICATE).read_text(encoding="utf-8"))
+    champion = json.loads((folder / CHAMPION).read_text(encoding="utf-8"))
+    parts = {
+        "champion": _champion(champion, certificate),
+        "table": _table(found["by_hand"], certified(certificate)),
+        "seen": _seen(found),
+    }
+    return NUMBERS.sub(lambda match: f"{match[1]}{parts[match[2]]}\n{match[3]}", page)
+
+
+def worked_out(page: str) -> dict[str, Any]:
+    """The names that the code on the page defines; it reads the walk from the root of the checkout."""
+    match, names = CODE.search(page), dict[str, Any]()
+    assert match
+    with contextlib.chdir(ROOT), contextlib.redirect_stdout(io.StringIO()):
+        exec(match[1], names)
+    return names
+
+
+def certified(certificate: Mapping[str, Any]) -> dict[str, float]:
+    """The same measures by name, as the certificate has them."""
+    chosen = (c for c in certificate["criteria"] if c["number"] in BY_HAND)
+    return {m["name"]: m["value"] for c in chosen for m in c["measures"]}
+
+
+def _champion(champion: Mapping[str, Any], certificate: Mapping[str, Any]) -> str:
+    origin, numbers = champion["origin"], [c["number"] for c in certificate["criteria"]]
+    return (
+        f"Champion of generation {origin['generation']} of seed {origin['seed']}, made by mjxgait "
+        f"{origin['versions']['mjxgait']}: it passes all {len(numbers)} criteria ({numbers[0]} to "
+        f"{numbers[-1]}) with a margin of {certificate['margin']:.2f}, and its gait is called "
+        f"{certificate['report']['gait']}."
+    )
+
+
+def _table(by_hand: Mapping[str, float], certificate: Mapping[str, float]) -> str:
+    rows = [f"| {n} | {v:.6g} | {certificate[n]:.6g} |" for n, v in by_hand.items()]
+    return "\n".join(["| measure | by hand | certificate |", "|---|---|---|", *rows])
+
+
+def _seen(found: Mapping[str, Any]) -> str:
+    swings = [swings for swings, _ in found["feet"]]
+    stride, varied = found["periods"].mean() * found["dt"], found["periods"].std()
+    aside, slip = 100 * found["drift"] * found["distance"], found["slip"]
+    return "\n".join(
+        [
+            f"- In {found['seconds']:.0f} s the feet swing {', '.join(map(str, swings))} times. A stride takes "
+            f"{stride:.2f} s.",
+            f"- The standard deviation of the stride period is {varied:.2f} frames of "
+            f"{1e3 * found['dt']:.0f} ms.",
+            f"- The trunk is at most {aside:.0f} cm off the line over {found['distance']:.0f} m. Each foot "
+            f"slides {slip.min():.1f} to {slip.max():.1f} m meanwhile.",
+        ]
+    )
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ from helpers import altered, small_config, weight_vector
 from mjxgait.creature import Creature
 from mjxgait.settings.walk import WalkConfig, Weights
 from mjxgait.tasks.falls import Reason
-from mjxgait.tasks.score import score
+from mjxgait.tasks.score import hardness, ramped, score
 from mjxgait.tasks.walk.fitness import REWARDS, TERMS, fitness_terms, terms_under
 from mjxgait.tasks.walk.tally import Judge
 from mjxgait.tasks.walk.task import Walk
@@ -183,3 +183,16 @@ def test_who_was_lucky_on_few_starts_is_not_believed():
     wary = [float(score(each, weights, 0.0, caution=2.0)) for each in (even, uneven, often)]
     assert plain == [2.0, 2.0, 2.0]
     assert wary == pytest.approx([2.0, 2.0 - 2 / np.sqrt(2), 2.0 - 2 / np.sqrt(4)])
+
+
+@pytest.mark.parametrize("steps", [0, 1, 7, 10])
+def test_ramps_rise_and_are_whole_from_their_last_step_on(steps: int):
+    """Compiled for any length: what is cut to whole numbers must become all of it."""
+    now = np.arange(20)
+    grown = np.asarray(jax.jit(jax.vmap(ramped, (None, 0)))(jnp.int32(steps), jnp.asarray(now)))
+    harder = np.asarray(jax.jit(jax.vmap(hardness, (None, 0)))(jnp.int32(steps), jnp.asarray(now)))
+    rising = now < steps
+    np.testing.assert_allclose(grown[rising], now[rising] / max(steps, 1), atol=1e-6)
+    np.testing.assert_allclose(harder[rising], (now[rising] + 1) / (steps + 1), rtol=1e-6)
+    assert (grown[~rising] == 1).all()
+    assert (harder[~rising] == 1).all()

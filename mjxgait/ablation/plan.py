@@ -16,7 +16,7 @@ from mjxgait.parts import resolve_config
 from mjxgait.parts.wishes import Wishes, wished
 from mjxgait.runs.folder import check_parts
 from mjxgait.settings.config import Config
-from mjxgait.settings.rollout import GroundText
+from mjxgait.settings.rollout import GroundText, Physics
 from mjxgait.settings.shipped import data_folder
 from mjxgait.settings.tables import STRICT, Count, Finite, Whole, build, merge, read_toml
 
@@ -59,6 +59,7 @@ class Study:
       rows: so many runs of one shape are side by side in one program; 0: all of them, which is best on one
         machine. A cluster hands out so many at a time. With other neighbours the fast step's last
         bits may differ.
+      physics: of all runs, as `train --physics` has it; by default as the settings say.
       base: config keys of all variants.
       variant: the first is the base that the others are compared with. grid: dotted config keys and
         their values, instead of variants.
@@ -78,6 +79,7 @@ class Study:
     paired: bool = True
     allow_equal: bool = False
     rows: Whole = 0
+    physics: Physics | None = None
     base: dict[str, Any] = dataclasses.field(default_factory=dict)
     variant: tuple[VariantTable, ...] = ()
     grid: dict[str, tuple[Any, ...]] = dataclasses.field(default_factory=dict)
@@ -208,6 +210,8 @@ def _config(study: Study, table: VariantTable, creature: Creature, where: str) -
     if not table.config:
         config = _lay(config, study.base, f"{where}: [base]")
     config = _lay(config, table.settings, here)
+    if study.physics is not None:
+        config = _lay(config, {"rollout": {"physics": study.physics}}, where)
     with _told_of(here):
         config = wished(config, creature, Wishes(gait=table.gait))
     return _settled(config, table.generations or study.generations)

@@ -62,6 +62,7 @@ class Bodies:
         self.bias, self.passive = bind("qfrc_bias"), bind("qfrc_passive")
         self.constraint = bind("qfrc_constraint")
         self.geom_xpos, self.geom_xmat = bind("geom_xpos"), bind("geom_xmat")
+        self.subtree_com = bind("subtree_com")
         # Of the step before, which the next one overwrites.
         self.last_force = np.zeros_like(self.qvel)
         self.sees_feet = any(name in FOOT_SENSES for name in reads)
@@ -148,6 +149,11 @@ class Bodies:
         """[rows, 3] m ahead, to the left and up from the start."""
         moved = self.xpos[rows, self.creature.trunk] - self.start.place
         return np.stack([moved @ self.start.forward, moved @ self.start.left, moved[:, 2]], 1)
+
+    def middle(self, rows: np.ndarray) -> np.ndarray:
+        """[rows, 3] m in the world's axes, from where the trunk starts to the centre of all mass."""
+        moved: np.ndarray = self.subtree_com[rows, self.creature.trunk] - self.start.place
+        return moved
 
     def astray(self, rows: np.ndarray, told: np.ndarray) -> np.ndarray:
         """[rows] rad that the nose is off the heading that was told."""

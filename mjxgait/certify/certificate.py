@@ -22,7 +22,7 @@ from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 
 SCHEMA = 2
-"""Of the file and of the rules: those of 1 had eight criteria, and chose on what they examined."""
+"""Version of the file and of the criteria: 1 had eight criteria, and chose on what it examined."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -70,7 +70,7 @@ class Certificate:
     def to_json(self) -> str:
         """The text of `certificate.json`; numbers that are not finite become null."""
         document = {
-            "schema": SCHEMA,
+            "schema": schema_of(self.task),
             "creature": self.creature,
             "creature_digest": self.digest,
             "task": self.task,
@@ -271,6 +271,11 @@ def _bears(shares: dict[float, float]) -> dict[str, Any]:
         "push_survival": {f"{speed:g}": share for speed, share in sorted(shares.items())},
         "push_that_fells_half": half_point(shares),
     }
+
+
+def schema_of(task: str) -> int:
+    """Version of `certificate.json` for a task: a certificate with another one is outdated."""
+    return SCHEMA + how_simulated(task).revision
 
 
 def _entry(measure: criteria.Measure) -> dict[str, Any]:

@@ -72,15 +72,15 @@ def blank_film(creature: Creature, time_step: float, rows: int, steps: int) -> T
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Outcome:
-    """What became of the simulations.
+    """Results of the simulations.
 
     fell: [S] s, infinite for those that stayed up. travel: [S, 3] m along the start's forward and
     left and upwards until the end or the fall.
-    path: [S, T] m forward after each control step; NaN from the fall on, or where nobody looked.
-    astray: [S, T] rad, the heading less the one it was told; NaN from the fall on; empty where
-    nobody was told one.
-    height: [S] m, the greatest of the lowest solid part above the ground, once the warm-up is over;
-    0 where nobody watches it.
+    The next four have a value after each control step, NaN from the fall on, and are empty where the
+    task does not need them (`path` is always there):
+    path: [S, T] m of the trunk forward. astray: [S, T] rad, the heading less the commanded one.
+    middle: [S, T, 3] m in the world's axes, from where the trunk starts to the centre of all mass.
+    low: [S, T] m, lowest solid part above the ground.
     clearance: [S] m, the least to the bar, `certify.bar.FAR` at most; infinite where there is none.
     """
 
@@ -90,7 +90,8 @@ class Outcome:
     clearance: np.ndarray
     trajectory: Trajectory
     astray: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros((0, 0)))
-    height: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros(0))
+    middle: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros((0, 0, 3)))
+    low: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros((0, 0)))
 
     @property
     def stayed_up(self) -> np.ndarray:
@@ -98,14 +99,19 @@ class Outcome:
         return np.isinf(self.fell)
 
     def copy(self, leader: int, rows: np.ndarray) -> None:
-        """Says of some simulations what it says of one that they have been alike to."""
-        own = (self.fell, self.travel, self.path, self.clearance, self.astray, self.height)
-        for values in own:
+        """Gives some simulations the results of the one that they have been identical to."""
+        own = (self.fell, self.travel, self.path, self.clearance, self.astray)
+        for values in (*own, self.middle, self.low):
             values[rows] = values[leader]
 
 
-def blank_outcome(count: int, steps: int, told: bool, film: Trajectory) -> Outcome:
-    """Of S simulations that have not begun. told: whether they are told a heading."""
+def blank_outcome(
+    count: int, steps: int, film: Trajectory, *, told: bool, middle: bool, low: bool
+) -> Outcome:
+    """Of S simulations that have not begun.
+
+    told: whether they follow a commanded heading. middle, low: whether these are recorded.
+    """
     return Outcome(
         fell=np.full(count, np.inf),
         travel=np.zeros((count, 3)),
@@ -113,5 +119,6 @@ def blank_outcome(count: int, steps: int, told: bool, film: Trajectory) -> Outco
         clearance=np.full(count, np.inf),
         trajectory=film,
         astray=np.full((count, steps if told else 0), np.nan),
-        height=np.zeros(count),
+        middle=np.full((count, steps if middle else 0, 3), np.nan),
+        low=np.full((count, steps if low else 0), np.nan),
     )

@@ -75,7 +75,8 @@ def simulate(
         path=np.concatenate([p.path for p in parts])[order],
         clearance=np.concatenate([p.clearance for p in parts])[order],
         astray=np.concatenate([p.astray for p in parts])[order],
-        height=np.concatenate([p.height for p in parts])[order],
+        middle=np.concatenate([p.middle for p in parts])[order],
+        low=np.concatenate([p.low for p in parts])[order],
         trajectory=Trajectory(
             creature.model.opt.timestep,
             *(np.concatenate([getattr(p.trajectory, f) for p in parts])[kept] for f in fields),

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from mjxgait.certify.certificate import SCHEMA
+from mjxgait.certify.certificate import schema_of
 from mjxgait.champion import Champion
 from mjxgait.errors import UserError
 
@@ -62,6 +62,6 @@ def outdated(document: dict[str, Any], champion: Champion) -> str | None:
             "The certificate is outdated: "
             "it was given to another champion than the one that is here now."
         )
-    if document.get("schema") != SCHEMA:
+    if document.get("schema") != schema_of(champion.task):
         return "The certificate is outdated: it was given under other rules than today's."
     return None

@@ -133,7 +133,9 @@ def unfamiliar(
     slope: float = 0.0,
     floor: tuple[float, float] = (1.0, 1.0),
 ) -> Starts:
-    """The same starts, disturbed besides in ways that evolution never tries.
+    """The same starts with further disturbances, most of which evolution does not use by default.
+
+    docs/certificate.md says which of them are new to a champion, by the settings of its run.
 
     Args:
       gains: half width of each joint's kp and kd, as a share. latency: most control steps of delay.

@@ -13,7 +13,6 @@ import numpy as np
 
 from mjxgait.certify.bar import Clearance
 from mjxgait.certify.bodies import Bodies, wrapped
-from mjxgait.certify.config import CertificateConfig
 from mjxgait.certify.drive import Drive
 from mjxgait.certify.outcome import (
     Fall,
@@ -31,8 +30,6 @@ from mjxgait.creature import Creature
 
 LOOK = 10
 """Control steps from one look at who can no longer succeed to the next."""
-WARMUP = CertificateConfig().warmup
-"""s; who leaps before has not settled yet."""
 
 
 def examined_model(creature: Creature) -> mujoco.MjModel:
@@ -49,6 +46,7 @@ class Around(Protocol):
     """What a simulation must know of the task; see `tasks.Demands`."""
 
     drag: float
+    grown: bool
     leaps: bool
 
     def onward(self, goal: np.ndarray, first: np.ndarray, way: np.ndarray) -> np.ndarray:
@@ -100,7 +98,9 @@ class Stepping:
         """
         count, time_step = len(self.starts), self.creature.model.opt.timestep
         film = blank_film(self.creature, time_step, self.record, steps)
-        seen = blank_outcome(count, steps, heading is not None, film)
+        told = heading is not None
+        middle, low = self.task.grown, self.task.leaps
+        seen = blank_outcome(count, steps, film, told=told, middle=middle, low=low)
         leader, waiting = self._alike(heading)
         running = np.setdiff1d(np.arange(count), waiting)
         for k in range(steps):
@@ -116,9 +116,9 @@ class Stepping:
             pushed = running[self._pushed(running, k)]
             if len(pushed):
                 self.bodies.push(pushed)
-            told = None if heading is None else heading[running, k]
-            self._control_step(running, k, told, film)
-            down = self._watch(seen, running, k, told)
+            wanted = None if heading is None else heading[running, k]
+            self._control_step(running, k, wanted, film)
+            down = self._watch(seen, running, k, wanted)
             watched = (k + 1) * time_step < self.starts.end[running]
             if down.any() or not watched.all():
                 running = running[
@@ -143,8 +143,10 @@ class Stepping:
                 bodies.geom_xpos[running], bodies.geom_xmat[running], self.starts.bar[running]
             )
             seen.clearance[running] = np.minimum(seen.clearance[running], clear)
-        if self.task.leaps and now > WARMUP:
-            seen.height[running] = np.maximum(seen.height[running], bodies.height(running))
+        if self.task.grown:
+            seen.middle[running, k] = bodies.middle(running)
+        if self.task.leaps:
+            seen.low[running, k] = bodies.height(running)
         down = bodies.down(running, self.fall)
         seen.fell[running[down]] = np.minimum(seen.fell[running[down]], now)
         return down

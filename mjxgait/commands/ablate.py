@@ -14,11 +14,12 @@ from mjxgait.creature.step import at_step
 from mjxgait.errors import INTERRUPTED, UserError
 from mjxgait.runs.folder import CREATURE, is_taken
 from mjxgait.runs.lock import locked
+from mjxgait.settings.rollout import Physics
 from mjxgait.settings.shipped import find_creature
 from mjxgait.settings.tables import build, dump_toml, read_toml
 
 STUDY = "study.toml"
-OVER = ("env", "seeds", "first_seed", "generations", "config", "rows")
+OVER = ("env", "seeds", "first_seed", "generations", "config", "rows", "physics")
 """Options that lie over keys of the study of the same name."""
 ROWS, STRIDE = 4, 5
 """Of a piece of work on a cluster: runs, and generations."""
@@ -42,6 +43,7 @@ class AblateOptions:
         their share of evaluations.
       config: Another base config: a TOML file, or the name of a shipped one.
       rows: So many runs side by side in one program, instead of all; on a cluster 4.
+      physics: mjx simulates all runs with MJX itself instead of this program's faster step.
       cluster: Have the runs done by a Ray cluster: HOST:PORT, or auto for the one that this machine is a
         part of (docs/cluster.md).
       resume: Folder of a study to go on with, as it was.
@@ -57,6 +59,7 @@ class AblateOptions:
     generations: int | None = None
     config: str | None = None
     rows: int | None = None
+    physics: Physics | None = None
     cluster: str | None = None
     resume: Path | None = None
     hours: float = 12.0

@@ -14,6 +14,7 @@ from mjxgait.errors import INTERRUPTED, UserError
 from mjxgait.library import Run, load_creature
 from mjxgait.runs.folder import check_parts, check_run, new_run_folder, open_run
 from mjxgait.settings.config import Config
+from mjxgait.settings.rollout import Physics
 from mjxgait.settings.tables import read_toml
 
 
@@ -39,6 +40,7 @@ class RefineOptions:
       seed: Of all randomness.
       population: Individuals of a generation.
       generations: At most.
+      physics: mjx simulates with MJX itself instead of this program's faster step.
       resume: Run folder of a refine to go on with, or the folder of several.
     """
 
@@ -56,6 +58,7 @@ class RefineOptions:
     seed: int = 0
     population: int | None = None
     generations: int | None = None
+    physics: Physics | None = None
     resume: Path | None = None
 
 
@@ -71,9 +74,9 @@ def refine_command(arguments: Sequence[str]) -> int:
     if options.keys is None:
         raise UserError("name the file with the cycle: mjxgait refine --env duck --keys walk.glb")
     creature = load_creature(options.env)
-    base = base_settings(
-        creature, options.config, options.seed, options.population, options.generations
-    )
+    numbers = options.seed, options.population, options.generations
+    others = {"rollout": {"physics": options.physics}} if options.physics else None
+    base = base_settings(creature, options.config, *numbers, others)
     brought = bring(
         creature,
         options.keys,

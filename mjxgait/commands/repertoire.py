@@ -20,6 +20,7 @@ from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.folder import check_parts, create_run, is_taken, open_run
 from mjxgait.runs.lock import locked
 from mjxgait.settings.config import Config
+from mjxgait.settings.rollout import Physics
 from mjxgait.settings.tables import build, merge
 
 MAP = "map.png"
@@ -47,6 +48,7 @@ class RepertoireOptions:
       population: Of each walk.
       generations: Of each walk, straight on and turning.
       seed: Of all randomness.
+      physics: mjx simulates with MJX itself instead of this program's faster step.
       rate: Key frames per second of the clips.
       travelling: The clips move their root; otherwise the creature walks in place.
       blends: Try what lies half way between neighbours in C MuJoCo too, and whether it can go over
@@ -65,6 +67,7 @@ class RepertoireOptions:
     population: int | None = None
     generations: int | None = None
     seed: int | None = None
+    physics: Physics | None = None
     rate: Literal[24, 30, 60] = 60
     travelling: bool = False
     blends: bool = True
@@ -176,6 +179,7 @@ def _settings(options: RepertoireOptions, creature: Creature) -> Config:
     short = {"population": options.population, "generations": options.generations}
     table: dict[str, Any] = {"evolution": {k: v for k, v in short.items() if v is not None}}
     table |= {} if options.seed is None else {"seed": options.seed}
+    table |= {} if options.physics is None else {"rollout": {"physics": options.physics}}
     return build(type(config), merge(dataclasses.asdict(config), table), "the options")
 
 

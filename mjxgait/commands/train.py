@@ -31,6 +31,7 @@ from mjxgait.runs.folder import (
 )
 from mjxgait.runs.own import command
 from mjxgait.settings.config import Config, ExaminationConfig
+from mjxgait.settings.rollout import Physics
 from mjxgait.settings.tables import build, merge
 from mjxgait.zoo.seeds import check_zoo, create_zoo, folders_of, is_zoo
 
@@ -77,6 +78,8 @@ class TrainOptions:
       cluster: Have it done by a Ray cluster: HOST:PORT, or auto for the one that this machine is a part
         of (docs/cluster.md).
       ground: Short for --rollout.ground: flat, slope:0.1, steps:0.05, bumps:0.05, rough:0.05.
+      physics: Short for --rollout.physics: mjx simulates with MJX itself, auto with the faster step of
+        this program where it knows the model (docs/performance.md).
       view: Show the best of each generation walking on a page that only this machine can reach.
       plots: Draw all plots of the run when it has ended (`mjxgait plot`).
       settings: The config, key by key.
@@ -101,6 +104,7 @@ class TrainOptions:
     certificate: str | None = None
     cluster: str | None = None
     ground: str | None = None
+    physics: Physics | None = None
     view: bool = False
     plots: bool = True
     settings: Annotated[Config, tyro.conf.arg(name="")] = dataclasses.field(default_factory=Config)
@@ -285,7 +289,11 @@ def _settings(options: TrainOptions) -> Config:
     table = {
         "use": dataclasses.asdict(meant(options.settings.use)),
         "evolution": {key: value for key, value in short.items() if value is not None},
-        "rollout": {} if options.ground is None else {"ground": options.ground},
+        "rollout": {
+            key: getattr(options, key)
+            for key in ("ground", "physics")
+            if getattr(options, key) is not None
+        },
     }
     return build(
         type(options.settings), merge(dataclasses.asdict(options.settings), table), "the options"

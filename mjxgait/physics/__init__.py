@@ -1,7 +1,7 @@
 """Batched rigid-body physics behind the `Plant` protocol."""
 
 import copy
-from typing import Any, Literal
+from typing import Any
 
 import mujoco
 from numpy.typing import ArrayLike
@@ -12,6 +12,7 @@ from mjxgait.errors import UserError
 from mjxgait.physics.fast import UnsupportedModel, fast_plant
 from mjxgait.physics.fast.support import check_supported
 from mjxgait.physics.layout import OtherTopology, sense_layout
+from mjxgait.settings.rollout import Physics
 from mjxgait.types import ModelPlant
 
 SLOWER = "15 to 30"
@@ -19,7 +20,7 @@ SLOWER = "15 to 30"
 
 
 def make_plant(
-    creature: Creature, physics: Literal["auto", "mjx"], touch_ends: bool, roomy: bool = False
+    creature: Creature, physics: Physics, touch_ends: bool, roomy: bool = False
 ) -> tuple[ModelPlant, int]:
     """The plant of a creature, and how many lanes per device suit it.
 

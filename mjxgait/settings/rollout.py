@@ -19,6 +19,7 @@ from mjxgait.settings.tables import (
     Whole,
 )
 
+Physics = Literal["auto", "mjx"]
 GroundText = Annotated[str, pydantic.AfterValidator(check_ground)]
 
 
@@ -77,7 +78,8 @@ class RolloutConfig:
       worst: share of the worst start in the score; the mean of the starts has the rest.
       caution: standard errors of its starts' mean by which the score is less: who was lucky on few
         is not believed as one that did well on many.
-      physics: the fast step where the model allows it, or plain MJX.
+      physics: auto takes this program's own step, and MJX for a model that it does not know; mjx
+        always takes MJX. Both give the same motion within tolerances (docs/performance.md).
       lanes: simulations in flight per device; 0 lets the program choose.
       block: individuals that a machine of a cluster judges at once, at most (docs/cluster.md).
       body: its numbers are constants of the compiled program, which is faster, or inputs:
@@ -105,7 +107,7 @@ class RolloutConfig:
     termination: TerminationConfig = dataclasses.field(default_factory=TerminationConfig)
     worst: Fraction = 0.5
     caution: Annotated[NonNegative, SHAPE] = 0.0
-    physics: Annotated[Literal["auto", "mjx"], SHAPE] = "auto"
+    physics: Annotated[Physics, SHAPE] = "auto"
     lanes: Annotated[Whole, SHAPE] = 0
     block: Annotated[Count, HOST] = 64
     ground: Annotated[GroundText, KIND] = FLAT

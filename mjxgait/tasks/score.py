@@ -1,7 +1,7 @@
 """From the terms of several trials to one number: higher is better."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import jax
 import jax.numpy as jnp
@@ -29,16 +29,24 @@ def score(
 
 
 def ramped(generations: jax.Array | int, generation: jax.Array) -> jax.Array:
-    """From 0 to 1, what of its full weight counts in a generation [] if that grows over so many; all of
-    it at once if over none.
+    """Share [] of the full weight in a generation [] that grows from 0 to 1 over so many generations;
+    1 if over none.
     """
-    grown = optax.linear_schedule(0.0, 1.0, 1)(generation / jnp.maximum(generations, 1))
-    return jnp.where(jnp.asarray(generations) > 0, grown, 1.0)
+    whole = optax.linear_schedule(0.0, 1.0, 1)
+    return ramp(generations, lambda now: whole(now / jnp.maximum(generations, 1)))(generation)
 
 
 def hardness(steps: jax.Array | int, level: jax.Array) -> jax.Array:
-    """Up to 1, the share [] of what trials will ask for that they ask for at a level [], if that grows in
-    so many steps; all of it if in none.
+    """Share [] of the full disturbances that trials have at a level [], if these grow in so many steps;
+    1 if in none.
     """
     # Compiled, the quotient need not be 1 to the bit, and what is cut to whole numbers would never be all.
-    return jnp.where(level < steps, (level + 1) / (steps + 1), 1.0)
+    return ramp(steps, lambda now: (now + 1) / (steps + 1))(level)
+
+
+def ramp(steps: jax.Array | float, rise: Callable[[jax.Array], jax.Array]) -> optax.Schedule:
+    """Schedule that follows `rise` for so many steps and is 1 from there on.
+
+    The number of steps may be a traced setting, which `optax.linear_schedule` does not accept.
+    """
+    return optax.join_schedules([rise, optax.constant_schedule(1.0)], [steps])

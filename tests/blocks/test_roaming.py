@@ -126,10 +126,8 @@ def nearer(body: Creature, outcome: Outcome) -> float:
     return float(apart[0] - apart[1])
 
 
-def test_how_high_they_leap_is_watched(experiment: Experiment, evolved):
-    """Frame by frame: of those that are not recorded only the greatest height is kept. On a small
-    moon, where everybody leaps.
-    """
+def test_heights_and_ways_are_watched_frame_by_frame(experiment: Experiment, evolved):
+    """Of those that are not recorded too. On a small moon, where every body leaps."""
     highest = []
     for rank in range(COUNT):
         champion = dataclasses.replace(experiment.champion(evolved[0], {}, rank), task="jump")
@@ -137,11 +135,14 @@ def test_how_high_they_leap_is_watched(experiment: Experiment, evolved):
         body.model.opt.gravity[2] = -0.5
         outcome = simulate(body, champion, nominal_starts(body, 2), 4.0, record=1)
         film = outcome.trajectory
-        low = seen_grown(body, film.qpos[0], film.qvel[0], 0.0).low
-        # What is recorded is before each step.
-        assert outcome.height[0] == pytest.approx(max(low[201:].max(), 0.0), abs=2e-3)
-        assert outcome.height[0] == outcome.height[1]
-        highest.append(outcome.height[0])
+        seen = seen_grown(body, film.qpos[0], film.qvel[0], 0.0)
+        # A frame is recorded before the step of which these tell the end.
+        np.testing.assert_allclose(outcome.low[0, :-1], seen.low[1:], atol=1e-9)
+        moved = seen.middle[1:] - body.stand_qpos[:3]
+        np.testing.assert_allclose(outcome.middle[0, :-1], moved, atol=1e-9)
+        np.testing.assert_array_equal(outcome.low[0], outcome.low[1])
+        np.testing.assert_array_equal(outcome.middle[0], outcome.middle[1])
+        highest.append(outcome.low[0].max())
     assert max(highest) > 0
 
 

@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 from certify_made_up import walk
 
-from mjxgait.certify import CertificateConfig
+from mjxgait.certify import CertificateConfig, outdated
+from mjxgait.certify.certificate import schema_of
 from mjxgait.certify.grown import Grown, seen_grown
 from mjxgait.certify.measure import Recording
+from mjxgait.certify.outcome import Outcome, Trajectory
 from mjxgait.certify.tasks.jump import JumpDemands
 from mjxgait.certify.tasks.roam import RoamDemands
 from mjxgait.creature.geometry import lowest
@@ -133,3 +135,23 @@ def test_who_is_off_the_ground_over_and_over_jumps():
     for later in (0.0, 9.0):
         (again,) = JumpDemands().kept(champion, jump(0.17, since=later), CONFIG)
         assert again.passed == (later == 0.0), "in as many seconds as evolution saw"
+
+
+def test_a_jumper_jumps_from_perturbed_starts_again_and_again():
+    """In six of ten spans, in four, once, and always but before it has settled."""
+    recorded = [jump(0.11, until=14.0), jump(0.11, until=10.0), jump(0.5, until=4.0), jump(0.09)]
+    low = np.stack([each.grown.low for each in recorded if each.grown])
+    film = Trajectory(STEP, *(np.zeros((0, FRAMES)) for _ in range(5)))
+    far, clear = np.zeros((4, 3)), np.full(4, np.inf)
+    outcome = Outcome(np.full(4, np.inf), far, np.zeros((4, FRAMES)), clear, film, low=low)
+    starts: Any = None
+    found = JumpDemands().succeeded(outcome, starts, CONFIG)
+    assert found.tolist() == [True, False, False, False]
+
+
+def test_a_certificate_by_the_earlier_rule_of_modular_bodies_is_outdated():
+    for task, version in (("walk", 2), ("hop", 2), ("swim", 3), ("jump", 3), ("follow", 3)):
+        assert schema_of(task) == version
+        champion: Any = SimpleNamespace(task=task, fingerprint="same")
+        document = {"champion": "same", "schema": 2}
+        assert (outdated(document, champion) is None) == (version == 2), task

@@ -12,6 +12,7 @@ from mjxgait.certify import CertificateConfig
 from mjxgait.certify.grown import Grown, seen_grown
 from mjxgait.certify.measure import Recording
 from mjxgait.certify.outcome import Outcome, Trajectory
+from mjxgait.certify.tasks.follow import FollowDemands
 from mjxgait.certify.tasks.swim import SwimDemands
 from mjxgait.certify.water import Water
 from mjxgait.library import load_creature
@@ -126,14 +127,34 @@ def test_what_evolution_said_must_hold():
 
 
 def test_a_start_succeeds_whichever_way_it_leads():
-    path = np.zeros((3, FRAMES))
-    film = Trajectory(STEP, *(np.zeros((0, FRAMES)) for _ in range(5)))
-    travel = np.array([[4.5, 0, 0], [0, 0, -4.5], [0, 0, 4.3]])
-    outcome = Outcome(np.full(3, np.inf), travel, path, np.full(3, np.inf), film)
+    """By the centre of all mass from 2 s on, as criterion 2 has it; how far the root gets is no matter."""
+    ways = 0.21 * np.array([[1, 0, 0], [0, 0, -1], [0, 0, 0.9]])
+    late = np.maximum(TIMES - 2.0, 0.0)[None, :, None]
+    outcome = disturbed(late * ways[:, None] + np.minimum(TIMES, 2.0)[None, :, None])
+    outcome.travel[2] = 100.0
     starts: Any = None
     assert DEMANDS.succeeded(outcome, starts, CONFIG).tolist() == [True, True, False]
     assert DEMANDS.disturbed(0.89, np.nan, CONFIG)[0].passed is False
     assert DEMANDS.disturbed(0.91, np.nan, CONFIG)[0].passed is True
+
+
+def disturbed(middle: np.ndarray) -> Outcome:
+    """Simulations [S] that nobody recorded, with a centre of mass [S, T, 3]."""
+    count = len(middle)
+    film = Trajectory(STEP, *(np.zeros((0, FRAMES)) for _ in range(5)))
+    path, clear = np.zeros((count, FRAMES)), np.full(count, np.inf)
+    return Outcome(np.full(count, np.inf), np.zeros((count, 3)), path, clear, film, middle=middle)
+
+
+def test_a_follower_succeeds_by_its_centre_of_mass_from_two_seconds_on():
+    """At 0.11 m/s towards a light 10 m to its left, at 0.09, at 0.11 away from it; upwards on land."""
+    late = np.maximum(TIMES - 2.0, 0.0)[None, :, None]
+    ways = np.array([[0, 0.11, 0], [0, 0.09, 0], [0, -0.11, 0], [0, 0, 0.2]])
+    outcome = disturbed(late * ways[:, None])
+    starts: Any = SimpleNamespace(light=np.tile([0.0, 10.0, 0.0], (4, 1)))
+    for drag in (500.0, 0.0):
+        found = FollowDemands(drag).succeeded(outcome, starts, CONFIG)
+        assert found.tolist() == [True, False, False, False]
 
 
 def test_what_is_seen_afloat_is_what_the_water_does():

@@ -29,6 +29,8 @@ class BlocksDemands(StaysUp, abc.ABC):
 
     pushed = by_pushes = False
     grown = True
+    revision = 1
+    """Criterion 4 measured the root from the first moment on, and of jumpers one leap."""
     verb: str
     """What one that passes does."""
     promised: str
@@ -148,13 +150,13 @@ class GoingDemands(BlocksDemands):
 
     def done(self, window: Recording) -> float:
         """See `BlocksDemands`: m/s."""
-        return flight(self._middle(window), window.time_step)
+        return float(flight(self._middle(window), window.time_step))
 
     def succeeded(self, outcome: Outcome, starts: Starts, config: CertificateConfig) -> np.ndarray:
-        """See `Demands`: those that were fast enough from the start to the end."""
-        seconds = outcome.path.shape[1] * outcome.trajectory.time_step
-        way = np.linalg.norm(outcome.travel[:, : self.axes], axis=1)
-        return outcome.stayed_up & (way >= self.wanted(config).speed * seconds)
+        """See `Demands`: those that are as fast as criterion 2 wants, measured in the same way."""
+        middle = counted(outcome.middle, outcome, config)[..., : self.axes]
+        fast = flight(middle, outcome.trajectory.time_step) >= self.wanted(config).speed
+        return outcome.stayed_up & fast
 
     def enough(self, seconds: float, config: CertificateConfig) -> float:
         """See `BlocksDemands`: m in the seconds that count, as far as it must get in all."""
@@ -176,7 +178,7 @@ def gets_on(name: str, middle: np.ndarray, time_step: float, config: GoingConfig
         2,
         name,
         (
-            at_least("speed (m/s)", flight(middle, time_step), config.speed),
+            at_least("speed (m/s)", float(flight(middle, time_step)), config.speed),
             at_least("way / path", straight, config.straight, 1.0),
             steady(first, second, config.second_half),
         ),
@@ -219,9 +221,16 @@ def apart(window: Recording, config: BlocksConfig, on_land: bool) -> Criterion:
     return Criterion(9, "parts", tuple(inside))
 
 
-def flight(middle: np.ndarray, time_step: float) -> float:
-    """m/s from the first frame to the last, as the crow flies."""
-    return float(np.linalg.norm(middle[-1] - middle[0]) / ((len(middle) - 1) * time_step))
+def flight(middle: np.ndarray, time_step: float) -> np.ndarray:
+    """[...] m/s in a straight line from the first frame to the last; middle: [..., T, 2 or 3] m."""
+    way = np.linalg.norm(middle[..., -1, :] - middle[..., 0, :], axis=-1)
+    speed: np.ndarray = way / ((middle.shape[-2] - 1) * time_step)
+    return speed
+
+
+def counted(frames: np.ndarray, outcome: Outcome, config: CertificateConfig) -> np.ndarray:
+    """Those of the frames [S, T, ...] of disturbed simulations that come after the warm-up."""
+    return frames[:, round(config.warmup / outcome.trajectory.time_step) :]
 
 
 def seen(recording: Recording) -> Grown:

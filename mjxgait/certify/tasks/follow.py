@@ -9,7 +9,7 @@ from mjxgait.certify.criteria import Criterion, at_least
 from mjxgait.certify.measure import Recording
 from mjxgait.certify.outcome import Outcome
 from mjxgait.certify.starts import Starts
-from mjxgait.certify.tasks.blocks import BlocksDemands, seen
+from mjxgait.certify.tasks.blocks import BlocksDemands, counted, seen
 from mjxgait.certify.tasks.roam import balanced
 from mjxgait.certify.tasks.swim import by_water
 from mjxgait.certify.thresholds.blocks import FollowConfig
@@ -47,8 +47,7 @@ class FollowDemands(BlocksDemands):
         """See `BlocksDemands`: m/s, by which the distance becomes less."""
         assert window.light is not None
         apart = (seen(window).middle - window.light)[:, : self.axes]
-        before, after = np.linalg.norm(apart[[0, -1]], axis=1)
-        return float((before - after) / ((len(apart) - 1) * window.time_step))
+        return float(approach(apart, window.time_step))
 
     def promise(self, champion: Champion, seconds: float, config: CertificateConfig) -> float:
         """See `BlocksDemands`: of the light that it is recorded with, not of all."""
@@ -72,14 +71,19 @@ class FollowDemands(BlocksDemands):
         )
 
     def succeeded(self, outcome: Outcome, starts: Starts, config: CertificateConfig) -> np.ndarray:
-        """See `Demands`: those that got nearer fast enough, from the start to the end."""
-        seconds = outcome.path.shape[1] * outcome.trajectory.time_step
-        apart = (starts.light - outcome.travel)[:, : self.axes]
-        nearer = np.linalg.norm(starts.light[:, : self.axes], axis=1) - np.linalg.norm(
-            apart, axis=1
-        )
-        return outcome.stayed_up & (nearer >= config.follow.speed * seconds)
+        """See `Demands`: those that approach as fast as criterion 2 wants, measured in the same way."""
+        middle = counted(outcome.middle, outcome, config)
+        apart = (middle - starts.light[:, None])[..., : self.axes]
+        nearer = approach(apart, outcome.trajectory.time_step)
+        return outcome.stayed_up & (nearer >= config.follow.speed)
 
     def enough(self, seconds: float, config: CertificateConfig) -> float:
         """See `BlocksDemands`: m in the seconds that count, as much nearer as it must get in all."""
         return config.follow.speed * seconds
+
+
+def approach(apart: np.ndarray, time_step: float) -> np.ndarray:
+    """[...] m/s by which a distance becomes less; apart: [..., T, 2 or 3] m from the light."""
+    first, last = (np.linalg.norm(apart[..., k, :], axis=-1) for k in (0, -1))
+    speed: np.ndarray = (first - last) / ((apart.shape[-2] - 1) * time_step)
+    return speed

@@ -1,4 +1,7 @@
-"""What is demanded of blocks that jump: to be off the ground as a whole, as high as evolution said."""
+"""Acceptance criteria for modular bodies that jump: the whole body off the ground, as high as in evolution.
+
+Letters: `T` frames, `P` spans of time.
+"""
 
 import numpy as np
 
@@ -7,16 +10,16 @@ from mjxgait.certify.criteria import Criterion, at_least
 from mjxgait.certify.measure import Recording
 from mjxgait.certify.outcome import Outcome
 from mjxgait.certify.starts import Starts
-from mjxgait.certify.tasks.blocks import BlocksDemands, seen
+from mjxgait.certify.tasks.blocks import BlocksDemands, counted, seen
 from mjxgait.certify.thresholds.blocks import JumpConfig
 from mjxgait.champion import Champion
 
 SPAN = 2.0
-"""s; in each of so many it is to jump, as in evolution. The highest leap of all is chance."""
+"""s; the body must jump in each span of this length, as in evolution. A single highest leap is chance."""
 
 
 class JumpDemands(BlocksDemands):
-    """See `Demands`: over and over. Of one that is disturbed a single jump is enough."""
+    """See `Demands`: it jumps again and again, from perturbed starts too."""
 
     verdict = "it jumps"
     verb = "jumps"
@@ -34,18 +37,25 @@ class JumpDemands(BlocksDemands):
 
     def done(self, window: Recording) -> float:
         """See `BlocksDemands`: m of its lowest part at the best moment, mean of the spans."""
-        low = seen(window).low
-        spans = np.array_split(low, max(round(len(low) * window.time_step / SPAN), 1))
-        return float(np.mean([max(span.max(), 0.0) for span in spans]))
+        return float(np.mean(highest(seen(window).low, window.time_step)))
 
     def promise(self, champion: Champion, seconds: float, config: CertificateConfig) -> float:
         """See `BlocksDemands`: of the trial that nothing disturbs, not of all."""
         return float(champion.origin.get("nominal", {}).get("height", np.nan))
 
     def succeeded(self, outcome: Outcome, starts: Starts, config: CertificateConfig) -> np.ndarray:
-        """See `Demands`: those that were high enough once."""
-        return outcome.stayed_up & (outcome.height >= config.jump.height)
+        """See `Demands`: those whose median span has a leap that is high enough."""
+        low = counted(outcome.low, outcome, config)
+        middling = np.median(highest(low, outcome.trajectory.time_step), axis=-1)
+        return outcome.stayed_up & (middling >= config.jump.height)
 
     def enough(self, seconds: float, config: CertificateConfig) -> float:
         """See `BlocksDemands`: m, a quarter higher than it must be."""
         return 1.25 * config.jump.height
+
+
+def highest(low: np.ndarray, time_step: float) -> np.ndarray:
+    """[..., P] m, greatest height of the lowest part in each span; low: [..., T] m."""
+    count = max(round(low.shape[-1] * time_step / SPAN), 1)
+    spans = np.array_split(low, count, axis=-1)
+    return np.stack([np.maximum(span.max(axis=-1), 0.0) for span in spans], axis=-1)

@@ -26,9 +26,11 @@ class Demands(Protocol):
     by_pushes: bool
     """Whether that decides: criterion 5. Else it is only told."""
     grown: bool
-    """Whether it is for bodies of blocks, which have grown."""
+    """Whether it is for modular bodies; then `Outcome.middle` is recorded."""
     leaps: bool
-    """Whether it is watched how high they leap."""
+    """Whether `Outcome.low` is recorded."""
+    revision: int
+    """How often the criteria of this task have changed since schema 2 of the certificate."""
     worth: float
     """Share of its trials in evolution that one must manage to be worth a look."""
 

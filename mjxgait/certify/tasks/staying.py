@@ -16,7 +16,12 @@ from mjxgait.creature import Creature
 
 
 class Unasked:
-    """See `Demands`: those of a task of which nothing more can be asked."""
+    """See `Demands`: those of a task of which nothing more can be asked.
+
+    revision: see `Demands`.
+    """
+
+    revision: int = 0
 
     def asked(self, wish: Mapping[str, Any]) -> Any:
         """See `Demands`: the same."""

@@ -18,6 +18,7 @@ from mjxgait.settings.rollout import RolloutConfig
 from mjxgait.tasks import protocol
 from mjxgait.tasks.plain import PlainTask
 from mjxgait.tasks.protocol import FINISHED
+from mjxgait.tasks.score import ramp
 from mjxgait.tasks.trials import NEVER, Starts
 from mjxgait.types import Sensed, pytree
 
@@ -76,7 +77,7 @@ class BlocksTask(PlainTask):
         counts more and more.
         """
         counts = {name: getattr(settings.weights, name) for name in self.terms}
-        share = jnp.where(generation < settings.apart, generation / settings.apart, 1.0)
+        share = ramp(settings.apart, lambda now: now / settings.apart)(generation)
         counts["overlap"] = counts["overlap"] * share
         wanted = self.terms[0]
         return {n: jnp.asarray(c) if n == wanted else -jnp.asarray(c) for n, c in counts.items()}
