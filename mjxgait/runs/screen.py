@@ -160,7 +160,7 @@ class Screen:
 
     def next_steps(self, folder: Path, certified: bool) -> None:
         """Print commands that lead on from a run that has ended."""
-        steps = {
+        steps: dict[tuple[object, ...], str] = {
             ("render", folder, "--out", "walk.webp"): "films it",
             ("share", folder, "--out", "walk.html"): "makes a page to give away",
             ("export", folder, "--out", "walk.glb"): "writes it for animation tools",
