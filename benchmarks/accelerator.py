@@ -1,0 +1,228 @@
+"""What an accelerator makes of the compiled step: creature-steps per second, and joules per million.
+
+    python benchmarks/accelerator.py --out FOLDER
+    JAX_PLATFORMS=cpu python benchmarks/accelerator.py --out FOLDER --engines ours --lanes 64
+
+A pass is the program by which a run judges its individuals: controller, drive, physics and statistics.
+Every lane simulates one episode of an individual that treads on the spot, so all lanes work until
+the end and all engines have the same episodes. The engines differ in the physics alone: `ours` is
+the lane-major step, `mjx` is MuJoCo's own MJX in JAX. MuJoCo Warp (`impl="warp"` of MJX) is not
+among them: it steps as a whole and does not let stable PD in between.
+
+Each row is a process of its own. All compile at once, beside each other; then one after the other
+is measured, alone. A row that fails or takes too long has the reason in its place. Prints a Markdown
+table and writes it, with everything as JSON, after each row:
+
+- lanes: simulations at once, on all devices together.
+- compile: s, tracing included, beside the other rows' compilers.
+- steps/s: creature-steps per second, the best pass; us: of one control step of all lanes.
+- W, J/M: mean of the card's power during the passes, and joules per million creature-steps; empty
+  where nvidia-smi does not know it.
+- alive, forward: share of the episodes that lasted, and m that the bodies moved, which tell whether
+  the engines did the same.
+"""
+
+import argparse
+import dataclasses
+import json
+import os
+import select
+import subprocess
+import sys
+import time
+from pathlib import Path
+from statistics import mean
+from typing import Any
+
+ENGINES = {"ours": "auto", "mjx": "mjx"}
+"""By name, what `rollout.physics` calls it."""
+INDIVIDUALS = 64
+"""That differ from each other; more lanes have them again."""
+SWING = 4.0
+"""deg about the standing pose within which the individuals tread."""
+COLUMNS = "engine", "lanes", "compile", "steps/s", "us", "W", "J/M", "alive", "forward"
+POWER = (
+    "nvidia-smi --query-gpu=power.draw.instant --format=csv,noheader,nounits --id=0 --loop-ms=100"
+)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--out", type=Path, required=True, help="folder for the results")
+    parser.add_argument("--name", default="accelerator", help="of the two files in it")
+    parser.add_argument("--env", default="tall_quadruped")
+    parser.add_argument("--engines", nargs="+", choices=ENGINES, default=list(ENGINES))
+    parser.add_argument("--lanes", nargs="+", type=int, default=[1024, 4096, 16384, 65536])
+    parser.add_argument("--seconds", type=float, default=0.8, help="of an episode")
+    parser.add_argument("--passes", type=float, default=3.0, help="s for which passes are timed")
+    parser.add_argument("--budget", type=float, default=200.0, help="s for everything")
+    parser.add_argument("--row", help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.row:
+        measure(options, *options.row.split(":"))
+        return
+    options.out.mkdir(parents=True, exist_ok=True)
+    report(options)
+
+
+def report(options: argparse.Namespace) -> None:
+    """All rows: compiled beside each other, measured one after the other, written after each."""
+    end = time.monotonic() + options.budget
+    names = [(engine, lanes) for lanes in options.lanes for engine in options.engines]
+    started = {name: start(*name) for name in names}
+    # Half of the time for compilers: a row that is not ready by then must not cost the others.
+    ready = {name: answer(child, end - options.budget / 2) for name, child in started.items()}
+    rows: list[dict[str, Any]] = []
+    for (engine, lanes), child in started.items():
+        row = ready[engine, lanes]
+        if "error" not in row:
+            child.stdin.write("go\n")
+            row = answer(child, end)
+        child.kill()
+        rows.append({"engine": engine, "lanes": lanes} | row)
+        write(options, rows)
+        print(rows[-1], flush=True)
+    print(table(rows), flush=True)
+
+
+def start(engine: str, lanes: int) -> Any:
+    """The process of a row. It takes the card's memory as it needs it, for it is not alone there."""
+    return subprocess.Popen(
+        [sys.executable, *sys.argv, "--row", f"{engine}:{lanes}"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        bufsize=1,
+        env=os.environ | {"XLA_PYTHON_CLIENT_PREALLOCATE": "false"},
+    )
+
+
+def answer(child: Any, end: float) -> dict[str, Any]:
+    """The next line that a process says, which is JSON; an error when it ends or the time does."""
+    if not select.select([child.stdout], [], [], max(end - time.monotonic(), 0.0))[0]:
+        child.kill()
+        return {"error": "took too long"}
+    line = child.stdout.readline()
+    return json.loads(line) if line else {"error": f"ended with {child.wait()}"}
+
+
+def measure(options: argparse.Namespace, engine: str, lanes: str) -> None:
+    """Compiles and says so; measures when it is bidden to, and says what came of it."""
+    # What libraries print goes to standard error, so that only answers are read.
+    said = os.fdopen(os.dup(1), "w", buffering=1)
+    os.dup2(2, 1)
+    # Only here: the process that waits for the others does without JAX, and without the card.
+    import jax
+
+    from mjxgait.runs.devices import compiled, everywhere, prepare_devices
+
+    prepare_devices()
+    jax.config.update("jax_enable_compilation_cache", False)
+    batch, genomes = workload(options, engine, int(lanes))
+    experiment = batch.experiments[0]
+    given = (batch.known[0], batch.rows.settings, batch.rows.starts, genomes)
+    given = jax.device_put(given, everywhere(experiment.simulator))
+    began = time.perf_counter()
+    program = compiled(batch.lower_judge(genomes, batch.rows.starts))
+    compile_s = time.perf_counter() - began
+    said.write(json.dumps({"compile": compile_s}) + "\n")
+    sys.stdin.readline()
+    judged = jax.block_until_ready(program(*given))
+    seconds, power = passes(lambda: jax.block_until_ready(program(*given)), options.passes)
+    steps, fastest = int(judged.sim_steps.sum()), min(seconds)
+    joules = mean(power) * mean(seconds) / (steps / 1e6) if power else None
+    outcome = judged.outcome[..., experiment.simulator.task.outcomes.index("forward")]
+    found = {
+        "compile": compile_s,
+        "steps/s": steps / fastest,
+        "us": 1e6 * fastest / experiment.simulator.steps,
+        "W": mean(power) if power else None,
+        "J/M": joules,
+        "alive": 1.0 - float(judged.failed.mean()),
+        "forward": float(outcome.mean()),
+        "steps": steps,
+        "computed_steps": int(judged.computed_steps.sum()),
+        "seconds": seconds,
+        "device": jax.devices()[0].device_kind,
+        "devices": jax.device_count(),
+    }
+    said.write(json.dumps(found) + "\n")
+
+
+def workload(options: argparse.Namespace, engine: str, lanes: int) -> tuple[Any, Any]:
+    """The run whose judge is measured, and its individuals [1, N, ...], one for each lane."""
+    import jax
+    import jax.numpy as jnp
+
+    from mjxgait.bench.workload import walking
+    from mjxgait.creature import load_creature
+    from mjxgait.runs.experiment import Batch, build_experiment
+    from mjxgait.settings.shipped import find_creature
+
+    creature = load_creature(find_creature(options.env))
+    config = walking(creature.settings)
+    stand = tuple(map(float, creature.joints.stand)) * config.controller.key_poses
+    config = dataclasses.replace(
+        config,
+        controller=dataclasses.replace(config.controller, around=stand, within=SWING),
+        evolution=dataclasses.replace(config.evolution, population=INDIVIDUALS),
+        rollout=dataclasses.replace(
+            config.rollout,
+            physics=ENGINES[engine],
+            lanes=-(-lanes // jax.device_count()),
+            seconds=options.seconds,
+            starts=1,
+            variety=1,
+        ),
+    )
+    batch = Batch((build_experiment(creature, config),))
+    places = jnp.arange(lanes) % INDIVIDUALS
+    return batch, jax.tree.map(lambda leaf: leaf[:, places], batch.init().genomes)
+
+
+def passes(work: Any, at_least: float) -> tuple[list[float], list[float]]:
+    """Seconds of each pass, for so many s; W of the card meanwhile, ten times a second."""
+    try:
+        watch = subprocess.Popen(POWER.split(), stdout=subprocess.PIPE, text=True)
+    except OSError:
+        watch = None
+    seconds: list[float] = []
+    while sum(seconds) < at_least:
+        began = time.perf_counter()
+        work()
+        seconds.append(time.perf_counter() - began)
+    if watch is None:
+        return seconds, []
+    watch.terminate()
+    # The first readings are of the moment before the passes.
+    said = watch.communicate()[0].split()[2:]
+    return seconds, [float(word) for word in said if word.replace(".", "", 1).isdigit()]
+
+
+def write(options: argparse.Namespace, rows: list[dict[str, Any]]) -> None:
+    said = {"env": options.env, "seconds": options.seconds, "rows": rows}
+    file = options.out / f"{options.name}.json"
+    file.write_text(json.dumps(said, indent=2) + "\n", encoding="utf-8")
+    file.with_suffix(".md").write_text(table(rows), encoding="utf-8")
+
+
+def table(rows: list[dict[str, Any]]) -> str:
+    lines = ["| " + " | ".join(COLUMNS) + " |", "|---" * len(COLUMNS) + "|"]
+    for row in rows:
+        cells = [cell(row.get(name)) for name in COLUMNS]
+        if "error" in row:
+            cells[2] = row["error"]
+        lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def cell(value: Any) -> str:
+    if not isinstance(value, float):
+        return "" if value is None else str(value)
+    return f"{value:,.0f}" if abs(value) >= 100 else f"{value:.3g}"
+
+
+if __name__ == "__main__":
+    main()
