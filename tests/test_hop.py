@@ -25,7 +25,7 @@ from mjxgait.settings.shipped import find_creature
 from mjxgait.settings.walk import WalkConfig
 from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.hop.fitness import STYLE, TERMS, fitness_terms, signed_weights
-from mjxgait.tasks.hop.tally import Tally, empty, goal_distance, rested, updated
+from mjxgait.tasks.hop.tally import Tally, away, empty, goal_distance, rested, updated
 from mjxgait.tasks.hop.task import Hop
 from mjxgait.tasks.trials import Starts, draw_starts
 from mjxgait.types import Sensed
@@ -112,15 +112,24 @@ def test_arrival_is_the_first_step_near_the_goal(stool: Creature):
     assert after(stool, [moment(stool, 0.5)] * 6).arrived == HORIZON
 
 
+def test_who_is_beside_the_goal_is_not_there(stool: Creature):
+    """The distance is that in the plane; a sideways step may undo an arrival or bring one."""
+    beside = after(stool, [moment(stool, 1.0, 0.3)])
+    assert beside.arrived == HORIZON
+    assert float(away(beside)) == pytest.approx(0.3, abs=1e-6)
+    assert float(away(after(stool, [moment(stool, 0.6, -0.3)]))) == pytest.approx(0.5, abs=1e-6)
+    assert after(stool, [moment(stool, 1.0, 0.3), moment(stool, 1.0, 0.04)]).arrived == 1
+
+
 def test_near_is_a_share_of_the_way(stool: Creature):
     assert after(stool, [moment(stool, 1.91)], goal=2.0).arrived == 0
     assert after(stool, [moment(stool, 0.37)], goal=0.4).arrived == HORIZON
 
 
-@pytest.mark.parametrize("forward", [1.9, 2.1])
-def test_how_far_off_it_ends_is_told_in_m_and_over_the_goals_distance(stool: Creature, forward):
+@pytest.mark.parametrize("place", [(1.9, 0.0), (2.1, 0.0), (2.0, 0.1), (2.06, -0.08)])
+def test_how_far_off_it_ends_is_told_in_m_and_over_the_goals_distance(stool: Creature, place):
     task = Hop(stool, STEP, HORIZON, stool.settings.termination)
-    outcome = task.outcome(after(stool, [moment(stool, forward)], goal=2.0))
+    outcome = task.outcome(after(stool, [moment(stool, *place)], goal=2.0))
     assert float(outcome["left"]) == pytest.approx(0.1, abs=1e-6)
     assert float(outcome["off"]) == pytest.approx(0.05, abs=1e-6)
 
@@ -184,10 +193,13 @@ CASES: list[tuple[str, float, dict]] = [
     ("distance", 0.5, HALF_WAY | {"left": -0.8}),
     ("distance", 1.0, {}),
     ("distance", 2.0, HALF_WAY | {"left": 9.0}),
+    # in the plane: the sides of a triangle are 3, 4 and 5 tenths
+    ("distance", 0.5, {"goal": 1.0, "left": 0.3, "aside": -0.4}),
     # all of it up to 5 % of the goal's distance, and half of it at half of that
     ("missed", 1.0, {}),
     ("missed", 1.0, HALF_WAY | {"left": 0.09}),
     ("missed", 0.5, HALF_WAY | {"left": -0.04}),
+    ("missed", 0.5, THERE | {"aside": 0.04}),
     ("time", 1.0, THERE),
     ("time", 0.25, THERE | {"arrived": 250}),
     ("restless", 0.5, THERE | {"after": 0.8}),

@@ -316,7 +316,8 @@ def became(clear: list[float]) -> Outcome:
     count = len(clear)
     path, nothing = np.full((count, 4400), 1.4), np.zeros((0, 4400))
     film = Trajectory(STEP, *[nothing] * 5)
-    return Outcome(np.full(count, np.inf), np.zeros((count, 2)), path, np.array(clear), film)
+    up, aside = np.full(count, np.inf), np.zeros((count, 4400))
+    return Outcome(up, np.zeros((count, 2)), path, np.array(clear), film, aside=aside)
 
 
 def test_of_the_disturbed_only_those_succeed_that_are_clear(luxo: Creature):

@@ -81,6 +81,7 @@ class Outcome:
     nobody was told one.
     height: [S] m, the greatest of the lowest solid part above the ground, once the warm-up is over;
     0 where nobody watches it.
+    aside: [S, T] m to the left after each control step, as `path`.
     clearance: [S] m, the least to the bar, `certify.bar.FAR` at most; infinite where there is none.
     """
 
@@ -91,6 +92,7 @@ class Outcome:
     trajectory: Trajectory
     astray: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros((0, 0)))
     height: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros(0))
+    aside: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros((0, 0)))
 
     @property
     def stayed_up(self) -> np.ndarray:
@@ -99,8 +101,8 @@ class Outcome:
 
     def copy(self, leader: int, rows: np.ndarray) -> None:
         """Says of some simulations what it says of one that they have been alike to."""
-        own = (self.fell, self.travel, self.path, self.clearance, self.astray, self.height)
-        for values in own:
+        paths = (self.path, self.aside, self.astray)
+        for values in (self.fell, self.travel, *paths, self.clearance, self.height):
             values[rows] = values[leader]
 
 
@@ -110,6 +112,7 @@ def blank_outcome(count: int, steps: int, told: bool, film: Trajectory) -> Outco
         fell=np.full(count, np.inf),
         travel=np.zeros((count, 3)),
         path=np.full((count, steps), np.nan),
+        aside=np.full((count, steps), np.nan),
         clearance=np.full(count, np.inf),
         trajectory=film,
         astray=np.full((count, steps if told else 0), np.nan),

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 from mjxgait.body import Body
 from mjxgait.settings.hop import NEAR, HopConfig, HopWeights, TravelConfig
 from mjxgait.tasks.falls import Reason
-from mjxgait.tasks.hop.tally import Tally
+from mjxgait.tasks.hop.tally import Tally, away
 from mjxgait.tasks.overlap import crossed
 from mjxgait.tasks.score import ramped
 
@@ -38,10 +38,10 @@ def fitness_terms(
     Args:
       horizon: T, steps of a full episode. more: style that another task adds.
     """
-    away = jnp.abs(tally.left) / tally.goal
-    near = jnp.clip(1.0 - away, 0.0, 1.0)
+    left = away(tally) / tally.goal
+    near = jnp.clip(1.0 - left, 0.0, 1.0)
     style = style_terms(creature, horizon, tally) | dict(more or {})
-    terms = {GOAL: jnp.minimum(away, FARTHEST), MISSED: jnp.minimum(away / NEAR, 1.0)}
+    terms = {GOAL: jnp.minimum(left, FARTHEST), MISSED: jnp.minimum(left / NEAR, 1.0)}
     return terms | {name: near * value for name, value in style.items()}
 
 

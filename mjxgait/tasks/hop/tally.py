@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from mjxgait.body import Body
-from mjxgait.senses import forward_way
+from mjxgait.senses import forward_way, sideways
 from mjxgait.settings.hop import NEAR
 from mjxgait.tasks import protocol
 from mjxgait.tasks.falls import touches
@@ -22,7 +22,8 @@ class Tally(protocol.Tally):
     """Over the steps that a creature was up.
 
     reason: a `falls.Reason`. goal: [] m ahead of the start. left: [] m from the latest position to
-    the goal, negative beyond it. arrived: [] steps until it first was near the goal; as many as an
+    the goal along the start's forward axis, negative beyond it. aside: [] m to the left of the
+    start, latest. arrived: [] steps until it first was near the goal; as many as an
     episode has if it never was. after: [] m, path of the trunk since then.
     ground: [] steps on which a part touched the floor that must not. bent: [J] rad, how far the
     joints are from standing, latest. fastest: [] rad/s, of all joints. still: [] steps since it last
@@ -31,6 +32,7 @@ class Tally(protocol.Tally):
 
     goal: jax.Array
     left: jax.Array
+    aside: jax.Array
     arrived: jax.Array
     after: jax.Array
     ground: jax.Array
@@ -55,6 +57,7 @@ def empty(creature: Body, horizon: int) -> Tally:
         overlap=zero,
         goal=one,
         left=one,
+        aside=zero,
         arrived=jnp.full((), horizon, jnp.int32),
         after=zero,
         ground=zero,
@@ -69,10 +72,21 @@ def goal_distance(creature: Body, goal: jax.Array, sensed: Sensed) -> jax.Array:
     return goal - forward_way(creature, sensed)
 
 
+def distance(left: jax.Array, aside: jax.Array) -> jax.Array:
+    """Distance [] in m to a goal in the plane, of which so much lies ahead and to the side."""
+    return jnp.sqrt(left * left + aside * aside)
+
+
+def away(tally: Tally) -> jax.Array:
+    """Distance [] in m from the latest position to the goal, measured in the plane."""
+    return distance(tally.left, tally.aside)
+
+
 def updated(creature: Body, step: float, tally: Tally, sensed: Sensed, goal: jax.Array) -> Tally:
     """The tally after one more step in s. goal: [] m."""
     left = goal_distance(creature, goal, sensed)
-    near = jnp.abs(left) <= NEAR * goal
+    aside = sideways(creature, sensed)
+    near = distance(left, aside) <= NEAR * goal
     arrived = jnp.where(near, jnp.minimum(tally.arrived, tally.steps), tally.arrived)
     moved = jnp.linalg.norm(sensed.trunk_vel) * step
     return dataclasses.replace(
@@ -80,6 +94,7 @@ def updated(creature: Body, step: float, tally: Tally, sensed: Sensed, goal: jax
         steps=tally.steps + 1,
         goal=goal,
         left=left,
+        aside=aside,
         arrived=arrived,
         after=tally.after + jnp.where(arrived < tally.steps, moved, 0.0),
         ground=tally.ground + touches(creature, sensed),

@@ -11,7 +11,7 @@ from mjxgait.settings.hop import GOALS, NOMINAL_GOAL, HopConfig
 from mjxgait.settings.rollout import RolloutConfig
 from mjxgait.tasks.falls import touches
 from mjxgait.tasks.hop.fitness import TERMS, fitness_terms, signed_weights
-from mjxgait.tasks.hop.tally import Standards, Tally, empty, goal_distance, rested, updated
+from mjxgait.tasks.hop.tally import Standards, Tally, away, empty, goal_distance, rested, updated
 from mjxgait.tasks.plain import PlainTask
 from mjxgait.tasks.trials import Starts, draw_starts
 from mjxgait.types import Sensed
@@ -67,9 +67,10 @@ class Hop(PlainTask):
         """See `Task`: m from the goal in the end, and over the goal's distance; s until it first was
         there, and until the end.
         """
+        left = away(tally)
         return {
-            "left": jnp.abs(tally.left),
-            "off": jnp.abs(tally.left) / tally.goal,
+            "left": left,
+            "off": left / tally.goal,
             "arrival": tally.arrived * self.step,
             "seconds": tally.steps * self.step,
         }
