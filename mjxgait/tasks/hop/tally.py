@@ -1,6 +1,7 @@
 """What a way to a goal leaves behind, updated once per step for one creature."""
 
 import dataclasses
+from collections.abc import Sequence
 
 import jax
 import jax.numpy as jnp
@@ -11,6 +12,7 @@ from mjxgait.senses import forward_way, sideways
 from mjxgait.settings.hop import NEAR
 from mjxgait.tasks import protocol
 from mjxgait.tasks.falls import touches
+from mjxgait.tasks.work import positive_work
 from mjxgait.types import Sensed, pytree
 
 SLOW, SLOW_TURN = 0.0005, 0.005
@@ -27,7 +29,8 @@ class Tally(protocol.Tally):
     episode has if it never was. after: [] m, path of the trunk since then.
     ground: [] steps on which a part touched the floor that must not. bent: [J] rad, how far the
     joints are from standing, latest. fastest: [] rad/s, of all joints. still: [] steps since it last
-    moved.
+    moved. work: [] J that the joints have done; None where it counts nothing. closest: [G] m, the
+    smallest distance to each sub-goal; None where there is none.
     """
 
     goal: jax.Array
@@ -39,6 +42,8 @@ class Tally(protocol.Tally):
     bent: jax.Array
     fastest: jax.Array
     still: jax.Array
+    work: jax.Array | None
+    closest: jax.Array | None
 
 
 @pytree
@@ -48,8 +53,11 @@ class Standards:
     rest: jax.Array
 
 
-def empty(creature: Body, horizon: int) -> Tally:
-    """Of one that has not moved, whatever its goal."""
+def empty(creature: Body, horizon: int, energy: bool = False, sub_goals: int = 0) -> Tally:
+    """Tally of an individual that has not moved, whatever its goal.
+
+    energy: whether work counts. sub_goals: how many there are.
+    """
     none, zero, one = jnp.zeros((), jnp.int32), jnp.zeros(()), jnp.ones(())
     return Tally(
         steps=none,
@@ -64,6 +72,8 @@ def empty(creature: Body, horizon: int) -> Tally:
         bent=jnp.zeros(len(creature.joints.names)),
         fastest=zero,
         still=none,
+        work=zero if energy else None,
+        closest=jnp.full(sub_goals, jnp.inf) if sub_goals else None,
     )
 
 
@@ -102,6 +112,23 @@ def updated(creature: Body, step: float, tally: Tally, sensed: Sensed, goal: jax
         fastest=jnp.maximum(tally.fastest, jnp.max(jnp.abs(sensed.joint_vel), initial=0.0)),
         still=jnp.where(moves(sensed), 0, tally.still + 1),
     )
+
+
+def with_extras(
+    tally: Tally, sensed: Sensed, torque: jax.Array, step: float, sub_goals: Sequence[float]
+) -> Tally:
+    """The tally with what only some settings count: work, and distances to sub-goals.
+
+    torque: [J] N·m. step: s. sub_goals: [G] shares of the straight way to the goal.
+    """
+    if tally.work is not None:
+        done = tally.work + positive_work(torque, sensed, step)
+        tally = dataclasses.replace(tally, work=done)
+    if tally.closest is not None:
+        way = tally.goal - tally.left
+        apart = distance(jnp.array(sub_goals) * tally.goal - way, tally.aside)
+        tally = dataclasses.replace(tally, closest=jnp.minimum(tally.closest, apart))
+    return tally
 
 
 def moves(sensed: Sensed) -> jax.Array:
