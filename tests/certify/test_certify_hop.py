@@ -85,9 +85,17 @@ def test_who_arrives_and_stays_passes():
         to((0, 0), (3, GOAL), drift=0.07 * GOAL),
         to((0, 0), (3, GOAL), drift=-0.07 * GOAL),
     ],
-    ids="short,far,passes by,leaves,is away for a moment,late,stands,left of it,right of it".split(
-        ","
-    ),
+    ids=[
+        "short",
+        "far",
+        "passes by",
+        "leaves",
+        "is away for a moment",
+        "late",
+        "stands",
+        "left of it",
+        "right of it",
+    ],
 )
 def test_criterion_2_arrives_and_stays(way: Recording):
     assert failures(way) == {2}
