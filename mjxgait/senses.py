@@ -118,6 +118,11 @@ def forward_way(creature: Body, sensed: Sensed) -> jax.Array:
     return _along(creature, sensed, 0)
 
 
+def sideways(creature: Body, sensed: Sensed) -> jax.Array:
+    """Way [] in m of the trunk from the start, to the left of the start's forward axis."""
+    return _along(creature, sensed, 1)
+
+
 def trunk_height(sensed: Sensed) -> jax.Array:
     """Height [] in m of the trunk above the ground under it."""
     height = sensed.trunk_pos[2]

@@ -14,6 +14,7 @@ from mjxgait.certify import record
 from mjxgait.certify.simulate import simulate
 from mjxgait.certify.starts import nominal_starts
 from mjxgait.creature import Creature, load_creature
+from mjxgait.errors import UserError
 from mjxgait.parts import resolve_config
 from mjxgait.parts.own import load
 from mjxgait.parts.settings import build_config
@@ -24,8 +25,8 @@ from mjxgait.settings.rollout import RolloutConfig
 from mjxgait.settings.shipped import find_creature
 from mjxgait.settings.walk import WalkConfig
 from mjxgait.tasks.falls import Reason
-from mjxgait.tasks.hop.fitness import STYLE, TERMS, fitness_terms, signed_weights
-from mjxgait.tasks.hop.tally import Tally, empty, goal_distance, rested, updated
+from mjxgait.tasks.hop.fitness import STYLE, TERMS, fitness_terms, signed_weights, terms_under
+from mjxgait.tasks.hop.tally import Tally, away, empty, goal_distance, rested, updated
 from mjxgait.tasks.hop.task import Hop
 from mjxgait.tasks.trials import Starts, draw_starts
 from mjxgait.types import Sensed
@@ -112,15 +113,24 @@ def test_arrival_is_the_first_step_near_the_goal(stool: Creature):
     assert after(stool, [moment(stool, 0.5)] * 6).arrived == HORIZON
 
 
+def test_who_is_beside_the_goal_is_not_there(stool: Creature):
+    """The distance is that in the plane; a sideways step may undo an arrival or bring one."""
+    beside = after(stool, [moment(stool, 1.0, 0.3)])
+    assert beside.arrived == HORIZON
+    assert float(away(beside)) == pytest.approx(0.3, abs=1e-6)
+    assert float(away(after(stool, [moment(stool, 0.6, -0.3)]))) == pytest.approx(0.5, abs=1e-6)
+    assert after(stool, [moment(stool, 1.0, 0.3), moment(stool, 1.0, 0.04)]).arrived == 1
+
+
 def test_near_is_a_share_of_the_way(stool: Creature):
     assert after(stool, [moment(stool, 1.91)], goal=2.0).arrived == 0
     assert after(stool, [moment(stool, 0.37)], goal=0.4).arrived == HORIZON
 
 
-@pytest.mark.parametrize("forward", [1.9, 2.1])
-def test_how_far_off_it_ends_is_told_in_m_and_over_the_goals_distance(stool: Creature, forward):
+@pytest.mark.parametrize("place", [(1.9, 0.0), (2.1, 0.0), (2.0, 0.1), (2.06, -0.08)])
+def test_how_far_off_it_ends_is_told_in_m_and_over_the_goals_distance(stool: Creature, place):
     task = Hop(stool, STEP, HORIZON, stool.settings.termination)
-    outcome = task.outcome(after(stool, [moment(stool, forward)], goal=2.0))
+    outcome = task.outcome(after(stool, [moment(stool, *place)], goal=2.0))
     assert float(outcome["left"]) == pytest.approx(0.1, abs=1e-6)
     assert float(outcome["off"]) == pytest.approx(0.05, abs=1e-6)
 
@@ -184,10 +194,13 @@ CASES: list[tuple[str, float, dict]] = [
     ("distance", 0.5, HALF_WAY | {"left": -0.8}),
     ("distance", 1.0, {}),
     ("distance", 2.0, HALF_WAY | {"left": 9.0}),
+    # in the plane: the sides of a triangle are 3, 4 and 5 tenths
+    ("distance", 0.5, {"goal": 1.0, "left": 0.3, "aside": -0.4}),
     # all of it up to 5 % of the goal's distance, and half of it at half of that
     ("missed", 1.0, {}),
     ("missed", 1.0, HALF_WAY | {"left": 0.09}),
     ("missed", 0.5, HALF_WAY | {"left": -0.04}),
+    ("missed", 0.5, THERE | {"aside": 0.04}),
     ("time", 1.0, THERE),
     ("time", 0.25, THERE | {"arrived": 250}),
     ("restless", 0.5, THERE | {"after": 0.8}),
@@ -204,6 +217,12 @@ CASES: list[tuple[str, float, dict]] = [
     ("neutral", 0.25, THERE | {"bent": [np.radians(40), 0.0, 0.0, 0.0]}),
     # 0.05 hip heights beyond the 0.005 at which parts only touch
     ("overlap", 0.5, THERE | {"overlap": 0.055 * 0.5}),
+    # 3 times the weight of 2 kg over the way, at least a quarter of a body length
+    ("energy", 3.0, THERE | {"work": 3 * 2 * 9.81 * 1.6}),
+    ("energy", 1.5, HALF_WAY | {"work": 3 * 2 * 9.81 * 0.8}),
+    ("energy", 0.1 * 3.0, HALF_WAY | {"left": 1.44, "work": 3 * 2 * 9.81 * 0.25}),
+    ("sub_goals", 0.5, THERE | {"closest": [0.0, 0.8, 9.0]}),
+    ("sub_goals", 0.5, {"goal": 1.6, "left": 1.6, "closest": [0.0, 0.8, 9.0]}),
     # whatever is bad at the goal is half as bad half way, and nothing for who has not moved
     ("ground", 0.15, HALF_WAY | {"ground": 300.0}),
     ("fall", 0.0, {"reason": int(Reason.TIPPED)}),
@@ -213,7 +232,7 @@ CASES: list[tuple[str, float, dict]] = [
 
 @pytest.mark.parametrize(("name", "value", "tally"), CASES)
 def test_a_term_is_what_its_tally_says(stool: Creature, name: str, value: float, tally: dict):
-    body = altered(stool, frame={"hip_height": 0.5})
+    body = altered(stool, frame={"hip_height": 0.5, "mass": 2.0, "body_length": 1.0})
     arrays = {key: jnp.asarray(number) for key, number in tally.items()}
     filled = dataclasses.replace(empty(body, HORIZON), **arrays)
     assert float(fitness_terms(body, HORIZON, filled)[name]) == pytest.approx(value, abs=1e-5)
@@ -223,11 +242,52 @@ def test_every_term_has_a_case_that_is_not_zero():
     assert {name for name, value, _ in CASES if value} == set(TERMS)
 
 
+def tallied(task: Hop, moments: list[Sensed], torques: list[list[float]]) -> Tally:
+    tally = task.init()
+    for sensed, torque in zip(moments, torques, strict=True):
+        standards = task.standards(task.settings)
+        tally = task.update(tally, sensed, jnp.array(torque), standards, jnp.float32(1.0))
+    return jax.device_get(tally)
+
+
+def test_work_and_sub_goals_are_watched_only_where_they_count(stool: Creature):
+    """Braking gives no work back, and of each sub-goal the nearest moment counts."""
+    way = [(0.0, 0.0), (0.5, 0.1), (0.9, 0.0)]
+    speed = jnp.array([1.0, -2.0, 0.0, 0.0])
+    moments = [moment(stool, *place, joint_vel=speed) for place in way]
+    torques = [[3.0, 1.0, 9.0, 0.0], [-1.0, -1.0, 0.0, 0.0], [0.0] * 4]
+    ends, settings = stool.settings.termination, HopConfig(sub_goals=(0.25, 0.5))
+    off = Hop(stool, STEP, HORIZON, ends, settings)
+    assert set(TERMS) - set(off.terms) == {"energy", "sub_goals"}
+    tally = tallied(off, moments, torques)
+    assert (tally.work, tally.closest) == (None, None)
+    weights = HopWeights(energy=0.1, sub_goals=0.2)
+    on = Hop(stool, STEP, HORIZON, ends, dataclasses.replace(settings, weights=weights))
+    assert set(on.terms) == set(TERMS)
+    tally = tallied(on, moments, torques)
+    assert tally.work == pytest.approx((3.0 + 2.0) * STEP)
+    assert tally.closest == pytest.approx([0.25, 0.1], abs=1e-6)
+    judged = on.judge(tally, on.settings)
+    assert set(judged) == set(on.terms)
+    counted = on.weights(on.settings, jnp.int32(10))
+    # Style, at half of its ramp.
+    assert float(counted["energy"]) == pytest.approx(-0.05)
+    assert float(counted["sub_goals"]) == pytest.approx(-0.1)
+
+
+@pytest.mark.parametrize("points", ["[]", "[0.5, 1.5]", "[0.0]"])
+def test_sub_goals_lie_on_the_way(points: str, tmp_path: Path, luxo: Creature):
+    file = tmp_path / "mine.toml"
+    file.write_text(f"[fitness]\nsub_goals = {points}\n")
+    with pytest.raises(UserError, match=r"mine.toml: fitness\.sub_goals"):
+        resolve_config(luxo.settings.train, "luxo", file)
+
+
 @pytest.mark.parametrize("generation", [0, 10, 1000])
 def test_standing_still_is_worse_than_getting_nearer_in_any_manner(generation: int):
     """The worst manner is every style term at its most, 1, by the share of the way."""
     weights = {n: float(w) for n, w in signed_weights(HopConfig(), jnp.int32(generation)).items()}
-    manner = sum(weights[name] for name in STYLE)
+    manner = sum(weights[name] for name in STYLE if name in weights)
     scores = [
         weights["distance"] * (1 - near) + manner * near for near in np.linspace(0.0, 1.0, 11)
     ]
@@ -265,6 +325,22 @@ def test_every_episode_is_judged_by_its_own_goal(experiment: Experiment):
     # In a fifth of a second nobody gets far, and nobody stays where it was.
     assert (np.abs(way) < 0.4).all()
     assert np.abs(way).max() > 1e-3
+
+
+def test_evolution_weighs_energy_and_sub_goals_where_they_have_a_weight(stool: Creature):
+    table = {
+        "use": {"task": "hop"},
+        "evolution": {"population": 4},
+        "rollout": {"seconds": 0.2, "starts": 2, "promote": 1.0, "lanes": 4},
+        "fitness": {"weights": {"energy": 0.1, "sub_goals": 0.2}, "sub_goals": [0.1, 0.5]},
+    }
+    made = build_experiment(stool, build_config(table, "test"))
+    tally = jax.device_get(jax.jit(made.simulate)(made.init().genomes).tally)
+    assert (tally.work > 0).all()
+    # In a fifth of a second all are nearest to the first point, and near neither.
+    assert tally.closest.shape == (4, 2, 2)
+    assert (tally.closest[..., 0] < tally.closest[..., 1]).all()
+    assert (tally.closest[..., 0] > 0).all()
 
 
 REACH = """
@@ -362,7 +438,7 @@ def test_a_short_run_ends_with_a_champion_and_a_verdict(tmp_path: Path, capsys):
     )
     champion = json.loads((folder / "champion.json").read_text())
     assert champion["task"] == "hop"
-    assert list(champion["terms"]) == list(TERMS)
+    assert list(champion["terms"]) == list(terms_under(HopWeights()))
     assert set(champion["origin"]["nominal"]) == {"left", "off", "arrival", "seconds"}
     said_by(capsys, "certify", folder, "--config", short, code=0)
     certificate = json.loads((folder / "certificate.json").read_text())

@@ -30,10 +30,10 @@ from mjxgait.runs.generation import LEADERS, Row, climbed, next_starts
 from mjxgait.search.chance import key_of
 from mjxgait.search.state import EvolutionState
 from mjxgait.settings import limbo as evolution
-from mjxgait.settings.limbo import BAR_PLACE, LimboConfig
+from mjxgait.settings.limbo import BAR_PLACE, LimboConfig, LimboWeights
 from mjxgait.settings.rollout import RolloutConfig
 from mjxgait.settings.shipped import find_creature
-from mjxgait.tasks.hop.fitness import signed_weights
+from mjxgait.tasks.hop.fitness import signed_weights, terms_under
 from mjxgait.tasks.limbo.bar import bar_distance, intrusion
 from mjxgait.tasks.limbo.task import Aim, Limbo
 from mjxgait.types import Sensed
@@ -316,7 +316,8 @@ def became(clear: list[float]) -> Outcome:
     count = len(clear)
     path, nothing = np.full((count, 4400), 1.4), np.zeros((0, 4400))
     film = Trajectory(STEP, *[nothing] * 5)
-    return Outcome(np.full(count, np.inf), np.zeros((count, 2)), path, np.array(clear), film)
+    up, aside = np.full(count, np.inf), np.zeros((count, 4400))
+    return Outcome(up, np.zeros((count, 2)), path, np.array(clear), film, aside=aside)
 
 
 def test_of_the_disturbed_only_those_succeed_that_are_clear(luxo: Creature):
@@ -371,7 +372,7 @@ def test_a_short_run_ends_with_a_champion_and_a_verdict(tmp_path: Path, capsys):
     rest = "--examination.candidates 0 --no-plots --task limbo"
     said_by(capsys, "train", "--env", STOOL, *small.split(), *rest.split(), "--out", folder, code=0)
     champion = json.loads((folder / "champion.json").read_text())
-    assert list(champion["terms"]) == list(Limbo.terms)
+    assert list(champion["terms"]) == list(terms_under(LimboWeights()))
     assert set(champion["origin"]["nominal"]) == {"left", "off", "arrival", "seconds", "bar"}
     said_by(capsys, "certify", folder, "--config", short, code=0)
     certificate = json.loads((folder / "certificate.json").read_text())

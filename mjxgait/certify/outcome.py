@@ -76,9 +76,9 @@ class Outcome:
 
     fell: [S] s, infinite for those that stayed up. travel: [S, 3] m along the start's forward and
     left and upwards until the end or the fall.
-    The next four have a value after each control step, NaN from the fall on, and are empty where the
-    task does not need them (`path` is always there):
-    path: [S, T] m of the trunk forward. astray: [S, T] rad, the heading less the commanded one.
+    The next five have a value after each control step, NaN from the fall on, and are empty where the
+    task does not need them (`path` and `aside` are always there):
+    path, aside: [S, T] m of the trunk forward, and to the left. astray: [S, T] rad, the heading less the commanded one.
     middle: [S, T, 3] m in the world's axes, from where the trunk starts to the centre of all mass.
     low: [S, T] m, lowest solid part above the ground.
     clearance: [S] m, the least to the bar, `certify.bar.FAR` at most; infinite where there is none.
@@ -92,6 +92,7 @@ class Outcome:
     astray: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros((0, 0)))
     middle: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros((0, 0, 3)))
     low: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros((0, 0)))
+    aside: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros((0, 0)))
 
     @property
     def stayed_up(self) -> np.ndarray:
@@ -100,7 +101,7 @@ class Outcome:
 
     def copy(self, leader: int, rows: np.ndarray) -> None:
         """Gives some simulations the results of the one that they have been identical to."""
-        own = (self.fell, self.travel, self.path, self.clearance, self.astray)
+        own = (self.fell, self.travel, self.path, self.aside, self.clearance, self.astray)
         for values in (*own, self.middle, self.low):
             values[rows] = values[leader]
 
@@ -116,6 +117,7 @@ def blank_outcome(
         fell=np.full(count, np.inf),
         travel=np.zeros((count, 3)),
         path=np.full((count, steps), np.nan),
+        aside=np.full((count, steps), np.nan),
         clearance=np.full(count, np.inf),
         trajectory=film,
         astray=np.full((count, steps if told else 0), np.nan),

@@ -73,6 +73,7 @@ def simulate(
         fell=np.concatenate([p.fell for p in parts])[order],
         travel=np.concatenate([p.travel for p in parts])[order],
         path=np.concatenate([p.path for p in parts])[order],
+        aside=np.concatenate([p.aside for p in parts])[order],
         clearance=np.concatenate([p.clearance for p in parts])[order],
         astray=np.concatenate([p.astray for p in parts])[order],
         middle=np.concatenate([p.middle for p in parts])[order],

@@ -135,7 +135,7 @@ class Stepping:
         """Writes down what came of a control step; which of the running [running] are down."""
         bodies, now = self.bodies, (k + 1) * self.creature.model.opt.timestep
         seen.travel[running] = bodies.travel(running)
-        seen.path[running, k] = seen.travel[running, 0]
+        seen.path[running, k], seen.aside[running, k] = seen.travel[running, :2].T
         if told is not None:
             seen.astray[running, k] = bodies.astray(running, told)
         if self.bar is not None:

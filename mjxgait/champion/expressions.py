@@ -1,4 +1,4 @@
-"""Expressions: as text for people, and as arrays for evolution.
+"""Expressions: as arrays for evolution, and as text for people (`reading` reads that again).
 
 An expression is arrays `code` [C] and `value` [C] in prefix order, as far as `code` is not `EMPTY`.
 In text it is a number, a name, or `(function argument ...)`.
@@ -6,7 +6,7 @@ In text it is a number, a name, or `(function argument ...)`.
 
 import dataclasses
 import fnmatch
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -23,9 +23,6 @@ LEAST_DIVISOR, LARGEST = 1e-6, 1e9
 """`/` gives 1 where the divisor is smaller. No function gives more than the second, so that none
 gives what is not finite.
 """
-DEEPEST = 400
-"""Functions that an expression in text may have: it is read by recursion."""
-
 
 Expression = str | float | tuple[Any, ...]
 """The name of a sense, a number, or a function with its arguments."""
@@ -148,80 +145,3 @@ def nested(code: np.ndarray, value: np.ndarray, known: Sequence[Terminal]) -> Ex
         return (name, *(read() for _ in range(FUNCTIONS[name])))
 
     return read()
-
-
-def to_arrays(
-    text: str, known: Sequence[Terminal], nodes: int, where: str
-) -> tuple[np.ndarray, np.ndarray]:
-    """code and value [nodes] of an expression in text.
-
-    Raises:
-      UserError: names what is wrong with it; `where` says whose it is.
-    """
-    words = text.replace("(", " ( ").replace(")", " ) ").split()
-    count = sum(word not in "()" for word in words)
-    if count > nodes:
-        raise UserError(f"{where}: {count:,} nodes; an expression may have {nodes}")
-    if words.count("(") > DEEPEST:
-        raise UserError(f"{where}: {words.count('(')} functions; the most is {DEEPEST}")
-    reader = _Reader(words, {terminal.name: terminal.code for terminal in known}, where)
-    found = reader.expression()
-    if reader.words:
-        raise UserError(f'{where}: more after its end: "{reader.words[-1]}"')
-    code, value = np.zeros(nodes, np.int32), np.zeros(nodes, np.float32)
-    code[: len(found)], value[: len(found)] = zip(*found, strict=True)
-    return code, value
-
-
-class _Reader:
-    """Takes the words of an expression, the last of `words` first."""
-
-    def __init__(self, words: Sequence[str], codes: Mapping[str, int], where: str) -> None:
-        self.words, self.codes, self.where = list(reversed(words)), codes, where
-
-    def expression(self) -> list[tuple[int, float]]:
-        """Its nodes: code and value of each."""
-        word = self._take()
-        if word == ")":
-            raise UserError(f"{self.where}: a closing parenthesis too many")
-        if word != "(":
-            return [self._leaf(word)]
-        name = self._take()
-        if name not in FUNCTIONS:
-            raise UserError(
-                f'{self.where}: there is no function "{name}"; {did_you_mean(name, FUNCTIONS)}'
-            )
-        nodes, given = [(FUNCTION_CODES[name], 0.0)], 0
-        while self._next() != ")":
-            nodes += self.expression()
-            given += 1
-        self._take()
-        if given != FUNCTIONS[name]:
-            raise UserError(
-                f'{self.where}: "{name}" takes {FUNCTIONS[name]} arguments, not {given}'
-            )
-        return nodes
-
-    def _leaf(self, word: str) -> tuple[int, float]:
-        if word in self.codes:
-            return self.codes[word], 0.0
-        try:
-            number = float(word)
-        except ValueError:
-            raise UserError(
-                f'{self.where}: "{word}" is neither a sense nor a number; '
-                f"{did_you_mean(word, self.codes)}"
-            ) from None
-        if not abs(number) <= LARGEST:
-            raise UserError(f"{self.where}: {word}: a constant must be within ±{LARGEST:g}")
-        return CONSTANT, number
-
-    def _next(self) -> str:
-        if not self.words:
-            raise UserError(f"{self.where}: ends too early; something is missing")
-        return self.words[-1]
-
-    def _take(self) -> str:
-        word = self._next()
-        self.words.pop()
-        return word

@@ -1,12 +1,21 @@
 """Genomes of expressions, one per joint, as people read and write them."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from mjxgait.champion.expressions import ADDED, in_text, nested, terminals, to_arrays, to_text
+from mjxgait.champion.expressions import (
+    ADDED,
+    HasParts,
+    chosen_terminals,
+    in_text,
+    nested,
+    terminals,
+    to_text,
+)
 from mjxgait.champion.plain import PlainCodec
+from mjxgait.champion.reading import DEEPEST, Vocabulary, read_programs, to_arrays
 from mjxgait.champion.simplify import simplified
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
@@ -71,3 +80,48 @@ class ProgramCodec(PlainCodec):
         """See `Codec`."""
         shape = (len(creature.joints.names), settings.nodes)
         return {"code": shape, "value": shape}
+
+
+def vocabulary(
+    body: HasParts, settings: ProgramConfig, added: Sequence[str], depth: int = DEEPEST
+) -> Vocabulary:
+    """What a program may be made of under these settings, plain or traced.
+
+    added: senses that the task adds. depth: most functions within each other.
+    """
+    known = terminals(body, added)
+    return Vocabulary(
+        known,
+        settings.nodes,
+        senses=tuple(terminal.name for terminal in chosen_terminals(known, settings.senses)),
+        functions=settings.functions,
+        patterns=settings.senses,
+        depth=min(depth, DEEPEST),
+    )
+
+
+def programs_to_begin_with(
+    body: HasParts, settings: ProgramConfig, added: Sequence[str], depth: int = DEEPEST
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """code and value [G, J, C] of the programs that the settings name; None if they name none.
+
+    added, depth: see `vocabulary`.
+
+    Raises:
+      UserError: one of them is wrong.
+    """
+    limits, found = vocabulary(body, settings, added, depth), []
+    for number, text in enumerate(settings.expressions, 1):
+        where = f"controller.expressions: program {number}"
+        found += read_programs(text, body.joints.names, limits, where, numbered=False)
+    if not found:
+        return None
+    code, value = (np.stack(column) for column in zip(*found, strict=True))
+    return code, value
+
+
+def program_text(body: HasParts, program: tuple[np.ndarray, np.ndarray]) -> str:
+    """A program, code and value [J, C], as `(list EXPRESSION ...)`."""
+    known = terminals(body, tuple(ADDED.values()))
+    rows = [to_text(code, value, known) for code, value in zip(*program, strict=True)]
+    return f"(list {' '.join(rows)})"

@@ -20,8 +20,8 @@ from mjxgait.settings.tables import build
 SCHEMA = 2
 """Champions of 1 had key poses without saying so, and the drive among the controller's settings."""
 
-SOUGHT = ("around", "within")
-"""Settings that say where evolution looked for the poses, and nothing of how they move."""
+SOUGHT = ("around", "within", "expressions")
+"""Settings that say where evolution began to look, and nothing of how a champion moves."""
 USUAL = {"steering": 1.0}
 """Settings that came later, and what they were before: champions of then keep their fingerprint."""
 

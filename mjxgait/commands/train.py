@@ -19,6 +19,7 @@ from mjxgait.errors import INTERRUPTED, UserError
 from mjxgait.library import Run, load_creature
 from mjxgait.parts.registry import meant
 from mjxgait.parts.wishes import WISHES, Wishes, configured, hint
+from mjxgait.parts.written import with_expressions
 from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.folder import (
     METRICS,
@@ -55,6 +56,8 @@ class TrainOptions:
       scale: Parts of another size, as PATTERN=FACTOR: '*_shin=1.2' for longer shins, 'trunk=0.9'
         (docs/creature.md). Lengths, masses and inertias follow, gains do not.
       way: back, left or right: where it goes, seen from itself; forward by default (docs/wishes.md).
+      expressions: File of programs written by hand that evolution begins with, for --controller
+        program (docs/programs.md).
       out: Folder for the run; by default a new one under runs/.
       runs: So many separate runs side by side, with seeds from --seed on, each a run folder in the
         folder, and a picture of all champions (docs/zoo.md).
@@ -89,6 +92,7 @@ class TrainOptions:
     config: str | None = None
     scale: tuple[str, ...] = ()
     way: Way = "forward"
+    expressions: Path | None = None
     out: Path | None = None
     runs: int | None = None
     resume: Path | None = None
@@ -120,6 +124,13 @@ def train_command(arguments: Sequence[str]) -> int:
     config = _settings(options)
     if not options.resume:
         creature = at_step(creature, config.rollout.step)
+        if options.expressions:
+            config = with_expressions(creature, config, options.expressions)
+    elif options.expressions:
+        raise UserError(
+            f"{options.resume}: a resumed run keeps the programs that it began with; --expressions "
+            "needs a new run"
+        )
     if said := hint(config):
         print(said)
     if options.runs is not None or _is_zoo(options.resume):

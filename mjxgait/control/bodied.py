@@ -72,7 +72,11 @@ class BodiedController:
             sizes = jittered(key_sizes, genome.sizes, box.low, box.high, rate, sigma)
             return Bodied(own.mutate(key_plan, genome.plan), sizes)
 
-        return Variation(create, cross, mutate, long=own.long)
+        first = own.first
+        if first is not None:  # on the body as the creature has it
+            count = jax.tree.leaves(first)[0].shape[0]
+            first = Bodied(first, jnp.zeros((count, self.sizes)))
+        return Variation(create, cross, mutate, long=own.long, first=first)
 
     def genes(self, genomes: Bodied, settings: Any) -> np.ndarray:
         """See `Controller`."""

@@ -7,8 +7,17 @@ run.champion, run.certificate, run.metrics()
 mjxgait.walk(run)["trunk_z"]
 """
 
-from mjxgait.library.look import examine, walk
+from mjxgait.library.look import examine, examine_expressions, walk
 from mjxgait.library.make import load_creature, refine, train
 from mjxgait.library.run import Run, open
 
-__all__ = ["Run", "examine", "load_creature", "open", "refine", "train", "walk"]
+__all__ = [
+    "Run",
+    "examine",
+    "examine_expressions",
+    "load_creature",
+    "open",
+    "refine",
+    "train",
+    "walk",
+]

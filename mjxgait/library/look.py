@@ -5,7 +5,9 @@ from pathlib import Path
 import numpy as np
 
 from mjxgait.certify import Certificate, CertificateConfig, certify
+from mjxgait.creature.step import at_step
 from mjxgait.errors import UserError
+from mjxgait.library.make import load_creature
 from mjxgait.library.run import Place, Run, open
 from mjxgait.runs.exams import Exams
 from mjxgait.runs.folder import EXAMS
@@ -30,6 +32,33 @@ def examine(run: Run | Place, config: Place | None = None) -> Certificate:
     return certify(
         known.creature, champion, build(CertificateConfig, table, str(config)), attempts=attempt
     )
+
+
+def examine_expressions(
+    env: Place, file: Place, task: str | None = None, config: Place | None = None
+) -> Certificate:
+    """Examines a program that was written by hand (docs/programs.md); writes nothing.
+
+    Args:
+      env: shipped creature, creature folder, or model file; its own settings decide how often the
+        expressions are evaluated and how the drive follows. file: holds one program. task: by
+        default what the creature usually does. config: as for `examine`.
+
+    Raises:
+      UserError: names the file and the line of a mistake.
+    """
+    from mjxgait.parts.fit import check_fit
+    from mjxgait.parts.wishes import Wishes, configured
+    from mjxgait.parts.written import written_champion
+
+    table = read_toml(Path(config)) if config else {}
+    thresholds = build(CertificateConfig, table, str(config))
+    use = {"controller": "program"} | ({"task": task} if task else {})
+    creature = load_creature(env)
+    settings = configured(creature, None, use, Wishes())
+    check_fit(creature, settings)
+    creature = at_step(creature, settings.rollout.step).on(settings.rollout.ground)
+    return certify(creature, written_champion(creature, settings, Path(file)), thresholds)
 
 
 def walk(run: Run | Place, seconds: float = 12.0) -> dict[str, np.ndarray]:

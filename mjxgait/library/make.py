@@ -63,6 +63,7 @@ def train(
     steer: float | None = None,
     style: Place | None = None,
     certificate: str | None = None,
+    expressions: Place | None = None,
     seed: int = 0,
     population: int | None = None,
     generations: int | None = None,
@@ -84,6 +85,7 @@ def train(
       speed, gait, turn, steer, style: what is asked of a walk (docs/wishes.md): m/s or text such as
         "0.4bl/s", a name, deg/s to the left, deg/s to either side, a name or a file.
       certificate: walks, or anywhere (docs/certificate.md).
+      expressions: file of programs to begin with, for the controller program (docs/programs.md).
       seed, population, generations: the settings that are changed most often.
       settings: any others, in tables as in a config file: {"rollout": {"seconds": 5.0}}.
       quiet: says nothing on the screen.
@@ -92,6 +94,7 @@ def train(
       UserError: one sentence that says what is wrong with what was given.
     """
     from mjxgait.parts.wishes import Wishes, configured
+    from mjxgait.parts.written import with_expressions
 
     use = _use(controller=controller, task=task)
     creature = load_creature(env, scale, way=way)
@@ -110,6 +113,8 @@ def train(
     table = merge(dataclasses.asdict(resolved), {"seed": seed, "evolution": evolution})
     chosen = build(type(resolved), merge(table, settings or {}), "the settings given to train")
     creature = at_step(creature, chosen.rollout.step)
+    if expressions is not None:
+        chosen = with_expressions(creature, chosen, Path(expressions))
     folder = check_run(Path(out) if out else None, creature, chosen)
     begin = partial(create_run, folder, creature, chosen)
     return _evolved(folder, creature, chosen, quiet, begin)

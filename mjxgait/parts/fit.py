@@ -7,6 +7,7 @@ from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.ground.spec import FLAT
 from mjxgait.parts.registry import SHIPPED, find
+from mjxgait.parts.written import check_programs
 from mjxgait.settings.config import Config
 
 
@@ -35,6 +36,8 @@ def check_fit(creature: Creature, config: Config) -> None:
                 f"controller.around has {len(around)} angles; {config.controller.key_poses} key poses "
                 f"of {name} have {wanted}; --gait auto begins with no poses that were drawn"
             )
+    if controller == "program":
+        check_programs(creature, config)
     if not creature.settings.creature.grows:
         if config.rollout.step:
             raise UserError(

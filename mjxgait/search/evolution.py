@@ -42,7 +42,7 @@ class Evolution:
         count, window = self.config.population, self.config.forced.window
         integer = jnp.zeros((), jnp.int32)
         return EvolutionState(
-            genomes=self.variation.create(key_create, count),
+            genomes=self.variation.begin(key_create, count),
             terms=jnp.zeros((count, trials, terms)),
             outcome=jnp.zeros((count, trials, outcomes)),
             fitness=jnp.full(count, -jnp.inf, jnp.float32),

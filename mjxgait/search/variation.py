@@ -35,6 +35,7 @@ class Variation:
     create: key, count -> genomes [count, ...]. cross: key, genome, genome -> genome. mutate: key,
     genome -> genome. price: genomes [N, ...] -> [N], by which fitness is less; None: free.
     long: whether they walk along a genome place by place, and so are worth some of the compiler's time.
+    first: genomes [G, ...] that take the first places of the first generation; None: all are drawn.
     """
 
     create: Callable[[jax.Array, int], Any]
@@ -42,6 +43,14 @@ class Variation:
     mutate: Callable[[jax.Array, Any], Any]
     price: Callable[[Any], jax.Array] | None = None
     long: bool = False
+    first: Any = None
+
+    def begin(self, key: jax.Array, count: int) -> Any:
+        """Genomes [count, ...] of the first generation: those given, and others created."""
+        created = self.create(key, count)
+        if self.first is None:
+            return created
+        return jax.tree.map(lambda own, leaf: leaf.at[: len(own)].set(own), self.first, created)
 
 
 def creation(box: Box, config: EvolutionConfig) -> Callable[[jax.Array, int], Any]:

@@ -1,8 +1,11 @@
 """Settings of the task of hopping to a goal."""
 
 import dataclasses
+from typing import Annotated
 
-from mjxgait.settings.tables import STRICT, Finite, NonNegative, Whole
+import pydantic
+
+from mjxgait.settings.tables import SHAPE, STRICT, Finite, NonNegative, Whole
 
 GOALS = (0.4, 2.0)
 """m ahead of the start: the nearest and the farthest goal."""
@@ -10,6 +13,7 @@ NOMINAL_GOAL = 1.2
 """m, of the trial that nobody disturbs."""
 NEAR = 0.05
 """Share of the goal's distance; who is nearer has arrived."""
+OnTheWay = Annotated[float, pydantic.Field(gt=0, lt=1)]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -30,6 +34,8 @@ class HopWeights:
       neutral: how far joints are from standing in the end, in halves of their ranges.
       fast: the fastest that a joint turned: nothing up to 14 rad/s, 1 from 20 on.
       overlap: how deep parts are in each other.
+      energy: work of the joints per weight and way (cost of transport); 0: it is no term.
+      sub_goals: how near it came to each of `fitness.sub_goals`; 0: it is no term.
     """
 
     __pydantic_config__ = STRICT
@@ -42,6 +48,8 @@ class HopWeights:
     neutral: Finite = 0.1
     fast: Finite = 0.04
     overlap: Finite = 0.1
+    energy: Annotated[Finite, SHAPE] = 0.0
+    sub_goals: Annotated[Finite, SHAPE] = 0.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -64,10 +72,17 @@ class HopConfig(GoalConfig):
     """What is wanted of the way to one goal.
 
     Attributes:
+      sub_goals: points on the straight way from the start to the goal that are to be passed, as
+        shares of that way; read only if the weight of that name is not 0.
       weights: what each term counts.
     """
 
     __pydantic_config__ = STRICT
+    sub_goals: Annotated[tuple[OnTheWay, ...], pydantic.Field(min_length=1), SHAPE] = (
+        0.25,
+        0.5,
+        0.75,
+    )
     weights: HopWeights = dataclasses.field(default_factory=HopWeights)
 
 

@@ -23,6 +23,8 @@ FUNCTIONS = {
 """How many arguments each takes. `/` is protected; `ifltz` gives its second where the first is
 below zero, else its third (docs/programs.md).
 """
+MOST_NODES = 1024
+"""That an expression may ever have."""
 
 
 def _known(names: tuple[str, ...]) -> tuple[str, ...]:
@@ -55,6 +57,9 @@ class ProgramConfig:
       constant_sigma: by how much constants move and subtrees are nudged, in units of the range;
         a hundredth of it is as likely.
       parsimony: fitness that each node costs.
+      expressions: programs that the first generation begins with, each as `(list EXPRESSION ...)`
+        with one expression per joint; the others are drawn. `mjxgait train --expressions` fills
+        them in.
     """
 
     __pydantic_config__ = STRICT
@@ -67,7 +72,7 @@ class ProgramConfig:
     )
     every: Annotated[int, pydantic.AfterValidator(holds), SHAPE] = 4
     senses: Annotated[tuple[str, ...], SHAPE] = ("*",)
-    nodes: Annotated[int, pydantic.Field(ge=3, le=1024), SHAPE] = 128
+    nodes: Annotated[int, pydantic.Field(ge=3, le=MOST_NODES), SHAPE] = 128
     depth: Annotated[int, pydantic.Field(ge=1), SHAPE] = 17
     initial_depth: Annotated[tuple[int, int], SHAPE] = (2, 5)
     constants: Interval = (-1.0, 1.0)
@@ -79,6 +84,7 @@ class ProgramConfig:
     nudge: NonNegative = 3.0
     constant_sigma: NonNegative = 0.1
     parsimony: NonNegative = 0.0
+    expressions: Annotated[tuple[str, ...], SHAPE] = ()
 
     def __post_init__(self) -> None:
         low, high = self.initial_depth

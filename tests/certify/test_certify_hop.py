@@ -37,12 +37,15 @@ FRAMES, STEP, GOAL = 4400, 0.005, 1.2
 # Made-up ways of 22 s
 
 
-def to(*places: tuple[float, float]) -> Recording:
-    """A way through these times in s and m ahead, without physics."""
+def to(*places: tuple[float, float], drift: float = 0.0) -> Recording:
+    """A way through these times in s and m ahead, without physics.
+
+    drift: m to the left of the start in the end, in proportion to the way ahead.
+    """
     times, ways = zip(*places, strict=True)
     made = walk()
     forward = np.interp(np.arange(FRAMES) * STEP, times, ways)
-    path = np.stack([forward, 0 * forward, np.full(FRAMES, 0.4)], 1)
+    path = np.stack([forward, drift * forward / GOAL, np.full(FRAMES, 0.4)], 1)
     return dataclasses.replace(made, trunk_pos=path, goal=GOAL)
 
 
@@ -79,8 +82,20 @@ def test_who_arrives_and_stays_passes():
         to((0, 0), (3, GOAL), (18, GOAL), (18.1, 0.9 * GOAL), (18.2, GOAL)),
         to((0, 0), (18, 0), (18.5, GOAL)),
         to((0, 0)),
+        to((0, 0), (3, GOAL), drift=0.07 * GOAL),
+        to((0, 0), (3, GOAL), drift=-0.07 * GOAL),
     ],
-    ids=["short", "far", "passes by", "leaves", "is away for a moment", "late", "stands"],
+    ids=[
+        "short",
+        "far",
+        "passes by",
+        "leaves",
+        "is away for a moment",
+        "late",
+        "stands",
+        "left of it",
+        "right of it",
+    ],
 )
 def test_criterion_2_arrives_and_stays(way: Recording):
     assert failures(way) == {2}
@@ -117,7 +132,9 @@ def test_the_report_says_where_it_ends_and_since_when():
     report = DEMANDS.report(to((0, 0), (3, 1.2), (10, 1.2), (11, 1.1), (12, 1.21)), CONFIG)
     # Within 0.06 m again at 1.14 m, on its way back from 1.1 to 1.21 m.
     assert report["arrival"] == pytest.approx(11 + 0.04 / 0.11, abs=0.01)
-    assert report["left"] == pytest.approx(-0.01)
+    assert report["left"] == pytest.approx(0.01)
+    beside = DEMANDS.report(to((0, 0), (3, 1.2), drift=0.5), CONFIG)
+    assert (beside["left"], beside["arrival"]) == (pytest.approx(0.5), None)
     assert DEMANDS.report(to((0, 0), (3, 1.0)), CONFIG)["arrival"] is None
 
 
@@ -125,19 +142,21 @@ def test_the_report_says_where_it_ends_and_since_when():
 
 
 def became(ways: list[Recording], fell: list[float]) -> Outcome:
-    path = np.stack([way.trunk_pos[:, 0] for way in ways])
+    path, aside = (np.stack([way.trunk_pos[:, axis] for way in ways]) for axis in (0, 1))
     nothing = np.zeros((0, FRAMES))
     film = Trajectory(STEP, *[nothing] * 5)
     clear = np.full(len(ways), np.inf)
-    return Outcome(np.array(fell), np.zeros((len(ways), 2)), path, clear, film)
+    return Outcome(np.array(fell), np.zeros((len(ways), 2)), path, clear, film, aside=aside)
 
 
 def test_of_the_disturbed_only_those_succeed_that_stay_up_and_at_their_own_goal(tiny: Creature):
     ways = [good(), good(), good(), to((0, 0), (3, 0.4)), to((0, 0), (20, 1.2))]
-    starts = nominal_starts(tiny, 5)
-    starts.goal[:] = [1.2, 1.2, 1.3, 0.4, 1.2]
-    outcome = became(ways, [np.inf, 21.0, np.inf, np.inf, np.inf])
-    assert DEMANDS.succeeded(outcome, starts, CONFIG).tolist() == [True, False, False, True, False]
+    ways.append(to((0, 0), (3, 1.2), drift=0.2))
+    starts = nominal_starts(tiny, 6)
+    starts.goal[:] = [1.2, 1.2, 1.3, 0.4, 1.2, 1.2]
+    outcome = became(ways, [np.inf, 21.0, np.inf, np.inf, np.inf, np.inf])
+    arrived = [True, False, False, True, False, False]
+    assert DEMANDS.succeeded(outcome, starts, CONFIG).tolist() == arrived
 
 
 def test_nine_of_ten_must_succeed_and_pushes_do_not_count():
@@ -213,20 +232,20 @@ def test_nobody_is_tried_further_than_what_is_wanted_is_in_reach(
 def test_in_the_end_all_are_lost_but_those_that_succeed(tiny: Creature, task: str):
     """And nobody is lost before it cannot be mended any more."""
     demands = demands_of(task)
-    ways = [good(), good(), to((0, 0), (3, 1.0)), to((0, 0), (19, 0), (20, GOAL)), good()]
-    starts = nominal_starts(tiny, 5)
+    beside = to((0, 0), (3, GOAL), drift=0.5)
+    ways = [good(), good(), to((0, 0), (3, 1.0)), to((0, 0), (19, 0), (20, GOAL)), beside, good()]
+    starts = nominal_starts(tiny, 6)
     starts.goal[:] = GOAL
-    clearance = np.array([0.02, 0.02, 0.02, 0.02, -0.01 if task == "limbo" else np.inf])
-    outcome = dataclasses.replace(
-        became(ways, [np.inf, 21.0, np.inf, np.inf, np.inf]), clearance=clearance
-    )
+    clearance = np.array([*[0.02] * 5, -0.01 if task == "limbo" else np.inf])
+    fell = np.array([np.inf, 21.0, *[np.inf] * 4])
+    outcome = dataclasses.replace(became(ways, list(fell)), clearance=clearance)
     lost = demands.lost(outcome, starts, FRAMES)
     assert (~lost).tolist() == demands.succeeded(outcome, starts, CONFIG).tolist()
-    assert lost.tolist() == [False, True, True, True, task == "limbo"]
+    assert lost.tolist() == [False, True, True, True, True, task == "limbo"]
     # Who stands still may get there yet, until it must be there.
     before = round((CONFIG.seconds - demands.wanted(CONFIG).stay) / STEP)
-    assert not demands.lost(outcome, starts, before)[[2, 3]].any()
-    assert demands.lost(outcome, starts, before + 1)[[2, 3]].all()
+    assert not demands.lost(outcome, starts, before)[[2, 3, 4]].any()
+    assert demands.lost(outcome, starts, before + 1)[[2, 3, 4]].all()
 
 
 def test_a_simulation_ends_when_those_that_are_lost_decide_it(tiny: Creature):
@@ -373,6 +392,8 @@ def test_the_path_is_that_of_the_recording_and_ends_with_a_fall(tiny: Creature, 
     together = simulate(tiny, trotter, starts, 1.0, threads=1)
     film = simulate(tiny, trotter, starts, 1.0, record=4)
     np.testing.assert_array_equal(together.path[:, :-1], film.trajectory.qpos[:, 1:, 0])
+    np.testing.assert_array_equal(together.aside[:, :-1], film.trajectory.qpos[:, 1:, 1])
+    assert np.abs(together.aside).max() > 1e-3
     thrown = pushed_starts(tiny, 1, np.random.default_rng(0), 6.0, (0.1, 0.1))
     fallen = simulate(tiny, trotter, thrown, 1.0)
     down = round(float(fallen.fell[0]) / STEP)

@@ -23,9 +23,9 @@ from mjxgait.champion.expressions import (
     Terminal,
     in_text,
     nested,
-    to_arrays,
     to_text,
 )
+from mjxgait.champion.reading import to_arrays
 from mjxgait.champion.simplify import simplified
 from mjxgait.control.programs.evaluate import evaluator, listed
 from mjxgait.control.programs.grow import Words, half_and_half

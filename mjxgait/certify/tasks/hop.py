@@ -36,21 +36,22 @@ class HopDemands(GoalDemands):
         """See `Demands`: those that stayed up, arrived, and stayed there."""
         wanted = self.wanted(config)
         frames = frames_in(wanted.stay, outcome.trajectory.time_step)
-        away = farthest(starts.goal[:, None] - outcome.path, starts.goal, frames)
-        return outcome.stayed_up & (away <= wanted.near)
+        left = away(starts.goal[:, None], outcome.path, outcome.aside)
+        return outcome.stayed_up & (farthest(left, starts.goal, frames) <= wanted.near)
 
     def lost(self, outcome: Outcome, starts: Starts, steps: int) -> np.ndarray:
         """See `Demands`: who is down, or not near when it must be there."""
         wanted = self.wanted(CertificateConfig())
         frames = frames_in(wanted.stay, outcome.trajectory.time_step)
-        due = outcome.path[:, outcome.path.shape[1] - frames : steps]
-        away = np.abs(starts.goal[:, None] - due) > wanted.near * starts.goal[:, None]
-        return super().lost(outcome, starts, steps) | away.any(1)
+        due = slice(outcome.path.shape[1] - frames, steps)
+        goal = starts.goal[:, None]
+        outside = away(goal, outcome.path[:, due], outcome.aside[:, due]) > wanted.near * goal
+        return super().lost(outcome, starts, steps) | outside.any(1)
 
     def report(self, whole: Recording, config: CertificateConfig) -> dict[str, Any]:
         """See `Demands`: how far off it ends, and since when it is there for good."""
-        left = whole.goal - whole.trunk_pos[:, 0]
-        outside = np.flatnonzero(~(np.abs(left) <= self.wanted(config).near * whole.goal))
+        left = _left(whole)
+        outside = np.flatnonzero(~(left <= self.wanted(config).near * whole.goal))
         begins = outside[-1] + 1 if len(outside) else 0
         arrival = float(begins * whole.time_step) if begins < len(left) else None
         when = f"there from {arrival:.2f} s on" if arrival is not None else "not there"
@@ -59,16 +60,15 @@ class HopDemands(GoalDemands):
             "left": float(left[-1]),
             "arrival": arrival,
             "overlap": worst_overlap(whole),
-            "summary": f"{abs(left[-1]):.3f} m from a goal {whole.goal:g} m ahead, {when}",
+            "summary": f"{left[-1]:.3f} m from a goal {whole.goal:g} m ahead, {when}",
         }
 
     def second(self, whole: Recording, config: CertificateConfig) -> Criterion:
         """See `GoalDemands`: it arrives and stays."""
         wanted = self.wanted(config)
-        left = whole.goal - whole.trunk_pos[:, 0]
         frames = frames_in(wanted.stay, whole.time_step)
-        away = farthest(left[None], np.array([whole.goal]), frames)[0]
-        there = at_most("farthest left / goal distance", away, wanted.near)
+        left = farthest(_left(whole)[None], np.array([whole.goal]), frames)[0]
+        there = at_most("farthest left / goal distance", left, wanted.near)
         return Criterion(2, "arrives and stays", (there,))
 
     def managed(
@@ -79,13 +79,29 @@ class HopDemands(GoalDemands):
         return to_the_end(outcome, seconds, creature) & near
 
 
+def away(goal: np.ndarray, path: np.ndarray, aside: np.ndarray) -> np.ndarray:
+    """Distance in m to a goal that lies straight ahead of the start, measured in the plane.
+
+    Args:
+      goal: m ahead of the start. path, aside: m forward and to the left, at each moment.
+    """
+    distance: np.ndarray = np.hypot(goal - path, aside)
+    return distance
+
+
+def _left(whole: Recording) -> np.ndarray:
+    """[T] m from the trunk to the goal."""
+    ahead, aside, _ = whole.trunk_pos.T
+    return away(np.array(whole.goal), ahead, aside)
+
+
 def farthest(left: np.ndarray, goal: np.ndarray, frames: int) -> np.ndarray:
-    """[S] farthest from the goal over the last frames, in goal distances; NaN where one is NaN.
+    """Largest distance [S] to the goal over the last frames, in goal distances; NaN if one is NaN.
 
     Args:
       left: [S, T] m. goal: [S] m.
     """
-    last: np.ndarray = np.abs(left[:, -frames:]).max(1) / goal
+    last: np.ndarray = left[:, -frames:].max(1) / goal
     return last
 
 

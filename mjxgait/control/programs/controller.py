@@ -15,6 +15,7 @@ from mjxgait.champion.expressions import (
     chosen_terminals,
     terminals,
 )
+from mjxgait.champion.programs import programs_to_begin_with
 from mjxgait.control.programs.evaluate import Listing, evaluator, listed
 from mjxgait.control.programs.grow import Words
 from mjxgait.control.programs.operators import program_variation
@@ -45,6 +46,7 @@ class Programs:
         self, creature: Body, step: float, settings: ProgramConfig, added: Sequence[str] = ()
     ) -> None:
         self.creature, self.step, self.every = creature, step, settings.every
+        self.added = tuple(added)
         self.known: tuple[Terminal, ...] = chosen_terminals(
             terminals(creature, added), settings.senses
         )
@@ -56,8 +58,10 @@ class Programs:
         self.reads = tuple(dict.fromkeys(terminal.sense for terminal in self.known))
 
     def variation(self, settings: ProgramConfig, evolution: EvolutionConfig) -> Variation:
-        """See `Controller`."""
-        return program_variation(self.words, len(self.creature.joints.names), settings)
+        """See `Controller`; the first generation begins with the programs of the settings."""
+        given = programs_to_begin_with(self.creature, settings, self.added)
+        first = None if given is None else Trees(*map(jnp.asarray, given))
+        return program_variation(self.words, len(self.creature.joints.names), settings, first)
 
     def genes(self, genomes: Trees, settings: ProgramConfig) -> np.ndarray:
         """See `Controller`: any other node is a difference."""

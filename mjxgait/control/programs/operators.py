@@ -23,8 +23,10 @@ FINEST = 0.01
 """Share of the largest change of a constant."""
 
 
-def program_variation(words: Words, joints: int, settings: Any) -> Variation:
-    """The operators; settings: `ProgramConfig`, plain or traced."""
+def program_variation(
+    words: Words, joints: int, settings: Any, first: Trees | None = None
+) -> Variation:
+    """The operators; settings: `ProgramConfig`, plain or traced. first: see `Variation`."""
 
     def create(key: jax.Array, count: int) -> Trees:
         keys = jax.random.split(key, count * joints)
@@ -53,7 +55,7 @@ def program_variation(words: Words, joints: int, settings: Any) -> Variation:
     def price(genomes: Trees) -> jax.Array:
         return jnp.asarray(settings.parsimony * jnp.sum(genomes.code != EMPTY, axis=(1, 2)))
 
-    return Variation(create, cross, mutate, price, long=True)
+    return Variation(create, cross, mutate, price, long=True, first=first)
 
 
 def crossed(key: jax.Array, mother: Tree, father: Tree, settings: Any) -> Tree:

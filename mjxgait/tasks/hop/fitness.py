@@ -7,11 +7,12 @@ import jax
 import jax.numpy as jnp
 
 from mjxgait.body import Body
-from mjxgait.settings.hop import NEAR, HopConfig, HopWeights, TravelConfig
+from mjxgait.settings.hop import NEAR, HopConfig, HopWeights, TravelConfig, TravelWeights
 from mjxgait.tasks.falls import Reason
-from mjxgait.tasks.hop.tally import Tally
+from mjxgait.tasks.hop.tally import Tally, away
 from mjxgait.tasks.overlap import crossed
 from mjxgait.tasks.score import ramped
+from mjxgait.tasks.work import cost_of_transport
 
 TERMS = tuple(field.name for field in dataclasses.fields(HopWeights))
 GOAL = "distance"
@@ -19,12 +20,22 @@ MISSED = "missed"
 AIM = (GOAL, MISSED)
 """What counts from the first generation on."""
 STYLE = tuple(name for name in TERMS if name not in AIM)
-"""The manner of a way: counted as far as there is one, and ramped in over the generations."""
+"""The manner of a way, ramped in over the generations."""
+OPTIONAL = ("energy", "sub_goals")
+"""Terms only where they have a weight."""
 
 FARTHEST = 2.0
 """Goal distances; who is farther off than that is no worse."""
+SHORTEST = 0.25
+"""Body lengths of the way that work is at least divided by."""
 FASTEST, FAST = 20.0, 0.7
 """rad/s that no joint of a machine turns at, and the share of it that costs nothing."""
+
+
+def terms_under(weights: HopWeights | TravelWeights) -> tuple[str, ...]:
+    """Names of the terms that there are under these weights."""
+    names = tuple(field.name for field in dataclasses.fields(weights))
+    return tuple(n for n in names if n not in OPTIONAL or getattr(weights, n))
 
 
 def fitness_terms(
@@ -33,23 +44,26 @@ def fitness_terms(
     """The terms [] of one episode, each without unit and before its weight; all are at least zero.
 
     Style counts in proportion to how near it got: who has yet to learn to hop must not be punished
-    for trying.
+    for trying. Sub-goals count in full: whoever stands still has passed none.
 
     Args:
       horizon: T, steps of a full episode. more: style that another task adds.
     """
-    away = jnp.abs(tally.left) / tally.goal
-    near = jnp.clip(1.0 - away, 0.0, 1.0)
+    left = away(tally) / tally.goal
+    near = jnp.clip(1.0 - left, 0.0, 1.0)
     style = style_terms(creature, horizon, tally) | dict(more or {})
-    terms = {GOAL: jnp.minimum(away, FARTHEST), MISSED: jnp.minimum(away / NEAR, 1.0)}
-    return terms | {name: near * value for name, value in style.items()}
+    terms = {GOAL: jnp.minimum(left, FARTHEST), MISSED: jnp.minimum(left / NEAR, 1.0)}
+    terms |= {name: near * value for name, value in style.items()}
+    if tally.closest is not None:
+        terms["sub_goals"] = jnp.mean(jnp.minimum(tally.closest / tally.goal, 1.0))
+    return terms
 
 
 def style_terms(creature: Body, horizon: int, tally: Tally) -> dict[str, jax.Array]:
     """The manner [] of one episode, however near it got."""
     lived = jnp.maximum(tally.steps, 1)
     half_range = 0.5 * (creature.joints.pose_high - creature.joints.pose_low).astype(jnp.float32)
-    return {
+    terms = {
         "time": tally.arrived / horizon,
         "restless": jnp.minimum(tally.after / tally.goal, 1.0),
         "ground": tally.ground / lived,
@@ -58,6 +72,10 @@ def style_terms(creature: Body, horizon: int, tally: Tally) -> dict[str, jax.Arr
         "neutral": jnp.minimum(jnp.mean(tally.bent / jnp.maximum(half_range, 1e-6)), 1.0),
         "overlap": crossed(creature, tally.overlap),
     }
+    if tally.work is not None:
+        way = jnp.maximum(tally.goal - tally.left, SHORTEST * creature.frame.body_length)
+        terms["energy"] = cost_of_transport(creature, tally.work, way)
+    return terms
 
 
 def signed_weights(config: HopConfig | TravelConfig, generation: jax.Array) -> dict[str, jax.Array]:
@@ -68,4 +86,4 @@ def signed_weights(config: HopConfig | TravelConfig, generation: jax.Array) -> d
         signed = -jnp.float32(getattr(config.weights, name))
         return signed if name in AIM else signed * ramp
 
-    return {field.name: weight(field.name) for field in dataclasses.fields(config.weights)}
+    return {name: weight(name) for name in terms_under(config.weights)}

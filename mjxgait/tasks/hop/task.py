@@ -6,26 +6,64 @@ from typing import Any, ClassVar
 import jax
 import jax.numpy as jnp
 
+from mjxgait.body import Body, Ends
 from mjxgait.creature import Creature
+from mjxgait.creature.settings import Termination
 from mjxgait.settings.hop import GOALS, NOMINAL_GOAL, HopConfig
 from mjxgait.settings.rollout import RolloutConfig
 from mjxgait.tasks.falls import touches
-from mjxgait.tasks.hop.fitness import TERMS, fitness_terms, signed_weights
-from mjxgait.tasks.hop.tally import Standards, Tally, empty, goal_distance, rested, updated
+from mjxgait.tasks.hop.fitness import fitness_terms, signed_weights, terms_under
+from mjxgait.tasks.hop.tally import (
+    Standards,
+    Tally,
+    away,
+    empty,
+    goal_distance,
+    rested,
+    updated,
+    with_extras,
+)
 from mjxgait.tasks.plain import PlainTask
 from mjxgait.tasks.trials import Starts, draw_starts
 from mjxgait.types import Sensed
 
 
 class Hop(PlainTask):
-    """One creature's way to a goal; see `PlainTask`. Whoever has a trunk may do it."""
+    """One creature's way to a goal; see `PlainTask`. Any creature with a trunk can do it."""
 
     Settings: ClassVar[type] = HopConfig
-    terms: ClassVar[tuple[str, ...]] = TERMS
     outcomes: ClassVar[tuple[str, ...]] = ("left", "off", "arrival", "seconds")
     adds: ClassVar[tuple[str, ...]] = ("goal_distance",)
     goals: ClassVar[tuple[float, float]] = GOALS
     nominal: ClassVar[float] = NOMINAL_GOAL
+
+    def __init__(
+        self,
+        body: Body,
+        step: float,
+        horizon: int,
+        ends: Termination | Ends,
+        settings: Any = None,
+    ) -> None:
+        super().__init__(body, step, horizon, ends)
+        self.settings = settings or self.Settings()
+
+    @classmethod
+    def told(
+        cls, body: Body, step: float, horizon: int, ends: Termination | Ends, settings: Any
+    ) -> "Hop":
+        """The task under these settings, which decide the terms."""
+        return cls(body, step, horizon, ends, settings)
+
+    @property
+    def terms(self) -> tuple[str, ...]:
+        """See `Task`."""
+        return terms_under(self.settings.weights)
+
+    @property
+    def sub_goals(self) -> tuple[float, ...]:
+        """Points that are to be passed, as shares of the way; none where they count nothing."""
+        return self.settings.sub_goals if "sub_goals" in self.terms else ()
 
     def trials(self, key: jax.Array, creature: Creature, settings: RolloutConfig) -> Starts:
         """See `Task`: starts as everybody's, each with a goal of its own, the first the nominal."""
@@ -50,13 +88,15 @@ class Hop(PlainTask):
 
     def init(self) -> Tally:
         """See `Task`."""
-        return empty(self.creature, self.horizon)
+        energy = "energy" in self.terms
+        return empty(self.creature, self.horizon, energy, len(self.sub_goals))
 
     def update(
         self, tally: Tally, sensed: Sensed, torque: jax.Array, standards: Any, aim: jax.Array
     ) -> Tally:
         """See `Task`."""
         after = updated(self.creature, self.step, tally, sensed, aim)
+        after = with_extras(after, sensed, torque, self.step, self.sub_goals)
         return rested(after, self.horizon, standards.rest, touches(self.creature, sensed))
 
     def judge(self, tally: Tally, settings: HopConfig) -> dict[str, jax.Array]:
@@ -67,9 +107,10 @@ class Hop(PlainTask):
         """See `Task`: m from the goal in the end, and over the goal's distance; s until it first was
         there, and until the end.
         """
+        left = away(tally)
         return {
-            "left": jnp.abs(tally.left),
-            "off": jnp.abs(tally.left) / tally.goal,
+            "left": left,
+            "off": left / tally.goal,
             "arrival": tally.arrived * self.step,
             "seconds": tally.steps * self.step,
         }

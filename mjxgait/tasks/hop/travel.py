@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 import jax
 import jax.numpy as jnp
 
-from mjxgait.settings.hop import NEAR, NOMINAL_GOAL, TravelConfig, TravelWeights
+from mjxgait.settings.hop import NEAR, NOMINAL_GOAL, TravelConfig
 from mjxgait.tasks.hop import tally as hop
 from mjxgait.tasks.hop.fitness import GOAL, signed_weights, style_terms
 from mjxgait.tasks.hop.task import Hop
@@ -33,7 +33,6 @@ class Travel(Hop):
     """One creature's way from goal to goal; see `Hop`."""
 
     Settings: ClassVar[type] = TravelConfig
-    terms = tuple(field.name for field in dataclasses.fields(TravelWeights))
     outcomes = ("goals", "way", "seconds")
 
     def aim(self, trial: Starts) -> Any:

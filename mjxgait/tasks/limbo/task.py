@@ -10,7 +10,7 @@ import jax.numpy as jnp
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.ground.spec import parse_ground
-from mjxgait.settings.limbo import GOALS, NOMINAL_GOAL, LimboConfig, LimboWeights
+from mjxgait.settings.limbo import GOALS, NOMINAL_GOAL, LimboConfig
 from mjxgait.settings.rollout import RolloutConfig
 from mjxgait.tasks.hop import tally as hop
 from mjxgait.tasks.hop.fitness import MISSED, fitness_terms
@@ -56,7 +56,6 @@ class Limbo(Hop):
     """One creature's way to a goal beneath a bar; see `Hop`."""
 
     Settings = LimboConfig
-    terms = tuple(field.name for field in dataclasses.fields(LimboWeights))
     outcomes = (*Hop.outcomes, "bar")
     adds = (*Hop.adds, "bar_distance")
     climbs = True

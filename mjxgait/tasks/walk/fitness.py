@@ -12,6 +12,7 @@ from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.overlap import crossed
 from mjxgait.tasks.score import ramped
 from mjxgait.tasks.walk.tally import Tally
+from mjxgait.tasks.work import cost_of_transport
 
 TERMS = tuple(field.name for field in dataclasses.fields(Weights))
 REWARDS = ("distance", "alive")
@@ -91,7 +92,7 @@ def plain_terms(
         "tilt": tally.tilt / lived,
         "wobble": jnp.sqrt(tally.wobble / lived + 1e-12),
         "touch": tally.touch / lived,
-        "energy": tally.work / (creature.frame.mass * 9.81 * moved),
+        "energy": cost_of_transport(creature, tally.work, moved),
         "saturation": tally.saturation / lived,
         "limits": tally.limits / lived,
         "overlap": crossed(creature, tally.overlap),

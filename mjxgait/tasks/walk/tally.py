@@ -10,6 +10,7 @@ from mjxgait.body import Body
 from mjxgait.senses import CONTACT_GAP, foot_geoms, foot_heights
 from mjxgait.tasks import protocol
 from mjxgait.tasks.falls import touches
+from mjxgait.tasks.work import positive_work
 from mjxgait.types import Sensed, pytree
 
 SWING = 0.03
@@ -148,7 +149,7 @@ class Judge:
             tilt=tally.tilt + 1.0 - up,
             wobble=tally.wobble + sensed.trunk_angvel @ sensed.trunk_angvel,
             touch=tally.touch + touches(creature, sensed),
-            work=tally.work + jnp.sum(jnp.maximum(torque * sensed.joint_vel, 0.0)) * self.step,
+            work=tally.work + positive_work(torque, sensed, self.step),
             saturation=tally.saturation
             + jnp.mean(jnp.abs(torque) >= creature.gains.torque_limit.astype(np.float32)),
             limits=tally.limits + jnp.mean(outside),
