@@ -86,6 +86,17 @@ def test_what_is_kept_of_a_program_is_the_same_program(luxo: Creature, limits: V
         np.testing.assert_array_equal(one, other)
 
 
+def test_many_functions_side_by_side_can_be_read(luxo: Creature, limits: Vocabulary):
+    """511 of them: only those within each other are read by recursion."""
+    text = "a0"
+    for _ in range(9):
+        text = f"(+ {text} {text})"
+    [(code, _)] = read_programs(
+        f"(list {text} 1 2)", luxo.joints.names, dataclasses.replace(limits, nodes=1024), "f.txt"
+    )
+    assert (code[0] != EMPTY).sum() == 1023
+
+
 MISTAKES = [
     ("", "f.txt: holds no program; write (list EXPRESSION ...)"),
     ("# nothing\n", "f.txt: holds no program"),
