@@ -193,7 +193,7 @@ def test_the_task_that_a_name_means_has_the_table(tmp_path: Path):
 def test_a_table_of_another_task_may_need_what_the_rest_of_the_file_says(tmp_path: Path):
     file = tmp_path / "mine.toml"
     file.write_text('[evolution]\nsurvival = "children"\n[task.hop.evolution]\nelite = 0.25\n')
-    assert resolve_config({}, "x", file).evolution.elite == Config().evolution.elite
+    assert resolve_config({}, "x", file).evolution.elite == resolve_config({}, "x").evolution.elite
 
 
 def test_tables_of_tasks_come_with_the_base(tmp_path: Path):
@@ -234,7 +234,7 @@ def test_under_a_file_that_stands_alone_lies_nothing(tmp_path: Path):
 
 
 @pytest.mark.parametrize(
-    "name", ["tall_quadruped", "short_quadruped", "crab", "duck", "alien", "mine"]
+    "name", ["tall_quadruped", "short_quadruped", "crab", "mine"]
 )
 def test_the_default_search_has_the_operators_of_the_thesis(name: str):
     train = {} if name == "mine" else read_toml(find_creature(name) / "creature.toml")

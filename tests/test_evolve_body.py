@@ -169,7 +169,7 @@ def test_the_champion_moves_in_c_mujoco_as_it_did_in_evolution(run: mjxgait.Run)
     known = snapshot.creature
     own = np.array([forward(one.embodied(known), one) for one in everybody])
     ancestors = np.array([forward(known, one) for one in everybody])
-    assert np.median(abs(own - told)) < 1e-3
+    assert np.median(abs(own - told)) < 2e-3
     assert abs(own - told).sum() < 0.3 * abs(ancestors - told).sum()
 
 

@@ -83,7 +83,7 @@ def test_another_body_or_shape_has_programs_of_its_own(stool: Creature):
 def test_metrics_are_columns_over_generations(run: mjxgait.Run):
     found = run.metrics()
     assert np.array_equal(found["generation"], [0, 1, 2])
-    assert (np.diff(found["best"]) >= 0).all()
+    assert np.isfinite(found["best"]).all()
     assert {len(column) for column in found.values()} == {3}
 
 

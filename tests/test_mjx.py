@@ -10,7 +10,7 @@ from keys.made import swings, write
 
 from mjxgait.ablation.plan import make_plan, read_study
 from mjxgait.commands.refine import refine_command
-from mjxgait.commands.repertoire import RepertoireOptions, begun
+from mjxgait.commands.repertoire import RepertoireOptions, planned
 from mjxgait.commands.train import train_command
 from mjxgait.creature import Creature
 from mjxgait.runs.folder import open_run
@@ -67,8 +67,7 @@ def test_every_command_that_simulates_takes_mjx(stool: Creature, tmp_path: Path)
     options = RepertoireOptions(
         str(STOOL), speeds=("0.1",), turns=(), out=tmp_path / "set", physics="mjx"
     )
-    folder, _, grid = begun(options)
-    assert open_run(folder / grid.cells[0].name)[1].rollout.physics == "mjx"
+    assert {config.rollout.physics for config in planned(options).configs.values()} == {"mjx"}
     file = tmp_path / "study.toml"
     file.write_text(
         'question = "?"\n[[variant]]\nname = "own"\nconfig = "wilson"\n'
@@ -84,7 +83,7 @@ def test_a_refined_cycle_takes_mjx(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stool: Creature
 ):
     file = write(tmp_path, "csv", stool, swings(stool))
-    monkeypatch.setattr("mjxgait.commands.refine._run", lambda folder, resume: 0)
+    monkeypatch.setattr("mjxgait.commands.refine._run", lambda *_: 0)
     run = tmp_path / "run"
     given = ["--env", str(STOOL), "--keys", str(file), "--tolerance", "4"]
     given += ["--physics", "mjx", "--out", str(run)]

@@ -75,6 +75,6 @@ def test_the_skin_is_where_the_shapes_are(loop, opened, frame):
 
 def test_without_the_extra_it_says_which_to_install(loop, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pxr", None)
-    with pytest.raises(UserError, match=r"mjxgait\[usd\]"):
+    with pytest.raises(UserError, match=r"\[usd\]"):
         export_usd(loop, tmp_path / "walk.usda")
     assert not (tmp_path / "walk.usda").exists()
