@@ -71,8 +71,14 @@ def check_fit(creature: Creature, config: Config) -> None:
 
 
 def _check_settings(name: str, config: Config) -> None:
-    """Of a body that grows: what needs one that is there."""
+    """Refuse what needs a body that is there, and episodes of which nothing would count."""
     rollout = config.rollout
+    settle = getattr(config.fitness, "settle", 0.0)
+    if settle >= rollout.seconds:
+        raise UserError(
+            f"{name}: fitness.settle = {settle:g} s do not count, and an episode lasts "
+            f"{rollout.seconds:g} s; make rollout.seconds longer or fitness.settle shorter"
+        )
     needs = {
         "evolution.body": config.evolution.body != 1.0,
         "evolution.pose_span": config.evolution.pose_span != 0.0,

@@ -134,6 +134,16 @@ def test_a_creature_says_things_to_one_task_only():
             "rollout.ground is for a body that is there",
         ),
         (
+            "blocks",
+            {"use": {"controller": "brain", "task": "swim"}, "rollout": {"seconds": 1.5}},
+            "fitness.settle = 2 s do not count",
+        ),
+        (
+            "blocks",
+            {"use": {"controller": "brain", "task": "swim"}, "evolution": {"pose_span": 60.0}},
+            "evolution.pose_span is for a body that is there",
+        ),
+        (
             "tall_quadruped",
             {"evolution": {"family": 0.5, "islands": {"count": 2}}},
             "evolution.family is for one population",

@@ -122,6 +122,8 @@ def test_what_evolution_said_must_hold():
         )
         (kept,) = DEMANDS.kept(champion, slower, CONFIG)
         assert (kept.number, kept.passed) == (10, holds), told
+    soon: Any = SimpleNamespace(terms={"speed": 0.4}, origin={"nominal": {"seconds": 1.0}})
+    assert not DEMANDS.kept(soon, slower, CONFIG)[0].passed, "ended before anything counted"
     nobody: Any = SimpleNamespace(terms={}, origin={})
     assert not DEMANDS.kept(nobody, slower, CONFIG)[0].passed
 

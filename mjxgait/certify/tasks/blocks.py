@@ -105,10 +105,14 @@ class BlocksDemands(StaysUp, abc.ABC):
     def kept(
         self, champion: Champion, whole: Recording, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
-        """See `Demands`: 10, as much as evolution said, in as many seconds as it saw."""
+        """Return criterion 10: as much as evolution said, in as many seconds as evolution saw.
+
+        It fails where the episode had ended before anything counted.
+        """
         seconds = champion.origin.get("nominal", {}).get("seconds", np.inf)
         told = self.promise(champion, seconds, config)
-        done = self.done(whole.window(self.since(champion, config), seconds))
+        window = whole.window(self.since(champion, config), seconds)
+        done = self.done(window) if len(window.trunk_pos) > 1 else np.nan
         change = abs(done / told - 1) if told > 0 else np.nan
         again = at_most("change", change, self.wanted(config).again)
         return (Criterion(10, "as in evolution", (again,)),)
