@@ -74,15 +74,16 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--rounds", type=int, default=9)
-    rounds = parser.parse_args().rounds
+    parser.add_argument("--links", type=int, nargs="+", default=[12, 16], help="room of a body")
+    options = parser.parse_args()
     water = Surroundings(floor=False, gravity=0.0, drag=300.0)
     runs = {"tall quadruped": quadruped()}
-    for links in (12, 16):
+    for links in options.links:
         capacity = Capacity(links=links)
         runs[f"blocks, {links} links, land"] = blocks(capacity, Surroundings())
         runs[f"blocks, {links} links, water"] = blocks(capacity, water)
     best = dict.fromkeys(runs, float("inf"))
-    for _ in range(rounds):
+    for _ in range(options.rounds):
         for name, run in runs.items():
             began = time.process_time()
             run()

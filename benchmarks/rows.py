@@ -3,8 +3,8 @@ generation in turns.
 
     python benchmarks/rows.py --variants 4 --seeds 16 --generations 4
 
-Both are the shipped tall_quadruped with the default settings and the same lanes; the study's
-variants differ in their mutation rate. Prints both rates for each generation, the median ratio, and
+Both are the shipped tall_quadruped, or another creature, with its own settings and the same lanes; the
+study's variants differ in their mutation rate. Prints both rates for each generation, the median ratio, and
 the largest memory of the process before and after.
 """
 
@@ -22,6 +22,7 @@ from mjxgait.runs.experiment import build_batch, build_experiment
 from mjxgait.settings.config import Config
 from mjxgait.settings.layers import resolve_config
 from mjxgait.settings.shipped import find_creature
+from mjxgait.settings.tables import build, merge
 
 
 def main() -> None:
@@ -31,10 +32,20 @@ def main() -> None:
     parser.add_argument("--variants", type=int, default=4)
     parser.add_argument("--seeds", type=int, default=16)
     parser.add_argument("--generations", type=int, default=4)
+    parser.add_argument("--env", default="tall_quadruped")
+    parser.add_argument("--population", type=int, help="instead of the creature's own")
+    parser.add_argument(
+        "--seconds", type=float, help="of an episode, instead of the creature's own"
+    )
     options = parser.parse_args()
     prepare_devices()
-    creature = load_creature(find_creature("tall_quadruped"))
+    creature = load_creature(find_creature(options.env))
     config = resolve_config(creature.settings.train, creature.name)
+    table = {
+        "evolution": {"population": options.population or config.evolution.population},
+        "rollout": {"seconds": options.seconds or config.rollout.seconds},
+    }
+    config = build(Config, merge(dataclasses.asdict(config), table), "the options")
     single = build_experiment(creature, config)
     batch = build_batch(
         creature,

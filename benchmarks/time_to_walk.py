@@ -33,7 +33,7 @@ PARTS = (
 )
 
 
-def run(env: str, seed: int, cache: Path, folder: Path) -> dict:
+def run(env: str, seed: int, cache: Path, folder: Path, more: list[str]) -> dict:
     """One run of the command: its wall time, and what came of it."""
     parts = folder.with_suffix(".parts.json")
     command = [
@@ -47,6 +47,7 @@ def run(env: str, seed: int, cache: Path, folder: Path) -> dict:
         "--out",
         str(folder),
         "--no-plots",
+        *more,
     ]
     began = time.perf_counter()
     subprocess.run(
@@ -81,6 +82,7 @@ def main() -> None:
     parser.add_argument("--picture", type=Path)
     parser.add_argument("--env", nargs="+", default=["tall_quadruped"])
     parser.add_argument("--seeds", type=int, default=5)
+    parser.add_argument("more", nargs="*", help="options of train, after --")
     options = parser.parse_args()
     reports: dict[str, dict] = {}
     for env in options.env:
@@ -89,7 +91,8 @@ def main() -> None:
             with tempfile.TemporaryDirectory() as scratch:
                 for kind, entries in runs.items():
                     there = Path(scratch)
-                    entries.append({"seed": seed} | run(env, seed, there / "cache", there / kind))
+                    found = run(env, seed, there / "cache", there / kind, options.more)
+                    entries.append({"seed": seed} | found)
                     print(
                         f"{env}, seed {seed} {kind}: {entries[-1]['seconds']:.1f} s, certified: "
                         f"{entries[-1]['passed']}",

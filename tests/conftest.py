@@ -35,6 +35,13 @@ SHIPPED = [path.name for path in FOLDERS if not load_creature(path).settings.cre
 """Those that have a body before they are trained."""
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """`--matrix FILE`: see tests/end_to_end/test_trainings.py."""
+    parser.addoption(
+        "--matrix", type=Path, help="append a row of Markdown for each training that is tried"
+    )
+
+
 def pytest_collection_finish() -> None:
     """Modules and lists of tests stay: no collection of garbage need look at them again."""
     gc.freeze()

@@ -233,9 +233,7 @@ def test_under_a_file_that_stands_alone_lies_nothing(tmp_path: Path):
     assert found == build(Config, {"rollout": {"starts": 9}}, "test")
 
 
-@pytest.mark.parametrize(
-    "name", ["tall_quadruped", "short_quadruped", "crab", "mine"]
-)
+@pytest.mark.parametrize("name", ["tall_quadruped", "short_quadruped", "crab", "mine"])
 def test_the_default_search_has_the_operators_of_the_thesis(name: str):
     train = {} if name == "mine" else read_toml(find_creature(name) / "creature.toml")
     evolution = resolve_config(train.get("train", {}), name).evolution

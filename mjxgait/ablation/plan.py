@@ -187,7 +187,7 @@ def make_plan(study: Study, creature: Creature, where: str) -> Plan:
     return Plan(study, tuple(configs), tuple(runs))
 
 
-def check_plan(plan: Plan, creature: Creature, where: str) -> None:
+def check_variants(plan: Plan, creature: Creature, where: str) -> None:
     """Refuse a study with a variant whose runs could not be examined in the end.
 
     Raises:

@@ -70,7 +70,7 @@ def ablate_command(arguments: Sequence[str]) -> int:
     """Returns the exit code."""
     options = tyro.cli(AblateOptions, args=list(arguments), prog="mjxgait ablate")
     from mjxgait.ablation.measures import measure, read_logs
-    from mjxgait.ablation.plan import check_plan, make_plan, read_study
+    from mjxgait.ablation.plan import check_variants, make_plan, read_study
     from mjxgait.ablation.report import write_report
 
     folder = (
@@ -95,7 +95,7 @@ def ablate_command(arguments: Sequence[str]) -> int:
     plan = make_plan(study, creature, where)
     creature = at_step(creature, plan.runs[0].config.rollout.step)
     if not options.resume:
-        check_plan(plan, creature, where)
+        check_variants(plan, creature, where)
     # JAX takes a second to import: only once the study is known to be good.
     from mjxgait.ablation.rows import groups
     from mjxgait.runs.blueprint import check_plan

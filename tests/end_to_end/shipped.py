@@ -1,0 +1,141 @@
+"""What the program ships, and every way of training that it names; read from the files and the registries.
+
+A new creature, task, configuration, style, study, subcommand, benchmark or script is in the net by
+itself: it is found here, and it fails there until it ends as it should.
+"""
+
+import dataclasses
+import functools
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from mjxgait.creature import Creature, load_creature
+from mjxgait.creature.step import at_step
+from mjxgait.errors import UserError
+from mjxgait.parts import resolve_config
+from mjxgait.parts.fit import check_fit
+from mjxgait.parts.registry import OF_BODIES_THAT_GROW, SHIPPED, find
+from mjxgait.settings.config import UseConfig
+from mjxgait.settings.layers import over_base
+from mjxgait.settings.shipped import data_folder, shipped_configs, shipped_creatures
+
+ROOT = Path(__file__).parents[2]
+CREATURES, CONFIGS = shipped_creatures(), shipped_configs()
+TASKS = [name for name in SHIPPED["task"] if name not in OF_BODIES_THAT_GROW.values()]
+"""By the names that a user gives them."""
+STYLES = sorted(path.stem for path in (data_folder("configs") / "styles").glob("*.toml"))
+STUDIES = sorted(path.stem for path in (data_folder("configs") / "ablations").glob("*.toml"))
+BENCHMARKS = sorted(path.name for path in (ROOT / "benchmarks").glob("*.py"))
+SCRIPTS = sorted(path.name for path in (ROOT / "scripts").glob("*.py"))
+
+TINY = (
+    *("--population", "4", "--generations", "1", "--seed", "7", "--no-plots"),
+    *("--rollout.seconds", "0.3", "--rollout.lanes", "2"),
+    *("--examination.candidates", "1", "--examination.draws", "2"),
+)
+"""Options of `train` that make a run of seconds of any configuration; nothing else is changed."""
+FEW_BLOCKS = (
+    *("--controller.nodes", "3", "--controller.parts", "3", "--controller.links", "4"),
+    *("--fitness.settle", "0.1"),
+)
+"""The same for bodies that grow: the time to compile goes with the room of a body, and an episode is
+longer than it takes to settle.
+"""
+
+
+@dataclasses.dataclass(frozen=True)
+class Way:
+    """One way of training that the shipped files name. None: not given on the command line."""
+
+    creature: str
+    task: str | None = None
+    config: str | None = None
+    style: str | None = None
+
+    @property
+    def name(self) -> str:
+        """A short name for the test."""
+        return "-".join(part for part in dataclasses.astuple(self) if part)
+
+    @property
+    def arguments(self) -> list[str]:
+        """Arguments of `mjxgait train`."""
+        given = {"env": self.creature, "task": self.task, "config": self.config}
+        given["style"] = self.style
+        words = [w for key, value in given.items() if value for w in (f"--{key}", value)]
+        return [*words, *(FEW_BLOCKS if creature_of(self.creature).settings.creature.grows else ())]
+
+
+@functools.cache
+def creature_of(name: str) -> Creature:
+    """Return a shipped creature."""
+    return load_creature(data_folder("envs") / name)
+
+
+@functools.cache
+def use_of(name: str) -> UseConfig:
+    """Return the controller and the task that a creature names itself."""
+    creature = creature_of(name)
+    return resolve_config(creature.settings.train, creature.name).use
+
+
+def tasks_of(name: str) -> list[str]:
+    """Return the tasks of a creature: every task that fits, of the kind of its own."""
+    creature, own = creature_of(name), use_of(name)
+    return [task for task in TASKS if _fits(creature, task) and _akin(creature, task, own.task)]
+
+
+def _fits(creature: Creature, task: str) -> bool:
+    try:
+        config = resolve_config(creature.settings.train, creature.name, use={"task": task})
+        check_fit(at_step(creature, config.rollout.step), config)
+    except UserError:
+        return False
+    return True
+
+
+def _akin(creature: Creature, task: str, own: str) -> bool:
+    """Bodies that grow have all tasks that fit. A task of another body is its own or derives from it."""
+    return creature.settings.creature.grows or issubclass(find("task", task), find("task", own))
+
+
+def smallest(names: list[str]) -> str:
+    """Return the creature with the fewest degrees of freedom, which compiles soonest."""
+    return min(names, key=lambda name: creature_of(name).nv)
+
+
+def read_config(name: str) -> dict[str, Any]:
+    """Return the table of a shipped configuration, over its base."""
+    path = data_folder("configs") / f"{name}.toml"
+    return over_base(tomllib.loads(path.read_text(encoding="utf-8")), str(path))
+
+
+def creatures_of(config: str) -> list[str]:
+    """Return the creatures of a configuration.
+
+    They are those whose controller it names. If its file has tables for single creatures, it is
+    trained with all of them, otherwise with the smallest.
+    """
+    table = read_config(config)
+    controller = table.get("use", {}).get("controller", UseConfig.controller)
+    fit = [name for name in CREATURES if use_of(name).controller == controller]
+    return fit if table.get("creature") else [smallest(fit)]
+
+
+def trainings() -> Iterator[Way]:
+    """Yield every way of training, creature by creature, so that neighbours share programs."""
+    walkers = [name for name in CREATURES if use_of(name).task == "walk"]
+    for name in CREATURES:
+        grows, own = creature_of(name).settings.creature.grows, use_of(name).task
+        for task in tasks_of(name):
+            yield Way(name, None if task == own else task)
+        for config in CONFIGS:
+            if name not in creatures_of(config):
+                continue
+            named = read_config(config).get("use", {}).get("task", own)
+            for task in tasks_of(name) if grows else [named]:
+                yield Way(name, None if task == named else task, config)
+        if name == smallest(walkers):
+            yield from (Way(name, style=style) for style in STYLES)

@@ -1,0 +1,115 @@
+"""Every subcommand ends as it should, on runs that the command made itself."""
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from end_to_end.shipped import CONFIGS, CREATURES, ROOT
+from end_to_end.walks import small_settings, trained, walker
+from helpers import STOOL, said_by
+from keys.made import columns, swings
+
+from mjxgait.certify import read_certificate
+from mjxgait.cli import COMMANDS
+from mjxgait.creature import load_creature
+from mjxgait.runs.folder import CERTIFICATE, open_run
+
+ELSEWHERE = {
+    "train": "tests/end_to_end/test_trainings.py::test_a_training_ends_with_a_certificate",
+    "ablate": "tests/end_to_end/test_studies.py::test_a_study_ends_with_its_report",
+    "bench": "tests/bench/test_bench.py::test_the_command_writes_the_ratios",
+    "view": "tests/viewing/test_live.py",
+}
+"""Subcommands that have tests of their own, and where."""
+
+Made = Callable[[Path], tuple[list[str], str]]
+"""Makes the arguments of a subcommand in a folder, and names the file that it writes there."""
+
+
+def of_run(*more: str, writes: str) -> Made:
+    """A subcommand that takes a run folder first."""
+    return lambda folder: ([str(walker(folder / "run")), *more], writes)
+
+
+def refined(folder: Path) -> tuple[list[str], str]:
+    stool = load_creature(STOOL)
+    (folder / "walk.csv").write_text(columns(stool, swings(stool)))
+    given = ["--env", str(STOOL), "--keys", "walk.csv", "--config", small_settings(folder)]
+    return [*given, "--generations", "1", "--out", "refined"], f"refined/{CERTIFICATE}"
+
+
+def gathered(folder: Path) -> tuple[list[str], str]:
+    given = ["--env", str(STOOL), "--speeds", "0.2", "0.4", "--turns", "10"]
+    given += ["--config", small_settings(folder), "--generations", "1", "--out", "set"]
+    return given, "set/map.png"
+
+
+FORMS: dict[str, list[Made]] = {
+    "refine": [refined],
+    "certify": [of_run(writes=f"run/{CERTIFICATE}")],
+    "stress": [of_run("--starts", "4", writes="run/stress.json")],
+    "inspect": [of_run(writes=""), of_run("--all", "--json", writes="")],
+    "plot": [of_run("--formats", "png", writes="run/plots/filmstrip.png")],
+    "render": [
+        of_run("--renderer", "painter", "--seconds", "0.4", "--out", f"walk.{kind}", writes="")
+        for kind in ("png", "webp")
+    ],
+    "export": [of_run("--out", f"walk.{kind}", writes=f"walk.{kind}") for kind in ("glb", "bvh")],
+    "share": [of_run("--out", "walk.html", writes="walk.html")],
+    "repertoire": [gathered],
+    "import": [
+        lambda folder: ([str(STOOL / "creature.xml"), "--out", "mine"], "mine/creature.toml")
+    ],
+    "check": [
+        lambda folder, name=name: ([name, "--out", "seen.png"], "seen.png") for name in CREATURES
+    ],
+    "envs": [lambda folder: ([], "")],
+}
+EACH = [(name, number) for name, forms in FORMS.items() for number in range(len(forms))]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "number"), EACH, ids=[f"{name}-{n}" for name, n in EACH])
+def test_a_subcommand_ends_as_it_should(
+    name: str, number: int, tmp_path: Path, capsys: pytest.CaptureFixture
+):
+    given, writes = FORMS[name][number](tmp_path)
+    said = said_by(capsys, name, *given, code=0)
+    assert "Traceback" not in said
+    assert (tmp_path / writes).exists()
+
+
+def test_every_subcommand_is_in_the_net():
+    assert FORMS.keys() | ELSEWHERE.keys() == COMMANDS.keys()
+    assert not FORMS.keys() & ELSEWHERE.keys()
+    for place in ELSEWHERE.values():
+        file, _, test = place.partition("::")
+        assert f"def {test}" in (ROOT / file).read_text(encoding="utf-8")
+
+
+def test_all_that_is_shipped_is_listed(capsys: pytest.CaptureFixture):
+    said = said_by(capsys, "envs", code=0)
+    assert [line.split()[0] for line in said.splitlines()] == [*CREATURES, *CONFIGS]
+
+
+@pytest.mark.slow
+def test_a_certificate_follows_its_champion(tmp_path: Path, capsys: pytest.CaptureFixture):
+    """`certify` of a run says what the run's own examination said."""
+    run = trained(tmp_path / "run")
+    before = json.loads((run / CERTIFICATE).read_text())
+    said_by(capsys, "certify", run, code=0)
+    after = read_certificate(run / CERTIFICATE)
+    assert after["champion"] == before["champion"]
+    assert after["criteria"] == before["criteria"]
+
+
+@pytest.mark.slow
+def test_several_runs_side_by_side(tmp_path: Path, capsys: pytest.CaptureFixture):
+    given = ("--env", STOOL, "--config", small_settings(tmp_path), "--generations", 1, "--runs", 2)
+    said_by(capsys, "train", *given, "--seed", 3, "--out", "zoo", code=0)
+    for seed in (3, 4):
+        folder = next(path.parent for path in Path("zoo").glob(f"*{seed}/{CERTIFICATE}"))
+        assert open_run(folder)[1].seed == seed
+    shutil.rmtree("zoo")

@@ -1,0 +1,142 @@
+"""Every script, and every benchmark in its smallest form, ends as it should."""
+
+import importlib.util
+import json
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import jax
+import pytest
+from end_to_end.shipped import BENCHMARKS, FEW_BLOCKS, ROOT, SCRIPTS, TINY
+from end_to_end.walks import faller, trained, walker
+from helpers import STOOL
+
+from mjxgait.runs import checkpoint, examination, experiment, looks, loop, stages
+
+BLENDER = "needs Blender as a module of Python"
+RAY = "needs Ray; tests/cluster/test_ray.py runs what it measures, where Ray is installed"
+ELSEWHERE = {
+    "in_blender.py": BLENDER,
+    "rig_of_blender.py": BLENDER,
+    "blender.py": BLENDER,
+    "cluster.py": RAY,
+    "cluster_faults.py": RAY,
+    "plant_faults.py": "tests/test_faults.py runs it on a tree of its own",
+}
+"""What is not run here, and why."""
+
+Given = Callable[[Path], list[str]]
+STOOLS = ["--env", str(STOOL)]
+COSTS = {
+    "calls": {
+        "ms of this process per piece, 100 bytes": 1.0,
+        "ms of this process per piece, 1000000 bytes": 3.0,
+        "µs per piece under way and look": 1.0,
+        "ms there and back": 2.0,
+        "bytes per genome": 100,
+        "bytes per verdict": 100,
+        "ms to put a row's state on disk": 10.0,
+    },
+    "rows": {"processor_s": {"one": [10.0, 12.0]}, "runs": 8, "generations": 4},
+    "blocks": {"s of a processor per block": 1.0},
+}
+
+
+def on_paper(folder: Path) -> list[str]:
+    (folder / "costs.json").write_text(json.dumps(COSTS))
+    return ["costs.json"]
+
+
+FORMS: dict[str, Given] = {
+    "blocks.py": lambda folder: ["--rounds", "1", "--links", "4"],
+    "bodies.py": lambda folder: [*STOOLS, "--rounds", "1"],
+    "cluster_paper.py": on_paper,
+    "contacts.py": lambda folder: [*STOOLS, "--points", "4", "--rounds", "1"],
+    "diversity.py": lambda folder: [str(trained(folder / "run", "--env", "blocks", *FEW_BLOCKS))],
+    "every_creature.py": lambda folder: [*STOOLS, "--seeds", "7", "--out", "out", "--", *TINY],
+    "ground.py": lambda folder: [*STOOLS, "--rounds", "1"],
+    "imported.py": lambda folder: [
+        *("--files", str(STOOL / "creature.xml"), "--out", "out", "--", *TINY)
+    ],
+    "inspect_seconds.py": lambda folder: [str(trained(folder / "run")), "--times", "1"],
+    "islands.py": lambda folder: [
+        *("islands.json", *STOOLS, "--seeds", "2", "--population", "16"),
+        *("--generations", "2", "--seconds", "0.3"),
+    ],
+    "keyed.py": lambda folder: [
+        *("keyed", "--only", "short trot", "--population", "4", "--generations", "1")
+    ],
+    "overlap.py": lambda folder: [str(walker(folder / "run"))],
+    "raise.py": lambda folder: [str(faller(folder / "run")), "--starts", "4"],
+    "rows.py": lambda folder: [
+        *(*STOOLS, "--variants", "2", "--seeds", "1", "--generations", "1"),
+        *("--population", "4", "--seconds", "0.3"),
+    ],
+    "stopwatch.py": lambda folder: ["parts.json", *STOOLS, *TINY, "--out", "run"],
+    "time_to_walk.py": lambda folder: [
+        *("--json", "times.json", *STOOLS, "--seeds", "1", "--", *TINY)
+    ],
+    "wishes.py": lambda folder: [
+        *(*STOOLS, "--speeds", "0.25", "--gaits", "walk", "--json", "found.json", "--", *TINY)
+    ],
+    "ablate.py": lambda folder: ["null", "--dry-run"],
+    "filmstrips.py": lambda folder: [str(certified(folder / "run"))],
+    "inspect_checkpoint.py": lambda folder: [str(trained(folder / "run"))],
+    "portraits.py": lambda folder: [str(walker(folder / "run"))],
+    "store_walk.py": lambda folder: [str(trained(folder / "run")), "stored"],
+    "train.py": lambda folder: [*STOOLS, *TINY, "--out", "run"],
+}
+
+
+def certified(folder: Path) -> Path:
+    """A run whose champion treads, with the certificate that it has."""
+    run = walker(folder)
+    done = subprocess.run([sys.executable, "-m", "mjxgait", "certify", str(run)], check=True)
+    assert not done.returncode
+    return run
+
+
+@pytest.fixture
+def as_it_was():
+    """Undoes what a benchmark changes in this process."""
+    watched = (loop, stages, experiment, looks.Looks, examination.Examiner, checkpoint.Checkpoints)
+    before = [dict(vars(place)) for place in watched]
+    cached, path = jax.config.jax_enable_compilation_cache, list(sys.path)
+    yield
+    jax.config.update("jax_enable_compilation_cache", cached)
+    sys.path[:] = path
+    for place, names in zip(watched, before, strict=True):
+        for name, value in names.items():
+            if vars(place)[name] is not value:
+                setattr(place, name, value)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FORMS)
+def test_a_script_ends_as_it_should(name: str, tmp_path: Path, as_it_was):
+    """In a copy of its folder, for some write into the documentation beside it."""
+    where = "scripts" if name in SCRIPTS else "benchmarks"
+    shutil.copytree(ROOT / where, tmp_path / where)
+    (tmp_path / "tests").symlink_to(ROOT / "tests")
+    (tmp_path / "docs" / "images").mkdir(parents=True)
+    given = [sys.executable, str(tmp_path / where / name), *FORMS[name](tmp_path)]
+    done = subprocess.run(given, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout
+    assert "Traceback" not in done.stdout
+
+
+@pytest.mark.parametrize("name", ELSEWHERE)
+def test_what_is_left_out_has_a_reason(name: str):
+    if ELSEWHERE[name] is BLENDER and importlib.util.find_spec("bpy") is None:
+        pytest.skip(BLENDER)
+    if ELSEWHERE[name] is RAY and importlib.util.find_spec("ray") is None:
+        pytest.skip(RAY)
+
+
+def test_every_script_is_in_the_net():
+    assert FORMS.keys() | ELSEWHERE.keys() == {*BENCHMARKS, *SCRIPTS}
+    assert not FORMS.keys() & ELSEWHERE.keys()
+    assert not {*BENCHMARKS} & {*SCRIPTS}

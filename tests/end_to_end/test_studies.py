@@ -1,0 +1,67 @@
+"""Every shipped study runs to its report: its own variants, with few individuals and short episodes."""
+
+import tomllib
+from functools import partial
+from pathlib import Path
+
+import pytest
+import tomli_w
+from end_to_end.shipped import STUDIES, creature_of
+from helpers import STOOL, said_by
+
+from mjxgait.ablation.plan import Study
+from mjxgait.cluster import board
+from mjxgait.cluster.here import Here
+from mjxgait.cluster.programs import Programs
+from mjxgait.settings.shipped import data_folder
+from mjxgait.settings.tables import merge
+
+SEEDS, ROWS = 2, 2
+"""The fewest seeds of a study; of all studies, runs of the same shape share a program."""
+SHARED = Programs()
+
+
+def shrunk(name: str) -> dict:
+    """The study on a small body, each variant with few individuals and short episodes."""
+    path = data_folder("configs") / "ablations" / f"{name}.toml"
+    study = tomllib.loads(path.read_text(encoding="utf-8"))
+    # The thesis's configuration has 40 of its own.
+    few = {"evolution": {"population": 4}, "rollout": {"seconds": 0.3, "lanes": 2}}
+    for variant in study["variant"]:
+        settings = variant.get("settings", {})
+        own = "population" in settings.get("evolution", {})
+        small = few | {"evolution": {"population": 6}} if own else few
+        variant["settings"] = merge(settings, small)
+    if study.get("env", Study.env) == Study.env:
+        study["env"] = str(STOOL)
+    return study | {"allow_equal": True}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", STUDIES)
+def test_a_study_ends_with_its_report(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(board, "Here", partial(Here, SHARED))
+    file, out = tmp_path / f"{name}.toml", tmp_path / "out"
+    file.write_text(tomli_w.dumps(shrunk(name)))
+    given = ("--generations", 1, "--seeds", SEEDS, "--rows", ROWS, "--out", out)
+    said = said_by(capsys, "ablate", file, *given, code=0)
+    report = (out / "report.md").read_text()
+    assert report in said
+    variants = shrunk(name)["variant"]
+    assert all(variant["name"] in report for variant in variants)
+    assert len((out / "results.csv").read_text().splitlines()) == 1 + SEEDS * len(variants)
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_a_study_can_be_run_as_it_is_shipped(name: str, capsys: pytest.CaptureFixture):
+    """All its variants, on its own creature: each can be examined in the end."""
+    said = said_by(capsys, "ablate", name, "--dry-run", "--hours", 1000, code=0)
+    assert "runs in" in said
+
+
+def test_there_are_studies():
+    assert {"thesis", "blocks", "lamp"} <= set(STUDIES)
+    assert {shrunk(name)["env"] for name in STUDIES} == {str(STOOL), "blocks", "luxo"}
+    assert all(creature_of(name) for name in ("blocks", "luxo"))

@@ -1,0 +1,152 @@
+"""Every shipped configuration, with every creature and task that it names, runs to its certificate.
+
+`python -m pytest tests/end_to_end/test_trainings.py --matrix FILE` also writes a table of them
+(docs/testing.md).
+"""
+
+import json
+import time
+import tomllib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from end_to_end.shipped import (
+    CONFIGS,
+    CREATURES,
+    ROOT,
+    STYLES,
+    TASKS,
+    TINY,
+    Way,
+    creature_of,
+    read_config,
+    trainings,
+    use_of,
+)
+from helpers import STOOL, said_by
+
+from mjxgait.certify import CertificateConfig, glance
+from mjxgait.champion import Champion, write_champion
+from mjxgait.parts import resolve_config
+from mjxgait.parts.registry import OF_BODIES_THAT_GROW
+from mjxgait.runs.folder import CERTIFICATE, CHAMPION, METRICS, create_run, open_champion, open_run
+from mjxgait.settings.control import gene_names
+
+WAYS = list(trainings())
+
+
+def train(capsys: pytest.CaptureFixture, folder: Path, *given: str) -> dict:
+    """Train, and return the certificate; the run folder must be whole."""
+    said_by(capsys, "train", *TINY, *given, "--out", folder, code=0)
+    document = json.loads((folder / CERTIFICATE).read_text())
+    _, champion = open_champion(folder)
+    assert document["champion"] == champion.fingerprint
+    assert len(document["criteria"]) >= 5
+    assert json.loads((folder / METRICS).read_text().splitlines()[-1])["generation"] == 1
+    return document
+
+
+HEADER = "| configuration | creature | task | certificate | processor, s |\n|---|---|---|---|---|\n"
+
+
+@pytest.fixture
+def told(request: pytest.FixtureRequest) -> Iterator[Callable[[Way, str, dict], None]]:
+    """Takes what came of a training, for the table of `--matrix`; processor seconds of this process."""
+    file, began, rows = request.config.getoption("--matrix"), time.process_time(), []
+
+    def tell(way: Way, task: str, document: dict) -> None:
+        passed = "passed" if document["passed"] else "not passed"
+        given = f"style {way.style}" if way.style else way.config or "the creature's own"
+        rows.append((given, way.creature, task, passed, f"{time.process_time() - began:.0f}"))
+
+    yield tell
+    if file is not None:
+        table = "".join(f"| {' | '.join(row)} |\n" for row in rows)
+        with file.open("a", encoding="utf-8") as written:
+            written.write(table if written.tell() else HEADER + table)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("way", WAYS, ids=[way.name for way in WAYS])
+def test_a_training_ends_with_a_certificate(way: Way, tmp_path: Path, capsys, told):
+    document = train(capsys, tmp_path / "run", *way.arguments)
+    _, config = open_run(tmp_path / "run")
+    told(way, config.use.task, document)
+    asked = way.task or (way.config and read_config(way.config).get("use", {}).get("task"))
+    task = asked or use_of(way.creature).task
+    if creature_of(way.creature).settings.creature.grows:
+        task = OF_BODIES_THAT_GROW.get(task, task)
+    assert config.use.task == document["task"] == task
+
+
+def test_the_ways_cover_all_that_is_shipped():
+    assert {way.creature for way in WAYS} == set(CREATURES)
+    assert {way.config for way in WAYS} - {None} == set(CONFIGS)
+    assert {way.style for way in WAYS} - {None} == set(STYLES)
+    assert {way.task or use_of(way.creature).task for way in WAYS} == set(TASKS)
+    assert len(WAYS) == len(set(WAYS))
+    thesis = {way.creature for way in WAYS if way.config == "wilson"}
+    assert thesis == {name for name in CREATURES if use_of(name).task == "walk"}
+    paper, all_of_blocks = (
+        {way.task for way in WAYS if way.creature == "blocks" and way.config == config}
+        for config in ("sims", None)
+    )
+    assert paper == all_of_blocks >= {None, "walk", "jump", "follow", "follow-on-land"}
+
+
+def test_every_file_of_configurations_is_one():
+    """No file of settings lies where nothing finds it."""
+    files = {path.relative_to(ROOT / "configs") for path in (ROOT / "configs").rglob("*.toml")}
+    assert {path.parts[0] for path in files if len(path.parts) > 1} == {
+        "ablations",
+        "certificate",
+        "styles",
+    }
+    for path in files:
+        tomllib.loads((ROOT / "configs" / path).read_text(encoding="utf-8"))
+
+
+WALKERS = [name for name in CREATURES if use_of(name).controller == "poses"]
+OF_POSES = [name for name in CONFIGS if read_config(name).get("use", {}) == {}]
+
+
+@pytest.mark.parametrize("name", WALKERS)
+@pytest.mark.parametrize("config", OF_POSES)
+def test_every_walker_can_be_examined_under_every_configuration(
+    config: str, name: str, tmp_path: Path
+):
+    """From the new run folder to the look in C MuJoCo, without evolution: poses about the stand."""
+    creature = creature_of(name)
+    settings = resolve_config(creature.settings.train, name, Path(config))
+    folder = create_run(tmp_path / "run", creature, settings)
+    joints = creature.joints
+    poses = np.tile(joints.stand, (settings.controller.key_poses, 1))
+    genes = [getattr(settings.controller.tuning, g, (0.0,))[0] for g in gene_names(False)]
+    genome = {"key_poses": poses, "tuning": np.array(genes)}
+    made = Champion.of(creature, settings, genome, fitness=0.0, terms={}, origin={})
+    write_champion(made, creature, folder / CHAMPION)
+    body, champion = open_champion(folder)
+    assert champion.fingerprint == made.fingerprint
+    assert glance(body, champion, CertificateConfig(seconds=1.0, warmup=0.2)).criteria
+
+
+VARIANTS = {
+    "plain MJX": ("--rollout.physics", "mjx"),
+    "sizes evolve under a pose span": ("--config", "wilson", "--evolve-body", "1.2"),
+    "expressions under a pose span": (
+        *("--use.controller", "program", "--evolution.pose-span", "60"),
+        *("--controller.nodes", "16", "--controller.depth", "4"),
+    ),
+    "another way, scaled, on other ground": (
+        *("--way", "back", "--scale", "*leg*=1.1", "--ground", "rough:0.03"),
+    ),
+}
+"""What changes the creature, or the simulator, before the examiner sees the champion."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", VARIANTS)
+def test_what_changes_the_body_ends_with_a_certificate(name: str, tmp_path: Path, capsys):
+    train(capsys, tmp_path / "run", "--env", str(STOOL), *VARIANTS[name])

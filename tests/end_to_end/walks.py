@@ -1,0 +1,67 @@
+"""Small runs that the command itself has made, once for all tests of a process."""
+
+import contextlib
+import functools
+import shutil
+import tempfile
+from pathlib import Path
+
+from end_to_end.shipped import TINY
+from helpers import STOOL
+from viewing.made_up import falling, treading
+
+from mjxgait.champion import write_champion
+from mjxgait.cli import main
+from mjxgait.creature import Creature
+from mjxgait.runs.folder import CERTIFICATE, CHAMPION, open_run
+
+SMALL = """
+[evolution]
+population = 4
+[rollout]
+seconds = 0.3
+lanes = 2
+[examination]
+candidates = 1
+draws = 2
+"""
+
+
+@functools.cache
+def _made(*given: str) -> tempfile.TemporaryDirectory:
+    """A run in a folder that stays as long as the process."""
+    folder = tempfile.TemporaryDirectory(prefix="mjxgait-end-to-end-")
+    with contextlib.suppress(SystemExit):
+        main(["train", *TINY, *given, "--out", f"{folder.name}/run"])
+    return folder
+
+
+def trained(folder: Path, *given: str) -> Path:
+    """A copy of a run that was evolved and examined; by default the smallest creature's."""
+    shutil.copytree(Path(_made(*(given or ("--env", str(STOOL)))).name) / "run", folder)
+    return folder
+
+
+def walker(folder: Path) -> Path:
+    """The same with a champion that treads on the spot, of which a loop can be made."""
+    return _with(treading, folder)
+
+
+def faller(folder: Path) -> Path:
+    """The same with a champion that falls at once, whose longest trials take no time."""
+    return _with(falling, folder)
+
+
+def _with(made_up, folder: Path) -> Path:
+    trained(folder)
+    creature: Creature = open_run(folder)[0]
+    write_champion(made_up(creature), creature, folder / CHAMPION)
+    (folder / CERTIFICATE).unlink()
+    return folder
+
+
+def small_settings(folder: Path) -> str:
+    """A file of settings with few individuals and short episodes."""
+    file = folder / "small.toml"
+    file.write_text(SMALL)
+    return str(file)
