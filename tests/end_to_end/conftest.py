@@ -75,10 +75,12 @@ def said_by_python(arguments: Sequence[str]) -> tuple[int, str]:
 
 
 def _run_here(run: Callable[..., Any]) -> Callable[..., Any]:
-    """Return `subprocess.run` that stays in this process where it would start this Python."""
+    """Return `subprocess.run` that stays in this process where it would start `mjxgait` or a script."""
 
     def here(command: Any, **options: Any) -> Any:
-        if isinstance(command, str) or str(command[0]) != sys.executable:
+        given = [] if isinstance(command, str) else list(map(str, command))
+        ours = given[1:3] == ["-m", "mjxgait"] or (len(given) > 1 and given[1].endswith(".py"))
+        if not ours or given[0] != sys.executable:
             return run(command, **options)
         code, said = said_by_python(list(map(str, command[1:])))
         if code and options.get("check"):
