@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -83,7 +84,12 @@ def test_a_refined_cycle_takes_mjx(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stool: Creature
 ):
     file = write(tmp_path, "csv", stool, swings(stool))
-    monkeypatch.setattr("mjxgait.commands.refine._run", lambda *_: 0)
+
+    def only_written(*given: Any) -> int:
+        given[-1]()
+        return 0
+
+    monkeypatch.setattr("mjxgait.commands.refine._run", only_written)
     run = tmp_path / "run"
     given = ["--env", str(STOOL), "--keys", str(file), "--tolerance", "4"]
     given += ["--physics", "mjx", "--out", str(run)]

@@ -84,7 +84,7 @@ class Champion:
         """Hash of all that decides how it moves: body, controller, genome, settings; not of its
         fitness or where it comes from.
         """
-        moves = {
+        moves: dict[str, Any] = {
             "creature": self.digest,
             "controller": self.controller,
             # As float64, which is what a file gives back: a champion has one fingerprint before it
