@@ -93,7 +93,7 @@ def run(env: str, wish: list[str], seed: int, more: list[str]) -> dict:
         "stride": round(likeness["stride"] or float("nan"), 2),
         "duty_factor": round(likeness["duty_factor"] or float("nan"), 2),
         "certified": certificate["passed"],
-        "margin": round(certificate["margin"], 2),
+        "margin": None if certificate["margin"] is None else round(certificate["margin"], 2),
         "fails": "; ".join(failed) or "-",
         "generations": json.loads(lines[-1])["generation"],
         "seconds": round(seconds),

@@ -36,7 +36,12 @@ SHIPPED = [path.name for path in FOLDERS if not load_creature(path).settings.cre
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """`--matrix FILE`: see tests/end_to_end/test_trainings.py."""
+    """Options of tests/end_to_end."""
+    parser.addoption(
+        "--thorough",
+        action="store_true",
+        help="run also what the end-to-end net leaves out for time",
+    )
     parser.addoption(
         "--matrix", type=Path, help="append a row of Markdown for each training that is tried"
     )

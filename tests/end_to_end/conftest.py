@@ -7,13 +7,12 @@ import io
 import runpy
 import subprocess
 import sys
-import tomllib
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import pytest
-from helpers import SHORT
+from end_to_end.walks import SHORTER
 
 import mjxgait.cores
 from mjxgait.ablation import measures
@@ -22,15 +21,11 @@ from mjxgait.certify.stress import StressConfig
 from mjxgait.cli import main
 from mjxgait.settings.tables import build
 
-EXAMINED = {"seconds": 2.0, "warmup": 0.3, "hop": {"stay": 0.5}, "limbo": {"stay": 0.5}}
-"""Over `SHORT`: s of an examination, and of the rest of a lamp at its end."""
-
 
 @pytest.fixture(autouse=True)
 def short(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """The code of an examination is as shipped; its defaults are few starts and short times."""
-    table = tomllib.loads(SHORT) | EXAMINED
-    _default(monkeypatch, CertificateConfig, build(CertificateConfig, table, "short"))
+    _default(monkeypatch, CertificateConfig, build(CertificateConfig, SHORTER, "short"))
     _default(monkeypatch, StressConfig, StressConfig(starts=4, seconds=1.0, long=2.0))
     monkeypatch.setattr(measures, "SECONDS", 0.5)
     monkeypatch.setattr(measures, "STARTS", 2)
@@ -38,6 +33,17 @@ def short(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
         monkeypatch.setattr(module, "process_per_core", _one_thread)
     monkeypatch.setattr(subprocess, "run", _run_here(subprocess.run))
     monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture
+def thorough(request: pytest.FixtureRequest) -> Callable[[str], None]:
+    """Return a function that skips the test with a reason, unless `--thorough` is given."""
+
+    def skip(reason: str) -> None:
+        if not request.config.getoption("--thorough"):
+            pytest.skip(f"{reason}; --thorough runs it")
+
+    return skip
 
 
 def _default(monkeypatch: pytest.MonkeyPatch, cls: type, short: Any) -> None:
@@ -58,29 +64,39 @@ def _one_thread(
 
 def said_by_python(arguments: Sequence[str]) -> tuple[int, str]:
     """Run `python ARGUMENTS` in this process; return the exit code and what it printed."""
-    said, old = io.StringIO(), sys.argv
+    said, old = io.StringIO(), (sys.argv, list(sys.path))
+    siblings = {path.stem for path in Path(arguments[0]).parent.glob("*.py")}
+    hidden = {name: sys.modules.pop(name) for name in siblings & sys.modules.keys()}
     try:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
             if arguments[:2] == ["-m", "mjxgait"]:
                 main(arguments[2:])
-            sys.argv = list(arguments)
+            sys.argv, sys.path[:0] = list(arguments), [str(Path(arguments[0]).parent)]
             runpy.run_path(arguments[0], run_name="__main__")
     except SystemExit as ended:
         if isinstance(ended.code, str):
             return 1, said.getvalue() + ended.code
         return ended.code or 0, said.getvalue()
     finally:
-        sys.argv = old
+        sys.argv, sys.path[:] = old
+        for name in siblings:
+            sys.modules.pop(name, None)
+        sys.modules.update(hidden)
     return 0, said.getvalue()
 
 
+def _is_ours(command: Any) -> bool:
+    """Tell whether a process would run this program or a file of Python."""
+    if isinstance(command, str) or str(command[0]) != sys.executable:
+        return False
+    return list(command[1:3]) == ["-m", "mjxgait"] or str(command[1]).endswith(".py")
+
+
 def _run_here(run: Callable[..., Any]) -> Callable[..., Any]:
-    """Return `subprocess.run` that stays in this process where it would start `mjxgait` or a script."""
+    """Return `subprocess.run` that stays in this process where it would start this Python."""
 
     def here(command: Any, **options: Any) -> Any:
-        given = [] if isinstance(command, str) else list(map(str, command))
-        ours = given[1:3] == ["-m", "mjxgait"] or (len(given) > 1 and given[1].endswith(".py"))
-        if not ours or given[0] != sys.executable:
+        if not _is_ours(command):
             return run(command, **options)
         code, said = said_by_python(list(map(str, command[1:])))
         if code and options.get("check"):

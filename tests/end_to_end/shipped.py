@@ -7,7 +7,7 @@ itself: it is found here, and it fails there until it ends as it should.
 import dataclasses
 import functools
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -122,6 +122,28 @@ def creatures_of(config: str) -> list[str]:
     controller = table.get("use", {}).get("controller", UseConfig.controller)
     fit = [name for name in CREATURES if use_of(name).controller == controller]
     return fit if table.get("creature") else [smallest(fit)]
+
+
+def marks(way: Way) -> set[tuple[str, ...]]:
+    """Return what a way of training covers: its files, and each file's table for its task."""
+    task = way.task or read_config(way.config or "default").get("use", {}).get("task")
+    task = task or use_of(way.creature).task
+    found = {("creature", way.creature), ("task", task), ("config", way.config or "")}
+    if way.style:
+        found.add(("style", way.style))
+    if way.config and task in read_config(way.config).get("task", {}):
+        found.add(("table", way.config, task))
+    return found
+
+
+def covering(ways: Iterable[Way]) -> list[Way]:
+    """Return the ways that bring something which no way before them has covered."""
+    chosen, known = [], set[tuple[str, ...]]()
+    for way in ways:
+        if marks(way) - known:
+            chosen.append(way)
+            known |= marks(way)
+    return chosen
 
 
 def trainings() -> Iterator[Way]:

@@ -20,7 +20,9 @@ from end_to_end.shipped import (
     TASKS,
     TINY,
     Way,
+    covering,
     creature_of,
+    marks,
     read_config,
     trainings,
     use_of,
@@ -35,6 +37,7 @@ from mjxgait.runs.folder import CERTIFICATE, CHAMPION, METRICS, create_run, open
 from mjxgait.settings.control import gene_names
 
 WAYS = list(trainings())
+FEWER = covering(WAYS)
 
 
 def train(capsys: pytest.CaptureFixture, folder: Path, *given: str) -> dict:
@@ -70,7 +73,9 @@ def told(request: pytest.FixtureRequest) -> Iterator[Callable[[Way, str, dict], 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("way", WAYS, ids=[way.name for way in WAYS])
-def test_a_training_ends_with_a_certificate(way: Way, tmp_path: Path, capsys, told):
+def test_a_training_ends_with_a_certificate(way: Way, tmp_path: Path, capsys, told, thorough):
+    if way not in FEWER:
+        thorough("its creature, its configuration and its task each run in another combination")
     document = train(capsys, tmp_path / "run", *way.arguments)
     _, config = open_run(tmp_path / "run")
     told(way, config.use.task, document)
@@ -94,6 +99,12 @@ def test_the_ways_cover_all_that_is_shipped():
         for config in ("sims", None)
     )
     assert paper == all_of_blocks >= {None, "walk", "jump", "follow", "follow-on-land"}
+
+
+def test_what_runs_every_time_covers_every_file_and_task():
+    everything = set.union(*map(marks, WAYS))
+    assert set.union(*map(marks, FEWER)) == everything
+    assert {("table", "sims", "follow"), ("style", "calm"), ("creature", "duck")} < everything
 
 
 def test_every_file_of_configurations_is_one():
@@ -138,9 +149,10 @@ VARIANTS = {
     "expressions under a pose span": (
         *("--use.controller", "program", "--evolution.pose-span", "60"),
         *("--controller.nodes", "16", "--controller.depth", "4"),
+        *("--controller.initial-depth", "2", "4"),
     ),
     "another way, scaled, on other ground": (
-        *("--way", "back", "--scale", "*leg*=1.1", "--ground", "rough:0.03"),
+        *("--way", "back", "--scale", "front*=1.1", "--ground", "rough:0.03"),
     ),
 }
 """What changes the creature, or the simulator, before the examiner sees the champion."""

@@ -4,10 +4,12 @@ import contextlib
 import functools
 import shutil
 import tempfile
+import tomllib
 from pathlib import Path
 
+import tomli_w
 from end_to_end.shipped import TINY
-from helpers import STOOL
+from helpers import SHORT, STOOL
 from viewing.made_up import falling, treading
 
 from mjxgait.champion import write_champion
@@ -25,6 +27,12 @@ lanes = 2
 candidates = 1
 draws = 2
 """
+
+SHORTER = tomllib.loads(SHORT) | {
+    **{"seconds": 2.0, "warmup": 0.3},
+    **{"hop": {"stay": 0.5}, "limbo": {"stay": 0.5}},
+}
+"""An examination of 2 s; a lamp is to be at rest for half a second at its end."""
 
 
 @functools.cache
@@ -58,6 +66,13 @@ def _with(made_up, folder: Path) -> Path:
     write_champion(made_up(creature), creature, folder / CHAMPION)
     (folder / CERTIFICATE).unlink()
     return folder
+
+
+def short_examination(folder: Path) -> str:
+    """A file of settings of the examination, for `certify`, whose file states what differs."""
+    file = folder / "short.toml"
+    file.write_text(tomli_w.dumps(SHORTER))
+    return str(file)
 
 
 def small_settings(folder: Path) -> str:
