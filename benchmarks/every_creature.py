@@ -61,7 +61,7 @@ def main() -> None:
     print(*HEADER, sep=" | ")
     for name in options.env:
         for seed in options.seeds:
-            folder = options.out / f"{name}-{seed}"
+            folder = options.out / f"{Path(name).name}-{seed}"
             wall = train(folder, name, seed, more)
             print(*row(folder, seed, wall), sep=" | ", flush=True)
 

@@ -8,10 +8,12 @@ import runpy
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
+from end_to_end.unevolved import Unevolved, unevolved
 from end_to_end.walks import SHORTER
 
 import mjxgait.cores
@@ -19,7 +21,15 @@ from mjxgait.ablation import measures
 from mjxgait.certify import CertificateConfig
 from mjxgait.certify.stress import StressConfig
 from mjxgait.cli import main
+from mjxgait.cluster import board
+from mjxgait.cluster.here import Here
+from mjxgait.cluster.programs import Programs
+from mjxgait.runs import loop
 from mjxgait.settings.tables import build
+
+COMPILED, CERTIFICATE = loop._compiled, CertificateConfig.__init__
+PROGRAMS = Programs()
+"""Of all studies and sets of runs: those of the same shape share one."""
 
 
 @pytest.fixture(autouse=True)
@@ -33,6 +43,27 @@ def short(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
         monkeypatch.setattr(module, "process_per_core", _one_thread)
     monkeypatch.setattr(subprocess, "run", _run_here(subprocess.run))
     monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture(autouse=True)
+def sketched(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let generations pass without a simulation, unless `--thorough` is given."""
+    if not request.config.getoption("--thorough"):
+        monkeypatch.setattr(loop, "_compiled", unevolved)
+        monkeypatch.setattr(board, "Here", partial(Unevolved, PROGRAMS))
+
+
+@pytest.fixture
+def evolving(sketched: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Compile and simulate generations as shipped."""
+    monkeypatch.setattr(loop, "_compiled", COMPILED)
+    monkeypatch.setattr(board, "Here", partial(Here, PROGRAMS))
+
+
+@pytest.fixture
+def examined_in_full(short: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Examine as long as shipped."""
+    monkeypatch.setattr(CertificateConfig, "__init__", CERTIFICATE)
 
 
 @pytest.fixture

@@ -125,12 +125,10 @@ def creatures_of(config: str) -> list[str]:
 
 
 def marks(way: Way) -> set[tuple[str, ...]]:
-    """Return what a way of training covers: its files, and each file's table for its task."""
+    """Return what a way of training simulates: its task, its file, and the file's table for the task."""
     task = way.task or read_config(way.config or "default").get("use", {}).get("task")
     task = task or use_of(way.creature).task
-    found = {("creature", way.creature), ("task", task), ("config", way.config or "")}
-    if way.style:
-        found.add(("style", way.style))
+    found = {("task", task), ("config", way.config or "")}
     if way.config and task in read_config(way.config).get("task", {}):
         found.add(("table", way.config, task))
     return found

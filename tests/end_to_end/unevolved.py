@@ -1,0 +1,116 @@
+"""Generations in which nothing is simulated, for tests of everything around them."""
+
+import contextlib
+import dataclasses
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from mjxgait.champion import Champion
+from mjxgait.cluster.crew import Report
+from mjxgait.cluster.here import Here
+from mjxgait.cluster.jobs import Advanced, AdvanceRows
+from mjxgait.cluster.programs import Programs
+from mjxgait.cluster.recipe import Recipe
+from mjxgait.errors import UserError
+from mjxgait.runs.experiment import Experiment
+from mjxgait.runs.packed import pack
+from mjxgait.search.state import EvolutionState, GenerationMetrics
+from mjxgait.simulation.evaluator import Evaluator
+
+Step = Callable[[EvolutionState], tuple[EvolutionState, GenerationMetrics]]
+
+
+def unevolved(
+    experiment: Experiment, evaluator: Evaluator | None, restored: EvolutionState | None
+) -> tuple[Step, EvolutionState]:
+    """Stand in for `loop._compiled`: the first population stays, and no program is compiled.
+
+    The body, the settings, the starts and the genomes are made as in a real run.
+    """
+    step = partial(generation, follows=experiment.config.evolution.follows)
+    return step, embodied(experiment) if restored is None else restored
+
+
+def embodied(experiment: Experiment) -> EvolutionState:
+    """Return the first state, turned until its first genome grows a body that can move."""
+    state = experiment.init()
+    known = dataclasses.replace(state, fitness=jnp.zeros_like(state.fitness))
+    for place in range(len(state.fitness)):
+        turned = jax.tree.map(partial(jnp.roll, shift=-place, axis=0), state.genomes)
+        with contextlib.suppress(UserError):
+            champion = experiment.champion(dataclasses.replace(known, genomes=turned), {})
+            champion.embodied(experiment.creature)
+            return dataclasses.replace(state, genomes=turned)
+    raise AssertionError("none of the first population can move")
+
+
+def generation(
+    state: EvolutionState, follows: bool = False
+) -> tuple[EvolutionState, GenerationMetrics]:
+    """Return the same population, one generation later, and metrics of ones."""
+    later = dataclasses.replace(
+        state,
+        terms=jnp.zeros_like(state.terms),
+        outcome=jnp.ones_like(state.outcome),
+        fitness=jnp.zeros_like(state.fitness),
+        generation=state.generation + 1,
+    )
+    names = {field.name for field in dataclasses.fields(GenerationMetrics)}
+    numbers = dict.fromkeys(names - {"mothers", "level"}, jnp.ones(()))
+    known = {
+        "generation": later.generation,
+        "forced": jnp.zeros((), bool),
+        "best_terms": jnp.zeros(state.terms.shape[-1]),
+        "best_outcome": jnp.zeros(state.outcome.shape[-1]),
+        "mothers": jnp.zeros(state.fitness.shape, jnp.int32) if follows else None,
+    }
+    metrics = GenerationMetrics(**(numbers | known), level=state.level)
+    return jax.device_get((later, metrics))
+
+
+class Unevolved(Here):
+    """A worker that evolves nothing: champions are the first of the first population.
+
+    Bodies, settings, starts and genomes are made as ever; no generation is compiled.
+    """
+
+    def wait(self, seconds: float) -> list[Report]:
+        """See `Hands`."""
+        if self._work is None:
+            return []
+        (worker, recipe, job), self._work = self._work, None
+        return [Report(worker, first_population(self._programs, recipe, job))]
+
+
+def first_population(programs: Programs, recipe: Recipe, job: AdvanceRows) -> Advanced:
+    """Return what evolution would, as if nothing came of it."""
+    batch = programs.batch(recipe)
+    packed = job.state or pack(batch.init())
+    rows = range(len(batch.experiments))
+    begun = -1 if job.state is None else job.state.generation
+    lines = [[line_of(g) for _ in rows] for g in range(begun + 1, job.until + 1)]
+    arrays: dict[str, Any] = {"generation": np.full(len(rows), job.until, np.int32)}
+    arrays |= {name: np.zeros_like(packed.arrays[name]) for name in ("fitness", "terms", "outcome")}
+    after = packed.with_arrays(arrays)
+    ends = [row for row in rows if batch.experiments[row].config.evolution.generations == job.until]
+    champions = {row: champion_of(batch.experiments[row]) for row in ends}
+    return Advanced(after, lines, "", 1.0, len(rows), champions)
+
+
+def line_of(generation: int) -> dict[str, Any]:
+    """Return a line of the log of a run that has not got better."""
+    counts = {"sim_steps": 10, "failures": 0, "episodes": 4}
+    values = {"best": 0.5, "mean": 0.25, "forced": False, "term_distance": 0.5}
+    return {"generation": generation} | counts | values
+
+
+def champion_of(experiment: Experiment) -> Champion:
+    """Return the first genome of the first population."""
+    state = experiment.init()
+    known = {"fitness": jnp.ones_like(state.fitness), "terms": jnp.zeros_like(state.terms)}
+    return experiment.champion(dataclasses.replace(state, **known), {})
