@@ -87,7 +87,7 @@ def test_the_stored_champion_walks_the_stored_walk(store_walk):
     champion = read_champion(FOLDER / "champion.json", creature)
     certificate = json.loads((FOLDER / "certificate.json").read_text())
     assert certificate["passed"]
-    assert outdated(certificate, champion) is None
+    assert outdated(certificate, champion, creature) is None
     stored = np.load(FOLDER / "walk.npz")
     again = store_walk.arrays(record(creature, champion, config.seconds).window(config.warmup))
     assert again.keys() == set(stored)
