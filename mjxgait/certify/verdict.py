@@ -57,13 +57,13 @@ class Verdict:
             return self.contradiction
         return f"by other rules: {', '.join(self.other_rules)}" if self.other_rules else ""
 
-    def in_words(self, most: int = 2) -> str:
-        """A few words; of the criteria that fail, so many by name."""
+    def in_words(self) -> str:
+        """A few words; of the criteria that fail two by name."""
         if self.passed:
             return self.reservation or "certified"
         if not self.failed:
             return "has no criteria"
-        names, more = [c.name for c in self.failed[:most]], len(self.failed) - most
+        names, more = [c.name for c in self.failed[:2]], len(self.failed) - 2
         return f"fails {', '.join(names)}{f' and {more} more' if more > 0 else ''}"
 
 

@@ -66,7 +66,7 @@ class Run:
         document = self.certificate
         if document is None or not judged(document).certified:
             return False
-        return outdated(document, self.champion, str(self.creature.terrain)) is None
+        return outdated(document, self.champion, self.creature) is None
 
     @property
     def departure(self) -> "Departure":

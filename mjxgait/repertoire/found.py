@@ -25,8 +25,8 @@ class Found:
     """Of one cell.
 
     speed: m/s, along the heading that it was told. heading_off: deg, farthest from that. duty:
-    mean duty factor of the feet. lacks: why it is not certified; empty if it is, or has not been
-    examined.
+    mean duty factor of the feet. fails: criteria that it does not meet; none if it is certified, or
+    has not been examined. reservation: why it is not certified though it passes all.
     Numbers are None where there was no walk to measure.
     """
 
@@ -37,7 +37,8 @@ class Found:
     duty: float | None
     gait: str
     margin: float | None
-    lacks: str
+    fails: tuple[str, ...]
+    reservation: str = ""
 
 
 def found_in(folder: Path, grid: Grid) -> list[Found]:
@@ -60,7 +61,7 @@ def table(found: list[Found]) -> Table:
             one.gait,
             _number(one.margin),
             _number(one.heading_off),
-            "certified" if one.certified else one.lacks or "not examined",
+            "certified" if one.certified else " ".join(_reason(one)),
         )
     return shown
 
@@ -100,7 +101,7 @@ def _field(axes: Axes, one: Found, x: float, y: float) -> None:
 
 def _found(cell: Cell, document: dict[str, Any] | None) -> Found:
     if document is None:
-        return Found(cell, False, None, None, None, "", None, "")
+        return Found(cell, False, None, None, None, "", None, ())
     report, verdict = document["report"], judged(document)
     measures = [m for c in document["criteria"] for m in c["measures"]]
     off = [m["value"] for m in measures if m["name"].startswith("off the heading")]
@@ -113,14 +114,23 @@ def _found(cell: Cell, document: dict[str, Any] | None) -> Found:
         float(np.mean(duty)) if duty else None,
         report["gait"],
         verdict.margin,
-        "" if verdict.certified else verdict.in_words(most=3),
+        tuple(c.name for c in verdict.failed),
+        verdict.reservation,
     )
 
 
 def _said(one: Found) -> str:
     if one.certified:
         return f"{one.speed:.2f} m/s\n{one.gait}\nduty {one.duty:.2f}"
-    return "\n".join(textwrap.wrap(one.lacks or "not examined", LINE))
+    return "\n".join(_reason(one))
+
+
+def _reason(one: Found) -> list[str]:
+    """Why it is not certified, in words that are short."""
+    if not one.fails:
+        return textwrap.wrap(one.reservation or "not examined", LINE)
+    more = len(one.fails) - 3
+    return ["fails", *one.fails[:3], *([f"and {more} more"] if more > 0 else [])]
 
 
 def _number(value: float | None) -> str:
