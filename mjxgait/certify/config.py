@@ -115,7 +115,7 @@ class GaitConfig:
     duty_factor: tuple[Fraction, Fraction] = (0.15, 0.9)
     flicker: Positive = 5.0
     buzz: Positive = 0.35
-    amplitudes: Positive = 0.25
+    amplitudes: Positive = 0.28
     duties: Positive = 0.1
 
 
