@@ -9,6 +9,7 @@ import re
 import shutil
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -106,6 +107,22 @@ def test_tells_whether_the_certificate_is_the_champions(run):
     assert said().endswith("it was given under other rules than today's.")
     (run / CERTIFICATE).write_text("[]")
     assert "not a certificate" in said()
+
+
+def test_an_examination_again_ends_with_zero_only_if_all_is_equal(run, capsys, monkeypatch):
+    fingerprint = read_champion(run / CHAMPION, read_snapshot(run).creature).fingerprint
+    again = made_up_certificate(fingerprint)
+    found = SimpleNamespace(document=lambda: again)
+    monkeypatch.setattr("mjxgait.library.look.certify", lambda *_: found)
+    assert "not there" in said_by(capsys, "inspect", run, "--verify", code=2)
+    (run / CERTIFICATE).write_text(json.dumps(again))
+    assert "every measure is that" in said_by(capsys, "inspect", run, "--verify", code=0)
+    (run / CERTIFICATE).write_text(json.dumps(made_up_certificate(fingerprint, margin=0.4)))
+    said = said_by(capsys, "inspect", run, "--verify", code=1)
+    assert "2 progress, speed: 0.9 >= 0.5, again 1 >= 0.5" in said
+    assert "takes one run folder" in said_by(
+        capsys, "inspect", run, "--verify", "--individual", 1, code=2
+    )
 
 
 @pytest.mark.parametrize("text", ['{"schema": 1', "[]", "{}"], ids=["cut off", "a list", "empty"])
