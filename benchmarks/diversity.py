@@ -20,6 +20,7 @@ import mujoco
 import numpy as np
 
 import mjxgait
+from mjxgait.certify import judged
 from mjxgait.runs.folder import CERTIFICATE
 from mjxgait.search.state import NOBODY
 
@@ -73,7 +74,7 @@ def animal(folder: Path) -> Animal:
     model = mujoco.MjModel.from_xml_path(str(folder / "body" / "creature.xml"))
     return Animal(
         name=folder.name,
-        certified=told["passed"],
+        certified=judged(told).certified,
         speed=told["report"]["speed"],
         blocks=told["report"]["parts"],
         hinges=model.nv - 6,

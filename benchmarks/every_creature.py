@@ -20,7 +20,7 @@ import sys
 import time
 from pathlib import Path
 
-from mjxgait.certify import distance, outdated, read_certificate, survival
+from mjxgait.certify import distance, judged, outdated, read_certificate, survival
 from mjxgait.runs.folder import CERTIFICATE, METRICS, open_champion, open_run, read_metrics
 
 HEADER = (
@@ -98,13 +98,14 @@ def row(folder: Path, seed: int, wall: float) -> list[str]:
     seconds, evolved = config.rollout.seconds, champion.origin["nominal"]["forward"]
     examined = distance(creature, champion, seconds)
     starts = next(c for c in certificate["criteria"] if c["number"] == 4)["measures"][0]["value"]
-    margin = certificate["margin"]
+    margin, verdict = certificate["margin"], judged(certificate)
+    old = outdated(certificate, champion, creature)
     return [
         creature.name,
         str(seed),
-        "outdated" if outdated(certificate, champion) else "yes" if certificate["passed"] else "no",
+        "outdated" if old else "yes" if verdict.certified else "no",
         "none" if margin is None else f"{margin:.2f}",
-        " ".join(str(c["number"]) for c in certificate["criteria"] if not c["passed"]) or "-",
+        " ".join(map(str, verdict.numbers)) or "-",
         f"{certificate['report']['speed_body_lengths'] or 0:.2f}",
         f"{evolved / creature.frame.body_length / seconds:.2f}",
         f"{examined / creature.frame.body_length / seconds:.2f} ({examined / evolved - 1:+.0%})",

@@ -21,8 +21,10 @@ from pathlib import Path
 from typing import Any
 
 sys.path.append(str(Path(__file__).parents[1] / "tests"))
+import numpy as np
 from importing.packages import MODELS, model_file
 
+from mjxgait.certify import judged
 from mjxgait.runs.folder import CERTIFICATE, METRICS, read_metrics
 
 HEADER = (
@@ -85,17 +87,18 @@ def _mjxgait(log: Path, *command: str) -> str:
 
 
 def _findings(certificate: dict[str, Any], generations: int) -> list[str]:
-    measures = [m for c in certificate["criteria"] for m in c["measures"] if not m["passed"]]
-    values = ["none" if m["value"] is None else f"{m['value']:.3g}" for m in measures]
+    verdict = judged(certificate)
+    measures = [m for c in verdict.failed for m in c.measures if not m.passed]
+    values = ["none" if np.isnan(m.value) else f"{m.value:.3g}" for m in measures]
     report, margin = certificate["report"], certificate["margin"]
     return [
-        "yes" if certificate["passed"] else "no",
+        "yes" if verdict.certified else "no",
         "none" if margin is None else f"{margin:.2f}",
         f"{report['speed'] or 0:.2f}",
         f"{report['speed_body_lengths'] or 0:.2f}",
         str(report["gait"]),
         str(generations),
-        ", ".join(f"{m['name']} {value}" for m, value in zip(measures, values, strict=True)) or "-",
+        ", ".join(f"{m.name} {value}" for m, value in zip(measures, values, strict=True)) or "-",
     ]
 
 

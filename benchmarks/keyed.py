@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mjxgait.certify import read_certificate
+from mjxgait.certify import judged, read_certificate
 from mjxgait.creature import Creature, load_creature
 from mjxgait.keys.departure import departure_of
 from mjxgait.runs.folder import CERTIFICATE
@@ -110,8 +110,8 @@ def refined(folder: Path, name: str, keep: float, others: list[str]) -> dict[str
         return found | {"certified": False}
     apart = departure_of(run)
     return found | {
-        "certified": document["passed"],
-        "failed": [c["number"] for c in document["criteria"] if not c["passed"]],
+        "certified": judged(document).certified,
+        "failed": judged(document).numbers,
         "summary": document["report"]["summary"],
         "poses_deg": round(apart.poses, 1),
         "moved_deg": None if apart.moved is None else round(apart.moved, 1),

@@ -18,6 +18,7 @@ import tempfile
 import time
 from pathlib import Path
 
+from mjxgait.certify import judged
 from mjxgait.library import load_creature
 from mjxgait.parts.wishes import NATURAL
 from mjxgait.settings.gaits import GAITS
@@ -77,12 +78,8 @@ def run(env: str, wish: list[str], seed: int, more: list[str]) -> dict:
         seconds = time.perf_counter() - began
         lines = (folder / "metrics.jsonl").read_text(encoding="utf-8").splitlines()
         certificate = json.loads((folder / "certificate.json").read_text(encoding="utf-8"))
-    failed = [
-        f"{criterion['number']} {measure['name']}"
-        for criterion in certificate["criteria"]
-        for measure in criterion["measures"]
-        if not measure["passed"]
-    ]
+    verdict = judged(certificate)
+    failed = [f"{c.number} {m.name}" for c in verdict.failed for m in c.measures if not m.passed]
     likeness = certificate["report"]["likeness"]
     return {
         "creature": env,
@@ -92,7 +89,7 @@ def run(env: str, wish: list[str], seed: int, more: list[str]) -> dict:
         "gait": certificate["report"]["gait"],
         "stride": round(likeness["stride"] or float("nan"), 2),
         "duty_factor": round(likeness["duty_factor"] or float("nan"), 2),
-        "certified": certificate["passed"],
+        "certified": verdict.certified,
         "margin": None if certificate["margin"] is None else round(certificate["margin"], 2),
         "fails": "; ".join(failed) or "-",
         "generations": json.loads(lines[-1])["generation"],

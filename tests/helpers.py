@@ -10,7 +10,7 @@ import jax
 import numpy as np
 import pytest
 
-from mjxgait.certify import CertificateConfig
+from mjxgait.certify import Certificate, CertificateConfig, Criterion, Measure
 from mjxgait.champion import Champion
 from mjxgait.cli import main
 from mjxgait.creature import Creature
@@ -23,6 +23,27 @@ from mjxgait.tasks.score import in_order
 from mjxgait.tasks.walk.fitness import signed_weights, terms_under
 
 STOOL = Path(__file__).parent / "data" / "stool"
+
+
+def made_up_certificate(
+    fingerprint: str,
+    *failed: tuple[int, str],
+    task: str = "walk",
+    margin: float = 0.5,
+    report: Mapping[str, Any] | None = None,
+    config: CertificateConfig | None = None,
+    **others: Any,
+) -> dict[str, Any]:
+    """The document of a certificate whose only criteria are those that failed, or one that passed."""
+    sign = -1 if failed else 1
+    criteria = tuple(
+        Criterion(number, name, (Measure("speed", 0.5 + sign * margin, ">=", 0.5, 1.0),))
+        for number, name in failed or [(2, "progress")]
+    )
+    told = {"ground": "flat", "summary": ""} | dict(report or {})
+    settings = config or CertificateConfig()
+    made = Certificate("stool", "", task, fingerprint, criteria, told, settings, 1.0)
+    return made.document() | others
 
 
 def small_config(**tables: dict) -> Config:

@@ -14,6 +14,7 @@ from mjxgait.certify.config import CertificateConfig
 from mjxgait.certify.criteria import Criterion, Measure
 from mjxgait.certify.rehearsal import rehearse
 from mjxgait.certify.standing import outdated, read_certificate, read_stress
+from mjxgait.certify.verdict import Verdict, criteria_of, judge, judged
 
 __all__ = [
     "Certificate",
@@ -21,9 +22,13 @@ __all__ = [
     "Criterion",
     "Glance",
     "Measure",
+    "Verdict",
     "certify",
+    "criteria_of",
     "distance",
     "glance",
+    "judge",
+    "judged",
     "outdated",
     "push_ladder",
     "read_certificate",

@@ -18,6 +18,7 @@ from mjxgait.certify.simulate import simulate
 from mjxgait.certify.starts import Starts, join, nominal_starts, perturbed_starts
 from mjxgait.certify.steering import told_to_turn
 from mjxgait.certify.tasks import demands_of, how_simulated
+from mjxgait.certify.verdict import Verdict, judge, judged
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 
@@ -45,13 +46,18 @@ class Certificate:
 
     @property
     def passed(self) -> bool:
-        """Whether all criteria pass."""
-        return all(c.passed for c in self.criteria)
+        """Whether there are criteria and all of them pass."""
+        return judge(self.criteria).passed
 
     @property
     def margin(self) -> float:
         """That of the worst criterion, by which candidates are ranked; positive when all pass."""
-        return min(c.margin for c in self.criteria)
+        return judge(self.criteria).margin
+
+    @property
+    def verdict(self) -> Verdict:
+        """As a reader of the file comes to it."""
+        return judged(self.document())
 
     def rows(self) -> list[tuple[str, str, str, str, str]]:
         """A table: criterion, measure, value, threshold, verdict."""
@@ -68,7 +74,11 @@ class Certificate:
         ]
 
     def to_json(self) -> str:
-        """The text of `certificate.json`; numbers that are not finite become null."""
+        """The text of `certificate.json`."""
+        return json.dumps(self.document(), indent=2, allow_nan=False) + "\n"
+
+    def document(self) -> dict[str, Any]:
+        """What `certificate.json` holds; numbers that are not finite become null."""
         document = {
             "schema": schema_of(self.task),
             "creature": self.creature,
@@ -92,7 +102,8 @@ class Certificate:
             "config": dataclasses.asdict(self.config),
             "seconds": round(self.seconds, 2),
         }
-        return json.dumps(_finite(document), indent=2, allow_nan=False) + "\n"
+        found: dict[str, Any] = _finite(document)
+        return found
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -105,7 +116,7 @@ class Glance:
     @property
     def margin(self) -> float:
         """That of the worst of its criteria."""
-        return min(c.margin for c in self.criteria)
+        return judge(self.criteria).margin
 
 
 def glance(
@@ -284,6 +295,7 @@ def _entry(measure: criteria.Measure) -> dict[str, Any]:
         "value": measure.value,
         "sense": measure.sense,
         "threshold": measure.threshold,
+        "room": measure.room,
         "passed": measure.passed,
         "margin": measure.margin,
     }

@@ -15,13 +15,15 @@ from mjxgait.settings.tables import STRICT, Count, Fraction, NonNegative, Positi
 class ProgressConfig:
     """2. strides: least number.
 
-    speed: body lengths/s. drift: over distance. second_half: its speed over the first half's.
+    speed: body lengths/s. drift: over distance. heading: deg off straight ahead, mean over a second.
+    second_half: its speed over the first half's.
     """
 
     __pydantic_config__ = STRICT
     strides: Count = 8
     speed: NonNegative = 0.5
     drift: Positive = 0.25
+    heading: Positive = 25.0
     second_half: Positive = 0.8
 
 
@@ -99,6 +101,10 @@ class GaitConfig:
       frequency: largest stride frequency, in units of 4.48 m^-0.14 Hz. stride_length: least, in hip
         heights.
       clearance: least, in hip heights. slip: largest, over the distance. duty_factor: range.
+      flicker: most touchdowns per stride that end no swing, mean of the feet.
+      buzz: strongest vibration of a joint over the speed of all joints.
+      amplitudes: largest difference of a joint's amplitude from its mirror image's, over the larger.
+      duties: largest difference between the duty factors of a left foot and of the right one.
     """
 
     __pydantic_config__ = STRICT
@@ -107,6 +113,10 @@ class GaitConfig:
     clearance: Positive = 0.03
     slip: Positive = 0.15
     duty_factor: tuple[Fraction, Fraction] = (0.15, 0.9)
+    flicker: Positive = 5.0
+    buzz: Positive = 0.35
+    amplitudes: Positive = 0.28
+    duties: Positive = 0.1
 
 
 @dataclasses.dataclass(frozen=True)

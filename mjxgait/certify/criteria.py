@@ -58,13 +58,13 @@ class Criterion:
 
     @property
     def passed(self) -> bool:
-        """Whether all measures pass."""
-        return all(m.passed for m in self.measures)
+        """Whether there are measures and all of them pass."""
+        return bool(self.measures) and all(m.passed for m in self.measures)
 
     @property
     def margin(self) -> float:
         """That of the worst measure."""
-        return min(m.margin for m in self.measures)
+        return min((m.margin for m in self.measures), default=-np.inf)
 
 
 def at_least(name: str, value: float, threshold: float, best: float | None = None) -> Measure:

@@ -28,6 +28,8 @@ class Dimensions:
     torque_limit: N·m per joint. joint_range: rad per joint, infinite where it has none.
     foot_places: forward and left of the trunk when standing, in m per foot.
     crawler: whether other parts than feet may touch the floor.
+    partner: joint on the other side, per joint; empty for a body without two like sides.
+    stand_tilt: deg of the trunk's up axis when standing.
     """
 
     stand_height: float
@@ -40,6 +42,8 @@ class Dimensions:
     foot_names: tuple[str, ...]
     foot_places: tuple[tuple[float, float], ...]
     crawler: bool = False
+    partner: tuple[int, ...] = ()
+    stand_tilt: float = 0.0
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -117,6 +121,7 @@ def dimensions(creature: Creature) -> Dimensions:
     axes = data.xmat[creature.trunk].reshape(3, 3) @ np.stack(
         [creature.frame.forward, creature.frame.left], 1
     )
+    up = data.xmat[creature.trunk].reshape(3, 3) @ creature.frame.up
     feet = foot_middles(creature, data.geom_xpos[None])[0]
     middles = (feet - data.xpos[creature.trunk]) @ axes
     return Dimensions(
@@ -133,6 +138,8 @@ def dimensions(creature: Creature) -> Dimensions:
         foot_names=creature.feet.names,
         foot_places=tuple((float(forward), float(left)) for forward, left in middles),
         crawler=len(creature.feet.ground) > 0,
+        partner=creature.mirror.partners if creature.mirror.symmetric else (),
+        stand_tilt=float(np.degrees(np.arccos(min(up[2], 1.0)))),
     )
 
 

@@ -21,10 +21,13 @@ class Fall:
     min_up: least product of the trunk's up axis with the world's. height: range of the trunk's
     height in standing heights.
     touch: whether a part that is neither foot nor ground contact is down when it touches the floor.
+    tilt: most deg by which the trunk of a walk leans more than in the standing pose; who leans more
+    is not down, but no walk.
     """
 
     __pydantic_config__ = STRICT
     min_up: Annotated[float, pydantic.Field(ge=-1, le=1)] = 0.5
+    tilt: Positive = 35.0
     height: tuple[NonNegative, Positive] = (0.5, 1.5)
     touch: bool = True
 

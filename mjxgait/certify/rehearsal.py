@@ -13,6 +13,7 @@ from mjxgait.certify.simulate import simulate
 from mjxgait.certify.starts import Starts, join
 from mjxgait.certify.steering import told_to_turn
 from mjxgait.certify.tasks import demands_of
+from mjxgait.certify.verdict import judge
 from mjxgait.certify.watch import Watch
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
@@ -75,4 +76,5 @@ def _cautious(well: np.ndarray, caution: float) -> float:
 
 
 def _worst(criteria: Sequence[Criterion]) -> float:
-    return min((criterion.margin for criterion in criteria), default=np.inf)
+    """Their margin; nothing that is not asked is in the way."""
+    return judge(criteria).margin if criteria else np.inf

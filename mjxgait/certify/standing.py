@@ -8,7 +8,9 @@ from typing import Any
 
 from mjxgait.certify.certificate import schema_of
 from mjxgait.champion import Champion
+from mjxgait.creature import Creature
 from mjxgait.errors import UserError
+from mjxgait.ground.spec import FLAT
 
 
 def read_certificate(path: Path) -> dict[str, Any] | None:
@@ -48,9 +50,9 @@ def _read(path: Path, parts: str, keys: set[str], command: str) -> dict[str, Any
     return document
 
 
-def outdated(document: dict[str, Any], champion: Champion) -> str | None:
+def outdated(document: dict[str, Any], champion: Champion, creature: Creature) -> str | None:
     """A sentence that says why a certificate does not count for this champion; None when it is of
-    this one.
+    this one, of its task, and of the ground of this creature.
 
     Times of files tell nothing: copying a run, or writing the same champion once more, changes
     them.
@@ -62,6 +64,14 @@ def outdated(document: dict[str, Any], champion: Champion) -> str | None:
             "The certificate is outdated: "
             "it was given to another champion than the one that is here now."
         )
+    if (task := document.get("task")) != champion.task:
+        return (
+            f"The certificate is outdated: it was given for the task {task}, "
+            f"the champion's is {champion.task}."
+        )
+    ground, here = document.get("report", {}).get("ground", FLAT), str(creature.terrain)
+    if ground != here:
+        return f"The certificate is outdated: it was given on {ground} ground, the run's is {here}."
     if document.get("schema") != schema_of(champion.task):
         return "The certificate is outdated: it was given under other rules than today's."
     return None

@@ -22,7 +22,10 @@ class CertifyOptions:
 
     With --env and --expressions it examines a program that was written by hand instead
     (docs/programs.md). Then nothing is written without --out, and the exit code is 0 if the program
-    is certified and 1 if it is not.
+    passes and 1 if it does not.
+
+    By other thresholds than the shipped ones (--config) nothing is certified: every command shows
+    such a certificate as "by other rules", with what differs.
 
     Attributes:
       run: Run folder.

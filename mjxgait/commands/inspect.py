@@ -19,7 +19,7 @@ PIPED_WIDTH = 160
 
 @dataclasses.dataclass(frozen=True)
 class InspectOptions:
-    """Tell what a checkpoint holds, without compiling or simulating.
+    """Tell what a checkpoint holds, without compiling; only --verify simulates.
 
     Attributes:
       path: Run folder, one of its checkpoints, or a folder full of runs.
@@ -27,6 +27,8 @@ class InspectOptions:
       individual: Everything about one member of the population; 1 is the best.
       all: Show the whole population instead of its best ten.
       diff: Two runs or checkpoints to compare.
+      verify: Examine the champion of a run again, and compare every measure with its certificate.
+        The exit code is 0 only if all are equal (docs/certificate.md).
       json: Print JSON for programs.
     """
 
@@ -35,6 +37,7 @@ class InspectOptions:
     individual: int | None = None
     all: bool = False
     diff: tuple[Path, Path] | None = None
+    verify: bool = False
     json: bool = False
 
 
@@ -55,6 +58,10 @@ def inspect_command(arguments: Sequence[str]) -> int:
             show(found, console)
         return 0
 
+    if options.verify:
+        found = _verified(options)
+        tell(found, _print_verified)
+        return 0 if found["equal"] else 1
     if options.diff:
         if (
             options.path is not None
@@ -84,3 +91,23 @@ def inspect_command(arguments: Sequence[str]) -> int:
             inspect.individual_facts(snapshot, options.individual), inspect.print_individual
         )
     return tell(inspect.facts(snapshot), partial(inspect.print_facts, few=not options.all))
+
+
+def _verified(options: InspectOptions) -> dict[str, Any]:
+    """What a second examination of a run's champion says of its certificate."""
+    others = options.generation, options.individual, options.diff
+    if options.path is None or any(option is not None for option in others) or options.all:
+        raise UserError("--verify takes one run folder and nothing else but --json")
+    from mjxgait.library import verify
+
+    differences = verify(options.path)
+    return {"run": str(options.path), "equal": not differences, "differences": differences}
+
+
+def _print_verified(found: dict[str, Any], console: Console) -> None:
+    if found["equal"]:
+        console.print("Examined again: every measure is that of the certificate.", markup=False)
+        return
+    console.print("Examined again: the certificate says something else.", markup=False)
+    for difference in found["differences"]:
+        console.print(f"  {difference}", markup=False)

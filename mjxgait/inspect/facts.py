@@ -12,7 +12,7 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
-from mjxgait.certify import outdated, read_certificate, read_stress
+from mjxgait.certify import judged, outdated, read_certificate, read_stress
 from mjxgait.certify.likeness import in_words
 from mjxgait.errors import UserError
 from mjxgait.inspect.genomes import view_of
@@ -23,6 +23,7 @@ from mjxgait.parts.registry import what_ends
 from mjxgait.runs.folder import CERTIFICATE, STRESS, kept_champion
 from mjxgait.runs.lock import running
 from mjxgait.search.state import Origin
+from mjxgait.settings.tables import flat
 from mjxgait.tasks.protocol import Task
 
 KINDS = {
@@ -79,13 +80,15 @@ def certificate(snapshot: Snapshot) -> str:
     document = _certificate(snapshot)
     if isinstance(document, str):
         return document
-    failed = " ".join(str(c["number"]) for c in document["criteria"] if not c["passed"])
-    if failed:
-        return f"The champion fails criteria {failed}."
+    found = judged(document)
+    if not found.passed:
+        failed = " ".join(map(str, found.numbers))
+        told = f"fails criteria {failed}" if failed else "is not certified: there are no criteria"
+        return f"The champion {told}{f'; {found.reservation}' if found.reservation else ''}."
+    if found.reservation:
+        return f"The champion is not certified: it passes, but {found.reservation}."
     like = in_words(document.get("report", {}))
-    told = (
-        f"margin {document['margin']:.2f}. {like}" if like else f"margin {document['margin']:.2f}."
-    )
+    told = f"margin {found.margin:.2f}.{f' {like}' if like else ''}"
     return f"The champion is certified, {told}{_anywhere(snapshot)}"
 
 
@@ -104,17 +107,18 @@ def verdict(snapshot: Snapshot) -> dict[str, Any] | None:
     """The certificate of the run's champion in a few values; None where it has none that counts.
 
     speed: m/s. gait: its name. Both are None for what is no walk. anywhere: whether it walks there
-    too; None where nobody has tried.
+    too; None where nobody has tried. reservation: see `certify.Verdict`.
     """
     document = _certificate(snapshot)
     if isinstance(document, str):
         return None
-    report = document.get("report", {})
+    report, found = document.get("report", {}), judged(document)
     return {
-        "certified": document["passed"],
-        "failed": [c["number"] for c in document["criteria"] if not c["passed"]],
+        "certified": found.certified,
+        "failed": found.numbers,
+        "reservation": found.reservation,
         "anywhere": None if (stress := _stress(snapshot)) is None else stress["passed"],
-        "margin": document["margin"],
+        "margin": number(found.margin),
         "speed": report.get("speed"),
         "gait": report.get("gait"),
     }
@@ -129,7 +133,7 @@ def _certificate(snapshot: Snapshot) -> dict[str, Any] | str:
         if document is None:
             return "The champion has not been examined."
         champion = kept_champion(snapshot.run, snapshot.creature)
-        return outdated(document, champion) or document
+        return outdated(document, champion, snapshot.creature) or document
     except UserError as error:
         return str(error)
 
@@ -155,17 +159,6 @@ def settings_changed(snapshot: Snapshot) -> dict[str, dict[str, Any]]:
         for key in mine
         if mine[key] != default[key]
     }
-
-
-def flat(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """The leaves of nested tables by dotted key; tuples as lists, as TOML and JSON have them."""
-    leaves: dict[str, Any] = {}
-    for key, value in table.items():
-        if isinstance(value, Mapping):
-            leaves |= flat(value, f"{prefix}{key}.")
-        else:
-            leaves[prefix + key] = list(value) if isinstance(value, tuple) else value
-    return leaves
 
 
 def fitness_summary(fitness: np.ndarray) -> dict[str, Any]:

@@ -105,7 +105,7 @@ def _rounded(value: float | None) -> str:
 
 
 def _state(line: Mapping[str, Any]) -> str:
-    """Return what became of a run, in two words or three."""
+    """Return what became of a run, in two words or three; by other rules, with what differs."""
     if line["running"]:
         return "running"
     if line["trouble"]:
@@ -116,4 +116,6 @@ def _state(line: Mapping[str, Any]) -> str:
         return "not examined"
     if line["verdict"]["certified"]:
         return "anywhere" if line["verdict"]["anywhere"] else "certified"
+    if not line["verdict"]["failed"]:
+        return line["verdict"]["reservation"] or "has no criteria"
     return f"fails {' '.join(map(str, line['verdict']['failed']))}"

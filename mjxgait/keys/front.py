@@ -3,7 +3,9 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from mjxgait.certify import read_certificate
+import numpy as np
+
+from mjxgait.certify import criteria_of, judged, read_certificate
 from mjxgait.errors import UserError
 from mjxgait.keys.departure import departure
 from mjxgait.keys.refine import FARTHEST, KEYS, read_original
@@ -59,13 +61,13 @@ def look(run: Path) -> Kept:
     document = read_certificate(run / CERTIFICATE)
     if document is None:
         raise UserError(f"{run}: has no certificate yet; mjxgait refine --resume {run}")
-    criterion = next(c for c in document["criteria"] if c["number"] == STARTS)
+    found = {c.number: c for c in criteria_of(document)}
     walk = champion_of(run, LOOP_SECONDS).walk
     return Kept(
         kept_by(run),
         departure(read_original(run, walk.creature), walk).poses,
-        float(criterion["measures"][0]["value"] or 0.0),
-        bool(document["passed"]),
+        float(np.nan_to_num(found[STARTS].measures[0].value)),
+        judged(document).certified,
         walk,
     )
 

@@ -7,7 +7,7 @@ run.champion, run.certificate, run.metrics()
 mjxgait.walk(run)["trunk_z"]
 """
 
-from mjxgait.library.look import examine, examine_expressions, walk
+from mjxgait.library.look import examine, examine_expressions, verify, walk
 from mjxgait.library.make import load_creature, refine, train
 from mjxgait.library.run import Run, open
 
@@ -19,5 +19,6 @@ __all__ = [
     "open",
     "refine",
     "train",
+    "verify",
     "walk",
 ]

@@ -5,12 +5,14 @@ from pathlib import Path
 import numpy as np
 
 from mjxgait.certify import Certificate, CertificateConfig, certify
+from mjxgait.certify.verify import differences
 from mjxgait.creature.step import at_step
 from mjxgait.errors import UserError
 from mjxgait.library.make import load_creature
 from mjxgait.library.run import Place, Run, open
 from mjxgait.runs.exams import Exams
-from mjxgait.runs.folder import EXAMS
+from mjxgait.runs.folder import CERTIFICATE, EXAMS
+from mjxgait.runs.own import command
 from mjxgait.settings.tables import build, read_toml
 
 
@@ -32,6 +34,25 @@ def examine(run: Run | Place, config: Place | None = None) -> Certificate:
     return certify(
         known.creature, champion, build(CertificateConfig, table, str(config)), attempts=attempt
     )
+
+
+def verify(run: Run | Place) -> list[str]:
+    """Examines the champion of a run again, by the thresholds of its certificate; writes nothing.
+
+    Returns what differs from the certificate, a phrase each: none where all measures are equal
+    (`certify.verify.TOLERANCE`).
+
+    Raises:
+      UserError: no run, no champion, no certificate, or thresholds of another version.
+    """
+    known = run if isinstance(run, Run) else open(run)
+    stored, path = known.certificate, known.folder / CERTIFICATE
+    if stored is None:
+        raise UserError(
+            f"{path}: not there; {command('certify', known.folder, run=known.folder)} examines the champion"
+        )
+    config = build(CertificateConfig, stored.get("config", {}), str(path))
+    return differences(stored, certify(known.creature, known.champion, config).document())
 
 
 def examine_expressions(

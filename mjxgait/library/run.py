@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mjxgait.certify import read_certificate
+from mjxgait.certify import judged, outdated, read_certificate
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 from mjxgait.runs.folder import (
@@ -62,9 +62,11 @@ class Run:
 
     @property
     def certified(self) -> bool:
-        """Whether its champion has passed every criterion."""
+        """Whether its champion has passed every criterion, by the shipped rules, on its ground."""
         document = self.certificate
-        return bool(document and document["passed"])
+        if document is None or not judged(document).certified:
+            return False
+        return outdated(document, self.champion, self.creature) is None
 
     @property
     def departure(self) -> "Departure":

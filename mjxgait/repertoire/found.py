@@ -1,6 +1,7 @@
 """What is reachable: cell by cell what the examiner found, as values, as a table and as a picture."""
 
 import dataclasses
+import textwrap
 from pathlib import Path
 from typing import Any
 
@@ -10,10 +11,13 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from rich.table import Table
 
-from mjxgait.certify import read_certificate
+from mjxgait.certify import judged, read_certificate
 from mjxgait.repertoire.grid import Cell, Grid
 from mjxgait.runs.folder import CERTIFICATE
 from mjxgait.viewing.style import DARK, MIDDLE, PALE
+
+LINE = 20
+"""Characters of a line in a field of the picture."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -22,7 +26,7 @@ class Found:
 
     speed: m/s, along the heading that it was told. heading_off: deg, farthest from that. duty:
     mean duty factor of the feet. fails: criteria that it does not meet; none if it is certified, or
-    has not been examined.
+    has not been examined. reservation: why it is not certified though it passes all.
     Numbers are None where there was no walk to measure.
     """
 
@@ -34,6 +38,7 @@ class Found:
     gait: str
     margin: float | None
     fails: tuple[str, ...]
+    reservation: str = ""
 
 
 def found_in(folder: Path, grid: Grid) -> list[Found]:
@@ -97,20 +102,20 @@ def _field(axes: Axes, one: Found, x: float, y: float) -> None:
 def _found(cell: Cell, document: dict[str, Any] | None) -> Found:
     if document is None:
         return Found(cell, False, None, None, None, "", None, ())
-    report = document["report"]
-    fails = [c["name"] for c in document["criteria"] if not c["passed"]]
+    report, verdict = document["report"], judged(document)
     measures = [m for c in document["criteria"] for m in c["measures"]]
     off = [m["value"] for m in measures if m["name"].startswith("off the heading")]
     duty = [share for share in report["duty_factor"].values() if share is not None]
     return Found(
         cell,
-        document["passed"],
+        verdict.certified,
         report["speed"],
         off[0] if off else None,
         float(np.mean(duty)) if duty else None,
         report["gait"],
-        document["margin"],
-        tuple(fails),
+        verdict.margin,
+        tuple(c.name for c in verdict.failed),
+        verdict.reservation,
     )
 
 
@@ -123,7 +128,7 @@ def _said(one: Found) -> str:
 def _reason(one: Found) -> list[str]:
     """Why it is not certified, in words that are short."""
     if not one.fails:
-        return ["not examined"]
+        return textwrap.wrap(one.reservation or "not examined", LINE)
     more = len(one.fails) - 3
     return ["fails", *one.fails[:3], *([f"and {more} more"] if more > 0 else [])]
 

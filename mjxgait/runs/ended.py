@@ -5,7 +5,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
 
-from mjxgait.certify import outdated, read_certificate
+from mjxgait.certify import judged, outdated, read_certificate
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.runs.examination import due, why_ended
@@ -58,11 +58,12 @@ def _certified(run: Path, creature: Creature, config: Config, stored: Stored) ->
         return None
     try:
         document = read_certificate(run / CERTIFICATE)
-        if document is None or outdated(document, kept_champion(run, creature)):
+        if document is None or outdated(document, kept_champion(run, creature), creature):
             return None
     except UserError:
         return None
-    return why_ended(generation, document["margin"]) if document["passed"] else None
+    verdict = judged(document)
+    return why_ended(generation, verdict.margin) if verdict.certified else None
 
 
 def _examined(run: Path, creature: Creature, config: Config) -> bool:
@@ -74,7 +75,7 @@ def _examined(run: Path, creature: Creature, config: Config) -> bool:
         return False
     if document is None:
         return config.examination.candidates == 0
-    return outdated(document, champion) is None
+    return outdated(document, champion, creature) is None
 
 
 def _onward(run: Path, config: Config, stored: Stored) -> str:

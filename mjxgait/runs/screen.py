@@ -106,7 +106,10 @@ class Screen:
             table.add_row(*row, style="bold" if row[-1] == "FAIL" else None)
         self.console.print(table)
         report, does = certificate.report, demands_of(certificate.task).verdict
-        verdict = f"Certified: {does}" if certificate.passed else "Not certified"
+        found = certificate.verdict
+        verdict = f"Certified: {does}" if found.certified else "Not certified"
+        if found.passed and found.reservation:
+            verdict = f"Not certified; it passes {found.reservation}"
         ground = report.get("ground", FLAT)
         where = "" if ground == FLAT else f" on {ground}"
         if certificate.attempts > 1:

@@ -46,10 +46,15 @@ WALKS_UP_TO = 0.5
 """Froude number from which four-legged animals trot rather than walk."""
 
 
-def stride_limit(mass: float) -> float:
-    """Hz; 1.2 times the trot-gallop transition frequency of an animal of this mass in kg,
-    `4.48 m^-0.14` (Heglund, Taylor & McMahon 1974).
+def transition(mass: float) -> float:
+    """Hz, at which an animal of this mass in kg changes from trot to gallop (Heglund, Taylor &
+    McMahon 1974).
     """
+    return 4.48 * mass**-0.14
+
+
+def stride_limit(mass: float) -> float:
+    """Hz; 1.2 times the trot-gallop transition frequency of an animal of this mass in kg."""
     return 1.2 * 4.48 * mass**-0.14
 
 

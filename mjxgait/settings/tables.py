@@ -146,3 +146,14 @@ def _without_none(value: Any) -> Any:
             return [_without_none(inner) for inner in value]
         case _:
             return value
+
+
+def flat(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """The leaves of nested tables by dotted key; tuples as lists, as TOML and JSON have them."""
+    leaves: dict[str, Any] = {}
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            leaves |= flat(value, f"{prefix}{key}.")
+        else:
+            leaves[prefix + key] = list(value) if isinstance(value, tuple) else value
+    return leaves

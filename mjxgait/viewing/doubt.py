@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mjxgait.certify import outdated, read_certificate
+from mjxgait.certify import judged, outdated, read_certificate
 from mjxgait.errors import UserError
 from mjxgait.runs.folder import CERTIFICATE
 from mjxgait.runs.own import command
@@ -23,12 +23,13 @@ def doubt(run: Path, walk: Walk) -> str:
         return f"Not certified: {'; '.join([*reasons, str(error)])}"
     if document is None:
         reasons.append(f"it has not been examined, which {command('certify', run, run=run)} does")
-    elif old := outdated(document, walk.champion):
+    elif old := outdated(document, walk.champion, walk.creature):
         reasons.append(old[0].lower() + old[1:].rstrip("."))
-    elif document["passed"]:
+    elif (verdict := judged(document)).certified:
         return ""
-    else:
-        failed = [c for c in document["criteria"] if not c["passed"]]
-        names = ", ".join(f"{c['number']} {c.get('name', '')}".strip() for c in failed)
+    elif failed := verdict.failed:
+        names = ", ".join(f"{c.number} {c.name}".strip() for c in failed)
         reasons.append(f"it fails {'criterion' if len(failed) == 1 else 'criteria'} {names}")
+    else:
+        reasons.append(verdict.reservation or "its certificate has no criteria")
     return f"Not certified: {'; '.join(reasons)}"

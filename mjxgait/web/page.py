@@ -10,10 +10,9 @@ from collections.abc import Iterable, Sequence
 from importlib import resources
 from io import BytesIO
 from pathlib import Path
-from typing import Any
 
 from mjxgait.animation import WalkLoop, build_glb, walk_loop
-from mjxgait.certify import outdated, read_certificate, read_stress
+from mjxgait.certify import Verdict, criteria_of, judged, outdated, read_certificate, read_stress
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
@@ -26,6 +25,11 @@ from mjxgait.viewing.style import Figures, figure
 from mjxgait.viewing.walk import Walk, record_walk
 
 RATE = 30
+CHECK = (
+    "This page proves nothing by itself. Whoever has the run folder can have the champion examined "
+    "again: <code>mjxgait inspect RUN --verify</code> compares every measure with the certificate "
+    "and ends with exit code 0 only if all are equal."
+)
 FAR = 1.7
 """Of the camera, in units of the creature's size."""
 
@@ -94,7 +98,7 @@ def _sections(run: Path, creature: Creature, champion: Champion, walk: Walk) -> 
     parts = ["<h2>The walk</h2>", *_images(gait_figures(walk), creature)]
     if fitness:
         parts += ["<h2>How it was learnt</h2>", *_images(fitness, creature)]
-    parts += ["<h2>Certificate</h2>", certificate_table(run, champion)]
+    parts += ["<h2>Certificate</h2>", certificate_table(run, creature, champion)]
     parts += ["<h2>Where it comes from</h2>", _origin(creature, champion)]
     return "\n".join(parts)
 
@@ -110,32 +114,35 @@ def _images(figures: Figures, creature: Creature) -> Iterable[str]:
         yield f'<div class="wide"><img alt="{alt}" src="data:image/svg+xml;base64,{data}"></div>'
 
 
-def certificate_table(run: Path, champion: Champion) -> str:
+def certificate_table(run: Path, creature: Creature, champion: Champion) -> str:
     """The criteria as a table, or why there is none."""
     document = read_certificate(run / CERTIFICATE)
     if document is None:
         return "<p>Not examined: <code>mjxgait certify</code> does it.</p>"
-    if reason := outdated(document, champion):
+    if reason := outdated(document, champion, creature):
         return f"<p>{html.escape(reason)} <code>mjxgait certify</code> examines this one.</p>"
-    try:
-        rows = [
-            [
-                f"{c['number']} {c['name']}",
-                m["name"],
-                _show(m["value"]),
-                f"{m['sense']} {m['threshold']:g}",
-                "pass" if m["passed"] else "fails",
-            ]
-            for c in document["criteria"]
-            for m in c["measures"]
+    rows = [
+        [
+            f"{c.number} {c.name}",
+            m.name,
+            _show(m.value),
+            f"{m.sense} {m.threshold:g}",
+            "pass" if m.passed else "fails",
         ]
-        verdict = "All criteria pass." if document["passed"] else "Not all criteria pass."
-    except (ValueError, KeyError, TypeError):
-        raise UserError(
-            f"{run / CERTIFICATE}: not a certificate; `mjxgait certify {run}` writes it anew"
-        ) from None
+        for c in criteria_of(document)
+        for m in c.measures
+    ]
     table = _table(("criterion", "measure", "value", "wanted", "verdict"), rows)
-    return f"<p>{verdict}</p>{table}{_anywhere(run, champion)}"
+    said = html.escape(_said(judged(document)))
+    return f"<p>{said}</p>{table}{_anywhere(run, champion)}<p>{CHECK}</p>"
+
+
+def _said(verdict: Verdict) -> str:
+    """The verdict in a sentence or two."""
+    said = "All criteria pass" if verdict.passed else "Not all criteria pass"
+    if verdict.reservation:
+        return f"Not certified. {said}, but {verdict.reservation}."
+    return f"{said}."
 
 
 def _anywhere(run: Path, champion: Champion) -> str:
@@ -195,5 +202,5 @@ def _is_number(text: str) -> bool:
         return False
 
 
-def _show(value: Any) -> str:
-    return "none" if value is None else f"{value:.3g}"
+def _show(value: float) -> str:
+    return "none" if math.isnan(value) else f"{value:.3g}"

@@ -7,7 +7,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 from rich.table import Table
 
-from mjxgait.certify import read_certificate
+from mjxgait.certify import judged, read_certificate
 from mjxgait.runs.folder import CERTIFICATE, CHAMPION
 from mjxgait.viewing.cast import champion_of
 from mjxgait.viewing.stage import Stage
@@ -21,22 +21,15 @@ SIZE = (420, 300)
 
 @dataclasses.dataclass(frozen=True)
 class Found:
-    """Of one run. summary: what the examiner says of its motion; fails: criteria that it does not meet."""
+    """Of one run. summary: what the examiner says of its motion; margin: None before an examination."""
 
     folder: Path
     examined: bool
     certified: bool
     summary: str
     margin: float | None
-    fails: tuple[str, ...]
-
-    @property
-    def verdict(self) -> str:
-        """In a few words."""
-        if not self.examined:
-            return "not examined"
-        more = f" and {len(self.fails) - 2} more" if len(self.fails) > 2 else ""
-        return "certified" if self.certified else f"fails {', '.join(self.fails[:2])}{more}"
+    verdict: str
+    """In a few words."""
 
 
 def found_in(folders: Sequence[Path]) -> list[Found]:
@@ -82,7 +75,6 @@ def draw_zoo(drawing: Figure, name: str, found: Sequence[Found]) -> None:
 def _found(folder: Path) -> Found:
     document = read_certificate(folder / CERTIFICATE)
     if document is None:
-        return Found(folder, False, False, "", None, ())
-    fails = tuple(c["name"] for c in document["criteria"] if not c["passed"])
-    summary = document["report"].get("summary", "")
-    return Found(folder, True, document["passed"], summary, document["margin"], fails)
+        return Found(folder, False, False, "", None, "not examined")
+    verdict, summary = judged(document), document["report"].get("summary", "")
+    return Found(folder, True, verdict.certified, summary, verdict.margin, verdict.in_words())

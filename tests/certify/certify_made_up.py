@@ -90,6 +90,7 @@ DOG = Dimensions(
     joint_range=((-0.8, 0.5),) * 4,
     foot_names=tuple(LEGS),
     foot_places=tuple(LEGS.values()),
+    partner=(1, 0, 3, 2),
 )
 
 
@@ -124,4 +125,5 @@ def walk(
         body_speed=still + 2.0,
         overlap_pairs=(("trunk", "hind_left"), ("front_left", "hind_left")),
         overlap=np.zeros((len(time), 2)),
+        heading=still,
     )

@@ -59,7 +59,15 @@ def test_the_file_is_strict_json_with_value_threshold_and_verdict(certificate):
     assert document["passed"] is certificate.passed
     assert [c["number"] for c in document["criteria"]] == list(range(1, 10))
     for measure in (m for c in document["criteria"] for m in c["measures"]):
-        assert set(measure) == {"name", "value", "sense", "threshold", "passed", "margin"}
+        assert set(measure) == {
+            "name",
+            "value",
+            "sense",
+            "threshold",
+            "room",
+            "passed",
+            "margin",
+        }
     assert document["report"]["gait"] in ("trot", "walk", "running walk")
     assert document["report"]["push_survival"]["2"] < 0.5
     assert 0.1 < document["report"]["push_that_fells_half"] <= 2.0

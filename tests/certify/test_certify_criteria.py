@@ -126,6 +126,8 @@ def aimless():
     good = walk()
     rng = np.random.default_rng(0)
     noise = np.cumsum(rng.normal(0, 0.02, (4400, 4)), 0)
+    # As far on the left as on the right.
+    noise /= noise[400:].std(0)
     # It wanders further than the dog's joints go, which is not what is to be found out here.
     return changed(
         good,

@@ -32,11 +32,14 @@ from mjxgait.certify.tasks import walk as demands
 CONFIG = CertificateConfig()
 AT = 3000
 """A frame within the window."""
+EARLY = 100
+"""One before it."""
 
 
 def leaner() -> Recording:
+    """It is down before the window begins: a fall counts from the first moment on."""
     good = walk()
-    return changed(good, trunk_up=np.where(np.arange(4400) == AT, 0.4, good.trunk_up))
+    return changed(good, trunk_up=np.where(np.arange(4400) == EARLY, 0.4, good.trunk_up))
 
 
 def ducker() -> Recording:
@@ -65,6 +68,47 @@ def once(name: str, value: float) -> Callable[[], Recording]:
     return fraud
 
 
+def waddler_astray() -> Recording:
+    """Its nose is off for three seconds."""
+    return changed(walk(), heading=np.radians(np.where(np.arange(4400) // 600 == 3, 30.0, 0.0)))
+
+
+def chatterer() -> Recording:
+    """Every foot loses the floor six times in each stance of 96 frames."""
+    good = walk()
+    held = np.arange(4400)[:, None] % 14 > 0
+    return changed(good, foot_force=np.where(held, good.foot_force, 0.0))
+
+
+def buzzer() -> Recording:
+    """A knee vibrates by 0.01 rad at 28 Hz."""
+    good = walk()
+    vibrates = np.sin(2 * np.pi * 28 * time_of(good))[:, None] * [0, 1.0, 0, 0]
+    return changed(good, joint_vel=good.joint_vel + 2 * np.pi * 28 * 0.01 * vibrates)
+
+
+def slumper() -> Recording:
+    """It leans by 40 degrees in one frame."""
+    good = walk()
+    leans = np.cos(np.radians(40.0))
+    return changed(good, trunk_up=np.where(np.arange(4400) == AT, leans, good.trunk_up))
+
+
+def limper() -> Recording:
+    """One leg swings at 70 % of the others' amplitude."""
+    good = walk()
+    return changed(good, joint_pos=good.joint_pos * [1, 1, 0.7, 1])
+
+
+def hopper() -> Recording:
+    """One foot stands for a sixth of the stride less than its partner."""
+    good = walk()
+    short = walk(duty=0.45)
+    force = good.foot_force.copy()
+    force[:, 3] = short.foot_force[:, 3]
+    return changed(good, foot_force=force)
+
+
 FRAUDS: dict[str, Callable[[], Recording]] = {
     "least upright": leaner,
     "least height": ducker,
@@ -74,6 +118,7 @@ FRAUDS: dict[str, Callable[[], Recording]] = {
     "shortest stride / mean stride": rocker,
     "speed (body lengths/s)": creeper,
     "drift / distance": drifter,
+    "off straight ahead (deg)": waddler_astray,
     "second half / first half": fader,
     "autocorrelation at stride period": aimless,
     "variation of stride period": unsteady,
@@ -83,6 +128,11 @@ FRAUDS: dict[str, Callable[[], Recording]] = {
     "worst foot's slip / distance": foot_slider,
     "least duty factor": flier,
     "greatest duty factor": stander,
+    "flicker of a foot per stride": chatterer,
+    "buzz of a joint / joint speed": buzzer,
+    "tilt beyond standing (deg)": slumper,
+    "left and right amplitudes": limper,
+    "left and right duty factors": hopper,
     "joint speed (rad/s)": once("joint_vel", -21.0),
     "joint past its range (rad)": once("joint_pos", -0.95),
     "body speed / sqrt(g h)": once("body_speed", 6.0),

@@ -6,8 +6,18 @@ import os
 
 import numpy as np
 import pytest
+from helpers import made_up_certificate
 
-from mjxgait.certify import CertificateConfig, certify, outdated, read_certificate
+from mjxgait.certify import (
+    CertificateConfig,
+    Criterion,
+    certify,
+    judge,
+    judged,
+    outdated,
+    read_certificate,
+)
+from mjxgait.certify.verify import differences
 from mjxgait.champion import read_champion, write_champion
 from mjxgait.errors import UserError
 from mjxgait.settings.tables import build
@@ -34,15 +44,17 @@ def run(tiny, trotter, tmp_path_factory):
 def test_a_certificate_is_of_the_champion_that_was_examined(run, tiny, trotter):
     document = read_certificate(run / "certificate.json")
     assert document["champion"] == trotter.fingerprint
-    assert outdated(document, trotter) is None
-    assert outdated(document, read_champion(run / "champion.json", tiny)) is None
+    assert outdated(document, trotter, tiny) is None
+    assert outdated(document, read_champion(run / "champion.json", tiny), tiny) is None
 
 
 def test_times_of_files_do_not_matter(run, tiny):
     os.utime(run / "certificate.json", (0, 0))
     assert (
         outdated(
-            read_certificate(run / "certificate.json"), read_champion(run / "champion.json", tiny)
+            read_certificate(run / "certificate.json"),
+            read_champion(run / "champion.json", tiny),
+            tiny,
         )
         is None
     )
@@ -63,16 +75,16 @@ def test_times_of_files_do_not_matter(run, tiny):
     ],
     ids=["pose", "tuning", "controller", "drive", "body"],
 )
-def test_whatever_moves_otherwise_is_another_champion(run, trotter, change):
+def test_whatever_moves_otherwise_is_another_champion(run, tiny, trotter, change):
     other = dataclasses.replace(trotter, **change(trotter))
-    assert "another champion" in outdated(read_certificate(run / "certificate.json"), other)
+    assert "another champion" in outdated(read_certificate(run / "certificate.json"), other, tiny)
 
 
-def test_fitness_and_origin_are_not_what_was_examined(run, trotter):
+def test_fitness_and_origin_are_not_what_was_examined(run, tiny, trotter):
     same = dataclasses.replace(
         trotter, fitness=9.0, terms={"distance": 1.0}, origin={"generation": 3}
     )
-    assert outdated(read_certificate(run / "certificate.json"), same) is None
+    assert outdated(read_certificate(run / "certificate.json"), same, tiny) is None
 
 
 def test_poses_in_single_precision_have_the_fingerprint_of_what_is_written(tiny, trotter, tmp_path):
@@ -85,10 +97,10 @@ def test_poses_in_single_precision_have_the_fingerprint_of_what_is_written(tiny,
     assert read_champion(tmp_path / "champion.json", tiny).fingerprint == single.fingerprint
 
 
-def test_a_certificate_that_does_not_say_whose_it_is_is_outdated(run, trotter):
+def test_a_certificate_that_does_not_say_whose_it_is_is_outdated(run, tiny, trotter):
     document = read_certificate(run / "certificate.json")
     del document["champion"]
-    assert "does not say which champion" in outdated(document, trotter)
+    assert "does not say which champion" in outdated(document, trotter, tiny)
 
 
 @pytest.mark.parametrize(
@@ -113,3 +125,84 @@ def test_the_file_is_read_as_written(run):
     assert read_certificate(run / "certificate.json") == json.loads(
         (run / "certificate.json").read_text()
     )
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [({"task": "hop"}, "for the task walk"), ({"terrain": "rough:0.2"}, "on flat ground")],
+)
+def test_a_certificate_is_of_one_task_and_one_ground(run, tiny, trotter, change, said):
+    document = read_certificate(run / "certificate.json")
+    ground = change.pop("terrain", "flat")
+    champion = dataclasses.replace(trotter, **change)
+    assert champion.fingerprint == trotter.fingerprint
+    assert said in outdated(document, champion, tiny.on(ground))
+
+
+def test_without_criteria_nothing_has_passed():
+    assert not judge(()).passed
+    assert not judge((Criterion(2, "progress", ()),)).passed
+    assert not judged(made_up_certificate("", criteria=[])).passed
+
+
+def test_a_stored_verdict_is_derived_from_its_measures():
+    good, bad = made_up_certificate("", margin=0.25), made_up_certificate("", (2, "progress"))
+    assert judged(good).certified
+    assert judged(good).margin == pytest.approx(0.25)
+    for lie in ({"passed": True}, {"passed": True, "margin": 0.9}):
+        verdict = judged(bad | lie)
+        assert not verdict.passed
+        assert verdict.margin == pytest.approx(-0.5)
+        assert verdict.contradiction.endswith("it says passed, its measures say failed")
+    assert not judged(good | {"passed": False}).certified
+    criteria = [bad["criteria"][0] | {"passed": True}]
+    assert judged(bad | {"criteria": criteria}).contradiction.endswith("otherwise of criteria 2")
+
+
+def test_a_certificate_of_an_earlier_version_has_the_margin_that_it_says():
+    document = made_up_certificate("", margin=0.25)
+    del document["criteria"][0]["measures"][0]["room"]
+    assert judged(document).margin == pytest.approx(0.25)
+    assert judged(document).certified
+
+
+def test_other_thresholds_are_told_but_not_those_of_other_tasks():
+    def rules(task="walk", **tables):
+        config = build(CertificateConfig, tables, "test")
+        return judged(made_up_certificate("", task=task, config=config))
+
+    lax = rules(progress={"drift": 5.0}, seconds=4.0)
+    assert lax.passed
+    assert not lax.certified
+    assert lax.other_rules == (
+        "seconds = 4.0 instead of 22.0",
+        "progress.drift = 5.0 instead of 0.25",
+    )
+    assert lax.in_words() == f"by other rules: {', '.join(lax.other_rules)}"
+    assert rules(hop={"near": 0.5}).certified
+    assert not rules("hop", hop={"near": 0.5}).certified
+    assert not rules("follow", swim={"speed": 0.01}).certified
+    assert not judged(made_up_certificate("") | {"config": None}).certified
+
+
+def test_an_examination_again_is_compared_measure_by_measure(run, tiny, trotter):
+    stored = read_certificate(run / "certificate.json")
+    again = certify(tiny, trotter, build(CertificateConfig, BRIEF, "test")).document()
+    assert differences(stored, again) == []
+    measure = stored["criteria"][1]["measures"][2]
+    for key, value in (("value", measure["value"] + 1e-5), ("threshold", 0.0)):
+        altered = json.loads(json.dumps(stored))
+        altered["criteria"][1]["measures"][2][key] = value
+        told = [said for said in differences(altered, again) if not said.startswith("the file")]
+        assert len(told) == 1
+        assert told[0].startswith("2 progress, speed (body lengths/s): ")
+    fewer = stored | {"criteria": stored["criteria"][1:]}
+    assert any(said.endswith("is missing") for said in differences(fewer, again))
+    assert differences(stored | {"task": "hop"}, again) == ["task: hop, again walk"]
+
+
+def test_numbers_that_none_is_are_equal():
+    document = made_up_certificate("") | {"creature_digest": ""}
+    document["criteria"][0]["measures"][0]["value"] = None
+    document["criteria"][0]["passed"] = document["passed"] = False
+    assert differences(document, document) == []

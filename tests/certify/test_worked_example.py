@@ -19,6 +19,12 @@ ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "worked-example.md").read_text(encoding="utf-8")
 CODE = re.search(r"```python\n(.*?)```", PAGE, re.DOTALL).group(1)
 FOLDER = ROOT / "docs" / "data" / "walk"
+NOT_STORED = {
+    "off straight ahead (deg)",
+    "buzz of a joint / joint speed",
+    "left and right amplitudes",
+}
+"""Measures of criteria 2, 3 and 7 that need more than `walk.npz` has."""
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +59,8 @@ def test_the_code_knows_nothing_of_the_examiner():
 
 
 def test_every_number_of_criteria_2_3_and_7_comes_out_by_hand(by_hand, certified):
-    assert by_hand.keys() == certified.keys()
+    assert by_hand.keys() | NOT_STORED == certified.keys()
+    assert not by_hand.keys() & NOT_STORED
     for name, value in by_hand.items():
         assert value == pytest.approx(certified[name], rel=1e-5), name
 
@@ -87,7 +94,7 @@ def test_the_stored_champion_walks_the_stored_walk(store_walk):
     champion = read_champion(FOLDER / "champion.json", creature)
     certificate = json.loads((FOLDER / "certificate.json").read_text())
     assert certificate["passed"]
-    assert outdated(certificate, champion) is None
+    assert outdated(certificate, champion, creature) is None
     stored = np.load(FOLDER / "walk.npz")
     again = store_walk.arrays(record(creature, champion, config.seconds).window(config.warmup))
     assert again.keys() == set(stored)

@@ -9,19 +9,21 @@ import re
 import shutil
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from helpers import said_by
+from helpers import made_up_certificate, said_by
 from inspection.made_up import FORCED, LAST, POPULATION
 
-from mjxgait.certify.certificate import SCHEMA
+from mjxgait.certify import CertificateConfig
 from mjxgait.certify.stress import Stress, StressConfig, Trial
 from mjxgait.champion import read_champion
 from mjxgait.cli import main
 from mjxgait.inspect import facts, individual_facts, read_snapshot, text
 from mjxgait.runs.folder import CERTIFICATE, CHAMPION, STRESS
 from mjxgait.runs.lock import locked
+from mjxgait.settings.tables import build
 
 
 def tell(capsys, *arguments):
@@ -77,26 +79,50 @@ def test_tells_whether_the_certificate_is_the_champions(run):
 
     snapshot = read_snapshot(run)
     fingerprint = read_champion(run / CHAMPION, snapshot.creature).fingerprint
-    certificate = {
-        "schema": SCHEMA,
-        "passed": False,
-        "margin": -1.0,
-        "champion": fingerprint,
-        "criteria": [{"number": 7, "passed": False, "measures": []}],
-    }
+    certificate = made_up_certificate(fingerprint, margin=0.25)
     assert said() == "The champion has not been examined."
-    (run / CERTIFICATE).write_text(json.dumps(certificate))
+    failing = made_up_certificate(fingerprint, (7, "gait"))
+    (run / CERTIFICATE).write_text(json.dumps(failing))
     assert said() == "The champion fails criteria 7."
-    (run / CERTIFICATE).write_text(
-        json.dumps(certificate | {"passed": True, "margin": 0.25, "criteria": []})
-    )
+    (run / CERTIFICATE).write_text(json.dumps(certificate))
     assert said() == "The champion is certified, margin 0.25."
-    (run / CERTIFICATE).write_text(json.dumps(certificate | {"champion": "other"}))
-    assert "outdated" in said()
+    (run / CERTIFICATE).write_text(json.dumps(certificate | {"criteria": []}))
+    assert said().startswith(
+        "The champion is not certified: there are no criteria; the file contra"
+    )
+    (run / CERTIFICATE).write_text(json.dumps(failing | {"passed": True}))
+    assert said() == (
+        "The champion fails criteria 7; the file contradicts itself: it says passed, its measures "
+        "say failed."
+    )
+    lax = build(CertificateConfig, {"progress": {"drift": 5.0}}, "lax")
+    (run / CERTIFICATE).write_text(json.dumps(made_up_certificate(fingerprint, config=lax)))
+    rules = "by other rules: progress.drift = 5.0 instead of 0.25"
+    assert said() == f"The champion is not certified: it passes, but {rules}."
+    assert not facts(read_snapshot(run))["verdict"]["certified"]
+    for key, value in (("champion", "other"), ("task", "hop"), ("report", {"ground": "rough:0.2"})):
+        (run / CERTIFICATE).write_text(json.dumps(certificate | {key: value}))
+        assert "outdated" in said(), key
     (run / CERTIFICATE).write_text(json.dumps(certificate | {"schema": 1}))
     assert said().endswith("it was given under other rules than today's.")
     (run / CERTIFICATE).write_text("[]")
     assert "not a certificate" in said()
+
+
+def test_an_examination_again_ends_with_zero_only_if_all_is_equal(run, capsys, monkeypatch):
+    fingerprint = read_champion(run / CHAMPION, read_snapshot(run).creature).fingerprint
+    again = made_up_certificate(fingerprint)
+    found = SimpleNamespace(document=lambda: again)
+    monkeypatch.setattr("mjxgait.library.look.certify", lambda *_: found)
+    assert "not there" in said_by(capsys, "inspect", run, "--verify", code=2)
+    (run / CERTIFICATE).write_text(json.dumps(again))
+    assert "every measure is that" in said_by(capsys, "inspect", run, "--verify", code=0)
+    (run / CERTIFICATE).write_text(json.dumps(made_up_certificate(fingerprint, margin=0.4)))
+    said = said_by(capsys, "inspect", run, "--verify", code=1)
+    assert "2 progress, speed: 0.9 >= 0.5, again 1 >= 0.5" in said
+    assert "takes one run folder" in said_by(
+        capsys, "inspect", run, "--verify", "--individual", 1, code=2
+    )
 
 
 @pytest.mark.parametrize("text", ['{"schema": 1', "[]", "{}"], ids=["cut off", "a list", "empty"])
@@ -132,13 +158,7 @@ def test_tells_whether_the_champion_walks_anywhere(run):
     """Of trials of this champion, and with the names of those that it fails."""
     snapshot = read_snapshot(run)
     fingerprint = read_champion(run / CHAMPION, snapshot.creature).fingerprint
-    certificate = {
-        "schema": SCHEMA,
-        "passed": True,
-        "margin": 0.5,
-        "champion": fingerprint,
-        "criteria": [],
-    }
+    certificate = made_up_certificate(fingerprint)
     (run / CERTIFICATE).write_text(json.dumps(certificate))
     trials = [Trial("bumps of 5%", 0.95, True), Trial("friction 0.4", 0.25, False)]
 
@@ -163,14 +183,7 @@ def test_a_folder_of_runs_tells_which_of_them_walk(run, capsys):
     snapshot = read_snapshot(run)
     fingerprint = read_champion(run / CHAMPION, snapshot.creature).fingerprint
     report = {"speed": 1.25, "gait": "trot", "summary": "trot, 1.25 m/s"}
-    certificate = {
-        "schema": SCHEMA,
-        "passed": True,
-        "margin": 0.5,
-        "champion": fingerprint,
-        "criteria": [{"number": 7, "passed": True, "measures": []}],
-        "report": report,
-    }
+    certificate = made_up_certificate(fingerprint, report=report)
 
     def told() -> str:
         code, said = tell(capsys, run.parent)
@@ -180,13 +193,13 @@ def test_a_folder_of_runs_tells_which_of_them_walk(run, capsys):
     assert "not examined" in told()
     (run / CERTIFICATE).write_text(json.dumps(certificate))
     assert re.search(r"0\.50 +1\.25 +trot .* certified", told())
-    failed = {
-        "passed": False,
-        "margin": -0.25,
-        "criteria": [{"number": 7, "passed": False, "measures": []}],
-    }
-    (run / CERTIFICATE).write_text(json.dumps(certificate | failed))
+    failed = made_up_certificate(fingerprint, (7, "gait"), margin=0.25, report=report)
+    (run / CERTIFICATE).write_text(json.dumps(failed))
     assert re.search(r"-0\.25 +1\.25 +trot .* fails 7", told())
+    lax = build(CertificateConfig, {"progress": {"drift": 5.0}}, "lax")
+    (run / CERTIFICATE).write_text(json.dumps(made_up_certificate(fingerprint, config=lax)))
+    assert "by other rules: progress.drift = 5.0 instead of 0.25" in " ".join(told().split())
+    assert not re.search(r"\bcertified", told())
     (run / CERTIFICATE).write_text(json.dumps(certificate | {"champion": "other"}))
     assert "not examined" in told()
 

@@ -6,10 +6,9 @@ import shutil
 from pathlib import Path
 
 import pytest
-from helpers import said_by
+from helpers import made_up_certificate, said_by
 from viewing.made_up import falling
 
-from mjxgait.certify.certificate import SCHEMA
 from mjxgait.champion import write_champion
 from mjxgait.runs.folder import CERTIFICATE, CHAMPION
 from mjxgait.viewing.doubt import doubt
@@ -21,15 +20,7 @@ def run(stool_run: Path, tmp_path: Path) -> Path:
 
 
 def certificate(walk, *failed: tuple[int, str], **others: object) -> str:
-    document = {
-        "schema": SCHEMA,
-        "passed": not failed,
-        "champion": walk.champion.fingerprint,
-        "criteria": [
-            {"number": n, "name": name, "passed": False, "measures": []} for n, name in failed
-        ],
-    }
-    return json.dumps(document | others)
+    return json.dumps(made_up_certificate(walk.champion.fingerprint, *failed) | others)
 
 
 def test_a_certified_champion_is_not_doubted(run: Path, stool_walk):

@@ -8,18 +8,19 @@ import re
 
 import numpy as np
 import pytest
+from helpers import made_up_certificate
 from viewing.browser import canvas, drawn, is_blank, watched_tab
 from viewing.made_up import treading, write_run
 
-from mjxgait.certify.certificate import SCHEMA
+from mjxgait.certify import CertificateConfig
 from mjxgait.certify.stress import Stress, StressConfig, Trial
 from mjxgait.cli import main
 from mjxgait.errors import UserError
 from mjxgait.runs.folder import CERTIFICATE, STRESS
+from mjxgait.settings.tables import build
 from mjxgait.web.page import certificate_table
 
-CERTIFIED = {
-    "schema": SCHEMA,
+CERTIFIED = made_up_certificate("") | {
     "passed": False,
     "criteria": [
         {
@@ -141,32 +142,45 @@ def test_the_page_names_no_place_outside_itself(page):
 def test_the_certificate_is_shown_as_long_as_it_is_this_champions(stool, tmp_path):
     champion = treading(stool)
     run = write_run(tmp_path / "run", stool, champion)
-    assert "Not examined" in certificate_table(run, champion)
+    assert "Not examined" in certificate_table(run, stool, champion)
     (run / CERTIFICATE).write_text(json.dumps(CERTIFIED | {"champion": champion.fingerprint}))
-    assert "Not all criteria pass." in certificate_table(run, champion)
-    assert "slip &lt;or&gt; slide" in certificate_table(run, champion)
-    assert "outdated" in certificate_table(run, treading(stool, degrees=3.0))
+    assert "Not all criteria pass." in certificate_table(run, stool, champion)
+    assert "slip &lt;or&gt; slide" in certificate_table(run, stool, champion)
+    assert "outdated" in certificate_table(run, stool, treading(stool, degrees=3.0))
     (run / CERTIFICATE).write_text(json.dumps(CERTIFIED))
-    assert "outdated" in certificate_table(run, champion)
+    assert "outdated" in certificate_table(run, stool, champion)
+    passing = made_up_certificate(champion.fingerprint)
+    (run / CERTIFICATE).write_text(json.dumps(passing))
+    assert "<p>All criteria pass.</p>" in certificate_table(run, stool, champion)
+    assert "inspect RUN --verify" in certificate_table(run, stool, champion)
+    (run / CERTIFICATE).write_text(json.dumps(passing | {"passed": False}))
+    assert "the file contradicts itself" in certificate_table(run, stool, champion)
+    lax = build(CertificateConfig, {"progress": {"drift": 5.0}}, "lax")
+    lenient = made_up_certificate(champion.fingerprint, config=lax)
+    (run / CERTIFICATE).write_text(json.dumps(lenient))
+    rules = "by other rules: progress.drift = 5.0 instead of 0.25"
+    assert f"Not certified. All criteria pass, but {rules}." in certificate_table(
+        run, stool, champion
+    )
     (run / CERTIFICATE).write_text("[]")
     with pytest.raises(UserError, match="not a certificate"):
-        certificate_table(run, champion)
+        certificate_table(run, stool, champion)
 
 
 def test_what_a_champion_bears_beyond_it_is_shown_beside_it(stool, tmp_path):
     champion = treading(stool)
     run = write_run(tmp_path / "run", stool, champion)
     (run / CERTIFICATE).write_text(json.dumps(CERTIFIED | {"champion": champion.fingerprint}))
-    assert "anywhere" not in certificate_table(run, champion)
+    assert "anywhere" not in certificate_table(run, stool, champion)
     trials = (Trial("bumps of 5%", 0.95, True), Trial("friction 0.4", 0.25, False))
     found = Stress(champion.fingerprint, trials, StressConfig())
     (run / STRESS).write_text(json.dumps(found.document()))
-    table = certificate_table(run, champion)
+    table = certificate_table(run, stool, champion)
     assert "It does not walk anywhere." in table
     assert re.search(r"friction 0.4.*25%.*fails", table)
     (run / STRESS).write_text("{}")
     with pytest.raises(UserError, match="mjxgait stress"):
-        certificate_table(run, champion)
+        certificate_table(run, stool, champion)
 
 
 def test_what_cannot_be_is_said(stool, stool_run, tmp_path, capsys):

@@ -5,8 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from mjxgait.certify.buzz import buzz
 from mjxgait.certify.config import CertificateConfig
-from mjxgait.certify.criteria import Criterion, at_least
+from mjxgait.certify.criteria import Criterion, at_least, at_most
 from mjxgait.certify.describe import worst_overlap
 from mjxgait.certify.measure import Recording
 from mjxgait.certify.outcome import Outcome
@@ -25,6 +26,8 @@ class TravelDemands(GoalDemands):
 
     verdict = "it travels from goal to goal"
     share = "share that travels"
+    revision = 1
+    """A buzz was in no criterion."""
 
     def wanted(self, config: CertificateConfig) -> TravelConfig:
         """See `GoalDemands`."""
@@ -54,6 +57,13 @@ class TravelDemands(GoalDemands):
                 at_least("second half's speed / first", kept, wanted.second_half, 1.0),
             ),
         )
+
+    def undisturbed(
+        self, whole: Recording, halved: Recording, config: CertificateConfig
+    ) -> tuple[Criterion, ...]:
+        """See `Demands`: as of all that have a goal, and 7: it does not get on by a vibration."""
+        shakes = at_most("buzz of a joint / joint speed", buzz(whole), config.gait.buzz)
+        return (*super().undisturbed(whole, halved, config), Criterion(7, "gait", (shakes,)))
 
     def report(self, whole: Recording, config: CertificateConfig) -> dict[str, Any]:
         """See `Demands`: how far it gets, and by how many goals."""

@@ -3,11 +3,13 @@
 Letters: `T` frames, `N` feet.
 """
 
+import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
+from mjxgait.certify.buzz import buzz
 from mjxgait.certify.config import CertificateConfig, GaitConfig, PeriodConfig, ProgressConfig
 from mjxgait.certify.criteria import (
     Criterion,
@@ -23,21 +25,25 @@ from mjxgait.certify.criteria import (
     upright,
 )
 from mjxgait.certify.describe import describe, slip_distance
-from mjxgait.certify.measure import Recording
+from mjxgait.certify.likeness import patter
+from mjxgait.certify.measure import Dimensions, Recording
 from mjxgait.certify.obstacle import obstacle
-from mjxgait.certify.outcome import Outcome
+from mjxgait.certify.outcome import Fall, Outcome
+from mjxgait.certify.sides import amplitudes_apart, duties_apart, sides
 from mjxgait.certify.strides import clearances, stride_frequency, stride_starts
 from mjxgait.certify.tasks.staying import StaysUp, to_the_end
 from mjxgait.certify.tasks.wishes import (
     as_asked,
     draw_commands,
     following,
+    heading_off,
     posture,
     steered,
     told_heading,
     unrolled,
 )
 from mjxgait.creature import Creature
+from mjxgait.settings.gaits import gait_of, transition
 
 SPARE = 1.2
 """How much faster than the certificate's least speed a gait should be in evolution before it is
@@ -55,6 +61,8 @@ class WalkDemands(StaysUp):
     """See `Demands`: steady strides that lead forward, in the manner of an animal."""
 
     verdict = "it walks"
+    revision = 1
+    """Flicker, buzz, tilt, heading and a limp were in no criterion."""
 
     def __init__(self, wish: Mapping[str, Any] | None = None) -> None:
         self.wish = dict(wish or {})
@@ -92,7 +100,7 @@ class WalkDemands(StaysUp):
         return (
             *basic(whole, config),
             half_step(whole, halved, config),
-            gait(window, config.gait),
+            gait(window, config.gait, self.wish),
             physics(window, config.physics),
             parts(window, config.parts),
             *wishes,
@@ -102,7 +110,7 @@ class WalkDemands(StaysUp):
         """See `Demands`."""
         whole = unrolled(whole, self.wish)
         window = whole.window(config.warmup)
-        told = describe(window, config.gait.clearance)
+        told = describe(window, config.gait.clearance) | {"sides": sides(window)}
         if self.wish:
             told |= {"asked": self.wish, "posture": posture(window)}
         found = {"obstacle": obstacle(whole, config)}
@@ -123,11 +131,18 @@ class WalkDemands(StaysUp):
 def basic(whole: Recording, config: CertificateConfig) -> tuple[Criterion, Criterion, Criterion]:
     """Criteria 1 to 3 of one recording."""
     window = whole.window(config.warmup)
+    stays = upright(whole, window, config.upright)
     return (
-        upright(whole, window, config.upright),
+        dataclasses.replace(stays, measures=(*stays.measures, lean(window, config.upright))),
         progress(window, config.progress),
         periodic(window, config.period),
     )
+
+
+def lean(window: Recording, config: Fall) -> Measure:
+    """Of criterion 1: how far the trunk leans, beyond what it does standing."""
+    most = np.degrees(np.arccos(np.clip(window.trunk_up.min(), -1, 1)))
+    return at_most("tilt beyond standing (deg)", most - window.dimensions.stand_tilt, config.tilt)
 
 
 def progress(window: Recording, config: ProgressConfig) -> Criterion:
@@ -151,6 +166,7 @@ def progress(window: Recording, config: ProgressConfig) -> Criterion:
                 config.speed,
             ),
             at_most("drift / distance", ratio(sideways, distance), config.drift),
+            at_most("off straight ahead (deg)", heading_off(window), config.heading),
             steady(first, second, config.second_half),
         ),
     )
@@ -213,39 +229,59 @@ def half_step(whole: Recording, halved: Recording, config: CertificateConfig) ->
     )
 
 
-def gait(window: Recording, config: GaitConfig) -> Criterion:
+def gait(window: Recording, config: GaitConfig, wish: Mapping[str, Any] | None = None) -> Criterion:
     """7. A gait, not a buzz: slow, long strides; feet that leave the floor and do not slide on
-    it.
+    it; left and right that do the same.
     """
+    return Criterion(7, "gait", (*_strides(window, config), *_manner(window, config, wish or {})))
+
+
+def _manner(window: Recording, config: GaitConfig, wish: Mapping[str, Any]) -> tuple[Measure, ...]:
+    """The measures of 7 that tell a vibration and a limp."""
+    measures = (
+        at_most("flicker of a foot per stride", patter(window), config.flicker),
+        at_most("buzz of a joint / joint speed", buzz(window), config.buzz),
+    )
+    if not two_like_sides(wish, window.dimensions):
+        return measures
+    return (
+        *measures,
+        at_most("left and right amplitudes", amplitudes_apart(window), config.amplitudes),
+        at_most("left and right duty factors", duties_apart(window), config.duties),
+    )
+
+
+def two_like_sides(wish: Mapping[str, Any], size: Dimensions) -> bool:
+    """Whether left and right have the same to do: not on a circle, nor where a gait is asked for
+    that leads with one side.
+    """
+    leads = "gait" in wish and not gait_of(wish["gait"], len(size.foot_names)).twice
+    return bool(size.partner) and not wish.get("turn") and not leads
+
+
+def _strides(window: Recording, config: GaitConfig) -> tuple[Measure, ...]:
+    """The measures of 7 that strides and feet give."""
     size = window.dimensions
     frequency = stride_frequency(window, config.clearance)
     duty = window.contact.mean(0)
     low, high = config.duty_factor
-    return Criterion(
-        7,
-        "gait",
-        (
-            at_most(
-                "stride frequency / animal's",
-                frequency / (4.48 * size.mass**-0.14),
-                config.frequency,
-            ),
-            at_least(
-                "stride length / hip height",
-                speed(window) / frequency / size.hip_height,
-                config.stride_length,
-            ),
-            at_least(
-                "least clearance / hip height",
-                clearances(window).min(initial=np.inf) / size.hip_height,
-                config.clearance,
-            ),
-            at_most(
-                "worst foot's slip / distance",
-                ratio(slip_distance(window).max(), distance(window)),
-                config.slip,
-            ),
-            at_least("least duty factor", duty.min(), low),
-            Measure("greatest duty factor", float(duty.max()), "<=", high, 1 - high),
+    return (
+        at_most("stride frequency / animal's", frequency / transition(size.mass), config.frequency),
+        at_least(
+            "stride length / hip height",
+            speed(window) / frequency / size.hip_height,
+            config.stride_length,
         ),
+        at_least(
+            "least clearance / hip height",
+            clearances(window).min(initial=np.inf) / size.hip_height,
+            config.clearance,
+        ),
+        at_most(
+            "worst foot's slip / distance",
+            ratio(slip_distance(window).max(), distance(window)),
+            config.slip,
+        ),
+        at_least("least duty factor", duty.min(), low),
+        Measure("greatest duty factor", float(duty.max()), "<=", high, 1 - high),
     )

@@ -69,12 +69,16 @@ def steered(outcome: Outcome, told: np.ndarray, limits: WishesConfig) -> Criteri
 
 
 def following(config: CertificateConfig, wish: Wish, size: Dimensions) -> CertificateConfig:
-    """The thresholds with those that depend on the speed as the speed asked for has them.
+    """The thresholds with those that depend on the speed as the speed asked for has them. Whoever is
+    to carry its nose high or low may lean by so much more.
 
     The least speed is no more than a share of the one asked for, which is held from both sides by a
     criterion of its own, and the least stride no more than half of an animal's at that speed: a slow
     walk has short strides.
     """
+    if "pitch" in wish:
+        tilt = config.upright.tilt + abs(wish["pitch"])
+        config = dataclasses.replace(config, upright=dataclasses.replace(config.upright, tilt=tilt))
     if "speed" not in wish:
         return config
     asked = wish["speed"]
