@@ -5,6 +5,7 @@ The browser test needs Chromium (apt: chromium) and playwright.
 
 import json
 import os
+import socket
 import subprocess
 import sys
 import threading
@@ -112,6 +113,23 @@ def test_only_this_machine_can_reach_it(site):
     for path in ("/../config.toml", "/config.toml", "/walk.glb"):
         with pytest.raises(urllib.error.HTTPError, match="404"):
             get(address + path)
+
+
+def test_idle_connections_leave_no_room_for_more_and_are_closed(run, monkeypatch):
+    monkeypatch.setattr("mjxgait.web.live.CONNECTIONS", 2)
+    monkeypatch.setattr("mjxgait.web.live._Handler.timeout", 0.5)
+    server = open_server(Watcher(run), 0)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    place = (HERE, server.server_port)
+    idle = [socket.create_connection(place, 10) for _ in range(2)]
+    one_more = socket.create_connection(place, 10)
+    assert one_more.recv(1) == b""
+    assert [connection.recv(1) for connection in idle] == [b"", b""]
+    assert get(f"http://{HERE}:{server.server_port}/state.json")
+    for connection in (*idle, one_more):
+        connection.close()
+    server.shutdown()
+    server.server_close()
 
 
 def test_a_port_that_is_taken_is_said(site, run):
