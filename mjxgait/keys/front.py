@@ -59,12 +59,16 @@ def look(run: Path) -> Kept:
     document = read_certificate(run / CERTIFICATE)
     if document is None:
         raise UserError(f"{run}: has no certificate yet; mjxgait refine --resume {run}")
-    criterion = next(c for c in document["criteria"] if c["number"] == STARTS)
+    held = [
+        m["value"] for c in document["criteria"] if c["number"] == STARTS for m in c["measures"]
+    ]
+    if not held:
+        raise UserError(f"{run / CERTIFICATE}: has no criterion {STARTS}; mjxgait certify {run}")
     walk = champion_of(run, LOOP_SECONDS).walk
     return Kept(
         kept_by(run),
         departure(read_original(run, walk.creature), walk).poses,
-        float(criterion["measures"][0]["value"] or 0.0),
+        float(held[0] or 0.0),
         bool(document["passed"]),
         walk,
     )

@@ -84,5 +84,5 @@ def _found(folder: Path) -> Found:
     if document is None:
         return Found(folder, False, False, "", None, ())
     fails = tuple(c["name"] for c in document["criteria"] if not c["passed"])
-    summary = document["report"].get("summary", "")
+    summary = document.get("report", {}).get("summary", "")
     return Found(folder, True, document["passed"], summary, document["margin"], fails)
