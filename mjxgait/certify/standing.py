@@ -31,9 +31,9 @@ class _Measure:
 class _Criterion:
     __pydantic_config__ = STORED
     number: Index
-    name: Text
     passed: Flag
     measures: list[_Measure]
+    name: Text = ""
 
 
 @dataclasses.dataclass(frozen=True)

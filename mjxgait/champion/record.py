@@ -231,11 +231,12 @@ def read_champion(path: Path, creature: Creature) -> Champion:
     try:
         document = read_json(path)
         if isinstance(document, Mapping) and document.get("schema") == SCHEMA:
-            check(_File, document, str(path), "damaged, or not a champion file")
+            check(_File, document, str(path), "nothing stands in its place")
         champion = _champion(document, creature, path)
         champion.check_finite(creature)
     except DamagedFile as error:
-        raise DamagedChampion(str(error)) from None
+        told = str(error).removeprefix(f"{path}: ")
+        raise DamagedChampion(f"{path}: damaged, or not a champion file ({told})") from None
     except UserError as error:
         told = str(error)
         raise UserError(told if str(path) in told else f"{path}: {told}") from None

@@ -98,7 +98,7 @@ def _found(cell: Cell, document: dict[str, Any] | None) -> Found:
     if document is None:
         return Found(cell, False, None, None, None, "", None, ())
     report = document.get("report", {})
-    fails = [c["name"] for c in document["criteria"] if not c["passed"]]
+    fails = [c.get("name", "") for c in document["criteria"] if not c["passed"]]
     measures = [m for c in document["criteria"] for m in c["measures"]]
     off = [m["value"] for m in measures if m["name"].startswith("off the heading")]
     duty = [share for share in report.get("duty_factor", {}).values() if share is not None]

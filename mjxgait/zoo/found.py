@@ -83,6 +83,6 @@ def _found(folder: Path) -> Found:
     document = read_certificate(folder / CERTIFICATE)
     if document is None:
         return Found(folder, False, False, "", None, ())
-    fails = tuple(c["name"] for c in document["criteria"] if not c["passed"])
+    fails = tuple(c.get("name", "") for c in document["criteria"] if not c["passed"])
     summary = document.get("report", {}).get("summary", "")
     return Found(folder, True, document["passed"], summary, document["margin"], fails)

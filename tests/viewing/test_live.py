@@ -154,7 +154,7 @@ def test_the_command_tells_its_address_and_ends(run):
 
 def test_a_training_can_be_followed(run, capfd):
     with following(run):
-        end = time.monotonic() + 20
+        end = time.monotonic() + 120
         said = ""
         while "http" not in said and time.monotonic() < end:
             time.sleep(0.1)
