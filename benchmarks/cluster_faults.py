@@ -26,6 +26,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "cluster"))
 
 from simulated import machines, workers
 
+from mjxgait.processes import python_command
 from mjxgait.runs.folder import read_metrics
 
 STOOL = Path(__file__).parents[1] / "tests" / "data" / "stool"
@@ -121,7 +122,7 @@ class Command:
         self.log = folder.with_suffix(".log")
         with self.log.open("a") as log:
             self.process = subprocess.Popen(
-                [sys.executable, "-m", "mjxgait", name, *map(str, given), "--cluster", address],
+                python_command("mjxgait", name, *map(str, given), "--cluster", address),
                 stdout=log,
                 stderr=subprocess.STDOUT,
             )

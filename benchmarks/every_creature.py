@@ -21,6 +21,7 @@ import time
 from pathlib import Path
 
 from mjxgait.certify import distance, judged, outdated, read_certificate, survival
+from mjxgait.processes import python_command
 from mjxgait.runs.folder import CERTIFICATE, METRICS, open_champion, open_run, read_metrics
 
 HEADER = (
@@ -70,19 +71,8 @@ def train(folder: Path, name: str, seed: int, more: list[str]) -> float:
     """Wall time of the run in s; the one noted beside it when it is there already. more: options."""
     note = folder.with_suffix(".wall")
     if not note.exists():
-        command = [
-            sys.executable,
-            "-m",
-            "mjxgait",
-            "train",
-            "--env",
-            name,
-            "--seed",
-            str(seed),
-            "--out",
-            str(folder),
-            "--no-plots",
-        ]
+        given = ["--env", name, "--seed", str(seed), "--out", str(folder), "--no-plots"]
+        command = python_command("mjxgait", "train", *given)
         began = time.perf_counter()
         subprocess.run([*command, *more], check=True, stdout=subprocess.DEVNULL)
         note.write_text(str(time.perf_counter() - began))

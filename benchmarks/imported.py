@@ -25,6 +25,7 @@ import numpy as np
 from importing.packages import MODELS, model_file
 
 from mjxgait.certify import judged
+from mjxgait.processes import python_command
 from mjxgait.runs.folder import CERTIFICATE, METRICS, read_metrics
 
 HEADER = (
@@ -80,7 +81,7 @@ def _mjxgait(log: Path, *command: str) -> str:
     """Runs a command, its output into a file; what it says last if it fails, else nothing."""
     log.parent.mkdir(parents=True, exist_ok=True)
     done = subprocess.run(
-        [sys.executable, "-m", "mjxgait", *command], capture_output=True, text=True, check=False
+        python_command("mjxgait", *command), capture_output=True, text=True, check=False
     )
     log.write_text(done.stdout + done.stderr, encoding="utf-8")
     return done.stderr.strip().splitlines()[-1] if done.returncode else ""

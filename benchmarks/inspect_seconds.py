@@ -7,13 +7,14 @@ import argparse
 import resource
 import statistics
 import subprocess
-import sys
+
+from mjxgait.processes import python_command
 
 
 def seconds(run: str) -> float:
     """Of one call, of all its processes; a busy machine changes it little."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    command = [sys.executable, "-m", "mjxgait", "inspect", run, "--json"]
+    command = python_command("mjxgait", "inspect", run, "--json")
     subprocess.run(command, capture_output=True, check=True)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     return (after.ru_utime + after.ru_stime) - (before.ru_utime + before.ru_stime)

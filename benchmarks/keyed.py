@@ -9,7 +9,6 @@ other options are handed on: `--config near.toml`.
 import argparse
 import json
 import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -18,6 +17,7 @@ import numpy as np
 from mjxgait.certify import judged, read_certificate
 from mjxgait.creature import Creature, load_creature
 from mjxgait.keys.departure import departure_of
+from mjxgait.processes import python_command
 from mjxgait.runs.folder import CERTIFICATE
 from mjxgait.settings.shipped import find_creature
 
@@ -98,7 +98,7 @@ def refined(folder: Path, name: str, keep: float, others: list[str]) -> dict[str
     """What became of a chart; others: options of the command."""
     file, run = write_cycle(folder, name), folder / name.replace(" ", "-")
     kind, began = CHARTS[name][0], time.perf_counter()
-    command = [sys.executable, "-m", "mjxgait", "refine", "--env", kind, "--keys", str(file)]
+    command = python_command("mjxgait", "refine", "--env", kind, "--keys", str(file))
     done = subprocess.run(
         [*command, "--out", str(run), "--keep", str(keep), *others], capture_output=True, text=True
     )

@@ -13,7 +13,6 @@ import argparse
 import json
 import os
 import subprocess
-import sys
 import tempfile
 import time
 from pathlib import Path
@@ -21,6 +20,7 @@ from pathlib import Path
 from mjxgait.certify import judged
 from mjxgait.library import load_creature
 from mjxgait.parts.wishes import NATURAL
+from mjxgait.processes import python_command
 from mjxgait.settings.gaits import GAITS
 
 ENVS = ("tall_quadruped", "short_quadruped", "crab", "duck")
@@ -71,7 +71,7 @@ def run(env: str, wish: list[str], seed: int, more: list[str]) -> dict:
     """One run of the command, and what came of it."""
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch) / "run"
-        command = [sys.executable, "-m", "mjxgait", "train", "--env", env, "--seed", str(seed)]
+        command = python_command("mjxgait", "train", "--env", env, "--seed", str(seed))
         command += [*wish, "--out", str(folder), "--no-plots", *more]
         began = time.perf_counter()
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL, env=dict(os.environ))

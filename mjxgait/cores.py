@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from mjxgait.errors import UserError
+from mjxgait.processes import SAFE_PATH, environment
 
 Item = TypeVar("Item")
 Done = TypeVar("Done")
@@ -26,17 +27,12 @@ def cores() -> int:
 
 @contextmanager
 def single_threaded() -> Iterator[None]:
-    """Processes that are started in here use one thread each for their linear algebra."""
-    before = {name: os.environ.get(name) for name in SINGLE_THREADED}
-    os.environ.update(SINGLE_THREADED)
-    try:
+    """Processes that are started in here use one thread each for their linear algebra.
+
+    None of them looks for modules in the current folder.
+    """
+    with environment({**SINGLE_THREADED, **SAFE_PATH}):
         yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
 
 
 @contextmanager

@@ -36,6 +36,7 @@ FLOORS = (
     ("settings",),
     ("ground", "clips"),
     ("types", "cores"),
+    ("files", "processes"),
     ("errors",),
 )
 """The rooms, from the top down: each may import from the floors below it, and from itself."""

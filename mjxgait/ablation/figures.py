@@ -9,6 +9,7 @@ from scipy.stats import trim_mean
 
 from mjxgait.ablation.findings import Finding
 from mjxgait.ablation.plan import Plan
+from mjxgait.files import replaced
 from mjxgait.viewing.style import ACCENT, DARK, figure
 
 LINES = ("-", "--", "-.", ":")
@@ -34,7 +35,8 @@ def draw_intervals(findings: Sequence[Finding], measure: str, path: Path) -> Non
         axes.set_yticks(range(len(findings)), [finding.name for finding in findings])
         axes.invert_yaxis()
         axes.set(xlabel=measure, title="estimate with 95 % interval; dots are runs")
-        drawing.savefig(path, metadata={"Software": None})
+        with replaced(path) as beside:
+            drawing.savefig(beside, metadata={"Software": None})
 
 
 def draw_curves(plan: Plan, logs: Sequence[Mapping[str, Any]], path: Path) -> None:
@@ -65,4 +67,5 @@ def draw_curves(plan: Plan, logs: Sequence[Mapping[str, Any]], path: Path) -> No
             )
         axes.set(xlabel="generation", ylabel="best fitness (higher is better)")
         axes.legend(loc="best", fontsize=8)
-        drawing.savefig(path, metadata={"Software": None})
+        with replaced(path) as beside:
+            drawing.savefig(beside, metadata={"Software": None})

@@ -25,7 +25,8 @@ from mjxgait.cores import process_per_core, survivable
 from mjxgait.creature import Creature, load_creature
 from mjxgait.parts.own import load_all, loaded
 from mjxgait.runs.disk import disk_errors
-from mjxgait.runs.folder import CREATURE, METRICS, read_metrics
+from mjxgait.runs.folder import CREATURE, METRICS, read_metrics, read_records, write_lines
+from mjxgait.runs.stored import is_number
 
 MEASURED = "measured.jsonl"
 SECONDS, STARTS, SEED = 22.0, 16, 1000
@@ -77,7 +78,9 @@ class Result:
 
 def read_logs(folder: Path) -> list[dict[str, Any]]:
     """Every generation of every run that a study has logged so far."""
-    files = sorted((folder / GROUPS).glob(f"*/{METRICS}"), key=lambda file: int(file.parent.name))
+    found = (folder / GROUPS).glob(f"*/{METRICS}")
+    known = [file for file in found if is_number(file.parent.name)]
+    files = sorted(known, key=lambda file: int(file.parent.name))
     return [line for file in files for line in read_metrics(file)]
 
 
@@ -89,7 +92,11 @@ def measure(folder: Path, plan: Plan, tell: Callable[[int, int], None]) -> list[
     Raises:
       UserError: a process was killed from outside, or the folder cannot be written.
     """
-    known = {(line["variant"], line["seed"]): Result(**line) for line in _measured(folder)}
+    measured = _measured(folder)
+    if measured:  # a last line that was cut off goes, or the next would be written behind it
+        with disk_errors(folder):
+            write_lines(folder / MEASURED, measured)
+    known = {(line["variant"], line["seed"]): Result(**line) for line in measured}
     lines: dict[tuple[str, int], list[dict[str, Any]]] = {}
     for line in read_logs(folder):
         lines.setdefault((line["variant"], line["seed"]), []).append(line)
@@ -114,7 +121,7 @@ def measure(folder: Path, plan: Plan, tell: Callable[[int, int], None]) -> list[
 
 
 def _measured(folder: Path) -> list[dict[str, Any]]:
-    return read_metrics(folder / MEASURED)
+    return read_records(folder / MEASURED, Result)
 
 
 def _result(study: Study, run: Run, lines: Sequence[Mapping[str, Any]], judged: Judged) -> Result:

@@ -5,6 +5,7 @@ import csv
 import dataclasses
 import html
 import io
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ from mjxgait.ablation.findings import Finding, find, trim_of
 from mjxgait.ablation.measures import Result
 from mjxgait.ablation.plan import Plan
 from mjxgait.ablation.statistics import Estimate, share
+from mjxgait.files import replaced, write_text
 from mjxgait.ground.spec import FLAT
 from mjxgait.runs.disk import disk_errors
 
@@ -53,17 +55,15 @@ def write_report(
     """
     findings = find(plan, results)
     with disk_errors(folder):
-        (folder / "results.csv").write_text(_csv(results), encoding="utf-8")
-        pyarrow.parquet.write_table(
-            pyarrow.Table.from_pylist([dict(line) for line in logs]), folder / "generations.parquet"
-        )
+        write_text(folder / "results.csv", _csv(results))
+        with replaced(folder / "generations.parquet") as beside:
+            table = pyarrow.Table.from_pylist([dict(line) for line in logs])
+            pyarrow.parquet.write_table(table, beside)
         draw_intervals(findings, plan.study.measure, folder / "intervals.png")
         draw_curves(plan, logs, folder / "curves.png")
         text = markdown(plan, results, findings, command)
-        (folder / "report.md").write_text(text, encoding="utf-8")
-        (folder / "report.html").write_text(
-            _page(plan.study.question, text, folder), encoding="utf-8"
-        )
+        write_text(folder / "report.md", text)
+        write_text(folder / "report.html", _page(plan.study.question, text, folder))
     return folder / "report.md"
 
 
@@ -71,12 +71,12 @@ def markdown(
     plan: Plan, results: Sequence[Result], findings: Sequence[Finding], command: str
 ) -> str:
     """The report."""
-    study, base = plan.study, plan.variants[0]
+    study, base = plan.study, _plain(plan.variants[0])
     means = "Interquartile means" if trim_of(study.measure) else "Means"
     lines = [
-        f"# {study.question}",
+        f"# {_plain(study.question)}",
         "",
-        f"{study.env}: {len(plan.variants)} variants × {study.seeds} seeds "
+        f"{_plain(study.env)}: {len(plan.variants)} variants × {study.seeds} seeds "
         f"({'the same for all' if study.paired else 'each variant its own'}, from "
         f"{study.first_seed}), {study.generations} generations. Measure: {NAMES[study.measure]}"
         f"{_where(study.grounds[0])}.",
@@ -95,7 +95,7 @@ def markdown(
         "",
         "## What can be concluded, and what cannot",
         "",
-        *[f"- {_sentence(finding, base)}" for finding in findings[1:]],
+        *[f"- {_sentence(finding, plan.variants[0])}" for finding in findings[1:]],
         *[f"- {caution}" for caution in _cautions(plan, results)],
         "",
         "## Curves",
@@ -128,7 +128,7 @@ def _table(plan: Plan, results: Sequence[Result], findings: Sequence[Finding]) -
     for finding in findings:
         mine = [r for r in results if r.variant == finding.name]
         comparison = finding.comparison
-        cells = [finding.name, _estimate(finding.estimate)]
+        cells = [_plain(finding.name), _estimate(finding.estimate)]
         if comparison:
             cells += [
                 _estimate(comparison.difference, "+"),
@@ -161,16 +161,16 @@ def _elsewhere(plan: Plan, results: Sequence[Result]) -> list[str]:
 
 
 def _sentence(finding: Finding, base: str) -> str:
-    comparison = finding.comparison
+    comparison, name, base = finding.comparison, _plain(finding.name), _plain(base)
     assert comparison is not None
     gap = comparison.difference
     interval = f"({_number(gap.low, '+')} to {_number(gap.high, '+')})"
     if comparison.corrected < LEVEL:
         word = "better" if gap.value > 0 else "worse"
-        return f"“{finding.name}” is {word} than “{base}” by {_number(abs(gap.value))} {interval}."
+        return f"“{name}” is {word} than “{base}” by {_number(abs(gap.value))} {interval}."
     half = 0.5 * (gap.high - gap.low)
     return (
-        f"Between “{finding.name}” and “{base}” no difference is shown: {_number(gap.value, '+')} "
+        f"Between “{name}” and “{base}” no difference is shown: {_number(gap.value, '+')} "
         f"{interval}. That is not proof of none; with these seeds a difference of less than about "
         f"{_number(half)} would be missed."
     )
@@ -188,7 +188,7 @@ def _cautions(plan: Plan, results: Sequence[Result]) -> list[str]:
                 "The variants do not share fitness and starts, so their fitness values are not on "
                 "one scale; compare by `walk`."
             )
-    broken = [f"{r.variant}, seed {r.seed}" for r in results if not r.finite]
+    broken = [f"{_plain(r.variant)}, seed {r.seed}" for r in results if not r.finite]
     if broken:
         found.append(
             "Runs in which nobody could be judged (not finite), counted as the worst: "
@@ -203,7 +203,7 @@ def _cautions(plan: Plan, results: Sequence[Result]) -> list[str]:
             "generations are not equal cost."
         )
     found.append(
-        f"It holds for {plan.study.env} under these settings and this budget; another creature or "
+        f"It holds for {_plain(plan.study.env)} under these settings and this budget; another creature or "
         "a longer run may differ."
     )
     return found
@@ -218,13 +218,24 @@ def _csv(results: Sequence[Result]) -> str:
     writer.writerow([*names, *there])
     for result in results:
         own = [value for ground in grounds for value in result.elsewhere[ground]]
-        writer.writerow([*(getattr(result, name) for name in names), *own])
+        writer.writerow([*(_cell(getattr(result, name)) for name in names), *own])
     return text.getvalue()
+
+
+def _cell(value: Any) -> Any:
+    """A value of a CSV file; a text that a spreadsheet would take for a formula begins with a quote."""
+    formula = isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r"))
+    return f"'{value}" if formula else value
+
+
+def _plain(text: str) -> str:
+    """A user's text within Markdown: in one line, and neither HTML nor a link, a picture or a cell."""
+    return re.sub(r"([\\`<>\[\]|&])", r"\\\1", " ".join(text.split()))
 
 
 def _page(title: str, text: str, folder: Path) -> str:
     """The report as one page that needs nothing else."""
-    body = MarkdownIt("commonmark").enable("table").render(text)
+    body = MarkdownIt("commonmark", {"html": False}).enable("table").render(text)
     for name in ("intervals.png", "curves.png"):
         picture = base64.b64encode((folder / name).read_bytes()).decode()
         body = body.replace(f'src="{name}"', f'src="data:image/png;base64,{picture}"')

@@ -14,6 +14,7 @@ from mjxgait.animation.loop import WalkLoop
 from mjxgait.animation.skeleton import STILL, gltf_axes, resting, skeleton_of, travel, world_poses
 from mjxgait.animation.surface import far_end
 from mjxgait.errors import UserError
+from mjxgait.files import write_text
 
 ORDER = "ZXY"
 """In which a bone's angles are told, as most programs write them."""
@@ -26,7 +27,7 @@ def export_bvh(loop: WalkLoop, path: Path, travelling: bool = False) -> None:
       UserError: the file cannot be written.
     """
     try:
-        path.write_text(build_bvh(loop, travelling), encoding="utf-8")
+        write_text(path, build_bvh(loop, travelling))
     except OSError as error:
         raise UserError(f"{path}: cannot be written ({error.strerror})") from None
 

@@ -29,6 +29,7 @@ from mjxgait.animation.skeleton import (
     world_poses,
 )
 from mjxgait.errors import UserError
+from mjxgait.files import write_bytes
 
 ROUGHNESS = 0.75
 
@@ -40,7 +41,7 @@ def export_glb(loop: WalkLoop, path: Path, travelling: bool = False) -> None:
       UserError: the file cannot be written.
     """
     try:
-        path.write_bytes(build_glb(loop, travelling))
+        write_bytes(path, build_glb(loop, travelling))
     except OSError as error:
         raise UserError(f"{path}: cannot be written ({error.strerror})") from None
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
+from mjxgait.processes import python_command, safe_environment
 from mjxgait.settings.rollout import RolloutConfig
 
 POPULATIONS = (32, 128, 512, 2048, 8192)
@@ -65,7 +66,8 @@ def measure(creature: str, point: Point) -> dict[str, Any]:
     """One point, in a new process."""
     arguments = [creature, json.dumps(dataclasses.asdict(point))]
     result = subprocess.run(
-        [sys.executable, "-m", "mjxgait.bench.scaling", *arguments],
+        python_command("mjxgait.bench.scaling", *arguments),
+        env=safe_environment(),
         capture_output=True,
         text=True,
         check=True,

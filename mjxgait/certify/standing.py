@@ -2,15 +2,83 @@
 lies beside them.
 """
 
-import json
+import dataclasses
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+import pydantic
 
 from mjxgait.certify.certificate import schema_of
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
-from mjxgait.errors import UserError
+from mjxgait.files import DamagedFile, read_json
 from mjxgait.ground.spec import FLAT
+from mjxgait.settings.tables import STORED, Flag, Index, Number, Text, check
+
+_NAMES = {"certify": "a certificate", "stress": "what `mjxgait stress` writes"}
+"""By the command that writes it."""
+
+
+@dataclasses.dataclass(frozen=True)
+class _Measure:
+    __pydantic_config__ = STORED
+    name: Text
+    value: Number | None
+    sense: Text
+    threshold: Number | None
+    passed: Flag
+
+
+@dataclasses.dataclass(frozen=True)
+class _Criterion:
+    __pydantic_config__ = STORED
+    number: Index
+    passed: Flag
+    measures: list[_Measure]
+    name: Text = ""
+
+
+@dataclasses.dataclass(frozen=True)
+class _Report:
+    """What is read of a report; each task has further keys."""
+
+    __pydantic_config__ = STORED
+    speed: Number | None = None
+    gait: Text | None = None
+    summary: Text = ""
+    duty_factor: dict[str, Number | None] = dataclasses.field(default_factory=dict)
+    likeness: dict[str, Number | None] = dataclasses.field(default_factory=dict)
+
+
+@dataclasses.dataclass(frozen=True)
+class _Certificate:
+    __pydantic_config__ = STORED
+    passed: Flag
+    margin: Number | None
+    criteria: list[_Criterion]
+    report: _Report = dataclasses.field(default_factory=_Report)
+    schema: Index = 0
+    champion: Text = ""
+
+    def __post_init__(self) -> None:
+        if self.passed and self.margin is None:
+            raise ValueError("what is passed has a margin")
+
+
+@dataclasses.dataclass(frozen=True)
+class _Trial:
+    __pydantic_config__ = STORED
+    name: Text
+    share: Annotated[float, pydantic.Field(strict=True, ge=0, le=1)]
+    passed: Flag
+
+
+@dataclasses.dataclass(frozen=True)
+class _Stress:
+    __pydantic_config__ = STORED
+    passed: Flag
+    trials: list[_Trial]
+    champion: Text = ""
 
 
 def read_certificate(path: Path) -> dict[str, Any] | None:
@@ -19,7 +87,7 @@ def read_certificate(path: Path) -> dict[str, Any] | None:
     Raises:
       UserError: it is not a certificate.
     """
-    return _read(path, "criteria", {"number", "passed", "measures"}, "certify")
+    return _read(path, _Certificate, "certify")
 
 
 def read_stress(path: Path, champion: Champion) -> dict[str, Any] | None:
@@ -29,25 +97,22 @@ def read_stress(path: Path, champion: Champion) -> dict[str, Any] | None:
     Raises:
       UserError: it is no such file.
     """
-    document = _read(path, "trials", {"name", "share", "passed"}, "stress")
+    document = _read(path, _Stress, "stress")
     return document if document and document.get("champion") == champion.fingerprint else None
 
 
-def _read(path: Path, parts: str, keys: set[str], command: str) -> dict[str, Any] | None:
-    """A document with a verdict and a list of parts with these keys. command: that writes it."""
+def _read(path: Path, schema: type, command: str) -> dict[str, Any] | None:
+    """A document as its schema says. command: that writes it."""
     if not path.exists():
         return None
+    cure = f"`mjxgait {command} {path.parent}` writes it anew"
     try:
-        document: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        whole = isinstance(document["passed"], bool) and all(
-            keys <= set(part) for part in document[parts]
-        )
-    except (OSError, ValueError, KeyError, TypeError):
-        whole = False
-    if not whole:
-        name = "a certificate" if command == "certify" else "what `mjxgait stress` writes"
-        raise UserError(f"{path}: not {name}; `mjxgait {command} {path.parent}` writes it anew")
-    return document
+        document = read_json(path)
+    except DamagedFile as error:
+        told = str(error).removeprefix(f"{path}: ")
+        raise DamagedFile(f"{path}: not {_NAMES[command]}: {told}; {cure}") from None
+    check(schema, document, f"{path}: not {_NAMES[command]}", cure)
+    return dict(document)
 
 
 def outdated(document: dict[str, Any], champion: Champion, creature: Creature) -> str | None:

@@ -11,6 +11,8 @@ from mjxgait.errors import UserError
 from mjxgait.settings.control import PoseConfig, gene_names
 from mjxgait.settings.tables import build
 
+MOST_POSES, SHORTEST = 1000, 1e-3
+"""Key poses of a cycle, and s that one takes; evolution stays far within both."""
 LATER = {"begin": 0.0, "turn": 0.0}
 """Genes that came later, and what they were before."""
 
@@ -35,6 +37,8 @@ class PoseCodec(PlainCodec):
     def genome(self, document: Mapping[str, Any], creature: Creature) -> dict[str, np.ndarray]:
         """See `Codec`."""
         poses = [[pose[name] for name in creature.joints.names] for pose in document["key_poses"]]
+        if not 1 <= len(poses) <= MOST_POSES:
+            raise ValueError(f"{len(poses)} key poses: a cycle has 1 to {MOST_POSES}")
         genes = LATER | document["tuning"]
         tuning = [genes[name] for name in gene_names(creature.corrections.steps)]
         return {"key_poses": np.array(poses, float), "tuning": np.array(tuning, float)}
@@ -58,6 +62,11 @@ class PoseCodec(PlainCodec):
                 raise UserError(
                     f'the tuning "{name}" is {value}: this champion cannot move; '
                     "take one of another generation"
+                )
+            if name == "period" and value < SHORTEST:
+                raise UserError(
+                    f"the period of its cycle is {value:g} s: this champion cannot move; take one "
+                    "of another generation"
                 )
 
     def shapes(self, settings: PoseConfig, creature: Creature) -> dict[str, tuple[int, ...]]:

@@ -19,7 +19,7 @@ from mjxgait.champion.reading import DEEPEST, Vocabulary, read_programs, to_arra
 from mjxgait.champion.simplify import simplified
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
-from mjxgait.settings.programs import ProgramConfig
+from mjxgait.settings.programs import MOST_NODES, ProgramConfig
 from mjxgait.settings.tables import build
 
 
@@ -53,6 +53,8 @@ class ProgramCodec(PlainCodec):
     def genome(self, document: Mapping[str, Any], creature: Creature) -> dict[str, np.ndarray]:
         """See `Codec`."""
         known, nodes = terminals(creature, tuple(ADDED.values())), int(document["nodes"])
+        if not 1 <= nodes <= MOST_NODES:
+            raise ValueError(f"nodes = {nodes}: an expression has 1 to {MOST_NODES}")
         texts = document["expressions"]
         if missing := [name for name in creature.joints.names if name not in texts]:
             raise UserError(f'no expression for joint "{missing[0]}"')

@@ -3,19 +3,22 @@
 import dataclasses
 import hashlib
 import json
+import reprlib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+import pydantic
 
 from mjxgait.champion.codecs import Genome, codec_of
 from mjxgait.creature import Creature
 from mjxgait.creature.proportions import grown, proportions
 from mjxgait.errors import UserError
+from mjxgait.files import DamagedFile, read_json, write_text
 from mjxgait.settings.config import Config
 from mjxgait.settings.control import DriveConfig
-from mjxgait.settings.tables import build
+from mjxgait.settings.tables import STORED, Index, Number, Text, build, check
 
 SCHEMA = 2
 """Champions of 1 had key poses without saying so, and the drive among the controller's settings."""
@@ -76,7 +79,13 @@ class Champion:
           UserError: its sizes are those of another creature.
         """
         codec = codec_of(self.controller)
-        body = codec.embodied(self.genome, self.settings, self.task, creature)
+        try:
+            body = codec.embodied(self.genome, self.settings, self.task, creature)
+        except (LookupError, TypeError, ValueError, ArithmeticError) as error:
+            raise UserError(
+                f"the champion's genome is damaged: no body grows from it ({error}); take one of "
+                "another generation"
+            ) from None
         return grown(body, self.sizes).spanned(self.pose_span)
 
     @property
@@ -158,13 +167,57 @@ def write_champion(champion: Champion, creature: Creature, path: Path) -> None:
         "terms": dict(champion.terms),
         "origin": dict(champion.origin),
     }
-    scratch = path.with_suffix(".tmp")
-    scratch.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
-    scratch.replace(path)
+    write_text(path, json.dumps(document, indent=2) + "\n")
 
 
-class DamagedChampion(UserError):
+class DamagedChampion(DamagedFile):
     """A file that is there and holds no champion."""
+
+
+def _plain(values: Mapping[str, Any]) -> Mapping[str, Any]:
+    """What was asked of a walk: numbers, a speed above zero, and the name of a gait."""
+    for name, value in values.items():
+        kind = str if name == "gait" else (int, float)
+        if not isinstance(value, kind) or isinstance(value, bool):
+            raise ValueError(f"{name} = {value!r} cannot be asked of a walk")
+        if name != "gait" and not np.isfinite(value):
+            raise ValueError(f"{name} = {value!r} is not a finite number")
+    if values.get("speed", 1.0) <= 0:
+        raise ValueError(f"speed = {values['speed']!r}: must be above zero")
+    return values
+
+
+@dataclasses.dataclass(frozen=True)
+class _Origin:
+    """Schema of `origin`."""
+
+    __pydantic_config__ = STORED
+    versions: dict[str, Text] = dataclasses.field(default_factory=dict)
+
+
+@dataclasses.dataclass(frozen=True)
+class _File:
+    """Schema of `champion.json`, but for what its controller alone knows."""
+
+    __pydantic_config__ = STORED
+    schema: Index
+    creature: Text
+    creature_digest: Text
+    task: Text
+    controller: Text
+    genome: dict[str, Any]
+    settings: dict[str, Any]
+    drive: dict[str, Any]
+    fitness: Number
+    terms: dict[str, Number | None]
+    origin: _Origin
+    sizes: dict[str, Annotated[float, pydantic.Field(strict=True, ge=0.01, le=100)]] = (
+        dataclasses.field(default_factory=dict)
+    )
+    wish: Annotated[dict[str, Any], pydantic.AfterValidator(_plain)] = dataclasses.field(
+        default_factory=dict
+    )
+    pose_span: Annotated[float, pydantic.Field(strict=True, ge=0, le=360)] = 0.0
 
 
 def read_champion(path: Path, creature: Creature) -> Champion:
@@ -173,17 +226,23 @@ def read_champion(path: Path, creature: Creature) -> Champion:
     Raises:
       UserError: the file is missing, damaged (`DamagedChampion`), or of another creature.
     """
+    if not path.exists():
+        raise UserError(f"{path}: no such file; the run has no champion yet")
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
+        document = read_json(path)
+        if isinstance(document, Mapping) and document.get("schema") == SCHEMA:
+            check(_File, document, str(path), "nothing stands in its place")
         champion = _champion(document, creature, path)
         champion.check_finite(creature)
+    except DamagedFile as error:
+        told = str(error).removeprefix(f"{path}: ")
+        raise DamagedChampion(f"{path}: damaged, or not a champion file ({told})") from None
     except UserError as error:
         told = str(error)
         raise UserError(told if str(path) in told else f"{path}: {told}") from None
-    except FileNotFoundError:
-        raise UserError(f"{path}: no such file; the run has no champion yet") from None
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise DamagedChampion(f"{path}: damaged, or not a champion file ({error!r})") from None
+    except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
+        told = reprlib.repr(str(error))
+        raise DamagedChampion(f"{path}: damaged, or not a champion file ({told})") from None
     return champion
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mjxgait import files
 from mjxgait.errors import UserError
 
 NOTE = "mjxgait"
@@ -56,14 +57,7 @@ def read_bytes(path: Path, most: int = MOST_BYTES) -> bytes:
     Raises:
       UserError: it is missing, empty, too large or cannot be read.
     """
-    try:
-        if not path.is_file():
-            raise UserError(f"{path}: no such file")
-        if path.stat().st_size > most:
-            raise UserError(f"{path}: larger than {most // 1_000_000} MB; export one clip only")
-        data = path.read_bytes()
-    except OSError as error:
-        raise UserError(f"{path}: cannot be read ({error.strerror})") from None
+    data = files.read_bytes(path, most)
     if not data:
         raise UserError(f"{path}: the file is empty")
     return data
@@ -71,10 +65,10 @@ def read_bytes(path: Path, most: int = MOST_BYTES) -> bytes:
 
 def read_text(path: Path) -> str:
     """The content of a text file; see `read_bytes`."""
-    try:
-        return read_bytes(path, MOST_TEXT).decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise UserError(f"{path}: not a text file in UTF-8") from None
+    text = files.read_text(path, MOST_TEXT)
+    if not text:
+        raise UserError(f"{path}: the file is empty")
+    return text
 
 
 def check_size(path: Path, bones: int, frames: int) -> None:

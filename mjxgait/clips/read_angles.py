@@ -6,11 +6,11 @@ its name ends with `_deg`. Columns of `mjxgait.walk` (`pos_NAME`) will do. JSON:
 """
 
 import csv
-import json
 from pathlib import Path
 
 import numpy as np
 
+from mjxgait import files
 from mjxgait.clips.clip import AngleTrack, check_numbers, check_size, check_times, read_text
 from mjxgait.errors import UserError
 
@@ -54,7 +54,7 @@ def read_json(path: Path) -> AngleTrack:
       UserError: says what it must hold.
     """
     try:
-        document = json.loads(read_text(path))
+        document = files.read_json(path)
         unit = document.get("unit", "rad")
         times = np.array(document["time"], float)
         named = {str(n): np.array(v, float) for n, v in document["joints"].items()}

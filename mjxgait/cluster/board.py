@@ -37,7 +37,7 @@ class Board:
     """What each machine is doing."""
 
     def __init__(self, console: Console | None = None) -> None:
-        self.console = console or Console(highlight=False, soft_wrap=True)
+        self.console = console or Console(highlight=False, soft_wrap=True, markup=False)
         self._live = Live(console=self.console, transient=True, refresh_per_second=A_SECOND)
         self._shown = 0.0
 

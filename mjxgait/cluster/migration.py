@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from mjxgait.runs.lineage import MOTHERS
+from mjxgait.runs.folder import MOTHERS
 from mjxgait.runs.packed import Packed
 from mjxgait.settings.islands import IslandsConfig
 

@@ -12,11 +12,12 @@ import tyro
 from mjxgait.creature import Creature, load_creature
 from mjxgait.creature.step import at_step
 from mjxgait.errors import INTERRUPTED, UserError
+from mjxgait.files import write_text
 from mjxgait.runs.folder import CREATURE, is_taken
 from mjxgait.runs.lock import locked
 from mjxgait.settings.rollout import Physics
 from mjxgait.settings.shipped import find_creature
-from mjxgait.settings.tables import build, dump_toml, read_toml
+from mjxgait.settings.tables import build, check_whole, dump_toml, read_toml
 
 STUDY = "study.toml"
 OVER = ("env", "seeds", "first_seed", "generations", "config", "rows", "physics")
@@ -202,8 +203,8 @@ def _create(folder: Path, study: Any, creature: Creature) -> None:
     try:
         (folder / CREATURE).mkdir(parents=True, exist_ok=True)
         for name, text in creature.files.items():
-            (folder / CREATURE / name).write_text(text, encoding="utf-8")
-        (folder / STUDY).write_text(dump_toml(study), encoding="utf-8")
+            write_text(folder / CREATURE / name, text)
+        write_text(folder / STUDY, dump_toml(study))
     except OSError as error:
         raise UserError(f"{folder}: cannot be written ({error.strerror})") from None
 
@@ -213,9 +214,10 @@ def _open(folder: Path) -> tuple[Any, Creature]:
 
     if not (folder / STUDY).is_file():
         raise UserError(f"{folder}: not the folder of a study (it has no {STUDY})")
-    return build(Study, read_toml(folder / STUDY), str(folder / STUDY)), load_creature(
-        folder / CREATURE
-    )
+    table = read_toml(folder / STUDY)
+    study = build(Study, table, str(folder / STUDY))
+    check_whole(study, table, str(folder / STUDY))
+    return study, load_creature(folder / CREATURE)
 
 
 def _repeatable(options: AblateOptions) -> list[str]:

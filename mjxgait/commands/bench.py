@@ -10,6 +10,7 @@ import tyro
 
 from mjxgait.creature import load_creature
 from mjxgait.errors import UserError
+from mjxgait.files import write_text
 from mjxgait.settings.shipped import data_folder, find_creature
 
 
@@ -115,7 +116,7 @@ def _say(line: str) -> None:
 
 def _write(file: Path, result: dict[str, Any]) -> None:
     file.parent.mkdir(parents=True, exist_ok=True)
-    file.write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
+    write_text(file, json.dumps(result, indent=2) + "\n")
 
 
 def _summary(result: dict[str, Any]) -> str:

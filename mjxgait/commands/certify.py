@@ -7,6 +7,7 @@ from pathlib import Path
 import tyro
 
 from mjxgait.errors import UserError
+from mjxgait.files import write_text
 from mjxgait.library import examine, examine_expressions
 from mjxgait.runs.disk import disk_errors, require_writable
 from mjxgait.runs.folder import CERTIFICATE
@@ -59,7 +60,9 @@ def certify_command(arguments: Sequence[str]) -> int:
     certificate = examine(options.run, options.config)
     from mjxgait.runs.screen import Screen  # rich is slow to import
 
-    (options.run / CERTIFICATE).write_text(certificate.to_json(), encoding="utf-8")
+    path = options.run / CERTIFICATE
+    with disk_errors(path, "what was there before is as it was", "examine it again"):
+        write_text(path, certificate.to_json())
     Screen().certificate(certificate)
     return 0
 
@@ -80,6 +83,6 @@ def _certify_expressions(options: CertifyOptions, file: Path) -> int:
 
     if options.out is not None:
         with disk_errors(options.out, "nothing else was written", "examine again"):
-            options.out.write_text(certificate.to_json(), encoding="utf-8")
+            write_text(options.out, certificate.to_json())
     Screen().certificate(certificate)
     return 0 if certificate.passed else 1

@@ -9,6 +9,7 @@ import tyro
 from mjxgait.certify.check_body import check_body
 from mjxgait.creature import load_creature
 from mjxgait.errors import UserError
+from mjxgait.files import replaced
 from mjxgait.parts.wishes import Wishes, configured
 from mjxgait.runs.disk import require_writable
 from mjxgait.settings.shipped import find_creature
@@ -49,7 +50,8 @@ def check_command(arguments: Sequence[str]) -> int:
     if note := fallback_note(creature.evolution_model):
         print(note)
     try:
-        portrait(creature).save(out)
+        with replaced(out) as beside:
+            portrait(creature).save(beside)
     except OSError as error:
         raise UserError(f"{out}: cannot be written ({error.strerror})") from None
     print(f"wrote {out}")

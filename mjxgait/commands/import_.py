@@ -5,11 +5,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Literal
 
+import numpy as np
 import tyro
 
 from mjxgait.creature.scale import load_files
 from mjxgait.errors import UserError
+from mjxgait.files import write_text
 from mjxgait.importing import TOML, WRITTEN, ImportChoices, Imported, import_model
+from mjxgait.importing.worker import GIGABYTES, SECONDS
 
 Words = Annotated[tuple[str, ...], tyro.conf.UseAppendAction]
 
@@ -31,6 +34,8 @@ class ImportOptions:
       up: Axis of the file that points up, where the guess is wrong.
       forward: Axis along which it should walk, where the guess is wrong.
       height: Metres that a skeleton is tall at rest, where the guess of its unit is wrong.
+      seconds: Processor time that MuJoCo may take to compile the model.
+      gigabytes: Memory that it may take for that.
       force: Write over a creature folder that is there already.
     """
 
@@ -43,6 +48,8 @@ class ImportOptions:
     up: Literal["x", "y", "z"] | None = None
     forward: Literal["x", "-x", "y", "-y"] | None = None
     height: float | None = None
+    seconds: float = SECONDS
+    gigabytes: float = GIGABYTES
     force: bool = False
 
 
@@ -57,7 +64,11 @@ def import_command(arguments: Sequence[str]) -> int:
         options.up,
         options.forward,
         options.height,
+        seconds=options.seconds,
+        gigabytes=options.gigabytes,
     )
+    if not (0 < options.seconds < np.inf and 0 < options.gigabytes < np.inf):
+        raise UserError("--seconds and --gigabytes: give numbers above zero")
     check_folder(options.out, choices.search, options.model, options.force)
     imported = import_model(options.model, choices)
     write_folder(options.out, imported)
@@ -108,6 +119,6 @@ def write_folder(folder: Path, imported: Imported) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for name, text in imported.files.items():
-            (folder / name).write_text(text, encoding="utf-8")
+            write_text(folder / name, text)
     except OSError as error:
         raise UserError(f"{folder}: cannot be written ({error.strerror})") from None

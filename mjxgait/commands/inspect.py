@@ -49,7 +49,9 @@ def inspect_command(arguments: Sequence[str]) -> int:
     os.environ.setdefault("JAX_PLATFORMS", "cpu")
     from mjxgait import inspect
 
-    console = Console(highlight=False, width=None if sys.stdout.isatty() else PIPED_WIDTH)
+    # Names of runs are no markup.
+    width = None if sys.stdout.isatty() else PIPED_WIDTH
+    console = Console(highlight=False, markup=False, width=width)
 
     def tell(found: Any, show: Any) -> int:
         if options.json:

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 import tyro
 
 from mjxgait.errors import UserError
+from mjxgait.files import replaced
 
 MOST_RUNNERS = 12
 SIZE = (640, 360)
@@ -156,6 +157,7 @@ def _still(runners: list[Any], stage: Any, options: RenderOptions) -> None:
         picture = stage.picture(stage.frames - 1)
         video.write_captions(picture, stage, runners, stage.frames - 1)
     try:
-        picture.save(options.out)
+        with replaced(options.out) as beside:
+            picture.save(beside)
     except OSError as error:
         raise UserError(f"{options.out}: cannot be written ({error.strerror or error})") from None

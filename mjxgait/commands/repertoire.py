@@ -12,6 +12,7 @@ from rich.console import Console
 
 from mjxgait.creature import Creature
 from mjxgait.errors import INTERRUPTED, UserError
+from mjxgait.files import replaced, write_text
 from mjxgait.library import load_creature
 from mjxgait.parts import resolve_config
 from mjxgait.parts.wishes import Wishes, speed_of, wished
@@ -87,7 +88,7 @@ def repertoire_command(arguments: Sequence[str]) -> int:
     from mjxgait.runs.loop import interruptible
 
     prepare_devices(1 if options.cluster else None)
-    console, began = Console(highlight=False, soft_wrap=True), time.perf_counter()
+    console, began = Console(highlight=False, soft_wrap=True, markup=False), time.perf_counter()
     screen = _Screen(console)
     with interruptible() as interrupted, crew_at(options.cluster, console) as crew:
         if plan is not None:
@@ -156,7 +157,7 @@ def begin(plan: Planned) -> None:
     for cell in cells:
         create_run(folder / cell.name, plan.creature, plan.configs[cell])
     with disk_errors(folder):
-        (folder / GRID).write_text(plan.grid.text, encoding="utf-8")
+        write_text(folder / GRID, plan.grid.text)
 
 
 def _resumed(options: RepertoireOptions) -> tuple[Path, Grid]:
@@ -199,7 +200,8 @@ def _leave(
     size = (2.4 + 1.3 * (2 * len(grid.turns) + 1), 1.6 + 0.9 * len(grid.speeds))
     with disk_errors(folder / MAP), figure(size) as drawing:
         draw_map(drawing, creature.name, grid, found)
-        drawing.savefig(folder / MAP)
+        with replaced(folder / MAP) as beside:
+            drawing.savefig(beside)
     walks = sum(one.certified for one in found)
     console.print(f"{walks} of {len(found)} walks are certified: {folder / MAP}")
     between = blends(folder, creature, grid, found, screen.blended) if options.blends else []

@@ -30,6 +30,7 @@ def stress_command(arguments: Sequence[str]) -> int:
     options = tyro.cli(StressOptions, args=list(arguments), prog="mjxgait stress")
     from mjxgait.certify.stress import StressConfig, stress
     from mjxgait.errors import UserError
+    from mjxgait.files import write_text
     from mjxgait.runs.disk import disk_errors
     from mjxgait.runs.folder import STRESS, open_champion
     from mjxgait.viewing.stressplot import draw_stress
@@ -45,7 +46,7 @@ def stress_command(arguments: Sequence[str]) -> int:
     picture = options.run / "stress"
     with disk_errors(options.run), figure((7.0, 3.6)) as drawing:
         text = json.dumps(found.document(), indent=2) + "\n"
-        (options.run / STRESS).write_text(text, encoding="utf-8")
+        write_text(options.run / STRESS, text)
         draw_stress(drawing, found)
         files = save(drawing, picture, ("png",))
     print(f"{options.run / STRESS}, {files[0]}")

@@ -11,6 +11,7 @@ from pathlib import Path
 import tyro
 
 from mjxgait.parts.own import loaded
+from mjxgait.processes import python_command, safe_environment
 
 
 @dataclasses.dataclass(frozen=True)
@@ -20,10 +21,13 @@ class ViewOptions:
     Attributes:
       run: Run folder.
       port: Port on 127.0.0.1; by default the first free one from 8765 on.
+      until_input_ends: End when the standard input does; `train --view` asks for it, so that the
+        page ends with the training however that ends.
     """
 
     run: tyro.conf.Positional[Path]
     port: int | None = None
+    until_input_ends: bool = False
 
 
 def view_command(arguments: Sequence[str]) -> int:
@@ -40,21 +44,24 @@ def view_command(arguments: Sequence[str]) -> int:
         ready=lambda address: print(
             f"{address} (only from this machine; Ctrl-C ends it)", flush=True
         ),
+        wait=sys.stdin.buffer.read if options.until_input_ends else None,
     )
     return 0
 
 
 @contextlib.contextmanager
 def following(run: Path) -> Iterator[None]:
-    """Show a run as long as the block lasts, in a process of its own that prints its address;
-    if it fails, the block goes on.
+    """Show a run as long as the block lasts, in a process of its own that prints its address.
+
+    If it fails, the block goes on. It ends with this process too where that is killed: then the
+    system closes the pipe that it reads.
     """
     # What was named on this command line, not what the run folder says.
     own = [word for kind, place in loaded() for word in (f"--{kind}", place)]
-    command = [sys.executable, "-m", "mjxgait", "view", str(run), *own]
-    viewer = subprocess.Popen(command, stdin=subprocess.DEVNULL)
+    command = python_command("mjxgait", "view", str(run), "--until-input-ends", *own)
+    viewer = subprocess.Popen(command, stdin=subprocess.PIPE, env=safe_environment())
     try:
         yield
     finally:
         viewer.terminate()
-        viewer.wait()
+        viewer.communicate()

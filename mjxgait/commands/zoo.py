@@ -8,6 +8,7 @@ from typing import Any
 from rich.console import Console
 
 from mjxgait.errors import INTERRUPTED
+from mjxgait.files import replaced
 from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.folder import open_run
 from mjxgait.runs.lock import locked
@@ -33,7 +34,7 @@ def evolve_zoo(
     from mjxgait.runs.loop import interruptible
 
     prepare_devices(1 if cluster else None)
-    console, began = Console(highlight=False, soft_wrap=True), time.perf_counter()
+    console, began = Console(highlight=False, soft_wrap=True, markup=False), time.perf_counter()
     screen = _Screen(console)
     with interruptible() as interrupted, crew_at(cluster, console) as crew:
         begin()
@@ -64,7 +65,8 @@ def _leave(zoo: Path, name: str, folders: list[Path], console: Console) -> None:
     console.print(table(found))
     with disk_errors(zoo / PICTURE), figure(size(found)) as drawing:
         draw_zoo(drawing, name, found)
-        drawing.savefig(zoo / PICTURE)
+        with replaced(zoo / PICTURE) as beside:
+            drawing.savefig(beside)
     count = sum(one.certified for one in found)
     console.print(f"{count} of {len(found)} are certified: {zoo / PICTURE}")
 

@@ -17,6 +17,7 @@ from mjxgait.creature.settings import CreatureSettings, JointException
 from mjxgait.creature.stepping import stepping_of
 from mjxgait.creature.world import check_world
 from mjxgait.errors import UserError, did_you_mean
+from mjxgait.files import read_text
 from mjxgait.settings.gaits import stations_of
 from mjxgait.settings.tables import build, read_toml
 
@@ -24,7 +25,7 @@ NOT_ALONE = re.compile(
     r"<\s*(!DOCTYPE|!ENTITY|include|plugin|extension|replicate|composite|flexcomp|attach|model|size)\b|[\s\"'](file\w*|\w+dir)\s*="
 )
 MOST_TEXT = 8_000_000
-"""Characters of a file."""
+"""Bytes of a file."""
 
 
 def load_creature(folder: Path) -> Creature:
@@ -36,12 +37,10 @@ def load_creature(folder: Path) -> Creature:
     toml, xml = folder / "creature.toml", folder / "creature.xml"
     settings = build(CreatureSettings, read_toml(toml), str(toml))
     try:
-        files = {path.name: path.read_text(encoding="utf-8") for path in (toml, xml)}
+        files = {path.name: read_text(path, MOST_TEXT) for path in (toml, xml)}
         _check_alone(xml, files["creature.xml"])
         model = mujoco.MjModel.from_xml_string(files["creature.xml"])
-    except OSError as error:
-        raise UserError(f"{xml}: cannot be read ({error.strerror})") from None
-    except (ValueError, UnicodeDecodeError, mujoco.FatalError) as error:
+    except (ValueError, mujoco.FatalError) as error:
         raise UserError(
             f"{xml}: not a model that MuJoCo can load ({' '.join(str(error).split())})"
         ) from None
@@ -55,8 +54,6 @@ def _check_alone(path: Path, text: str) -> None:
     """A body may come from a stranger: it refers to no other file, runs no plugin, and does not
     multiply itself.
     """
-    if len(text) > MOST_TEXT:
-        raise UserError(f"{path}: larger than {MOST_TEXT // 1_000_000} MB; a creature is smaller")
     if found := NOT_ALONE.search(text):
         what = found.group(1) or found.group(2)
         raise UserError(

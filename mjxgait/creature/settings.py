@@ -1,6 +1,7 @@
 """`creature.toml`: what a body needs said that its model file cannot say (docs/creature.md)."""
 
 import dataclasses
+import re
 from typing import Annotated, Any, Literal
 
 import pydantic
@@ -11,6 +12,20 @@ Pattern = str
 Degrees = tuple[Finite, Finite]
 
 
+MOST_NAME = 100
+NO_NAME = re.compile(r"""[\x00-\x1f\x7f/\\:*?"<>|]|^[.-]|^\s|[\s.]$""")
+"""In a name that is no file's on some system, or an option, or hidden."""
+
+
+def _file_name(name: str) -> str:
+    if not name or len(name) > MOST_NAME or NO_NAME.search(name):
+        raise ValueError(
+            f"{name[:MOST_NAME]!r} cannot be the name of a file; use letters, digits and _, at "
+            f"most {MOST_NAME}"
+        )
+    return name
+
+
 @dataclasses.dataclass(frozen=True)
 class Identity:
     """The names of the parts. grows: whether it is a seed: what is simulated grows from genomes.
@@ -19,7 +34,7 @@ class Identity:
     """
 
     __pydantic_config__ = STRICT
-    name: str
+    name: Annotated[str, pydantic.AfterValidator(_file_name)]
     trunk: str
     feet: tuple[str, ...]
     description: str = ""

@@ -29,7 +29,7 @@ from mjxgait.importing.source import Places, Source, parse_xml
 from mjxgait.importing.stance import stance_of
 from mjxgait.importing.standing import Candidate, first_pose, offered_poses, standing
 from mjxgait.importing.urdf import clean_urdf
-from mjxgait.importing.worker import compile_apart, compile_here
+from mjxgait.importing.worker import GIGABYTES, SECONDS, compile_apart, compile_here
 from mjxgait.importing.write_toml import creature_toml
 from mjxgait.importing.write_xml import creature_xml
 
@@ -41,7 +41,8 @@ XML, TOML, README = WRITTEN = ("creature.xml", "creature.toml", "README.md")
 class ImportChoices:
     """What the user says about a model.
 
-    keep, freeze: patterns of joint names. height: m, of a skeleton at rest. apart: whether to compile in a process of its own.
+    keep, freeze: patterns of joint names. height: m, of a skeleton at rest. apart: whether to
+    compile in a process of its own, which may take so many seconds and gigabytes.
     """
 
     name: str | None = None
@@ -52,6 +53,8 @@ class ImportChoices:
     forward: str | None = None
     height: float | None = None
     apart: bool = True
+    seconds: float = SECONDS
+    gigabytes: float = GIGABYTES
 
 
 @dataclasses.dataclass(frozen=True)
@@ -94,8 +97,11 @@ def import_model(path: Path, choices: ImportChoices | None = None) -> Imported:
 
 def _import(path: Path, choices: ImportChoices, notes: Notes) -> Imported:
     source = _read(path, choices, notes)
-    compiled = compile_apart if choices.apart else compile_here
-    model, changes = compiled(source.tree, source.assets, source.missing)
+    parts = source.tree, source.assets, source.missing
+    if choices.apart:
+        model, changes = compile_apart(*parts, choices.seconds, choices.gigabytes)
+    else:
+        model, changes = compile_here(*parts)
     for what, why in changes:
         notes.change(what, why)
     tell_dropped(model, notes)

@@ -12,13 +12,15 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from mjxgait.errors import UserError
+from mjxgait.files import read_bytes
 from mjxgait.importing.notes import Guess, Notes
 
 MOST_XML = 4_000_000
 MOST_MESH = 30_000_000
 MOST_MESHES = 120_000_000
 """bytes of one XML file, of one mesh, of all meshes together."""
-MOST_ELEMENTS, MOST_DEPTH, MOST_INCLUDES = 20_000, 200, 40
+MOST_ELEMENTS, MOST_ATTRIBUTES, MOST_DEPTH, MOST_INCLUDES = 20_000, 100, 200, 40
+"""Of all elements together, of each, and within each other; MuJoCo's own have up to 40 attributes."""
 READABLE_MESHES = (".stl", ".obj", ".msh")
 
 
@@ -89,16 +91,7 @@ def parse_xml(path: Path) -> ET.Element:
       UserError: missing, too large, not XML, with a document type (entities can refer to files and
         grow without bound) or too deep.
     """
-    try:
-        if not path.is_file():
-            raise UserError(f"{path}: no such file")
-        if path.stat().st_size > MOST_XML:
-            raise UserError(
-                f"{path}: larger than {MOST_XML // 1_000_000} MB, so it is not read as a model file"
-            )
-        data = path.read_bytes()
-    except (OSError, ValueError) as error:
-        raise UserError(f"{path}: cannot be read ({error})") from None
+    data = read_bytes(path, MOST_XML)
     if b"<!DOCTYPE" in data or b"<!ENTITY" in data or b"\0" in data:
         raise UserError(
             f"{path}: has a document type, entities or zero bytes, which are not read; save it as "
@@ -122,6 +115,11 @@ def _bounded(path: Path, events: Iterator[tuple[str, ET.Element]]) -> ET.Element
             raise UserError(
                 f"{path}: more than {MOST_ELEMENTS} elements, or nested deeper than {MOST_DEPTH}; "
                 "this is not a creature"
+            )
+        if len(element.attrib) > MOST_ATTRIBUTES:
+            raise UserError(
+                f"{path}: <{element.tag[:40]}> has {len(element.attrib)} attributes, more than "
+                f"{MOST_ATTRIBUTES}; take out those that MuJoCo does not know"
             )
     if root is None:
         raise UserError(f"{path}: empty")

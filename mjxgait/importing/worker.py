@@ -3,22 +3,29 @@ and memory.
 """
 
 import json
+import math
+import os
 import pickle
 import re
+import signal
 import subprocess
 import sys
+import time
 import warnings
 import xml.etree.ElementTree as ET
+from pathlib import Path
 
 import mujoco
 import numpy as np
 
 from mjxgait.errors import UserError
 from mjxgait.importing.missing import leave_out, lost, put_stand_in
+from mjxgait.processes import python_command, safe_environment
 
-SECONDS = 60
-MEMORY = 6 * 2**30
-"""bytes of address space of the compiling process."""
+SECONDS, GIGABYTES = 10.0, 1.0
+"""Processor time and memory that a model may take to compile, by default."""
+PATIENCE = 6.0
+"""Seconds to wait for each second of processor time: other programs may have the cores too."""
 MOST_REPAIRS = 40
 OPTIONAL = ("actuator", "sensor", "keyframe", "tendon", "contact")
 """Sections that may be left out when the model does not compile with them."""
@@ -27,32 +34,40 @@ ASSET = re.compile(r"asset[0-9]+\.(?:stl|obj|msh)|(?<=')asset[0-9]+(?=')")
 
 
 def compile_apart(
-    tree: ET.Element, assets: dict[str, bytes], missing: dict[str, str] | None = None
+    tree: ET.Element,
+    assets: dict[str, bytes],
+    missing: dict[str, str] | None = None,
+    seconds: float = SECONDS,
+    gigabytes: float = GIGABYTES,
 ) -> tuple[mujoco.MjModel, list[tuple[str, str]]]:
     """`compile_here` in a process of its own, which cannot take this one down.
 
     Raises:
       UserError: it does not compile, or takes too long or too much memory.
     """
-    order = pickle.dumps((ET.tostring(tree), assets, missing))
+    order = pickle.dumps((ET.tostring(tree), assets, missing, seconds, gigabytes))
+    slow = UserError(
+        f"MuJoCo did not compile the model within {seconds:g} s; simplify its meshes, take out what "
+        "is not its body, or allow more with --seconds"
+    )
     try:
         done = subprocess.run(
-            [sys.executable, "-m", __name__],
+            python_command(__name__),
+            env=safe_environment(),
             input=order,
             capture_output=True,
-            timeout=SECONDS,
+            timeout=PATIENCE * seconds + PATIENCE,
             check=False,
         )
     except subprocess.TimeoutExpired:
-        raise UserError(
-            f"MuJoCo did not compile the model within {SECONDS} s; simplify its meshes or take out "
-            "what is not its body"
-        ) from None
+        raise slow from None
+    if os.name == "posix" and done.returncode == -signal.SIGXCPU:
+        raise slow
     head, _, body = done.stdout.partition(b"\n")
     if done.returncode or not head:
         raise UserError(
-            "MuJoCo ended abnormally or ran out of memory while it compiled the model; simplify "
-            "its meshes"
+            "MuJoCo ended abnormally or ran out of memory while it compiled the model "
+            f"({gigabytes:g} GB); simplify its meshes, or allow more with --gigabytes"
         )
     answer = json.loads(head)
     if "error" in answer:
@@ -186,24 +201,39 @@ def _compiler(tree: ET.Element) -> ET.Element:
     return found[-1] if found else ET.SubElement(home, "compiler")
 
 
-def _serve() -> None:
-    """Reads an order from standard input and answers on standard output."""
+def _bound(seconds: float, gigabytes: float) -> None:
+    """Limit this process to what it has taken so far and so much more, where the system can."""
     try:
         import resource
 
-        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
-        resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
-    except (ImportError, ValueError, OSError):  # not on every system
+        last = math.ceil(time.process_time() + seconds)
+        resource.setrlimit(resource.RLIMIT_CPU, (last, last + 1))
+        pages = int(Path("/proc/self/statm").read_text().split()[0])
+        most = pages * resource.getpagesize() + int(gigabytes * 1e9)
+        resource.setrlimit(resource.RLIMIT_AS, (most, most))
+    except (ImportError, ValueError, OSError):
         pass
+
+
+def _reason(error: Exception, gigabytes: float) -> str:
+    short = isinstance(error, MemoryError) or "allocate memory" in str(error)
+    return (
+        f"compiling the model takes more than {gigabytes:g} GB of memory; simplify its meshes, or "
+        "allow more with --gigabytes"
+        if short
+        else str(error)
+    )
+
+
+def _serve() -> None:
+    """Reads an order from standard input and answers on standard output."""
     # Written by compile_apart.
-    text, assets, missing = pickle.loads(sys.stdin.buffer.read())
+    text, assets, missing, seconds, gigabytes = pickle.loads(sys.stdin.buffer.read())
+    _bound(seconds, gigabytes)
     try:
         model, changes = compile_here(ET.fromstring(text), assets, missing)
     except (UserError, MemoryError) as error:
-        sys.stdout.buffer.write(
-            json.dumps({"error": str(error) or "out of memory while compiling the model"}).encode()
-            + b"\n"
-        )
+        sys.stdout.buffer.write(json.dumps({"error": _reason(error, gigabytes)}).encode() + b"\n")
         return
     buffer = np.empty(mujoco.mj_sizeModel(model), np.uint8)
     mujoco.mj_saveModel(model, None, buffer)

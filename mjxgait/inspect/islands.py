@@ -1,13 +1,28 @@
 """What a run on islands holds: how each stands, and what they have exchanged."""
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+import pydantic
 from rich.console import Console
 
 from mjxgait.inspect.tables import show, titled_table
-from mjxgait.runs.folder import ISLANDS, METRICS, MIGRATIONS, read_metrics
+from mjxgait.runs.folder import ISLANDS, METRICS, MIGRATIONS, read_metrics, read_records
+from mjxgait.runs.stored import is_number
+from mjxgait.settings.tables import STORED, Index, Number
+
+
+@dataclasses.dataclass(frozen=True)
+class _Exchange:
+    """Schema of a line of `migrations.jsonl`: who came to an island, best first."""
+
+    __pydantic_config__ = STORED
+    generation: int
+    to: Index
+    sender: Annotated[Index, pydantic.Field(alias="from")]
+    fitness: Annotated[list[Number], pydantic.Field(min_length=1)]
 
 
 def island_facts(run: Path, last: int) -> list[dict[str, Any]]:
@@ -15,8 +30,9 @@ def island_facts(run: Path, last: int) -> list[dict[str, Any]]:
 
     arrived: migrants that came to it; ahead: how often they were better than all that it had.
     """
-    told = [line for line in read_metrics(run / MIGRATIONS) if line["generation"] < last]
-    folders = sorted((run / ISLANDS).glob("*/"), key=lambda folder: int(folder.name))
+    told = [line for line in read_records(run / MIGRATIONS, _Exchange) if line["generation"] < last]
+    known = [folder for folder in (run / ISLANDS).glob("*/") if is_number(folder.name)]
+    folders = sorted(known, key=lambda folder: int(folder.name))
     return [row for folder in folders if (row := _row(folder, told, last))]
 
 

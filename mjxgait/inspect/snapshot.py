@@ -5,7 +5,6 @@ Letters: `P` individuals, `R` starts, `F` fitness terms.
 """
 
 import dataclasses
-import json
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
@@ -16,6 +15,7 @@ import numpy as np
 from mjxgait.champion import Champion, codec_of, split_genome
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
+from mjxgait.files import read_json
 from mjxgait.runs.ended import end_of
 from mjxgait.runs.folder import (
     CHAMPION,
@@ -25,7 +25,14 @@ from mjxgait.runs.folder import (
     open_run,
     read_metrics,
 )
-from mjxgait.runs.stored import FOLDER, Manifest, Stored, read_stored, stored_generations
+from mjxgait.runs.stored import (
+    FOLDER,
+    Manifest,
+    Stored,
+    is_number,
+    read_stored,
+    stored_generations,
+)
 from mjxgait.settings.config import Config
 
 
@@ -147,7 +154,7 @@ def _lines(path: Path, last: int) -> list[dict[str, Any]]:
     """
     try:
         return [line for line in read_metrics(path) if line["generation"] <= last]
-    except (OSError, UnicodeDecodeError, TypeError, KeyError):
+    except UserError:
         return []
 
 
@@ -160,7 +167,7 @@ def _locate(path: Path, generation: int | None) -> tuple[Path, int | None]:
     path = path.resolve()
     if path.name == FOLDER and (path.parent / CONFIG).is_file():
         return path.parent, generation
-    if path.name.isdigit() and path.parent.name == FOLDER:
+    if is_number(path.name) and path.parent.name == FOLDER:
         run = path.parent.parent
         if not (run / CONFIG).is_file():
             raise UserError(
@@ -196,6 +203,6 @@ def _check_shape(
 
 def _versions(run: Path) -> dict[str, str]:
     try:
-        return dict(json.loads((run / CHAMPION).read_text(encoding="utf-8"))["origin"]["versions"])
-    except (OSError, ValueError, KeyError, TypeError):
+        return dict(read_json(run / CHAMPION)["origin"]["versions"])
+    except (UserError, ValueError, LookupError, TypeError):
         return {}

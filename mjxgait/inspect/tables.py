@@ -17,7 +17,7 @@ def show(value: float | None, sign: bool = False) -> str:
 
 def titled_table(title: str, console: Console) -> Table:
     """Prints a heading and returns the empty table to print below it."""
-    console.print(f"\n[bold]{title}[/]")
+    console.print(f"\n{title}", style="bold")
     return Table(box=None, pad_edge=False)
 
 

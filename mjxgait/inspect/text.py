@@ -34,8 +34,9 @@ def print_facts(facts: Mapping[str, Any], console: Console, few: bool = False) -
 def print_individual(individual: Mapping[str, Any], console: Console) -> None:
     """All about one member of a population; see `individual_facts`."""
     console.print(
-        f"[bold]individual {individual['rank']}[/]: fitness {show(individual['fitness'])}, "
-        f"{individual['kind']}, born in generation {individual['born']}"
+        f"individual {individual['rank']}: fitness {show(individual['fitness'])}, "
+        f"{individual['kind']}, born in generation {individual['born']}",
+        style="bold",
     )
     starts = len(next(iter(individual["terms"].values())))
     table = titled_table("fitness terms, one column per start (the first is undisturbed)", console)
@@ -92,7 +93,8 @@ def _print_identity(facts: Mapping[str, Any], console: Console) -> None:
         " ".join(f"{word:08x}" for word in facts["random_key"]["data"]),
     )
     console.print(
-        f"[bold]{facts['creature']}[/], generation {facts['generation']} of {facts['generations']}"
+        f"{facts['creature']}, generation {facts['generation']} of {facts['generations']}",
+        style="bold",
     )
     fitness = facts["fitness"]
     rows = {

@@ -62,6 +62,8 @@ def look(run: Path) -> Kept:
     if document is None:
         raise UserError(f"{run}: has no certificate yet; mjxgait refine --resume {run}")
     found = {c.number: c for c in criteria_of(document)}
+    if STARTS not in found:
+        raise UserError(f"{run / CERTIFICATE}: has no criterion {STARTS}; mjxgait certify {run}")
     walk = champion_of(run, LOOP_SECONDS).walk
     return Kept(
         kept_by(run),

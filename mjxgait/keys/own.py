@@ -48,7 +48,7 @@ def own_poses(creature: Creature, note: str, cycle: Cycle) -> Own | None:
         mirrored, advance = bool(document["mirrored"]), str(document["advance"])
         if not (np.isfinite(poses).all() and np.isfinite(motion).all() and len(motion) > 1):
             return None
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+    except (ValueError, KeyError, TypeError, AttributeError, ArithmeticError, RecursionError):
         return None
     motion = _resampled(motion, len(cycle.drawn))
     shifts = [np.roll(cycle.drawn, -s, axis=0) for s in range(len(motion))]

@@ -10,6 +10,7 @@ import numpy as np
 
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
+from mjxgait.files import read_json, write_text
 from mjxgait.keys.bring import Brought
 from mjxgait.parts import resolve_config
 from mjxgait.parts.drawn import ORDERED
@@ -115,7 +116,7 @@ def begin(
         "joints": joints,
     }
     with disk_errors(folder):
-        (folder / KEYS).write_text(json.dumps(document) + "\n", encoding="utf-8")
+        write_text(folder / KEYS, json.dumps(document) + "\n")
     return folder
 
 
@@ -126,12 +127,12 @@ def read_original(folder: Path, creature: Creature) -> Original:
       UserError: the run was not made by `refine`, or the file is damaged.
     """
     path = folder / KEYS
+    if not path.exists():
+        raise UserError(f"{folder}: was not made by `mjxgait refine` (it has no {KEYS})")
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
+        document = read_json(path)
         angles = np.array([document["joints"][name] for name in creature.joints.names], float).T
         known = {key: float(document[key]) for key in ("period", "starts")}
         return Original(str(document["source"]), angles, **known)
-    except FileNotFoundError:
-        raise UserError(f"{folder}: was not made by `mjxgait refine` (it has no {KEYS})") from None
-    except (OSError, ValueError, KeyError, TypeError):
+    except (ValueError, LookupError, TypeError, ArithmeticError):
         raise UserError(f"{path}: damaged; it must hold the cycle's angles by joint") from None

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from mjxgait.animation import WalkLoop, build_clips, standing_still, stride_in_phase
+from mjxgait.files import write_bytes, write_text
 from mjxgait.repertoire.blends import Blend
 from mjxgait.repertoire.changes import Change
 from mjxgait.repertoire.found import Found
@@ -46,8 +47,8 @@ def write_clips(
     document["transitions"] = [way.entry for way in ways]
     clips = loops | {way.name: way.loop for way in ways if way.loop is not None}
     with disk_errors(file.parent):
-        file.write_bytes(build_clips(clips, travelling))
-        table.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
+        write_bytes(file, build_clips(clips, travelling))
+        write_text(table, json.dumps(document, indent=2) + "\n")
 
 
 def table_of(

@@ -102,17 +102,17 @@ def _field(axes: Axes, one: Found, x: float, y: float) -> None:
 def _found(cell: Cell, document: dict[str, Any] | None) -> Found:
     if document is None:
         return Found(cell, False, None, None, None, "", None, ())
-    report, verdict = document["report"], judged(document)
+    report, verdict = document.get("report", {}), judged(document)
     measures = [m for c in document["criteria"] for m in c["measures"]]
     off = [m["value"] for m in measures if m["name"].startswith("off the heading")]
-    duty = [share for share in report["duty_factor"].values() if share is not None]
+    duty = [share for share in report.get("duty_factor", {}).values() if share is not None]
     return Found(
         cell,
         verdict.certified,
-        report["speed"],
+        report.get("speed"),
         off[0] if off else None,
         float(np.mean(duty)) if duty else None,
-        report["gait"],
+        report.get("gait") or "",
         verdict.margin,
         tuple(c.name for c in verdict.failed),
         verdict.reservation,

@@ -1,9 +1,9 @@
 """A repertoire as a page to give away, in which it is driven."""
 
-import json
 from pathlib import Path
 
 from mjxgait.errors import UserError
+from mjxgait.files import read_json
 from mjxgait.repertoire.clips import TABLE, clips_of, table_of
 from mjxgait.repertoire.found import found_in
 from mjxgait.repertoire.grid import Grid
@@ -34,9 +34,9 @@ def write_driven(folder: Path, out: Path) -> str:
 def _blends(folder: Path) -> str:
     """How many blends were tried as physics, and how many walked."""
     try:
-        tried = json.loads((folder / TABLE).read_text(encoding="utf-8"))["blends"]
+        tried = read_json(folder / TABLE)["blends"]
         walking = sum(bool(blend["walks"]) for blend in tried)
-    except (OSError, ValueError, KeyError, TypeError):
+    except (UserError, ValueError, LookupError, TypeError):
         tried, walking = [], 0
     if not tried:
         return "no blend of them has been tried as physics"

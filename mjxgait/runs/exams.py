@@ -1,11 +1,21 @@
 """`exams.jsonl`: who of a run has been examined for the certificate, and how often it was tried."""
 
 import dataclasses
-import json
 from pathlib import Path
 from typing import Any
 
-from mjxgait.runs.folder import read_metrics
+from mjxgait.runs.folder import read_records, write_lines
+from mjxgait.settings.tables import STORED, Flag, Index, Text
+
+
+@dataclasses.dataclass(frozen=True)
+class _Exam:
+    """Schema of a line."""
+
+    __pydantic_config__ = STORED
+    generation: Index
+    champion: Text
+    passed: Flag
 
 
 @dataclasses.dataclass(frozen=True)
@@ -39,14 +49,11 @@ class Exams:
         if champion in (line["champion"] for line in self._lines()):
             return
         line = {"generation": generation, "champion": champion, "passed": passed}
-        text = "".join(json.dumps(line) + "\n" for line in [*self._lines(), line])
-        scratch = self.path.with_suffix(".tmp")
-        scratch.write_text(text, encoding="utf-8")
-        scratch.replace(self.path)
+        write_lines(self.path, [*self._lines(), line])
 
     def _until(self, generation: int) -> list[str]:
         lines = sorted(self._lines(), key=lambda line: line["generation"])
         return [line["champion"] for line in lines if line["generation"] <= generation]
 
     def _lines(self) -> list[dict[str, Any]]:
-        return read_metrics(self.path)
+        return read_records(self.path, _Exam)

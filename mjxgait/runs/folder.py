@@ -1,24 +1,61 @@
 """The run folder: what lies where, how it is made and opened."""
 
+import dataclasses
 import json
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+import pydantic
 
 from mjxgait.certify.check_body import check_body
 from mjxgait.champion import Champion, DamagedChampion, read_champion
 from mjxgait.creature import Creature, load_creature
 from mjxgait.creature.proportions import extreme_bodies
 from mjxgait.errors import NotLoaded, UserError
+from mjxgait.files import TAKE_OUT, DamagedFile, read_lines, write_text
 from mjxgait.parts import build_config
 from mjxgait.parts.fit import check_fit
 from mjxgait.runs.own import CONFIG, command, keep_places, with_options
 from mjxgait.settings.config import Config
-from mjxgait.settings.tables import dump_toml, read_toml
+from mjxgait.settings.tables import (
+    STORED,
+    Flag,
+    Index,
+    Number,
+    check,
+    check_whole,
+    dump_toml,
+    read_toml,
+)
 
 CREATURE, METRICS, CHAMPION = "creature", "metrics.jsonl", "champion.json"
 CERTIFICATE, STRESS, EXAMS = "certificate.json", "stress.json", "exams.jsonl"
 PLOT, PLOTS, BODY = "fitness.png", "plots", "body"
+MOTHERS = "mothers"
+"""In a line of the log, of everybody in the population the place that it had itself, or its mother,
+in the generation before."""
 ISLANDS, MIGRATIONS = "islands", "migrations.jsonl"
+
+
+@dataclasses.dataclass(frozen=True)
+class Numbered:
+    """Schema of a line of a file that a resumed run takes lines out of."""
+
+    __pydantic_config__ = STORED
+    generation: Annotated[int, pydantic.Field(strict=True)]
+
+
+@dataclasses.dataclass(frozen=True)
+class _Metrics:
+    """Schema of a line of `metrics.jsonl`; all else in it is numbers."""
+
+    __pydantic_config__ = STORED
+    generation: Index
+    best: Number | None
+    mean: Number | None
+    forced: Flag
+    mothers: list[int] = dataclasses.field(default_factory=list)
 
 
 def check_run(folder: Path | None, creature: Creature, config: Config) -> Path:
@@ -78,7 +115,7 @@ def create_run(folder: Path | None, creature: Creature, config: Config) -> Path:
     try:
         keep_body(folder / CREATURE, creature)
         keep_places(folder, config.use)
-        (folder / CONFIG).write_text(dump_toml(config), encoding="utf-8")
+        write_text(folder / CONFIG, dump_toml(config))
     except OSError as error:
         raise UserError(f"{folder}: cannot be written ({error.strerror})") from None
     return folder
@@ -88,7 +125,7 @@ def keep_body(folder: Path, creature: Creature) -> None:
     """Writes a creature folder."""
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in creature.files.items():
-        (folder / name).write_text(text, encoding="utf-8")
+        write_text(folder / name, text)
 
 
 def new_run_folder(creature: str, seed: int) -> Path:
@@ -105,12 +142,14 @@ def open_run(folder: Path) -> tuple[Creature, Config]:
     Raises:
       UserError: it is not a run folder, or its controller or task was not named.
     """
-    if not (folder / CONFIG).is_file():
+    if not (folder / CONFIG).exists():
         raise UserError(f"{folder}: not a run folder (it has no {CONFIG})")
     try:
-        config = build_config(read_toml(folder / CONFIG), str(folder / CONFIG))
+        table = read_toml(folder / CONFIG)
+        config = build_config(table, str(folder / CONFIG))
     except NotLoaded as error:
         raise with_options(error, folder) from None
+    check_whole(config, table, str(folder / CONFIG))
     return load_creature(folder / CREATURE).on(config.rollout.ground), config
 
 
@@ -139,19 +178,33 @@ def kept_champion(folder: Path, creature: Creature) -> Champion:
 
 
 def read_metrics(path: Path) -> list[dict[str, Any]]:
-    """The lines of a `metrics.jsonl`; a last line that was cut off by a kill is left out."""
-    lines = []
-    for text in path.read_text(encoding="utf-8").splitlines() if path.exists() else []:
-        try:
-            lines.append(json.loads(text))
-        except json.JSONDecodeError:
-            break
+    """The lines of a `metrics.jsonl`; a last line that was cut off by a kill is left out.
+
+    Raises:
+      UserError: it is damaged; names the line.
+    """
+    lines = read_records(path, _Metrics)
+    for number, line in enumerate(lines, 1):
+        for name, value in line.items():
+            if not isinstance(value, int | float | None) and name not in (MOTHERS, "variant"):
+                raise DamagedFile(f"{path}, line {number}: {name} is not a number; {TAKE_OUT}")
+    return lines
+
+
+def read_records(path: Path, schema: type) -> list[dict[str, Any]]:
+    """The lines of a file that grows, each as its schema says; see `files.read_lines`."""
+    lines = read_lines(path)
+    for number, line in enumerate(lines, 1):
+        check(schema, line, f"{path}, line {number}", TAKE_OUT)
     return lines
 
 
 def truncate_metrics(path: Path, generation: int) -> None:
     """Takes out the lines after a generation, as a resumed run will write them again."""
-    kept = [line for line in read_metrics(path) if line["generation"] <= generation]
-    scratch = path.with_suffix(".tmp")
-    scratch.write_text("".join(json.dumps(line) + "\n" for line in kept), encoding="utf-8")
-    scratch.replace(path)
+    kept = [line for line in read_records(path, Numbered) if line["generation"] <= generation]
+    write_lines(path, kept)
+
+
+def write_lines(path: Path, lines: Iterable[Mapping[str, Any]]) -> None:
+    """Write a file with an object in each line in one go."""
+    write_text(path, "".join(json.dumps(line) + "\n" for line in lines))

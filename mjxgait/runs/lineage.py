@@ -3,11 +3,8 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from mjxgait.runs.folder import MOTHERS
 from mjxgait.search.state import NOBODY
-
-MOTHERS = "mothers"
-"""In a line of the log, of everybody in the population the place that it had itself, or its mother,
-in the generation before."""
 
 
 def mothers_line(lines: Sequence[Mapping[str, Any]], generation: int, place: int) -> dict[int, int]:
@@ -17,7 +14,12 @@ def mothers_line(lines: Sequence[Mapping[str, Any]], generation: int, place: int
     """
     known = {line["generation"]: line[MOTHERS] for line in lines if MOTHERS in line}
     found = {generation: place}
-    while (mother := known.get(generation, {place: NOBODY})[place]) != NOBODY:
+    while (mother := _mother(known.get(generation, ()), place)) != NOBODY:
         generation, place = generation - 1, mother
         found[generation] = place
     return found
+
+
+def _mother(places: Sequence[int], place: int) -> int:
+    """The place of somebody's mother; nobody where the log does not tell."""
+    return places[place] if 0 <= place < len(places) else NOBODY

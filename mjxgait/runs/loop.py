@@ -20,6 +20,7 @@ import numpy as np
 from mjxgait.champion import write_champion
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
+from mjxgait.files import write_text
 from mjxgait.runs.checkpoint import Checkpoints
 from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.examination import Examined, Examiner, why_ended
@@ -31,6 +32,7 @@ from mjxgait.runs.folder import (
     CHAMPION,
     EXAMS,
     METRICS,
+    MOTHERS,
     STRESS,
     keep_body,
     kept_champion,
@@ -38,7 +40,6 @@ from mjxgait.runs.folder import (
     truncate_metrics,
 )
 from mjxgait.runs.latest import Latest
-from mjxgait.runs.lineage import MOTHERS
 from mjxgait.runs.looks import Looks
 from mjxgait.runs.screen import Screen
 from mjxgait.runs.stages import Stages
@@ -150,10 +151,10 @@ def conclude(folder: Path, creature: Creature, screen: Screen, examined: Examine
         body = examined.champion.embodied(creature)
         if body.digest != creature.digest:
             keep_body(folder / BODY, body)
-        (folder / CERTIFICATE).write_text(examined.certificate.to_json(), encoding="utf-8")
+        write_text(folder / CERTIFICATE, examined.certificate.to_json())
         if examined.beyond:
             text = json.dumps(examined.beyond.document(), indent=2) + "\n"
-            (folder / STRESS).write_text(text, encoding="utf-8")
+            write_text(folder / STRESS, text)
     screen.certificate(examined.certificate)
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import tomli_w
 
 from mjxgait.errors import NotLoaded, UserError
+from mjxgait.files import write_text
 from mjxgait.parts.own import KINDS, places_of
 from mjxgait.settings.config import UseConfig
 from mjxgait.settings.tables import read_toml
@@ -21,7 +22,7 @@ the user's."""
 def keep_places(folder: Path, use: UseConfig) -> None:
     """Write where the loaded code of the user's lies that takes part; nothing where there is none."""
     if places := places_of(use):
-        (folder / OWN).write_text(tomli_w.dumps(places), encoding="utf-8")
+        write_text(folder / OWN, tomli_w.dumps(places))
 
 
 def own_options(folder: Path) -> list[str]:

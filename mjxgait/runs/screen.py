@@ -27,7 +27,7 @@ class Screen:
     """Prints the progress of one run."""
 
     def __init__(self, console: Console | None = None) -> None:
-        self.console = console or Console(highlight=False, soft_wrap=True)
+        self.console = console or Console(highlight=False, soft_wrap=True, markup=False)
         self._status: Status | None = None
         self._walls: list[float] = []
         self._first: tuple[float, int] | None = None

@@ -2,7 +2,7 @@
 
 import dataclasses
 import hashlib
-import json
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -11,10 +11,14 @@ import numpy as np
 import tensorstore
 
 from mjxgait.errors import UserError
+from mjxgait.files import read_json
 from mjxgait.runs.lock import why_empty
+from mjxgait.settings.tables import Index, Text, check
 
 SCHEMA = 2
 FOLDER = "checkpoints"
+MOST_BYTES = 20_000_000_000
+"""Of the arrays of a checkpoint."""
 STATE, MANIFEST = "state", "manifest"
 
 
@@ -26,12 +30,12 @@ class Manifest:
     arrays: hash of all values of the state. key_impl: which random generator the key belongs to.
     """
 
-    schema: int
-    creature: str
-    creature_digest: str
-    generation: int
-    arrays: str
-    key_impl: str
+    schema: Index
+    creature: Text
+    creature_digest: Text
+    generation: Index
+    arrays: Text
+    key_impl: Text
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -53,10 +57,15 @@ def stored_generations(run: Path) -> list[int]:
     """
     folder = run / FOLDER
     return (
-        sorted(int(entry.name) for entry in folder.iterdir() if entry.name.isdigit())
+        sorted(int(entry.name) for entry in folder.iterdir() if is_number(entry.name))
         if folder.is_dir()
         else []
     )
+
+
+def is_number(name: str) -> bool:
+    """Return whether a folder's name is that of a generation; int() knows fewer digits than str."""
+    return name.isascii() and name.isdecimal()
 
 
 def read_stored(run: Path, digest: str, generation: int | None = None) -> Stored:
@@ -109,9 +118,11 @@ def _intact(run: Path, generation: int, digest: str) -> bool:
 
 def _read(folder: Path, digest: str) -> Stored:
     try:
-        text = (folder / MANIFEST / "metadata").read_text(encoding="utf-8")
-        manifest = Manifest(**json.loads(text))
-    except (OSError, ValueError, TypeError) as error:
+        path = folder / MANIFEST / "metadata"
+        document = read_json(path)
+        check(Manifest, document, str(path), "it cannot be read")
+        manifest = Manifest(**document)
+    except (UserError, TypeError) as error:
         raise _Damaged(_reason(error)) from None
     if manifest.schema != SCHEMA:
         raise UserError(
@@ -141,13 +152,18 @@ def _read_arrays(folder: Path) -> dict[str, np.ndarray]:
     place = {"driver": "ocdbt", "base": {"driver": "file", "path": f"{folder.resolve()}/"}}
     keys = tensorstore.KvStore.open(place).result().list().result()
     names = [key.decode().removesuffix("/.zarray") for key in keys if key.endswith(b"/.zarray")]
-    return {
-        name: tensorstore.open({"driver": "zarr", "kvstore": {**place, "path": f"{name}/"}})
-        .result()
-        .read()
-        .result()
+    stores = {
+        name: tensorstore.open(
+            {"driver": "zarr", "kvstore": {**place, "path": f"{name}/"}}
+        ).result()
         for name in names
     }
+    size = sum(
+        math.prod(store.shape) * store.dtype.numpy_dtype.itemsize for store in stores.values()
+    )
+    if size > MOST_BYTES:
+        raise ValueError(f"its arrays would take {size / 1e9:.0f} GB")
+    return {name: store.read().result() for name, store in stores.items()}
 
 
 def _reason(error: Exception) -> str:

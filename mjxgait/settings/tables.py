@@ -1,6 +1,7 @@
 """Strict reading of TOML tables into frozen dataclasses: unknown keys, wrong types and bad ranges are named, none is dropped in silence."""
 
 import dataclasses
+import reprlib
 import tomllib
 from collections.abc import Mapping
 from functools import cache
@@ -11,6 +12,7 @@ import pydantic
 import tomli_w
 
 from mjxgait.errors import UserError, did_you_mean
+from mjxgait.files import DamagedFile, check_tree, read_text
 
 T = TypeVar("T")
 Table = Mapping[str, Any]
@@ -43,6 +45,16 @@ KIND = "kind"
 HOST = "host"
 """Marks what only the host reads, never the compiled program."""
 
+MOST_TOML = 8_000_000
+"""Bytes of a file."""
+Number = Annotated[float, pydantic.Field(strict=True)]
+Text = pydantic.StrictStr
+Flag = pydantic.StrictBool
+Index = Annotated[int, pydantic.Field(strict=True, ge=0)]
+"""What the schemas of files that a program wrote are made of: no text stands for a number."""
+STORED = pydantic.ConfigDict(extra="ignore")
+"""What a schema of such a file names as its `__pydantic_config__`: keys may be added to it."""
+
 UNKNOWN = "unexpected_keyword_argument"
 STRICT = pydantic.ConfigDict(extra="forbid")
 """What a dataclass read by `build` names as its `__pydantic_config__`."""
@@ -57,14 +69,13 @@ class NoSettings:
 
 def read_toml(path: Path) -> dict[str, Any]:
     """The table in a TOML file; UserError names the file and the line of what is wrong."""
+    text = read_text(path, MOST_TOML)
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise UserError(f"{path}: no such file") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise UserError(f"{path}: cannot be read ({error})") from None
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        table = tomllib.loads(text)
+        check_tree(table)
+    except (ValueError, RecursionError) as error:
         raise UserError(f"{path}: not valid TOML ({error})") from None
+    return table
 
 
 def dump_toml(value: Any) -> str:
@@ -101,6 +112,48 @@ def build(cls: type[T], table: Table, where: str) -> T:
         raise UserError(f"{where}: {_sentence(cls, problems[0])}") from None
 
 
+def check(cls: type, document: Any, where: str, cure: str) -> None:
+    """Refuse a document that a program wrote and that is not as the schema `cls` says.
+
+    Args:
+      cure: the way out.
+
+    Raises:
+      DamagedFile: names the first key that is wrong.
+    """
+    if not isinstance(document, Mapping):
+        raise DamagedFile(f"{where}: damaged (not a table); {cure}")
+    try:
+        build(cls, document, where)
+    except UserError as error:
+        raise DamagedFile(f"{error}; {cure}") from None
+
+
+def check_whole(value: Any, table: Table, where: str) -> None:
+    """Refuse a table that lacks keys which `dump_toml` writes of the dataclass it was read into.
+
+    Raises:
+      UserError: names the first.
+    """
+    if missing := _missing(_without_none(dataclasses.asdict(value)), table):
+        raise UserError(
+            f'{where}: the key "{missing}" is missing, and what a default would put in its place is '
+            "not what was meant; write it there again, or take the whole folder from a copy"
+        )
+
+
+def _missing(wanted: Table, table: Table, prefix: str = "") -> str | None:
+    """Return the first key, dotted, that a table lacks; None where it has all."""
+    for key, value in wanted.items():
+        if key not in table:
+            return prefix + key
+        if isinstance(value, Mapping) and isinstance(table[key], Mapping):
+            found = _missing(value, table[key], f"{prefix}{key}.")
+            if found:
+                return found
+    return None
+
+
 @cache
 def _adapter(cls: type) -> pydantic.TypeAdapter:
     """What checks tables for a dataclass; to make one takes longer than to use it."""
@@ -118,7 +171,7 @@ def _sentence(cls: type, problem: Mapping[str, Any]) -> str:
         case "value_error":
             return f"{key}: {problem['ctx']['error']}" if key else str(problem["ctx"]["error"])
         case _:
-            return f"{key} = {problem['input']!r}: {problem['msg'].lower()}"
+            return f"{key} = {reprlib.repr(problem['input'])}: {problem['msg'].lower()}"
 
 
 def _keys(cls: type, parents: list[str]) -> list[str]:

@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 
+from mjxgait.files import replaced
 from mjxgait.viewing.style import ACCENT, DARK, MIDDLE, PALE, Figures, figure
 
 Lines = Sequence[Mapping[str, Any]]
@@ -25,7 +26,8 @@ def plot_fitness(lines: Lines, path: Path) -> None:
     """The fitness curve as one PNG, which every run has in its folder."""
     with figure((8, 4.5)) as drawing:
         draw_fitness(drawing.subplots(), lines)
-        drawing.savefig(path)
+        with replaced(path) as beside:
+            drawing.savefig(beside)
 
 
 def draw_fitness(axes: Axes, lines: Lines) -> None:

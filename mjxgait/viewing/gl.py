@@ -1,6 +1,5 @@
 """Pictures by MuJoCo's own renderer where GL works, which a process of its own finds out."""
 
-import os
 import subprocess
 import sys
 import tempfile
@@ -12,6 +11,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from mjxgait.errors import UserError
+from mjxgait.processes import python_command, safe_environment
 from mjxgait.viewing.floor import band_lines, number_bands
 from mjxgait.viewing.painter import lamp_direction
 from mjxgait.viewing.stage import Stage
@@ -161,9 +161,9 @@ def _ground(stage: Stage) -> dict[str, Any]:
 def _command(stage: Stage, frames: Sequence[int], folder: Path) -> list[str]:
     path = folder / "scene.npz"
     scene_file(stage, frames, path)
-    return [sys.executable, "-m", WORKER, str(path)]
+    return python_command(WORKER, str(path))
 
 
 def _environment(backend: str) -> dict[str, str]:
     chosen = {} if backend == "default" else {"MUJOCO_GL": backend, "PYOPENGL_PLATFORM": backend}
-    return {key: value for key, value in os.environ.items() if key != "MUJOCO_GL"} | chosen
+    return {key: value for key, value in safe_environment().items() if key != "MUJOCO_GL"} | chosen

@@ -12,6 +12,8 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 
+from mjxgait.files import replaced
+
 Figures = Mapping[str, tuple[tuple[float, float], Callable[[Figure], None]]]
 """By file name: size in inches, and what draws on the figure."""
 FORMATS = ("png", "svg")
@@ -50,5 +52,6 @@ def save(drawing: Figure, path: Path, formats: Sequence[str] = FORMATS) -> list[
     files = [path.with_name(f"{path.name}.{kind}") for kind in formats]
     for file in files:
         # Without the date, the same plot is the same file.
-        drawing.savefig(file, metadata={"Date": None} if file.suffix == ".svg" else None)
+        with replaced(file) as beside:
+            drawing.savefig(beside, metadata={"Date": None} if file.suffix == ".svg" else None)
     return files

@@ -10,6 +10,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from mjxgait.errors import UserError
+from mjxgait.files import replaced
 from mjxgait.runs.disk import require_writable
 from mjxgait.settings.shipped import install_command
 from mjxgait.viewing.floor import DARK_INK, font
@@ -103,18 +104,14 @@ def write_video(pictures: Iterable[Image.Image], path: Path, fps: int) -> None:
     Raises:
       UserError: another format, MP4 without the extra, or a file that cannot be written.
     """
+    writers = {".mp4": _write_mp4, ".webp": _write_webp, ".gif": _write_gif}
+    if (write := writers.get(path.suffix.lower())) is None:
+        raise UserError(
+            f'{path}: cannot write "{path.suffix}"; end the name with {", ".join(FORMATS)}'
+        )
     try:
-        match path.suffix.lower():
-            case ".mp4":
-                _write_mp4(pictures, path, fps)
-            case ".webp":
-                _write_webp(list(pictures), path, fps)
-            case ".gif":
-                _write_gif(list(pictures), path, fps)
-            case other:
-                raise UserError(
-                    f'{path}: cannot write "{other}"; end the name with {", ".join(FORMATS)}'
-                )
+        with replaced(path) as beside:
+            write(pictures, beside, fps)
     except OSError as error:
         raise UserError(f"{path}: cannot be written ({error.strerror or error})") from None
 
@@ -134,11 +131,12 @@ def require_writer(path: Path) -> None:
     require_writable(path)
 
 
-def _write_webp(pictures: list[Image.Image], path: Path, fps: int) -> None:
-    pictures[0].save(
+def _write_webp(pictures: Iterable[Image.Image], path: Path, fps: int) -> None:
+    first, *others = pictures
+    first.save(
         path,
         save_all=True,
-        append_images=pictures[1:],
+        append_images=others,
         duration=round(1000 / fps),
         loop=0,
         quality=75,
@@ -146,7 +144,8 @@ def _write_webp(pictures: list[Image.Image], path: Path, fps: int) -> None:
     )
 
 
-def _write_gif(pictures: list[Image.Image], path: Path, fps: int) -> None:
+def _write_gif(given: Iterable[Image.Image], path: Path, fps: int) -> None:
+    pictures = list(given)
     # One palette for all, so that still parts do not flicker.
     samples = pictures[:: max(len(pictures) // 6, 1)]
     joined = Image.fromarray(np.concatenate([np.asarray(sample) for sample in samples]))

@@ -10,6 +10,7 @@ import contextlib
 import dataclasses
 import json
 import os
+import sys
 import threading
 import time
 from collections.abc import Callable
@@ -34,6 +35,8 @@ SHARE = 0.04
 """Of one core that looking at new champions may take on average."""
 PATIENCE = 1.0
 """s between looks at the folder."""
+CONNECTIONS, IDLE = 32, 10.0
+"""Connections at once, and s after which one that neither asks nor takes an answer is closed."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -77,17 +80,17 @@ class Watcher:
 
     def state(self) -> dict[str, Any]:
         """What the page asks for every second."""
+        what = self.shown.what
+        try:
+            lines = read_metrics(self.run / METRICS)
+        except UserError as error:
+            lines, what = [], str(error)
         history = [
             {key: line.get(key) for key in ("generation", "best", "mean", "forced")}
-            for line in read_metrics(self.run / METRICS)
+            for line in lines
         ]
         name = self.creature.name.replace("_", " ")
-        return {
-            "name": name,
-            "what": self.shown.what,
-            "version": self.shown.version,
-            "history": history,
-        }
+        return {"name": name, "what": what, "version": self.shown.version, "history": history}
 
     def _shown(self) -> Shown:
         creature, champion = open_champion(self.run)
@@ -106,8 +109,13 @@ class Watcher:
         return Shown(self.shown.version + 1, f"{found}: {gait}", build_glb(loop))
 
 
-def serve(run: Path, port: int | None = None, ready: Callable[[str], None] = print) -> None:
-    """Shows a run until interrupted.
+def serve(
+    run: Path,
+    port: int | None = None,
+    ready: Callable[[str], None] = print,
+    wait: Callable[[], object] | None = None,
+) -> None:
+    """Shows a run until interrupted, or until `wait` returns.
 
     Args:
       port: on this machine; by default the first free one.
@@ -122,12 +130,48 @@ def serve(run: Path, port: int | None = None, ready: Callable[[str], None] = pri
     server = open_server(watcher, port)
     ended = threading.Event()
     threading.Thread(target=watcher.follow, args=(ended.is_set,), daemon=True).start()
+    if wait is not None:
+        threading.Thread(target=_shut_after, args=(server, wait), daemon=True).start()
     ready(f"http://{HERE}:{server.server_port}")
     try:
         server.serve_forever()
     finally:
         ended.set()
         server.server_close()
+
+
+def _shut_after(server: ThreadingHTTPServer, wait: Callable[[], object]) -> None:
+    wait()
+    server.shutdown()
+
+
+class _Server(ThreadingHTTPServer):
+    """A server that has so many connections at once; a further one is closed at once."""
+
+    daemon_threads = True
+
+    def __init__(self, *given: Any) -> None:
+        self._free = threading.BoundedSemaphore(CONNECTIONS)
+        super().__init__(*given)
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """Answer in a thread of its own where there is one free."""
+        if self._free.acquire(blocking=False):
+            super().process_request(request, client_address)
+        else:
+            self.shutdown_request(request)
+
+    def process_request_thread(self, request: Any, client_address: Any) -> None:
+        """Answer, and give the thread back."""
+        try:
+            super().process_request_thread(request, client_address)
+        finally:
+            self._free.release()
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Say nothing of a browser that has gone or has waited too long."""
+        if not isinstance(sys.exception(), OSError):
+            super().handle_error(request, client_address)
 
 
 def open_server(watcher: Watcher, port: int | None = None) -> ThreadingHTTPServer:
@@ -142,7 +186,7 @@ def open_server(watcher: Watcher, port: int | None = None) -> ThreadingHTTPServe
 
     for candidate in PORTS if port is None else [port]:
         try:
-            return ThreadingHTTPServer((HERE, candidate), Handler)
+            return _Server((HERE, candidate), Handler)
         except OSError:
             continue
     raise UserError(
@@ -153,6 +197,7 @@ def open_server(watcher: Watcher, port: int | None = None) -> ThreadingHTTPServe
 
 class _Handler(BaseHTTPRequestHandler):
     follows: Watcher
+    timeout = IDLE
 
     def do_GET(self) -> None:
         # A page from elsewhere whose name has been made to point here must get nothing.
@@ -185,7 +230,7 @@ class _Handler(BaseHTTPRequestHandler):
         self.send_header("Cache-Control", "no-store")
         self.end_headers()
         # The browser may have gone on to the next one.
-        with contextlib.suppress(ConnectionError):
+        with contextlib.suppress(ConnectionError, TimeoutError):
             self.wfile.write(content)
 
     def log_message(self, format: str, *args: Any) -> None:

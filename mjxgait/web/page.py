@@ -11,6 +11,7 @@ from importlib import resources
 from io import BytesIO
 from pathlib import Path
 
+from mjxgait import files
 from mjxgait.animation import WalkLoop, build_glb, walk_loop
 from mjxgait.certify import Verdict, criteria_of, judged, outdated, read_certificate, read_stress
 from mjxgait.champion import Champion
@@ -54,7 +55,7 @@ def write_text(out: Path, page: str) -> None:
       UserError: the file cannot be written.
     """
     try:
-        out.write_text(page, encoding="utf-8")
+        files.write_text(out, page)
     except OSError as error:
         raise UserError(f"{out}: cannot be written ({error.strerror})") from None
 

@@ -76,5 +76,5 @@ def _found(folder: Path) -> Found:
     document = read_certificate(folder / CERTIFICATE)
     if document is None:
         return Found(folder, False, False, "", None, "not examined")
-    verdict, summary = judged(document), document["report"].get("summary", "")
+    verdict, summary = judged(document), document.get("report", {}).get("summary", "")
     return Found(folder, True, verdict.certified, summary, verdict.margin, verdict.in_words())

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
+from mjxgait.files import write_text
 from mjxgait.runs.disk import disk_errors
 from mjxgait.runs.folder import check_parts, create_run, is_taken, new_run_folder
 from mjxgait.settings.config import Config
@@ -93,7 +94,7 @@ def create_zoo(
         create_run(folder, creature, to_the_last(dataclasses.replace(config, seed=seed)))
     # Last: what is whole can be gone on with.
     with disk_errors(zoo):
-        (zoo / ZOO).write_text(dump_toml(seeds), encoding="utf-8")
+        write_text(zoo / ZOO, dump_toml(seeds))
     return zoo
 
 

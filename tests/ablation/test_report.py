@@ -27,17 +27,23 @@ RESULT = Result(
 
 
 def report(
-    creature: Creature, folder: Path, measure: str = "walk", settings: dict | None = None, **other
+    creature: Creature,
+    folder: Path,
+    measure: str = "walk",
+    settings: dict | None = None,
+    names: tuple[str, str] = ("base", "other"),
+    question: str = "?",
+    **other,
 ) -> str:
     """Of two variants: the base's runs lie around RESULT, the other's are changed by these
     amounts or to these values.
     """
     variants = (
-        VariantTable("base"),
-        VariantTable("other", settings or {"evolution": {"mutation_rate": 0.4}}),
+        VariantTable(names[0]),
+        VariantTable(names[1], settings or {"evolution": {"mutation_rate": 0.4}}),
     )
     study = Study(
-        "?",
+        question,
         env=str(STOOL),
         seeds=SEEDS,
         generations=2,
@@ -114,3 +120,20 @@ def test_runs_that_broke_are_named_and_count_as_the_worst(stool: Creature, tmp_p
 def test_what_is_not_comparable_is_said(stool: Creature, tmp_path: Path, keys: dict, words: str):
     assert words in report(stool, tmp_path, **keys)
     assert words not in report(stool, tmp_path)
+
+
+def test_names_and_questions_are_text_and_no_program(stool: Creature, tmp_path: Path):
+    """Neither HTML nor a picture from elsewhere in the page, no formula in the table."""
+    names = ("=1+1", "<img src=x> ![a](http://x) | b")
+    report(stool, tmp_path, names=names, question="<script>alert(1)</script>\n# more")
+    page = (tmp_path / "report.html").read_text()
+    for unwanted in ("<script", "<img src=x", 'src="http', "<h1>more"):
+        assert unwanted not in page
+    assert "&lt;script&gt;alert(1)&lt;/script&gt; # more" in page
+    rows = (tmp_path / "results.csv").read_text().splitlines()
+    assert rows[1].startswith("'=1+1,0,0.5,")
+
+
+def test_numbers_of_a_table_stay_numbers(stool: Creature, tmp_path: Path):
+    report(stool, tmp_path, walk=-1.0)
+    assert any(",-0." in row for row in (tmp_path / "results.csv").read_text().splitlines())

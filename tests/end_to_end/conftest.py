@@ -100,8 +100,8 @@ def said_by_python(arguments: Sequence[str]) -> tuple[int, str]:
     hidden = {name: sys.modules.pop(name) for name in siblings & sys.modules.keys()}
     try:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
-            if arguments[:2] == ["-m", "mjxgait"]:
-                main(arguments[2:])
+            if arguments[:3] == ["-P", "-m", "mjxgait"]:
+                main(arguments[3:])
             sys.argv, sys.path[:0] = list(arguments), [str(Path(arguments[0]).parent)]
             runpy.run_path(arguments[0], run_name="__main__")
     except SystemExit as ended:
@@ -120,7 +120,7 @@ def _is_ours(command: Any) -> bool:
     """Tell whether a process would run this program or a file of Python."""
     if isinstance(command, str) or str(command[0]) != sys.executable:
         return False
-    return list(command[1:3]) == ["-m", "mjxgait"] or str(command[1]).endswith(".py")
+    return list(command[1:4]) == ["-P", "-m", "mjxgait"] or str(command[1]).endswith(".py")
 
 
 def _run_here(run: Callable[..., Any]) -> Callable[..., Any]:

@@ -14,6 +14,7 @@ from end_to_end.shipped import BENCHMARKS, FEW_BLOCKS, ROOT, SCRIPTS, TINY
 from end_to_end.walks import faller, short_examination, trained, walker
 from helpers import STOOL
 
+from mjxgait.processes import python_command
 from mjxgait.runs import checkpoint, examination, experiment, looks, loop, stages
 
 BLENDER = "needs Blender as a module of Python"
@@ -111,7 +112,7 @@ def certified(folder: Path) -> Path:
     """A run whose champion treads, with the certificate that it has."""
     run = walker(folder)
     given = ["certify", str(run), "--config", short_examination(folder.parent)]
-    subprocess.run([sys.executable, "-m", "mjxgait", *given], check=True)
+    subprocess.run(python_command("mjxgait", *given), check=True)
     return run
 
 

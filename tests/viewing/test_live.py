@@ -5,6 +5,7 @@ The browser test needs Chromium (apt: chromium) and playwright.
 
 import json
 import os
+import socket
 import subprocess
 import sys
 import threading
@@ -114,6 +115,23 @@ def test_only_this_machine_can_reach_it(site):
             get(address + path)
 
 
+def test_idle_connections_leave_no_room_for_more_and_are_closed(run, monkeypatch):
+    monkeypatch.setattr("mjxgait.web.live.CONNECTIONS", 2)
+    monkeypatch.setattr("mjxgait.web.live._Handler.timeout", 0.5)
+    server = open_server(Watcher(run), 0)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    place = (HERE, server.server_port)
+    idle = [socket.create_connection(place, 10) for _ in range(2)]
+    one_more = socket.create_connection(place, 10)
+    assert one_more.recv(1) == b""
+    assert [connection.recv(1) for connection in idle] == [b"", b""]
+    assert get(f"http://{HERE}:{server.server_port}/state.json")
+    for connection in (*idle, one_more):
+        connection.close()
+    server.shutdown()
+    server.server_close()
+
+
 def test_a_port_that_is_taken_is_said(site, run):
     _, address = site
     with pytest.raises(UserError, match="taken by another program"):
@@ -136,7 +154,7 @@ def test_the_command_tells_its_address_and_ends(run):
 
 def test_a_training_can_be_followed(run, capfd):
     with following(run):
-        end = time.monotonic() + 20
+        end = time.monotonic() + 120
         said = ""
         while "http" not in said and time.monotonic() < end:
             time.sleep(0.1)
