@@ -1,6 +1,7 @@
 """A damaged file of a run folder is one sentence: every field is changed into everything that it may not be."""
 
 import copy
+import dataclasses
 import errno
 import json
 import tomllib
@@ -15,7 +16,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from viewing.made_up import metrics_line, treading, write_run
 
-from mjxgait.certify import read_certificate, read_stress
+from mjxgait.certify import CertificateConfig, read_certificate, read_stress
 from mjxgait.champion import read_champion, write_champion
 from mjxgait.commands import certify
 from mjxgait.creature import Creature, load_creature
@@ -94,6 +95,7 @@ CRITERION = {
 
 
 def certificate_of(champion: Any) -> dict[str, Any]:
+
     from mjxgait.certify.certificate import schema_of
 
     report = {"speed": 0.5, "gait": "trot", "summary": "It walks.", "duty_factor": {"a": 0.5}}
@@ -103,6 +105,8 @@ def certificate_of(champion: Any) -> dict[str, Any]:
         "passed": True,
         "margin": 0.5,
         "criteria": [CRITERION],
+        "task": champion.task,
+        "config": dataclasses.asdict(CertificateConfig()),
         "report": report | {"likeness": {"stride": 1.0, "duty_factor": 1.0, "patter": 0.1}},
     }
 
@@ -138,7 +142,7 @@ def test_a_certificate(data: st.DataObject, stool: Creature, tmp_path: Path):
 
     def read() -> None:
         if found := read_certificate(path):
-            assert certificate_table(tmp_path, champion)
+            assert certificate_table(tmp_path, stool, champion)
             f"{found['margin'] or 0.0:.2f}"
 
     assert is_one_sentence(read, CERTIFICATE)

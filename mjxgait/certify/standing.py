@@ -27,6 +27,8 @@ class _Measure:
     sense: Text
     threshold: Number | None
     passed: Flag
+    room: Number | None = None
+    margin: Number | None = None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -46,6 +48,7 @@ class _Report:
     speed: Number | None = None
     gait: Text | None = None
     summary: Text = ""
+    ground: Text = FLAT
     duty_factor: dict[str, Number | None] = dataclasses.field(default_factory=dict)
     likeness: dict[str, Number | None] = dataclasses.field(default_factory=dict)
 
@@ -59,6 +62,8 @@ class _Certificate:
     report: _Report = dataclasses.field(default_factory=_Report)
     schema: Index = 0
     champion: Text = ""
+    task: Text = ""
+    config: dict[str, Any] = dataclasses.field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if self.passed and self.margin is None:
