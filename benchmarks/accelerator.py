@@ -116,7 +116,7 @@ def measure(options: argparse.Namespace, engine: str, lanes: str) -> None:
     # Only here: the process that waits for the others does without JAX, and without the card.
     import jax
 
-    from mjxgait.runs.devices import compiled, everywhere, prepare_devices
+    from mjxgait.training.devices import compiled, everywhere, prepare_devices
 
     prepare_devices()
     jax.config.update("jax_enable_compilation_cache", False)
@@ -157,9 +157,9 @@ def workload(options: argparse.Namespace, engine: str, lanes: int) -> tuple[Any,
     import jax.numpy as jnp
 
     from mjxgait.bench.workload import walking
+    from mjxgait.config.shipped import find_creature
     from mjxgait.creature import load_creature
-    from mjxgait.runs.experiment import Batch, build_experiment
-    from mjxgait.settings.shipped import find_creature
+    from mjxgait.training.experiment import Batch, build_experiment
 
     creature = load_creature(find_creature(options.env))
     config = walking(creature.settings)

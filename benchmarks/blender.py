@@ -15,12 +15,12 @@ from typing import Any
 
 import numpy as np
 
-from mjxgait.animation import export_glb, walk_loop
+from mjxgait.animation.export import export_glb, walk_loop
+from mjxgait.animation.keys import bring
+from mjxgait.animation.keys.bring import Brought
 from mjxgait.creature import Creature
-from mjxgait.keys import bring
-from mjxgait.keys.bring import Brought
-from mjxgait.runs.folder import open_champion
-from mjxgait.viewing.walk import record_walk
+from mjxgait.rendering.walk import record_walk
+from mjxgait.training.folder import open_champion
 
 SCRIPT = Path(__file__).with_name("in_blender.py")
 SECONDS = 12.0

@@ -14,12 +14,12 @@ import jax
 import jax.numpy as jnp
 
 from mjxgait import load_creature
-from mjxgait.blocks.genotype import Capacity, Ranges, random_graph
-from mjxgait.blocks.phenotype import body_of
+from mjxgait.controllers.sims_brain.genotype import Capacity, Ranges, random_graph
+from mjxgait.controllers.sims_brain.phenotype import body_of
+from mjxgait.evolution.chance import key_of
 from mjxgait.physics import make_plant
-from mjxgait.physics.trees.plant import TreePlant
-from mjxgait.physics.trees.tree import Surroundings
-from mjxgait.search.chance import key_of
+from mjxgait.physics.batched_trees.plant import TreePlant
+from mjxgait.physics.batched_trees.tree import Surroundings
 from mjxgait.types import BodyState
 
 LANES, STEPS = 64, 200

@@ -32,20 +32,20 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "cluster"))
 import jax
 from simulated import Machines, machines
 
-from mjxgait.cluster.blocks import Blocks
-from mjxgait.cluster.connect import connected
-from mjxgait.cluster.crew import Crew
-from mjxgait.cluster.jobs import AdvanceRows, Job
-from mjxgait.cluster.recipe import Recipe
+from mjxgait.api import load_creature
+from mjxgait.config.schema import Config
+from mjxgait.config.tables import build, merge
 from mjxgait.creature import Creature
-from mjxgait.library import load_creature
-from mjxgait.parts import resolve_config
-from mjxgait.runs.checkpoint import Checkpoints
-from mjxgait.runs.devices import prepare_devices
-from mjxgait.runs.experiment import build_experiment
-from mjxgait.runs.packed import pack
-from mjxgait.settings.config import Config
-from mjxgait.settings.tables import build, merge
+from mjxgait.distributed.chunks import Blocks
+from mjxgait.distributed.connect import connected
+from mjxgait.distributed.jobs import AdvanceRows, Job
+from mjxgait.distributed.recipe import Recipe
+from mjxgait.distributed.scheduler import Crew
+from mjxgait.plugins import resolve_config
+from mjxgait.training.checkpoint import Checkpoints
+from mjxgait.training.devices import prepare_devices
+from mjxgait.training.experiment import build_experiment
+from mjxgait.training.packed import pack
 
 SIZES = (64, 256, 1024, 4096)
 """Of blocks, of one population of the largest."""

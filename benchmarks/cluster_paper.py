@@ -21,10 +21,10 @@ from typing import Any
 from cluster import Nothing, gather, say
 from simulated import machines
 
-from mjxgait.cluster.connect import connected
-from mjxgait.cluster.crew import Crew, Report, Worker
-from mjxgait.cluster.recipe import Recipe
-from mjxgait.commands.ablate import ROWS, STRIDE
+from mjxgait.cli.ablate import ROWS, STRIDE
+from mjxgait.distributed.connect import connected
+from mjxgait.distributed.recipe import Recipe
+from mjxgait.distributed.scheduler import Crew, Report, Worker
 
 RUNS, PEOPLE, BLOCK = 10_000, 1_000_000, 64
 MB = 1e6

@@ -20,9 +20,9 @@ import mujoco
 import numpy as np
 
 import mjxgait
-from mjxgait.certify import judged
-from mjxgait.runs.folder import CERTIFICATE
-from mjxgait.search.state import NOBODY
+from mjxgait.certification import judged
+from mjxgait.evolution.state import NOBODY
+from mjxgait.training.folder import CERTIFICATE
 
 HEADER = ("run", "certified", "speed", "blocks", "hinges", "mass", "families", "one from")
 

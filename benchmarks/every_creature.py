@@ -20,9 +20,21 @@ import sys
 import time
 from pathlib import Path
 
-from mjxgait.certify import distance, judged, outdated, read_certificate, survival
+from mjxgait.certification import (
+    distance,
+    judged,
+    outdated,
+    read_certificate,
+    survival,
+)
 from mjxgait.processes import python_command
-from mjxgait.runs.folder import CERTIFICATE, METRICS, open_champion, open_run, read_metrics
+from mjxgait.training.folder import (
+    CERTIFICATE,
+    METRICS,
+    open_champion,
+    open_run,
+    read_metrics,
+)
 
 HEADER = (
     "creature",

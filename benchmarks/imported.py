@@ -24,9 +24,9 @@ sys.path.append(str(Path(__file__).parents[1] / "tests"))
 import numpy as np
 from importing.packages import MODELS, model_file
 
-from mjxgait.certify import judged
+from mjxgait.certification import judged
 from mjxgait.processes import python_command
-from mjxgait.runs.folder import CERTIFICATE, METRICS, read_metrics
+from mjxgait.training.folder import CERTIFICATE, METRICS, read_metrics
 
 HEADER = (
     "model",

@@ -17,17 +17,17 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from mjxgait.ablation.statistics import compare, estimate
-from mjxgait.cluster.migration import exchanged
-from mjxgait.library import load_creature
-from mjxgait.parts import resolve_config
-from mjxgait.runs.devices import prepare_devices
-from mjxgait.runs.experiment import build_batch
-from mjxgait.runs.packed import Packed, pack
-from mjxgait.search.state import EvolutionState
-from mjxgait.settings.config import Config
-from mjxgait.settings.islands import IslandsConfig
-from mjxgait.settings.tables import build, merge
+from mjxgait.api import load_creature
+from mjxgait.config.islands import IslandsConfig
+from mjxgait.config.schema import Config
+from mjxgait.config.tables import build, merge
+from mjxgait.distributed.migration import exchanged
+from mjxgait.evolution.state import EvolutionState
+from mjxgait.experiments.ablation.statistics import compare, estimate
+from mjxgait.plugins import resolve_config
+from mjxgait.training.devices import prepare_devices
+from mjxgait.training.experiment import build_batch
+from mjxgait.training.packed import Packed, pack
 
 WAYS = {
     "one population": IslandsConfig(1, 0),

@@ -14,12 +14,12 @@ from pathlib import Path
 
 import numpy as np
 
-from mjxgait.certify import judged, read_certificate
+from mjxgait.animation.keys.departure import departure_of
+from mjxgait.certification import judged, read_certificate
+from mjxgait.config.shipped import find_creature
 from mjxgait.creature import Creature, load_creature
-from mjxgait.keys.departure import departure_of
 from mjxgait.processes import python_command
-from mjxgait.runs.folder import CERTIFICATE
-from mjxgait.settings.shipped import find_creature
+from mjxgait.training.folder import CERTIFICATE
 
 RATE = 24
 """Frames/s, as films are drawn."""

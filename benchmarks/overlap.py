@@ -12,12 +12,12 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from mjxgait.certify import judged
-from mjxgait.certify.simulate import simulate
-from mjxgait.certify.starts import nominal_starts
+from mjxgait.certification import judged
+from mjxgait.certification.simulate import simulate
 from mjxgait.creature import Creature
 from mjxgait.creature.overlap import NEAR, neighbours
-from mjxgait.runs.folder import CERTIFICATE, open_champion
+from mjxgait.reference.starts import nominal_starts
+from mjxgait.training.folder import CERTIFICATE, open_champion
 
 SECONDS = 20.0
 EVERY = 2

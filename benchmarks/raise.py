@@ -33,16 +33,21 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from mjxgait.certify import CertificateConfig, push_ladder
-from mjxgait.certify.certificate import half_point
-from mjxgait.certify.config import PushesConfig
-from mjxgait.certify.outcome import Fall, Outcome
-from mjxgait.certify.simulate import simulate
-from mjxgait.certify.starts import Starts, join, nominal_starts, perturbed_starts
-from mjxgait.certify.worlds import slippery, sloping
+from mjxgait.certification import CertificateConfig, push_ladder
+from mjxgait.certification.certificate import half_point
+from mjxgait.certification.config import PushesConfig
+from mjxgait.certification.simulate import simulate
+from mjxgait.certification.worlds import slippery, sloping
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
-from mjxgait.runs.folder import open_champion
+from mjxgait.reference.outcome import Fall, Outcome
+from mjxgait.reference.starts import (
+    Starts,
+    join,
+    nominal_starts,
+    perturbed_starts,
+)
+from mjxgait.training.folder import open_champion
 
 SECONDS = 22.0
 SEED = 7

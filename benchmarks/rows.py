@@ -16,13 +16,13 @@ from statistics import median
 
 import jax
 
+from mjxgait.config.layers import resolve_config
+from mjxgait.config.schema import Config
+from mjxgait.config.shipped import find_creature
+from mjxgait.config.tables import build, merge
 from mjxgait.creature import load_creature
-from mjxgait.runs.devices import prepare_devices
-from mjxgait.runs.experiment import build_batch, build_experiment
-from mjxgait.settings.config import Config
-from mjxgait.settings.layers import resolve_config
-from mjxgait.settings.shipped import find_creature
-from mjxgait.settings.tables import build, merge
+from mjxgait.training.devices import prepare_devices
+from mjxgait.training.experiment import build_batch, build_experiment
 
 
 def main() -> None:

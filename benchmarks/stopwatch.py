@@ -47,7 +47,16 @@ class Stopwatch:
 def main() -> None:
     path, *arguments = sys.argv[1:]
     from mjxgait.cli import main as command
-    from mjxgait.runs import checkpoint, examination, experiment, looks, loop, stages
+    from mjxgait.training import (
+        checkpoint,
+        examination,
+        experiment,
+        loop,
+        stages,
+    )
+    from mjxgait.training import (
+        validation as looks,
+    )
 
     watch = Stopwatch()
     watch.add("imports", time.perf_counter() - BEGAN)

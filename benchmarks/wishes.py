@@ -17,11 +17,11 @@ import tempfile
 import time
 from pathlib import Path
 
-from mjxgait.certify import judged
-from mjxgait.library import load_creature
-from mjxgait.parts.wishes import NATURAL
+from mjxgait.api import load_creature
+from mjxgait.certification import judged
 from mjxgait.processes import python_command
-from mjxgait.settings.gaits import GAITS
+from mjxgait.tasks.walk.gaits import GAITS
+from mjxgait.tasks.walk.targets import NATURAL
 
 ENVS = ("tall_quadruped", "short_quadruped", "crab", "duck")
 SPEEDS = ("0.25", "0.5", "1", "1.5")

@@ -20,7 +20,15 @@ On the command line: `mjxgait --help`.
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from mjxgait.library import Run, examine, load_creature, open, refine, train, walk
+    from mjxgait.api import (
+        Run,
+        examine,
+        load_creature,
+        open,
+        refine,
+        train,
+        walk,
+    )
 
 __version__ = "0.1.0"
 __all__ = ["Run", "examine", "load_creature", "open", "refine", "train", "walk"]
@@ -29,7 +37,7 @@ __all__ = ["Run", "examine", "load_creature", "open", "refine", "train", "walk"]
 def __getattr__(name: str) -> Any:
     """What is asked for, imported then: the command line must not wait for it."""
     if name in __all__:
-        from mjxgait import library
+        from mjxgait import api as library
 
         return getattr(library, name)
     raise AttributeError(f"module 'mjxgait' has no attribute {name!r}")

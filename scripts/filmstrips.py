@@ -8,10 +8,10 @@ from pathlib import Path
 
 from PIL import Image
 
-from mjxgait.certify import read_certificate
+from mjxgait.certification import read_certificate
 from mjxgait.cli import main
 from mjxgait.errors import UserError
-from mjxgait.runs.folder import CERTIFICATE, open_run
+from mjxgait.training.folder import CERTIFICATE, open_run
 
 DOCS = Path(__file__).parents[1] / "docs"
 WIDTH = 1100

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 from mjxgait.cli import main
-from mjxgait.runs.folder import open_run
+from mjxgait.training.folder import open_run
 
 PICTURES = Path(__file__).parents[1] / "docs" / "images"
 

@@ -20,9 +20,15 @@ from typing import Any
 
 import numpy as np
 
-from mjxgait.certify import CertificateConfig, certify, record
-from mjxgait.certify.measure import Recording
-from mjxgait.runs.folder import CERTIFICATE, CHAMPION, CONFIG, CREATURE, open_champion
+from mjxgait.certification import CertificateConfig, certify, record
+from mjxgait.reference.measure import Recording
+from mjxgait.training.folder import (
+    CERTIFICATE,
+    CHAMPION,
+    CONFIG,
+    CREATURE,
+    open_champion,
+)
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE, FOLDER = ROOT / "docs" / "worked-example.md", ROOT / "docs" / "data" / "walk"

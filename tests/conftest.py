@@ -22,8 +22,8 @@ import jax
 import pytest
 from helpers import STOOL
 
+from mjxgait.config.shipped import data_folder
 from mjxgait.creature import Creature, load_creature
-from mjxgait.settings.shipped import data_folder
 
 OLDER = "--xla_cpu_use_fusion_emitters=false"
 """XLA's older way from fused operations to machine code, which needs a third less of the compiler's time."""

@@ -7,13 +7,13 @@ import numpy as np
 from certify_made_up import LEGS, TOML, XML, make_champion
 from helpers import small_config
 
-from mjxgait.certify import starts as examined
-from mjxgait.certify.outcome import Fall, Outcome
-from mjxgait.certify.simulate import simulate
+from mjxgait.certification.simulate import simulate
 from mjxgait.champion import Champion
+from mjxgait.config.schema import Config
 from mjxgait.creature import Creature, load_creature
-from mjxgait.settings.config import Config
-from mjxgait.tasks.walk.tally import Tally
+from mjxgait.reference import starts as examined
+from mjxgait.reference.outcome import Fall, Outcome
+from mjxgait.tasks.walk.stats import Tally
 
 STEP, SECONDS = 0.005, 1.2
 STEPS = round(SECONDS / STEP)

@@ -10,17 +10,28 @@ import jax
 import numpy as np
 import pytest
 
-from mjxgait.certify import Certificate, CertificateConfig, Criterion, Measure
+from mjxgait.certification import (
+    Certificate,
+    CertificateConfig,
+    Criterion,
+    Measure,
+)
 from mjxgait.champion import Champion
 from mjxgait.cli import main
+from mjxgait.config.schema import Config
+from mjxgait.config.tables import build
+from mjxgait.controllers.key_poses.config import (
+    STEPPING,
+    TUNING,
+    DriveConfig,
+    PoseConfig,
+    gene_names,
+)
 from mjxgait.creature import Creature
-from mjxgait.runs.experiment import Batch
-from mjxgait.settings.config import Config
-from mjxgait.settings.control import STEPPING, TUNING, DriveConfig, PoseConfig, gene_names
-from mjxgait.settings.tables import build
-from mjxgait.settings.walk import WalkConfig
 from mjxgait.tasks.score import in_order
+from mjxgait.tasks.walk.config import WalkConfig
 from mjxgait.tasks.walk.fitness import signed_weights, terms_under
+from mjxgait.training.experiment import Batch
 
 STOOL = Path(__file__).parent / "data" / "stool"
 

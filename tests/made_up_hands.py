@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 from viewing.made_up import metrics_line
 
-from mjxgait.cluster.crew import Crew, Report, Worker
-from mjxgait.cluster.jobs import Advanced, AdvanceRows
-from mjxgait.cluster.programs import Programs
-from mjxgait.cluster.recipe import Recipe
-from mjxgait.repertoire.cells import POSES
-from mjxgait.runs.packed import pack
+from mjxgait.distributed.jobs import Advanced, AdvanceRows
+from mjxgait.distributed.programs import Programs
+from mjxgait.distributed.recipe import Recipe
+from mjxgait.distributed.scheduler import Crew, Report, Worker
+from mjxgait.experiments.repertoire.cells import POSES
+from mjxgait.training.packed import pack
 
 PROGRAMS = Programs()
 

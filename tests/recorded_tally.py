@@ -3,11 +3,11 @@
 import mujoco
 import numpy as np
 
-from mjxgait.certify.outcome import Fall, Trajectory
 from mjxgait.creature import Creature
 from mjxgait.creature.settings import Termination
+from mjxgait.reference.outcome import Fall, Trajectory
 from mjxgait.tasks.falls import Reason
-from mjxgait.tasks.walk.tally import CONTACT_GAP, SWING
+from mjxgait.tasks.walk.stats import CONTACT_GAP, SWING
 
 
 class Frames:

@@ -9,14 +9,14 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from mjxgait.control.pose_variation import pose_variation
-from mjxgait.control.poses import Genome
-from mjxgait.search.breeding import Nursery
-from mjxgait.search.chance import key_of
-from mjxgait.search.variation import Box, first_occurrence
-from mjxgait.settings.config import Config
-from mjxgait.settings.evolution import EvolutionConfig
-from mjxgait.settings.traced import traced
+from mjxgait.config.evolution import EvolutionConfig
+from mjxgait.config.schema import Config
+from mjxgait.config.traced import traced
+from mjxgait.controllers.key_poses.controller import Genome
+from mjxgait.controllers.key_poses.operators import pose_variation
+from mjxgait.evolution.breeding import Nursery
+from mjxgait.evolution.chance import key_of
+from mjxgait.evolution.variation import Box, first_occurrence
 
 THESIS = EvolutionConfig(
     population=12,

@@ -10,7 +10,7 @@ import pytest
 from scipy import stats
 
 from mjxgait.errors import UserError
-from mjxgait.search.chance import NAME, key_from, key_of
+from mjxgait.evolution.chance import NAME, key_from, key_of
 
 MANY = 1 << 18
 UNLIKELY = 1e-6

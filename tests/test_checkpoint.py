@@ -16,9 +16,9 @@ import pytest
 from test_evolution import advance, begin, inputs, toy
 
 from mjxgait.errors import UserError
-from mjxgait.runs.checkpoint import FOLDER, Checkpoints
-from mjxgait.search.chance import key_of
-from mjxgait.search.state import EvolutionState
+from mjxgait.evolution.chance import key_of
+from mjxgait.evolution.state import EvolutionState
+from mjxgait.training.checkpoint import FOLDER, Checkpoints
 
 DIGEST = "0123456789abcdef"
 
@@ -203,8 +203,8 @@ from pathlib import Path
 import jax
 from test_evolution import begin, inputs, toy
 from mjxgait.errors import UserError
-from mjxgait.runs import checkpoint
-from mjxgait.search.chance import key_of
+from mjxgait.training import checkpoint
+from mjxgait.evolution.chance import key_of
 
 begun = begin(*inputs(toy()), key_of(0))
 state, later = (dataclasses.replace(begun, generation=jax.numpy.int32(g)) for g in (0, 1))

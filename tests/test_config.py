@@ -8,14 +8,14 @@ from pathlib import Path
 
 import pytest
 
+from mjxgait.config.layers import over_base
+from mjxgait.config.schema import Config, UseConfig
+from mjxgait.config.shipped import data_folder, find_creature
+from mjxgait.config.tables import build, dump_toml, read_toml
 from mjxgait.errors import UserError
-from mjxgait.parts import resolve_config
-from mjxgait.parts.registry import SHIPPED
-from mjxgait.parts.settings import build_config, config_class
-from mjxgait.settings.config import Config, UseConfig
-from mjxgait.settings.layers import over_base
-from mjxgait.settings.shipped import data_folder, find_creature
-from mjxgait.settings.tables import build, dump_toml, read_toml
+from mjxgait.plugins import resolve_config
+from mjxgait.plugins.registry import SHIPPED
+from mjxgait.plugins.settings import build_config, config_class
 
 
 @pytest.mark.parametrize(

@@ -16,18 +16,25 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from viewing.made_up import metrics_line, treading, write_run
 
-from mjxgait.certify import CertificateConfig, read_certificate, read_stress
+from mjxgait.certification import CertificateConfig, read_certificate, read_stress
 from mjxgait.champion import read_champion, write_champion
-from mjxgait.commands import certify
+from mjxgait.cli import certify
+from mjxgait.config.schema import Config
 from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import UserError
 from mjxgait.inspect.islands import island_facts
-from mjxgait.runs.exams import Exams
-from mjxgait.runs.folder import CERTIFICATE, CHAMPION, CONFIG, METRICS, open_run, read_metrics
-from mjxgait.runs.stored import FOLDER, stored_generations
-from mjxgait.settings.config import Config
-from mjxgait.viewing.curves import columns
-from mjxgait.viewing.walk import record_walk
+from mjxgait.rendering.curves import columns
+from mjxgait.rendering.walk import record_walk
+from mjxgait.training.exams import Exams
+from mjxgait.training.folder import (
+    CERTIFICATE,
+    CHAMPION,
+    CONFIG,
+    METRICS,
+    open_run,
+    read_metrics,
+)
+from mjxgait.training.stored import FOLDER, stored_generations
 from mjxgait.web.live import Watcher
 from mjxgait.web.page import certificate_table
 
@@ -96,7 +103,7 @@ CRITERION = {
 
 def certificate_of(champion: Any) -> dict[str, Any]:
 
-    from mjxgait.certify.certificate import schema_of
+    from mjxgait.certification.certificate import schema_of
 
     report = {"speed": 0.5, "gait": "trot", "summary": "It walks.", "duty_factor": {"a": 0.5}}
     return {

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from mjxgait.commands.train import _plot_fitness
+from mjxgait.cli.train import _plot_fitness
 from mjxgait.errors import UserError
-from mjxgait.runs.disk import disk_errors, require_writable, try_room
+from mjxgait.training.disk import disk_errors, require_writable, try_room
 
 RUN = Path("runs/a")
 WRAPPED = (

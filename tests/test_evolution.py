@@ -10,18 +10,24 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from mjxgait.control.pose_variation import pose_variation
-from mjxgait.control.poses import Genome
-from mjxgait.search.breeding import parents, proportional_parents
-from mjxgait.search.chance import key_of
-from mjxgait.search.copies import first_of_kind
-from mjxgait.search.evolution import Evolution
-from mjxgait.search.families import families, place_in_family
-from mjxgait.search.state import NOBODY, EvolutionState, GenerationMetrics, Origin, stop_reason
-from mjxgait.search.variation import Box, Variation, first_occurrence
-from mjxgait.settings.config import Config
-from mjxgait.settings.evolution import EvolutionConfig, ForcedConfig
-from mjxgait.settings.traced import traced
+from mjxgait.config.evolution import EvolutionConfig, ForcedConfig
+from mjxgait.config.schema import Config
+from mjxgait.config.traced import traced
+from mjxgait.controllers.key_poses.controller import Genome
+from mjxgait.controllers.key_poses.operators import pose_variation
+from mjxgait.evolution.breeding import parents, proportional_parents
+from mjxgait.evolution.chance import key_of
+from mjxgait.evolution.copies import first_of_kind
+from mjxgait.evolution.evolution import Evolution
+from mjxgait.evolution.families import families, place_in_family
+from mjxgait.evolution.state import (
+    NOBODY,
+    EvolutionState,
+    GenerationMetrics,
+    Origin,
+    stop_reason,
+)
+from mjxgait.evolution.variation import Box, Variation, first_occurrence
 from mjxgait.types import Judged, pytree
 
 FORCED = ForcedConfig(window=2)

@@ -12,21 +12,21 @@ from jax.tree_util import keystr
 from scipy.spatial.transform import Rotation
 
 import mjxgait
-from mjxgait.certify.simulate import simulate
-from mjxgait.certify.starts import nominal_starts
+from mjxgait.certification.simulate import simulate
 from mjxgait.champion import Champion, read_champion
-from mjxgait.control.bodied import Bodied
+from mjxgait.controllers.sized_body import Bodied
 from mjxgait.creature import Creature, load_creature
 from mjxgait.creature.overlap import find_crossings
 from mjxgait.creature.proportions import grown, proportions
+from mjxgait.evolution.chance import key_of
 from mjxgait.inspect import facts, read_snapshot
-from mjxgait.physics.fast import fast_plant
+from mjxgait.physics.lane_major import fast_plant
 from mjxgait.physics.layout import sense_layout
-from mjxgait.physics.plain import mjx_plant
-from mjxgait.runs.folder import BODY, CHAMPION
-from mjxgait.runs.growth import SizeGrowth
-from mjxgait.search.chance import key_of
-from mjxgait.tasks.trials import draw_starts
+from mjxgait.physics.mjx import mjx_plant
+from mjxgait.reference.starts import nominal_starts
+from mjxgait.tasks.starts import draw_starts
+from mjxgait.training.folder import BODY, CHAMPION
+from mjxgait.training.growth import SizeGrowth
 
 MOST = 1.3
 
@@ -112,7 +112,7 @@ def compare_with_the_scaled_files(shipped: Creature, make: Any) -> None:
 def test_it_stands_as_high_above_the_floor(shipped: Creature):
     known, sizes = proportions(shipped), some_sizes(shipped, 4)
     plant = fast_plant(shipped.model, sense_layout(shipped), None)
-    config = mjxgait.settings.config.RolloutConfig(starts=1)
+    config = mjxgait.config.schema.RolloutConfig(starts=1)
     start = jax.tree.map(lambda x: x[0], draw_starts(key_of(0), shipped, config))
     # Compiled for the place alone, for the body's other numbers take the compiler ten seconds.
     place = jax.jit(lambda genome: SizeGrowth(known).body(plant, genome, start).qpos)

@@ -16,21 +16,31 @@ import pytest
 from helpers import STOOL, Shares, small_config
 from rich.console import Console
 
-from mjxgait.certify import Certificate, CertificateConfig, Criterion, Measure
-from mjxgait.certify.stress import Stress, StressConfig, Trial
+from mjxgait.certification import (
+    Certificate,
+    CertificateConfig,
+    Criterion,
+    Measure,
+)
+from mjxgait.certification.stress import Stress, StressConfig, Trial
+from mjxgait.config.schema import ExaminationConfig
 from mjxgait.creature import load_creature
 from mjxgait.errors import UserError
+from mjxgait.evolution.state import EvolutionState
 from mjxgait.inspect.snapshot import read_snapshot
-from mjxgait.runs import examination, loop
-from mjxgait.runs.examination import Examiner, due
-from mjxgait.runs.exams import Exams
-from mjxgait.runs.experiment import Experiment, build_experiment
-from mjxgait.runs.folder import CERTIFICATE, EXAMS, create_run, read_metrics
-from mjxgait.runs.looks import Looks as RunLooks
-from mjxgait.runs.screen import Screen
-from mjxgait.runs.stored import stored_generations
-from mjxgait.search.state import EvolutionState
-from mjxgait.settings.config import ExaminationConfig
+from mjxgait.training import examination, loop
+from mjxgait.training.examination import Examiner, due
+from mjxgait.training.exams import Exams
+from mjxgait.training.experiment import Experiment, build_experiment
+from mjxgait.training.folder import (
+    CERTIFICATE,
+    EXAMS,
+    create_run,
+    read_metrics,
+)
+from mjxgait.training.screen import Screen
+from mjxgait.training.stored import stored_generations
+from mjxgait.training.validation import Looks as RunLooks
 
 SECONDS = 0.4
 

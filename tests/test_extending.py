@@ -14,9 +14,9 @@ from helpers import SHORT, STOOL
 from rich.console import Console
 
 from mjxgait.cli import main
-from mjxgait.commands.view import following
-from mjxgait.runs.own import own_options
-from mjxgait.runs.screen import Screen
+from mjxgait.cli.view import following
+from mjxgait.training.own import own_options
+from mjxgait.training.screen import Screen
 
 PAGE = Path(__file__).parents[1] / "docs" / "extending.md"
 SMALL = (
@@ -125,7 +125,7 @@ def test_it_takes_part_in_studies(folder: Path, monkeypatch: pytest.MonkeyPatch)
 
 
 def test_no_code_is_loaded_from_a_run(trained: Path, capfd, monkeypatch):
-    from mjxgait.parts import registry
+    from mjxgait.plugins import registry
 
     monkeypatch.setattr(registry, "_OWN", {})
     monkeypatch.chdir(trained.parents[1])
@@ -185,7 +185,10 @@ def test_the_page_that_follows_a_run_is_given_the_same_code(folder: Path, traine
     [
         ("--controller nothere.py:Spin", "no such file"),
         ("--controller my.py:Nobody", 'has no class "Nobody"'),
-        ("--controller my.py:Stand", "must inherit from mjxgait.control.reals.RealController"),
+        (
+            "--controller my.py:Stand",
+            "must inherit from mjxgait.controllers.real_genome.RealController",
+        ),
         ("--controller half.py:Half", "Half lacks act"),
         ("--controller broken.py:X", "cannot be loaded (ZeroDivisionError"),
         ("--controller rare.py:Rare", "Rare.every = 3: must be one of 1, 2, 4, 8, 16"),
@@ -198,7 +201,7 @@ def test_the_page_that_follows_a_run_is_given_the_same_code(folder: Path, traine
 )
 def test_a_mistake_is_one_sentence(folder: Path, arguments, words, capfd, monkeypatch):
     monkeypatch.chdir(folder)
-    head = "from mjxgait.control.reals import RealController\n"
+    head = "from mjxgait.controllers.real_genome import RealController\n"
     bounds = "    def bounds(self, settings):\n        return {'a': (0.0, 1.0)}\n"
     act = "    def act(self, plan, memory, senses):\n        return 0, memory\n"
     (folder / "half.py").write_text(f"{head}class Half(RealController):\n{bounds}")

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from mjxgait.animation import export_usd
+from mjxgait.animation.export import export_usd
+from mjxgait.config import shipped
+from mjxgait.config.shipped import install_command
 from mjxgait.errors import UserError
-from mjxgait.settings import shipped
-from mjxgait.settings.shipped import install_command
 
 ROOT = Path(__file__).parents[1]
 

@@ -9,14 +9,14 @@ import pytest
 from helpers import STOOL, said_by
 from scipy.spatial.transform import Rotation
 
+from mjxgait.api import load_creature
+from mjxgait.config.schema import Config
+from mjxgait.controllers.observations import SENSES
 from mjxgait.creature import Creature
 from mjxgait.creature.facing import WAYS, facing
 from mjxgait.creature.settings import Balance, Steering, Stepping
 from mjxgait.errors import UserError
-from mjxgait.library import load_creature
-from mjxgait.runs.folder import create_run, open_run
-from mjxgait.senses import SENSES
-from mjxgait.settings.config import Config
+from mjxgait.training.folder import create_run, open_run
 
 RNG = np.random.default_rng(5)
 

@@ -9,11 +9,16 @@ import pytest
 from helpers import altered, small_config, weight_vector
 
 from mjxgait.creature import Creature
-from mjxgait.settings.walk import WalkConfig, Weights
 from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.score import hardness, ramped, score
-from mjxgait.tasks.walk.fitness import REWARDS, TERMS, fitness_terms, terms_under
-from mjxgait.tasks.walk.tally import Judge
+from mjxgait.tasks.walk.config import WalkConfig, Weights
+from mjxgait.tasks.walk.fitness import (
+    REWARDS,
+    TERMS,
+    fitness_terms,
+    terms_under,
+)
+from mjxgait.tasks.walk.stats import Judge
 from mjxgait.tasks.walk.task import Walk
 from mjxgait.types import Sensed
 

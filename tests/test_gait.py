@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from helpers import altered, pose_champion
 
-from mjxgait.certify.twins.poses import PoseTwin
-from mjxgait.control.poses import (
+from mjxgait.controllers.key_poses.config import PoseConfig
+from mjxgait.controllers.key_poses.controller import (
     PERIOD,
     PITCH,
     PITCH_RATE,
@@ -26,9 +26,9 @@ from mjxgait.control.poses import (
     interpolate,
     pose_cycle,
 )
+from mjxgait.controllers.key_poses.reference import PoseTwin
+from mjxgait.controllers.observations import sense
 from mjxgait.creature import Creature
-from mjxgait.senses import sense
-from mjxgait.settings.control import PoseConfig
 from mjxgait.types import Sensed
 
 

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from helpers import small_config
 
+from mjxgait.config.schema import Config
 from mjxgait.creature import Creature
-from mjxgait.runs import generation
-from mjxgait.runs.experiment import build_batch
-from mjxgait.runs.generation import SENT, with_guests
-from mjxgait.search.state import EvolutionState, Proposal
-from mjxgait.settings.config import Config
+from mjxgait.evolution.state import EvolutionState, Proposal
+from mjxgait.training import generation
+from mjxgait.training.experiment import build_batch
+from mjxgait.training.generation import SENT, with_guests
 
 ROWS, POPULATION, CHILDREN = 3, 6, 5
 

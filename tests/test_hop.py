@@ -10,25 +10,43 @@ import numpy as np
 import pytest
 from helpers import SHORT, altered, pose_champion, said_by
 
-from mjxgait.certify import record
-from mjxgait.certify.simulate import simulate
-from mjxgait.certify.starts import nominal_starts
+from mjxgait.certification import record
+from mjxgait.certification.simulate import simulate
+from mjxgait.config.rollout import RolloutConfig
+from mjxgait.config.shipped import find_creature
 from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import UserError
-from mjxgait.parts import resolve_config
-from mjxgait.parts.own import load
-from mjxgait.parts.settings import build_config
-from mjxgait.runs.experiment import Experiment, build_experiment
-from mjxgait.search.chance import key_of
-from mjxgait.settings.hop import GOALS, NOMINAL_GOAL, HopConfig, HopWeights
-from mjxgait.settings.rollout import RolloutConfig
-from mjxgait.settings.shipped import find_creature
-from mjxgait.settings.walk import WalkConfig
+from mjxgait.evolution.chance import key_of
+from mjxgait.plugins import resolve_config
+from mjxgait.plugins.settings import build_config
+from mjxgait.plugins.user_code import load
+from mjxgait.reference.starts import nominal_starts
 from mjxgait.tasks.falls import Reason
-from mjxgait.tasks.hop.fitness import STYLE, TERMS, fitness_terms, signed_weights, terms_under
-from mjxgait.tasks.hop.tally import Tally, away, empty, goal_distance, rested, updated
+from mjxgait.tasks.hop.config import (
+    GOALS,
+    NOMINAL_GOAL,
+    HopConfig,
+    HopWeights,
+)
+from mjxgait.tasks.hop.fitness import (
+    STYLE,
+    TERMS,
+    fitness_terms,
+    signed_weights,
+    terms_under,
+)
+from mjxgait.tasks.hop.stats import (
+    Tally,
+    away,
+    empty,
+    goal_distance,
+    rested,
+    updated,
+)
 from mjxgait.tasks.hop.task import Hop
-from mjxgait.tasks.trials import Starts, draw_starts
+from mjxgait.tasks.starts import Starts, draw_starts
+from mjxgait.tasks.walk.config import WalkConfig
+from mjxgait.training.experiment import Experiment, build_experiment
 from mjxgait.types import Sensed
 
 STEP, HORIZON = 0.005, 1000
@@ -345,7 +363,7 @@ def test_evolution_weighs_energy_and_sub_goals_where_they_have_a_weight(stool: C
 
 REACH = """
 import jax.numpy as jnp
-from mjxgait.control.reals import RealController
+from mjxgait.controllers.real_genome import RealController
 
 
 class Reach(RealController):

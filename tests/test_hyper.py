@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from helpers import STOOL, program_text, small_config
 
+from mjxgait.config.evolution import EvolutionConfig
+from mjxgait.config.schema import Config
+from mjxgait.config.traced import chosen, traced
 from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import UserError
-from mjxgait.runs.experiment import Batch, Step, build_batch
-from mjxgait.settings.config import Config
-from mjxgait.settings.evolution import EvolutionConfig
-from mjxgait.settings.traced import chosen, traced
+from mjxgait.training.experiment import Batch, Step, build_batch
 
 
 def shape(**tables: dict) -> object:

@@ -13,7 +13,7 @@ import mjxgait
 from mjxgait.creature import Creature
 from mjxgait.creature.scale import scaled
 from mjxgait.errors import UserError
-from mjxgait.runs.experiment import build_experiment
+from mjxgait.training.experiment import build_experiment
 
 SMALL = {
     "rollout": {"seconds": 0.4, "starts": 2, "promote": 1.0, "lanes": 4},
@@ -25,7 +25,7 @@ SMALL = {
 def short() -> Iterator[None]:
     """What is examined here is examined for 3 s: the whole takes ten times as long."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("mjxgait.certify.certificate.CertificateConfig", short_examination)
+        patch.setattr("mjxgait.certification.certificate.CertificateConfig", short_examination)
         yield
 
 
@@ -54,7 +54,7 @@ def test_a_second_run_of_the_same_shape_compiles_nothing(
     def compiled(*_: object) -> None:
         raise AssertionError("compiled anew")
 
-    monkeypatch.setattr("mjxgait.runs.experiment.compile_stages", compiled)
+    monkeypatch.setattr("mjxgait.training.experiment.compile_stages", compiled)
     other = SMALL | {"fitness": {"weights": {"slip": 3.0}}}
     mjxgait.train(
         STOOL, out=tmp_path / "x", seed=4, population=6, generations=1, settings=other, quiet=True

@@ -11,31 +11,36 @@ import numpy as np
 import pytest
 from helpers import SHORT, STOOL, pose_champion, said_by
 
-from mjxgait.certify import CertificateConfig, record
-from mjxgait.certify.bar import FAR, Clearance
-from mjxgait.certify.bar import RADIUS as EXAMINED_RADIUS
-from mjxgait.certify.measure import Recording
-from mjxgait.certify.outcome import Outcome, Trajectory
-from mjxgait.certify.simulate import simulate
-from mjxgait.certify.starts import nominal_starts, perturbed_starts
-from mjxgait.certify.tasks import demands_of, promising
-from mjxgait.certify.thresholds.goals import LimboConfig as Demanded
+from mjxgait.certification import CertificateConfig, record
+from mjxgait.certification.simulate import simulate
+from mjxgait.certification.tasks import demands_of, promising
 from mjxgait.champion import Champion
+from mjxgait.config.rollout import RolloutConfig
+from mjxgait.config.shipped import find_creature
 from mjxgait.creature import Creature, load_creature
 from mjxgait.creature.geometry import support_extents
 from mjxgait.errors import UserError
-from mjxgait.parts.settings import build_config
-from mjxgait.runs.experiment import build_experiment
-from mjxgait.runs.generation import LEADERS, Row, climbed, next_starts
-from mjxgait.search.chance import key_of
-from mjxgait.search.state import EvolutionState
-from mjxgait.settings import limbo as evolution
-from mjxgait.settings.limbo import BAR_PLACE, LimboConfig, LimboWeights
-from mjxgait.settings.rollout import RolloutConfig
-from mjxgait.settings.shipped import find_creature
+from mjxgait.evolution.chance import key_of
+from mjxgait.evolution.state import EvolutionState
+from mjxgait.plugins.settings import build_config
+from mjxgait.reference.bar import FAR, Clearance
+from mjxgait.reference.bar import RADIUS as EXAMINED_RADIUS
+from mjxgait.reference.measure import Recording
+from mjxgait.reference.outcome import Outcome, Trajectory
+from mjxgait.reference.starts import nominal_starts, perturbed_starts
+from mjxgait.tasks.hop import limbo_config as evolution
+from mjxgait.tasks.hop.bar import bar_distance, intrusion
 from mjxgait.tasks.hop.fitness import signed_weights, terms_under
-from mjxgait.tasks.limbo.bar import bar_distance, intrusion
-from mjxgait.tasks.limbo.task import Aim, Limbo
+from mjxgait.tasks.hop.limbo import Aim, Limbo
+from mjxgait.tasks.hop.limbo_config import BAR_PLACE, LimboConfig, LimboWeights
+from mjxgait.tasks.hop.thresholds import LimboConfig as Demanded
+from mjxgait.training.experiment import build_experiment
+from mjxgait.training.generation import (
+    LEADERS,
+    Row,
+    climbed,
+    next_starts,
+)
 from mjxgait.types import Sensed
 
 CONFIG, DEMANDS = CertificateConfig(), demands_of("limbo")

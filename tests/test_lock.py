@@ -14,19 +14,24 @@ from pathlib import Path
 import pytest
 from helpers import STOOL, said_by
 
+from mjxgait.config.schema import Config
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
-from mjxgait.runs import lock
-from mjxgait.runs.folder import create_run
-from mjxgait.runs.lock import LOCK, locked, running, why_empty
-from mjxgait.settings.config import Config
+from mjxgait.training import lock
+from mjxgait.training.folder import create_run
+from mjxgait.training.lock import (
+    LOCK,
+    locked,
+    running,
+    why_empty,
+)
 
 pytest.importorskip("fcntl", reason="this system has no flock")
 
 HOLD = """
 import sys
 from pathlib import Path
-from mjxgait.runs.lock import locked
+from mjxgait.training.lock import locked
 with locked(Path(sys.argv[1])):
     print("locked", flush=True)
     sys.stdin.read()
@@ -74,7 +79,7 @@ def test_a_look_does_not_keep_a_process_from_beginning(tmp_path: Path, monkeypat
     (tmp_path / LOCK).touch()
     looks = (tmp_path / LOCK).open("rb")
     assert lock._try(looks, shared=True)
-    monkeypatch.setattr("mjxgait.runs.lock.time.sleep", lambda seconds: looks.close())
+    monkeypatch.setattr("mjxgait.training.lock.time.sleep", lambda seconds: looks.close())
     with locked(tmp_path):
         assert running(tmp_path) == ME
 
@@ -136,7 +141,7 @@ def test_a_second_resume_is_refused_with_the_name_of_the_first(
     command: str, stool: Creature, tmp_path: Path, capsys, monkeypatch
 ):
     run = create_run(tmp_path / "run", stool, Config())
-    monkeypatch.setattr("mjxgait.keys.refine.read_original", lambda *_: None)
+    monkeypatch.setattr("mjxgait.animation.keys.refine.read_original", lambda *_: None)
     with locked(run):
         said = said_by(capsys, command, "--resume", run, code=2)
         assert said == (
@@ -153,7 +158,7 @@ def test_a_new_run_is_locked_as_long_as_it_evolves(tmp_path: Path, capsys, monke
         seen.append(running(folder))
         return True
 
-    monkeypatch.setattr("mjxgait.runs.loop.train", train)
+    monkeypatch.setattr("mjxgait.training.loop.train", train)
     said_by(capsys, "train", "--env", STOOL, "--no-plots", "--out", run, code=0)
     assert seen == [ME]
     assert not (run / LOCK).exists()

@@ -9,12 +9,12 @@ import pytest
 from helpers import STOOL, said_by, short_examination
 from keys.made import swings, write
 
-from mjxgait.ablation.plan import make_plan, read_study
-from mjxgait.commands.refine import refine_command
-from mjxgait.commands.repertoire import RepertoireOptions, planned
-from mjxgait.commands.train import train_command
+from mjxgait.cli.refine import refine_command
+from mjxgait.cli.repertoire import RepertoireOptions, planned
+from mjxgait.cli.train import train_command
 from mjxgait.creature import Creature
-from mjxgait.runs.folder import open_run
+from mjxgait.experiments.ablation.plan import make_plan, read_study
+from mjxgait.training.folder import open_run
 
 SMALL = [
     "--population",
@@ -51,7 +51,7 @@ def test_a_run_with_mjx_ends_with_a_certificate(
     own_step_is_absent: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     """With 3 s of examination instead of 22, and of a population that cannot walk yet."""
-    monkeypatch.setattr("mjxgait.certify.certificate.CertificateConfig", short_examination)
+    monkeypatch.setattr("mjxgait.certification.certificate.CertificateConfig", short_examination)
     run = tmp_path / "run"
     assert train_command(["--env", str(STOOL), *SMALL, "--physics", "mjx", "--out", str(run)]) == 0
     assert open_run(run)[1].rollout.physics == "mjx"
@@ -89,7 +89,7 @@ def test_a_refined_cycle_takes_mjx(
         given[-1]()
         return 0
 
-    monkeypatch.setattr("mjxgait.commands.refine._run", only_written)
+    monkeypatch.setattr("mjxgait.cli.refine._run", only_written)
     run = tmp_path / "run"
     given = ["--env", str(STOOL), "--keys", str(file), "--tolerance", "4"]
     given += ["--physics", "mjx", "--out", str(run)]

@@ -15,11 +15,11 @@ from viewing.made_up import treading, write_run
 from mjxgait.bench.scaling import Point, measure
 from mjxgait.cores import process_per_core
 from mjxgait.creature import Creature
-from mjxgait.importing import import_model
+from mjxgait.importer import import_model
 from mjxgait.processes import SAFE_PATH, python_command, safe_environment
-from mjxgait.viewing.gl import working_backend
-from mjxgait.viewing.stage import Stage
-from mjxgait.viewing.walk import record_walk
+from mjxgait.rendering.gl import working_backend
+from mjxgait.rendering.stage import Stage
+from mjxgait.rendering.walk import record_walk
 
 TRAP = """
 with open({marker!r}, "a") as marker:
@@ -82,7 +82,7 @@ def test_the_trap_is_one(marker: Path):
 FOLLOWS = """
 import sys
 from pathlib import Path
-from mjxgait.commands.view import following
+from mjxgait.cli.view import following
 with following(Path(sys.argv[1])):
     sys.stdin.read()
 """

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 from helpers import small_config
 
-from mjxgait.control.pose_variation import pose_variation
-from mjxgait.control.poses import Genome
+from mjxgait.config.evolution import EvolutionConfig
+from mjxgait.controllers.key_poses.controller import Genome
+from mjxgait.controllers.key_poses.operators import pose_variation
 from mjxgait.creature import Creature
-from mjxgait.runs.experiment import Experiment, build_experiment
-from mjxgait.search.chance import key_of
-from mjxgait.search.evolution import Evolution
-from mjxgait.search.state import EvolutionState, GenerationMetrics, Proposal
-from mjxgait.search.variation import Box
-from mjxgait.settings.evolution import EvolutionConfig
+from mjxgait.evolution.chance import key_of
+from mjxgait.evolution.evolution import Evolution
+from mjxgait.evolution.state import EvolutionState, GenerationMetrics, Proposal
+from mjxgait.evolution.variation import Box
+from mjxgait.training.experiment import Experiment, build_experiment
 from mjxgait.types import Judged
 
 STARTS = {"starts": 3, "lanes": 4}

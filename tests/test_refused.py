@@ -6,11 +6,11 @@ import pytest
 from helpers import STOOL, said_by
 from keys.made import swings, write
 
-from mjxgait.commands.import_ import write_folder
+from mjxgait.cli.import_ import write_folder
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
-from mjxgait.importing import Imported
-from mjxgait.importing.notes import Notes
+from mjxgait.importer import Imported
+from mjxgait.importer.notes import Notes
 
 STUDY = f"""
 question = "?"
@@ -70,7 +70,7 @@ def test_a_body_without_a_program_is_refused_first(
     arguments: tuple[object, ...], stool: Creature, tmp_path: Path, capsys, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("mjxgait.runs.blueprint.make_plant", refuse)
+    monkeypatch.setattr("mjxgait.training.blueprint.make_plant", refuse)
     (tmp_path / "study.toml").write_text(STUDY)
     write(tmp_path, "csv", stool, swings(stool))
     out = tmp_path / "out"

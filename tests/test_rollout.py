@@ -13,21 +13,18 @@ import numpy as np
 import pytest
 from helpers import small_config, weight_vector
 
-from mjxgait.control.poses import Genome
+from mjxgait.config.layers import resolve_config
+from mjxgait.config.schema import Config
+from mjxgait.config.shipped import find_creature
+from mjxgait.controllers.key_poses.controller import Genome
 from mjxgait.creature import Creature, load_creature
-from mjxgait.runs.experiment import Experiment, build_experiment
-from mjxgait.runs.generation import evolution_of
-from mjxgait.search.chance import key_of
-from mjxgait.search.variation import Box, uniform
-from mjxgait.settings.config import Config
-from mjxgait.settings.gaits import stride_limit
-from mjxgait.settings.layers import resolve_config
-from mjxgait.settings.shipped import find_creature
+from mjxgait.evolution.chance import key_of
+from mjxgait.evolution.variation import Box, uniform
 from mjxgait.simulation.evaluator import Local
 from mjxgait.simulation.rollout import Episodes
 from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.score import in_order, score
-from mjxgait.tasks.trials import NEVER, Starts, draw_starts
+from mjxgait.tasks.starts import NEVER, Starts, draw_starts
 from mjxgait.tasks.walk.fitness import (
     BEYOND,
     REWARDS,
@@ -35,6 +32,9 @@ from mjxgait.tasks.walk.fitness import (
     fitness_terms,
     terms_under,
 )
+from mjxgait.tasks.walk.gaits import stride_limit
+from mjxgait.training.experiment import Experiment, build_experiment
+from mjxgait.training.generation import evolution_of
 from mjxgait.types import BodyState, Judged, Sensed
 
 ENDS = (Reason.TIPPED, Reason.TOO_LOW, Reason.TOO_HIGH, Reason.TOUCHED)

@@ -19,10 +19,10 @@ from helpers import STOOL, said_by
 
 from mjxgait.champion import read_champion
 from mjxgait.creature import load_creature
-from mjxgait.runs.checkpoint import Checkpoints
-from mjxgait.runs.experiment import build_experiment
-from mjxgait.runs.folder import open_run, read_metrics
-from mjxgait.runs.loop import mend_champion
+from mjxgait.training.checkpoint import Checkpoints
+from mjxgait.training.experiment import build_experiment
+from mjxgait.training.folder import open_run, read_metrics
+from mjxgait.training.loop import mend_champion
 
 SMALL = [
     "--env",
@@ -233,7 +233,7 @@ def test_a_run_that_is_over_says_how_to_go_on_and_does_nothing(
     shutil.copytree(finished[0], folder)
     before = {path: path.stat().st_mtime_ns for path in folder.rglob("*")}
     with monkeypatch.context() as patch:
-        patch.setattr("mjxgait.cluster.evolve.evolve", None)
+        patch.setattr("mjxgait.distributed.evolve.evolve", None)
         said = said_by(capsys, "train", "--resume", folder, code=0)
     assert said == (
         f"{folder}: nothing is left to do: all 7 generations are done. "
@@ -274,8 +274,8 @@ def test_what_comes_next_is_said_before_plots_are_drawn_which_may_be_interrupted
     def interrupted(run: Path):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("mjxgait.cluster.evolve.evolve", lambda *given: given[-1]() is None)
-    monkeypatch.setattr("mjxgait.viewing.plots.plot_run", interrupted)
+    monkeypatch.setattr("mjxgait.distributed.evolve.evolve", lambda *given: given[-1]() is None)
+    monkeypatch.setattr("mjxgait.rendering.plots.plot_run", interrupted)
     said = said_by(capsys, "train", "--env", STOOL, "--out", tmp_path / "run", code=130)
     assert said.index("Next:") < said.index("Drawing") < said.index("mjxgait plot")
 

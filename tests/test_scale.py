@@ -6,10 +6,10 @@ import mujoco
 import numpy as np
 import pytest
 
+from mjxgait.api import load_creature
 from mjxgait.creature import Creature
 from mjxgait.creature.scale import parse_scales, scaled
 from mjxgait.errors import UserError
-from mjxgait.library import load_creature
 
 
 def test_a_whole_creature_scales_as_geometry_says(shipped: Creature):
@@ -57,8 +57,8 @@ def test_patterns_multiply_and_none_changes_nothing(stool: Creature):
 
 
 def test_a_run_keeps_the_scaled_body(tmp_path: Path, stool: Creature):
-    from mjxgait.runs.folder import create_run, open_run
-    from mjxgait.settings.config import Config
+    from mjxgait.config.schema import Config
+    from mjxgait.training.folder import create_run, open_run
 
     tall = scaled(stool, {"front_*": 1.2, "hind_*": 1.2})
     create_run(tmp_path / "run", tall, Config())

@@ -8,9 +8,9 @@ import pytest
 from helpers import small_config
 from rich.console import Console
 
-from mjxgait.certify import Certificate, CertificateConfig
-from mjxgait.certify.criteria import Criterion, Measure
-from mjxgait.runs.screen import Screen, duration
+from mjxgait.certification import Certificate, CertificateConfig
+from mjxgait.certification.criteria import Criterion, Measure
+from mjxgait.training.screen import Screen, duration
 
 
 @pytest.mark.parametrize(
@@ -96,7 +96,7 @@ def test_the_time_left_counts_what_lies_between_generations(monkeypatch: pytest.
     """Examinations, of which the log of a generation says nothing."""
     clock = iter((100.0, 100.0, 109.0))
     stopped = SimpleNamespace(perf_counter=lambda: next(clock))
-    monkeypatch.setattr("mjxgait.runs.screen.time", stopped)
+    monkeypatch.setattr("mjxgait.training.screen.time", stopped)
     out = io.StringIO()
     screen = Screen(Console(file=out, width=300))
     line = {"best": 1.0, "mean": 0.5, "episodes": 8, "failures": 2, "forced": False}

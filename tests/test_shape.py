@@ -6,8 +6,8 @@ import pytest
 from helpers import small_config
 
 from mjxgait.creature import Creature
-from mjxgait.parts import registry
-from mjxgait.runs.shape import shape_of
+from mjxgait.plugins import registry
+from mjxgait.training.shape import shape_of
 
 
 def test_numbers_are_free(stool: Creature):

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from helpers import STOOL, small_config
 
-from mjxgait.control.drive import Rules
-from mjxgait.control.spd import limited_torque, pd_force
+from mjxgait.controllers.drive import Rules
+from mjxgait.controllers.spd import limited_torque, pd_force
 from mjxgait.creature import Creature, load_creature
-from mjxgait.runs.experiment import build_experiment
 from mjxgait.simulation.rollout import Simulator
+from mjxgait.training.experiment import build_experiment
 from mjxgait.types import BodyState
 
 SLIM = {"xla_backend_optimization_level": 0}

@@ -3,9 +3,9 @@
 import pytest
 
 from mjxgait.creature import Creature
-from mjxgait.parts.settings import resolve_config
-from mjxgait.runs.experiment import build_experiment
-from mjxgait.runs.stages import compile_stages
+from mjxgait.plugins.settings import resolve_config
+from mjxgait.training.experiment import build_experiment
+from mjxgait.training.stages import compile_stages
 
 
 class Written:

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from helpers import small_config
 
+from mjxgait.controllers.key_poses.config import HOLDS
 from mjxgait.creature import Creature
-from mjxgait.runs.experiment import Experiment, build_experiment
-from mjxgait.runs.generation import next_starts
-from mjxgait.search.chance import key_of
-from mjxgait.settings.control import HOLDS
+from mjxgait.evolution.chance import key_of
 from mjxgait.simulation.rollout import CHECK_EVERY
-from mjxgait.tasks.trials import NEVER, Starts, draw_starts
+from mjxgait.tasks.starts import NEVER, Starts, draw_starts
+from mjxgait.training.experiment import Experiment, build_experiment
+from mjxgait.training.generation import next_starts
 
 NONE = {
     "joint_noise": 0.0,

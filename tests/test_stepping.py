@@ -11,25 +11,30 @@ import pytest
 from helpers import STOOL, altered, pose_champion
 from importing.models import BIPED, QUADRUPED
 
-from mjxgait.certify.check_body import check_body
-from mjxgait.certify.layout import start_frame
-from mjxgait.certify.state import State
-from mjxgait.certify.state import sense as examiner_sense
-from mjxgait.certify.twins.changing import ChangingTwin
-from mjxgait.certify.twins.halting import HaltingTwin
-from mjxgait.certify.twins.poses import PoseTwin
-from mjxgait.certify.twins.protocol import Twin
+from mjxgait.certification.check_body import check_body
 from mjxgait.champion.record import read_champion, write_champion
-from mjxgait.control.poses import Genome, PoseTracker, stepping
+from mjxgait.config.schema import Config
+from mjxgait.controllers.key_poses.config import (
+    STEPPING,
+    TUNING,
+    PoseConfig,
+    gene_names,
+)
+from mjxgait.controllers.key_poses.controller import Genome, PoseTracker, stepping
+from mjxgait.controllers.key_poses.reference import PoseTwin
+from mjxgait.controllers.observations import sense
 from mjxgait.creature import Creature, load_creature
 from mjxgait.creature.scale import load_files
 from mjxgait.errors import UserError
-from mjxgait.importing import ImportChoices, import_model
-from mjxgait.parts import resolve_config
-from mjxgait.senses import sense
-from mjxgait.settings.config import Config
-from mjxgait.settings.control import STEPPING, TUNING, PoseConfig, gene_names
-from mjxgait.settings.gaits import stride_limit
+from mjxgait.importer import ImportChoices, import_model
+from mjxgait.plugins import resolve_config
+from mjxgait.reference.controllers.changing import ChangingTwin
+from mjxgait.reference.controllers.halting import HaltingTwin
+from mjxgait.reference.controllers.protocol import Twin
+from mjxgait.reference.layout import start_frame
+from mjxgait.reference.state import State
+from mjxgait.reference.state import sense as examiner_sense
+from mjxgait.tasks.walk.gaits import stride_limit
 from mjxgait.types import Sensed
 
 STEP = 0.005

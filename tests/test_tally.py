@@ -22,8 +22,8 @@ from recorded_tally import Frames, end, tally_of
 
 from mjxgait.creature import Creature
 from mjxgait.tasks.falls import Reason, why_fallen
-from mjxgait.tasks.walk.tally import CONTACT_GAP, Judge, Tally
-from mjxgait.tasks.walk.wish_tally import WishTally, wish_tally, wish_updated
+from mjxgait.tasks.walk.stats import CONTACT_GAP, Judge, Tally
+from mjxgait.tasks.walk.target_stats import WishTally, wish_tally, wish_updated
 from mjxgait.types import Sensed
 
 

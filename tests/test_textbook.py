@@ -6,7 +6,12 @@ import pytest
 
 from mjxgait.creature import Creature
 from mjxgait.creature.textbook import CROUCH, Footfalls, textbook_cycle
-from mjxgait.settings.gaits import animal_duty, animal_stride, gait_of, placed
+from mjxgait.tasks.walk.gaits import (
+    animal_duty,
+    animal_stride,
+    gait_of,
+    placed,
+)
 
 POSES = 16
 NAMES = {2: "walk", 4: "walk", 6: "tripod"}

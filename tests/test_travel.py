@@ -10,15 +10,21 @@ import pytest
 from certify_made_up import walk
 from test_hop import HORIZON, REACH, STEP, moment, reaching
 
-from mjxgait.certify import CertificateConfig
-from mjxgait.certify.measure import Recording
-from mjxgait.certify.outcome import Outcome, Trajectory
-from mjxgait.certify.simulate import simulate
-from mjxgait.certify.starts import nominal_starts
-from mjxgait.certify.tasks import demands_of, promising, travel
-from mjxgait.certify.thresholds.goals import TravelConfig as Demanded
+from mjxgait.certification import CertificateConfig
+from mjxgait.certification.simulate import simulate
+from mjxgait.certification.tasks import demands_of, promising
 from mjxgait.creature import Creature
-from mjxgait.settings.hop import GOALS, NEAR, NOMINAL_GOAL, TravelConfig
+from mjxgait.reference.measure import Recording
+from mjxgait.reference.outcome import Outcome, Trajectory
+from mjxgait.reference.starts import nominal_starts
+from mjxgait.tasks.hop import travel_criteria as travel
+from mjxgait.tasks.hop.config import (
+    GOALS,
+    NEAR,
+    NOMINAL_GOAL,
+    TravelConfig,
+)
+from mjxgait.tasks.hop.thresholds import TravelConfig as Demanded
 from mjxgait.tasks.hop.travel import Aim, Travel
 
 CONFIG, DEMANDS = CertificateConfig(), demands_of("travel")

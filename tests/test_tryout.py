@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 from helpers import STOOL, Shares, small_config
 
-from mjxgait.certify import CertificateConfig
+from mjxgait.certification import CertificateConfig
+from mjxgait.config.schema import Config
+from mjxgait.config.shipped import find_creature
 from mjxgait.creature import load_creature
-from mjxgait.parts import resolve_config
-from mjxgait.runs import tryout
-from mjxgait.runs.examination import Examiner
-from mjxgait.runs.exams import Exams
-from mjxgait.runs.experiment import Experiment, build_experiment
-from mjxgait.runs.tryout import Tryout, tried_settings, tryout_of
-from mjxgait.settings.config import Config
-from mjxgait.settings.shipped import find_creature
+from mjxgait.plugins import resolve_config
+from mjxgait.training import prescreen as tryout
+from mjxgait.training.examination import Examiner
+from mjxgait.training.exams import Exams
+from mjxgait.training.experiment import Experiment, build_experiment
+from mjxgait.training.prescreen import Tryout, tried_settings, tryout_of
 
 STARTS, MOST = 5, 3
 SECONDS = 0.1

@@ -13,28 +13,45 @@ from helpers import altered, pose_champion, small_config
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mjxgait.certify.describe import gait_name
-from mjxgait.certify.stress import StressConfig
+from mjxgait.certification.describe import gait_name
+from mjxgait.certification.stress import StressConfig
 from mjxgait.champion import read_champion, write_champion
+from mjxgait.config.schema import Config, UseConfig
+from mjxgait.config.shipped import data_folder, shipped_creatures
+from mjxgait.config.traced import traced
 from mjxgait.creature import Creature, load_creature
 from mjxgait.creature.facing import facing
 from mjxgait.creature.scale import SETTINGS, load_files
 from mjxgait.errors import UserError
-from mjxgait.parts import resolve_config
-from mjxgait.parts.fit import check_fit
-from mjxgait.parts.wishes import Wishes, configured, hint, speed_of, wished
-from mjxgait.runs.experiment import build_batch
-from mjxgait.search.chance import key_of
-from mjxgait.settings.config import Config, UseConfig
-from mjxgait.settings.gaits import GAITS, animal_stride, gait_of, placed, stations_of
-from mjxgait.settings.shipped import data_folder, shipped_creatures
-from mjxgait.settings.traced import traced
-from mjxgait.settings.walk import WalkConfig, Weights, WishWeights
+from mjxgait.evolution.chance import key_of
+from mjxgait.plugins import resolve_config
+from mjxgait.plugins.fit import check_fit
 from mjxgait.tasks.score import in_order, score
+from mjxgait.tasks.walk.config import WalkConfig, Weights, WishWeights
 from mjxgait.tasks.walk.fitness import REWARDS, TERMS, terms_under
-from mjxgait.tasks.walk.footfalls import Footfalls, gait_missed, no_footfalls, stepped
-from mjxgait.tasks.walk.tally import Tally
+from mjxgait.tasks.walk.footfalls import (
+    Footfalls,
+    gait_missed,
+    no_footfalls,
+    stepped,
+)
+from mjxgait.tasks.walk.gaits import (
+    GAITS,
+    animal_stride,
+    gait_of,
+    placed,
+    stations_of,
+)
+from mjxgait.tasks.walk.stats import Tally
+from mjxgait.tasks.walk.targets import (
+    Wishes,
+    configured,
+    hint,
+    speed_of,
+    wished,
+)
 from mjxgait.tasks.walk.task import AskedWalk, Walk
+from mjxgait.training.experiment import build_batch
 
 STEP, HORIZON = 0.005, 1000
 """5 s."""

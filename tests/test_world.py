@@ -8,7 +8,7 @@ from helpers import STOOL
 
 from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import UserError
-from mjxgait.importing import ImportChoices, import_model
+from mjxgait.importer import ImportChoices, import_model
 
 FLOOR = '<geom name="floor"'
 FREE = "1 0 0 0 0 0 0 0"

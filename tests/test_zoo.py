@@ -15,14 +15,20 @@ from repertoire.made_up import certificate
 from viewing.made_up import treading
 
 from mjxgait.champion import write_champion
-from mjxgait.cluster.crew import Crew
-from mjxgait.cluster.rows import Rows
 from mjxgait.creature import Creature
-from mjxgait.repertoire.cells import POSES
-from mjxgait.runs.folder import CERTIFICATE, CHAMPION, METRICS, open_run, read_metrics
-from mjxgait.runs.stored import read_stored, stored_generations
-from mjxgait.zoo.found import found_in
-from mjxgait.zoo.seeds import create_zoo, folders_of, read_seeds
+from mjxgait.distributed.rows import Rows
+from mjxgait.distributed.scheduler import Crew
+from mjxgait.experiments.multi_seed.found import found_in
+from mjxgait.experiments.multi_seed.seeds import create_zoo, folders_of, read_seeds
+from mjxgait.experiments.repertoire.cells import POSES
+from mjxgait.training.folder import (
+    CERTIFICATE,
+    CHAMPION,
+    METRICS,
+    open_run,
+    read_metrics,
+)
+from mjxgait.training.stored import read_stored, stored_generations
 
 SEEDS = (5, 6, 7)
 

@@ -14,8 +14,8 @@ import numpy as np
 from mjxgait.bench.bare import bare_model
 from mjxgait.bench.mujoco_peer import Law, check_controller, quiet
 from mjxgait.bench.workload import Workload
-from mjxgait.certify.layout import LowestPoint
 from mjxgait.creature import Creature
+from mjxgait.reference.layout import LowestPoint
 
 SOURCE = Path(__file__).with_suffix(".c")
 COMPILERS = ("cc", "gcc", "clang")

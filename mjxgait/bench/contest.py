@@ -24,9 +24,9 @@ from mjxgait.bench.ours import Ours, as_workload, half_and_half
 from mjxgait.bench.overhead import overhead
 from mjxgait.bench.workers import Workers
 from mjxgait.bench.workload import Lap, Workload
+from mjxgait.config.schema import Config
+from mjxgait.config.shipped import install_command
 from mjxgait.cores import cores
-from mjxgait.settings.config import Config
-from mjxgait.settings.shipped import install_command
 
 DART_STRIDE = 4
 """DART is so much slower that it is given every fourth genome only."""

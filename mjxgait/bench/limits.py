@@ -9,8 +9,8 @@ import jax
 import jax.numpy as jnp
 
 from mjxgait.bench.flops import count_flops
-from mjxgait.runs.experiment import Experiment
 from mjxgait.simulation.rollout import Lane
+from mjxgait.training.experiment import Experiment
 
 
 def step_cost(experiment: Experiment) -> dict[str, float]:

@@ -13,9 +13,9 @@ import numpy as np
 from mujoco.batch import Batch
 
 from mjxgait.bench.workload import Workload
-from mjxgait.certify.layout import Layout, LowestPoint
+from mjxgait.config.schema import Config
 from mjxgait.creature import Creature
-from mjxgait.settings.config import Config
+from mjxgait.reference.layout import Layout, LowestPoint
 
 VELOCITY_STAGE = int(mujoco.mjtStage.mjSTAGE_VEL)
 LANES = 128
@@ -129,7 +129,7 @@ class MujocoPeer:
             self.batch.forward(lanes, stage=VELOCITY_STAGE)
 
     def _down(self, rows: Any) -> np.ndarray:
-        """The rules of `mjxgait.tasks.walk.tally`.
+        """The rules of `mjxgait.tasks.walk.stats`.
 
         Negated comparisons: what is not a number is down.
         """

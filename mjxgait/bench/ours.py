@@ -11,13 +11,13 @@ import jax.numpy as jnp
 import numpy as np
 
 from mjxgait.bench.workload import Lap, Workload
-from mjxgait.control.poses import TUNING, Genome
+from mjxgait.config.schema import Config
+from mjxgait.controllers.key_poses.controller import TUNING, Genome
 from mjxgait.creature import load_creature
-from mjxgait.runs.devices import prepare_devices
-from mjxgait.runs.experiment import Experiment, build_experiment
-from mjxgait.runs.generation import next_starts
-from mjxgait.search.state import EvolutionState
-from mjxgait.settings.config import Config
+from mjxgait.evolution.state import EvolutionState
+from mjxgait.training.devices import prepare_devices
+from mjxgait.training.experiment import Experiment, build_experiment
+from mjxgait.training.generation import next_starts
 
 
 class Ours:

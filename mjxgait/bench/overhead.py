@@ -16,15 +16,15 @@ import jax.numpy as jnp
 from rich.console import Console
 
 from mjxgait.bench.ours import Ours
-from mjxgait.runs import loop
-from mjxgait.runs.checkpoint import Checkpoints
-from mjxgait.runs.examination import Examiner
-from mjxgait.runs.exams import Exams
-from mjxgait.runs.experiment import Experiment
-from mjxgait.runs.folder import EXAMS
-from mjxgait.runs.generation import evolution_of
-from mjxgait.runs.screen import Screen
-from mjxgait.search.state import EvolutionState, GenerationMetrics
+from mjxgait.evolution.state import EvolutionState, GenerationMetrics
+from mjxgait.training import loop
+from mjxgait.training.checkpoint import Checkpoints
+from mjxgait.training.examination import Examiner
+from mjxgait.training.exams import Exams
+from mjxgait.training.experiment import Experiment
+from mjxgait.training.folder import EXAMS
+from mjxgait.training.generation import evolution_of
+from mjxgait.training.screen import Screen
 from mjxgait.types import Judged
 
 REPEATS = 30

@@ -12,8 +12,8 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
+from mjxgait.config.rollout import RolloutConfig
 from mjxgait.processes import python_command, safe_environment
-from mjxgait.settings.rollout import RolloutConfig
 
 POPULATIONS = (32, 128, 512, 2048, 8192)
 LANES = (8, 16, 32, 64, 128, 256)
@@ -82,8 +82,8 @@ def measure_here(creature: str, point: Point) -> dict[str, Any]:
     """
     from mjxgait.bench.ours import Ours
     from mjxgait.bench.workload import walking
+    from mjxgait.config.shipped import find_creature
     from mjxgait.creature import load_creature
-    from mjxgait.settings.shipped import find_creature
 
     folder = find_creature(creature)
     config = walking(load_creature(folder).settings)

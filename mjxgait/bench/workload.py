@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from mjxgait.certify.twins.poses import pose_cycle
+from mjxgait.config.schema import Config, UseConfig
+from mjxgait.controllers.key_poses.reference import pose_cycle
 from mjxgait.creature import Creature, load_creature
 from mjxgait.creature.settings import CreatureSettings
-from mjxgait.parts import resolve_config
-from mjxgait.settings.config import Config, UseConfig
+from mjxgait.plugins import resolve_config
 
 
 def walking(settings: CreatureSettings) -> Config:

@@ -1,6 +1,5 @@
 """One individual, complete and readable without JAX: `champion.json`."""
 
-from mjxgait.champion.codecs import CODECS, Codec, codec_of
 from mjxgait.champion.record import (
     Champion,
     DamagedChampion,
@@ -8,6 +7,7 @@ from mjxgait.champion.record import (
     split_genome,
     write_champion,
 )
+from mjxgait.champion.serializers import CODECS, Codec, codec_of
 
 __all__ = [
     "CODECS",

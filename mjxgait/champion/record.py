@@ -11,14 +11,21 @@ from typing import Annotated, Any
 import numpy as np
 import pydantic
 
-from mjxgait.champion.codecs import Genome, codec_of
+from mjxgait.champion.serializers import Genome, codec_of
+from mjxgait.config.schema import Config
+from mjxgait.config.tables import (
+    STORED,
+    Index,
+    Number,
+    Text,
+    build,
+    check,
+)
+from mjxgait.controllers.key_poses.config import DriveConfig
 from mjxgait.creature import Creature
 from mjxgait.creature.proportions import grown, proportions
 from mjxgait.errors import UserError
 from mjxgait.files import DamagedFile, read_json, write_text
-from mjxgait.settings.config import Config
-from mjxgait.settings.control import DriveConfig
-from mjxgait.settings.tables import STORED, Index, Number, Text, build, check
 
 SCHEMA = 2
 """Champions of 1 had key poses without saying so, and the drive among the controller's settings."""

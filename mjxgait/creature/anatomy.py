@@ -1,7 +1,7 @@
 """The parts that a creature's facts fall into: what controllers, tasks and senses know of a body.
 
 Letters: `J` actuated joints in the model's order, `F` geoms of feet, `G` watched geoms, the feet's
-first. Numbers are arrays that a compiled program has as constants or as inputs (`mjxgait/body.py`);
+first. Numbers are arrays that a compiled program has as constants or as inputs (`mjxgait/creature/body.py`);
 what shapes a program is a tuple.
 """
 

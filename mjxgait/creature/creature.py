@@ -7,9 +7,16 @@ from collections.abc import Mapping
 import mujoco
 import numpy as np
 
-from mjxgait.creature.anatomy import Corrections, Feet, Frame, Gains, Joints, Mirror
+from mjxgait.creature.anatomy import (
+    Corrections,
+    Feet,
+    Frame,
+    Gains,
+    Joints,
+    Mirror,
+)
+from mjxgait.creature.ground.spec import LEVEL, GroundSpec, parse_ground
 from mjxgait.creature.settings import CreatureSettings
-from mjxgait.ground.spec import LEVEL, GroundSpec, parse_ground
 
 HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
 SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)

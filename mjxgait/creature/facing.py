@@ -8,11 +8,17 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from mjxgait.config.tables import dump_toml
 from mjxgait.creature.creature import Creature
 from mjxgait.creature.scale import SETTINGS, load_files
-from mjxgait.creature.settings import Balance, CreatureSettings, Steering, Stepping, Usual
+from mjxgait.creature.settings import (
+    Balance,
+    CreatureSettings,
+    Steering,
+    Stepping,
+    Usual,
+)
 from mjxgait.errors import UserError, did_you_mean
-from mjxgait.settings.tables import dump_toml
 
 Way = Literal["forward", "back", "left", "right"]
 WAYS: tuple[Way, ...] = get_args(Way)

@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 
 from mjxgait.creature.creature import Creature
-from mjxgait.ground.spec import Place
+from mjxgait.creature.ground.spec import Place
 
 
 def start_place(creature: Creature) -> Place:

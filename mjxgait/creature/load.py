@@ -9,17 +9,29 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+from mjxgait.config.tables import build, read_toml
 from mjxgait.creature import geometry
-from mjxgait.creature.anatomy import Corrections, Feet, Frame, Gains, Joints, Mirror
-from mjxgait.creature.creature import FLOOR, HINGE, SLIDE, Creature
+from mjxgait.creature.anatomy import (
+    Corrections,
+    Feet,
+    Frame,
+    Gains,
+    Joints,
+    Mirror,
+)
+from mjxgait.creature.creature import (
+    FLOOR,
+    HINGE,
+    SLIDE,
+    Creature,
+)
 from mjxgait.creature.mirrored import mirrored
 from mjxgait.creature.settings import CreatureSettings, JointException
 from mjxgait.creature.stepping import stepping_of
 from mjxgait.creature.world import check_world
 from mjxgait.errors import UserError, did_you_mean
 from mjxgait.files import read_text
-from mjxgait.settings.gaits import stations_of
-from mjxgait.settings.tables import build, read_toml
+from mjxgait.tasks.walk.gaits import stations_of
 
 NOT_ALONE = re.compile(
     r"<\s*(!DOCTYPE|!ENTITY|include|plugin|extension|replicate|composite|flexcomp|attach|model|size)\b|[\s\"'](file\w*|\w+dir)\s*="

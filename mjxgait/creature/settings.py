@@ -6,7 +6,12 @@ from typing import Annotated, Any, Literal
 
 import pydantic
 
-from mjxgait.settings.tables import STRICT, Finite, NonNegative, Positive
+from mjxgait.config.tables import (
+    STRICT,
+    Finite,
+    NonNegative,
+    Positive,
+)
 
 Pattern = str
 Degrees = tuple[Finite, Finite]

@@ -2,7 +2,13 @@
 
 from mjxgait.inspect.difference import differences, print_differences
 from mjxgait.inspect.facts import facts, individual_facts
-from mjxgait.inspect.runs import just_begun, list_runs, print_just_begun, print_runs, runs_in
+from mjxgait.inspect.runs import (
+    just_begun,
+    list_runs,
+    print_just_begun,
+    print_runs,
+    runs_in,
+)
 from mjxgait.inspect.snapshot import Snapshot, read_snapshot
 from mjxgait.inspect.text import print_facts, print_individual
 

@@ -6,11 +6,11 @@ from typing import Any
 
 from rich.console import Console
 
+from mjxgait.config.tables import flat
 from mjxgait.inspect.facts import fitness_summary
 from mjxgait.inspect.genomes import view_of
 from mjxgait.inspect.snapshot import Snapshot
 from mjxgait.inspect.tables import print_columns, print_pairs, show
-from mjxgait.settings.tables import flat
 
 
 def differences(a: Snapshot, b: Snapshot) -> dict[str, Any]:

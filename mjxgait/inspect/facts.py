@@ -12,19 +12,24 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
-from mjxgait.certify import judged, outdated, read_certificate, read_stress
-from mjxgait.certify.likeness import in_words
+from mjxgait.certification import (
+    judged,
+    outdated,
+    read_certificate,
+    read_stress,
+)
+from mjxgait.certification.likeness import in_words
+from mjxgait.config.tables import flat
 from mjxgait.errors import UserError
+from mjxgait.evolution.state import Origin
 from mjxgait.inspect.genomes import view_of
 from mjxgait.inspect.islands import island_facts
 from mjxgait.inspect.snapshot import Snapshot
-from mjxgait.parts import make_task, resolve_config
-from mjxgait.parts.registry import what_ends
-from mjxgait.runs.folder import CERTIFICATE, STRESS, kept_champion
-from mjxgait.runs.lock import running
-from mjxgait.search.state import Origin
-from mjxgait.settings.tables import flat
-from mjxgait.tasks.protocol import Task
+from mjxgait.plugins import make_task, resolve_config
+from mjxgait.plugins.registry import what_ends
+from mjxgait.tasks.base import Task
+from mjxgait.training.folder import CERTIFICATE, STRESS, kept_champion
+from mjxgait.training.lock import running
 
 KINDS = {
     Origin.INITIAL: "initial",

@@ -6,9 +6,9 @@ from typing import Any, Protocol
 import numpy as np
 from rich.console import Console
 
-from mjxgait.inspect.graphs import GraphView
-from mjxgait.inspect.poses import PoseView, shared, title
-from mjxgait.inspect.programs import ProgramView
+from mjxgait.controllers.expressions.report import ProgramView
+from mjxgait.controllers.key_poses.report import PoseView, shared, title
+from mjxgait.controllers.sims_brain.report import GraphView
 from mjxgait.inspect.snapshot import Snapshot
 from mjxgait.inspect.tables import titled_table
 

@@ -8,10 +8,16 @@ from typing import Annotated, Any
 import pydantic
 from rich.console import Console
 
+from mjxgait.config.tables import STORED, Index, Number
 from mjxgait.inspect.tables import show, titled_table
-from mjxgait.runs.folder import ISLANDS, METRICS, MIGRATIONS, read_metrics, read_records
-from mjxgait.runs.stored import is_number
-from mjxgait.settings.tables import STORED, Index, Number
+from mjxgait.training.folder import (
+    ISLANDS,
+    METRICS,
+    MIGRATIONS,
+    read_metrics,
+    read_records,
+)
+from mjxgait.training.stored import is_number
 
 
 @dataclasses.dataclass(frozen=True)

@@ -11,9 +11,9 @@ from mjxgait.errors import UserError
 from mjxgait.inspect.facts import facts
 from mjxgait.inspect.snapshot import read_snapshot
 from mjxgait.inspect.text import ago, show
-from mjxgait.runs.folder import CONFIG
-from mjxgait.runs.lock import running, why_empty
-from mjxgait.runs.stored import stored_generations
+from mjxgait.training.folder import CONFIG
+from mjxgait.training.lock import running, why_empty
+from mjxgait.training.stored import stored_generations
 
 
 def runs_in(folder: Path) -> list[Path]:

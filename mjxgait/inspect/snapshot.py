@@ -13,11 +13,12 @@ from typing import Any
 import numpy as np
 
 from mjxgait.champion import Champion, codec_of, split_genome
+from mjxgait.config.schema import Config
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.files import read_json
-from mjxgait.runs.ended import end_of
-from mjxgait.runs.folder import (
+from mjxgait.training.ended import end_of
+from mjxgait.training.folder import (
     CHAMPION,
     CONFIG,
     METRICS,
@@ -25,7 +26,7 @@ from mjxgait.runs.folder import (
     open_run,
     read_metrics,
 )
-from mjxgait.runs.stored import (
+from mjxgait.training.stored import (
     FOLDER,
     Manifest,
     Stored,
@@ -33,7 +34,6 @@ from mjxgait.runs.stored import (
     read_stored,
     stored_generations,
 )
-from mjxgait.settings.config import Config
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -6,13 +6,13 @@ from typing import Any
 import mujoco
 from numpy.typing import ArrayLike
 
+from mjxgait.config.rollout import Physics
 from mjxgait.creature import Creature
 from mjxgait.creature.overlap import find_crossings
 from mjxgait.errors import UserError
-from mjxgait.physics.fast import UnsupportedModel, fast_plant
-from mjxgait.physics.fast.support import check_supported
+from mjxgait.physics.lane_major import UnsupportedModel, fast_plant
+from mjxgait.physics.lane_major.support import check_supported
 from mjxgait.physics.layout import OtherTopology, sense_layout
-from mjxgait.settings.rollout import Physics
 from mjxgait.types import ModelPlant
 
 SLOWER = "15 to 30"
@@ -40,7 +40,7 @@ def make_plant(
         except UnsupportedModel as reason:
             note = _cost(reason)
     # MJX and the geometry package that it wants take half a second to import.
-    from mjxgait.physics.plain import mjx_plant
+    from mjxgait.physics.mjx import mjx_plant
 
     try:
         return mjx_plant(model, layout, crossings, note), 16

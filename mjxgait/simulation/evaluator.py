@@ -7,11 +7,11 @@ from typing import Any, Protocol
 import jax
 import jax.numpy as jnp
 
-from mjxgait.settings.config import Config
+from mjxgait.config.schema import Config
 from mjxgait.simulation.rollout import Episodes, Simulator
-from mjxgait.tasks.protocol import FINISHED, NONFINITE
+from mjxgait.tasks.base import FINISHED, NONFINITE
 from mjxgait.tasks.score import in_order
-from mjxgait.tasks.trials import Starts
+from mjxgait.tasks.starts import Starts
 from mjxgait.types import Asked, Judged
 
 

@@ -14,14 +14,19 @@ import jax.numpy as jnp
 import numpy as np
 from jax.sharding import Mesh, PartitionSpec
 
-from mjxgait.body import Body
-from mjxgait.control.drive import Drive, Rules, per_lane
-from mjxgait.control.protocol import Controller
-from mjxgait.senses import sense
-from mjxgait.settings.config import Config
-from mjxgait.tasks.protocol import FINISHED, NONFINITE, Task
-from mjxgait.tasks.trials import Starts
-from mjxgait.types import BodyState, Plant, Sensed, pytree
+from mjxgait.config.schema import Config
+from mjxgait.controllers.base import Controller
+from mjxgait.controllers.drive import Drive, Rules, per_lane
+from mjxgait.controllers.observations import sense
+from mjxgait.creature.body import Body
+from mjxgait.tasks.base import FINISHED, NONFINITE, Task
+from mjxgait.tasks.starts import Starts
+from mjxgait.types import (
+    BodyState,
+    Plant,
+    Sensed,
+    pytree,
+)
 
 CHECK_EVERY = 16
 """Steps between two looks at which lanes are free (a look costs about as much as a step),

@@ -6,10 +6,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from mjxgait.body import Body, Ends
+from mjxgait.controllers.observations import trunk_height
+from mjxgait.creature.body import Body, Ends
 from mjxgait.creature.settings import Termination
-from mjxgait.senses import trunk_height
-from mjxgait.tasks import protocol
+from mjxgait.tasks import base as protocol
 from mjxgait.types import Sensed
 
 

@@ -3,7 +3,7 @@
 import jax
 import jax.numpy as jnp
 
-from mjxgait.body import Body
+from mjxgait.creature.body import Body
 
 TOUCHING = 0.005
 """Hip heights; parts that are less deep in each other than this only touch."""

@@ -8,14 +8,14 @@ from typing import Any, ClassVar
 import jax
 import jax.numpy as jnp
 
-from mjxgait.body import Body, Ends
+from mjxgait.config.rollout import RolloutConfig
+from mjxgait.config.tables import NoSettings
 from mjxgait.creature import Creature
+from mjxgait.creature.body import Body, Ends
 from mjxgait.creature.settings import Termination
-from mjxgait.settings.rollout import RolloutConfig
-from mjxgait.settings.tables import NoSettings
+from mjxgait.tasks.base import Tally
 from mjxgait.tasks.falls import why_fallen
-from mjxgait.tasks.protocol import Tally
-from mjxgait.tasks.trials import Starts, draw_starts
+from mjxgait.tasks.starts import Starts, draw_starts
 from mjxgait.types import Sensed
 
 

@@ -3,7 +3,7 @@
 import jax
 import jax.numpy as jnp
 
-from mjxgait.body import Body
+from mjxgait.creature.body import Body
 from mjxgait.types import Sensed
 
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from importlib import resources
 from typing import Any
 
-from mjxgait.animation import WalkLoop, build_driven
+from mjxgait.animation.export import WalkLoop, build_driven
 from mjxgait.web.page import viewer_script
 
 FAR = 3.2

@@ -22,10 +22,16 @@ from typing import Any
 
 import numpy as np
 
-from mjxgait.animation import build_glb, walk_loop, walk_take
+from mjxgait.animation.export import build_glb, walk_loop, walk_take
 from mjxgait.errors import UserError
-from mjxgait.runs.folder import CHAMPION, METRICS, open_champion, open_run, read_metrics
-from mjxgait.viewing.walk import record_walk
+from mjxgait.rendering.walk import record_walk
+from mjxgait.training.folder import (
+    CHAMPION,
+    METRICS,
+    open_champion,
+    open_run,
+    read_metrics,
+)
 
 HERE = "127.0.0.1"
 PORTS = range(8765, 8785)

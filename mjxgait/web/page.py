@@ -12,18 +12,31 @@ from io import BytesIO
 from pathlib import Path
 
 from mjxgait import files
-from mjxgait.animation import WalkLoop, build_glb, walk_loop
-from mjxgait.certify import Verdict, criteria_of, judged, outdated, read_certificate, read_stress
+from mjxgait.animation.export import WalkLoop, build_glb, walk_loop
+from mjxgait.certification import (
+    Verdict,
+    criteria_of,
+    judged,
+    outdated,
+    read_certificate,
+    read_stress,
+)
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
-from mjxgait.runs.folder import CERTIFICATE, METRICS, STRESS, open_champion, read_metrics
-from mjxgait.viewing.cast import LOOP_SECONDS
-from mjxgait.viewing.curves import draw_fitness
-from mjxgait.viewing.doubt import doubt
-from mjxgait.viewing.gaitplots import gait_figures
-from mjxgait.viewing.style import Figures, figure
-from mjxgait.viewing.walk import Walk, record_walk
+from mjxgait.rendering.cast import LOOP_SECONDS
+from mjxgait.rendering.curves import draw_fitness
+from mjxgait.rendering.doubt import doubt
+from mjxgait.rendering.gaitplots import gait_figures
+from mjxgait.rendering.style import Figures, figure
+from mjxgait.rendering.walk import Walk, record_walk
+from mjxgait.training.folder import (
+    CERTIFICATE,
+    METRICS,
+    STRESS,
+    open_champion,
+    read_metrics,
+)
 
 RATE = 30
 CHECK = (

@@ -3,7 +3,7 @@
 A file of its own, since the processes that judge read it anew.
 """
 
-from mjxgait.ablation import measures
+from mjxgait.experiments.ablation import measures
 
 measures.SECONDS = 2.0
 

@@ -17,7 +17,7 @@ import pyarrow.parquet
 import pytest
 from helpers import STOOL, said_by
 
-from mjxgait.runs.folder import read_metrics
+from mjxgait.training.folder import read_metrics
 
 STUDY = f"""
 question = "Does plain PD do as well?"

@@ -6,14 +6,19 @@ from pathlib import Path
 import pytest
 from helpers import STOOL
 
-from mjxgait.ablation.plan import Plan, Study, make_plan, read_study
-from mjxgait.ablation.rows import groups
+from mjxgait.config.layers import resolve_config
+from mjxgait.config.shipped import data_folder
+from mjxgait.config.tables import build
 from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import UserError
-from mjxgait.parts.wishes import Wishes, wished
-from mjxgait.settings.layers import resolve_config
-from mjxgait.settings.shipped import data_folder
-from mjxgait.settings.tables import build
+from mjxgait.experiments.ablation.plan import (
+    Plan,
+    Study,
+    make_plan,
+    read_study,
+)
+from mjxgait.experiments.ablation.rows import groups
+from mjxgait.tasks.walk.targets import Wishes, wished
 
 TWO = [{"name": "base"}, {"name": "half", "settings": {"evolution": {"mutation_rate": 0.4}}}]
 

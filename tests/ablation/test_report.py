@@ -6,10 +6,15 @@ from pathlib import Path
 import pytest
 from helpers import STOOL
 
-from mjxgait.ablation.measures import Result
-from mjxgait.ablation.plan import Plan, Study, VariantTable, make_plan
-from mjxgait.ablation.report import write_report
 from mjxgait.creature import Creature
+from mjxgait.experiments.ablation.measures import Result
+from mjxgait.experiments.ablation.plan import (
+    Plan,
+    Study,
+    VariantTable,
+    make_plan,
+)
+from mjxgait.experiments.ablation.report import write_report
 
 SEEDS = 16
 RESULT = Result(

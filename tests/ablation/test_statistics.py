@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from mjxgait.ablation import statistics
-from mjxgait.ablation.statistics import (
+from mjxgait.experiments.ablation import statistics
+from mjxgait.experiments.ablation.statistics import (
     Estimate,
     compare,
     estimate,

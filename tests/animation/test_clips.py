@@ -8,10 +8,16 @@ import pygltflib as gltf
 import pytest
 from viewing.made_up import treading
 
-from mjxgait.animation import WalkLoop, build_clips, standing_still, stride_in_phase, walk_loop
-from mjxgait.animation.loop import _straightened
+from mjxgait.animation.export import (
+    WalkLoop,
+    build_clips,
+    standing_still,
+    stride_in_phase,
+    walk_loop,
+)
+from mjxgait.animation.export.loop import _straightened
 from mjxgait.creature import Creature
-from mjxgait.viewing.walk import Walk, record_walk
+from mjxgait.rendering.walk import Walk, record_walk
 
 RATE = 60
 

@@ -8,8 +8,8 @@ import pytest
 from animation.test_glb import read
 from viewing.made_up import treading
 
-from mjxgait.animation import build_glb, walk_loop
-from mjxgait.viewing.walk import record_walk
+from mjxgait.animation.export import build_glb, walk_loop
+from mjxgait.rendering.walk import record_walk
 
 
 @pytest.fixture(scope="module")

@@ -12,13 +12,13 @@ import pygltflib as gltf
 import pytest
 from viewing.made_up import treading
 
-from mjxgait.animation import RATES, build_glb, walk_loop
-from mjxgait.animation.limbs import ALONG
-from mjxgait.animation.skeleton import gltf_axes, resting
-from mjxgait.animation.surface import geom_surface
+from mjxgait.animation.export import RATES, build_glb, walk_loop
+from mjxgait.animation.export.limbs import ALONG
+from mjxgait.animation.export.skeleton import gltf_axes, resting
+from mjxgait.animation.export.surface import geom_surface
 from mjxgait.cli import main
 from mjxgait.errors import UserError
-from mjxgait.viewing.walk import record_walk
+from mjxgait.rendering.walk import record_walk
 
 MILLIMETRE = 1e-3
 WIDTH = {"SCALAR": 1, "VEC3": 3, "VEC4": 4, "MAT4": 16}

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from viewing.made_up import treading
 
-from mjxgait.animation import walk_loop
-from mjxgait.animation.pieces import pieces_of
-from mjxgait.animation.skeleton import gltf_axes, skeleton_of
-from mjxgait.animation.usd import export_usd
+from mjxgait.animation.export import walk_loop
+from mjxgait.animation.export.pieces import pieces_of
+from mjxgait.animation.export.skeleton import gltf_axes, skeleton_of
+from mjxgait.animation.export.usd import export_usd
 from mjxgait.errors import UserError
-from mjxgait.viewing.walk import record_walk
+from mjxgait.rendering.walk import record_walk
 
 
 @pytest.fixture(scope="module")

@@ -20,17 +20,17 @@ from mjxgait.bench.mujoco_peer import DampedSolve, Law, MujocoPeer
 from mjxgait.bench.ours import as_workload
 from mjxgait.bench.scaling import draw
 from mjxgait.bench.workload import Lap, Workload, walking
-from mjxgait.certify.layout import start_frame
-from mjxgait.certify.state import State, sense
-from mjxgait.certify.twins.poses import READS, PoseTwin
-from mjxgait.commands import bench
+from mjxgait.cli import bench
+from mjxgait.config.schema import Config
+from mjxgait.config.shipped import data_folder, find_creature
+from mjxgait.controllers.key_poses.reference import READS, PoseTwin
 from mjxgait.creature import load_creature
 from mjxgait.errors import UserError
-from mjxgait.parts import resolve_config
-from mjxgait.runs.experiment import build_experiment
-from mjxgait.runs.generation import next_starts
-from mjxgait.settings.config import Config
-from mjxgait.settings.shipped import data_folder, find_creature
+from mjxgait.plugins import resolve_config
+from mjxgait.reference.layout import start_frame
+from mjxgait.reference.state import State, sense
+from mjxgait.training.experiment import build_experiment
+from mjxgait.training.generation import next_starts
 
 NEEDS_DART = pytest.mark.skipif(
     importlib.util.find_spec("dartpy") is None, reason="dartpy is not installed"

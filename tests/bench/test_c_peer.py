@@ -9,12 +9,17 @@ import pytest
 
 from mjxgait.bench import c_peer, contest
 from mjxgait.bench.bare import bare_model
-from mjxgait.bench.c_peer import COMPILERS, CPeer, NoCompiler, build
+from mjxgait.bench.c_peer import (
+    COMPILERS,
+    CPeer,
+    NoCompiler,
+    build,
+)
 from mjxgait.bench.mujoco_peer import MujocoPeer
 from mjxgait.bench.workload import Workload
+from mjxgait.config.schema import Config
+from mjxgait.config.shipped import find_creature
 from mjxgait.creature import load_creature
-from mjxgait.settings.config import Config
-from mjxgait.settings.shipped import find_creature
 
 TUNING = {
     "threshold": 0.12,

@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from mjxgait.blocks.genotype import Graph
+from mjxgait.controllers.sims_brain.genotype import Graph
 from mjxgait.types import Sensed
 
 

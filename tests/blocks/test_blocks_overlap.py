@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from blocks.made_up import genome_of, one
 
-from mjxgait.blocks.genotype import Capacity, Ranges, random_graph
-from mjxgait.blocks.phenotype import Body, body_of
-from mjxgait.certify.overlap import overlaps
-from mjxgait.champion.blocks.folder import body_files
-from mjxgait.champion.blocks.parts import Part, grow
+from mjxgait.controllers.sims_brain.genotype import Capacity, Ranges, random_graph
+from mjxgait.controllers.sims_brain.phenotype import Body, body_of
+from mjxgait.controllers.sims_brain.reference_body.folder import body_files
+from mjxgait.controllers.sims_brain.reference_body.parts import Part, grow
 from mjxgait.creature.scale import load_files
-from mjxgait.physics.trees.plant import TreePlant
-from mjxgait.physics.trees.tree import Surroundings
-from mjxgait.search.chance import key_of
+from mjxgait.evolution.chance import key_of
+from mjxgait.physics.batched_trees.plant import TreePlant
+from mjxgait.physics.batched_trees.tree import Surroundings
+from mjxgait.reference.overlap import overlaps
 from mjxgait.types import BodyState
 
 CAPACITY, COUNT = Capacity(), 80

@@ -11,15 +11,20 @@ import numpy as np
 import pytest
 from blocks.made_up import genome_of, one
 
-from mjxgait.blocks.genotype import Capacity, Graph, Ranges, random_graph
-from mjxgait.blocks.phenotype import Body, body_of
-from mjxgait.champion.blocks.parts import grow
-from mjxgait.champion.blocks.xml import body_xml
+from mjxgait.controllers.sims_brain.genotype import (
+    Capacity,
+    Graph,
+    Ranges,
+    random_graph,
+)
+from mjxgait.controllers.sims_brain.phenotype import Body, body_of
+from mjxgait.controllers.sims_brain.reference_body.parts import grow
+from mjxgait.controllers.sims_brain.reference_body.xml import body_xml
 from mjxgait.creature.geometry import DOWN, geom_reach, lowest
-from mjxgait.physics.trees.plant import TreePlant
-from mjxgait.physics.trees.tree import Surroundings
-from mjxgait.search.chance import key_of
-from mjxgait.tasks.blocks.follow import Following
+from mjxgait.evolution.chance import key_of
+from mjxgait.physics.batched_trees.plant import TreePlant
+from mjxgait.physics.batched_trees.tree import Surroundings
+from mjxgait.tasks.modular.follow import Following
 from mjxgait.types import BodyState
 
 CAPACITY, LANES = Capacity(), 96

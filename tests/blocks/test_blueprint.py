@@ -5,22 +5,22 @@ from typing import Any
 
 import pytest
 
-from mjxgait.champion.blocks.material import DRAG, GRAVITY
-from mjxgait.commands.train import train_command
-from mjxgait.control.brains.controller import Brains
+from mjxgait.api import load_creature, train
+from mjxgait.cli.train import train_command
+from mjxgait.config.schema import Config
+from mjxgait.controllers.sims_brain.config import BrainConfig
+from mjxgait.controllers.sims_brain.controller import Brains
+from mjxgait.controllers.sims_brain.reference_body.material import DRAG, GRAVITY
 from mjxgait.creature import Creature
 from mjxgait.creature.step import at_step
 from mjxgait.errors import UserError
-from mjxgait.library import load_creature, train
-from mjxgait.parts.registry import add_own, find
-from mjxgait.parts.settings import build_config, resolve_config
-from mjxgait.physics.trees.tree import Surroundings
-from mjxgait.runs.blueprint import draw_up
-from mjxgait.runs.folder import create_run
-from mjxgait.settings.blocks import RoamConfig
-from mjxgait.settings.brains import BrainConfig
-from mjxgait.settings.config import Config
+from mjxgait.physics.batched_trees.tree import Surroundings
+from mjxgait.plugins.registry import add_own, find
+from mjxgait.plugins.settings import build_config, resolve_config
 from mjxgait.simulation.rollout import Simulator
+from mjxgait.tasks.modular.config import RoamConfig
+from mjxgait.training.blueprint import draw_up
+from mjxgait.training.folder import create_run
 
 
 class Smelling(Brains):
@@ -75,7 +75,7 @@ def test_a_run_has_the_step_of_its_task(task: str, step: float, monkeypatch: pyt
         seen.append(float(creature.model.opt.timestep))
         raise UserError("that is enough")
 
-    for caller in ("mjxgait.commands.train", "mjxgait.library.make"):
+    for caller in ("mjxgait.cli.train", "mjxgait.api.make"):
         monkeypatch.setattr(f"{caller}.check_run", only_look)
     with pytest.raises(UserError, match="enough"):
         train_command(["--env", "blocks", "--use.task", task])

@@ -8,21 +8,21 @@ import numpy as np
 import pytest
 from blocks.made_up import one
 
-from mjxgait.blocks.genotype import Capacity, Graph, Ranges
-from mjxgait.blocks.nerves import NerveRoom, random_centre, random_nerves
-from mjxgait.blocks.phenotype import Body, body_of
-from mjxgait.blocks.variation import Genotype, Kin
-from mjxgait.blocks.wiring import Brain, wired
-from mjxgait.certify.twins.brains import BrainTwin, fire
-from mjxgait.champion.blocks.material import NEURONS
-from mjxgait.champion.blocks.parts import grow
-from mjxgait.control.brains.neurons import fired
-from mjxgait.control.brains.thought import Perceived, blank, thought
-from mjxgait.runs.experiment import arrays_of
-from mjxgait.search.chance import key_of
-from mjxgait.viewing.brain import draw_brain, shape
-from mjxgait.viewing.network import READS, kind_of, network_of
-from mjxgait.viewing.style import figure
+from mjxgait.controllers.sims_brain.genotype import Capacity, Graph, Ranges
+from mjxgait.controllers.sims_brain.nerves import NerveRoom, random_centre, random_nerves
+from mjxgait.controllers.sims_brain.neurons import fired
+from mjxgait.controllers.sims_brain.operators import Genotype, Kin
+from mjxgait.controllers.sims_brain.phenotype import Body, body_of
+from mjxgait.controllers.sims_brain.reference import BrainTwin, fire
+from mjxgait.controllers.sims_brain.reference_body.material import NEURONS
+from mjxgait.controllers.sims_brain.reference_body.parts import grow
+from mjxgait.controllers.sims_brain.thought import Perceived, blank, thought
+from mjxgait.controllers.sims_brain.wiring import Brain, wired
+from mjxgait.evolution.chance import key_of
+from mjxgait.rendering.brain import draw_brain, shape
+from mjxgait.rendering.network import READS, kind_of, network_of
+from mjxgait.rendering.style import figure
+from mjxgait.training.experiment import arrays_of
 
 CAPACITY, ROOM, COUNT, STEP = Capacity(), NerveRoom(), 200, 0.01
 KIN = Kin(CAPACITY, ROOM, Ranges())

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from blocks.test_blocks_physics import CAPACITY, IN_WATER, LANES, in_mujoco, moments, one
 
-from mjxgait.blocks.genotype import Graph, Ranges, random_graph
-from mjxgait.blocks.phenotype import body_of
-from mjxgait.certify.water import Water
-from mjxgait.physics.trees.plant import TreePlant
-from mjxgait.physics.trees.tree import Surroundings
-from mjxgait.search.chance import key_of
+from mjxgait.controllers.sims_brain.genotype import Graph, Ranges, random_graph
+from mjxgait.controllers.sims_brain.phenotype import body_of
+from mjxgait.evolution.chance import key_of
+from mjxgait.physics.batched_trees.plant import TreePlant
+from mjxgait.physics.batched_trees.tree import Surroundings
+from mjxgait.reference.water import Water
 
 
 @pytest.fixture(scope="module")

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from blocks.made_up import genome_of, one
 
-from mjxgait.blocks.genotype import Capacity, Ranges, random_graph
-from mjxgait.certify.overlap import overlaps
-from mjxgait.champion.blocks.folder import body_files
-from mjxgait.champion.blocks.parts import grow
+from mjxgait.controllers.sims_brain.genotype import Capacity, Ranges, random_graph
+from mjxgait.controllers.sims_brain.reference_body.folder import body_files
+from mjxgait.controllers.sims_brain.reference_body.parts import grow
 from mjxgait.creature.scale import load_files
 from mjxgait.errors import UserError
-from mjxgait.search.chance import key_of
+from mjxgait.evolution.chance import key_of
+from mjxgait.reference.overlap import overlaps
 
 CAPACITY, COUNT = Capacity(), 60
 

@@ -10,15 +10,20 @@ import numpy as np
 import pytest
 from blocks.made_up import one
 
-from mjxgait.blocks.genotype import Capacity, Ranges
-from mjxgait.blocks.growth import grown
-from mjxgait.blocks.nerves import NerveRoom
-from mjxgait.blocks.variation import Genotype, Kin, Rates, reachable
-from mjxgait.champion.blocks.material import JOINTS, NEURONS
-from mjxgait.control.brains.controller import Brains
-from mjxgait.search.chance import key_of
-from mjxgait.settings.brains import BrainConfig
-from mjxgait.settings.evolution import EvolutionConfig
+from mjxgait.config.evolution import EvolutionConfig
+from mjxgait.controllers.sims_brain.config import BrainConfig
+from mjxgait.controllers.sims_brain.controller import Brains
+from mjxgait.controllers.sims_brain.genotype import Capacity, Ranges
+from mjxgait.controllers.sims_brain.growth import grown
+from mjxgait.controllers.sims_brain.nerves import NerveRoom
+from mjxgait.controllers.sims_brain.operators import (
+    Genotype,
+    Kin,
+    Rates,
+    reachable,
+)
+from mjxgait.controllers.sims_brain.reference_body.material import JOINTS, NEURONS
+from mjxgait.evolution.chance import key_of
 
 CAPACITY, ROOM, RANGES, COUNT = Capacity(), NerveRoom(), Ranges(), 2000
 KIN = Kin(CAPACITY, ROOM, RANGES, Rates(value=20.0, connection=0.8, node=0.8))

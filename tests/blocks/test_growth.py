@@ -12,16 +12,21 @@ import numpy as np
 import pytest
 from blocks.made_up import genome_of, one
 
-from mjxgait.blocks.genotype import Capacity, Graph, Ranges, random_graph
-from mjxgait.blocks.growth import Parts, grown
-from mjxgait.blocks.phenotype import Body, body_of
-from mjxgait.blocks.variation import Genotype
-from mjxgait.champion.blocks.material import JOINTS, ROOM
-from mjxgait.champion.blocks.parts import grow
-from mjxgait.champion.blocks.xml import body_xml
-from mjxgait.runs.growth import GraphGrowth
-from mjxgait.search.chance import key_of
-from mjxgait.tasks.trials import Starts
+from mjxgait.controllers.sims_brain.genotype import (
+    Capacity,
+    Graph,
+    Ranges,
+    random_graph,
+)
+from mjxgait.controllers.sims_brain.growth import Parts, grown
+from mjxgait.controllers.sims_brain.operators import Genotype
+from mjxgait.controllers.sims_brain.phenotype import Body, body_of
+from mjxgait.controllers.sims_brain.reference_body.material import JOINTS, ROOM
+from mjxgait.controllers.sims_brain.reference_body.parts import grow
+from mjxgait.controllers.sims_brain.reference_body.xml import body_xml
+from mjxgait.evolution.chance import key_of
+from mjxgait.tasks.starts import Starts
+from mjxgait.training.growth import GraphGrowth
 
 CAPACITY, COUNT = Capacity(), 1000
 CREATE = jax.jit(jax.vmap(lambda key: random_graph(key, CAPACITY, Ranges())))

@@ -10,26 +10,26 @@ import numpy as np
 import pytest
 from blocks.made_up import CALM
 
-from mjxgait.certify.bodies import VELOCITY_STAGE
-from mjxgait.certify.config import CertificateConfig
-from mjxgait.certify.grown import seen_grown
-from mjxgait.certify.outcome import Outcome
-from mjxgait.certify.simulate import simulate
-from mjxgait.certify.starts import nominal_starts
-from mjxgait.certify.stepping import Stepping
-from mjxgait.certify.tasks import demands_of, promising
-from mjxgait.champion.blocks.material import LIGHT
+from mjxgait.api import load_creature
+from mjxgait.certification.config import CertificateConfig
+from mjxgait.certification.simulate import simulate
+from mjxgait.certification.tasks import demands_of, promising
+from mjxgait.config.rollout import RolloutConfig
+from mjxgait.controllers.sims_brain.reference_body.material import LIGHT
 from mjxgait.creature import Creature
-from mjxgait.library import load_creature
-from mjxgait.parts.settings import build_config
-from mjxgait.runs.experiment import Experiment, build_experiment
-from mjxgait.search.chance import key_of
-from mjxgait.search.state import EvolutionState
-from mjxgait.settings.blocks import JumpConfig, RoamConfig
-from mjxgait.settings.rollout import RolloutConfig
-from mjxgait.tasks.blocks.follow import Following, FollowInWater, FollowOnLand
-from mjxgait.tasks.blocks.jump import SPANS, Jump
-from mjxgait.tasks.blocks.roam import Roam
+from mjxgait.evolution.chance import key_of
+from mjxgait.evolution.state import EvolutionState
+from mjxgait.plugins.settings import build_config
+from mjxgait.reference.bodies import VELOCITY_STAGE
+from mjxgait.reference.grown import seen_grown
+from mjxgait.reference.outcome import Outcome
+from mjxgait.reference.starts import nominal_starts
+from mjxgait.reference.stepping import Stepping
+from mjxgait.tasks.modular.config import JumpConfig, RoamConfig
+from mjxgait.tasks.modular.follow import Following, FollowInWater, FollowOnLand
+from mjxgait.tasks.modular.jump import SPANS, Jump
+from mjxgait.tasks.modular.roam import Roam
+from mjxgait.training.experiment import Experiment, build_experiment
 
 TABLE = {
     "use": {"controller": "brain", "task": "follow-on-land"},

@@ -10,26 +10,26 @@ import numpy as np
 import pytest
 from blocks.made_up import CALM
 
-from mjxgait.certify.grown import seen_grown
-from mjxgait.certify.simulate import simulate
-from mjxgait.certify.starts import nominal_starts
+from mjxgait.api import load_creature
+from mjxgait.certification.simulate import simulate
 from mjxgait.champion import read_champion, write_champion
-from mjxgait.champion.blocks.material import DRAG
-from mjxgait.champion.blocks.parts import grow
+from mjxgait.controllers.sims_brain.reference_body.material import DRAG
+from mjxgait.controllers.sims_brain.reference_body.parts import grow
+from mjxgait.evolution.state import EvolutionState
 from mjxgait.inspect.snapshot import read_snapshot
-from mjxgait.library import load_creature
-from mjxgait.parts.settings import build_config
-from mjxgait.runs.checkpoint import Checkpoints
-from mjxgait.runs.experiment import Experiment, Step, build_experiment
-from mjxgait.runs.folder import METRICS, create_run
-from mjxgait.runs.loop import metrics_line
-from mjxgait.search.state import EvolutionState
-from mjxgait.settings.blocks import SwimConfig
-from mjxgait.tasks.blocks.alive import FASTEST_HINGE, FURTHEST
-from mjxgait.tasks.blocks.swim import Swim
-from mjxgait.viewing.grown import bodies_of, draw_bodies, draw_graph
-from mjxgait.viewing.style import figure
-from mjxgait.viewing.walk import record_walk
+from mjxgait.plugins.settings import build_config
+from mjxgait.reference.grown import seen_grown
+from mjxgait.reference.starts import nominal_starts
+from mjxgait.rendering.grown import bodies_of, draw_bodies, draw_graph
+from mjxgait.rendering.style import figure
+from mjxgait.rendering.walk import record_walk
+from mjxgait.tasks.modular.config import SwimConfig
+from mjxgait.tasks.modular.swim import Swim
+from mjxgait.tasks.modular.task import FASTEST_HINGE, FURTHEST
+from mjxgait.training.checkpoint import Checkpoints
+from mjxgait.training.experiment import Experiment, Step, build_experiment
+from mjxgait.training.folder import METRICS, create_run
+from mjxgait.training.loop import metrics_line
 
 TABLE = {
     "use": {"controller": "brain", "task": "swim"},

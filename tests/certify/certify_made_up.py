@@ -5,8 +5,8 @@ import dataclasses
 import numpy as np
 from helpers import pose_champion
 
-from mjxgait.certify.measure import Dimensions, Recording
-from mjxgait.settings.control import DriveConfig, PoseConfig
+from mjxgait.controllers.key_poses.config import DriveConfig, PoseConfig
+from mjxgait.reference.measure import Dimensions, Recording
 
 LEG = """
       <body name="{name}_upper" pos="{x} {y} 0">

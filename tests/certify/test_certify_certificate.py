@@ -8,12 +8,23 @@ import numpy as np
 import pytest
 from certify_made_up import DOG, make_champion, walk
 
-from mjxgait.certify import CertificateConfig, certify, draws, glance, rehearse
-from mjxgait.certify.describe import cost_of_transport, describe, footfall_phases, gait_name
-from mjxgait.certify.measure import dimensions
-from mjxgait.certify.starts import nominal_starts
+from mjxgait.certification import (
+    CertificateConfig,
+    certify,
+    draws,
+    glance,
+    rehearse,
+)
+from mjxgait.certification.describe import (
+    cost_of_transport,
+    describe,
+    footfall_phases,
+    gait_name,
+)
+from mjxgait.config.tables import build, read_toml
 from mjxgait.errors import UserError
-from mjxgait.settings.tables import build, read_toml
+from mjxgait.reference.measure import dimensions
+from mjxgait.reference.starts import nominal_starts
 
 SMALL = {
     "seconds": 7.0,

@@ -7,16 +7,16 @@ import pytest
 from certify_made_up import make_champion
 from helpers import altered, short_examination
 
-from mjxgait.certify import glance
-from mjxgait.certify.check_body import check_body
+from mjxgait.certification import glance
+from mjxgait.certification.check_body import check_body
 from mjxgait.champion import read_champion, write_champion
+from mjxgait.config.schema import Config
+from mjxgait.config.tables import build
 from mjxgait.creature import load_creature
 from mjxgait.creature.scale import load_files
 from mjxgait.errors import UserError
-from mjxgait.runs import folder
-from mjxgait.runs.folder import create_run
-from mjxgait.settings.config import Config
-from mjxgait.settings.tables import build
+from mjxgait.training import folder
+from mjxgait.training.folder import create_run
 
 
 def changed(values, index, value):

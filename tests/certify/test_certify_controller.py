@@ -8,10 +8,15 @@ import pytest
 from certify_made_up import make_champion
 from helpers import altered
 
-from mjxgait.certify.drive import Drive
-from mjxgait.certify.layout import start_frame
-from mjxgait.certify.state import ADDED, SENSES, State, sense
-from mjxgait.certify.twins.poses import READS, PoseTwin, pose_cycle
+from mjxgait.controllers.key_poses.reference import READS, PoseTwin, pose_cycle
+from mjxgait.reference.drive import Drive
+from mjxgait.reference.layout import start_frame
+from mjxgait.reference.state import (
+    ADDED,
+    SENSES,
+    State,
+    sense,
+)
 
 STEP = 0.005
 
@@ -268,7 +273,7 @@ def test_the_senses_are_those_of_evolution(tiny):
     """Every name."""
     import jax.numpy as jnp
 
-    from mjxgait import senses as evolution
+    from mjxgait.controllers import observations as evolution
 
     state, sensed = askew(tiny)
     assert SENSES.keys() == evolution.SENSES.keys()
@@ -282,7 +287,7 @@ def test_the_senses_are_those_of_evolution(tiny):
 def test_the_beat_begins_anew_every_second(tiny, time, beat):
     import jax.numpy as jnp
 
-    from mjxgait import senses as evolution
+    from mjxgait.controllers import observations as evolution
 
     state, sensed = askew(tiny)
     state = dataclasses.replace(state, time=np.array([time]))
@@ -296,8 +301,8 @@ def test_the_senses_that_tasks_add_are_those_of_evolution(tiny):
     """
     import jax.numpy as jnp
 
-    from mjxgait.champion.blocks.material import IN_WATER, ON_LAND
-    from mjxgait.parts.registry import SHIPPED
+    from mjxgait.controllers.sims_brain.reference_body.material import IN_WATER, ON_LAND
+    from mjxgait.plugins.registry import SHIPPED
 
     state, sensed = askew(tiny)
     state = dataclasses.replace(state, goal=np.array([0.8]), bar=np.array([0.6]))

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from certify_made_up import DOG, walk
 
-from mjxgait.certify import CertificateConfig, criteria, describe, strides
-from mjxgait.certify.certificate import half_point
-from mjxgait.certify.criteria import Measure
-from mjxgait.certify.obstacle import obstacle
-from mjxgait.certify.tasks import walk as demands
+from mjxgait.certification import CertificateConfig, criteria, describe
+from mjxgait.certification.certificate import half_point
+from mjxgait.certification.criteria import Measure
+from mjxgait.certification.obstacle import obstacle
+from mjxgait.reference import strides
+from mjxgait.tasks.walk import criteria as demands
 
 CONFIG = CertificateConfig()
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from certify_made_up import make_champion
 
-from mjxgait.certify.outcome import Fall
-from mjxgait.certify.simulate import simulate
-from mjxgait.certify.starts import Starts, nominal_starts, pushed_starts
+from mjxgait.certification.simulate import simulate
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
+from mjxgait.reference.outcome import Fall
+from mjxgait.reference.starts import Starts, nominal_starts, pushed_starts
 
 ANYHOW = {"min_up": -1.0, "height": (0.001, 100.0), "touch": False}
 

@@ -5,15 +5,15 @@ import numpy as np
 import pytest
 from certify_made_up import make_champion
 
-from mjxgait.certify.certificate import record
-from mjxgait.certify.config import CertificateConfig
-from mjxgait.certify.layout import LowestPoint
-from mjxgait.certify.measure import measure
-from mjxgait.certify.simulate import simulate
-from mjxgait.certify.starts import nominal_starts
-from mjxgait.certify.stepping import examined_model
-from mjxgait.certify.terrain import grounded_model, terrain_of
-from mjxgait.certify.worlds import slippery
+from mjxgait.certification.certificate import record
+from mjxgait.certification.config import CertificateConfig
+from mjxgait.certification.simulate import simulate
+from mjxgait.certification.worlds import slippery
+from mjxgait.reference.layout import LowestPoint
+from mjxgait.reference.measure import measure
+from mjxgait.reference.starts import nominal_starts
+from mjxgait.reference.stepping import examined_model
+from mjxgait.reference.terrain import grounded_model, terrain_of
 
 ROUGH = "rough:0.1@2"
 

@@ -8,27 +8,34 @@ import numpy as np
 import pytest
 from certify_made_up import DOG, make_champion, walk
 
-from mjxgait.certify import CertificateConfig, draws, rehearsal, rehearse
-from mjxgait.certify.measure import Recording
-from mjxgait.certify.outcome import Outcome, Trajectory
-from mjxgait.certify.simulate import simulate
-from mjxgait.certify.starts import (
+from mjxgait.certification import (
+    CertificateConfig,
+    draws,
+    rehearse,
+)
+from mjxgait.certification import (
+    trial_run as rehearsal,
+)
+from mjxgait.certification.simulate import simulate
+from mjxgait.certification.tasks import demands_of, promising
+from mjxgait.champion import Champion
+from mjxgait.config.rollout import RolloutConfig
+from mjxgait.creature import Creature
+from mjxgait.evolution.chance import key_of
+from mjxgait.reference.measure import Recording
+from mjxgait.reference.outcome import Outcome, Trajectory
+from mjxgait.reference.starts import (
     Starts,
     join,
     nominal_starts,
     perturbed_starts,
     pushed_starts,
 )
-from mjxgait.certify.tasks import demands_of, promising
-from mjxgait.certify.tasks.hop import HopDemands
-from mjxgait.certify.thresholds.goals import HopConfig
-from mjxgait.certify.watch import Watch
-from mjxgait.champion import Champion
-from mjxgait.creature import Creature
-from mjxgait.search.chance import key_of
-from mjxgait.settings import hop as evolution
-from mjxgait.settings.rollout import RolloutConfig
+from mjxgait.reference.watch import Watch
+from mjxgait.tasks.hop import config as evolution
+from mjxgait.tasks.hop.criteria import HopDemands
 from mjxgait.tasks.hop.task import Hop
+from mjxgait.tasks.hop.thresholds import HopConfig
 
 CONFIG, DEMANDS = CertificateConfig(), HopDemands()
 FRAMES, STEP, GOAL = 4400, 0.005, 1.2
@@ -362,7 +369,7 @@ class Pointer:
 
 @pytest.fixture
 def pointer(tiny: Creature, monkeypatch: pytest.MonkeyPatch) -> Champion:
-    monkeypatch.setattr("mjxgait.certify.stepping.twin_of", Pointer)
+    monkeypatch.setattr("mjxgait.reference.stepping.twin_of", Pointer)
     monkeypatch.setattr(Pointer, "phase", lambda self, memory: np.nan)
     return dataclasses.replace(make_champion(tiny), task="hop")
 

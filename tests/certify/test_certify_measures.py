@@ -24,10 +24,10 @@ from test_certify_criteria import (
     unsteady,
 )
 
-from mjxgait.certify import CertificateConfig, criteria
-from mjxgait.certify.criteria import Criterion
-from mjxgait.certify.measure import Recording
-from mjxgait.certify.tasks import walk as demands
+from mjxgait.certification import CertificateConfig, criteria
+from mjxgait.certification.criteria import Criterion
+from mjxgait.reference.measure import Recording
+from mjxgait.tasks.walk import criteria as demands
 
 CONFIG = CertificateConfig()
 AT = 3000

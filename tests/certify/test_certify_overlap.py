@@ -8,13 +8,18 @@ import pytest
 from certify_made_up import LEGS, TOML, XML, make_champion
 from scipy.optimize import minimize
 
-from mjxgait.certify import CertificateConfig, criteria, glance, record
-from mjxgait.certify.describe import worst_overlap
-from mjxgait.certify.overlap import colliding_with_itself, neighbours, overlaps
+from mjxgait.certification import (
+    CertificateConfig,
+    criteria,
+    glance,
+    record,
+)
+from mjxgait.certification.describe import worst_overlap
+from mjxgait.config.tables import build
 from mjxgait.creature import load_creature
 from mjxgait.creature.overlap import find_crossings
 from mjxgait.errors import UserError
-from mjxgait.settings.tables import build
+from mjxgait.reference.overlap import colliding_with_itself, neighbours, overlaps
 
 SHORT = build(CertificateConfig, {"seconds": 2.0, "warmup": 0.5}, "test")
 

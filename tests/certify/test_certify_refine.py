@@ -5,13 +5,13 @@ import dataclasses
 import numpy as np
 import pytest
 
-from mjxgait.certify import record
-from mjxgait.certify.batch import batch_of
-from mjxgait.certify.certificate import recordings
-from mjxgait.certify.starts import Starts, nominal_starts
-from mjxgait.certify.stepping import examined_model
+from mjxgait.certification import record
+from mjxgait.certification.certificate import recordings
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
+from mjxgait.reference.batch import batch_of
+from mjxgait.reference.starts import Starts, nominal_starts
+from mjxgait.reference.stepping import examined_model
 
 
 def refined(creature: Creature, *refine: int) -> Starts:

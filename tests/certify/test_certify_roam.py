@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 from certify_made_up import walk
 
-from mjxgait.certify import CertificateConfig, outdated
-from mjxgait.certify.certificate import schema_of
-from mjxgait.certify.grown import Grown, seen_grown
-from mjxgait.certify.measure import Recording
-from mjxgait.certify.outcome import Outcome, Trajectory
-from mjxgait.certify.tasks.jump import JumpDemands
-from mjxgait.certify.tasks.roam import RoamDemands
+from mjxgait.api import load_creature
+from mjxgait.certification import CertificateConfig, outdated
+from mjxgait.certification.certificate import schema_of
 from mjxgait.creature.geometry import lowest
-from mjxgait.library import load_creature
+from mjxgait.reference.grown import Grown, seen_grown
+from mjxgait.reference.measure import Recording
+from mjxgait.reference.outcome import Outcome, Trajectory
+from mjxgait.tasks.modular.jump_criteria import JumpDemands
+from mjxgait.tasks.modular.roam_criteria import RoamDemands
 
 CONFIG, DEMANDS = CertificateConfig(), RoamDemands()
 FRAMES, STEP, SPEED = 2200, 0.01, 0.4

@@ -11,23 +11,28 @@ import numpy as np
 import pytest
 from certify_made_up import make_champion
 
-from mjxgait.certify import distance, glance, record, survival
-from mjxgait.certify.drive import Drive
-from mjxgait.certify.layout import start_frame
-from mjxgait.certify.measure import measure
-from mjxgait.certify.outcome import Fall
-from mjxgait.certify.simulate import simulate
-from mjxgait.certify.starts import (
+from mjxgait.certification import (
+    distance,
+    glance,
+    record,
+    survival,
+)
+from mjxgait.certification.simulate import simulate
+from mjxgait.controllers.key_poses.reference import PoseTwin
+from mjxgait.errors import UserError
+from mjxgait.reference.drive import Drive
+from mjxgait.reference.layout import start_frame
+from mjxgait.reference.measure import measure
+from mjxgait.reference.outcome import Fall
+from mjxgait.reference.starts import (
     join,
     nominal_starts,
     perturbed_starts,
     pushed_starts,
     unfamiliar,
 )
-from mjxgait.certify.state import State, sense
-from mjxgait.certify.stepping import examined_model
-from mjxgait.certify.twins.poses import PoseTwin
-from mjxgait.errors import UserError
+from mjxgait.reference.state import State, sense
+from mjxgait.reference.stepping import examined_model
 
 SECONDS = 1.5
 
@@ -362,5 +367,5 @@ def test_what_is_not_a_number_is_refused_in_one_sentence(
 
 
 def test_the_examiner_never_imports_jax():
-    code = "import mjxgait.certify, sys; sys.exit(any(name.split('.')[0] in ('jax', 'jaxlib', 'mjx') for name in sys.modules))"
+    code = "import mjxgait.certification, sys; sys.exit(any(name.split('.')[0] in ('jax', 'jaxlib', 'mjx') for name in sys.modules))"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

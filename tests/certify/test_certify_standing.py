@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from helpers import made_up_certificate
 
-from mjxgait.certify import (
+from mjxgait.certification import (
     CertificateConfig,
     Criterion,
     certify,
@@ -17,10 +17,10 @@ from mjxgait.certify import (
     outdated,
     read_certificate,
 )
-from mjxgait.certify.verify import differences
+from mjxgait.certification.verify import differences
 from mjxgait.champion import read_champion, write_champion
+from mjxgait.config.tables import build
 from mjxgait.errors import UserError
-from mjxgait.settings.tables import build
 
 BRIEF = {
     "seconds": 1.5,

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from certify_made_up import walk
 
-from mjxgait.certify import CertificateConfig
-from mjxgait.certify.grown import Grown, seen_grown
-from mjxgait.certify.measure import Recording
-from mjxgait.certify.outcome import Outcome, Trajectory
-from mjxgait.certify.tasks.follow import FollowDemands
-from mjxgait.certify.tasks.swim import SwimDemands
-from mjxgait.certify.water import Water
-from mjxgait.library import load_creature
+from mjxgait.api import load_creature
+from mjxgait.certification import CertificateConfig
+from mjxgait.reference.grown import Grown, seen_grown
+from mjxgait.reference.measure import Recording
+from mjxgait.reference.outcome import Outcome, Trajectory
+from mjxgait.reference.water import Water
+from mjxgait.tasks.modular.follow_criteria import FollowDemands
+from mjxgait.tasks.modular.swim_criteria import SwimDemands
 
 CONFIG, DEMANDS = CertificateConfig(), SwimDemands()
 FRAMES, STEP, MASS, SPEED = 2200, 0.01, 10.0, 0.4

@@ -7,13 +7,13 @@ import pytest
 from certify_made_up import DOG, make_champion, walk
 from test_certify_measures import failed
 
-from mjxgait.certify import CertificateConfig
-from mjxgait.certify.measure import Recording
-from mjxgait.certify.outcome import Outcome, Trajectory
-from mjxgait.certify.simulate import simulate
-from mjxgait.certify.starts import nominal_starts
-from mjxgait.certify.tasks import demands_of
-from mjxgait.certify.tasks.wishes import (
+from mjxgait.certification import CertificateConfig
+from mjxgait.certification.simulate import simulate
+from mjxgait.certification.tasks import demands_of
+from mjxgait.reference.measure import Recording
+from mjxgait.reference.outcome import Outcome, Trajectory
+from mjxgait.reference.starts import nominal_starts
+from mjxgait.tasks.walk.target_criteria import (
     as_asked,
     draw_commands,
     following,

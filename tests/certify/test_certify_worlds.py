@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from certify_made_up import make_champion
 
-from mjxgait.certify.outcome import Fall
-from mjxgait.certify.simulate import simulate
-from mjxgait.certify.starts import perturbed_starts
-from mjxgait.certify.worlds import slippery, sloping
+from mjxgait.certification.simulate import simulate
+from mjxgait.certification.worlds import slippery, sloping
+from mjxgait.reference.outcome import Fall
+from mjxgait.reference.starts import perturbed_starts
 
 
 def rng(seed=0):

@@ -4,13 +4,13 @@ from pathlib import Path
 
 import pytest
 
-from mjxgait.certify import CertificateConfig
-from mjxgait.importing.manner import few_feet, four_feet
-from mjxgait.library import load_creature
-from mjxgait.parts import resolve_config
-from mjxgait.parts.wishes import Wishes, configured
-from mjxgait.settings.config import Config
-from mjxgait.settings.rollout import RolloutConfig
+from mjxgait.api import load_creature
+from mjxgait.certification import CertificateConfig
+from mjxgait.config.rollout import RolloutConfig
+from mjxgait.config.schema import Config
+from mjxgait.importer.manner import few_feet, four_feet
+from mjxgait.plugins import resolve_config
+from mjxgait.tasks.walk.targets import Wishes, configured
 
 EXAMINED = CertificateConfig().starts
 WALK = {"masses", "late torques", "slopes"}

@@ -7,11 +7,16 @@ import numpy as np
 import pytest
 from certify_made_up import make_champion
 
-from mjxgait.certify import stress as module
-from mjxgait.certify.stress import Stress, StressConfig, Trial, stress
+from mjxgait.certification import stress as module
+from mjxgait.certification.stress import (
+    Stress,
+    StressConfig,
+    Trial,
+    stress,
+)
 from mjxgait.errors import UserError
-from mjxgait.viewing.stressplot import draw_stress
-from mjxgait.viewing.style import figure
+from mjxgait.rendering.stressplot import draw_stress
+from mjxgait.rendering.style import figure
 
 SHORT = StressConfig(starts=4, seconds=0.6, long=1.2)
 NAMES = [

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mjxgait.certify import CertificateConfig, outdated, record
+from mjxgait.certification import CertificateConfig, outdated, record
 from mjxgait.champion import read_champion
 from mjxgait.creature import load_creature
 

@@ -5,15 +5,15 @@ import numpy as np
 import pytest
 from helpers import small_config
 
-from mjxgait.cluster.blocks import Blocks, block_size
-from mjxgait.cluster.crew import Crew
-from mjxgait.cluster.here import Here
-from mjxgait.cluster.jobs import AdvanceRows
-from mjxgait.cluster.programs import Programs
-from mjxgait.cluster.recipe import Recipe
 from mjxgait.creature import Creature
+from mjxgait.distributed.chunks import Blocks, block_size
+from mjxgait.distributed.jobs import AdvanceRows
+from mjxgait.distributed.local import Here
+from mjxgait.distributed.programs import Programs
+from mjxgait.distributed.recipe import Recipe
+from mjxgait.distributed.scheduler import Crew
 from mjxgait.errors import UserError
-from mjxgait.runs.experiment import build_experiment
+from mjxgait.training.experiment import build_experiment
 
 CONFIG = small_config(rollout={"block": 3})
 

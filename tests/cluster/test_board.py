@@ -5,9 +5,9 @@ import io
 import pytest
 from rich.console import Console
 
-from mjxgait.cluster.board import Board, table
-from mjxgait.cluster.crew import Crew, Worker
-from mjxgait.cluster.here import Here
+from mjxgait.distributed.dashboard import Board, table
+from mjxgait.distributed.local import Here
+from mjxgait.distributed.scheduler import Crew, Worker
 
 
 @pytest.fixture

@@ -5,7 +5,13 @@ from typing import Any
 
 import pytest
 
-from mjxgait.cluster.crew import FATAL, LATE, Crew, Report, Worker
+from mjxgait.distributed.scheduler import (
+    FATAL,
+    LATE,
+    Crew,
+    Report,
+    Worker,
+)
 from mjxgait.errors import UserError
 
 

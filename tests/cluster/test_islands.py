@@ -11,15 +11,15 @@ from rich.console import Console
 
 import mjxgait
 from mjxgait.champion import read_champion
-from mjxgait.cluster import islands
-from mjxgait.cluster.crew import Crew
-from mjxgait.cluster.here import Here
-from mjxgait.cluster.programs import Programs
 from mjxgait.creature import Creature
+from mjxgait.distributed import islands
+from mjxgait.distributed.local import Here
+from mjxgait.distributed.programs import Programs
+from mjxgait.distributed.scheduler import Crew
 from mjxgait.inspect.islands import island_facts
-from mjxgait.runs.folder import create_run, read_metrics
-from mjxgait.runs.screen import Screen
-from mjxgait.runs.stored import stored_generations
+from mjxgait.training.folder import create_run, read_metrics
+from mjxgait.training.screen import Screen
+from mjxgait.training.stored import stored_generations
 
 PROGRAMS = Programs()
 

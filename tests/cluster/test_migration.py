@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from mjxgait.cluster.migration import exchanged, gathered, together
-from mjxgait.runs.packed import Packed
-from mjxgait.settings.islands import IslandsConfig
+from mjxgait.config.islands import IslandsConfig
+from mjxgait.distributed.migration import exchanged, gathered, together
+from mjxgait.training.packed import Packed
 
 
 def island(*fitness: float) -> Packed:

@@ -14,13 +14,18 @@ import pytest
 from helpers import STOOL
 from simulated import workers
 
-from mjxgait.ablation.plan import Plan, Study, VariantTable, make_plan
-from mjxgait.ablation.rows import run_study
-from mjxgait.cluster.connect import connected
+from mjxgait.config.tables import dump_toml
 from mjxgait.creature import Creature
+from mjxgait.distributed.connect import connected
 from mjxgait.errors import INTERRUPTED, UserError
-from mjxgait.runs.folder import read_metrics
-from mjxgait.settings.tables import dump_toml
+from mjxgait.experiments.ablation.plan import (
+    Plan,
+    Study,
+    VariantTable,
+    make_plan,
+)
+from mjxgait.experiments.ablation.rows import run_study
+from mjxgait.training.folder import read_metrics
 
 pytestmark = pytest.mark.skipif(
     importlib.util.find_spec("ray") is None, reason='needs Ray: pip install "mjxgait[cluster]"'

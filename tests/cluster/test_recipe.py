@@ -6,11 +6,16 @@ from pathlib import Path
 import pytest
 from helpers import small_config
 
-from mjxgait.cluster.nodes import Machine, mismatch, require_same, this
-from mjxgait.cluster.recipe import OwnPart, Recipe
 from mjxgait.creature import Creature
+from mjxgait.distributed.nodes import (
+    Machine,
+    mismatch,
+    require_same,
+    this,
+)
+from mjxgait.distributed.recipe import OwnPart, Recipe
 from mjxgait.errors import UserError
-from mjxgait.parts.registry import find
+from mjxgait.plugins.registry import find
 
 OWN = """
 from mjxgait.tasks.plain import PlainTask

@@ -7,7 +7,7 @@ from pathlib import Path
 import jax
 import pytest
 
-from mjxgait.cluster.worker import _turn
+from mjxgait.distributed.worker import _turn
 
 filelock = pytest.importorskip("filelock", reason='needs "mjxgait[cluster]"')
 

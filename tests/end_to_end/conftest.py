@@ -17,15 +17,15 @@ from end_to_end.unevolved import Unevolved, unevolved
 from end_to_end.walks import SHORTER
 
 import mjxgait.cores
-from mjxgait.ablation import measures
-from mjxgait.certify import CertificateConfig
-from mjxgait.certify.stress import StressConfig
+from mjxgait.certification import CertificateConfig
+from mjxgait.certification.stress import StressConfig
 from mjxgait.cli import main
-from mjxgait.cluster import board
-from mjxgait.cluster.here import Here
-from mjxgait.cluster.programs import Programs
-from mjxgait.runs import loop
-from mjxgait.settings.tables import build
+from mjxgait.config.tables import build
+from mjxgait.distributed import dashboard as board
+from mjxgait.distributed.local import Here
+from mjxgait.distributed.programs import Programs
+from mjxgait.experiments.ablation import measures
+from mjxgait.training import loop
 
 COMPILED, CERTIFICATE = loop._compiled, CertificateConfig.__init__
 PROGRAMS = Programs()

@@ -11,15 +11,15 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
+from mjxgait.config.layers import over_base
+from mjxgait.config.schema import UseConfig
+from mjxgait.config.shipped import data_folder, shipped_configs, shipped_creatures
 from mjxgait.creature import Creature, load_creature
 from mjxgait.creature.step import at_step
 from mjxgait.errors import UserError
-from mjxgait.parts import resolve_config
-from mjxgait.parts.fit import check_fit
-from mjxgait.parts.registry import OF_BODIES_THAT_GROW, SHIPPED, find
-from mjxgait.settings.config import UseConfig
-from mjxgait.settings.layers import over_base
-from mjxgait.settings.shipped import data_folder, shipped_configs, shipped_creatures
+from mjxgait.plugins import resolve_config
+from mjxgait.plugins.fit import check_fit
+from mjxgait.plugins.registry import OF_BODIES_THAT_GROW, SHIPPED, find
 
 ROOT = Path(__file__).parents[2]
 CREATURES, CONFIGS = shipped_creatures(), shipped_configs()

@@ -11,10 +11,10 @@ from end_to_end.walks import short_examination, small_settings, trained, walker
 from helpers import STOOL, said_by
 from keys.made import columns, swings
 
-from mjxgait.certify import read_certificate
+from mjxgait.certification import read_certificate
 from mjxgait.cli import COMMANDS
 from mjxgait.creature import load_creature
-from mjxgait.runs.folder import CERTIFICATE, open_run
+from mjxgait.training.folder import CERTIFICATE, open_run
 
 ELSEWHERE = {
     "train": "tests/end_to_end/test_trainings.py::test_a_training_ends_with_a_certificate",

@@ -15,7 +15,16 @@ from end_to_end.walks import faller, short_examination, trained, walker
 from helpers import STOOL
 
 from mjxgait.processes import python_command
-from mjxgait.runs import checkpoint, examination, experiment, looks, loop, stages
+from mjxgait.training import (
+    checkpoint,
+    examination,
+    experiment,
+    loop,
+    stages,
+)
+from mjxgait.training import (
+    validation as looks,
+)
 
 BLENDER = "needs Blender as a module of Python"
 RAY = "needs Ray; tests/cluster/test_ray.py runs what it measures, where Ray is installed"

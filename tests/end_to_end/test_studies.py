@@ -8,9 +8,9 @@ import tomli_w
 from end_to_end.shipped import STUDIES, creature_of
 from helpers import STOOL, said_by
 
-from mjxgait.ablation.plan import Study
-from mjxgait.settings.shipped import data_folder
-from mjxgait.settings.tables import merge
+from mjxgait.config.shipped import data_folder
+from mjxgait.config.tables import merge
+from mjxgait.experiments.ablation.plan import Study
 
 SEEDS, ROWS = 2, 2
 """The fewest seeds of a study."""

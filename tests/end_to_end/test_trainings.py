@@ -29,12 +29,19 @@ from end_to_end.shipped import (
 )
 from helpers import STOOL, said_by
 
-from mjxgait.certify import CertificateConfig, glance
+from mjxgait.certification import CertificateConfig, glance
 from mjxgait.champion import Champion, write_champion
-from mjxgait.parts import resolve_config
-from mjxgait.parts.registry import OF_BODIES_THAT_GROW
-from mjxgait.runs.folder import CERTIFICATE, CHAMPION, METRICS, create_run, open_champion, open_run
-from mjxgait.settings.control import gene_names
+from mjxgait.controllers.key_poses.config import gene_names
+from mjxgait.plugins import resolve_config
+from mjxgait.plugins.registry import OF_BODIES_THAT_GROW
+from mjxgait.training.folder import (
+    CERTIFICATE,
+    CHAMPION,
+    METRICS,
+    create_run,
+    open_champion,
+    open_run,
+)
 
 WAYS = list(trainings())
 FEWER = covering(WAYS)

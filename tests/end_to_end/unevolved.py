@@ -11,16 +11,16 @@ import jax.numpy as jnp
 import numpy as np
 
 from mjxgait.champion import Champion
-from mjxgait.cluster.crew import Report
-from mjxgait.cluster.here import Here
-from mjxgait.cluster.jobs import Advanced, AdvanceRows
-from mjxgait.cluster.programs import Programs
-from mjxgait.cluster.recipe import Recipe
+from mjxgait.distributed.jobs import Advanced, AdvanceRows
+from mjxgait.distributed.local import Here
+from mjxgait.distributed.programs import Programs
+from mjxgait.distributed.recipe import Recipe
+from mjxgait.distributed.scheduler import Report
 from mjxgait.errors import UserError
-from mjxgait.runs.experiment import Experiment
-from mjxgait.runs.packed import pack
-from mjxgait.search.state import EvolutionState, GenerationMetrics
+from mjxgait.evolution.state import EvolutionState, GenerationMetrics
 from mjxgait.simulation.evaluator import Evaluator
+from mjxgait.training.experiment import Experiment
+from mjxgait.training.packed import pack
 
 Step = Callable[[EvolutionState], tuple[EvolutionState, GenerationMetrics]]
 

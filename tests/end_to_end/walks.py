@@ -15,7 +15,7 @@ from viewing.made_up import falling, treading
 from mjxgait.champion import write_champion
 from mjxgait.cli import main
 from mjxgait.creature import Creature
-from mjxgait.runs.folder import CERTIFICATE, CHAMPION, open_run
+from mjxgait.training.folder import CERTIFICATE, CHAMPION, open_run
 
 SMALL = """
 [evolution]

@@ -5,8 +5,8 @@ import dataclasses
 import jax.numpy as jnp
 import numpy as np
 
+from mjxgait.controllers.observations import sense
 from mjxgait.creature import Creature
-from mjxgait.senses import sense
 from mjxgait.tasks.falls import Reason, why_fallen
 from mjxgait.types import Sensed
 

@@ -2,11 +2,11 @@
 
 import pytest
 
+from mjxgait.config.schema import Config
+from mjxgait.config.tables import build
+from mjxgait.config.traced import traced
+from mjxgait.creature.ground.spec import LEVEL, GroundSpec, parse_ground
 from mjxgait.errors import UserError
-from mjxgait.ground.spec import LEVEL, GroundSpec, parse_ground
-from mjxgait.settings.config import Config
-from mjxgait.settings.tables import build
-from mjxgait.settings.traced import traced
 
 TEXTS = {
     "flat": LEVEL,

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from helpers import small_config
 
-from mjxgait.certify.terrain import terrain_of
 from mjxgait.creature import Creature
 from mjxgait.creature.frame import start_place
-from mjxgait.ground.surface import (
+from mjxgait.creature.ground.surface import (
     Ground,
     contact,
     height,
@@ -20,8 +19,9 @@ from mjxgait.ground.surface import (
     named_draws,
     normal,
 )
-from mjxgait.search.chance import key_of
-from mjxgait.tasks.trials import draw_starts
+from mjxgait.evolution.chance import key_of
+from mjxgait.reference.terrain import terrain_of
+from mjxgait.tasks.starts import draw_starts
 
 TEXTS = (
     "slope:0.2",

@@ -10,10 +10,10 @@ from pathlib import Path
 from importing.fuzz_inputs import model_inputs, own_xml_inputs, toml_inputs
 from importing.models import QUADRUPED
 
+from mjxgait.config.layers import resolve_config
 from mjxgait.creature import load_creature
 from mjxgait.errors import UserError
-from mjxgait.importing import ImportChoices, import_model, stance
-from mjxgait.settings.layers import resolve_config
+from mjxgait.importer import ImportChoices, import_model, stance
 
 stance.FIRST, stance.ROUNDS = 60, 4  # it is the files that are hostile, not the search
 

@@ -9,8 +9,8 @@ import pytest
 from helpers import STOOL
 
 from mjxgait.errors import UserError
-from mjxgait.importing import ImportChoices, import_model
-from mjxgait.importing.source import MOST_ATTRIBUTES, MOST_ELEMENTS, MOST_XML
+from mjxgait.importer import ImportChoices, import_model
+from mjxgait.importer.source import MOST_ATTRIBUTES, MOST_ELEMENTS, MOST_XML
 
 MODEL = STOOL / "creature.xml"
 ATTRIBUTES = " ".join(f"a{i}='1'" for i in range(100_000))
@@ -47,7 +47,7 @@ def test_processor_time_is_bounded(monkeypatch: pytest.MonkeyPatch):
         given.update(options)
         return subprocess.CompletedProcess(command, -signal.SIGXCPU, b"", b"")
 
-    monkeypatch.setattr("mjxgait.importing.worker.subprocess.run", run)
+    monkeypatch.setattr("mjxgait.importer.worker.subprocess.run", run)
     with pytest.raises(UserError, match=r"within 10 s; .*--seconds"):
         import_model(MODEL)
     assert given["timeout"] > 10

@@ -5,7 +5,7 @@ import dataclasses
 import pytest
 
 from mjxgait.creature import Creature
-from mjxgait.importing.hold import Held, hold
+from mjxgait.importer.hold import Held, hold
 
 
 def held(stool: Creature, without: str = "") -> Held:

@@ -12,19 +12,19 @@ import pytest
 from helpers import altered, pose_champion
 from importing.models import BIPED, QUADRUPED, ROLLING
 
-from mjxgait.certify.simulate import simulate
-from mjxgait.certify.starts import perturbed_starts
+from mjxgait.certification.simulate import simulate
 from mjxgait.champion import Champion
 from mjxgait.cli import main
-from mjxgait.commands.import_ import write_folder
-from mjxgait.commands.train import _layers
+from mjxgait.cli.import_ import write_folder
+from mjxgait.cli.train import _layers
+from mjxgait.config.layers import resolve_config
+from mjxgait.config.shipped import find_creature
 from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import UserError
-from mjxgait.importing import ImportChoices, Imported, import_model
-from mjxgait.importing.portrait import facts, portrait, standing
-from mjxgait.importing.write_toml import _quoted
-from mjxgait.settings.layers import resolve_config
-from mjxgait.settings.shipped import find_creature
+from mjxgait.importer import ImportChoices, Imported, import_model
+from mjxgait.importer.portrait import facts, portrait, standing
+from mjxgait.importer.write_toml import _quoted
+from mjxgait.reference.starts import perturbed_starts
 
 
 def bring(folder: Path, text: str, kind: str = "xml", **choices) -> tuple[Creature, Imported]:

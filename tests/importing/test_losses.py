@@ -7,7 +7,7 @@ from importing.models import BIPED, QUADRUPED
 
 from mjxgait.cli import main
 from mjxgait.errors import UserError
-from mjxgait.importing import ImportChoices, import_model
+from mjxgait.importer import ImportChoices, import_model
 
 TRUNK = '<freejoint/><geom type="box" size=".2 .1 .04" mass="1.5"/>{shape}'
 LEG = (

@@ -5,12 +5,12 @@ from typing import Any
 
 import pytest
 
-from mjxgait.certify import CertificateConfig
-from mjxgait.importing.manner import manner
-from mjxgait.importing.notes import Notes
-from mjxgait.settings.config import Config
-from mjxgait.settings.layers import over_base
-from mjxgait.settings.tables import build
+from mjxgait.certification import CertificateConfig
+from mjxgait.config.layers import over_base
+from mjxgait.config.schema import Config
+from mjxgait.config.tables import build
+from mjxgait.importer.manner import manner
+from mjxgait.importer.notes import Notes
 
 STEP = 0.005
 

@@ -10,19 +10,19 @@ import numpy as np
 import pytest
 from importing.packages import MODELS, model_file
 
-from mjxgait.commands.import_ import write_folder
+from mjxgait.cli.import_ import write_folder
 from mjxgait.creature import load_creature
 from mjxgait.creature.geometry import ancestors
 from mjxgait.creature.overlap import find_crossings
 from mjxgait.creature.scale import load_files
 from mjxgait.errors import UserError
-from mjxgait.importing import ImportChoices, import_model
-from mjxgait.importing.convert import Imported
-from mjxgait.importing.portrait import standing
-from mjxgait.physics.fast import UnsupportedModel, fast_plant
-from mjxgait.physics.fast.difference import difference
-from mjxgait.physics.fast.support import check_supported
-from mjxgait.physics.fast.topology import Topology
+from mjxgait.importer import ImportChoices, import_model
+from mjxgait.importer.convert import Imported
+from mjxgait.importer.portrait import standing
+from mjxgait.physics.lane_major import UnsupportedModel, fast_plant
+from mjxgait.physics.lane_major.difference import difference
+from mjxgait.physics.lane_major.support import check_supported
+from mjxgait.physics.lane_major.topology import Topology
 from mjxgait.physics.layout import sense_layout
 
 REFUSED = {

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 from importing.packages import model_file
 
-from mjxgait.certify import read_certificate
-from mjxgait.runs.folder import CERTIFICATE
+from mjxgait.certification import read_certificate
+from mjxgait.training.folder import CERTIFICATE
 
 ASKED = os.environ.get("MJXGAIT_TEST_WALKERS", "")
 """Names of models, by commas. One takes three minutes: only those that are asked for are walked.

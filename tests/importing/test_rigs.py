@@ -12,19 +12,19 @@ import pytest
 from importing.rigs import DOG, Bone, bvh, glb, stated_longer
 from scipy.spatial.transform import Rotation
 
-from mjxgait.clips.clip import Clip
-from mjxgait.clips.read_bvh import read_bvh, rig_of_bvh
-from mjxgait.commands.import_ import import_command
+from mjxgait.animation.clips.clip import Clip
+from mjxgait.animation.clips.read_bvh import read_bvh, rig_of_bvh
+from mjxgait.animation.keys.axes import axes_of
+from mjxgait.animation.keys.retarget import retarget
+from mjxgait.cli.import_ import import_command
 from mjxgait.creature import Creature
 from mjxgait.creature.scale import load_files
 from mjxgait.errors import UserError
-from mjxgait.importing import ImportChoices, Imported, import_model
-from mjxgait.importing.hinges import Hinge, hinges_of
-from mjxgait.importing.notes import Notes
-from mjxgait.importing.plan import Plan
-from mjxgait.importing.rigged import model_of
-from mjxgait.keys.axes import axes_of
-from mjxgait.keys.retarget import retarget
+from mjxgait.importer import ImportChoices, Imported, import_model
+from mjxgait.importer.hinges import Hinge, hinges_of
+from mjxgait.importer.notes import Notes
+from mjxgait.importer.plan import Plan
+from mjxgait.importer.rigged import model_of
 
 FEET = ["LeftHand", "RightHand", "LeftHindPaw", "RightHindPaw"]
 SPIDER: dict[str, Bone] = {"Trunk": ("", (0, 10, 0), (0, 10, 8))} | {

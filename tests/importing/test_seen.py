@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from importing.models import BIPED, QUADRUPED
 
-from mjxgait.certify.check_body import check_body
-from mjxgait.commands.import_ import write_folder
+from mjxgait.certification.check_body import check_body
+from mjxgait.cli.import_ import write_folder
 from mjxgait.creature import Creature, load_creature
-from mjxgait.importing import ImportChoices, Imported, import_model
-from mjxgait.importing.orient import _named_front
+from mjxgait.importer import ImportChoices, Imported, import_model
+from mjxgait.importer.orient import _named_front
 
 
 def bring(folder: Path, text: str, kind: str = "xml") -> tuple[Creature, Imported]:

@@ -9,13 +9,13 @@ from helpers import pose_champion
 from inspection.made_up import FORCED, LAST, POPULATION, make_state
 
 from mjxgait.champion import write_champion
-from mjxgait.control.poses import TUNING
+from mjxgait.config.evolution import EvolutionConfig
+from mjxgait.config.schema import Config
+from mjxgait.config.shipped import find_creature
+from mjxgait.controllers.key_poses.controller import TUNING
 from mjxgait.creature import load_creature
-from mjxgait.runs.checkpoint import Checkpoints
-from mjxgait.runs.folder import CHAMPION, METRICS, create_run
-from mjxgait.settings.config import Config
-from mjxgait.settings.evolution import EvolutionConfig
-from mjxgait.settings.shipped import find_creature
+from mjxgait.training.checkpoint import Checkpoints
+from mjxgait.training.folder import CHAMPION, METRICS, create_run
 
 
 @pytest.fixture(scope="session")

@@ -4,9 +4,9 @@ import jax.numpy as jnp
 import numpy as np
 from helpers import weight_vector
 
-from mjxgait.control.poses import TUNING, Genome
-from mjxgait.search.chance import key_of
-from mjxgait.search.state import EvolutionState, Origin
+from mjxgait.controllers.key_poses.controller import TUNING, Genome
+from mjxgait.evolution.chance import key_of
+from mjxgait.evolution.state import EvolutionState, Origin
 from mjxgait.tasks.score import score
 from mjxgait.tasks.walk.fitness import terms_under
 from mjxgait.tasks.walk.task import Walk

@@ -16,14 +16,19 @@ import pytest
 from helpers import made_up_certificate, said_by
 from inspection.made_up import FORCED, LAST, POPULATION
 
-from mjxgait.certify import CertificateConfig
-from mjxgait.certify.stress import Stress, StressConfig, Trial
+from mjxgait.certification import CertificateConfig
+from mjxgait.certification.stress import Stress, StressConfig, Trial
 from mjxgait.champion import read_champion
 from mjxgait.cli import main
-from mjxgait.inspect import facts, individual_facts, read_snapshot, text
-from mjxgait.runs.folder import CERTIFICATE, CHAMPION, STRESS
-from mjxgait.runs.lock import locked
-from mjxgait.settings.tables import build
+from mjxgait.config.tables import build
+from mjxgait.inspect import (
+    facts,
+    individual_facts,
+    read_snapshot,
+    text,
+)
+from mjxgait.training.folder import CERTIFICATE, CHAMPION, STRESS
+from mjxgait.training.lock import locked
 
 
 def tell(capsys, *arguments):
@@ -113,7 +118,7 @@ def test_an_examination_again_ends_with_zero_only_if_all_is_equal(run, capsys, m
     fingerprint = read_champion(run / CHAMPION, read_snapshot(run).creature).fingerprint
     again = made_up_certificate(fingerprint)
     found = SimpleNamespace(document=lambda: again)
-    monkeypatch.setattr("mjxgait.library.look.certify", lambda *_: found)
+    monkeypatch.setattr("mjxgait.api.look.certify", lambda *_: found)
     assert "not there" in said_by(capsys, "inspect", run, "--verify", code=2)
     (run / CERTIFICATE).write_text(json.dumps(again))
     assert "every measure is that" in said_by(capsys, "inspect", run, "--verify", code=0)

@@ -8,10 +8,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 from viewing.made_up import treading
 
-from mjxgait.animation import WalkLoop, build_glb
-from mjxgait.animation.skeleton import gltf_axes
+from mjxgait.animation.export import WalkLoop, build_glb
+from mjxgait.animation.export.skeleton import gltf_axes
 from mjxgait.creature import Creature
-from mjxgait.viewing.walk import Walk
+from mjxgait.rendering.walk import Walk
 
 RATE, PERIOD = 30, 0.8
 

@@ -11,9 +11,9 @@ import pytest
 from importing.rigs import stated_longer
 from keys.made import bvh, columns, glb, swings, table
 
+from mjxgait.animation.keys import bring
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
-from mjxgait.keys import bring
 
 
 def packed(document: dict, blob: bytes) -> bytes:

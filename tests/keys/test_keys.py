@@ -10,18 +10,18 @@ import pytest
 from keys.made import PERIOD, RATE, bvh, columns, poses, swings, write
 from viewing.made_up import treading
 
-from mjxgait.animation import WalkLoop, build_glb, export_glb
-from mjxgait.clips.clip import NOTE
+from mjxgait.animation.clips.clip import NOTE
+from mjxgait.animation.export import WalkLoop, build_glb, export_glb
+from mjxgait.animation.keys import bring
+from mjxgait.animation.keys.bring import Brought
+from mjxgait.animation.keys.cycle import find_cycle
+from mjxgait.animation.keys.fit import fit_poses
+from mjxgait.animation.keys.match import matched
+from mjxgait.config.shipped import find_creature
+from mjxgait.controllers.key_poses.config import TUNING
 from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import UserError
-from mjxgait.keys import bring
-from mjxgait.keys.bring import Brought
-from mjxgait.keys.cycle import find_cycle
-from mjxgait.keys.fit import fit_poses
-from mjxgait.keys.match import matched
-from mjxgait.settings.control import TUNING
-from mjxgait.settings.shipped import find_creature
-from mjxgait.viewing.walk import Walk
+from mjxgait.rendering.walk import Walk
 
 LOOSE = np.radians(90.0)
 """Tolerance of tests that are not about key poses."""

@@ -13,21 +13,27 @@ from PIL import Image
 from viewing.made_up import treading
 
 import mjxgait
+from mjxgait.animation.keys import Brought, bring, front
+from mjxgait.animation.keys.departure import _feet_in_words, departure, departure_of
+from mjxgait.animation.keys.own import Own
+from mjxgait.animation.keys.refine import (
+    KEYS,
+    Original,
+    begin,
+    read_original,
+    refining,
+)
 from mjxgait.champion import read_champion, write_champion
 from mjxgait.cli import main
-from mjxgait.control.poses import PoseTracker
+from mjxgait.config.evolution import EvolutionConfig
+from mjxgait.controllers.key_poses.config import TUNING
+from mjxgait.controllers.key_poses.controller import PoseTracker
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
-from mjxgait.keys import Brought, bring, front
-from mjxgait.keys.departure import _feet_in_words, departure, departure_of
-from mjxgait.keys.own import Own
-from mjxgait.keys.refine import KEYS, Original, begin, read_original, refining
-from mjxgait.parts.fit import check_fit
-from mjxgait.runs.folder import CERTIFICATE, CHAMPION, open_run
-from mjxgait.search.chance import key_of
-from mjxgait.settings.control import TUNING
-from mjxgait.settings.evolution import EvolutionConfig
-from mjxgait.viewing.walk import record_walk
+from mjxgait.evolution.chance import key_of
+from mjxgait.plugins.fit import check_fit
+from mjxgait.rendering.walk import record_walk
+from mjxgait.training.folder import CERTIFICATE, CHAMPION, open_run
 
 SETTINGS = """
 [rollout]

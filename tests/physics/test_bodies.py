@@ -24,8 +24,8 @@ from many_bodies import (
     varied,
 )
 
-from mjxgait.physics.fast import fast_plant
-from mjxgait.physics.plain import mjx_plant
+from mjxgait.physics.lane_major import fast_plant
+from mjxgait.physics.mjx import mjx_plant
 from mjxgait.types import Plant
 
 BODIES = 6

@@ -10,14 +10,14 @@ import pytest
 from helpers import small_config
 from many_bodies import SLIM, stacked
 
-from mjxgait.control.poses import Genome
+from mjxgait.config.traced import traced
+from mjxgait.controllers.key_poses.controller import Genome
 from mjxgait.creature import Creature
-from mjxgait.runs.experiment import build_experiment
-from mjxgait.search.chance import key_of
-from mjxgait.search.variation import Box, uniform
-from mjxgait.settings.traced import traced
+from mjxgait.evolution.chance import key_of
+from mjxgait.evolution.variation import Box, uniform
 from mjxgait.simulation.rollout import Lane, Simulator
-from mjxgait.tasks.walk.tally import Tally
+from mjxgait.tasks.walk.stats import Tally
+from mjxgait.training.experiment import build_experiment
 
 BODIES = (1.0, 0.6, 1.7)
 """Factors on the masses."""

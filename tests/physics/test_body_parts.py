@@ -20,7 +20,7 @@ from many_bodies import (
 from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import UserError
 from mjxgait.physics import make_plant, parameters_of
-from mjxgait.physics.fast.topology import read_topology
+from mjxgait.physics.lane_major.topology import read_topology
 from mjxgait.types import BodyState
 
 

@@ -31,15 +31,15 @@ from disturbed_walks import (
 from helpers import STILL, small_config
 from recorded_tally import Frames, end, tally_of
 
-from mjxgait.certify.outcome import Outcome
-from mjxgait.control.poses import TUNING as GENES
-from mjxgait.control.poses import Genome
+from mjxgait.config.traced import traced
+from mjxgait.controllers.key_poses.controller import TUNING as GENES
+from mjxgait.controllers.key_poses.controller import Genome
 from mjxgait.creature import Creature
-from mjxgait.runs.experiment import build_experiment
-from mjxgait.settings.traced import traced
+from mjxgait.reference.outcome import Outcome
 from mjxgait.tasks.falls import Reason
-from mjxgait.tasks.trials import NEVER, Starts
-from mjxgait.tasks.walk.tally import Tally
+from mjxgait.tasks.starts import NEVER, Starts
+from mjxgait.tasks.walk.stats import Tally
+from mjxgait.training.experiment import build_experiment
 
 SLIM = {"xla_backend_optimization_level": 0, "xla_cpu_use_fusion_emitters": True}
 """Compiling is what takes the time here. The older way of emitting rounds otherwise, and one of the episodes ends elsewhere."""

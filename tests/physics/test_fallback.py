@@ -8,12 +8,12 @@ from types import SimpleNamespace
 import pytest
 from helpers import STOOL, small_config
 
-from mjxgait.commands.check import check_command
+from mjxgait.cli.check import check_command
 from mjxgait.creature import Creature, load_creature
 from mjxgait.physics import SLOWER, fallback_note, make_plant
-from mjxgait.physics.fast import FastPlant
-from mjxgait.physics.plain import MjxPlant
-from mjxgait.runs import loop
+from mjxgait.physics.lane_major import FastPlant
+from mjxgait.physics.mjx import MjxPlant
+from mjxgait.training import loop
 
 
 @pytest.fixture

@@ -10,9 +10,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from mjxgait.physics.fast import FastPlant, fast_plant
+from mjxgait.physics.lane_major import FastPlant, fast_plant
 from mjxgait.physics.layout import SenseLayout
-from mjxgait.physics.plain import mjx_plant
+from mjxgait.physics.mjx import mjx_plant
 from mjxgait.types import BodyState
 
 LEG = """

@@ -7,8 +7,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from mjxgait.physics.fast import UnsupportedModel, fast_plant
-from mjxgait.physics.fast.lanes import sin_cos
+from mjxgait.physics.lane_major import UnsupportedModel, fast_plant
+from mjxgait.physics.lane_major.lanes import sin_cos
 from mjxgait.physics.layout import SenseLayout
 
 FLAG = '<flag eulerdamp="disable"/>'

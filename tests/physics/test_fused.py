@@ -21,8 +21,8 @@ from many_bodies import (
 
 from mjxgait.creature.overlap import Crossings
 from mjxgait.physics import heavier_model
-from mjxgait.physics.fast import FastPlant, fast_plant
-from mjxgait.physics.plain import mjx_plant
+from mjxgait.physics.lane_major import FastPlant, fast_plant
+from mjxgait.physics.mjx import mjx_plant
 
 TOE = '<geom name="toe" class="foot"'
 WELDED = (

@@ -10,12 +10,12 @@ import mujoco
 import numpy as np
 from many_bodies import SLIM
 
-from mjxgait.certify.stepping import examined_model
-from mjxgait.certify.terrain import terrain_of
 from mjxgait.creature import Creature
 from mjxgait.creature.frame import start_place
-from mjxgait.ground.surface import lay_ground, named_draws
+from mjxgait.creature.ground.surface import lay_ground, named_draws
 from mjxgait.physics import make_plant
+from mjxgait.reference.stepping import examined_model
+from mjxgait.reference.terrain import terrain_of
 from mjxgait.types import BodyState
 
 LANES = 8

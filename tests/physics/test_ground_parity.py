@@ -15,13 +15,13 @@ import numpy as np
 import pytest
 from physics.test_fast_parity import LANES, SLIM, XML, _states
 
-from mjxgait.certify.layout import StartFrame
-from mjxgait.certify.terrain import Terrain
-from mjxgait.ground.spec import Place, parse_ground
-from mjxgait.ground.surface import lay_ground, named_draws
-from mjxgait.physics.fast import fast_plant
+from mjxgait.creature.ground.spec import Place, parse_ground
+from mjxgait.creature.ground.surface import lay_ground, named_draws
+from mjxgait.physics.lane_major import fast_plant
 from mjxgait.physics.layout import SenseLayout
-from mjxgait.physics.plain import mjx_plant
+from mjxgait.physics.mjx import mjx_plant
+from mjxgait.reference.layout import StartFrame
+from mjxgait.reference.terrain import Terrain
 from mjxgait.types import BodyState
 
 HIP, LENGTH = 0.4, 0.5

@@ -23,15 +23,15 @@ from mjxgait.creature.overlap import (
     neighbours,
     pair_depths,
 )
-from mjxgait.physics.fast import fast_plant
+from mjxgait.physics.lane_major import fast_plant
 from mjxgait.physics.layout import sense_layout
-from mjxgait.physics.plain import mjx_plant
-from mjxgait.settings.walk import WalkConfig
+from mjxgait.physics.mjx import mjx_plant
 from mjxgait.simulation.rollout import CHECK_EVERY, Lane, Simulator
 from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.overlap import DEEP, TOUCHING
+from mjxgait.tasks.walk.config import WalkConfig
 from mjxgait.tasks.walk.fitness import fitness_terms
-from mjxgait.tasks.walk.tally import Judge, Tally
+from mjxgait.tasks.walk.stats import Judge, Tally
 from mjxgait.types import BodyState
 
 LANES = 6
@@ -170,7 +170,7 @@ def test_the_pairs_are_the_same_each_time_and_no_neighbours(shipped: Creature):
 
 
 def test_the_crabs_claws_are_seen_by_its_front_legs():
-    from mjxgait.settings.shipped import find_creature
+    from mjxgait.config.shipped import find_creature
 
     crab = load_creature(find_creature("crab"))
     qpos = crab.stand_qpos.copy()
@@ -309,7 +309,7 @@ def test_the_term_grows_with_depth_and_counts_as_far_as_there_is_a_walk(stool: C
 
 def test_a_walker_whose_legs_cross_is_seen_and_nobody_else(stool: Creature):
     """On fewer lanes than individuals, one whose legs meet among others that stand still."""
-    from mjxgait.runs.experiment import build_experiment
+    from mjxgait.training.experiment import build_experiment
 
     experiment = build_experiment(
         stool, small_config(rollout={"lanes": 3, "starts": 1, "physics": "mjx"})

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from many_bodies import SLIM, XML
 
-from mjxgait.physics.fast import fast_plant
+from mjxgait.physics.lane_major import fast_plant
 from mjxgait.physics.layout import SenseLayout
 from mjxgait.types import BodyState
 

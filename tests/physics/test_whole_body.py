@@ -10,7 +10,7 @@ from helpers import STOOL
 
 from mjxgait.creature import Creature, load_creature
 from mjxgait.physics import make_plant
-from mjxgait.physics.fast import FastPlant
+from mjxgait.physics.lane_major import FastPlant
 from mjxgait.types import BodyState
 
 SECONDS = 1.0

@@ -13,16 +13,16 @@ import pytest
 from helpers import SHORT, STOOL, said_by
 
 import mjxgait
-from mjxgait.certify.simulate import simulate
-from mjxgait.certify.starts import nominal_starts
+from mjxgait.certification.simulate import simulate
 from mjxgait.champion import codec_of, read_champion
-from mjxgait.champion.expressions import EMPTY
-from mjxgait.control.programs.trees import Trees
+from mjxgait.controllers.expressions.config import ProgramConfig
+from mjxgait.controllers.expressions.text import EMPTY
+from mjxgait.controllers.expressions.trees import Trees
 from mjxgait.inspect import facts, read_snapshot
-from mjxgait.runs.experiment import build_experiment
-from mjxgait.runs.folder import CHAMPION, METRICS, read_metrics
-from mjxgait.settings.programs import ProgramConfig
-from mjxgait.viewing.plots import plot_run
+from mjxgait.reference.starts import nominal_starts
+from mjxgait.rendering.plots import plot_run
+from mjxgait.training.experiment import build_experiment
+from mjxgait.training.folder import CHAMPION, METRICS, read_metrics
 
 
 @pytest.fixture(scope="module")

@@ -13,8 +13,19 @@ import numpy as np
 import pytest
 from deap import gp
 
-from mjxgait.certify.twins.programs import read, value_of
-from mjxgait.champion.expressions import (
+from mjxgait.controllers.expressions.config import FUNCTIONS, ProgramConfig
+from mjxgait.controllers.expressions.evaluate import evaluator, listed
+from mjxgait.controllers.expressions.grow import Words, half_and_half
+from mjxgait.controllers.expressions.operators import (
+    crossed,
+    mutated,
+    program_variation,
+    spliced,
+)
+from mjxgait.controllers.expressions.parse import to_arrays
+from mjxgait.controllers.expressions.reference import read, value_of
+from mjxgait.controllers.expressions.simplify import simplified
+from mjxgait.controllers.expressions.text import (
     ARITY,
     CONSTANT,
     EMPTY,
@@ -25,15 +36,9 @@ from mjxgait.champion.expressions import (
     nested,
     to_text,
 )
-from mjxgait.champion.reading import to_arrays
-from mjxgait.champion.simplify import simplified
-from mjxgait.control.programs.evaluate import evaluator, listed
-from mjxgait.control.programs.grow import Words, half_and_half
-from mjxgait.control.programs.operators import crossed, mutated, program_variation, spliced
-from mjxgait.control.programs.trees import Trees, depths, subtree_sizes
+from mjxgait.controllers.expressions.trees import Trees, depths, subtree_sizes
 from mjxgait.errors import UserError
-from mjxgait.search.chance import key_of
-from mjxgait.settings.programs import FUNCTIONS, ProgramConfig
+from mjxgait.evolution.chance import key_of
 
 MANY = 10_000
 NODES = 64
@@ -279,7 +284,7 @@ def test_the_first_programs_are_shaped_as_deaps():
 
 def test_crossing_prefers_functions():
     """Nine points of ten are at a function where there is one; DEAP and Koza do likewise."""
-    from mjxgait.control.programs.operators import chosen_node
+    from mjxgait.controllers.expressions.operators import chosen_node
 
     code = to_arrays("(+ (* a0 a1) a2)", KNOWN, NODES, "x")[0]
     keys = jax.random.split(key_of(0), 4000)

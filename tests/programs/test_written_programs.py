@@ -10,18 +10,18 @@ import pytest
 from helpers import SHORT, STOOL, said_by
 
 import mjxgait
-from mjxgait.champion.expressions import EMPTY, terminals
-from mjxgait.champion.programs import program_text
-from mjxgait.champion.reading import Vocabulary, read_programs
+from mjxgait.config.shipped import find_creature
+from mjxgait.controllers.expressions.parse import Vocabulary, read_programs
+from mjxgait.controllers.expressions.serialize import program_text
+from mjxgait.controllers.expressions.text import EMPTY, terminals
+from mjxgait.controllers.expressions.written import with_expressions, written_champion
 from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import UserError
 from mjxgait.inspect import read_snapshot
-from mjxgait.parts import resolve_config
-from mjxgait.parts.settings import build_config
-from mjxgait.parts.written import with_expressions, written_champion
-from mjxgait.runs.experiment import build_experiment
-from mjxgait.runs.folder import METRICS, read_metrics
-from mjxgait.settings.shipped import find_creature
+from mjxgait.plugins import resolve_config
+from mjxgait.plugins.settings import build_config
+from mjxgait.training.experiment import build_experiment
+from mjxgait.training.folder import METRICS, read_metrics
 
 # The program of the lamp that Gritz & Hahn printed, as the transcript of the slides has it: line by
 # line, but for what the transcript lost. It has neither + nor * nor %, so those are ours: each stands

@@ -6,13 +6,18 @@ from pathlib import Path
 from helpers import STOOL
 from viewing.made_up import treading
 
-from mjxgait.certify import Certificate, CertificateConfig, Criterion, Measure
+from mjxgait.certification import (
+    Certificate,
+    CertificateConfig,
+    Criterion,
+    Measure,
+)
 from mjxgait.champion import write_champion
-from mjxgait.commands.repertoire import RepertoireOptions, planned
-from mjxgait.commands.repertoire import begin as begin_repertoire
+from mjxgait.cli.repertoire import RepertoireOptions, planned
+from mjxgait.cli.repertoire import begin as begin_repertoire
 from mjxgait.creature import Creature
-from mjxgait.repertoire.grid import Cell, Grid
-from mjxgait.runs.folder import CERTIFICATE, CHAMPION, open_run
+from mjxgait.experiments.repertoire.grid import Cell, Grid
+from mjxgait.training.folder import CERTIFICATE, CHAMPION, open_run
 
 SMALL = """
 checkpoint_every = 1

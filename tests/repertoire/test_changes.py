@@ -8,15 +8,21 @@ import pytest
 from repertoire.made_up import CERTIFIED, begin, examine
 from viewing.made_up import falling, treading
 
-from mjxgait.certify.outcome import Trajectory
-from mjxgait.certify.simulate import simulate
-from mjxgait.certify.starts import nominal_starts
-from mjxgait.certify.twins.changing import ChangingTwin
+from mjxgait.certification.simulate import simulate
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
-from mjxgait.repertoire.changes import MOMENTS, SECONDS, changes, succeeds, told_headings
-from mjxgait.repertoire.found import Found
-from mjxgait.viewing.walk import record_walk
+from mjxgait.experiments.repertoire.changes import (
+    MOMENTS,
+    SECONDS,
+    changes,
+    succeeds,
+    told_headings,
+)
+from mjxgait.experiments.repertoire.found import Found
+from mjxgait.reference.controllers.changing import ChangingTwin
+from mjxgait.reference.outcome import Trajectory
+from mjxgait.reference.starts import nominal_starts
+from mjxgait.rendering.walk import record_walk
 
 LARGE, SMALL = 35.0, 30.0
 CHANGES = np.array([1.0, 1.5, np.inf])

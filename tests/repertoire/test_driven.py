@@ -11,8 +11,8 @@ from helpers import said_by
 from repertoire.made_up import begin, examine
 from viewing.browser import drawn, wait_until, watched_tab
 
-from mjxgait.repertoire.share import write_driven
-from mjxgait.runs.folder import CERTIFICATE
+from mjxgait.experiments.repertoire.share import write_driven
+from mjxgait.training.folder import CERTIFICATE
 
 
 @pytest.fixture(scope="module")

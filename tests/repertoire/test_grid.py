@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from mjxgait.errors import UserError
-from mjxgait.repertoire.grid import GRID, Cell, Grid
+from mjxgait.experiments.repertoire.grid import GRID, Cell, Grid
 
 THREE = Grid.of([1.0, 0.5, 0.75], [15.0])
 

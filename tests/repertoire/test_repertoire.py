@@ -15,14 +15,14 @@ from made_up_hands import Interrupted, Pretend
 from repertoire.made_up import CERTIFIED, GENERATIONS, begin, examine
 from viewing.made_up import treading
 
-from mjxgait.cluster.crew import Crew
 from mjxgait.creature import Creature
-from mjxgait.repertoire.blends import half_way
-from mjxgait.repertoire.cells import POSES, mirrored
-from mjxgait.repertoire.evolve import evolve
-from mjxgait.repertoire.grid import Cell, Grid
-from mjxgait.runs.folder import METRICS, read_metrics
-from mjxgait.runs.stored import read_stored, stored_generations
+from mjxgait.distributed.scheduler import Crew
+from mjxgait.experiments.repertoire.blends import half_way
+from mjxgait.experiments.repertoire.cells import POSES, mirrored
+from mjxgait.experiments.repertoire.evolve import evolve
+from mjxgait.experiments.repertoire.grid import Cell, Grid
+from mjxgait.training.folder import METRICS, read_metrics
+from mjxgait.training.stored import read_stored, stored_generations
 
 
 def run(folder: Path, creature: Creature, grid: Grid, kind: type[Crew] = Crew) -> bool:

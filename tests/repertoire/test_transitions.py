@@ -7,14 +7,12 @@ import pygltflib as gltf
 import pytest
 from viewing.made_up import falling, treading
 
-from mjxgait.animation import WalkLoop, build_clips, stride_in_phase
-from mjxgait.certify.simulate import simulate
-from mjxgait.certify.starts import nominal_starts
-from mjxgait.certify.twins.halting import HaltingTwin
+from mjxgait.animation.export import WalkLoop, build_clips, stride_in_phase
+from mjxgait.certification.simulate import simulate
 from mjxgait.creature import Creature
-from mjxgait.repertoire.found import Found
-from mjxgait.repertoire.grid import Cell
-from mjxgait.repertoire.transitions import (
+from mjxgait.experiments.repertoire.found import Found
+from mjxgait.experiments.repertoire.grid import Cell
+from mjxgait.experiments.repertoire.transitions import (
     FADES,
     IDLE,
     PLACES,
@@ -24,7 +22,9 @@ from mjxgait.repertoire.transitions import (
     stop_of,
     transitions,
 )
-from mjxgait.viewing.walk import Walk, record_walk
+from mjxgait.reference.controllers.halting import HaltingTwin
+from mjxgait.reference.starts import nominal_starts
+from mjxgait.rendering.walk import Walk, record_walk
 
 RATE = 60
 

@@ -4,7 +4,7 @@ import pytest
 from viewing.browser import launch
 from viewing.made_up import treading, write_run
 
-from mjxgait.viewing.walk import record_walk
+from mjxgait.rendering.walk import record_walk
 
 
 @pytest.fixture(scope="session")

@@ -7,9 +7,9 @@ import numpy as np
 from helpers import pose_champion
 
 from mjxgait.champion import write_champion
-from mjxgait.runs.folder import CHAMPION, METRICS, create_run
-from mjxgait.settings.config import Config
-from mjxgait.settings.control import PoseConfig
+from mjxgait.config.schema import Config
+from mjxgait.controllers.key_poses.config import PoseConfig
+from mjxgait.training.folder import CHAMPION, METRICS, create_run
 
 
 def treading(creature, degrees=4.0, period=0.5):

@@ -10,8 +10,8 @@ from helpers import made_up_certificate, said_by
 from viewing.made_up import falling
 
 from mjxgait.champion import write_champion
-from mjxgait.runs.folder import CERTIFICATE, CHAMPION
-from mjxgait.viewing.doubt import doubt
+from mjxgait.rendering.doubt import doubt
+from mjxgait.training.folder import CERTIFICATE, CHAMPION
 
 
 @pytest.fixture

@@ -7,8 +7,8 @@ import sys
 import numpy as np
 import pytest
 
-from mjxgait.viewing.gl import gl_pictures, working_backend
-from mjxgait.viewing.stage import Stage
+from mjxgait.rendering.gl import gl_pictures, working_backend
+from mjxgait.rendering.stage import Stage
 
 
 @pytest.fixture(scope="module")

@@ -18,11 +18,16 @@ from viewing.browser import drawn, wait_until, watched_tab
 from viewing.made_up import falling, metrics_line, treading, write_run
 
 from mjxgait.champion import write_champion
-from mjxgait.commands.view import following
+from mjxgait.cli.view import following
 from mjxgait.errors import UserError
-from mjxgait.runs.folder import CHAMPION, METRICS
-from mjxgait.viewing.walk import record_walk
-from mjxgait.web.live import HERE, SHARE, Watcher, open_server
+from mjxgait.rendering.walk import record_walk
+from mjxgait.training.folder import CHAMPION, METRICS
+from mjxgait.web.live import (
+    HERE,
+    SHARE,
+    Watcher,
+    open_server,
+)
 
 
 @pytest.fixture
@@ -70,8 +75,8 @@ def test_it_follows_the_run(site, run, stool):
 
 
 def test_a_champion_that_falls_is_shown_falling(tmp_path):
+    from mjxgait.config.shipped import find_creature
     from mjxgait.creature import load_creature
-    from mjxgait.settings.shipped import find_creature
 
     creature = load_creature(find_creature("tall_quadruped"))
     watcher = Watcher(write_run(tmp_path / "run", creature, falling(creature)))

@@ -8,9 +8,9 @@ import pytest
 from viewing.made_up import treading
 
 from mjxgait.creature import Creature
-from mjxgait.viewing.gl import scene_file
-from mjxgait.viewing.stage import Stage
-from mjxgait.viewing.walk import Walk, record_walk
+from mjxgait.rendering.gl import scene_file
+from mjxgait.rendering.stage import Stage
+from mjxgait.rendering.walk import Walk, record_walk
 
 
 @pytest.fixture(scope="module")

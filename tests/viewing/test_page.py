@@ -12,12 +12,12 @@ from helpers import made_up_certificate
 from viewing.browser import canvas, drawn, is_blank, watched_tab
 from viewing.made_up import treading, write_run
 
-from mjxgait.certify import CertificateConfig
-from mjxgait.certify.stress import Stress, StressConfig, Trial
+from mjxgait.certification import CertificateConfig
+from mjxgait.certification.stress import Stress, StressConfig, Trial
 from mjxgait.cli import main
+from mjxgait.config.tables import build
 from mjxgait.errors import UserError
-from mjxgait.runs.folder import CERTIFICATE, STRESS
-from mjxgait.settings.tables import build
+from mjxgait.training.folder import CERTIFICATE, STRESS
 from mjxgait.web.page import certificate_table
 
 CERTIFIED = made_up_certificate("") | {

@@ -7,12 +7,17 @@ import numpy as np
 import pytest
 from viewing.made_up import treading
 
-from mjxgait.viewing.camera import Camera
-from mjxgait.viewing.floor import band_width
-from mjxgait.viewing.painter import Painter, geom_colours, paint, seen_geoms
-from mjxgait.viewing.shapes import Silhouettes, hit
-from mjxgait.viewing.stage import Stage
-from mjxgait.viewing.walk import record_walk
+from mjxgait.rendering.camera import Camera
+from mjxgait.rendering.floor import band_width
+from mjxgait.rendering.painter import (
+    Painter,
+    geom_colours,
+    paint,
+    seen_geoms,
+)
+from mjxgait.rendering.shapes import Silhouettes, hit
+from mjxgait.rendering.stage import Stage
+from mjxgait.rendering.walk import record_walk
 
 FORWARD = np.array([1.0, 0.0])
 SHAPES = {

@@ -7,14 +7,14 @@ import pytest
 from viewing.made_up import treading, write_run
 
 from mjxgait.cli import main
+from mjxgait.config.shipped import find_creature
 from mjxgait.creature import load_creature
-from mjxgait.settings.shipped import find_creature
-from mjxgait.viewing.cast import champions_of
-from mjxgait.viewing.entrant import Entrant
-from mjxgait.viewing.gl import working_backend
-from mjxgait.viewing.stage import Stage
-from mjxgait.viewing.video import Runner, moving_pictures
-from mjxgait.viewing.walk import record_walk
+from mjxgait.rendering.cast import champions_of
+from mjxgait.rendering.entrant import Entrant
+from mjxgait.rendering.gl import working_backend
+from mjxgait.rendering.stage import Stage
+from mjxgait.rendering.video import Runner, moving_pictures
+from mjxgait.rendering.walk import record_walk
 
 
 @pytest.fixture(scope="module")

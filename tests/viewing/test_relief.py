@@ -6,11 +6,11 @@ import mujoco
 import numpy as np
 import pytest
 
-from mjxgait.animation.loop import walk_take
-from mjxgait.viewing.floor import draw_floor
-from mjxgait.viewing.gl import scene_file
-from mjxgait.viewing.gl_worker import _compiled
-from mjxgait.viewing.stage import Stage
+from mjxgait.animation.export.loop import walk_take
+from mjxgait.rendering.floor import draw_floor
+from mjxgait.rendering.gl import scene_file
+from mjxgait.rendering.gl_worker import _compiled
+from mjxgait.rendering.stage import Stage
 
 
 @pytest.fixture(scope="module")

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from viewing.made_up import treading
 
-from mjxgait.champion.expressions import Expression
+from mjxgait.controllers.expressions.text import Expression
 from mjxgait.creature import Creature
-from mjxgait.viewing import strobe, trees
-from mjxgait.viewing.style import figure
-from mjxgait.viewing.walk import Walk, record_walk
+from mjxgait.rendering import strobe, trees
+from mjxgait.rendering.style import figure
+from mjxgait.rendering.walk import Walk, record_walk
 
 TREE: Expression = ("ifltz", ("-", "s0", 0.25), ("*", "a0", "a1"), "t")
 

@@ -8,12 +8,12 @@ from PIL import Image, ImageSequence
 from viewing.made_up import falling
 
 from mjxgait.cli import main
+from mjxgait.config.shipped import find_creature, install_command
 from mjxgait.creature import load_creature
-from mjxgait.settings.shipped import find_creature, install_command
-from mjxgait.viewing.camera import VIEWS
-from mjxgait.viewing.stage import Stage, smooth
-from mjxgait.viewing.video import Runner, condition, moving_pictures
-from mjxgait.viewing.walk import record_walk
+from mjxgait.rendering.camera import VIEWS
+from mjxgait.rendering.stage import Stage, smooth
+from mjxgait.rendering.video import Runner, condition, moving_pictures
+from mjxgait.rendering.walk import record_walk
 
 SMALL = ("--seconds", "0.8", "--fps", "10", "--size", "160", "96", "--renderer", "painter")
 

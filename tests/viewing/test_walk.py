@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from viewing.made_up import falling, treading
 
-from mjxgait.viewing.walk import AFTERMATH, record_walk
+from mjxgait.rendering.walk import AFTERMATH, record_walk
 
 
 def test_steady_strides_are_as_long_as_the_clock_says(stool_walk):
@@ -15,7 +15,7 @@ def test_steady_strides_are_as_long_as_the_clock_says(stool_walk):
 
 def test_targets_are_those_of_the_examiner(stool_walk):
     """Without steering and balance the target is the planned pose."""
-    from mjxgait.certify.twins.poses import PoseTwin
+    from mjxgait.controllers.key_poses.reference import PoseTwin
 
     twin = PoseTwin(stool_walk.creature, stool_walk.champion, stool_walk.time_step)
     positions = np.round(stool_walk.trajectory.phase[0] * twin.length).astype(int)
@@ -23,8 +23,8 @@ def test_targets_are_those_of_the_examiner(stool_walk):
 
 
 def test_a_walk_that_falls_ends_soon_after():
+    from mjxgait.config.shipped import find_creature
     from mjxgait.creature import load_creature
-    from mjxgait.settings.shipped import find_creature
 
     walk = record_walk(
         creature := load_creature(find_creature("tall_quadruped")), falling(creature), 6.0
@@ -41,7 +41,7 @@ def test_too_short_a_walk_has_no_steady_stride(stool):
 def test_one_that_blows_up_at_once_is_shown_standing(stool, monkeypatch):
     import dataclasses
 
-    from mjxgait.viewing import walk as module
+    from mjxgait.rendering import walk as module
 
     real = module.simulate
 

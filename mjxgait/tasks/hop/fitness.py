@@ -6,10 +6,16 @@ from collections.abc import Mapping
 import jax
 import jax.numpy as jnp
 
-from mjxgait.body import Body
-from mjxgait.settings.hop import NEAR, HopConfig, HopWeights, TravelConfig, TravelWeights
+from mjxgait.creature.body import Body
 from mjxgait.tasks.falls import Reason
-from mjxgait.tasks.hop.tally import Tally, away
+from mjxgait.tasks.hop.config import (
+    NEAR,
+    HopConfig,
+    HopWeights,
+    TravelConfig,
+    TravelWeights,
+)
+from mjxgait.tasks.hop.stats import Tally, away
 from mjxgait.tasks.overlap import crossed
 from mjxgait.tasks.score import ramped
 from mjxgait.tasks.work import cost_of_transport

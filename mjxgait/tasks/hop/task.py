@@ -6,14 +6,14 @@ from typing import Any, ClassVar
 import jax
 import jax.numpy as jnp
 
-from mjxgait.body import Body, Ends
+from mjxgait.config.rollout import RolloutConfig
 from mjxgait.creature import Creature
+from mjxgait.creature.body import Body, Ends
 from mjxgait.creature.settings import Termination
-from mjxgait.settings.hop import GOALS, NOMINAL_GOAL, HopConfig
-from mjxgait.settings.rollout import RolloutConfig
 from mjxgait.tasks.falls import touches
+from mjxgait.tasks.hop.config import GOALS, NOMINAL_GOAL, HopConfig
 from mjxgait.tasks.hop.fitness import fitness_terms, signed_weights, terms_under
-from mjxgait.tasks.hop.tally import (
+from mjxgait.tasks.hop.stats import (
     Standards,
     Tally,
     away,
@@ -24,7 +24,7 @@ from mjxgait.tasks.hop.tally import (
     with_extras,
 )
 from mjxgait.tasks.plain import PlainTask
-from mjxgait.tasks.trials import Starts, draw_starts
+from mjxgait.tasks.starts import Starts, draw_starts
 from mjxgait.types import Sensed
 
 

@@ -6,11 +6,11 @@ from typing import Any, ClassVar
 import jax
 import jax.numpy as jnp
 
-from mjxgait.settings.hop import NEAR, NOMINAL_GOAL, TravelConfig
-from mjxgait.tasks.hop import tally as hop
+from mjxgait.tasks.hop import stats as hop
+from mjxgait.tasks.hop.config import NEAR, NOMINAL_GOAL, TravelConfig
 from mjxgait.tasks.hop.fitness import GOAL, signed_weights, style_terms
 from mjxgait.tasks.hop.task import Hop
-from mjxgait.tasks.trials import Starts
+from mjxgait.tasks.starts import Starts
 from mjxgait.types import Sensed, pytree
 
 

@@ -5,13 +5,13 @@ import dataclasses
 import jax
 import jax.numpy as jnp
 
-from mjxgait.body import Body
-from mjxgait.settings.gaits import GRAVITY, stride_limit
-from mjxgait.settings.walk import WalkConfig, Weights
+from mjxgait.creature.body import Body
 from mjxgait.tasks.falls import Reason
 from mjxgait.tasks.overlap import crossed
 from mjxgait.tasks.score import ramped
-from mjxgait.tasks.walk.tally import Tally
+from mjxgait.tasks.walk.config import WalkConfig, Weights
+from mjxgait.tasks.walk.gaits import GRAVITY, stride_limit
+from mjxgait.tasks.walk.stats import Tally
 from mjxgait.tasks.work import cost_of_transport
 
 TERMS = tuple(field.name for field in dataclasses.fields(Weights))

@@ -9,8 +9,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from mjxgait.settings.gaits import gait_of, placed
-from mjxgait.tasks.walk.tally import Tally
+from mjxgait.tasks.walk.gaits import gait_of, placed
+from mjxgait.tasks.walk.stats import Tally
 from mjxgait.types import pytree
 
 SPARE = 0.03

@@ -1,0 +1,170 @@
+"""Reads a BVH file: a skeleton and the angles of its joints, frame by frame."""
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from mjxgait.animation.clips.clip import (
+    Clip,
+    check_numbers,
+    check_size,
+    read_text,
+)
+from mjxgait.animation.clips.rig import Rig
+from mjxgait.errors import UserError
+
+POSITION, ROTATION = (
+    ("Xposition", "Yposition", "Zposition"),
+    ("Xrotation", "Yrotation", "Zrotation"),
+)
+MOST_CHANNELS = 6
+
+
+CUT_OFF = "is cut off or damaged: a number or a word is missing"
+
+
+@dataclasses.dataclass
+class Skeleton:
+    """Of each bone in the order of the file its name, parent (-1 for none), channels, offset [3]
+    from its parent, and the offsets of its ends; in file units. above: bones that are still open.
+    """
+
+    names: list[str] = dataclasses.field(default_factory=list)
+    parents: list[int] = dataclasses.field(default_factory=list)
+    channels: list[list[str]] = dataclasses.field(default_factory=list)
+    offsets: list[list[float]] = dataclasses.field(default_factory=list)
+    ends: list[list[list[float]]] = dataclasses.field(default_factory=list)
+    above: list[int] = dataclasses.field(default_factory=list)
+
+    def add(self, name: str) -> None:
+        """A bone that hangs on the one that is open."""
+        self.names.append(name)
+        self.parents.append(self.above[-1] if self.above else -1)
+        self.channels.append([])
+        self.offsets.append([0.0, 0.0, 0.0])
+        self.ends.append([])
+
+
+def read_bvh(path: Path) -> Clip:
+    """The clip in a file; its bones rest with all angles at zero.
+
+    Raises:
+      UserError: it is no BVH file, or cut off; says where.
+    """
+    words = _words(path)
+    try:
+        bones, at = _hierarchy(path, words)
+        step, values = _motion(path, words, at, sum(map(len, bones.channels)))
+    except (IndexError, ValueError):
+        raise UserError(f"{path}: {CUT_OFF}") from None
+    check_size(path, len(bones.names), len(values))
+    check_numbers(path, "a value", values)
+    times = step * np.arange(len(values))
+    parents = tuple(bones.parents)
+    return Clip(tuple(bones.names), parents, times, _turned(parents, bones.channels, values))
+
+
+def rig_of_bvh(path: Path) -> Rig:
+    """The skeleton in a file, all angles at zero; a motion need not follow.
+
+    Raises:
+      UserError: it is no BVH file, or cut off.
+    """
+    try:
+        bones, _ = _hierarchy(path, _words(path))
+    except (IndexError, ValueError):
+        raise UserError(f"{path}: {CUT_OFF}") from None
+    places = np.array(bones.offsets).reshape(-1, 3)
+    for bone, parent in enumerate(bones.parents):
+        places[bone] += places[parent] if parent >= 0 else 0.0
+    ends = (
+        place + np.array(offsets).reshape(-1, 3)
+        for place, offsets in zip(places, bones.ends, strict=True)
+    )
+    bare = (np.zeros((0, 3)),) * len(places)
+    return Rig(tuple(bones.names), tuple(bones.parents), places, tuple(ends), bare)
+
+
+def _words(path: Path) -> list[str]:
+    words = read_text(path).split()
+    if not words or words[0].upper() != "HIERARCHY":
+        raise UserError(f"{path}: not a BVH file (it does not begin with HIERARCHY)")
+    return words
+
+
+def _hierarchy(path: Path, words: list[str]) -> tuple[Skeleton, int]:
+    """The bones, and the place of the word MOTION."""
+    bones, opened, ending, at = Skeleton(), -1, False, 1
+    while words[at].upper() != "MOTION":
+        word = words[at].upper()
+        if word in ("ROOT", "JOINT"):
+            opened = len(bones.names)
+            bones.add(words[at + 1])
+            at += 2
+        elif word == "END":
+            opened, ending = bones.above[-1], True
+            at += 2
+        elif word == "{":
+            bones.above.append(opened)
+            at += 1
+        elif word == "}":
+            bones.above.pop()
+            ending = False
+            at += 1
+        elif word == "OFFSET":
+            offset = [float(number) for number in words[at + 1 : at + 4]]
+            if ending:
+                bones.ends[bones.above[-1]].append(offset)
+            else:
+                bones.offsets[bones.above[-1]] = offset
+            at += 4
+        elif word == "CHANNELS":
+            at += 2 + _channels(path, words, at, bones)
+        else:
+            raise UserError(f'{path}: "{words[at][:40]}" is not a word of a BVH skeleton')
+    return bones, at
+
+
+def _channels(path: Path, words: list[str], at: int, bones: Skeleton) -> int:
+    """How many the open bone has."""
+    count = int(words[at + 1])
+    named = words[at + 2 : at + 2 + count]
+    if not 0 <= count <= MOST_CHANNELS or set(named) - {*POSITION, *ROTATION}:
+        name = bones.names[bones.above[-1]]
+        raise UserError(f'{path}: "{name}" has channels that BVH does not know')
+    bones.channels[bones.above[-1]] = named
+    return count
+
+
+def _motion(path: Path, words: list[str], at: int, width: int) -> tuple[float, np.ndarray]:
+    """Time of a frame in s, and all values [F, channels]."""
+    if words[at + 1].upper() != "FRAMES:" or words[at + 3].upper() != "FRAME":
+        raise UserError(f"{path}: MOTION does not tell Frames and Frame Time")
+    frames, step = int(words[at + 2]), float(words[at + 5])
+    check_size(path, 1, frames)
+    if not 0 < step < 10:
+        raise UserError(f"{path}: Frame Time: {step:g}: must be the seconds of one frame")
+    rest = words[at + 6 :]
+    if not width or len(rest) != frames * width:
+        raise UserError(
+            f"{path}: states {frames} frames of {width} numbers and has {len(rest)} numbers; is it "
+            "cut off?"
+        )
+    return step, np.array(rest, float).reshape(frames, width)
+
+
+def _turned(parents: tuple[int, ...], channels: list[list[str]], values: np.ndarray) -> np.ndarray:
+    """[F, B, 3, 3] of angles in degrees, in the order in which a bone's channels are named."""
+    world = np.zeros((len(values), len(parents), 3, 3))
+    first = 0
+    for bone, (parent, named) in enumerate(zip(parents, channels, strict=True)):
+        own = values[:, first : first + len(named)]
+        first += len(named)
+        world[:, bone] = np.eye(3) if parent < 0 else world[:, parent]
+        for name, angle in zip(named, own.T, strict=True):
+            if name in ROTATION:
+                turn = Rotation.from_euler(name[0].lower(), angle[:, None], degrees=True)
+                world[:, bone] = world[:, bone] @ turn.as_matrix()
+    return world

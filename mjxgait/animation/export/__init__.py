@@ -1,0 +1,36 @@
+"""A walk as an animation file that other programs open."""
+
+from mjxgait.animation.export.bvh import build_bvh, export_bvh
+from mjxgait.animation.export.glb import (
+    build_clips,
+    build_driven,
+    build_glb,
+    export_glb,
+)
+from mjxgait.animation.export.loop import (
+    RATES,
+    WalkLoop,
+    resampled,
+    walk_loop,
+    walk_take,
+)
+from mjxgait.animation.export.phase import falls_of_first_foot, standing_still, stride_in_phase
+from mjxgait.animation.export.usd import export_usd
+
+__all__ = [
+    "RATES",
+    "WalkLoop",
+    "build_bvh",
+    "build_clips",
+    "build_driven",
+    "build_glb",
+    "export_bvh",
+    "export_glb",
+    "export_usd",
+    "falls_of_first_foot",
+    "resampled",
+    "standing_still",
+    "stride_in_phase",
+    "walk_loop",
+    "walk_take",
+]

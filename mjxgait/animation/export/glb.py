@@ -1,0 +1,232 @@
+"""A walk as a GLB file: one skin whose joints are the creature's bodies, rigidly weighted, animated
+by key frames.
+
+glTF is Y-up with +Z forward and +X left, quaternions are (x, y, z, w), colours linear. Letters: `F`
+key frames, `B` joints of the skin (the root on the floor, then the bodies), `V` vertices.
+"""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pygltflib as gltf  # type: ignore[import-untyped]
+
+from mjxgait.animation.export.buffer import Buffer
+from mjxgait.animation.export.floor import add_floor, add_tiles
+from mjxgait.animation.export.limbs import along_limbs
+from mjxgait.animation.export.loop import WalkLoop
+from mjxgait.animation.export.note import note_of
+from mjxgait.animation.export.pieces import Piece, linear, pieces_of
+from mjxgait.animation.export.skeleton import (
+    STILL,
+    Skeleton,
+    gltf_axes,
+    local_poses,
+    resting,
+    skeleton_of,
+    travel,
+    world_poses,
+)
+from mjxgait.errors import UserError
+from mjxgait.files import write_bytes
+
+ROUGHNESS = 0.75
+
+
+def export_glb(loop: WalkLoop, path: Path, travelling: bool = False) -> None:
+    """Writes the loop; see `build_glb`.
+
+    Raises:
+      UserError: the file cannot be written.
+    """
+    try:
+        write_bytes(path, build_glb(loop, travelling))
+    except OSError as error:
+        raise UserError(f"{path}: cannot be written ({error.strerror})") from None
+
+
+def build_glb(loop: WalkLoop, travelling: bool = False, floor: bool = False) -> bytes:
+    """The bytes of the file.
+
+    travelling: the root moves forward at an even speed; otherwise the creature walks in place.
+    floor: rungs pass below it.
+    """
+    document, buffer = _scene({"walk": loop}, travelling)
+    if floor:
+        add_floor(document, buffer, loop)
+    document.extras = {
+        "strides": loop.strides,
+        "speed_m_per_s": loop.speed,
+        "frames_per_s": loop.rate,
+        "travelling": travelling,
+    }
+    # Blender keeps what a node has and forgets what the file has.
+    document.nodes[0].extras = document.extras | note_of(loop)
+    buffer.close()
+    return b"".join(document.save_to_bytes())
+
+
+def build_clips(loops: Mapping[str, WalkLoop], travelling: bool = False) -> bytes:
+    """The bytes of a file with an animation for each of several loops of one creature, by name.
+
+    All move the same joints, so that programs may blend them.
+    """
+    document, buffer = _scene(loops, travelling)
+    buffer.close()
+    return b"".join(document.save_to_bytes())
+
+
+def build_driven(loops: Mapping[str, WalkLoop]) -> tuple[bytes, float]:
+    """The same in place, on tiles that whoever plays it moves; and the m between two of these."""
+    document, buffer = _scene(loops, travelling=False)
+    walk = next(iter(loops.values())).walk
+    apart = add_tiles(document, buffer, walk.creature.frame.body_length)
+    buffer.close()
+    return b"".join(document.save_to_bytes()), apart
+
+
+def _scene(loops: Mapping[str, WalkLoop], travelling: bool) -> tuple[gltf.GLTF2, Buffer]:
+    """The creature with its skin, and the animations."""
+    loop = next(iter(loops.values()))
+    creature = loop.walk.creature
+    axes = gltf_axes(loop.walk.forward)
+    plain = skeleton_of(creature.model, creature.trunk)
+    skeleton = along_limbs(creature.model, plain, resting(loop), axes)
+    document = gltf.GLTF2(asset=gltf.Asset(version="2.0", generator="mjxgait"))
+    buffer = Buffer(document)
+    rest_pos, rest_quat = local_poses(creature.model, skeleton, resting(loop)[None], axes)
+    _add_joints(document, skeleton, rest_pos[0], rest_quat[0])
+    _add_mesh(document, buffer, pieces_of(creature.model, skeleton, axes, resting(loop)))
+    _add_skin(document, buffer, creature.model, skeleton, axes, resting(loop))
+    _add_animations(document, buffer, loops, skeleton, axes, travelling)
+    name = creature.name
+    document.nodes.append(gltf.Node(name=name, mesh=0, skin=0))
+    document.scenes = [gltf.Scene(name=name, nodes=[0, len(document.nodes) - 1])]
+    document.scene = 0
+    return document, buffer
+
+
+def _add_joints(
+    document: gltf.GLTF2, skeleton: Skeleton, pos: np.ndarray, quat: np.ndarray
+) -> None:
+    for b, name in enumerate(skeleton.names):
+        children = [c for c, parent in enumerate(skeleton.parent) if parent == b]
+        node = gltf.Node(name=name, translation=pos[b].tolist(), rotation=quat[b].tolist())
+        if children:
+            node.children = children
+        document.nodes.append(node)
+
+
+def _add_mesh(document: gltf.GLTF2, buffer: Buffer, pieces: Sequence[Piece]) -> None:
+    """One primitive and material per piece."""
+    primitives = [_primitive(buffer, piece, i) for i, piece in enumerate(pieces)]
+    document.materials += [_material(piece.name, piece.colour) for piece in pieces]
+    document.meshes.append(gltf.Mesh(name="body", primitives=primitives))
+
+
+def _primitive(buffer: Buffer, piece: Piece, material: int) -> gltf.Primitive:
+    count, joints = len(piece.points), piece.joints
+    places = np.zeros((count, 4), np.uint16 if joints.max() > 255 else np.uint8)
+    places[:, 0] = joints
+    weights = np.tile(np.array([255, 0, 0, 0], np.uint8), (count, 1))
+    indices = piece.faces.astype(np.uint16 if count < 0xFFFF else np.uint32)
+    return gltf.Primitive(
+        attributes=gltf.Attributes(
+            POSITION=buffer.add(piece.points.astype(np.float32), gltf.ARRAY_BUFFER, bounds=True),
+            NORMAL=buffer.add(_unit(piece.normals), gltf.ARRAY_BUFFER),
+            JOINTS_0=buffer.add(places, gltf.ARRAY_BUFFER),
+            WEIGHTS_0=buffer.add(weights, gltf.ARRAY_BUFFER, normalized=True),
+        ),
+        indices=buffer.add(indices.reshape(-1), gltf.ELEMENT_ARRAY_BUFFER),
+        material=material,
+    )
+
+
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    return (vectors / np.linalg.norm(vectors, axis=1, keepdims=True)).astype(np.float32)
+
+
+def _material(name: str, colour: np.ndarray) -> gltf.Material:
+    look = gltf.PbrMetallicRoughness(
+        baseColorFactor=[*map(float, linear(colour[:3])), float(colour[3])],
+        metallicFactor=0.0,
+        roughnessFactor=ROUGHNESS,
+    )
+    return gltf.Material(
+        name=name,
+        pbrMetallicRoughness=look,
+        alphaMode="BLEND" if colour[3] < 1 else "OPAQUE",
+    )
+
+
+def _add_skin(
+    document: gltf.GLTF2,
+    buffer: Buffer,
+    model: mujoco.MjModel,
+    skeleton: Skeleton,
+    axes: np.ndarray,
+    stand: np.ndarray,
+) -> None:
+    pos, rot = world_poses(model, skeleton, stand[None], axes)
+    inverse = np.zeros((len(skeleton.names), 4, 4))
+    inverse[:, :3, :3] = rot[0].transpose(0, 2, 1)
+    inverse[:, :3, 3] = -(inverse[:, :3, :3] @ pos[0][..., None])[..., 0]
+    inverse[:, 3, 3] = 1.0
+    # glTF stores matrices column by column.
+    columns = inverse.transpose(0, 2, 1).reshape(-1, 16).astype(np.float32)
+    document.skins.append(
+        gltf.Skin(
+            name="skeleton",
+            joints=list(range(len(skeleton.names))),
+            skeleton=0,
+            inverseBindMatrices=buffer.add(columns),
+        )
+    )
+
+
+def _add_animations(
+    document: gltf.GLTF2,
+    buffer: Buffer,
+    loops: Mapping[str, WalkLoop],
+    skeleton: Skeleton,
+    axes: np.ndarray,
+    travelling: bool,
+) -> None:
+    """One for each loop, all of the joints that move in any of them."""
+    rest = [(node.translation, node.rotation) for node in document.nodes]
+    tracks = {name: _tracks(loop, skeleton, axes, travelling) for name, loop in loops.items()}
+    moving = [
+        (b, i)
+        for b, still in enumerate(rest)
+        for i in (0, 1)
+        if any(np.abs(track[i][:, b] - still[i]).max() > STILL for track in tracks.values())
+    ]
+    for name, loop in loops.items():
+        animation = gltf.Animation(name=name)
+        times = buffer.add(loop.times.astype(np.float32), bounds=True)
+        for b, i in moving:
+            target = gltf.AnimationChannelTarget(node=b, path=("translation", "rotation")[i])
+            animation.channels.append(
+                gltf.AnimationChannel(sampler=len(animation.samplers), target=target)
+            )
+            output = buffer.add(tracks[name][i][:, b].astype(np.float32))
+            animation.samplers.append(
+                gltf.AnimationSampler(input=times, output=output, interpolation="LINEAR")
+            )
+        document.animations.append(animation)
+
+
+def _tracks(
+    loop: WalkLoop, skeleton: Skeleton, axes: np.ndarray, travelling: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """See `local_poses`; travelling: the root moves on evenly, in a circle where the walk turns. One
+    that has a path of its own follows that.
+    """
+    pos, quat = local_poses(loop.walk.creature.model, skeleton, loop.qpos, axes)
+    if loop.path is not None:
+        pos[:, 0] = np.pad(loop.path, ((0, 0), (0, 1))) @ axes.T
+    elif travelling:
+        pos[:, 0], turned = travel(loop)
+        quat[:, 0, 1], quat[:, 0, 3] = np.sin(turned / 2), np.cos(turned / 2)
+    return pos, quat

@@ -1,0 +1,181 @@
+"""Whole strides of a walk, closed so that the end meets the beginning.
+
+Letters: `F` key frames, `nq nv` as in MuJoCo.
+"""
+
+import dataclasses
+
+import mujoco
+import numpy as np
+
+from mjxgait.controllers.sims_brain.reference_body.material import IN_WATER
+from mjxgait.errors import UserError
+from mjxgait.rendering.walk import Walk
+
+RATES = (24, 30, 60)
+MOST_STRIDES = 4
+TOLERANCE = 0.01
+"""Change of speed that fitting the strides to whole frames may cost before another stride is
+taken in.
+"""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class WalkLoop:
+    """Key frames in place: the creature stays above the origin of the world.
+
+    walk: they were taken from. qpos: [F, nq], in a loop the last equal to the first. rate:
+    frames/s. strides: in the loop; 0 if it is none.
+    advance: m that the creature moves forward in one loop; the travelling walk adds it evenly.
+    stretched: duration over the recorded one. frames: first and last recorded one. turned: rad to
+    the left in one loop, likewise; in place the creature looks ahead all the time.
+    path: [F, 2] m in the world, where the root moves otherwise than evenly, in place too.
+    """
+
+    walk: Walk
+    qpos: np.ndarray
+    rate: int
+    strides: int
+    advance: float
+    stretched: float
+    frames: tuple[int, int]
+    turned: float = 0.0
+    path: np.ndarray | None = None
+
+    @property
+    def times(self) -> np.ndarray:
+        """[F] s."""
+        return np.arange(len(self.qpos)) / self.rate
+
+    @property
+    def speed(self) -> float:
+        """m/s."""
+        return float(self.advance / self.times[-1])
+
+
+def walk_loop(walk: Walk, rate: int = 30, most: int = MOST_STRIDES) -> WalkLoop:
+    """The steadiest strides of a walk as a loop of whole frames.
+
+    most: strides; with one the frames may be off the recorded times by half of one.
+
+    Raises:
+      UserError: the walk has no steady stride.
+    """
+    chosen = _fitting_strides(walk, rate, most)
+    if chosen is None and walk.champion.task in IN_WATER:
+        raise UserError(
+            f"{walk.creature.name}: a swimmer has no strides to make a loop of; `mjxgait render` "
+            "shows it"
+        )
+    if chosen is None:
+        why = (
+            f"it fell after {walk.fell:.2f} s"
+            if np.isfinite(walk.fell)
+            else f"none was completed in {walk.seconds:g} s"
+        )
+        raise UserError(
+            f"{walk.creature.name}: the champion has no steady stride to make a loop of ({why}); "
+            "train it for longer"
+        )
+    first, last, strides, count = chosen
+    share = np.linspace(0.0, 1.0, count + 1)
+    model = walk.creature.model
+    qpos = resampled(model, walk.qpos, first + share * (last - first))
+    seconds = (last - first) * walk.time_step
+    rate_of_turn = np.radians(walk.champion.wish.get("turn", 0.0))
+    if rate_of_turn:
+        qpos = _straightened(walk, qpos, first * walk.time_step + share * seconds, rate_of_turn)
+    gap = _difference(model, qpos[-1], qpos[0])
+    root = walk.creature.root_dof
+    advance = float(-gap[root : root + 2] @ walk.forward)
+    # What the end lacks to be the beginning is added little by little.
+    qpos = np.array([_integrate(model, q, s * gap) for q, s in zip(qpos, share, strict=True)])
+    qpos[-1] = qpos[0]
+    place = walk.creature.root_qpos
+    # Shown where a viewer's own floor is, or none: on ground that is no plane at its mean height.
+    below = walk.ground_heights(walk.qpos[first:last, place : place + 2])
+    qpos[:, place + 2] -= below.mean() - 0.5 * (below[-1] - below[0])
+    qpos[:, place : place + 2] -= qpos[:-1, place : place + 2].mean(0)
+    stretched, turned = count / rate / seconds, float(rate_of_turn * seconds)
+    return WalkLoop(walk, qpos, rate, strides, advance, stretched, (first, last), turned)
+
+
+def walk_take(walk: Walk, rate: int = 30) -> WalkLoop:
+    """The whole walk as it was, also one that falls, in place and with a seam."""
+    model, place = walk.creature.model, walk.creature.root_qpos
+    count = max(int(walk.seconds * rate), 2)
+    qpos = resampled(model, walk.qpos, np.arange(count) / rate / walk.time_step)
+    advance = float((qpos[-1, place : place + 2] - qpos[0, place : place + 2]) @ walk.forward)
+    share = np.linspace(0.0, 1.0, count)[:, None]
+    qpos[:, place + 2] -= walk.ground_heights(qpos[:, place : place + 2])
+    qpos[:, place : place + 2] -= (1 - share) * qpos[0, place : place + 2] + share * qpos[
+        -1, place : place + 2
+    ]
+    return WalkLoop(walk, qpos, rate, 0, advance, 1.0, (0, len(walk.qpos) - 1))
+
+
+def resampled(model: mujoco.MjModel, qpos: np.ndarray, frames: np.ndarray) -> np.ndarray:
+    """The poses [F, nq] at fractional frames [F] of poses [T, nq]."""
+    return np.array([_between(model, qpos, at) for at in frames])
+
+
+def _straightened(walk: Walk, qpos: np.ndarray, times: np.ndarray, rate: float) -> np.ndarray:
+    """The way [F, nq] of who turns evenly as if it led straight ahead.
+
+    times: [F] s since the start. rate: rad/s to the left. Each step is turned back by the heading
+    of its moment, and the whole so that it leads forward.
+    """
+    place, straight = walk.creature.root_qpos, qpos.copy()
+    headings, steps = rate * times, np.diff(qpos[:, place : place + 2], axis=0)
+    middles = (headings[1:] + headings[:-1]) / 2
+    way = np.cumsum(np.array([_turned(s, -a) for s, a in zip(steps, middles, strict=True)]), axis=0)
+    along = np.arctan2(way[-1] @ _turned(walk.forward, np.pi / 2), way[-1] @ walk.forward)
+    ahead = np.array([_turned(step, -along) for step in way])
+    straight[1:, place : place + 2] = straight[0, place : place + 2] + ahead
+    for row, heading in zip(straight, headings + along, strict=True):
+        about = np.array([np.cos(heading / 2), 0.0, 0.0, -np.sin(heading / 2)])
+        mujoco.mju_mulQuat(row[place + 3 : place + 7], about, row[place + 3 : place + 7].copy())
+    return straight
+
+
+def _turned(vector: np.ndarray, angle: float) -> np.ndarray:
+    """A vector [2] turned to the left by rad."""
+    c, s = np.cos(angle), np.sin(angle)
+    turned: np.ndarray = np.array([[c, -s], [s, c]]) @ vector
+    return turned
+
+
+def _fitting_strides(walk: Walk, rate: int, most: int) -> tuple[int, int, int, int] | None:
+    """First and last recorded frame, number of strides, and of key frames; the fewest strides
+    that fit the frames well.
+    """
+    found = []
+    for strides in range(1, most + 1):
+        if (ends := walk.steady_strides(strides)) is None:
+            break
+        seconds = (ends[1] - ends[0]) * walk.time_step
+        count = max(round(seconds * rate), 2)
+        error = abs(count / rate / seconds - 1)
+        found.append((error, (*ends, strides, count)))
+        if error < TOLERANCE:
+            break
+    return min(found)[1] if found else None
+
+
+def _between(model: mujoco.MjModel, qpos: np.ndarray, at: float) -> np.ndarray:
+    """The pose [nq] at a fractional frame of poses [T, nq]."""
+    low = min(int(at), len(qpos) - 2)
+    return _integrate(model, qpos[low], (at - low) * _difference(model, qpos[low], qpos[low + 1]))
+
+
+def _difference(model: mujoco.MjModel, start: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """[nv] that leads from one pose to another."""
+    change = np.zeros(model.nv)
+    mujoco.mj_differentiatePos(model, change, 1.0, start, end)
+    return change
+
+
+def _integrate(model: mujoco.MjModel, qpos: np.ndarray, change: np.ndarray) -> np.ndarray:
+    moved = qpos.copy()
+    mujoco.mj_integratePos(model, moved, change, 1.0)
+    return moved

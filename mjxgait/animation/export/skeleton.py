@@ -1,0 +1,122 @@
+"""The bones of a creature, and where they are in a pose, in glTF's axes, which are BVH's too.
+
+glTF is Y-up with +Z forward and +X left, quaternions are (x, y, z, w). Letters: `F` key frames, `B`
+joints of the skin (the root on the floor, then the bodies).
+"""
+
+import dataclasses
+
+import mujoco
+import numpy as np
+
+from mjxgait.animation.export.loop import WalkLoop
+
+STILL = 1e-6
+"""m or unit quaternion; what moves less is not animated."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Skeleton:
+    """The joints of the skin in glTF's axes.
+
+    names: [B]. parent: [B] place of the parent, -1 for the root. bodies: [B] MuJoCo's body, 0 (the
+    world) for the root. offset: [B, 3] m from the body's origin to the joint, in the body's axes.
+    turn: [B, 3, 3] from the joint's axes to the body's.
+    """
+
+    names: tuple[str, ...]
+    parent: tuple[int, ...]
+    bodies: tuple[int, ...]
+    offset: np.ndarray
+    turn: np.ndarray
+
+
+def skeleton_of(model: mujoco.MjModel, trunk: int) -> Skeleton:
+    """The bodies of the tree that begins at the trunk, below a root that stays on the floor, with
+    the bodies' own axes.
+    """
+    bodies = [
+        0,
+        *(b for b in range(1, model.nbody) if model.body_rootid[b] == model.body_rootid[trunk]),
+    ]
+    parents = (-1, *(bodies.index(int(model.body_parentid[b])) for b in bodies[1:]))
+    names = ("root", *(model.body(b).name or f"body_{b}" for b in bodies[1:]))
+    count = len(bodies)
+    return Skeleton(
+        names, parents, tuple(bodies), np.zeros((count, 3)), np.tile(np.eye(3), (count, 1, 1))
+    )
+
+
+def gltf_axes(forward: np.ndarray) -> np.ndarray:
+    """[3, 3] that turns MuJoCo's world into glTF's: left to +X, up to +Y, forward [2] to +Z."""
+    way = np.append(forward, 0.0)
+    return np.stack([np.cross([0.0, 0.0, 1.0], way), [0.0, 0.0, 1.0], way])
+
+
+def local_poses(
+    model: mujoco.MjModel, skeleton: Skeleton, qpos: np.ndarray, axes: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Each joint against its parent: positions [F, B, 3] m and quaternions [F, B, 4] (x, y, z,
+    w), in glTF's axes.
+    """
+    pos, rot = world_poses(model, skeleton, qpos, axes)
+    local_pos, quat = pos.copy(), np.zeros((*pos.shape[:2], 4))
+    for b, parent in enumerate(skeleton.parent):
+        turned = rot[:, b]
+        if parent >= 0:
+            back = rot[:, parent].transpose(0, 2, 1)
+            local_pos[:, b] = (back @ (pos[:, b] - pos[:, parent])[..., None])[..., 0]
+            turned = back @ turned
+        quat[:, b] = _quaternions(turned)
+    return local_pos, quat
+
+
+def world_poses(
+    model: mujoco.MjModel, skeleton: Skeleton, qpos: np.ndarray, axes: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Each joint in the world: positions [F, B, 3] m and rotations [F, B, 3, 3], in glTF's axes."""
+    data = mujoco.MjData(model)
+    bodies, pos, rot = list(skeleton.bodies), [], []
+    for row in qpos:
+        data.qpos[:] = row
+        mujoco.mj_kinematics(model, data)
+        turned = data.xmat[bodies].reshape(-1, 3, 3)
+        place = data.xpos[bodies] + (turned @ skeleton.offset[..., None])[..., 0]
+        pos.append(place @ axes.T)
+        rot.append(axes @ turned @ axes.T @ skeleton.turn)
+    return np.array(pos), np.array(rot)
+
+
+def resting(loop: WalkLoop) -> np.ndarray:
+    """The rest pose [nq] above the origin."""
+    creature = loop.walk.creature
+    qpos = creature.rest_qpos.copy()
+    place = creature.root_qpos
+    qpos[place : place + 2] = 0.0
+    return qpos
+
+
+def travel(loop: WalkLoop) -> tuple[np.ndarray, np.ndarray]:
+    """How the root moves on evenly: [F, 3] m, and [F] rad to the left, in a circle where the walk
+    turns.
+    """
+    share = np.linspace(0, 1, len(loop.qpos))
+    turned = share * loop.turned
+    # Chords of the circle: sin(a / 2) / (a / 2) as long as the way along it.
+    chord = share * loop.advance * np.sinc(turned / (2 * np.pi))
+    ahead = np.stack([np.sin(turned / 2), np.zeros_like(turned), np.cos(turned / 2)], 1)
+    return chord[:, None] * ahead, turned
+
+
+def _quaternions(rotations: np.ndarray) -> np.ndarray:
+    """[F, 4] (x, y, z, w) of rotations [F, 3, 3], neighbours on the same side of the sphere so
+    that they can be interpolated.
+    """
+    quats = np.zeros((len(rotations), 4))
+    for i, rotation in enumerate(rotations):
+        quat = np.zeros(4)
+        mujoco.mju_mat2Quat(quat, np.ascontiguousarray(rotation).ravel())
+        quats[i] = np.roll(quat, -1)
+        if i and quats[i] @ quats[i - 1] < 0:
+            quats[i] *= -1
+    return quats

@@ -1,0 +1,29 @@
+"""The program as a library: the same runs as the command line makes, from a script or a notebook.
+
+import mjxgait
+
+run = mjxgait.train("tall_quadruped", seed=0, out="runs/x", generations=20)
+run.champion, run.certificate, run.metrics()
+mjxgait.walk(run)["trunk_z"]
+"""
+
+from mjxgait.api.look import (
+    examine,
+    examine_expressions,
+    verify,
+    walk,
+)
+from mjxgait.api.make import load_creature, refine, train
+from mjxgait.api.run import Run, open
+
+__all__ = [
+    "Run",
+    "examine",
+    "examine_expressions",
+    "load_creature",
+    "open",
+    "refine",
+    "train",
+    "verify",
+    "walk",
+]

@@ -1,0 +1,113 @@
+"""Looking at runs: their examination, and their motion as numbers."""
+
+from pathlib import Path
+
+import numpy as np
+
+from mjxgait.api.make import load_creature
+from mjxgait.api.run import Place, Run, open
+from mjxgait.certification import Certificate, CertificateConfig, certify
+from mjxgait.certification.verify import differences
+from mjxgait.config.tables import build, read_toml
+from mjxgait.creature.step import at_step
+from mjxgait.errors import UserError
+from mjxgait.training.exams import Exams
+from mjxgait.training.folder import CERTIFICATE, EXAMS
+from mjxgait.training.own import command
+
+
+def examine(run: Run | Place, config: Place | None = None) -> Certificate:
+    """Examines the champion of a run in C MuJoCo, criterion by criterion; writes nothing.
+
+    Args:
+      config: TOML file with other thresholds (configs/certificate/default.toml shows all).
+
+    Raises:
+      UserError: no run, no champion, or a bad file.
+    """
+    known = run if isinstance(run, Run) else open(run)
+    table = read_toml(Path(config)) if config else {}
+    champion = known.champion
+    attempt = Exams(known.folder / EXAMS).attempt(
+        champion.fingerprint, int(champion.origin.get("generation", 0))
+    )
+    return certify(
+        known.creature, champion, build(CertificateConfig, table, str(config)), attempts=attempt
+    )
+
+
+def verify(run: Run | Place) -> list[str]:
+    """Examines the champion of a run again, by the thresholds of its certificate; writes nothing.
+
+    Returns what differs from the certificate, a phrase each: none where all measures are equal
+    (`certify.verify.TOLERANCE`).
+
+    Raises:
+      UserError: no run, no champion, no certificate, or thresholds of another version.
+    """
+    known = run if isinstance(run, Run) else open(run)
+    stored, path = known.certificate, known.folder / CERTIFICATE
+    if stored is None:
+        raise UserError(
+            f"{path}: not there; {command('certify', known.folder, run=known.folder)} examines the champion"
+        )
+    config = build(CertificateConfig, stored.get("config", {}), str(path))
+    return differences(stored, certify(known.creature, known.champion, config).document())
+
+
+def examine_expressions(
+    env: Place, file: Place, task: str | None = None, config: Place | None = None
+) -> Certificate:
+    """Examines a program that was written by hand (docs/programs.md); writes nothing.
+
+    Args:
+      env: shipped creature, creature folder, or model file; its own settings decide how often the
+        expressions are evaluated and how the drive follows. file: holds one program. task: by
+        default what the creature usually does. config: as for `examine`.
+
+    Raises:
+      UserError: names the file and the line of a mistake.
+    """
+    from mjxgait.controllers.expressions.written import written_champion
+    from mjxgait.plugins.fit import check_fit
+    from mjxgait.tasks.walk.targets import Wishes, configured
+
+    table = read_toml(Path(config)) if config else {}
+    thresholds = build(CertificateConfig, table, str(config))
+    use = {"controller": "program"} | ({"task": task} if task else {})
+    creature = load_creature(env)
+    settings = configured(creature, None, use, Wishes())
+    check_fit(creature, settings)
+    creature = at_step(creature, settings.rollout.step).on(settings.rollout.ground)
+    return certify(creature, written_champion(creature, settings, Path(file)), thresholds)
+
+
+def walk(run: Run | Place, seconds: float = 12.0) -> dict[str, np.ndarray]:
+    """The champion's undisturbed motion in C MuJoCo, as columns [T] for pandas or a plot.
+
+    `time` s; `trunk_x`, `trunk_y`, `trunk_z` m, forward, left and up from the start; `pitch`,
+    `roll` rad; per joint `pos_NAME` rad, `vel_NAME` rad/s, `torque_NAME` N·m; per foot
+    `height_NAME` m, `force_NAME` N. It ends soon after a fall.
+
+    Raises:
+      UserError: no run or no champion.
+    """
+    from mjxgait.rendering.walk import record_walk
+
+    known = run if isinstance(run, Run) else open(run)
+    if not seconds > 0:
+        raise UserError(f"seconds = {seconds}: must be more than zero")
+    creature = known.creature
+    seen = record_walk(creature, known.champion, seconds).recording
+    columns = {"time": np.arange(len(seen.pitch)) * seen.time_step}
+    columns |= {f"trunk_{axis}": seen.trunk_pos[:, i] for i, axis in enumerate("xyz")}
+    columns |= {"pitch": seen.pitch, "roll": seen.roll}
+    joints = {"pos": seen.joint_pos, "vel": seen.joint_vel, "torque": seen.torque}
+    feet = {"height": seen.foot_height, "force": seen.foot_force}
+    for names, values in ((creature.joints.names, joints), (creature.feet.names, feet)):
+        columns |= {
+            f"{what}_{name}": array[:, i]
+            for what, array in values.items()
+            for i, name in enumerate(names)
+        }
+    return columns

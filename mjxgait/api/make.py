@@ -1,0 +1,198 @@
+"""Making runs: a body, who moves it and what is asked of it, evolved and examined."""
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mjxgait.api.run import Place, Run
+from mjxgait.config.schema import Config
+from mjxgait.config.shipped import find_creature
+from mjxgait.config.tables import build, merge, read_toml
+from mjxgait.creature import Creature
+from mjxgait.creature import load_creature as load_folder
+from mjxgait.creature.facing import facing
+from mjxgait.creature.scale import load_files, scaled
+from mjxgait.creature.step import at_step
+from mjxgait.training.folder import check_run, create_run
+
+
+def load_creature(
+    env: Place,
+    scale: Mapping[str, float] | None = None,
+    tell: Callable[[str], object] = lambda said: None,
+    way: str = "forward",
+) -> Creature:
+    """A shipped creature by name, a creature folder, or a model file (MJCF, URDF) as it is.
+
+    Args:
+      scale: factors of the parts' size by pattern of their names (docs/creature.md).
+      tell: called with what was found in a model file.
+      way: forward, back, left or right: which side of it is to be ahead (docs/wishes.md).
+
+    Raises:
+      UserError: there is none, or it cannot be used; says why.
+    """
+    path = Path(env)
+    if not path.is_file():
+        creature = load_folder(find_creature(str(env)))
+    else:
+        from mjxgait.importer import import_model
+
+        imported = import_model(path)
+        tell(imported.notes.text())
+        creature = load_files(imported.files)
+    return facing(scaled(creature, scale or {}), way)
+
+
+def train(
+    env: Place = "tall_quadruped",
+    *,
+    out: Place | None = None,
+    config: Place | None = None,
+    controller: str | None = None,
+    task: str | None = None,
+    scale: Mapping[str, float] | None = None,
+    way: str = "forward",
+    speed: str | float | None = None,
+    gait: str | None = None,
+    turn: float | None = None,
+    steer: float | None = None,
+    style: Place | None = None,
+    certificate: str | None = None,
+    expressions: Place | None = None,
+    seed: int = 0,
+    population: int | None = None,
+    generations: int | None = None,
+    settings: Mapping[str, Any] | None = None,
+    quiet: bool = False,
+) -> Run:
+    """Evolves a creature, has its champion examined, and returns the run.
+
+    It is what `mjxgait train` does, without plots: the same settings give the same champion.
+
+    Args:
+      env: shipped creature, creature folder, or model file. out: the run folder, which must not
+        hold anything; by default a new one under runs/.
+      config: file with settings, or the name of a shipped config such as wilson.
+      controller, task: who moves the creature and what it is to do: a shipped name, or
+        FILE.py:CLASS of your own (docs/extending.md).
+      scale: factors of the parts' size, such as {"*_shin": 1.2} (docs/creature.md).
+      way: forward, back, left or right: where it goes, seen from itself (docs/wishes.md).
+      speed, gait, turn, steer, style: what is asked of a walk (docs/wishes.md): m/s or text such as
+        "0.4bl/s", a name, deg/s to the left, deg/s to either side, a name or a file.
+      certificate: walks, or anywhere (docs/certificate.md).
+      expressions: file of programs to begin with, for the controller program (docs/programs.md).
+      seed, population, generations: the settings that are changed most often.
+      settings: any others, in tables as in a config file: {"rollout": {"seconds": 5.0}}.
+      quiet: says nothing on the screen.
+
+    Raises:
+      UserError: one sentence that says what is wrong with what was given.
+    """
+    from mjxgait.controllers.expressions.written import with_expressions
+    from mjxgait.tasks.walk.targets import Wishes, configured
+
+    use = _use(controller=controller, task=task)
+    creature = load_creature(env, scale, way=way)
+    asked = {
+        "speed": speed,
+        "gait": gait,
+        "turn": turn,
+        "steer": steer,
+        "style": style,
+        "certificate": certificate,
+    }
+    file = Path(config) if config else None
+    resolved = configured(creature, file, use, Wishes.of(asked))
+    short = {"population": population, "generations": generations}
+    evolution = {key: value for key, value in short.items() if value is not None}
+    table = merge(dataclasses.asdict(resolved), {"seed": seed, "evolution": evolution})
+    chosen = build(type(resolved), merge(table, settings or {}), "the settings given to train")
+    creature = at_step(creature, chosen.rollout.step)
+    if expressions is not None:
+        chosen = with_expressions(creature, chosen, Path(expressions))
+    folder = check_run(Path(out) if out else None, creature, chosen)
+    begin = partial(create_run, folder, creature, chosen)
+    return _evolved(folder, creature, chosen, quiet, begin)
+
+
+def refine(
+    env: Place,
+    keys: Place,
+    *,
+    out: Place | None = None,
+    keep: float = 0.5,
+    names: Mapping[str, str] | Place | None = None,
+    begin: float | None = None,
+    end: float | None = None,
+    tolerance: float = 3.0,
+    forward: str | None = None,
+    config: Place | None = None,
+    seed: int = 0,
+    population: int | None = None,
+    generations: int | None = None,
+    settings: Mapping[str, Any] | None = None,
+    quiet: bool = False,
+) -> Run:
+    """Makes a hand-made or captured cycle walk, and returns the run (docs/refine.md).
+
+    It is what `mjxgait refine` does; `Run.departure` says what physics changed.
+
+    Args:
+      env: as for `train`. keys: file with the cycle: GLB, BVH, CSV or JSON. out: as for `train`.
+      keep: 1 leaves the poses as they are, 0 lets each joint depart by 30 degrees and the period by
+        30 %.
+      names: name in the file by part (of a CSV or JSON: joint), or a TOML file of these, where the
+        guess is wrong.
+      begin, end: s, of the cycle in the file. tolerance: degrees, root mean square, within which key
+        poses reproduce it. forward: z, -z, x or -x, where the file's creature looks, Y being up; by
+        default z, or as in the rig that the creature was imported from.
+      config, seed, population, generations, settings, quiet: as for `train`.
+
+    Raises:
+      UserError: one sentence that says what is wrong with what was given, or with the file.
+    """
+    from mjxgait.animation.keys import bring
+    from mjxgait.animation.keys import refine as near
+
+    creature, source = load_creature(env), Path(keys)
+    base = near.base_settings(
+        creature, Path(config) if config else None, seed, population, generations, settings
+    )
+    table = read_toml(Path(names)) if isinstance(names, str | Path) else names
+    tell: Callable[[str], object] = (lambda said: None) if quiet else print
+    brought = bring(creature, source, table, (begin, end), np.radians(tolerance), forward, tell)
+    chosen = near.refining(base, brought, keep)
+    folder = check_run(Path(out) if out else None, creature, chosen)
+    begins = partial(near.begin, folder, creature, chosen, source, brought)
+    return _evolved(folder, creature, chosen, quiet, begins)
+
+
+def _evolved(
+    folder: Path, creature: Creature, config: Config, quiet: bool, begin: Callable[[], object]
+) -> Run:
+    """Return the run in a new folder, evolved and examined. begin: makes the folder."""
+    from rich.console import Console
+
+    from mjxgait.distributed.evolve import evolve
+    from mjxgait.training.devices import prepare_devices
+    from mjxgait.training.screen import Screen
+
+    prepare_devices()
+    screen = Screen(Console(quiet=True)) if quiet else Screen()
+    evolve(folder, creature, config, screen, begin=begin)
+    return Run(folder)
+
+
+def _use(**named: str | None) -> dict[str, str]:
+    """Who takes part, the user's own code loaded."""
+    given = {kind: text for kind, text in named.items() if text is not None}
+    if not given:
+        return {}
+    from mjxgait.plugins.user_code import load
+
+    return {kind: load(kind, text) for kind, text in given.items()}

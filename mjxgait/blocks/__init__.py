@@ -1,1 +1,0 @@
-"""Bodies of blocks that grow from directed graphs, after Sims, "Evolving Virtual Creatures" (1994)."""

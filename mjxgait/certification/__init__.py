@@ -1,0 +1,44 @@
+"""The stable-walk certificate, in NumPy and C MuJoCo, free of JAX (docs/certificate.md)."""
+
+from mjxgait.certification.certificate import (
+    Certificate,
+    Glance,
+    certify,
+    distance,
+    glance,
+    push_ladder,
+    record,
+    survival,
+)
+from mjxgait.certification.config import CertificateConfig
+from mjxgait.certification.criteria import Criterion, Measure
+from mjxgait.certification.trial_run import rehearse
+from mjxgait.certification.validity import outdated, read_certificate, read_stress
+from mjxgait.certification.verdict import (
+    Verdict,
+    criteria_of,
+    judge,
+    judged,
+)
+
+__all__ = [
+    "Certificate",
+    "CertificateConfig",
+    "Criterion",
+    "Glance",
+    "Measure",
+    "Verdict",
+    "certify",
+    "criteria_of",
+    "distance",
+    "glance",
+    "judge",
+    "judged",
+    "outdated",
+    "push_ladder",
+    "read_certificate",
+    "read_stress",
+    "record",
+    "rehearse",
+    "survival",
+]

@@ -1,0 +1,318 @@
+"""The stable-walk certificate: examines a champion in C MuJoCo, free of JAX."""
+
+import dataclasses
+import itertools
+import json
+import time
+from typing import Any
+
+import numpy as np
+
+from mjxgait.certification import criteria, draws
+from mjxgait.certification.check_body import check_body
+from mjxgait.certification.config import CertificateConfig
+from mjxgait.certification.criteria import Criterion
+from mjxgait.certification.draws import AIMS
+from mjxgait.certification.simulate import simulate
+from mjxgait.certification.steering import told_to_turn
+from mjxgait.certification.tasks import demands_of, how_simulated
+from mjxgait.certification.verdict import Verdict, judge, judged
+from mjxgait.champion import Champion
+from mjxgait.creature import Creature
+from mjxgait.reference.measure import Recording, measure
+from mjxgait.reference.starts import (
+    Starts,
+    join,
+    nominal_starts,
+    perturbed_starts,
+)
+
+SCHEMA = 2
+"""Version of the file and of the criteria: 1 had eight criteria, and chose on what it examined."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Certificate:
+    """The verdict.
+
+    champion: fingerprint of the one examined. report: the numbers without a threshold.
+    seconds: that it took. attempts: examinations that its run has taken, this one included.
+    """
+
+    creature: str
+    digest: str
+    task: str
+    champion: str
+    criteria: tuple[Criterion, ...]
+    report: dict[str, Any]
+    config: CertificateConfig
+    seconds: float
+    attempts: int = 1
+
+    @property
+    def passed(self) -> bool:
+        """Whether there are criteria and all of them pass."""
+        return judge(self.criteria).passed
+
+    @property
+    def margin(self) -> float:
+        """That of the worst criterion, by which candidates are ranked; positive when all pass."""
+        return judge(self.criteria).margin
+
+    @property
+    def verdict(self) -> Verdict:
+        """As a reader of the file comes to it."""
+        return judged(self.document())
+
+    def rows(self) -> list[tuple[str, str, str, str, str]]:
+        """A table: criterion, measure, value, threshold, verdict."""
+        return [
+            (
+                f"{c.number} {c.name}",
+                m.name,
+                "none" if np.isnan(m.value) else f"{m.value:.3g}",
+                f"{m.sense} {m.threshold:g}",
+                "pass" if m.passed else "FAIL",
+            )
+            for c in self.criteria
+            for m in c.measures
+        ]
+
+    def to_json(self) -> str:
+        """The text of `certificate.json`."""
+        return json.dumps(self.document(), indent=2, allow_nan=False) + "\n"
+
+    def document(self) -> dict[str, Any]:
+        """What `certificate.json` holds; numbers that are not finite become null."""
+        document = {
+            "schema": schema_of(self.task),
+            "creature": self.creature,
+            "creature_digest": self.digest,
+            "task": self.task,
+            "champion": self.champion,
+            "passed": self.passed,
+            "margin": self.margin,
+            "attempts": self.attempts,
+            "criteria": [
+                {
+                    "number": c.number,
+                    "name": c.name,
+                    "passed": c.passed,
+                    "margin": c.margin,
+                    "measures": [_entry(m) for m in c.measures],
+                }
+                for c in self.criteria
+            ],
+            "report": self.report,
+            "config": dataclasses.asdict(self.config),
+            "seconds": round(self.seconds, 2),
+        }
+        found: dict[str, Any] = _finite(document)
+        return found
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Glance:
+    """The undisturbed walk, and the criteria that it alone decides: all but 4 and 5."""
+
+    whole: Recording
+    criteria: tuple[Criterion, ...]
+
+    @property
+    def margin(self) -> float:
+        """That of the worst of its criteria."""
+        return judge(self.criteria).margin
+
+
+def glance(
+    creature: Creature,
+    champion: Champion,
+    config: CertificateConfig | None = None,
+) -> Glance:
+    """The part of the examination that nobody disturbs: a fifth of its time.
+
+    The walk with half the time step is taken at the side of the other: most of what one walk costs
+    is Python's, which is no more for two.
+
+    Raises:
+      UserError: the creature's facts contradict its own files, or the champion is not finite.
+    """
+    config = config or CertificateConfig()
+    check_body(creature, champion.pose_span)
+    demands = demands_of(champion.task, champion.wish)
+    start = demands.aimed(nominal_starts(creature, 1), config)
+    both = dataclasses.replace(join(start, start), refine=np.array([1, 2]))
+    whole, halved = recordings(creature, champion, config.seconds, both)
+    found = demands.undisturbed(whole, halved, config)
+    return Glance(whole, (*found, *demands.kept(champion, whole, config)))
+
+
+def certify(
+    creature: Creature,
+    champion: Champion,
+    config: CertificateConfig | None = None,
+    threads: int = 0,
+    seen: Glance | None = None,
+    attempts: int = 1,
+) -> Certificate:
+    """Examines a champion against all nine criteria, on starts and pushes drawn for it alone.
+
+    Args:
+      seen: what a glance with the same config has found, to save looking again.
+      attempts: examinations that its run has taken, this one included.
+
+    Raises:
+      UserError: the creature's facts contradict its own files, or the champion is not finite.
+    """
+    config = config or CertificateConfig()
+    began = time.perf_counter()
+    seen = seen or glance(creature, champion, config)
+    draw, demands = draws.own(champion, config), demands_of(champion.task, champion.wish)
+    disturbed = draws.starts(creature, config, draw, config.starts.count)
+    groups = [
+        nominal_starts(creature, 1),
+        demands.aimed(disturbed, config, draw.generator(AIMS)),
+    ]
+    if demands.pushed:
+        groups += [draws.pushes(creature, config, draw, config.pushes.count)]
+        groups += draws.ladder(creature, config, draw)
+    starts = demands.aimed(join(*groups), config)
+    outcome = simulate(
+        creature, champion, starts, config.seconds, fall=demands.fall(config), threads=threads
+    )
+    ends = np.cumsum([len(g) for g in groups])[:-1]
+    plain, _, *pushed = (float(up.mean()) for up in np.split(outcome.stayed_up, ends))
+    started = float(np.split(demands.succeeded(outcome, starts, config), ends)[1].mean())
+    found = demands.disturbed(started, pushed[0] if pushed else np.nan, config)
+    found += told_to_turn(creature, champion, config, draw, threads)
+    judged = sorted((*seen.criteria, *found), key=lambda c: c.number)
+    report = demands.report(seen.whole, config) | {"ground": str(creature.terrain)}
+    if pushed:
+        sizes = (0.0, config.pushes.speed, *config.pushes.ladder)
+        report |= _bears(dict(zip(sizes, (plain, *pushed), strict=True)))
+    return Certificate(
+        creature.name,
+        creature.digest,
+        champion.task,
+        champion.fingerprint,
+        tuple(judged),
+        report,
+        config,
+        time.perf_counter() - began,
+        attempts,
+    )
+
+
+def record(
+    creature: Creature,
+    champion: Champion,
+    seconds: float,
+    start: Starts | None = None,
+) -> Recording:
+    """The undisturbed walk, measured.
+
+    start: how it begins; by default nominal, with the usual goal where the task has one.
+    """
+    start = nominal_starts(creature, 1) if start is None else start
+    return recordings(creature, champion, seconds, start)[0]
+
+
+def recordings(
+    creature: Creature, champion: Champion, seconds: float, starts: Starts
+) -> list[Recording]:
+    """Walks from some starts, measured; parts in each other only at the usual time step."""
+    task = how_simulated(champion.task, champion.wish)
+    starts = task.aimed(starts, CertificateConfig())
+    count, drag = len(starts), task.drag if task.grown else None
+    film = simulate(creature, champion, starts, seconds, record=count, threads=1).trajectory
+    return [
+        measure(creature, film, row, inside=starts.refine[row] == 1, aimed=starts, drag=drag)
+        for row in range(count)
+    ]
+
+
+def survival(
+    creature: Creature,
+    champion: Champion,
+    starts: int = 64,
+    seconds: float = 22.0,
+    seed: int = 0,
+    threads: int = 0,
+) -> float:
+    """Share of perturbed starts that are up to the end and have moved forward."""
+    disturbed = perturbed_starts(creature, starts, np.random.default_rng(seed))
+    outcome = simulate(creature, champion, disturbed, seconds, threads=threads)
+    return float((outcome.stayed_up & (outcome.travel[:, 0] > 0)).mean())
+
+
+def distance(creature: Creature, champion: Champion, seconds: float) -> float:
+    """Forward way in m of the undisturbed walk, up to its end or its fall."""
+    return float(simulate(creature, champion, nominal_starts(creature, 1), seconds).travel[0, 0])
+
+
+def push_ladder(
+    creature: Creature, champion: Champion, config: CertificateConfig, threads: int = 0
+) -> dict[float, float]:
+    """Share that stays up after each of the larger pushes, the same for all champions.
+
+    Their speeds are in units of sqrt(g * hip height).
+    """
+    groups = draws.ladder(creature, config, draws.common(config))
+    starts = demands_of(champion.task, champion.wish).aimed(join(*groups), config)
+    fall = demands_of(champion.task, champion.wish).fall(config)
+    outcome = simulate(creature, champion, starts, config.seconds, fall=fall, threads=threads)
+    return dict(
+        zip(
+            config.pushes.ladder,
+            map(float, outcome.stayed_up.reshape(len(groups), -1).mean(1)),
+            strict=True,
+        )
+    )
+
+
+def half_point(shares: dict[float, float]) -> float | None:
+    """Where the share of survivors first comes down to a half, between the pushes tried; None
+    when it never does.
+    """
+    steps = sorted(shares.items())
+    for (s0, share0), (s1, share1) in itertools.pairwise(steps):
+        if share0 > 0.5 >= share1:
+            return s0 + (share0 - 0.5) / (share0 - share1) * (s1 - s0)
+    return 0.0 if steps[0][1] <= 0.5 else None
+
+
+def _bears(shares: dict[float, float]) -> dict[str, Any]:
+    """What the report has of pushes; shares of survivors by speed."""
+    return {
+        "push_survival": {f"{speed:g}": share for speed, share in sorted(shares.items())},
+        "push_that_fells_half": half_point(shares),
+    }
+
+
+def schema_of(task: str) -> int:
+    """Version of `certificate.json` for a task: a certificate with another one is outdated."""
+    return SCHEMA + how_simulated(task).revision
+
+
+def _entry(measure: criteria.Measure) -> dict[str, Any]:
+    return {
+        "name": measure.name,
+        "value": measure.value,
+        "sense": measure.sense,
+        "threshold": measure.threshold,
+        "room": measure.room,
+        "passed": measure.passed,
+        "margin": measure.margin,
+    }
+
+
+def _finite(value: Any) -> Any:
+    match value:
+        case dict():
+            return {k: _finite(v) for k, v in value.items()}
+        case list() | tuple():
+            return [_finite(v) for v in value]
+        case float() if not np.isfinite(value):
+            return None
+        case _:
+            return value

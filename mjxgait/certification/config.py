@@ -1,0 +1,221 @@
+"""What the certificate demands: the nine criteria and the tasks, one table each, with the defaults.
+
+The first table is `outcome.Fall`; those of the tasks are in `thresholds`.
+"""
+
+import dataclasses
+
+from mjxgait.config.tables import (
+    STRICT,
+    Count,
+    Fraction,
+    NonNegative,
+    Positive,
+    Whole,
+)
+from mjxgait.reference.outcome import Fall
+from mjxgait.tasks.hop.thresholds import HopConfig, LimboConfig, TravelConfig
+from mjxgait.tasks.modular.thresholds import (
+    FollowConfig,
+    JumpConfig,
+    RoamConfig,
+    SwimConfig,
+)
+
+
+@dataclasses.dataclass(frozen=True)
+class ProgressConfig:
+    """2. strides: least number.
+
+    speed: body lengths/s. drift: over distance. heading: deg off straight ahead, mean over a second.
+    second_half: its speed over the first half's.
+    """
+
+    __pydantic_config__ = STRICT
+    strides: Count = 8
+    speed: NonNegative = 0.5
+    drift: Positive = 0.25
+    heading: Positive = 25.0
+    second_half: Positive = 0.8
+
+
+@dataclasses.dataclass(frozen=True)
+class PeriodConfig:
+    """3. autocorrelation: least, at the stride period.
+
+    variation: largest coefficient of variation of the stride period.
+    """
+
+    __pydantic_config__ = STRICT
+    autocorrelation: Fraction = 0.8
+    variation: Positive = 0.1
+
+
+@dataclasses.dataclass(frozen=True)
+class StartsConfig:
+    """4. Perturbed starts.
+
+    Attributes:
+      joints, velocities, masses, gains: half widths in rad, rad/s, and as a share of each body's
+        mass and of each joint's kp and kd.
+      friction: range of the factor. latency: most control steps by which torques come late.
+      slope: steepest, in degrees. floor: range of the factor on the softness of the floor.
+      upright: share that must stay up.
+    """
+
+    __pydantic_config__ = STRICT
+    count: Count = 64
+    joints: NonNegative = 0.05
+    velocities: NonNegative = 0.1
+    friction: tuple[Positive, Positive] = (0.8, 1.2)
+    masses: Fraction = 0.05
+    gains: Fraction = 0.1
+    latency: Whole = 1
+    slope: NonNegative = 1.0
+    floor: tuple[Positive, Positive] = (0.25, 4.0)
+    upright: Fraction = 0.9
+
+
+@dataclasses.dataclass(frozen=True)
+class PushesConfig:
+    """5. Speeds in units of sqrt(g * hip height).
+
+    Attributes:
+      count, speed: pushes and their size. window: s, when a push may come. upright: share that must
+        stay up to the end.
+      ladder: larger pushes, tried to find the one that fells half. ladder_count: at each.
+        ladder_seconds: s to fall after a push.
+    """
+
+    __pydantic_config__ = STRICT
+    count: Count = 64
+    speed: NonNegative = 0.1
+    window: tuple[NonNegative, Positive] = (2.0, 10.0)
+    upright: Fraction = 0.8
+    ladder: tuple[Positive, ...] = (0.2, 0.3, 0.4, 0.6, 0.8)
+    ladder_count: Count = 16
+    ladder_seconds: Positive = 5.0
+
+
+@dataclasses.dataclass(frozen=True)
+class HalfStepConfig:
+    """6. distance: largest relative change of the distance when the time step is halved."""
+
+    __pydantic_config__ = STRICT
+    distance: Positive = 0.2
+
+
+@dataclasses.dataclass(frozen=True)
+class GaitConfig:
+    """7. What makes a gait.
+
+    Attributes:
+      frequency: largest stride frequency, in units of 4.48 m^-0.14 Hz. stride_length: least, in hip
+        heights.
+      clearance: least, in hip heights. slip: largest, over the distance. duty_factor: range.
+      flicker: most touchdowns per stride that end no swing, mean of the feet.
+      buzz: strongest vibration of a joint over the speed of all joints.
+      amplitudes: largest difference of a joint's amplitude from its mirror image's, over the larger.
+      duties: largest difference between the duty factors of a left foot and of the right one.
+    """
+
+    __pydantic_config__ = STRICT
+    frequency: Positive = 1.2
+    stride_length: Positive = 0.5
+    clearance: Positive = 0.03
+    slip: Positive = 0.15
+    duty_factor: tuple[Fraction, Fraction] = (0.15, 0.9)
+    flicker: Positive = 5.0
+    buzz: Positive = 0.35
+    amplitudes: Positive = 0.28
+    duties: Positive = 0.1
+
+
+@dataclasses.dataclass(frozen=True)
+class PhysicsConfig:
+    """8. joint_speed: rad/s. joint_overrun: rad past the end of a joint's range. body_speed:
+    sqrt(g * hip height).
+
+    penetration: hip heights. torque: torque limits.
+    """
+
+    __pydantic_config__ = STRICT
+    joint_speed: Positive = 20.0
+    joint_overrun: Positive = 0.1
+    body_speed: Positive = 3.0
+    penetration: Positive = 0.05
+    torque: Positive = 1.0
+
+
+@dataclasses.dataclass(frozen=True)
+class PartsConfig:
+    """9. overlap: hip heights, how deep parts may stand in each other but neighbours."""
+
+    __pydantic_config__ = STRICT
+    overlap: Positive = 0.02
+
+
+@dataclasses.dataclass(frozen=True)
+class WishesConfig:
+    """10. How far what was asked of a walk may be missed (docs/wishes.md).
+
+    Attributes:
+      speed: over the speed asked for. heading: deg off the heading it was told, mean over a second.
+      height: standing heights. bounce: hip heights. sway: deg.
+      stride, duty_factor: over an animal's. reach: hip heights. pitch: deg.
+      commands: turns that who is to be steered is told, in so many simulations of their own; each
+        from straight on, at a rate that no one knew, to either side.
+      delay: s from a command on until the heading must be the one told. obey: share that must.
+    """
+
+    __pydantic_config__ = STRICT
+    speed: Positive = 0.1
+    heading: Positive = 15.0
+    commands: Count = 32
+    delay: NonNegative = 3.0
+    obey: Fraction = 0.9
+    height: Positive = 0.05
+    bounce: Positive = 0.02
+    sway: Positive = 2.0
+    stride: Positive = 0.25
+    duty_factor: Positive = 0.25
+    reach: Positive = 0.15
+    pitch: Positive = 8.0
+
+
+@dataclasses.dataclass(frozen=True)
+class CertificateConfig:
+    """The examination.
+
+    Attributes:
+      seconds: of each simulation. warmup: s at its start that do not count.
+      seed: of starts and pushes, together with the champion's fingerprint.
+    """
+
+    __pydantic_config__ = STRICT
+    seconds: Positive = 22.0
+    warmup: NonNegative = 2.0
+    seed: Whole = 0
+    upright: Fall = dataclasses.field(default_factory=Fall)
+    progress: ProgressConfig = dataclasses.field(default_factory=ProgressConfig)
+    period: PeriodConfig = dataclasses.field(default_factory=PeriodConfig)
+    starts: StartsConfig = dataclasses.field(default_factory=StartsConfig)
+    pushes: PushesConfig = dataclasses.field(default_factory=PushesConfig)
+    half_step: HalfStepConfig = dataclasses.field(default_factory=HalfStepConfig)
+    gait: GaitConfig = dataclasses.field(default_factory=GaitConfig)
+    physics: PhysicsConfig = dataclasses.field(default_factory=PhysicsConfig)
+    parts: PartsConfig = dataclasses.field(default_factory=PartsConfig)
+    wishes: WishesConfig = dataclasses.field(default_factory=WishesConfig)
+    hop: HopConfig = dataclasses.field(default_factory=HopConfig)
+    limbo: LimboConfig = dataclasses.field(default_factory=LimboConfig)
+    travel: TravelConfig = dataclasses.field(default_factory=TravelConfig)
+    swim: SwimConfig = dataclasses.field(default_factory=SwimConfig)
+    roam: RoamConfig = dataclasses.field(default_factory=RoamConfig)
+    jump: JumpConfig = dataclasses.field(default_factory=JumpConfig)
+    follow: FollowConfig = dataclasses.field(default_factory=FollowConfig)
+
+    def __post_init__(self) -> None:
+        if self.warmup >= self.seconds:
+            raise ValueError(
+                f"warmup = {self.warmup}: must be shorter than seconds = {self.seconds}"
+            )

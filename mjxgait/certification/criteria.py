@@ -1,0 +1,183 @@
+"""The criteria that every task shares: pure functions from what was measured to values, thresholds
+and verdicts.
+
+Letters: `T` frames, `J` actuated joints.
+"""
+
+import dataclasses
+from typing import Literal
+
+import numpy as np
+
+from mjxgait.certification.config import CertificateConfig, PartsConfig, PhysicsConfig
+from mjxgait.reference.measure import Recording
+from mjxgait.reference.outcome import Fall
+
+
+@dataclasses.dataclass(frozen=True)
+class Measure:
+    """One number against its threshold.
+
+    sense: whether the value must be at least or at most the threshold.
+    room: distance from the threshold at which nothing is left to gain.
+    """
+
+    name: str
+    value: float
+    sense: Literal[">=", "<="]
+    threshold: float
+    room: float
+
+    @property
+    def passed(self) -> bool:
+        """NaN never passes."""
+        return bool(
+            self.value >= self.threshold if self.sense == ">=" else self.value <= self.threshold
+        )
+
+    @property
+    def margin(self) -> float:
+        """Distance to the threshold in units of `room`: 1 at best, negative when failed."""
+        if np.isnan(self.value):
+            return -np.inf
+        distance = (
+            self.value - self.threshold if self.sense == ">=" else self.threshold - self.value
+        )
+        return (
+            float(min(distance / self.room, 1.0)) if self.room else (1.0 if self.passed else -1.0)
+        )
+
+
+@dataclasses.dataclass(frozen=True)
+class Criterion:
+    """A group of measures that must all pass."""
+
+    number: int
+    name: str
+    measures: tuple[Measure, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether there are measures and all of them pass."""
+        return bool(self.measures) and all(m.passed for m in self.measures)
+
+    @property
+    def margin(self) -> float:
+        """That of the worst measure."""
+        return min((m.margin for m in self.measures), default=-np.inf)
+
+
+def at_least(name: str, value: float, threshold: float, best: float | None = None) -> Measure:
+    """A measure that should be large; `best` is the value beyond which more is no better (twice
+    the threshold if not given).
+    """
+    return Measure(
+        name, float(value), ">=", threshold, (2 * threshold if best is None else best) - threshold
+    )
+
+
+def steady(first: float, second: float, least: float) -> Measure:
+    """What is done in the second half of a motion, over what is done in the first."""
+    share = second / first if first > 0 else np.nan
+    return at_least("second half / first half", share, least, 1.0)
+
+
+def at_most(name: str, value: float, threshold: float) -> Measure:
+    """A measure that should be small, at best zero."""
+    return Measure(name, float(value), "<=", threshold, threshold)
+
+
+def upright(whole: Recording, window: Recording, config: Fall) -> Criterion:
+    """1. Never falls, and in the window nothing but feet and ground contacts touches the floor."""
+    height = whole.trunk_pos[:, 2] / whole.dimensions.stand_height
+    low, high = config.height
+    return Criterion(
+        1,
+        "stays up",
+        (
+            at_least("least upright", whole.trunk_up.min(), config.min_up, 1.0),
+            at_least("least height", height.min(), low, 1.0),
+            Measure("greatest height", float(height.max()), "<=", high, high - 1.0),
+            at_most("time on wrong parts", window.touch.mean(), 0.0),
+        ),
+    )
+
+
+def starts(share: float, config: CertificateConfig) -> Criterion:
+    """4. Share of the perturbed starts that stayed up."""
+    return Criterion(
+        4, "perturbed starts", (at_least("share that stays up", share, config.starts.upright, 1.0),)
+    )
+
+
+def pushes(share: float, config: CertificateConfig) -> Criterion:
+    """5. Share of the pushed simulations that stayed up."""
+    return Criterion(
+        5, "pushes", (at_least("share that stays up", share, config.pushes.upright, 1.0),)
+    )
+
+
+def physics(window: Recording, config: PhysicsConfig) -> Criterion:
+    """8. No physics exploit: speeds, joint angles, penetration and torques of a machine that
+    could exist.
+    """
+    size = window.dimensions
+    return Criterion(
+        8,
+        "physics",
+        (
+            at_most("joint speed (rad/s)", np.abs(window.joint_vel).max(), config.joint_speed),
+            at_most(
+                "joint past its range (rad)", joint_overrun(window).max(), config.joint_overrun
+            ),
+            at_most(
+                "body speed / sqrt(g h)",
+                window.body_speed.max() / np.sqrt(size.gravity * size.hip_height),
+                config.body_speed,
+            ),
+            at_most(
+                "penetration / hip height",
+                window.penetration.max() / size.hip_height,
+                config.penetration,
+            ),
+            Measure(
+                "torque / limit",
+                float((np.abs(window.torque) / size.torque_limit).max()),
+                "<=",
+                config.torque,
+                0.0,
+            ),
+        ),
+    )
+
+
+def parts(window: Recording, config: PartsConfig) -> Criterion:
+    """9. No part stands in another but its neighbours, more than in the standing pose."""
+    deepest = window.overlap.max(initial=0.0) / window.dimensions.hip_height
+    return Criterion(9, "parts", (at_most("overlap / hip height", deepest, config.overlap),))
+
+
+def joint_overrun(window: Recording) -> np.ndarray:
+    """[T, J] rad past the end of each joint's range; 0 within it.
+
+    The shipped bodies have no stop there, only targets end there.
+    """
+    low, high = np.array(window.dimensions.joint_range).T
+    return np.maximum(np.maximum(low - window.joint_pos, window.joint_pos - high), 0.0)
+
+
+def speed(window: Recording) -> float:
+    """Mean forward speed in m/s."""
+    return distance(window) / ((len(window.trunk_pos) - 1) * window.time_step)
+
+
+def distance(window: Recording) -> float:
+    """m forward."""
+    return float(window.trunk_pos[-1, 0] - window.trunk_pos[0, 0])
+
+
+def ratio(part: float, distance: float) -> float:
+    """Of a nuisance to the distance; not a number where there is no way forward to compare it
+    with.
+    """
+    return part / distance if distance > 0 else np.nan

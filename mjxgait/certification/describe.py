@@ -1,0 +1,190 @@
+"""What a gait is like, without a threshold: speed, effort, rhythm, footfalls, and its name.
+
+`N` feet.
+"""
+
+import itertools
+from typing import Any
+
+import numpy as np
+
+from mjxgait.certification.criteria import speed
+from mjxgait.certification.likeness import likeness
+from mjxgait.reference.measure import Dimensions, Recording
+from mjxgait.reference.strides import stride_frequency, stride_starts
+
+
+def describe(window: Recording, clearance: float) -> dict[str, Any]:
+    """The report's numbers; clearance in hip heights makes a swing."""
+    size = window.dimensions
+    v, frequency = speed(window), stride_frequency(window, clearance)
+    duty, phases = window.contact.mean(0), footfall_phases(window)
+    return {
+        "speed": v,
+        "speed_body_lengths": v / size.body_length,
+        "froude_number": v**2 / (size.gravity * size.hip_height),
+        "cost_of_transport": cost_of_transport(window),
+        "stride_frequency": frequency,
+        "stride_length": v / frequency,
+        "duty_factor": dict(zip(size.foot_names, map(float, duty), strict=True)),
+        "footfall_phase": dict(zip(size.foot_names, map(float, phases), strict=True)),
+        "footfall_diagram": dict(zip(size.foot_names, footfall_diagram(window), strict=True)),
+        "slip": dict(zip(size.foot_names, map(float, slip_distance(window)), strict=True)),
+        "gait": gait_name(size, duty, phases),
+        "likeness": likeness(window, clearance),
+        "overlap": worst_overlap(window),
+    }
+
+
+def slip_distance(window: Recording) -> np.ndarray:
+    """[N] m, path that each foot slides on the floor while it carries weight."""
+    return (window.foot_slip * window.contact).sum(0) * window.time_step
+
+
+def worst_overlap(window: Recording) -> dict[str, Any] | None:
+    """The two parts deepest in each other: how deep in m, and in which share of frames."""
+    depth = np.nan_to_num(window.overlap)
+    if not depth.any():
+        return None
+    worst = int(depth.max(0).argmax())
+    return {
+        "parts": list(window.overlap_pairs[worst]),
+        "depth": float(depth[:, worst].max()),
+        "share": float((depth[:, worst] > 0).mean()),
+    }
+
+
+def cost_of_transport(window: Recording) -> float:
+    """Positive mechanical work of the joints per weight and distance."""
+    size = window.dimensions
+    # A torque acts from one frame to the next, so it works against the mean of their speeds.
+    mean_vel = (window.joint_vel[:-1] + window.joint_vel[1:]) / 2
+    work = np.maximum(window.torque[:-1] * mean_vel, 0).sum() * window.time_step
+    way = window.trunk_pos[-1, 0] - window.trunk_pos[0, 0]
+    return float(work / (size.mass * size.gravity * way)) if way > 0 else np.nan
+
+
+def mean_stance(window: Recording, parts: int) -> np.ndarray:
+    """[parts, N] how often each foot carries weight in each part of the stride, over all
+    strides.
+    """
+    starts = stride_starts(window)
+    share, seen = np.zeros((parts, window.contact.shape[1])), np.zeros((parts, 1))
+    for a, b in itertools.pairwise(starts):
+        part = (np.arange(b - a) * parts) // (b - a)
+        np.add.at(share, part, window.contact[a:b])
+        np.add.at(seen, part, 1)
+    return share / np.maximum(seen, 1)
+
+
+def footfall_diagram(window: Recording, parts: int = 20) -> list[str]:
+    """Per foot one character for each twentieth of the stride: `#` where it mostly stands, `.`
+    where it mostly swings.
+    """
+    return ["".join("#" if s > 0.5 else "." for s in foot) for foot in mean_stance(window, parts).T]
+
+
+def footfall_phases(window: Recording) -> np.ndarray:
+    """[N] middle of each foot's stance in cycles, [0, 1), against the first foot.
+
+    The middle of the stance, as a circular mean, does not hang on a single early or late touch as a
+    touchdown does. Where the duty factors are alike both agree.
+    """
+    stance = mean_stance(window, 100)
+    angle = np.exp(2j * np.pi * (np.arange(len(stance)) + 0.5) / len(stance))
+    centre = np.angle((stance * angle[:, None]).sum(0)) / (2 * np.pi)
+    return (centre - centre[0]) % 1.0
+
+
+def gait_name(size: Dimensions, duty: np.ndarray, phases: np.ndarray) -> str:
+    """The nearest of the named gaits (Hildebrand 1965 for four feet) from duty factors and
+    phases [N].
+    """
+    if not np.isfinite(phases).all() or duty.min() > 0.98 or duty.max() < 0.02:
+        return "none"
+    if size.crawler:
+        return "crawl"
+    places = np.array(size.foot_places)
+    walking = duty.mean() >= 0.5
+    match len(duty):
+        case 2:
+            return _biped(phases, walking)
+        case 4:
+            return _quadruped(places, duty, phases)
+        case n if n >= 6 and n % 2 == 0:
+            return _many_legs(places, duty, phases)
+        case _:
+            return "walk" if walking else "run"
+
+
+def _apart(a: float, b: float) -> float:
+    """Distance of two phases, 0 to 0.5."""
+    return abs((a - b + 0.5) % 1.0 - 0.5)
+
+
+def _biped(phases: np.ndarray, walking: bool) -> str:
+    if _apart(phases[0], phases[1]) < 0.2:
+        return "hop"
+    return "walk" if walking else "run"
+
+
+def _quadruped(places: np.ndarray, duty: np.ndarray, phases: np.ndarray) -> str:
+    order = np.argsort(-places[:, 0])
+    front, hind = (
+        sorted(order[:2], key=lambda n: -places[n, 1]),
+        sorted(order[2:], key=lambda n: -places[n, 1]),
+    )
+    fl, fr, hl, hr = (float(phases[n]) for n in (*front, *hind))
+    front_pair, hind_pair = _apart(fl, fr), _apart(hl, hr)
+    if max(front_pair, hind_pair) < 0.15:
+        return "pronk" if _apart(fl, hl) < 0.15 else "bound"
+    if _three_beats(fl, fr, hl, hr):
+        return "canter"
+    if min(front_pair, hind_pair) < 0.35:
+        return "gallop" if duty.mean() < 0.5 else "walk"
+    # Symmetrical gaits: how far a fore foot follows the hind foot of its side.
+    lag = (
+        float(
+            np.angle(np.exp(2j * np.pi * (fl - hl)) + np.exp(2j * np.pi * (fr - hr))) / (2 * np.pi)
+        )
+        % 1.0
+    )
+    if _apart(lag, 0.5) < 0.125:
+        return "trot"
+    if _apart(lag, 0.0) < 0.125:
+        return "pace"
+    if duty.mean() >= 0.75:
+        return "crawl"
+    return "walk" if duty.mean() >= 0.5 else "running walk"
+
+
+def _three_beats(fl: float, fr: float, hl: float, hr: float) -> bool:
+    """Whether the feet of one diagonal fall together, the two others apart from them and from
+    each other.
+    """
+    for together, others in (((fl, hr), (fr, hl)), ((fr, hl), (fl, hr))):
+        beats = (together[0], *others)
+        gaps = [_apart(a, b) for a, b in itertools.combinations(beats, 2)]
+        if _apart(*together) < 0.1 and min(gaps) > 0.2:
+            return True
+    return False
+
+
+def _many_legs(places: np.ndarray, duty: np.ndarray, phases: np.ndarray) -> str:
+    sides = [
+        sorted(np.flatnonzero(side), key=lambda n: -places[n, 0])
+        for side in (places[:, 1] > 0, places[:, 1] <= 0)
+    ]
+    if len(sides[0]) != len(sides[1]):
+        return "walk"
+    turn = np.array(
+        [
+            [(rank + side) % 2 * 0.5, phases[n]]
+            for side, feet in enumerate(sides)
+            for rank, n in enumerate(feet)
+        ]
+    )
+    together = abs(np.exp(2j * np.pi * (turn[:, 1] - turn[:, 0])).mean())
+    if together > 0.8:
+        return "tripod" if len(duty) == 6 else "alternating"
+    return "wave" if duty.mean() >= 0.75 else "metachronal" if duty.mean() >= 0.5 else "run"

@@ -1,0 +1,85 @@
+"""Runs many simulations of one champion on C MuJoCo under the NumPy controller.
+
+Letters: `S` simulations, `R` recorded ones (the first of the `S`), `T` control steps.
+"""
+
+import concurrent.futures
+from functools import partial
+
+import numpy as np
+
+from mjxgait.certification.config import CertificateConfig
+from mjxgait.certification.tasks import how_simulated
+from mjxgait.champion import Champion
+from mjxgait.cores import cores
+from mjxgait.creature import Creature
+from mjxgait.reference.controllers import Twin
+from mjxgait.reference.outcome import Fall, Outcome, Trajectory
+from mjxgait.reference.starts import Starts
+from mjxgait.reference.stepping import Stepping
+from mjxgait.reference.watch import Watch
+
+
+def simulate(
+    creature: Creature,
+    champion: Champion,
+    starts: Starts,
+    seconds: float,
+    *,
+    record: int = 0,
+    heading: np.ndarray | None = None,
+    fall: Fall | None = None,
+    threads: int = 0,
+    watch: Watch | None = None,
+    twin: Twin | None = None,
+) -> Outcome:
+    """Simulates the champion from every start, to the task's nominal goal where that has none.
+
+    Args:
+      record: R, how many of the first simulations to record; these run to the end even after a
+        fall, the others stop there.
+      fall: when one is down; by default as its task has it.
+      heading: [T] or [S, T] rad, commanded heading at each control step; None is as its task has
+        it, mostly straight ahead.
+      threads: 0 takes the machine's cores. The result does not depend on it.
+      watch: is told who is lost, and ends all as soon as that decides; how far they have come then
+        does depend on threads.
+      twin: moves it in the place of the champion's own controller; one that tells simulations apart
+        wants a single thread.
+    """
+    threads = threads or cores()
+    # Dealt out like cards, so that each thread gets its share of every kind of start.
+    shares = [np.arange(i, len(starts), threads) for i in range(min(threads, len(starts)))]
+    steps = round(seconds / creature.model.opt.timestep)
+    task = how_simulated(champion.task, champion.wish)
+    fall = fall or task.fall(CertificateConfig())
+    starts = task.aimed(starts, CertificateConfig())
+    if heading is None:
+        heading = task.told(steps, creature.model.opt.timestep)
+    told = None if heading is None else np.broadcast_to(heading, (len(starts), steps))
+
+    def run(share: np.ndarray) -> Outcome:
+        mine, kept = starts.rows(share), int((share < record).sum())
+        stepping = Stepping(creature, champion, mine, kept, fall, task, twin)
+        tell = None if watch is None else partial(watch.tell, share)
+        return stepping.to_the_end(steps, None if told is None else told[share], tell)
+
+    with concurrent.futures.ThreadPoolExecutor(len(shares)) as pool:
+        parts = list(pool.map(run, shares))
+    order = np.argsort(np.concatenate(shares))
+    kept = np.argsort(np.concatenate([share[share < record] for share in shares]))
+    fields = ("qpos", "qvel", "torque", "target", "phase")
+    return Outcome(
+        fell=np.concatenate([p.fell for p in parts])[order],
+        travel=np.concatenate([p.travel for p in parts])[order],
+        path=np.concatenate([p.path for p in parts])[order],
+        aside=np.concatenate([p.aside for p in parts])[order],
+        clearance=np.concatenate([p.clearance for p in parts])[order],
+        astray=np.concatenate([p.astray for p in parts])[order],
+        middle=np.concatenate([p.middle for p in parts])[order],
+        low=np.concatenate([p.low for p in parts])[order],
+        trajectory=Trajectory(
+            creature.model.opt.timestep,
+            *(np.concatenate([getattr(p.trajectory, f) for p in parts])[kept] for f in fields),
+        ),
+    )

@@ -1,0 +1,154 @@
+"""The second level: whether a walk goes anywhere, off the level floor and under more than the
+certificate asks (docs/certificate.md).
+
+Letters: `S` simulations.
+"""
+
+import dataclasses
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+
+from mjxgait.certification.config import CertificateConfig
+from mjxgait.certification.draws import common
+from mjxgait.certification.simulate import simulate
+from mjxgait.certification.worlds import slippery
+from mjxgait.champion import Champion
+from mjxgait.creature import Creature
+from mjxgait.errors import UserError
+from mjxgait.reference.layout import start_frame
+from mjxgait.reference.outcome import Fall, Outcome
+from mjxgait.reference.starts import Starts, perturbed_starts, pushed_starts
+
+FLOORS = 4
+"""Rough floors, on each of which some of the starts walk."""
+
+
+@dataclasses.dataclass(frozen=True)
+class StressConfig:
+    """What is asked.
+
+    starts: S of each trial. share: that must do it. seconds: each but the longest, `long`. bumps:
+    hip heights. slope: deg. friction: coefficient. push: sqrt(g * hip height). trunk: factor on its
+    mass and inertia.
+    """
+
+    starts: int = 32
+    share: float = 0.9
+    seconds: float = 22.0
+    long: float = 600.0
+    bumps: float = 0.05
+    slope: float = 5.0
+    friction: float = 0.4
+    push: float = 0.3
+    trunk: float = 1.2
+
+
+@dataclasses.dataclass(frozen=True)
+class Trial:
+    """One way of asking more. share: of its starts that stayed up and got a body length ahead."""
+
+    name: str
+    share: float
+    passed: bool
+
+
+@dataclasses.dataclass(frozen=True)
+class Stress:
+    """All trials of one champion, named by its fingerprint."""
+
+    champion: str
+    trials: tuple[Trial, ...]
+    config: StressConfig
+
+    @property
+    def passed(self) -> bool:
+        """Whether it walks anywhere."""
+        return all(trial.passed for trial in self.trials)
+
+    def rows(self) -> list[str]:
+        """A line for each trial, and one for the whole."""
+        lines = [
+            f"{t.name:24} {t.share:>4.0%}  {'pass' if t.passed else 'FAIL'}" for t in self.trials
+        ]
+        verdict = "It walks anywhere." if self.passed else "It does not walk anywhere yet."
+        return [*lines, verdict]
+
+    def document(self) -> dict[str, Any]:
+        """What `stress.json` holds."""
+        return {"schema": 1, "passed": self.passed} | dataclasses.asdict(self)
+
+
+def stress(
+    creature: Creature,
+    champion: Champion,
+    config: StressConfig | None = None,
+    tell: Callable[[str], object] = lambda name: None,
+    threads: int = 0,
+    hasty: bool = False,
+) -> Stress:
+    """Asks a champion that walks for more than the certificate does, one thing at a time.
+
+    Args:
+      tell: called with the name of each trial before it is tried.
+      hasty: nothing more is tried after the first that it fails; the longest is the last.
+
+    Raises:
+      UserError: its task is another one than walking.
+    """
+    if champion.task != "walk":
+        raise UserError(f"this champion's task is {champion.task}: only a walk is stressed")
+    config, found = config or StressConfig(), []
+    for name, tried in _trials(creature, champion, config, threads):
+        tell(name)
+        done = [_done(creature, outcome) for outcome in tried()]
+        share = float(np.concatenate(done).mean())
+        found.append(Trial(name, share, share >= config.share))
+        if hasty and not found[-1].passed:
+            break
+    return Stress(champion.fingerprint, tuple(found), config)
+
+
+def _trials(
+    creature: Creature, champion: Champion, config: StressConfig, threads: int
+) -> Iterator[tuple[str, Callable[[], list[Outcome]]]]:
+    """Names, and what simulates them."""
+    rng = common(CertificateConfig()).generator
+    plain = perturbed_starts(creature, config.starts, rng(0))
+
+    def walked(starts: Starts, body: Creature = creature, seconds: float = config.seconds) -> Any:
+        return lambda: [simulate(body, champion, starts, seconds, threads=threads)]
+
+    def bumps() -> list[Outcome]:
+        floors = [creature.on(f"rough:{config.bumps:g}@{i}") for i in range(FLOORS)]
+        shares = [plain.rows(np.arange(i, len(plain), FLOORS)) for i in range(FLOORS)]
+        # What hangs low may brush a bump.
+        return [
+            simulate(floor, champion, some, config.seconds, fall=Fall(touch=False), threads=threads)
+            for floor, some in zip(floors, shares, strict=True)
+            if len(some)
+        ]
+
+    yield f"bumps of {config.bumps:.0%}", bumps
+    start, rise = start_frame(creature), np.radians(config.slope)
+    ways = {"up": start.forward, "down": -start.forward, "left": start.left, "right": -start.left}
+    for way, direction in ways.items():
+        slope = np.tile(rise * direction[:2], (len(plain), 1))
+        yield f"slope of {config.slope:g}° {way}", walked(dataclasses.replace(plain, slope=slope))
+    even = dataclasses.replace(plain, friction=np.ones(len(plain)))
+    yield f"friction {config.friction:g}", walked(even, slippery(creature, config.friction))
+    speed = config.push * float(np.sqrt(9.81 * creature.frame.hip_height))
+    window = CertificateConfig().pushes.window
+    pushed = pushed_starts(creature, config.starts, rng(1), speed, window)
+    yield f"push of {config.push:g} √(g·h)", walked(pushed)
+    mass = plain.mass.copy()
+    mass[:, creature.trunk] *= config.trunk
+    yield f"trunk {config.trunk - 1:+.0%}", walked(dataclasses.replace(plain, mass=mass))
+    yield f"{config.long / 60:g} minutes", walked(plain, seconds=config.long)
+
+
+def _done(creature: Creature, outcome: Outcome) -> np.ndarray:
+    """Which [S] stayed up and got somewhere."""
+    done: np.ndarray = outcome.stayed_up & (outcome.travel[:, 0] > creature.frame.body_length)
+    return done

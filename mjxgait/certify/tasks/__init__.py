@@ -1,6 +1,0 @@
-"""What each task demands of its champion."""
-
-from mjxgait.certify.tasks.protocol import Demands, promising
-from mjxgait.certify.tasks.registry import demands_of, how_simulated, register_demands
-
-__all__ = ["Demands", "demands_of", "how_simulated", "promising", "register_demands"]

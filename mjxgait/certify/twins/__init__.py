@@ -1,6 +1,0 @@
-"""Each kind of controller a second time, in NumPy and float64, for many simulations at once."""
-
-from mjxgait.certify.twins.protocol import Command, Memory, Twin
-from mjxgait.certify.twins.registry import register_twin, twin_of
-
-__all__ = ["Command", "Memory", "Twin", "register_twin", "twin_of"]

@@ -1,0 +1,136 @@
+"""`mjxgait bench`: how fast the simulation is, beside C MuJoCo, DART, and the machine."""
+
+import dataclasses
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import tyro
+
+from mjxgait.config.shipped import data_folder, find_creature
+from mjxgait.creature import load_creature
+from mjxgait.errors import UserError
+from mjxgait.files import write_text
+
+
+@dataclasses.dataclass(frozen=True)
+class BenchOptions:
+    """Measure useful creature-steps per second beside C MuJoCo and DART, turn by turn in one run.
+
+    The contestants are a program in C around MuJoCo's functions, NumPy between batched steps of C
+    MuJoCo, and DART (docs/performance.md). C is left out where there is no compiler, DART unless
+    dartpy is installed (the extra peers). Leave the machine alone meanwhile: the ratios stand some
+    load, the rates do not.
+
+    Attributes:
+      json: File to write everything to; of several creatures `ratios` by name, and `creatures`.
+      env: Names of shipped creatures or paths of creature folders; `all`: every shipped one.
+      rounds: Turns of each contestant.
+      population: Genomes in the workload, each on all starts of the default settings.
+      generations: How long the better half of them has evolved.
+      scaling: Also measure the curves over population and lanes of a single creature, and the
+        overhead of a generation; takes minutes. The picture is written beside the JSON file.
+      history: File to append a line per creature to, such as benchmarks/history.jsonl, so that a
+        regression shows.
+    """
+
+    json: Path
+    env: tuple[str, ...] = ("tall_quadruped",)
+    rounds: int = 7
+    population: int = 256
+    generations: int = 10
+    scaling: bool = False
+    history: Path | None = None
+
+
+def bench_command(arguments: Sequence[str]) -> int:
+    """Returns the exit code."""
+    options = tyro.cli(BenchOptions, args=list(arguments), prog="mjxgait bench")
+    folders = _folders(options.env)
+    if options.scaling and len(folders) > 1:
+        raise UserError("--scaling measures one creature; name it with --env")
+    from mjxgait.bench.contest import append_history, ratio_table  # JAX takes a second to import
+
+    results: list[dict[str, Any]] = []
+    for folder in folders:
+        results.append(_measured(folder, options))
+        _write(options.json, _together(results) if len(folders) > 1 else results[0])
+        if options.history:
+            append_history(results[-1], options.history)
+        print(_summary(results[-1]), flush=True)
+    if options.scaling:
+        from mjxgait.bench.scaling import draw, scaling_points
+
+        results[0]["scaling"] = scaling_points(options.env[0], _say)
+        _write(options.json, results[0])
+        draw(results[0]["scaling"], options.json.with_suffix(".png"))
+    print(ratio_table(results))
+    print(f"written to {options.json}")
+    return 0
+
+
+def _folders(names: Sequence[str]) -> list[Path]:
+    if "all" in names:
+        folders = sorted(path.parent for path in data_folder("envs").glob("*/creature.toml"))
+        return [folder for folder in folders if not _grows(folder)]
+    if not names:
+        raise UserError("--env names no creature; leave it out for tall_quadruped, or give `all`")
+    folders = [find_creature(name) for name in dict.fromkeys(names)]
+    for folder in folders:
+        if _grows(folder):
+            raise UserError(f"{folder.name}: its body grows, and bench needs one that is there")
+    return folders
+
+
+def _grows(folder: Path) -> bool:
+    return load_creature(folder).settings.creature.grows
+
+
+def _measured(folder: Path, options: BenchOptions) -> dict[str, Any]:
+    from mjxgait.bench.contest import contest
+    from mjxgait.bench.workload import walking
+
+    settings = load_creature(folder).settings
+    config = walking(settings)
+    evolution = dataclasses.replace(config.evolution, population=options.population)
+    # The rivals' joints all have the creature's own gains.
+    rollout = dataclasses.replace(config.rollout, gains=0.0)
+    config = dataclasses.replace(config, evolution=evolution, rollout=rollout)
+    _say(settings.creature.name)
+    return contest(folder, config, options.rounds, options.generations, _say)
+
+
+def _together(results: list[dict[str, Any]]) -> dict[str, Any]:
+    """Results of several creatures as one: the ratios of each in front."""
+    ratios = {
+        result["creature"]: {k: v for k, v in result.items() if k.startswith("ratio_over_")}
+        for result in results
+    }
+    return {"ratios": ratios, "creatures": {result["creature"]: result for result in results}}
+
+
+def _say(line: str) -> None:
+    print(line, flush=True)
+
+
+def _write(file: Path, result: dict[str, Any]) -> None:
+    file.parent.mkdir(parents=True, exist_ok=True)
+    write_text(file, json.dumps(result, indent=2) + "\n")
+
+
+def _summary(result: dict[str, Any]) -> str:
+    from mjxgait.bench.contest import LABELS
+
+    lines = []
+    for name, rate in result["creature_steps_per_second"].items():
+        ratio = result.get(f"ratio_over_{name}")
+        lines.append(
+            f"{LABELS[name]:14} {rate['median']:>10,.0f} creature-steps/s"
+            + (f"   ours is {ratio:.2f} x" if ratio else "")
+        )
+    lines += [f"{LABELS[name]:14} left out: {why}" for name, why in result["left_out"].items()]
+    share = result["limit"]["share_of_bound"]
+    arithmetic, cache = f"{share['flops']:.1%}", f"{share['cache_bytes']:.1%}"
+    lines.append(f"of the measured peak: {arithmetic} of arithmetic, {cache} of cache traffic")
+    return "\n".join(lines)

@@ -1,0 +1,88 @@
+"""`mjxgait certify`: examine the champion of a run, or a program written by hand, in C MuJoCo."""
+
+import dataclasses
+from collections.abc import Sequence
+from pathlib import Path
+
+import tyro
+
+from mjxgait.api import examine, examine_expressions
+from mjxgait.errors import UserError
+from mjxgait.files import write_text
+from mjxgait.training.disk import disk_errors, require_writable
+from mjxgait.training.folder import CERTIFICATE
+
+
+@dataclasses.dataclass(frozen=True)
+class CertifyOptions:
+    """Examine the champion of a run: whether it truly walks, criterion by criterion
+    (docs/certificate.md).
+
+    Writes RUN/certificate.json. The exit code is 0 whether or not the champion passes, as long as
+    it could be examined.
+
+    With --env and --expressions it examines a program that was written by hand instead
+    (docs/programs.md). Then nothing is written without --out, and the exit code is 0 if the program
+    passes and 1 if it does not.
+
+    By other thresholds than the shipped ones (--config) nothing is certified: every command shows
+    such a certificate as "by other rules", with what differs.
+
+    Attributes:
+      run: Run folder.
+      env: With --expressions: name of a shipped creature, path of a creature folder, or a model
+        file.
+      expressions: File with the program: (list EXPRESSION ...), or lines JOINT = EXPRESSION.
+      task: With --expressions: what the creature is to do; by default what it usually does (hop
+        for luxo).
+      config: TOML file with other thresholds; configs/certificate/default.toml shows all.
+      out: With --expressions: file for the certificate, which must not exist.
+    """
+
+    run: tyro.conf.Positional[Path | None] = None
+    env: str | None = None
+    expressions: Path | None = None
+    task: str | None = None
+    config: Path | None = None
+    out: Path | None = None
+
+
+def certify_command(arguments: Sequence[str]) -> int:
+    """Returns the exit code."""
+    options = tyro.cli(CertifyOptions, args=list(arguments), prog="mjxgait certify")
+    if options.expressions is not None:
+        return _certify_expressions(options, options.expressions)
+    if options.run is None or options.env or options.out:
+        raise UserError(
+            "name the run to examine: mjxgait certify RUN; --env and --out are for a program: "
+            "mjxgait certify --env luxo --expressions FILE"
+        )
+    certificate = examine(options.run, options.config)
+    from mjxgait.training.screen import Screen  # rich is slow to import
+
+    path = options.run / CERTIFICATE
+    with disk_errors(path, "what was there before is as it was", "examine it again"):
+        write_text(path, certificate.to_json())
+    Screen().certificate(certificate)
+    return 0
+
+
+def _certify_expressions(options: CertifyOptions, file: Path) -> int:
+    """Returns 0 if the program in the file is certified, else 1."""
+    if options.run is not None or options.env is None:
+        raise UserError(
+            f"--expressions {file}: name the creature and no run: mjxgait certify --env luxo "
+            "--expressions FILE"
+        )
+    if options.out is not None:
+        if options.out.exists():
+            raise UserError(f"--out {options.out}: exists already; name another file")
+        require_writable(options.out)
+    certificate = examine_expressions(options.env, file, options.task, options.config)
+    from mjxgait.training.screen import Screen
+
+    if options.out is not None:
+        with disk_errors(options.out, "nothing else was written", "examine again"):
+            write_text(options.out, certificate.to_json())
+    Screen().certificate(certificate)
+    return 0 if certificate.passed else 1

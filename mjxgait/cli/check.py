@@ -1,0 +1,61 @@
+"""`mjxgait check`: validate a creature folder and draw it."""
+
+import dataclasses
+from collections.abc import Sequence
+from pathlib import Path
+
+import tyro
+
+from mjxgait.certification.check_body import check_body
+from mjxgait.config.shipped import find_creature
+from mjxgait.creature import load_creature
+from mjxgait.errors import UserError
+from mjxgait.files import replaced
+from mjxgait.tasks.walk.targets import Wishes, configured
+from mjxgait.training.disk import require_writable
+
+
+@dataclasses.dataclass(frozen=True)
+class CheckOptions:
+    """Validate a creature folder, let it stand for two seconds, and draw it with its feet, axes and
+    mirror pairs marked.
+
+    Attributes:
+      env: Creature folder, or the name of a shipped creature.
+      out: The picture; by default <name>-check.png in the folder where you are.
+    """
+
+    env: tyro.conf.Positional[str]
+    out: Path | None = None
+
+
+def check_command(arguments: Sequence[str]) -> int:
+    """Returns the exit code: 1 for a creature that is valid but does not stand."""
+    options = tyro.cli(CheckOptions, args=list(arguments), prog="mjxgait check")
+    folder = Path(options.env)
+    creature = load_creature(folder if folder.is_dir() else find_creature(options.env))
+    configured(creature, None, {}, Wishes())
+    if not creature.settings.creature.grows:
+        check_body(creature)
+    from mjxgait.importer.portrait import facts, portrait, standing
+
+    out = options.out or Path(f"{creature.name}-check.png")
+    if out.suffix.lower() != ".png":
+        raise UserError(f"{out}: the picture is a PNG; name it something.png")
+    require_writable(out)
+    from mjxgait.physics import fallback_note
+
+    held = standing(creature)
+    print("\n".join(facts(creature, held)))
+    if note := fallback_note(creature.evolution_model):
+        print(note)
+    try:
+        with replaced(out) as beside:
+            portrait(creature).save(beside)
+    except OSError as error:
+        raise UserError(f"{out}: cannot be written ({error.strerror})") from None
+    print(f"wrote {out}")
+    if held.stands:
+        return 0
+    print("It does not stand; correct the keyframe in creature.xml, or kp in creature.toml.")
+    return 1

@@ -1,0 +1,115 @@
+"""`mjxgait inspect`: what a checkpoint, a run or a folder of runs holds."""
+
+import dataclasses
+import json
+import os
+import sys
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import tyro
+from rich.console import Console
+
+from mjxgait.errors import UserError
+
+PIPED_WIDTH = 160
+
+
+@dataclasses.dataclass(frozen=True)
+class InspectOptions:
+    """Tell what a checkpoint holds, without compiling; only --verify simulates.
+
+    Attributes:
+      path: Run folder, one of its checkpoints, or a folder full of runs.
+      generation: The checkpoint of this generation instead of the latest.
+      individual: Everything about one member of the population; 1 is the best.
+      all: Show the whole population instead of its best ten.
+      diff: Two runs or checkpoints to compare.
+      verify: Examine the champion of a run again, and compare every measure with its certificate.
+        The exit code is 0 only if all are equal (docs/certificate.md).
+      json: Print JSON for programs.
+    """
+
+    path: tyro.conf.Positional[Path | None] = None
+    generation: int | None = None
+    individual: int | None = None
+    all: bool = False
+    diff: tuple[Path, Path] | None = None
+    verify: bool = False
+    json: bool = False
+
+
+def inspect_command(arguments: Sequence[str]) -> int:
+    """Returns the exit code."""
+    options = tyro.cli(InspectOptions, args=list(arguments), prog="mjxgait inspect")
+    # Reading needs no accelerator, and a broken one must not be in the way. Before anything imports
+    # JAX.
+    os.environ.setdefault("JAX_PLATFORMS", "cpu")
+    from mjxgait import inspect
+
+    # Names of runs are no markup.
+    width = None if sys.stdout.isatty() else PIPED_WIDTH
+    console = Console(highlight=False, markup=False, width=width)
+
+    def tell(found: Any, show: Any) -> int:
+        if options.json:
+            print(json.dumps(found, indent=2, allow_nan=False))
+        else:
+            show(found, console)
+        return 0
+
+    if options.verify:
+        found = _verified(options)
+        tell(found, _print_verified)
+        return 0 if found["equal"] else 1
+    if options.diff:
+        if (
+            options.path is not None
+            or options.generation is not None
+            or options.individual is not None
+        ):
+            raise UserError(
+                "--diff takes two runs or checkpoints (such as RUN/checkpoints/5) and nothing else "
+                "but --json"
+            )
+        return tell(
+            inspect.differences(*map(inspect.read_snapshot, options.diff)),
+            inspect.print_differences,
+        )
+    if options.path is None:
+        raise UserError(
+            "name a run folder, a checkpoint, or a folder full of runs: mjxgait inspect "
+            "runs/tall_quadruped-seed0"
+        )
+    if runs := inspect.runs_in(options.path):
+        return tell(inspect.list_runs(runs), inspect.print_runs)
+    if begun := inspect.just_begun(options.path):
+        return tell(begun, inspect.print_just_begun)
+    snapshot = inspect.read_snapshot(options.path, options.generation)
+    if options.individual is not None:
+        return tell(
+            inspect.individual_facts(snapshot, options.individual), inspect.print_individual
+        )
+    return tell(inspect.facts(snapshot), partial(inspect.print_facts, few=not options.all))
+
+
+def _verified(options: InspectOptions) -> dict[str, Any]:
+    """What a second examination of a run's champion says of its certificate."""
+    others = options.generation, options.individual, options.diff
+    if options.path is None or any(option is not None for option in others) or options.all:
+        raise UserError("--verify takes one run folder and nothing else but --json")
+    from mjxgait.api import verify
+
+    differences = verify(options.path)
+    return {"run": str(options.path), "equal": not differences, "differences": differences}
+
+
+def _print_verified(found: dict[str, Any], console: Console) -> None:
+    if found["equal"]:
+        console.print("Examined again: every measure is that of the certificate.", markup=False)
+        return
+    console.print("Examined again: the certificate says something else.", markup=False)
+    for difference in found["differences"]:
+        console.print(f"  {difference}", markup=False)

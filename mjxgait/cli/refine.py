@@ -1,0 +1,182 @@
+"""`mjxgait refine`: a hand-made cycle in, the nearest one that physics lets walk out."""
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+import tyro
+
+from mjxgait.api import Run, load_creature
+from mjxgait.config.rollout import Physics
+from mjxgait.config.schema import Config
+from mjxgait.config.tables import read_toml
+from mjxgait.creature import Creature
+from mjxgait.errors import INTERRUPTED, UserError
+from mjxgait.training.folder import (
+    check_parts,
+    check_run,
+    new_run_folder,
+    open_run,
+)
+
+
+@dataclasses.dataclass(frozen=True)
+class RefineOptions:
+    """Make a hand-made or captured cycle walk: its key poses change only as far as physics asks.
+
+    Attributes:
+      env: Name of a shipped creature, path of a creature folder, or a model file.
+      keys: The cycle: .glb, .bvh, or .csv or .json of joint angles (docs/refine.md).
+      out: Folder for the run; by default a new one under runs/.
+      keep: How much to keep: 1 leaves the poses as they are, 0 lets every joint depart by 30 degrees
+        and the period by 30 %. Several make a run each, below --out, and a picture of all.
+      names: TOML file with the name in the file of each part (of a CSV or JSON: joint), where the
+        guess is wrong.
+      begin: Second at which the cycle begins.
+      end: Second at which it ends.
+      tolerance: Degrees, root mean square, within which the key poses reproduce the cycle.
+      forward: Where the creature in the file looks, Y being up; by default z, or as in the rig that
+        the creature was imported from.
+      only_show: Show names, errors, cycle and key poses, and evolve nothing.
+      config: TOML file with settings, or the name of a shipped config.
+      seed: Of all randomness.
+      population: Individuals of a generation.
+      generations: At most.
+      physics: mjx simulates with MJX itself instead of this program's faster step.
+      resume: Run folder of a refine to go on with, or the folder of several.
+    """
+
+    env: str = "tall_quadruped"
+    keys: Path | None = None
+    out: Path | None = None
+    keep: tuple[float, ...] = (0.5,)
+    names: Path | None = None
+    begin: Annotated[float | None, tyro.conf.arg(name="from")] = None
+    end: Annotated[float | None, tyro.conf.arg(name="to")] = None
+    tolerance: float = 3.0
+    forward: Literal["z", "-z", "x", "-x"] | None = None
+    only_show: bool = False
+    config: Path | None = None
+    seed: int = 0
+    population: int | None = None
+    generations: int | None = None
+    physics: Physics | None = None
+    resume: Path | None = None
+
+
+def refine_command(arguments: Sequence[str]) -> int:
+    """Returns the exit code."""
+    options = tyro.cli(RefineOptions, args=list(arguments), prog="mjxgait refine")
+    from mjxgait.animation.keys import bring, front
+    from mjxgait.animation.keys.refine import base_settings, begin, refining
+
+    if options.resume:
+        runs = front.runs_in(options.resume)
+        return _front(options.resume, runs) if runs else _resumed(options.resume)
+    if options.keys is None:
+        raise UserError("name the file with the cycle: mjxgait refine --env duck --keys walk.glb")
+    creature = load_creature(options.env)
+    numbers = options.seed, options.population, options.generations
+    others = {"rollout": {"physics": options.physics}} if options.physics else None
+    base = base_settings(creature, options.config, *numbers, others)
+    brought = bring(
+        creature,
+        options.keys,
+        read_toml(options.names) if options.names else None,
+        (options.begin, options.end),
+        np.radians(options.tolerance),
+        options.forward,
+        print,
+    )
+    configs = [refining(base, brought, keep) for keep in options.keep]
+    if options.only_show:
+        return 0
+    if len(configs) == 1:
+        folder = check_run(options.out, creature, configs[0])
+        write = partial(begin, folder, creature, configs[0], options.keys, brought)
+        return _run(folder, creature, configs[0], write)
+    out = options.out or new_run_folder(creature.name, options.seed)
+    front.check_front(out, options.keep)
+    _check(creature, configs[0])
+    for keep, config in zip(options.keep, configs, strict=True):
+        begin(front.folder_of(out, keep), creature, config, options.keys, brought)
+    return _front(out, front.runs_in(out))
+
+
+def _check(creature: Creature, config: Config) -> None:
+    """Refuse what no run can be made of, before anything is written."""
+    from mjxgait.training.blueprint import check_plan
+    from mjxgait.training.devices import prepare_devices
+
+    check_parts(creature, config)
+    prepare_devices()
+    check_plan(creature, config)
+
+
+def _front(out: Path, runs: Sequence[Path]) -> int:
+    """Ends all runs of a front, the most faithful first, and draws them."""
+    from mjxgait.animation.keys import front
+
+    for run in runs:
+        print(f"{run}:")
+        if not front.finished(run) and _resumed(run) == INTERRUPTED:
+            print(f"To go on: mjxgait refine --resume {out}")
+            return INTERRUPTED
+    print(f"Side by side: {front.draw(out)}")
+    return 0
+
+
+def _resumed(folder: Path) -> int:
+    """Go on with a run; see `_run`."""
+    from mjxgait.animation.keys.refine import read_original
+    from mjxgait.training.ended import nothing_left
+
+    creature, config = open_run(folder)
+    read_original(folder, creature)  # a run of another kind is refused before the work
+    if over := nothing_left(folder, creature, config, config):
+        print(over)
+        _tell(folder, creature)
+        return 0
+    return _run(folder, creature, config)
+
+
+def _run(
+    folder: Path,
+    creature: Creature,
+    config: Config,
+    write: Callable[[], object] | None = None,
+) -> int:
+    """Evolve near the cycle, examine the champion, and print how far it departs.
+
+    write: makes the folder of a new run.
+    """
+    from mjxgait.distributed.evolve import evolve
+    from mjxgait.training.devices import prepare_devices
+    from mjxgait.training.screen import Screen
+
+    prepare_devices()
+    screen = Screen()
+    begin = write or (lambda: None)
+    if not evolve(folder, creature, config, screen, write is None, begin=begin):
+        return INTERRUPTED
+    _tell(folder, creature)
+    certified = Run(folder).certified
+    if not certified:
+        screen.say("With less of the original it may walk: a smaller --keep")
+    screen.next_steps(folder, certified)
+    return 0
+
+
+def _tell(folder: Path, creature: Creature) -> None:
+    """Print how far the champion of a run departs from the cycle that it stays near."""
+    from mjxgait.animation.keys.departure import departure_of
+    from mjxgait.animation.keys.refine import read_original
+
+    original, found = read_original(folder, creature), departure_of(folder)
+    moved = "" if found.moved is None else f", as moved {found.moved:.1f}"
+    print(f"From {original.source}: key poses {found.poses:.1f} degrees{moved} (r.m.s.)")
+    for sentence in found.words:
+        print(f"  {sentence}")

@@ -1,0 +1,262 @@
+"""`mjxgait repertoire`: a grid of walks that blend."""
+
+import dataclasses
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import tyro
+from rich.console import Console
+
+from mjxgait.api import load_creature
+from mjxgait.config.rollout import Physics
+from mjxgait.config.schema import Config
+from mjxgait.config.tables import build, merge
+from mjxgait.creature import Creature
+from mjxgait.errors import INTERRUPTED, UserError
+from mjxgait.experiments.repertoire.grid import GRID, Cell, Grid
+from mjxgait.files import replaced, write_text
+from mjxgait.plugins import resolve_config
+from mjxgait.tasks.walk.targets import Wishes, speed_of, wished
+from mjxgait.training.disk import disk_errors
+from mjxgait.training.folder import (
+    check_parts,
+    create_run,
+    is_taken,
+    open_run,
+)
+from mjxgait.training.lock import locked
+
+MAP = "map.png"
+OF_FILES = ("rate", "travelling", "blends", "cluster")
+"""Options that decide nothing about the walks."""
+
+
+@dataclasses.dataclass(frozen=True)
+class RepertoireOptions:
+    """Evolve a grid of walks, speeds by turns, side by side and each seeded from its neighbours;
+    examine each; write all that are certified as clips of one GLB, in phase, with a table of where
+    they belong in a blend space (docs/repertoire.md).
+
+    Attributes:
+      env: Name of a shipped creature, path of a creature folder, or a model file (MJCF or URDF).
+      speeds: How fast: 0.4 (m/s), 0.4bl/s (body lengths per second), or fr0.2 (Froude number).
+      turns: Degrees per second, each to either side; straight on is always among them.
+      gait: Of all walks; see `mjxgait train --help`.
+      style: Of all walks: calm, sneaky, heavy, proud, tired, hurried, or a FILE.toml of settings.
+      config: TOML file with settings, or the name of a shipped config; one of your own takes the
+        place of configs/repertoire.toml.
+      out: Folder for the repertoire; by default runs/repertoire-CREATURE. Each walk in it is a run
+        folder.
+      resume: Folder of a repertoire to go on with, as it was.
+      population: Of each walk.
+      generations: Of each walk, straight on and turning.
+      seed: Of all randomness.
+      physics: mjx simulates with MJX itself instead of this program's faster step.
+      rate: Key frames per second of the clips.
+      travelling: The clips move their root; otherwise the creature walks in place.
+      blends: Try what lies half way between neighbours in C MuJoCo too, and whether it can go over
+        from one to the other while it walks.
+      cluster: Have it evolved by a Ray cluster: HOST:PORT, or auto (docs/cluster.md).
+    """
+
+    env: str = "tall_quadruped"
+    speeds: tuple[str, ...] = ("0.3bl/s", "0.5bl/s", "0.7bl/s", "0.9bl/s", "1.1bl/s")
+    turns: tuple[float, ...] = (10.0, 20.0)
+    gait: str | None = None
+    style: str | None = None
+    config: str = "repertoire"
+    out: Path | None = None
+    resume: Path | None = None
+    population: int | None = None
+    generations: int | None = None
+    seed: int | None = None
+    physics: Physics | None = None
+    rate: Literal[24, 30, 60] = 60
+    travelling: bool = False
+    blends: bool = True
+    cluster: str | None = None
+
+
+def repertoire_command(arguments: Sequence[str]) -> int:
+    """Returns the exit code."""
+    options = tyro.cli(RepertoireOptions, args=list(arguments), prog="mjxgait repertoire")
+    plan = None if options.resume else planned(options)
+    folder, grid = _resumed(options) if plan is None else (plan.folder, plan.grid)
+    # JAX takes a second to import: only once the options are known to be good.
+    from mjxgait.distributed.dashboard import crew_at
+    from mjxgait.experiments.repertoire.evolve import evolve
+    from mjxgait.training.devices import prepare_devices
+    from mjxgait.training.examine import examine
+    from mjxgait.training.loop import interruptible
+
+    prepare_devices(1 if options.cluster else None)
+    console, began = Console(highlight=False, soft_wrap=True, markup=False), time.perf_counter()
+    screen = _Screen(console)
+    with interruptible() as interrupted, crew_at(options.cluster, console) as crew:
+        if plan is not None:
+            begin(plan)
+        with locked(folder):
+            creature, told = open_run(folder / grid.cells[0].name)[0], interrupted.is_set
+            ended = evolve(folder, creature, grid, crew, screen.evolved, told)
+            walks = [folder / cell.name for cell in grid.cells]
+            again = f"mjxgait repertoire --resume {folder}"
+            ended = ended and examine(folder, walks, again, screen.examined, told)
+    if not ended:
+        console.print(f"interrupted; go on with: mjxgait repertoire --resume {folder}")
+        return INTERRUPTED
+    _leave(folder, creature, grid, options, screen)
+    console.print(
+        f"{time.perf_counter() - began:.0f} s; each walk is a run: mjxgait inspect {folder}"
+    )
+    return 0
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Planned:
+    """A repertoire of which nothing is written yet. configs: of each cell's run."""
+
+    folder: Path
+    creature: Creature
+    grid: Grid
+    configs: Mapping[Cell, Config]
+
+
+def planned(options: RepertoireOptions) -> Planned:
+    """Read the options and check them. Writes nothing.
+
+    Raises:
+      UserError: the options mean nothing, or the folder holds something already.
+    """
+    from mjxgait.experiments.repertoire.cells import check, settings_of
+
+    creature = load_creature(options.env, tell=print)
+    grid = Grid.of([speed_of(text, creature) for text in options.speeds], options.turns)
+    base = _settings(options, creature)
+    check(base)
+    folder = options.out or Path("runs") / f"repertoire-{creature.name}"
+    configs = {cell: settings_of(cell, grid, creature, base) for cell in grid.cells}
+    check_parts(creature, base)
+    if is_taken(folder):
+        raise UserError(
+            f"{folder}: holds something already; name another folder with --out, or go on with "
+            f"--resume {folder}"
+        )
+    return Planned(folder, creature, grid, configs)
+
+
+def begin(plan: Planned) -> None:
+    """Make the folder, with a run folder for each cell.
+
+    Raises:
+      UserError: see `check_plan`; or the folder cannot be written.
+    """
+    from mjxgait.training.blueprint import check_plan
+
+    folder, cells = plan.folder, plan.grid.cells
+    check_plan(plan.creature, plan.configs[cells[0]])
+    with disk_errors(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+    for cell in cells:
+        create_run(folder / cell.name, plan.creature, plan.configs[cell])
+    with disk_errors(folder):
+        write_text(folder / GRID, plan.grid.text)
+
+
+def _resumed(options: RepertoireOptions) -> tuple[Path, Grid]:
+    folder = options.resume
+    assert folder is not None
+    grid, plain = Grid.read(folder), RepertoireOptions()
+    free = {name: getattr(plain, name) for name in ("resume", *OF_FILES)}
+    if dataclasses.replace(options, **free) != plain:
+        raise UserError(
+            f"{folder}: a resumed repertoire keeps its walks and their settings; only "
+            f"--{', --'.join(OF_FILES)} may be given"
+        )
+    return folder, grid
+
+
+def _settings(options: RepertoireOptions, creature: Creature) -> Config:
+    """What all walks share."""
+    config = resolve_config(creature.settings.train, creature.name, Path(options.config))
+    config = wished(config, creature, Wishes(gait=options.gait, style=options.style))
+    short = {"population": options.population, "generations": options.generations}
+    table: dict[str, Any] = {"evolution": {k: v for k, v in short.items() if v is not None}}
+    table |= {} if options.seed is None else {"seed": options.seed}
+    table |= {} if options.physics is None else {"rollout": {"physics": options.physics}}
+    return build(type(config), merge(dataclasses.asdict(config), table), "the options")
+
+
+def _leave(
+    folder: Path, creature: Creature, grid: Grid, options: RepertoireOptions, screen: "_Screen"
+) -> None:
+    """The map, and the clips where there are any."""
+    from mjxgait.experiments.repertoire.blends import blends
+    from mjxgait.experiments.repertoire.changes import changes
+    from mjxgait.experiments.repertoire.clips import (
+        CLIPS,
+        TABLE,
+        clips_of,
+        write_clips,
+    )
+    from mjxgait.experiments.repertoire.found import draw_map, found_in, table
+    from mjxgait.experiments.repertoire.transitions import transitions
+    from mjxgait.rendering.style import figure
+
+    found, console = found_in(folder, grid), screen.console
+    console.print(table(found))
+    size = (2.4 + 1.3 * (2 * len(grid.turns) + 1), 1.6 + 0.9 * len(grid.speeds))
+    with disk_errors(folder / MAP), figure(size) as drawing:
+        draw_map(drawing, creature.name, grid, found)
+        with replaced(folder / MAP) as beside:
+            drawing.savefig(beside)
+    walks = sum(one.certified for one in found)
+    console.print(f"{walks} of {len(found)} walks are certified: {folder / MAP}")
+    between = blends(folder, creature, grid, found, screen.blended) if options.blends else []
+    if between:
+        walking = sum(blend.walks for blend in between)
+        console.print(f"half way between neighbours {walking} of {len(between)} walk")
+    changed = changes(folder, creature, grid, found, screen.changed) if between else []
+    if changed:
+        told = sum(change.share == 1 for change in changed)
+        console.print(
+            f"told on the way to walk as a neighbour does, it always succeeds in {told} of "
+            f"{len(changed)} changes; from {np.mean([c.share for c in changed]):.0%} of the moments"
+        )
+    if loops := clips_of(folder, found, options.rate):
+        ways = transitions(found, loops)
+        console.print(f"from standing, and to a stand: {sum(map(bool, ways))} of {len(ways)} found")
+        files = folder / CLIPS, folder / TABLE
+        write_clips(*files, loops, found, between, changed, ways, options.travelling)
+        count = len(loops) + sum(map(bool, ways))
+        console.print(f"{count} clips: {files[0]}, their places: {files[1]}")
+
+
+class _Screen:
+    """Plain lines."""
+
+    def __init__(self, console: Console) -> None:
+        self.console = console
+
+    def evolved(self, name: str, generation: int, last: int, done: Any) -> None:
+        if done is None:
+            self.console.print(f"{name}: compiling")
+            return
+        left = (last - generation) * done.seconds / max(len(done.lines), 1)
+        alive = [1 - line["failures"] / max(line["episodes"], 1) for line in done.lines[-1]]
+        self.console.print(
+            f"{name}: generation {generation} of {last}, {len(alive)} walks side by side, "
+            f"{sum(alive) / len(alive):.0%} of their episodes without a fall, "
+            f"{done.steps / done.seconds / 1e6:.2f} M steps/s, {left:.0f} s left"
+        )
+
+    def examined(self, count: int, of: int) -> None:
+        self.console.print(f"examined in C MuJoCo: {count} of {of}")
+
+    def changed(self, count: int, of: int) -> None:
+        self.console.print(f"from one walk to another, in C MuJoCo: {count} of {of}")
+
+    def blended(self, count: int, of: int) -> None:
+        self.console.print(f"half way between neighbours, in C MuJoCo: {count} of {of}")

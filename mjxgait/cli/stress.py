@@ -1,0 +1,53 @@
+"""`mjxgait stress`: whether a walk goes anywhere."""
+
+import dataclasses
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+
+@dataclasses.dataclass(frozen=True)
+class StressOptions:
+    """Ask more of a champion than the certificate does: bumps, slopes to all sides, a slippery
+    floor, larger pushes, a heavier trunk, ten minutes (docs/certificate.md).
+
+    Writes RUN/stress.json and a picture beside it. The exit code is 0 whether or not it passes.
+
+    Attributes:
+      run: Run folder.
+      starts: Disturbed starts of each trial.
+    """
+
+    run: tyro.conf.Positional[Path]
+    starts: Annotated[int, tyro.conf.arg(metavar="COUNT")] = 32
+
+
+def stress_command(arguments: Sequence[str]) -> int:
+    """Returns the exit code."""
+    options = tyro.cli(StressOptions, args=list(arguments), prog="mjxgait stress")
+    from mjxgait.certification.stress import StressConfig, stress
+    from mjxgait.errors import UserError
+    from mjxgait.files import write_text
+    from mjxgait.rendering.stressplot import draw_stress
+    from mjxgait.rendering.style import figure, save
+    from mjxgait.training.disk import disk_errors
+    from mjxgait.training.folder import STRESS, open_champion
+
+    if options.starts < 1:
+        raise UserError(f"--starts {options.starts}: give at least one")
+    creature, champion = open_champion(options.run)
+    found = stress(
+        creature, champion, StressConfig(starts=options.starts), lambda name: print(f"{name}…")
+    )
+    print("\n".join(found.rows()))
+    picture = options.run / "stress"
+    with disk_errors(options.run), figure((7.0, 3.6)) as drawing:
+        text = json.dumps(found.document(), indent=2) + "\n"
+        write_text(options.run / STRESS, text)
+        draw_stress(drawing, found)
+        files = save(drawing, picture, ("png",))
+    print(f"{options.run / STRESS}, {files[0]}")
+    return 0

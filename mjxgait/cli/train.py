@@ -1,0 +1,327 @@
+"""`mjxgait train`: evolve a walk."""
+
+import argparse
+import contextlib
+import dataclasses
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+
+from mjxgait.api import Run, load_creature
+from mjxgait.cli.zoo import evolve_zoo
+from mjxgait.config.rollout import Physics
+from mjxgait.config.schema import Config, ExaminationConfig
+from mjxgait.config.tables import build, merge
+from mjxgait.controllers.expressions.written import with_expressions
+from mjxgait.creature import Creature
+from mjxgait.creature.facing import Way
+from mjxgait.creature.scale import parse_scales
+from mjxgait.creature.step import at_step
+from mjxgait.errors import INTERRUPTED, UserError
+from mjxgait.experiments.multi_seed.seeds import (
+    check_zoo,
+    create_zoo,
+    folders_of,
+    is_zoo,
+)
+from mjxgait.plugins.registry import meant
+from mjxgait.tasks.walk.targets import (
+    WISHES,
+    Wishes,
+    configured,
+    hint,
+)
+from mjxgait.training.disk import disk_errors
+from mjxgait.training.folder import (
+    METRICS,
+    PLOT,
+    PLOTS,
+    check_run,
+    create_run,
+    open_run,
+    read_metrics,
+)
+from mjxgait.training.own import command
+
+if TYPE_CHECKING:  # JAX takes a second to import
+    from mjxgait.training.screen import Screen
+
+
+@dataclasses.dataclass(frozen=True)
+class TrainOptions:
+    """Evolve a walk for a creature.
+
+    Settings come in layers, each over the one before: configs/default.toml, the creature's own
+    [train] table, the file of --config, and the options given here. Every key of the config is an
+    option. --controller and --task name who moves the creature and what it is to do: poses and
+    walk, or FILE.py:CLASS of your own (docs/extending.md).
+
+    Attributes:
+      env: Name of a shipped creature, path of a creature folder, or a model file (MJCF or URDF) to
+        import on the fly.
+      config: TOML file with settings, or the name of a shipped config such as wilson.
+      scale: Parts of another size, as PATTERN=FACTOR: '*_shin=1.2' for longer shins, 'trunk=0.9'
+        (docs/creature.md). Lengths, masses and inertias follow, gains do not.
+      way: back, left or right: where it goes, seen from itself; forward by default (docs/wishes.md).
+      expressions: File of programs written by hand that evolution begins with, for --controller
+        program (docs/programs.md).
+      out: Folder for the run; by default a new one under runs/.
+      runs: So many separate runs side by side, with seeds from --seed on, each a run folder in the
+        folder, and a picture of all champions (docs/zoo.md).
+      resume: Run folder to go on with; its own creature and settings are used, only what ends a run
+        may differ: --generations, --evolution.target, --examination.
+      generation: With --resume: the checkpoint to go on from instead of the latest.
+      population: Short for --evolution.population.
+      generations: Short for --evolution.generations.
+      evolve_body: Short for --evolution.body: 1.25 lets the parts below the trunk become up to a
+        quarter larger or a fifth smaller; the run keeps the body that won in body/.
+      speed: How fast it should walk: 0.4 (m/s), 0.4bl/s (body lengths per second), or fr0.2 (Froude
+        number). This and the next four are for walking (docs/wishes.md).
+      gait: walk, amble, trot, pace, canter, bound, gallop, hop (four feet), walk, tripod, wave (six),
+        walk, waddle, hop (two), natural (an animal's at this speed), or auto (what comes). Where
+        nothing is asked it is what creature.toml has as usual: natural for both dogs.
+      turn: Degrees per second to the left that it should turn while it walks.
+      steer: Degrees per second up to which it should obey when it is told to turn, to either side.
+      style: calm, sneaky, heavy, proud, tired, hurried, or a FILE.toml of settings.
+      certificate: walks, or anywhere: then it learns on uneven ground, and goes on until it bears what
+        `mjxgait stress` asks (docs/certificate.md).
+      cluster: Have it done by a Ray cluster: HOST:PORT, or auto for the one that this machine is a part
+        of (docs/cluster.md).
+      ground: Short for --rollout.ground: flat, slope:0.1, steps:0.05, bumps:0.05, rough:0.05.
+      physics: Short for --rollout.physics: mjx simulates with MJX itself, auto with the faster step of
+        this program where it knows the model (docs/performance.md).
+      view: Show the best of each generation walking on a page that only this machine can reach.
+      plots: Draw all plots of the run when it has ended (`mjxgait plot`).
+      settings: The config, key by key.
+    """
+
+    env: str = "tall_quadruped"
+    config: str | None = None
+    scale: tuple[str, ...] = ()
+    way: Way = "forward"
+    expressions: Path | None = None
+    out: Path | None = None
+    runs: int | None = None
+    resume: Path | None = None
+    generation: int | None = None
+    population: int | None = None
+    generations: int | None = None
+    evolve_body: float | None = None
+    speed: str | None = None
+    gait: str | None = None
+    turn: float | None = None
+    steer: float | None = None
+    style: str | None = None
+    certificate: str | None = None
+    cluster: str | None = None
+    ground: str | None = None
+    physics: Physics | None = None
+    view: bool = False
+    plots: bool = True
+    settings: Annotated[Config, tyro.conf.arg(name="")] = dataclasses.field(default_factory=Config)
+
+
+def train_command(arguments: Sequence[str]) -> int:
+    """Returns the exit code."""
+    creature, default = _layers(arguments)
+    shape = _options_of(type(default))
+    options = tyro.cli(
+        shape, args=list(arguments), prog="mjxgait train", default=shape(settings=default)
+    )
+    config = _settings(options)
+    if not options.resume:
+        creature = at_step(creature, config.rollout.step)
+        if options.expressions:
+            config = with_expressions(creature, config, options.expressions)
+    elif options.expressions:
+        raise UserError(
+            f"{options.resume}: a resumed run keeps the programs that it began with; --expressions "
+            "needs a new run"
+        )
+    if said := hint(config):
+        print(said)
+    if options.runs is not None or _is_zoo(options.resume):
+        return _several(options, creature, config, default)
+    if options.generation is not None and options.resume is None:
+        raise UserError("--generation: names a checkpoint to go on from, so it needs --resume")
+    if options.resume is None:
+        return _evolve(options, check_run(options.out, creature, config), creature, config)
+    _check_resumed(options, config, default)
+    from mjxgait.training.ended import nothing_left  # leads to JAX
+
+    over = options.generation is None and nothing_left(options.resume, creature, config, default)
+    if over:
+        print(over)
+        return 0
+    return _evolve(options, options.resume, creature, config)
+
+
+def _check_resumed(options: TrainOptions, config: Config, default: Config) -> None:
+    """Refuse what a resumed run cannot change. default: the settings of its folder."""
+    if options.scale or options.way != "forward":
+        raise UserError(
+            f"{options.resume}: a resumed run keeps its body; --scale and --way need a new run"
+        )
+    if _without_ends(config) != _without_ends(default):
+        raise UserError(
+            f"{options.resume}: a resumed run keeps its settings; only --generations, "
+            "--evolution.target and --examination may differ"
+        )
+
+
+def _evolve(options: TrainOptions, folder: Path, creature: Creature, config: Config) -> int:
+    """Evolve a new run, or go on with one, and draw it; return the exit code."""
+    # JAX takes a second to import: only once the options are known to be good.
+    from mjxgait.cli.view import following
+    from mjxgait.distributed.evolve import evolve
+    from mjxgait.training.devices import prepare_devices
+    from mjxgait.training.screen import Screen
+
+    prepare_devices(1 if options.cluster else None)
+    screen, resumed = Screen(), options.resume is not None
+    with contextlib.ExitStack() as beside:
+
+        def begin() -> None:
+            if not resumed:
+                create_run(folder, creature, config)
+            if options.view:
+                beside.enter_context(following(folder))
+
+        at = options.generation, options.cluster
+        ended = evolve(folder, creature, config, screen, resumed, *at, begin)
+    if ended:
+        screen.next_steps(folder, Run(folder).certified)
+    drawn = _draw(folder, screen, all_plots=ended and options.plots)
+    return 0 if ended and drawn else INTERRUPTED
+
+
+def _several(options: TrainOptions, creature: Creature, config: Config, default: Config) -> int:
+    """Runs side by side; returns the exit code."""
+    if options.view or options.generation is not None:
+        raise UserError("--runs: several runs have no --view and no --generation")
+    if options.resume is None:
+        assert options.runs is not None
+        # On a cluster each run is a piece of work, so all machines have some.
+        together = 1 if options.cluster else 0
+        zoo = check_zoo(options.out, creature, config, options.runs)
+        begin = partial(create_zoo, zoo, creature, config, options.runs, together)
+        return evolve_zoo(zoo, options.cluster, begin)
+    other = options.scale or options.way != "forward"
+    if options.runs is not None or other or config != default:
+        raise UserError(
+            f"{options.resume}: resumed runs keep their number, body and settings; only --cluster "
+            "may be given"
+        )
+    return evolve_zoo(options.resume, options.cluster)
+
+
+def _is_zoo(folder: Path | None) -> bool:
+    return folder is not None and is_zoo(folder)
+
+
+def _options_of(config: type[Config]) -> type[TrainOptions]:
+    """The options with every key of this config."""
+    settings = Annotated[config, tyro.conf.arg(name="")]  # type: ignore[valid-type]
+    field = ("settings", settings, dataclasses.field(default_factory=config))
+    return dataclasses.make_dataclass(
+        "TrainOptions",
+        [field],
+        bases=(TrainOptions,),
+        frozen=True,
+        namespace={"__doc__": TrainOptions.__doc__},
+    )
+
+
+def _draw(folder: Path, screen: "Screen", all_plots: bool) -> bool:
+    """Draws the run after all that it has to say is on the screen; returns whether nobody
+    interrupted it.
+    """
+    try:
+        _plot_fitness(folder)
+        if all_plots:
+            screen.say(f"Drawing {folder / PLOTS}/; the run itself is done and safe.")
+            from mjxgait.rendering.plots import plot_run
+
+            plot_run(folder)
+    except KeyboardInterrupt:
+        screen.say(f"Not all is drawn; {command('plot', folder, run=folder)} draws it.")
+        return False
+    return True
+
+
+def _plot_fitness(folder: Path) -> None:
+    """The curve that every run has; matplotlib is slow to import."""
+    if lines := read_metrics(folder / METRICS):
+        from mjxgait.rendering.curves import plot_fitness
+
+        with disk_errors(
+            folder / PLOT,
+            "the run itself is safe",
+            f"draw it with {command('plot', folder, run=folder)}",
+        ):
+            plot_fitness(lines, folder / PLOT)
+
+
+def _layers(arguments: Sequence[str]) -> tuple[Creature, Config]:
+    """The creature and the settings below the options: they decide what the options' defaults
+    are.
+    """
+    early = argparse.ArgumentParser(add_help=False, allow_abbrev=False, exit_on_error=False)
+    for name in ("--env", "--config", "--resume", "--use.controller", "--use.task"):
+        early.add_argument(name, nargs="?")
+    for name in WISHES:
+        early.add_argument(f"--{name}", nargs="?")
+    early.add_argument("--scale", nargs="*")
+    early.add_argument("--way", nargs="?")
+    try:
+        given, _ = early.parse_known_args(list(arguments))
+    except argparse.ArgumentError as error:
+        raise UserError(str(error)) from None
+    asked = {name: getattr(given, name) for name in WISHES}
+    if given.resume:
+        if any(asked.values()):
+            raise UserError(
+                f"{given.resume}: a resumed run keeps its settings; what is asked of a walk needs a "
+                "new run"
+            )
+        folder = Path(given.resume)
+        return open_run(folders_of(folder)[0] if is_zoo(folder) else folder)
+    scales = parse_scales(given.scale or ())
+    way = given.way or "forward"
+    creature = load_creature(given.env or TrainOptions.env, scales, print, way)
+    file = Path(given.config) if given.config else None
+    named = {kind: getattr(given, f"use.{kind}") for kind in ("controller", "task")}
+    use = {kind: name for kind, name in named.items() if name}
+    return creature, configured(creature, file, use, Wishes.of(asked))
+
+
+def _settings(options: TrainOptions) -> Config:
+    """The config with the short options laid over it, checked again: the options are typed but
+    their ranges are not.
+    """
+    short = {
+        "population": options.population,
+        "generations": options.generations,
+        "body": options.evolve_body,
+    }
+    table = {
+        "use": dataclasses.asdict(meant(options.settings.use)),
+        "evolution": {key: value for key, value in short.items() if value is not None},
+        "rollout": {
+            key: getattr(options, key)
+            for key in ("ground", "physics")
+            if getattr(options, key) is not None
+        },
+    }
+    return build(
+        type(options.settings), merge(dataclasses.asdict(options.settings), table), "the options"
+    )
+
+
+def _without_ends(config: Config) -> Config:
+    """The settings that decide what a generation computes."""
+    endless = dataclasses.replace(config.evolution, generations=0, target=None)
+    return dataclasses.replace(config, evolution=endless, examination=ExaminationConfig())

@@ -1,0 +1,101 @@
+"""`mjxgait train --runs`: several runs side by side."""
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from mjxgait.errors import INTERRUPTED
+from mjxgait.experiments.multi_seed.seeds import read_seeds
+from mjxgait.files import replaced
+from mjxgait.training.disk import disk_errors
+from mjxgait.training.folder import open_run
+from mjxgait.training.lock import locked
+from mjxgait.training.own import command
+
+PICTURE = "zoo.png"
+
+
+def evolve_zoo(
+    zoo: Path, cluster: str | None = None, begin: Callable[[], object] = lambda: None
+) -> int:
+    """Evolve the runs of a folder, or go on with them, and show what came of it; returns the exit
+    code.
+
+    cluster: address of the cluster that computes it, if not this machine. begin: makes the folder of
+    new runs; called after the last check.
+    """
+    from mjxgait.distributed.dashboard import crew_at
+    from mjxgait.distributed.rows import Rows
+    from mjxgait.training.devices import prepare_devices
+    from mjxgait.training.examine import examine
+    from mjxgait.training.loop import interruptible
+
+    prepare_devices(1 if cluster else None)
+    console, began = Console(highlight=False, soft_wrap=True, markup=False), time.perf_counter()
+    screen = _Screen(console)
+    with interruptible() as interrupted, crew_at(cluster, console) as crew:
+        begin()
+        with locked(zoo):
+            told, seeds = interrupted.is_set, read_seeds(zoo)
+            folders = seeds.folders(zoo)
+            creature, config = open_run(folders[0])
+            again = command("train", "--resume", zoo, run=folders[0])
+            rows = Rows(creature, folders, keep_every=config.keep_every, together=seeds.together)
+            ended = rows.to_the_end(None, crew, screen.evolved, told) is not None
+            ended = ended and examine(zoo, folders, again, screen.examined, told)
+    if not ended:
+        console.print(f"interrupted; go on with: {again}")
+        return INTERRUPTED
+    _leave(zoo, creature.name, folders, console)
+    console.print(
+        f"{time.perf_counter() - began:.0f} s; each is a run: "
+        f"{command('inspect', zoo, run=folders[0])}"
+    )
+    return 0
+
+
+def _leave(zoo: Path, name: str, folders: list[Path], console: Console) -> None:
+    from mjxgait.experiments.multi_seed.found import (
+        draw_zoo,
+        found_in,
+        size,
+        table,
+    )
+    from mjxgait.rendering.style import figure
+
+    found = found_in(folders)
+    console.print(table(found))
+    with disk_errors(zoo / PICTURE), figure(size(found)) as drawing:
+        draw_zoo(drawing, name, found)
+        with replaced(zoo / PICTURE) as beside:
+            drawing.savefig(beside)
+    count = sum(one.certified for one in found)
+    console.print(f"{count} of {len(found)} are certified: {zoo / PICTURE}")
+
+
+class _Screen:
+    """Plain lines."""
+
+    def __init__(self, console: Console) -> None:
+        self.console = console
+
+    def evolved(self, generation: int, last: int, done: Any) -> None:
+        if done is None:
+            self.console.print("compiling")
+            return
+        left = (last - generation) * done.seconds / max(len(done.lines), 1)
+        best = " ".join("-" if b is None else f"{b:.3g}" for b in _best(done.lines))
+        self.console.print(
+            f"generation {generation} of {last}, best fitness of each: {best}; "
+            f"{done.steps / done.seconds / 1e6:.2f} M steps/s, {left:.0f} s left"
+        )
+
+    def examined(self, count: int, of: int) -> None:
+        self.console.print(f"examined in C MuJoCo: {count} of {of}")
+
+
+def _best(lines: list[list[dict[str, Any]]]) -> list[float | None]:
+    return [line["best"] for line in lines[-1]] if lines else []

@@ -1,6 +1,0 @@
-"""What is read of an animator's files: motions, and skeletons at rest."""
-
-from mjxgait.clips.clip import AngleTrack, Clip
-from mjxgait.clips.rig import Rig
-
-__all__ = ["AngleTrack", "Clip", "Rig"]

@@ -1,0 +1,178 @@
+"""The genetic algorithm's settings, as frozen dataclasses."""
+
+import dataclasses
+from typing import Annotated, Literal
+
+import pydantic
+
+from mjxgait.config.islands import IslandsConfig
+from mjxgait.config.tables import (
+    HOST,
+    SHAPE,
+    STRICT,
+    Count,
+    Finite,
+    Fraction,
+    NonNegative,
+    Positive,
+    Whole,
+)
+
+
+@dataclasses.dataclass(frozen=True)
+class ForcedConfig:
+    """Forced evolution: a spell of rapid mutation and newcomers when growth stalls.
+
+    Attributes:
+      enabled: whether there are such spells.
+      window: generations over which best and mean are watched.
+      gain: relative growth below which both have stalled.
+      newcomers: share of new random genomes among a forced generation's offspring, the others
+        are mutants.
+      mutations: how many times each mutant is mutated.
+      accept: quantile of the population's fitness that an offspring must reach to be taken
+        in.
+      refresh: share of the population to replace.
+      limit: generations a spell lasts at most; 0 lets it last until the population is
+        refreshed.
+      patience: spells in a row without a better best after which the run stops; 0 never stops
+        it.
+    """
+
+    __pydantic_config__ = STRICT
+    enabled: bool = True
+    window: Annotated[Count, SHAPE] = 8
+    gain: NonNegative = 0.01
+    newcomers: Fraction = 0.5
+    mutations: Annotated[Count, SHAPE] = 3
+    accept: Fraction = 0.25
+    refresh: Fraction = 0.5
+    limit: Whole = 4
+    patience: Annotated[Whole, HOST] = 3
+
+
+@dataclasses.dataclass(frozen=True)
+class EvolutionConfig:
+    """The genetic algorithm; `mjxgait/evolution/breeding.py` says how parents and children are drawn.
+
+    Attributes:
+      population: P, individuals that live from one generation to the next.
+      generations: cap on the generations of a run.
+      target: fitness at which a run stops.
+      growth: the population grows to this multiple of P, then is culled back to P.
+      pose_range: share of each joint's pose range, about its middle, in which key poses lie.
+      pose_span: deg; width of every hinge's pose range, about its middle in creature.toml, as
+        far as the joint's range in creature.xml allows; 0 leaves the ranges of creature.toml.
+      initial: uniform draws or a Latin hypercube.
+      initial_spread: share of each gene's range, about its middle, in which the first genomes
+        lie.
+      initial_choice: so many are drawn and judged for each place of the first generation.
+      selection: how parents are drawn: any, by rank, or the best of some rivals.
+      rivals: of a tournament.
+      proportional: parents are drawn in proportion to their fitness instead.
+      crossover: share of offspring with two parents, the others have one.
+      crossing: `permute` draws K poses from the parents' 2K in any order (Wilson); `align` leaves
+        each pose in its place; `mixed` is one or the other for each child.
+      permuted: share of `mixed` crossovers that permute.
+      pool: whom parents are drawn from: last generation's survivors, or `growing`, which also
+        holds the children born so far (they rank last).
+      unique_children: a child that equals somebody of the pool or a sibling is drawn anew
+        before it is simulated.
+      survival: of the `best` of parents and children, or of `children` alone, and the best so
+        far.
+      elite: that share of the population, the best, lives on among the children and is judged
+        with them, for survival of children.
+      remember: whether their earlier rounds count as well: the mean of all rounds is what those
+        are worth that are judged once more.
+      mutation: `redraw` re-draws two joints of one pose, `single` one joint, `pose` a whole
+        pose, `gaussian` moves every joint of one pose by sigma, `mixed` is one or the other
+        of the first and the last. `bit` and `byte` read the value of one joint as 8 bits over
+        its range and flip one of them, or re-draw all eight, as classic GAs do.
+      redrawn: share of `mixed` mutations that re-draw.
+      mutation_rate: share of offspring mutated.
+      sigma: of the gaussian mutation, in units of the range of each joint.
+      body: how many times larger or smaller the parts below the trunk may become, each
+        mirrored pair by a gene of its own (docs/creature.md); 1 leaves the body as it is.
+      tuning_rate: chance that a tuning gene of a mutated offspring changes; likewise a
+        body's.
+      tuning_sigma: by how much it changes, in units of its range; likewise a body's.
+      remove_duplicates: of individuals with the same genome only one survives.
+      same: what makes a duplicate: the same `genome`, or the same `verdict` to the bit, for those of
+        which much may do nothing: a child lives in its parent's place. By genome in a spell.
+      lineage: whether a run's metrics tell whose child each is, not of islands.
+      family: of the population, the largest share that descends, mother by mother, from one of the
+        first generation: so that not all become one family.
+      forced: a spell of rapid mutation and newcomers when growth stalls.
+      islands: several such populations that exchange their best (docs/cluster.md).
+    """
+
+    __pydantic_config__ = STRICT
+    population: Annotated[Count, SHAPE] = 256
+    generations: Annotated[Whole, HOST] = 75
+    target: Annotated[Finite | None, HOST] = None
+    growth: Annotated[Positive, SHAPE] = 2.0
+    pose_range: Annotated[float, pydantic.Field(gt=0, le=1)] = 1.0
+    pose_span: Annotated[NonNegative, SHAPE] = 0.0
+    initial: Literal["uniform", "latin"] = "uniform"
+    initial_spread: Fraction = 0.6
+    initial_choice: Count = 1
+    selection: Literal["uniform", "rank", "tournament"] = "rank"
+    rivals: Annotated[Count, SHAPE] = 2
+    proportional: Annotated[bool, SHAPE] = False
+    crossover: Fraction = 0.7
+    crossing: Literal["permute", "align", "mixed"] = "align"
+    permuted: Fraction = 0.5
+    pool: Annotated[Literal["parents", "growing"], SHAPE] = "parents"
+    unique_children: Annotated[bool, SHAPE] = False
+    survival: Literal["best", "children"] = "best"
+    elite: Annotated[Fraction, SHAPE] = 0.0
+    remember: Annotated[bool, SHAPE] = False
+    mutation: Literal["redraw", "single", "pose", "gaussian", "mixed", "bit", "byte"] = "mixed"
+    redrawn: Fraction = 0.5
+    mutation_rate: Fraction = 0.8
+    sigma: Positive = 0.12
+    body: Annotated[float, pydantic.Field(ge=1, le=2), SHAPE] = 1.0
+    tuning_rate: Fraction = 0.3
+    tuning_sigma: Positive = 0.1
+    remove_duplicates: bool = True
+    same: Annotated[Literal["genome", "verdict"], SHAPE] = "genome"
+    lineage: Annotated[bool, SHAPE] = False
+    family: Annotated[Fraction, SHAPE] = 1.0
+    forced: ForcedConfig = dataclasses.field(default_factory=ForcedConfig)
+    islands: IslandsConfig = dataclasses.field(default_factory=IslandsConfig)
+
+    def __post_init__(self) -> None:
+        if self.population < 2:
+            raise ValueError("population must be at least 2: crossover needs two parents")
+        if round(self.population * (self.growth - 1)) < 1:
+            raise ValueError(
+                f"growth = {self.growth} leaves no room for offspring; make it larger than {1 + 1 / self.population:.3g}"
+            )
+
+        at_once = not self.unique_children and self.pool != "growing"
+        if (self.proportional or self.follows) and not at_once:
+            which = "proportional" if self.proportional else "lineage or family"
+            raise ValueError(f"{which} is for children that are born all at once")
+        if self.elite and self.survival == "best":
+            raise ValueError(
+                'elite is for survival = "children": of the best all live on anyway; set it to 0'
+            )
+        if self.remember and not self.elite:
+            raise ValueError("remember is for an elite: nobody else is judged more than once")
+        if self.elites >= self.offspring:
+            raise ValueError(f"elite = {self.elite} leaves no room for children")
+
+    @property
+    def follows(self) -> bool:
+        """Whether it is known whose child each is."""
+        return self.lineage or self.family < 1
+
+    @property
+    def offspring(self) -> int:
+        """Individuals evaluated per generation."""
+        return round(self.population * (self.growth - 1))
+
+    @property
+    def elites(self) -> int:
+        """Of the best that are judged again in each generation."""
+        return max(round(self.elite * self.population), 1) if self.elite else 0

@@ -1,0 +1,223 @@
+"""How the layers of settings are laid over each other."""
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from mjxgait.config.schema import Config, UseConfig
+from mjxgait.config.shipped import data_folder, shipped_configs, shipped_creatures
+from mjxgait.config.tables import build, merge, read_toml
+from mjxgait.errors import UserError, did_you_mean
+
+Layer = tuple[str, Mapping[str, Any]]
+"""The name of a source of settings in errors, and its table."""
+Meant = Callable[[UseConfig], UseConfig]
+
+
+def resolve_config(
+    creature_table: Mapping[str, Any],
+    creature_name: str,
+    file: Path | None = None,
+    use: Mapping[str, str] | None = None,
+    config_class: Callable[[UseConfig], type[Config]] = lambda use: Config,
+    meant: Meant = lambda use: use,
+) -> Config:
+    """Resolve the layers: `configs/default.toml`, then the creature's `[train]`, then the file.
+
+    A file may begin with `standalone = true`: then nothing but the built-in defaults lies under it.
+    A file or `[train]` may name a `base`, see `over_base`.
+    Tables `[train.task.NAME]` of the creature and `[task.NAME]` of the file hold keys for the task of
+    that name. Each lies over the rest of its layer, and over the table of the task that `like` names.
+    Tables `[creature.NAME]` of the file hold keys for the creature of that name; they lie on top.
+    What default.toml and `[train]` say to a controller or a task that takes no part is left out.
+
+    Args:
+      use: controller and task, over what the layers say. config_class: the class with their settings.
+      meant: controller and task under the names that the program uses.
+
+    Raises:
+      UserError: names the layer and the key.
+    """
+    default = data_folder("configs") / "default.toml"
+    mine = _FileLayers() if file is None else _file_layers(file, creature_name)
+    given: list[Layer] = []
+    own = f"{creature_name}/creature.toml: [train]"
+    general = over_base(creature_table, own)
+    of_tasks = general.pop("task", {})
+    if not mine.standalone:
+        given.append((str(default), read_toml(default)))
+        given.append((own, general))
+    chosen = meant(_chosen([*given, *mine.general, *mine.creature], use or {}))
+    if not mine.standalone:
+        tables = _layers_of(of_tasks, chosen, meant, f"{creature_name}/creature.toml: [train.task")
+        given += [(w, {**table, "use": dataclasses.asdict(chosen)}) for w, table in tables]
+    cls = config_class(chosen)
+    table: dict[str, Any] = {}
+    for where, layer in [
+        *((w, _without_absent(given_one, chosen, meant)) for w, given_one in given),
+        *mine.general,
+        *_layers_of(mine.tasks, chosen, meant, mine.where),
+        *mine.creature,
+    ]:
+        table = merge(table, layer)
+        build(cls, table, where)
+    table = merge(table, {"use": dataclasses.asdict(chosen)})
+    config = build(cls, table, "the settings taken together")
+    _check_other_tasks(mine, config, config_class, meant)
+    return config
+
+
+def over_base(table: Mapping[str, Any], where: str) -> dict[str, Any]:
+    """A table of settings laid over the shipped config that its key `base` names, if it has one.
+
+    Raises:
+      UserError: there is no such config.
+    """
+    rest = dict(table)
+    base = rest.pop("base", None)
+    if base is None:
+        return rest
+    known = shipped_configs()
+    if base not in known:
+        raise UserError(f"{where}: base = {base!r}: {did_you_mean(str(base), known)}")
+    under = data_folder("configs") / f"{base}.toml"
+    return merge(over_base(read_toml(under), str(under)), rest)
+
+
+def _layers_of(tables: Mapping[str, Any], use: UseConfig, meant: Meant, where: str) -> list[Layer]:
+    """Return the layers of the task in `use`: those of each table whose name means this task."""
+    names = [n for n in tables if meant(dataclasses.replace(use, task=n)).task == use.task]
+    return [layer for name in names for layer in _tables_of(tables, name, where)]
+
+
+def _check_other_tasks(
+    mine: "_FileLayers",
+    config: Config,
+    config_class: Callable[[UseConfig], type[Config]],
+    meant: Meant,
+) -> None:
+    """Check a file's tables of the tasks that take no part, so that a mistake shows in every run.
+
+    A task of the user's own is known only where it takes part.
+
+    Raises:
+      UserError: names the table and the key.
+    """
+    known = dataclasses.asdict(config)
+    base = {key: value for key, value in known.items() if key not in ("use", "fitness")}
+    for name in mine.tasks:
+        use = meant(dataclasses.replace(config.use, task=name))
+        if ":" in name or use.task == config.use.task:
+            continue
+        for place, table in _tables_of(mine.tasks, name, mine.where):
+            try:
+                cls = config_class(use)
+            except UserError as error:
+                raise UserError(f"{place}: {error}") from None
+            build(cls, merge(base, table), place)
+
+
+def _tables_of(tables: Mapping[str, Any], task: str, where: str) -> list[Layer]:
+    """Return the layers of a task: its table, over the table of the task that `like` names.
+
+    where: how the name of each table begins, such as `mine.toml: [task`.
+
+    Raises:
+      UserError: there is no such table, it is not a table, or it chooses controller or task.
+    """
+    place = f"{where}.{task}]"
+    if not isinstance(tables[task], Mapping):
+        raise UserError(f"{place} = {tables[task]!r}: give a table")
+    own = dict(tables[task])
+    if "use" in own:
+        raise UserError(f"{place}: use: a table of a task chooses neither controller nor task")
+    like = own.pop("like", None)
+    if like is None:
+        return [(place, own)]
+    others = {name: table for name, table in tables.items() if name != task}
+    if like not in list(others):
+        raise UserError(f"{place}: like = {like!r}: {did_you_mean(str(like), list(others))}")
+    return [*_tables_of(others, like, where), (place, own)]
+
+
+def _chosen(layers: Sequence[tuple[str, Mapping[str, Any]]], use: Mapping[str, str]) -> UseConfig:
+    table: dict[str, Any] = {}
+    for where, layer in layers:
+        given = layer.get("use", {})
+        if not isinstance(given, Mapping):
+            raise UserError(f"{where}: use = {given!r}: give a table such as [use]")
+        table = merge(table, given)
+        build(UseConfig, table, f"{where}: [use]")
+    return build(UseConfig, merge(table, use), "the options")
+
+
+def _without_absent(layer: Mapping[str, Any], use: UseConfig, meant: Meant) -> dict[str, Any]:
+    """A layer without what it says to a controller or a task that takes no part.
+
+    It was written for those that it names itself, and else for those of the default.
+    """
+    written = meant(build(UseConfig, layer.get("use", {}), "[use]"))
+    absent = {
+        "controller": use.controller != written.controller,
+        "fitness": use.task != written.task,
+    }
+    return {key: value for key, value in layer.items() if not absent.get(key)}
+
+
+@dataclasses.dataclass(frozen=True)
+class _FileLayers:
+    """What a user's file holds.
+
+    general: the layer for all. creature: the layer for the creature at hand. tasks: the tables by
+    task. where: how the names of these tables begin in an error.
+    """
+
+    standalone: bool = False
+    general: tuple[Layer, ...] = ()
+    creature: tuple[Layer, ...] = ()
+    tasks: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    where: str = ""
+
+
+def _file_layers(file: Path, creature_name: str) -> _FileLayers:
+    """Read a user's file.
+
+    The tables of other creatures are checked too, so that a mistake shows in every run.
+    """
+    path = _find_config(file)
+    general = over_base(read_toml(path), str(path))
+    standalone, creatures = general.pop("standalone", False), general.pop("creature", {})
+    tasks = general.pop("task", {})
+    if not isinstance(standalone, bool):
+        raise UserError(f"{path}: standalone = {standalone!r}: give true or false")
+    if not isinstance(creatures, Mapping):
+        raise UserError(f"{path}: creature = {creatures!r}: give tables such as [creature.crab]")
+    if not isinstance(tasks, Mapping):
+        raise UserError(f"{path}: task = {tasks!r}: give tables such as [task.follow]")
+    known = {creature_name, *shipped_creatures()}
+    for name, own in creatures.items():
+        if name not in known:
+            raise UserError(
+                f'{path}: creature.{name}: "{name}" is neither the creature at hand nor a shipped'
+                f" one; {did_you_mean(name, sorted(known))}"
+            )
+        if not isinstance(own, Mapping):
+            raise UserError(f"{path}: creature.{name} = {own!r}: give a table of config keys")
+        # That of the creature at hand is read below, for whoever takes part.
+        if name != creature_name and "use" not in {**general, **own}:
+            build(Config, own, f"{path}: [creature.{name}]")
+    mine = (f"{path}: [creature.{creature_name}]", creatures.get(creature_name, {}))
+    return _FileLayers(standalone, ((str(path), general),), (mine,), tasks, f"{path}: [task")
+
+
+def _find_config(file: Path) -> Path:
+    shipped = data_folder("configs") / f"{file}.toml"
+    if not file.exists() and shipped.exists():
+        return shipped
+    if not file.exists():
+        raise UserError(
+            f"{file}: no such file and no shipped config of that name; "
+            f"{did_you_mean(str(file), shipped_configs())}"
+        )
+    return file

@@ -1,0 +1,109 @@
+"""The drive: from a controller's command to the torques of the joints, the same for every controller.
+
+A pose is followed by stable PD (Tan, Liu & Turk 2011) or plain PD; a torque is only limited.
+"""
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.typing import ArrayLike
+
+from mjxgait.config.traced import chosen
+from mjxgait.controllers import spd
+from mjxgait.controllers.base import Command
+from mjxgait.controllers.key_poses.config import DriveConfig
+from mjxgait.creature.body import Body
+from mjxgait.types import (
+    BodyState,
+    Plant,
+    Sensed,
+    pytree,
+)
+
+
+@pytree
+class Rules:
+    """How an episode's drive differs from the creature's.
+
+    stable: [] stable PD, else plain PD. constraint_forces: [] whether it counts them.
+    stiffness, damping: [J] factors on kp and kd.
+    """
+
+    stable: jax.Array
+    constraint_forces: jax.Array
+    stiffness: jax.Array
+    damping: jax.Array
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Drive:
+    """The joints' motors of one creature. step: s between two commands."""
+
+    creature: Body
+    step: float
+    command: Command
+
+    def rules(self, settings: DriveConfig, stiffness: jax.Array, damping: jax.Array) -> Rules:
+        """What an episode keeps of the settings, plain or traced, and of its factors [J] on the gains."""
+        return Rules(
+            stable=chosen(settings.law, "spd"),
+            constraint_forces=jnp.asarray(settings.constraint_forces),
+            stiffness=settings.stiffness * stiffness,
+            damping=settings.damping * damping,
+        )
+
+    def torque(
+        self,
+        plant: Plant,
+        rules: Rules,
+        body: BodyState,
+        sensed: Sensed,
+        workings: Any,
+        command: jax.Array,
+    ) -> jax.Array:
+        """Joint torques in N·m; [J] per lane, as are rules, states and command."""
+        limit = self.creature.gains.torque_limit.astype(np.float32)
+        if self.command == "torque":
+            return per_lane(plant, lambda wanted: jnp.clip(wanted, -limit, limit))(command)
+        force, braked, damping = per_lane(plant, self._pull)(
+            rules, sensed.joint_pos, sensed.joint_vel, command
+        )
+        pushed = jnp.where(rules.constraint_forces, 1.0, 0.0)
+        total = per_lane(plant, lambda f, c, on, bias: self.lift(f) + on * c - bias)(
+            force, body.constraint_force, pushed, sensed.bias
+        )
+        acceleration = plant.solve_damped(workings, damping, total)
+        adr = self.creature.joints.dof_adr
+        return per_lane(plant, lambda f, a, b: spd.limited_torque(f, a[adr], b, limit))(
+            force, acceleration, braked
+        )
+
+    def _pull(
+        self, rules: Rules, pos: jax.Array, vel: jax.Array, goal: jax.Array
+    ) -> tuple[jax.Array, jax.Array, jax.Array]:
+        """Force of spring and damper [J], the brake [J], and damping [nv] for the implicit solve.
+
+        Plain PD is stable PD that looks no step ahead.
+        """
+        kp, kd = (
+            self.creature.gains.kp.astype(np.float32) * rules.stiffness,
+            self.creature.gains.kd.astype(np.float32) * rules.damping,
+        )
+        ahead = jnp.where(rules.stable, self.step, 0.0)
+        return spd.pd_force(pos, vel, goal, kp, kd, ahead), ahead * kd, self.lift(self.step * kd)
+
+    def lift(self, joints: ArrayLike) -> jax.Array:
+        """Joint values [J] at their places among the degrees of freedom [nv], zero elsewhere."""
+        adr, nv = self.creature.joints.dof_adr, self.creature.nv
+        if np.array_equal(adr, np.arange(adr[0], adr[0] + len(adr))):
+            return jnp.pad(jnp.asarray(joints), (adr[0], nv - adr[-1] - 1))
+        return jnp.zeros(nv, jnp.float32).at[adr].set(joints)
+
+
+def per_lane(plant: Plant, function: Callable[..., Any]) -> Callable[..., Any]:
+    """The function of one creature, mapped over a plant's lanes."""
+    return jax.vmap(function, in_axes=plant.lane_axis, out_axes=plant.lane_axis)

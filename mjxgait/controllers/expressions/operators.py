@@ -1,0 +1,194 @@
+"""How programs cross and mutate: trees in, trees out, never larger or deeper than they may be."""
+
+import dataclasses
+from functools import partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from mjxgait.controllers.expressions.grow import Words, grown, half_and_half
+from mjxgait.controllers.expressions.text import (
+    ARITY,
+    CONSTANT,
+    EMPTY,
+    FUNCTION_CODES,
+)
+from mjxgait.controllers.expressions.trees import (
+    Trees,
+    arity,
+    canonical,
+    depths,
+    size,
+    subtree_sizes,
+)
+from mjxgait.evolution.variation import Variation
+
+Tree = tuple[jax.Array, jax.Array]
+"""code, value [C]."""
+GRAFT = 3
+"""Depth of a new subtree in mutation."""
+NEUTRAL = {FUNCTION_CODES["+"]: 0.0, FUNCTION_CODES["*"]: 1.0}
+"""Functions, and the second argument with which each gives its first."""
+FINEST = 0.01
+"""Share of the largest change of a constant."""
+
+
+def program_variation(
+    words: Words, joints: int, settings: Any, first: Trees | None = None
+) -> Variation:
+    """The operators; settings: `ProgramConfig`, plain or traced. first: see `Variation`."""
+
+    def create(key: jax.Array, count: int) -> Trees:
+        keys = jax.random.split(key, count * joints)
+        make = partial(
+            half_and_half,
+            words=words,
+            depth=settings.initial_depth,
+            constants=settings.constants,
+        )
+        code, value = jax.vmap(lambda key: make(key))(keys)
+        shape = (count, joints, words.capacity)
+        return Trees(code.reshape(shape), value.reshape(shape))
+
+    def cross(key: jax.Array, mother: Trees, father: Trees) -> Trees:
+        key_joint, key_cross = jax.random.split(key)
+        joint = jax.random.randint(key_joint, (), 0, joints)
+        return _with(
+            mother, joint, crossed(key_cross, _of(mother, joint), _of(father, joint), settings)
+        )
+
+    def mutate(key: jax.Array, genome: Trees) -> Trees:
+        key_joint, key_mutate = jax.random.split(key)
+        joint = jax.random.randint(key_joint, (), 0, joints)
+        return _with(genome, joint, mutated(key_mutate, _of(genome, joint), words, settings))
+
+    def price(genomes: Trees) -> jax.Array:
+        return jnp.asarray(settings.parsimony * jnp.sum(genomes.code != EMPTY, axis=(1, 2)))
+
+    return Variation(create, cross, mutate, price, long=True, first=first)
+
+
+def crossed(key: jax.Array, mother: Tree, father: Tree, settings: Any) -> Tree:
+    """The mother with a subtree of the father in place of one of hers (Koza 1992); herself where
+    that would be too large or too deep.
+    """
+    key_here, key_there = jax.random.split(key)
+    here = chosen_node(key_here, mother[0], settings.functions_cross)
+    there = chosen_node(key_there, father[0], settings.functions_cross)
+    return spliced(mother, here, father, there, settings.depth)
+
+
+def mutated(key: jax.Array, tree: Tree, words: Words, settings: Any) -> Tree:
+    """With one change of a kind that is drawn by the settings' shares."""
+    key_kind, key_place, key_change = jax.random.split(key, 3)
+    place = jax.random.randint(key_place, (), 0, jnp.maximum(size(tree[0]), 1))
+    deep = jnp.int32(GRAFT)
+    graft = grown(key_change, words, deep, jnp.int32(0), settings.constants)
+    options = (
+        spliced(tree, place, graft, jnp.int32(0), settings.depth),
+        _another(key_change, tree, place, words),
+        spliced((jnp.zeros_like(tree[0]), tree[1]), jnp.int32(0), tree, place, settings.depth),
+        _moved(key_change, tree, settings),
+        _nudged(key_change, tree, place, words, settings),
+    )
+    kinds = ("subtree", "point", "hoist", "constant", "nudge")
+    shares = jnp.stack([jnp.asarray(getattr(settings, kind), jnp.float32) for kind in kinds])
+    kind = jax.random.categorical(key_kind, jnp.log(shares))
+    code, value = (jnp.stack(parts)[kind] for parts in zip(*options, strict=True))
+    return code, value
+
+
+def chosen_node(key: jax.Array, code: jax.Array, at_functions: Any) -> jax.Array:
+    """[] the place of a node: of a function with this chance, where there is one, else of an end."""
+    key_kind, key_node = jax.random.split(key)
+    inner = (code != EMPTY) & (arity(code) > 0)
+    ends = (code != EMPTY) & (arity(code) == 0)
+    wants_inner = jax.random.bernoulli(key_kind, at_functions) & jnp.any(inner)
+    among = jnp.where(wants_inner, inner, ends)
+    return jax.random.categorical(key_node, jnp.where(among, 0.0, -jnp.inf))
+
+
+def spliced(
+    host: Tree, here: jax.Array, donor: Tree, there: jax.Array, deepest: jax.Array | int
+) -> Tree:
+    """The host with the donor's subtree at `there` [] in place of its own at `here` []; the host
+    itself where that would be too large or too deep. An empty host becomes the subtree.
+    """
+    places = np.arange(host[0].shape[0])
+    lost, gained = subtree_sizes(host[0])[here], subtree_sizes(donor[0])[there]
+    from_donor = (places >= here) & (places < here + gained)
+    source = jnp.where(places < here, places, places - gained + lost)
+    after = size(host[0]) - lost + gained
+
+    def joined(ours: jax.Array, theirs: jax.Array) -> jax.Array:
+        last = len(places) - 1
+        kept = ours[jnp.clip(source, 0, last)]
+        given = theirs[jnp.clip(places - here + there, 0, last)]
+        return jnp.where(places < after, jnp.where(from_donor, given, kept), 0)
+
+    code, value = canonical(joined(host[0], donor[0]), joined(host[1], donor[1]))
+    fits = (after <= len(places)) & (jnp.max(depths(code)) <= deepest)
+    return jnp.where(fits, code, host[0]), jnp.where(fits, value, host[1])
+
+
+def _another(key: jax.Array, tree: Tree, place: jax.Array, words: Words) -> Tree:
+    """With another function of as many arguments at a place, or another sense."""
+    functions = np.array(words.functions, np.int32)
+    wanted = arity(tree[0])[place]
+    key_function, key_sense = jax.random.split(key)
+    alike = jnp.asarray(ARITY)[functions] == wanted
+    function = functions_at(key_function, functions, alike)
+    sense = jax.random.choice(key_sense, np.array(words.senses, np.int32))
+    code = tree[0].at[place].set(jnp.where(wanted > 0, function, sense))
+    return canonical(code, tree[1])
+
+
+def functions_at(key: jax.Array, functions: np.ndarray, allowed: jax.Array) -> jax.Array:
+    """[] one of the allowed codes."""
+    return jnp.asarray(functions)[jax.random.categorical(key, jnp.where(allowed, 0.0, -jnp.inf))]
+
+
+def _moved(key: jax.Array, tree: Tree, settings: Any) -> Tree:
+    """With one of its constants moved; itself where it has none."""
+    key_which, key_by = jax.random.split(key)
+    constants = tree[0] == CONSTANT
+    place = jax.random.categorical(key_which, jnp.where(constants, 0.0, -jnp.inf))
+    moves = constants & (np.arange(len(constants)) == place)
+    return tree[0], jnp.where(moves, tree[1] + _step(key_by, settings), tree[1])
+
+
+def _nudged(key: jax.Array, tree: Tree, place: jax.Array, words: Words, settings: Any) -> Tree:
+    """With what is at a place [] a little more or less, or larger or smaller; itself where it has
+    neither sums nor products.
+    """
+    ways = [(code, at) for code, at in NEUTRAL.items() if code in words.functions]
+    if not ways:
+        return tree
+    key_way, key_by = jax.random.split(key)
+    function, neutral = jax.random.choice(key_way, jnp.array(ways, jnp.float32))
+    room = jnp.zeros_like(tree[0])
+    code = room.at[:3].set(jnp.stack([function.astype(room.dtype), CONSTANT, CONSTANT]))
+    value = jnp.zeros_like(tree[1]).at[2].set(neutral + _step(key_by, settings))
+    changed = spliced((code, value), jnp.int32(1), tree, place, settings.depth)
+    return spliced(tree, place, changed, jnp.int32(0), settings.depth)
+
+
+def _step(key: jax.Array, settings: Any) -> jax.Array:
+    """[] Gaussian, and as often fine as coarse: nobody knows how sensitive an expression is."""
+    key_fine, key_by = jax.random.split(key)
+    low, high = settings.constants
+    fine = FINEST ** jax.random.uniform(key_fine)
+    return settings.constant_sigma * (high - low) * fine * jax.random.normal(key_by)
+
+
+def _of(trees: Trees, joint: jax.Array) -> Tree:
+    return trees.code[joint], trees.value[joint]
+
+
+def _with(trees: Trees, joint: jax.Array, tree: Tree) -> Trees:
+    code, value = tree
+    return dataclasses.replace(
+        trees, code=trees.code.at[joint].set(code), value=trees.value.at[joint].set(value)
+    )

@@ -1,0 +1,94 @@
+"""What there is to tell of genomes of expressions."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+
+from mjxgait.champion import codec_of
+from mjxgait.controllers.expressions.text import (
+    ADDED,
+    EMPTY,
+    terminals,
+    to_text,
+)
+from mjxgait.controllers.key_poses.report import shared, title
+from mjxgait.inspect.snapshot import Snapshot
+from mjxgait.inspect.tables import titled_table
+
+
+class ProgramView:
+    """An expression per joint; see `GenomeView`."""
+
+    def facts(self, snapshot: Snapshot, i: int) -> dict[str, Any]:
+        """See `GenomeView`."""
+        return {
+            "expressions": _texts(snapshot, i),
+            "nodes": _nodes(snapshot)[i].tolist(),
+            "nodes_that_matter": _mattering(snapshot, i),
+        }
+
+    def spread(self, snapshot: Snapshot) -> dict[str, Any]:
+        """See `GenomeView`: nodes per expression, over the population."""
+        nodes = _nodes(snapshot)
+        return {"nodes": {"mean": nodes.mean(0).tolist(), "most": nodes.max(0).tolist()}}
+
+    def difference(self, a: Snapshot, b: Snapshot) -> dict[str, Any]:
+        """See `GenomeView`."""
+        mine, other = _texts(a, 0), _texts(b, 0)
+        comparable = a.creature.joints.names == b.creature.joints.names
+        alike = a.genomes["code"].shape[1:] == b.genomes["code"].shape[1:]
+        return {
+            "same_individuals": shared(a, b) if comparable and alike else None,
+            "champion_expressions": {
+                joint: [text, other[joint]]
+                for joint, text in mine.items()
+                if joint in other and other[joint] != text
+            },
+        }
+
+    def show(
+        self, individual: Mapping[str, Any], spread: Mapping[str, Any] | None, console: Console
+    ) -> None:
+        """See `GenomeView`."""
+        table = titled_table(f"{title(individual)}: an expression per joint", console)
+        for heading in ("joint", "nodes", "that matter", "expression"):
+            table.add_column(heading, overflow="fold")
+        sizes = individual["nodes"], individual["nodes_that_matter"]
+        for (joint, text), nodes, matter in zip(
+            individual["expressions"].items(), *sizes, strict=True
+        ):
+            table.add_row(joint, str(nodes), f"{matter} ({matter / nodes:.0%})", text)
+        console.print(table)
+        if spread:
+            mean = np.mean(spread["nodes"]["mean"])
+            console.print(f"the population's expressions have {mean:.1f} nodes in the mean")
+
+    def show_difference(self, found: Mapping[str, Any], console: Console) -> None:
+        """See `GenomeView`."""
+        if found["same_individuals"] is None:
+            console.print("\nThe genomes differ in shape, so they cannot be compared in full.")
+        else:
+            console.print(f"\n{found['same_individuals']} genomes are in both populations.")
+        for joint, (mine, other) in found["champion_expressions"].items():
+            console.print(f"{joint}:\n  A {mine}\n  B {other}")
+
+
+def _texts(snapshot: Snapshot, i: int) -> dict[str, str]:
+    known = terminals(snapshot.creature, tuple(ADDED.values()))
+    rows = zip(snapshot.genomes["code"][i], snapshot.genomes["value"][i], strict=True)
+    texts = (to_text(code, value, known) for code, value in rows)
+    return dict(zip(snapshot.creature.joints.names, texts, strict=True))
+
+
+def _mattering(snapshot: Snapshot, i: int) -> list[int]:
+    """[J] nodes that are left of each expression when what makes no difference is gone."""
+    genome = {name: array[i] for name, array in snapshot.genomes.items()}
+    settled = codec_of("program").settled(genome, snapshot.creature)
+    return [int(count) for count in (settled["code"] != EMPTY).sum(axis=1)]
+
+
+def _nodes(snapshot: Snapshot) -> np.ndarray:
+    """[P, J]."""
+    return np.asarray((snapshot.genomes["code"] != EMPTY).sum(axis=2))

@@ -1,0 +1,134 @@
+"""Genomes of expressions, one per joint, as people read and write them."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from mjxgait.champion.plain import PlainCodec
+from mjxgait.config.tables import build
+from mjxgait.controllers.expressions.config import MOST_NODES, ProgramConfig
+from mjxgait.controllers.expressions.parse import (
+    DEEPEST,
+    Vocabulary,
+    read_programs,
+    to_arrays,
+)
+from mjxgait.controllers.expressions.simplify import simplified
+from mjxgait.controllers.expressions.text import (
+    ADDED,
+    HasParts,
+    chosen_terminals,
+    in_text,
+    nested,
+    terminals,
+    to_text,
+)
+from mjxgait.creature import Creature
+from mjxgait.errors import UserError
+
+
+class ProgramCodec(PlainCodec):
+    """Of genomes with `code` and `value` [J, C]; see `Codec`."""
+
+    def document(
+        self, genome: Mapping[str, np.ndarray], settings: ProgramConfig, creature: Creature
+    ) -> dict[str, Any]:
+        """See `Codec`. expressions: by joint. nodes: the most that one may have."""
+        known = terminals(creature, tuple(ADDED.values()))
+        rows = zip(creature.joints.names, genome["code"], genome["value"], strict=True)
+        return {
+            "expressions": {name: to_text(code, value, known) for name, code, value in rows},
+            "nodes": int(genome["code"].shape[1]),
+        }
+
+    def settled(
+        self, genome: Mapping[str, np.ndarray], creature: Creature
+    ) -> dict[str, np.ndarray]:
+        """See `Codec`: simplified, as it is written and read."""
+        known, nodes = terminals(creature, tuple(ADDED.values())), genome["code"].shape[1]
+        pairs = zip(genome["code"], genome["value"], strict=True)
+        rows = []
+        for code, value in pairs:
+            text = in_text(simplified(nested(code, value, known)))
+            rows.append(to_arrays(text, known, nodes, "an expression"))
+        code, value = (np.stack(parts) for parts in zip(*rows, strict=True))
+        return {"code": code, "value": value}
+
+    def genome(self, document: Mapping[str, Any], creature: Creature) -> dict[str, np.ndarray]:
+        """See `Codec`."""
+        known, nodes = terminals(creature, tuple(ADDED.values())), int(document["nodes"])
+        if not 1 <= nodes <= MOST_NODES:
+            raise ValueError(f"nodes = {nodes}: an expression has 1 to {MOST_NODES}")
+        texts = document["expressions"]
+        if missing := [name for name in creature.joints.names if name not in texts]:
+            raise UserError(f'no expression for joint "{missing[0]}"')
+        pairs = [
+            to_arrays(str(texts[name]), known, nodes, f'expression of joint "{name}"')
+            for name in creature.joints.names
+        ]
+        code, value = (np.stack(rows) for rows in zip(*pairs, strict=True))
+        return {"code": code, "value": value}
+
+    def settings(self, table: Mapping[str, Any], where: str) -> ProgramConfig:
+        """See `Codec`."""
+        return build(ProgramConfig, table, where)
+
+    def check(self, genome: Mapping[str, np.ndarray], creature: Creature) -> None:
+        """See `Codec`."""
+        for j, place in np.argwhere(~np.isfinite(genome["value"])):
+            raise UserError(
+                f'the expression of joint "{creature.joints.names[j]}" has a constant that is '
+                f"{genome['value'][j, place]}: this champion cannot move; take one of another "
+                "generation"
+            )
+
+    def shapes(self, settings: ProgramConfig, creature: Creature) -> dict[str, tuple[int, ...]]:
+        """See `Codec`."""
+        shape = (len(creature.joints.names), settings.nodes)
+        return {"code": shape, "value": shape}
+
+
+def vocabulary(
+    body: HasParts, settings: ProgramConfig, added: Sequence[str], depth: int = DEEPEST
+) -> Vocabulary:
+    """What a program may be made of under these settings, plain or traced.
+
+    added: senses that the task adds. depth: most functions within each other.
+    """
+    known = terminals(body, added)
+    return Vocabulary(
+        known,
+        settings.nodes,
+        senses=tuple(terminal.name for terminal in chosen_terminals(known, settings.senses)),
+        functions=settings.functions,
+        patterns=settings.senses,
+        depth=min(depth, DEEPEST),
+    )
+
+
+def programs_to_begin_with(
+    body: HasParts, settings: ProgramConfig, added: Sequence[str], depth: int = DEEPEST
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """code and value [G, J, C] of the programs that the settings name; None if they name none.
+
+    added, depth: see `vocabulary`.
+
+    Raises:
+      UserError: one of them is wrong.
+    """
+    limits, found = vocabulary(body, settings, added, depth), []
+    for number, text in enumerate(settings.expressions, 1):
+        where = f"controller.expressions: program {number}"
+        found += read_programs(text, body.joints.names, limits, where, numbered=False)
+    if not found:
+        return None
+    code, value = (np.stack(column) for column in zip(*found, strict=True))
+    return code, value
+
+
+def program_text(body: HasParts, program: tuple[np.ndarray, np.ndarray]) -> str:
+    """A program, code and value [J, C], as `(list EXPRESSION ...)`."""
+    known = terminals(body, tuple(ADDED.values()))
+    rows = [to_text(code, value, known) for code, value in zip(*program, strict=True)]
+    return f"(list {' '.join(rows)})"

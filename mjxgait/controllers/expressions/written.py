@@ -1,0 +1,117 @@
+"""Programs that were written by hand: read from a file, and laid over the settings of a run."""
+
+import dataclasses
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from mjxgait.champion import Champion
+from mjxgait.config.schema import Config
+from mjxgait.config.tables import build, merge
+from mjxgait.controllers.expressions.config import MOST_NODES, ProgramConfig
+from mjxgait.controllers.expressions.parse import Vocabulary, read_programs
+from mjxgait.controllers.expressions.serialize import (
+    program_text,
+    programs_to_begin_with,
+    vocabulary,
+)
+from mjxgait.controllers.expressions.text import EMPTY, terminals
+from mjxgait.creature import Creature
+from mjxgait.errors import UserError
+from mjxgait.plugins.registry import find
+
+Program = tuple[np.ndarray, np.ndarray]
+"""code and value [J, C] of a program."""
+
+
+def with_expressions(creature: Creature, config: Config, file: Path) -> Config:
+    """The settings of a run whose first generation begins with the programs of a file.
+
+    The settings hold the programs themselves, so that the run folder needs no other file.
+
+    Raises:
+      UserError: names the file and the line of a mistake.
+    """
+    if config.use.controller != "program":
+        raise UserError(
+            f"--expressions {file}: is for the controller of expressions, and this is "
+            f"{config.use.controller}; take --controller program"
+        )
+    settings = _settings(config)
+    limits = vocabulary(creature, settings, senses_added(config), settings.depth)
+    programs = programs_in(creature, file, limits)
+    texts = [program_text(creature, program) for program in programs]
+    table = merge(dataclasses.asdict(config), {"controller": {"expressions": texts}})
+    given = build(type(config), table, str(file))
+    _check_count(given, str(file), len(programs))
+    return given
+
+
+def written_champion(creature: Creature, config: Config, file: Path) -> Champion:
+    """The program of a file as a champion that no run has evolved.
+
+    It may use all functions and senses that there are.
+
+    Raises:
+      UserError: names the file and the line of a mistake; or the file holds several programs.
+    """
+    known = terminals(creature, senses_added(config))
+    programs = programs_in(creature, file, Vocabulary(known, MOST_NODES))
+    if len(programs) > 1:
+        raise UserError(f"{file}: holds {len(programs)} programs; leave the one to examine in it")
+    code, value = programs[0]
+    # As many places as a run's: then the same program has the same fingerprint.
+    places = max(_settings(config).nodes, int((code != EMPTY).sum(1).max()))
+    genome = {"code": code[:, :places], "value": value[:, :places]}
+    return Champion.of(creature, config, genome, fitness=0.0, terms={}, origin={})
+
+
+def programs_in(creature: Creature, file: Path, limits: Vocabulary) -> list[Program]:
+    """The programs of a file, under these limits.
+
+    Raises:
+      UserError: names the file, and the line of a mistake.
+    """
+    try:
+        text = file.read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        raise UserError(f"{file}: no such file") from None
+    except UnicodeDecodeError:
+        raise UserError(f"{file}: is not text in UTF-8; save it as such") from None
+    except OSError as error:
+        raise UserError(f"{file}: cannot be read ({error.strerror})") from None
+    return read_programs(text, creature.joints.names, limits, str(file))
+
+
+def check_programs(creature: Creature, config: Config) -> None:
+    """Refuses programs of the settings of the controller `program` that are wrong or too many.
+
+    Raises:
+      UserError: says which, and the way out.
+    """
+    settings = _settings(config)
+    if not settings.expressions:
+        return
+    given = programs_to_begin_with(creature, settings, senses_added(config), settings.depth)
+    _check_count(config, "controller.expressions", 0 if given is None else len(given[0]))
+
+
+def senses_added(config: Config) -> Sequence[str]:
+    """Names of the senses that the task of a config adds."""
+    return tuple(getattr(find("task", config.use.task), "adds", ()))
+
+
+def _settings(config: Config) -> ProgramConfig:
+    """The settings of the controller `program`."""
+    settings: Any = config.controller
+    return cast(ProgramConfig, settings)
+
+
+def _check_count(config: Config, where: str, count: int) -> None:
+    if count > config.evolution.population:
+        raise UserError(
+            f"{where}: {count} programs, and a population of {config.evolution.population}; take "
+            f"--population {count} or more"
+        )

@@ -1,0 +1,1 @@
+"""Controllers that track key poses (Wilson)."""

@@ -1,0 +1,293 @@
+"""From a genome to the target pose of each moment: mirroring, interpolation, corrections, advance (docs/controller.md).
+
+Every function is for one creature; the rollout maps them over its lanes.
+"""
+
+import dataclasses
+from collections.abc import Mapping
+from typing import ClassVar
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from mjxgait.config.evolution import EvolutionConfig
+from mjxgait.config.traced import chosen
+from mjxgait.controllers.base import Command, Senses
+from mjxgait.controllers.key_poses.config import STEPPING, TUNING, PoseConfig
+from mjxgait.controllers.key_poses.operators import pose_variation
+from mjxgait.creature.body import Body
+from mjxgait.evolution.variation import Box, Variation, in_ranges
+from mjxgait.types import Number, pytree
+
+THRESHOLD, PERIOD, STEER, PITCH, PITCH_RATE, ROLL, ROLL_RATE = range(len(TUNING))
+READS = ("joint_pos", "heading", "aside", "pitch", "roll", "pitch_rate", "roll_rate")
+STEP_READS = ("foot_height", "foot_place", "nose_vel")
+LIFTED = 0.02
+"""Hip heights from which a foot is wholly in its swing."""
+GRAVITY = 9.81
+"""m/s²; with the hip height it makes speeds comparable between bodies."""
+MAX_CORRECTION = 0.5
+"""rad, or relative stride length: the most that one correction may change the target."""
+
+
+@pytree
+class Genome:
+    """The evolvable values. key_poses: [..., K, J] rad; tuning: [..., E] in the order of `TUNING`."""
+
+    key_poses: jax.Array
+    tuning: jax.Array
+
+
+@pytree
+class PoseCycle:
+    """What an episode keeps of a genome and the settings.
+
+    poses: [C, J] rad, of which the first `count` [] are the cycle. tuning: [E]. interpolation: [] steps between neighbours.
+    clocked: [] whether the clock moves the target on. steering: factor on the weights of steering.
+    """
+
+    poses: jax.Array
+    tuning: jax.Array
+    count: jax.Array
+    interpolation: jax.Array
+    clocked: jax.Array
+    steering: float = dataclasses.field(default=1.0, metadata={"static": True})
+
+
+@pytree
+class GaitState:
+    """Where the controller is: position [] in steps of interpolation, steps [] since the start."""
+
+    position: jax.Array
+    steps: jax.Array
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class PoseTracker:
+    """A controller: the cycle of key poses of one creature.
+
+    step: s between two control steps.
+    """
+
+    creature: Body
+    step: float
+    command: ClassVar[Command] = "pose"
+    every: ClassVar[int] = 1
+
+    @property
+    def reads(self) -> tuple[str, ...]:
+        """See `Controller`."""
+        return READS + (STEP_READS if self.creature.corrections.steps else ())
+
+    def bounds(self, config: PoseConfig) -> tuple[Genome, Genome]:
+        """Lowest and highest genome: key_poses [K, J], tuning [E]."""
+        low, high = (
+            jnp.stack([jnp.float32(ends[end]) for ends in self._ranges(config)]) for end in (0, 1)
+        )
+        shape = (config.key_poses, len(self.creature.joints.names))
+
+        def genome(pose: Number, tuning: jax.Array) -> Genome:
+            return Genome(jnp.broadcast_to(jnp.asarray(pose, jnp.float32), shape), tuning)
+
+        joints = self.creature.joints
+        lowest, highest = genome(joints.pose_low, low), genome(joints.pose_high, high)
+        if not config.around:
+            return lowest, highest
+        middle, width = self._original(config), jnp.radians(config.within)
+        return (
+            dataclasses.replace(lowest, key_poses=jnp.maximum(lowest.key_poses, middle - width)),
+            dataclasses.replace(highest, key_poses=jnp.minimum(highest.key_poses, middle + width)),
+        )
+
+    def _ranges(self, config: PoseConfig) -> list[tuple[Number, Number]]:
+        """Ends of each gene besides the key poses."""
+        usual = [getattr(config.tuning, name) for name in TUNING]
+        if not self.creature.corrections.steps:
+            return usual
+        return [*usual, *(getattr(config.stepping, name) for name in STEPPING)]
+
+    def _original(self, config: PoseConfig) -> jax.Array:
+        """The key poses [K, J] that the config names, within the pose ranges."""
+        joints, shape = self.creature.joints, (config.key_poses, len(self.creature.joints.names))
+        given = jnp.stack([jnp.float32(angle) for angle in config.around]).reshape(shape)
+        low, high = (edge.astype(np.float32) for edge in (joints.pose_low, joints.pose_high))
+        return jnp.clip(given, low, high)
+
+    def variation(self, settings: PoseConfig, evolution: EvolutionConfig) -> Variation:
+        """See `Controller`; the first that is created has the key poses that the settings name."""
+        usual = pose_variation(Box(*self.bounds(settings)), evolution)
+        if not settings.around:
+            return usual
+
+        def create(key: jax.Array, count: int) -> Genome:
+            made = usual.create(key, count)
+            poses = made.key_poses.at[0].set(self._original(settings))
+            return dataclasses.replace(made, key_poses=poses)
+
+        return dataclasses.replace(usual, create=create)
+
+    def genes(self, genomes: Genome, settings: PoseConfig) -> np.ndarray:
+        """See `Controller`."""
+        return in_ranges(genomes, Box(*self.bounds(settings)))
+
+    def numbers(self, genomes: Genome) -> Mapping[str, np.ndarray]:
+        """See `Controller`: none."""
+        return {}
+
+    def prepare(self, genome: Genome, config: PoseConfig) -> PoseCycle:
+        """The whole cycle of a genome [K, J] under the settings, plain or traced."""
+        poses = pose_cycle(self.creature, genome.key_poses)
+        count = jnp.where(config.mirror, poses.shape[0], config.key_poses)
+        return PoseCycle(
+            poses,
+            genome.tuning,
+            count,
+            jnp.int32(config.interpolation),
+            chosen(config.advance, "clock"),
+            config.steering,
+        )
+
+    def load(self, plan: PoseCycle) -> None:
+        """See `Controller`: the same for all."""
+
+    def init(self) -> GaitState:
+        """The state at the start of an episode."""
+        return GaitState(position=jnp.zeros((), jnp.int32), steps=jnp.zeros((), jnp.int32))
+
+    def act(
+        self, cycle: PoseCycle, state: GaitState, senses: Senses
+    ) -> tuple[jax.Array, GaitState]:
+        """Target pose [J] of this moment, and the state of the next."""
+        creature = self.creature
+        target = interpolate(cycle.poses, state.position, cycle.interpolation, cycle.count)
+        if creature.corrections.steps:
+            stand = jnp.asarray(creature.joints.stand, jnp.float32)
+            target = stand + begun(cycle.tuning, state.steps, self.step) * (target - stand)
+        target = target + corrections(creature, cycle.tuning, target, senses, cycle.steering)
+        target = jnp.clip(
+            target, creature.joints.low.astype(np.float32), creature.joints.high.astype(np.float32)
+        )
+        steps = state.steps + 1
+        positions = cycle.count * cycle.interpolation
+        reached = jnp.mean((target - senses["joint_pos"]) ** 2) < cycle.tuning[THRESHOLD] ** 2
+        by_clock = clock_position(steps, self.step, cycle.tuning[PERIOD], positions)
+        position = jnp.where(cycle.clocked, by_clock, state.position + reached) % positions
+        return target, GaitState(position, steps)
+
+
+def pose_cycle(creature: Body, key_poses: jax.Array) -> jax.Array:
+    """The closed cycle [C, J]: the key poses [K, J] and, for a symmetric creature, their mirror images."""
+    if not creature.mirror.symmetric:
+        return key_poses
+    return jnp.concatenate(
+        [key_poses, creature.mirror.sign.astype(np.float32) * key_poses[:, creature.mirror.partner]]
+    )
+
+
+def clock_position(
+    steps: jax.Array, step: float, period: jax.Array, positions: jax.Array
+) -> jax.Array:
+    """Position [] in a cycle of `positions` [] and `period` [] s after `steps` [] of `step` s.
+
+    In integers that overflow at the end of a cycle: float32 time would drift away from the examiner's.
+    """
+    turns = step / period
+    turn = ((turns - jnp.floor(turns)) * 2.0**32).astype(jnp.uint32)
+    phase = steps.astype(jnp.uint32) * turn
+    place = ((phase >> 16) + 1) * positions.astype(jnp.uint32) >> 16
+    return place.astype(jnp.int32) % positions
+
+
+def interpolate(
+    poses: jax.Array, position: jax.Array, n: jax.Array | int, count: jax.Array | int
+) -> jax.Array:
+    """Target pose [J] at a position [] of a cycle with n steps between neighbours: the first `count` [] of the poses [C, J].
+
+    A weighted sum over all poses instead of two look-ups: with lanes innermost a look-up would be a gather per lane.
+    """
+    places = np.arange(poses.shape[0])
+    ahead = (position / n - places) % count
+    behind = (places - position / n) % count
+    weight = jnp.where(places < count, jnp.maximum(0.0, 1.0 - jnp.minimum(ahead, behind)), 0.0)
+    return jnp.sum(weight[:, None] * poses, axis=0)
+
+
+def begun(tuning: jax.Array, steps: jax.Array, step: float) -> jax.Array:
+    """Share [] of the cycle that has grown out of the standing pose after `steps` [] of `step` s."""
+    over = tuning[len(TUNING) + STEPPING.index("begin")]
+    return jnp.minimum(1.0, (steps + 1) * step / jnp.maximum(over, step))
+
+
+def corrections(
+    creature: Body,
+    tuning: jax.Array,
+    target: jax.Array,
+    senses: Senses,
+    steering: float = 1.0,
+) -> jax.Array:
+    """Change [J] of the target pose by steering and balance; zero where the genes are zero.
+
+    steering: factor on the creature's weights of steering.
+    """
+    wrong = off_the_way(creature, senses)
+    steer = _clip(tuning[STEER] * wrong)
+    pitch, roll = (
+        _clip(tuning[angle] * senses[name] + tuning[rate] * senses[f"{name}_rate"])
+        for name, angle, rate in (("pitch", PITCH, PITCH_RATE), ("roll", ROLL, ROLL_RATE))
+    )
+    bend, stride, on_pitch, on_roll, stand = (
+        value.astype(np.float32)
+        for value in (
+            creature.corrections.steer_bend * steering,
+            creature.corrections.steer_stride * steering,
+            creature.corrections.balance_pitch,
+            creature.corrections.balance_roll,
+            creature.joints.stand,
+        )
+    )
+    change = (target - stand) * steer * stride + steer * bend + pitch * on_pitch + roll * on_roll
+    if not creature.corrections.steps:
+        return change
+    return change + stepping(creature, tuning[len(TUNING) :], senses)
+
+
+def stepping(creature: Body, genes: jax.Array, senses: Senses) -> jax.Array:
+    """Change [J] of the target pose by stepping under a fall; genes: [10] in the order of
+    `STEPPING`.
+
+    After SIMBICON (Yin, Loken & van de Panne 2007): the leg that swings goes on for where the trunk
+    is over its support and how fast it goes there, the hip of the leg that stands turns the trunk
+    back, and to its way.
+    """
+    weights, hip = creature.corrections.stepping, creature.frame.hip_height
+    assert weights is not None
+    step, step_rate, side, side_rate, hold, hold_rate, sway, sway_rate, _, turn = genes
+    swing = jnp.clip(senses["foot_height"] / (LIFTED * hip), 0.0, 1.0)
+    stance = 1.0 - swing
+    moved = senses["foot_place"] - creature.feet.places.astype(np.float32)
+    share = stance / jnp.maximum(jnp.sum(stance), 1.0)
+    over = -jnp.sum(share[:, None] * moved, axis=0) / hip
+    speed = senses["nose_vel"] / jnp.sqrt(GRAVITY * hip)
+    ahead = _clip(step * over[0] + step_rate * speed[0])
+    aside = _clip(side * over[1] + side_rate * speed[1])
+    pitch = _clip(hold * senses["pitch"] + hold_rate * senses["pitch_rate"])
+    roll = _clip(sway * senses["roll"] + sway_rate * senses["roll_rate"])
+    yaw = _clip(turn * off_the_way(creature, senses))
+    asked = (
+        (swing * ahead - stance * pitch, weights.ahead),
+        (swing * aside + stance * roll, weights.aside),
+        ((stance - swing) * yaw, weights.turn),
+    )
+    by_joint = ((jnp.stack([feet[leg] for leg in weights.legs]), by) for feet, by in asked)
+    return sum((of * by.astype(np.float32) for of, by in by_joint), start=jnp.zeros(()))
+
+
+def off_the_way(creature: Body, senses: Senses) -> jax.Array:
+    """rad [] by which it looks to the left of its way, and more for how far it is to the left of it."""
+    aside = senses["aside"] / (2 * creature.frame.body_length)
+    return senses["heading"] + aside
+
+
+def _clip(correction: jax.Array) -> jax.Array:
+    return jnp.clip(correction, -MAX_CORRECTION, MAX_CORRECTION)

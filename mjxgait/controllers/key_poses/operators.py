@@ -1,0 +1,123 @@
+"""The operators of a genome of key poses [K, J] and tuning [E], each within its box."""
+
+import dataclasses
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+
+from mjxgait.config.evolution import EvolutionConfig
+from mjxgait.config.traced import chosen
+from mjxgait.evolution.variation import (
+    Box,
+    Variation,
+    creation,
+    jittered,
+    narrowed,
+)
+
+
+def pose_variation(box: Box, config: EvolutionConfig) -> Variation:
+    """The operators of a genome of key poses and tuning, as chosen in the config, which may be plain or traced.
+
+    All options of a choice are computed and one is taken: they cost next to nothing beside the simulations.
+    """
+    poses = narrowed(box, config.pose_range)
+    box = Box(
+        *(
+            dataclasses.replace(edge, key_poses=part.key_poses)
+            for edge, part in ((box.low, poses.low), (box.high, poses.high))
+        )
+    )
+    middle = narrowed(box, config.initial_spread)
+
+    def cross(key: jax.Array, mother: Any, father: Any) -> Any:
+        key_poses, key_tuning = jax.random.split(key)
+        permuted, aligned = (
+            f(key_poses, mother.key_poses, father.key_poses)
+            for f in (permuted_poses, aligned_poses)
+        )
+        from_mother = jax.random.bernoulli(key_tuning, 0.5, mother.tuning.shape)
+        key_which = jax.random.fold_in(key_poses, 1)
+        mixes = chosen(config.crossing, "mixed") & jax.random.bernoulli(key_which, config.permuted)
+        permutes = chosen(config.crossing, "permute") | mixes
+        return dataclasses.replace(
+            mother,
+            key_poses=jnp.where(permutes, permuted, aligned),
+            tuning=jnp.where(from_mother, mother.tuning, father.tuning),
+        )
+
+    def mutate(key: jax.Array, genome: Any) -> Any:
+        key_poses, key_tuning = jax.random.split(key)
+        low, high = box.low, box.high
+        poses = mutated_poses(
+            key_poses,
+            genome.key_poses,
+            low.key_poses,
+            high.key_poses,
+            config.mutation,
+            config.sigma,
+            config.redrawn,
+        )
+        tuning = jittered(
+            key_tuning,
+            genome.tuning,
+            low.tuning,
+            high.tuning,
+            config.tuning_rate,
+            config.tuning_sigma,
+        )
+        return dataclasses.replace(genome, key_poses=poses, tuning=tuning)
+
+    return Variation(create=creation(middle, config), cross=cross, mutate=mutate)
+
+
+def permuted_poses(key: jax.Array, mother: jax.Array, father: jax.Array) -> jax.Array:
+    """K poses [K, J] drawn without repetition from the parents' 2K, in any order (Wilson)."""
+    both = jnp.concatenate([mother, father])
+    return jax.random.permutation(key, both)[: mother.shape[0]]
+
+
+def aligned_poses(key: jax.Array, mother: jax.Array, father: jax.Array) -> jax.Array:
+    """K poses [K, J], each from the one or the other parent, in its place."""
+    return jnp.where(jax.random.bernoulli(key, 0.5, (mother.shape[0], 1)), mother, father)
+
+
+def mutated_poses(
+    key: jax.Array,
+    poses: jax.Array,
+    low: jax.Array,
+    high: jax.Array,
+    kind: Any,
+    sigma: jax.Array | float,
+    redrawn: jax.Array | float = 0.5,
+) -> jax.Array:
+    """Key poses [K, J] with a change in one of them, within the box.
+
+    kind, sigma, redrawn: see `mutation`, `sigma` and `redrawn` of `EvolutionConfig`.
+    """
+    key_pose, key_joint, key_value, key_kind = jax.random.split(key, 4)
+    count, joints = poses.shape
+    here = jnp.arange(count) == jax.random.randint(key_pose, (), 0, count)
+    order = jax.random.permutation(key_joint, jnp.arange(joints))
+    steps = jax.random.bernoulli(key_kind, 1 - redrawn)
+    moves = chosen(kind, "gaussian") | (chosen(kind, "mixed") & steps)
+    coded, code = chosen(kind, "bit") | chosen(kind, "byte"), eight_bits(poses, low, high)
+    flipped = code ^ jnp.where(
+        chosen(kind, "bit"),
+        1 << jax.random.randint(key_kind, (), 0, 8),
+        jax.random.randint(key_kind, (), 0, 256),
+    )
+    moved = poses + sigma * (high - low) * jax.random.normal(key_value, poses.shape)
+    drawn = low + (high - low) * jax.random.uniform(key_value, poses.shape)
+    value = jnp.where(moves, moved, jnp.where(coded, low + flipped / 255 * (high - low), drawn))
+    every = moves | chosen(kind, "pose")
+    joints_changed = jnp.where(every, joints, jnp.where(coded | chosen(kind, "single"), 1, 2))
+    return jnp.clip(jnp.where(here[:, None] & (order < joints_changed), value, poses), low, high)
+
+
+def eight_bits(values: jax.Array, low: jax.Array, high: jax.Array) -> jax.Array:
+    """The nearest of 256 levels between low and high, as integers."""
+    return jnp.round(
+        255 * jnp.clip((values - low) / jnp.maximum(high - low, 1e-9), 0.0, 1.0)
+    ).astype(jnp.int32)

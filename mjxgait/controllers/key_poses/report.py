@@ -1,0 +1,128 @@
+"""What there is to tell of genomes of key poses. Angles in degrees."""
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+
+from mjxgait.controllers.key_poses.config import gene_names
+from mjxgait.inspect.snapshot import Snapshot
+from mjxgait.inspect.tables import print_columns, titled_table
+
+
+class PoseView:
+    """Key poses by joint, tuning by name; see `GenomeView`."""
+
+    def facts(self, snapshot: Snapshot, i: int) -> dict[str, Any]:
+        """See `GenomeView`."""
+        creature, genomes = snapshot.creature, snapshot.genomes
+        ranges = zip(
+            creature.joints.names, creature.joints.pose_low, creature.joints.pose_high, strict=True
+        )
+        return {
+            "tuning": _by_gene(snapshot, genomes["tuning"][i]),
+            "key_poses_deg": [
+                _by_joint(snapshot, np.degrees(pose)) for pose in genomes["key_poses"][i]
+            ],
+            "range_deg": {
+                name: [math.degrees(low), math.degrees(high)] for name, low, high in ranges
+            },
+        }
+
+    def spread(self, snapshot: Snapshot) -> dict[str, Any]:
+        """See `GenomeView`: per joint the mean over the key poses."""
+        poses, tuning = snapshot.genomes["key_poses"], snapshot.genomes["tuning"]
+        spread = np.degrees(poses.std(axis=0).mean(axis=0))
+        room = np.degrees(snapshot.creature.joints.pose_high - snapshot.creature.joints.pose_low)
+        return {
+            "spread_deg": _by_joint(snapshot, spread),
+            "spread_of_range": _by_joint(snapshot, spread / np.maximum(room, 1e-9)),
+            "tuning_spread": _by_gene(snapshot, tuning.std(axis=0)),
+        }
+
+    def difference(self, a: Snapshot, b: Snapshot) -> dict[str, Any]:
+        """See `GenomeView`: of the key poses only where the joints are the same."""
+        mine, other = a.genomes, b.genomes
+        comparable = (
+            a.creature.joints.names == b.creature.joints.names
+            and mine["key_poses"].shape[1:] == other["key_poses"].shape[1:]
+        )
+        # A body that steps under its fall has more genes than one that does not.
+        pairs = zip(_genes(a), mine["tuning"][0], other["tuning"][0], strict=False)
+        return {
+            "same_individuals": shared(a, b) if comparable else None,
+            "champion_moved_deg": _moved(a, b) if comparable else None,
+            "champion_tuning": {name: [float(x), float(y)] for name, x, y in pairs},
+        }
+
+    def show(
+        self, individual: Mapping[str, Any], spread: Mapping[str, Any] | None, console: Console
+    ) -> None:
+        """See `GenomeView`."""
+        poses = individual["key_poses_deg"]
+        table = titled_table(f"{title(individual)}: key poses in degrees", console)
+        headings = [f"pose {k + 1}" for k in range(len(poses))]
+        for heading in ("joint", "may lie in", *headings, *(["spread", "of range"] * bool(spread))):
+            table.add_column(heading, justify="left" if heading == "joint" else "right")
+        for joint, (low, high) in individual["range_deg"].items():
+            apart = (
+                [f"{spread['spread_deg'][joint]:.1f}", f"{spread['spread_of_range'][joint]:.0%}"]
+                if spread
+                else []
+            )
+            table.add_row(
+                joint, f"{low:.0f} .. {high:.0f}", *(f"{pose[joint]:.1f}" for pose in poses), *apart
+            )
+        console.print(table)
+        tuning = (f"{name} {value:.3g}" for name, value in individual["tuning"].items())
+        console.print("tuning: " + ", ".join(tuning))
+
+    def show_difference(self, found: Mapping[str, Any], console: Console) -> None:
+        """See `GenomeView`."""
+        moved = found["champion_moved_deg"]
+        if moved is None:
+            console.print(
+                "\nThe joints or the number of key poses differ, so the poses cannot be compared."
+            )
+            return
+        console.print(f"\n{found['same_individuals']} genomes are in both populations.")
+        table = titled_table("champion: from A to B, in degrees", console)
+        for name in ("joint", *(f"pose {k + 1}" for k in range(len(next(iter(moved.values())))))):
+            table.add_column(name, justify="left" if name == "joint" else "right")
+        for joint, values in moved.items():
+            table.add_row(joint, *(f"{value:+.1f}" if round(value, 1) else "0" for value in values))
+        console.print(table)
+        pairs = found["champion_tuning"].items()
+        changed = {name: [f"{x:.3g}", f"{y:.3g}"] for name, (x, y) in pairs if x != y}
+        print_columns("champion's tuning", changed, console)
+
+
+def shared(a: Snapshot, b: Snapshot) -> int:
+    """How many genomes are in both populations."""
+    mine, other = ({row.tobytes() for row in s.rows} for s in (a, b))
+    return len(mine & other)
+
+
+def title(individual: Mapping[str, Any]) -> str:
+    """What to call an individual."""
+    return "champion" if individual["rank"] == 1 else f"individual {individual['rank']}"
+
+
+def _moved(a: Snapshot, b: Snapshot) -> dict[str, list[float]]:
+    change = np.degrees(b.genomes["key_poses"][0] - a.genomes["key_poses"][0])
+    columns = zip(a.creature.joints.names, change.T, strict=True)
+    return {name: [float(value) for value in column] for name, column in columns}
+
+
+def _by_joint(snapshot: Snapshot, values: Iterable[float]) -> dict[str, float]:
+    return dict(zip(snapshot.creature.joints.names, map(float, values), strict=True))
+
+
+def _genes(snapshot: Snapshot) -> tuple[str, ...]:
+    return gene_names(snapshot.creature.corrections.steps)
+
+
+def _by_gene(snapshot: Snapshot, values: np.ndarray) -> dict[str, float]:
+    return dict(zip(_genes(snapshot), map(float, values), strict=True))

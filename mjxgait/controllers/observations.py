@@ -1,0 +1,147 @@
+"""The senses: what a controller may know of a moment, by name.
+
+Letters: `J` actuated joints, `F` feet.
+"""
+
+from collections.abc import Callable, Collection, Mapping
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from mjxgait.creature.body import Body
+from mjxgait.errors import UserError, did_you_mean
+from mjxgait.types import Sensed
+
+CONTACT_GAP = 0.002
+"""m; a foot nearer to the floor is in contact. A resting foot sinks in by about a millimetre."""
+
+Sense = Callable[[Body, Sensed, jax.Array], jax.Array]
+"""From creature, state of the body and time [] in s to an array."""
+
+
+def _heading(creature: Body, sensed: Sensed, time: jax.Array) -> jax.Array:
+    nose = sensed.trunk_rot @ creature.frame.forward.astype(np.float32)
+    forward, left = creature.frame.start_axes
+    return jnp.arctan2(nose @ left, nose @ forward)
+
+
+def _along(creature: Body, sensed: Sensed, axis: int) -> jax.Array:
+    return (
+        sensed.trunk_pos - creature.frame.stand_pos.astype(np.float32)
+    ) @ creature.frame.start_axes[axis]
+
+
+def _nose(creature: Body, sensed: Sensed) -> tuple[jax.Array, jax.Array]:
+    """Horizontal unit vectors [3], along the nose and to its left; zero for a nose that points
+    straight up or down.
+    """
+    x, y, _ = sensed.trunk_rot @ creature.frame.forward.astype(np.float32)
+    size = jnp.sqrt(x * x + y * y + 1e-12)
+    none = jnp.zeros_like(x)
+    return jnp.stack([x, y, none]) / size, jnp.stack([-y, x, none]) / size
+
+
+def foot_places(creature: Body, sensed: Sensed) -> jax.Array:
+    """Places [F, 2] in m of the feet, ahead of the trunk and left of it along its nose."""
+    axes = jnp.stack(_nose(creature, sensed), axis=1)
+    middles = jnp.stack(
+        [jnp.mean(sensed.geom_pos[geoms], axis=0) for geoms in foot_geoms(creature)]
+    )
+    return (middles - sensed.trunk_pos) @ axes
+
+
+def _attitude(creature: Body, sensed: Sensed, axis: np.ndarray) -> jax.Array:
+    """Sine of the angle of one of the trunk's axes above the horizon."""
+    return jnp.clip((sensed.trunk_rot @ axis.astype(np.float32))[2], -1.0, 1.0)
+
+
+def _rate(creature: Body, sensed: Sensed, axis: np.ndarray) -> jax.Array:
+    """Angular velocity of the trunk about one of its own axes."""
+    return sensed.trunk_angvel @ (sensed.trunk_rot @ axis.astype(np.float32))
+
+
+SENSES: Mapping[str, Sense] = {
+    "time": lambda creature, sensed, time: time,
+    "beat": lambda creature, sensed, time: 2 * (time - jnp.floor(time)) - 1,
+    "joint_pos": lambda creature, sensed, time: sensed.joint_pos,
+    "joint_vel": lambda creature, sensed, time: sensed.joint_vel,
+    "foot_height": lambda creature, sensed, time: foot_heights(creature, sensed),
+    "contact": lambda creature, sensed, time: contacts(creature, sensed),
+    "trunk_pos": lambda creature, sensed, time: sensed.trunk_pos,
+    "trunk_height": lambda creature, sensed, time: trunk_height(sensed),
+    "trunk_rot": lambda creature, sensed, time: sensed.trunk_rot,
+    "trunk_vel": lambda creature, sensed, time: sensed.trunk_vel,
+    "trunk_angvel": lambda creature, sensed, time: sensed.trunk_angvel,
+    "heading": _heading,
+    "forward": lambda creature, sensed, time: _along(creature, sensed, 0),
+    "aside": lambda creature, sensed, time: _along(creature, sensed, 1),
+    "forward_vel": lambda creature, sensed, time: sensed.trunk_vel @ creature.frame.start_axes[0],
+    "nose_vel": lambda creature, sensed, time: jnp.stack(
+        [sensed.trunk_vel @ axis for axis in _nose(creature, sensed)]
+    ),
+    "foot_place": lambda creature, sensed, time: foot_places(creature, sensed),
+    "up_vel": lambda creature, sensed, time: sensed.trunk_vel[2],
+    "pitch": lambda creature, sensed, time: (
+        -jnp.arcsin(_attitude(creature, sensed, creature.frame.forward))
+    ),
+    "roll": lambda creature, sensed, time: jnp.arcsin(
+        _attitude(creature, sensed, creature.frame.left)
+    ),
+    "pitch_rate": lambda creature, sensed, time: _rate(creature, sensed, creature.frame.left),
+    "roll_rate": lambda creature, sensed, time: _rate(creature, sensed, creature.frame.forward),
+}
+"""Names, with shapes and units in docs/controller.md."""
+
+
+def sense(
+    creature: Body, sensed: Sensed, time: jax.Array, names: Collection[str]
+) -> dict[str, jax.Array]:
+    """The senses of these names."""
+    return {name: SENSES[name](creature, sensed, time) for name in names if name in SENSES}
+
+
+def check_senses(reads: Collection[str], added: Collection[str] = ()) -> None:
+    """Refuses a name that is neither a sense nor what a task adds.
+
+    Raises:
+      UserError: names it and the nearest that there are.
+    """
+    known = [*SENSES, *added]
+    for name in reads:
+        if name not in known:
+            raise UserError(f'there is no sense "{name}"; {did_you_mean(name, known)}')
+
+
+def forward_way(creature: Body, sensed: Sensed) -> jax.Array:
+    """Way [] in m of the trunk from the start, along the start's forward axis."""
+    return _along(creature, sensed, 0)
+
+
+def sideways(creature: Body, sensed: Sensed) -> jax.Array:
+    """Way [] in m of the trunk from the start, to the left of the start's forward axis."""
+    return _along(creature, sensed, 1)
+
+
+def trunk_height(sensed: Sensed) -> jax.Array:
+    """Height [] in m of the trunk above the ground under it."""
+    height = sensed.trunk_pos[2]
+    return height if sensed.floor is None else height - sensed.floor
+
+
+def foot_heights(creature: Body, sensed: Sensed) -> jax.Array:
+    """Height [F] in m of each foot's lowest point above the ground under it."""
+    return jnp.stack([jnp.min(sensed.geom_low[geoms]) for geoms in foot_geoms(creature)])
+
+
+def contacts(creature: Body, sensed: Sensed) -> jax.Array:
+    """Whether [F] each foot touches the floor, 0 or 1."""
+    return (foot_heights(creature, sensed) < CONTACT_GAP).astype(jnp.float32)
+
+
+def foot_geoms(creature: Body) -> list[slice]:
+    """Of each foot, its places among the watched geoms."""
+    groups = [
+        np.flatnonzero(creature.feet.foot_of == foot) for foot in range(len(creature.feet.names))
+    ]
+    return [slice(int(group[0]), int(group[-1]) + 1) for group in groups]

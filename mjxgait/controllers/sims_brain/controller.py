@@ -1,0 +1,127 @@
+"""A controller that grows with the body it moves: blocks and neurons from one graph (Sims 1994)."""
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from mjxgait.config.evolution import EvolutionConfig
+from mjxgait.controllers.base import Command, Senses
+from mjxgait.controllers.sims_brain.config import BrainConfig
+from mjxgait.controllers.sims_brain.genotype import Capacity, Ranges
+from mjxgait.controllers.sims_brain.nerves import NerveRoom
+from mjxgait.controllers.sims_brain.operators import Genotype, Kin, Rates
+from mjxgait.controllers.sims_brain.phenotype import body_of
+from mjxgait.controllers.sims_brain.reference_body.parts import grow
+from mjxgait.controllers.sims_brain.thought import (
+    Mind,
+    Perceived,
+    blank,
+    thought,
+)
+from mjxgait.controllers.sims_brain.wiring import Brain, wired
+from mjxgait.creature.body import Body
+from mjxgait.evolution.variation import Variation
+
+LIGHT = "light"
+
+
+def capacity_of(settings: BrainConfig) -> Capacity:
+    """The room for graphs and bodies."""
+    return Capacity(settings.nodes, settings.connections, settings.parts, settings.links)
+
+
+class Brains:
+    """See `Controller`: its commands are the torques of all hinges that its body may have."""
+
+    Settings: ClassVar[type] = BrainConfig
+    command: ClassVar[Command] = "torque"
+    grows: ClassVar[bool] = True
+
+    @classmethod
+    def told(
+        cls, creature: Body, step: float, settings: BrainConfig, added: Sequence[str]
+    ) -> "Brains":
+        """Under these settings, with the senses that the task adds."""
+        return cls(step, settings, added)
+
+    def __init__(self, step: float, settings: BrainConfig, added: Sequence[str] = ()) -> None:
+        self.every, self.capacity = settings.every, capacity_of(settings)
+        self.pause = step * settings.every
+        self.room = NerveRoom(settings.local, settings.central)
+        self.reads = ("joint_pos", "contact", *([LIGHT] if LIGHT in added else []))
+
+    def variation(self, settings: BrainConfig, evolution: EvolutionConfig) -> Variation:
+        """See `Controller`: of the offspring some have one parent, some are crossed, some grafted."""
+        rates = Rates(
+            settings.values, settings.sigma, settings.connect, settings.grow, settings.strength
+        )
+        kin = Kin(self.capacity, self.room, Ranges(), rates)
+
+        def create(key: jax.Array, count: int) -> Genotype:
+            return jax.vmap(kin.create)(jax.random.split(key, count))
+
+        def cross(key: jax.Array, mother: Genotype, father: Genotype) -> Genotype:
+            how, key = jax.random.split(key)
+            draw = jax.random.uniform(how)
+            crossed, grafted = kin.cross(key, mother, father), kin.graft(key, mother, father)
+            crosses, grafts = draw < settings.crossover, draw > 1 - settings.grafting
+            child = jax.tree.map(
+                lambda own, c, g: jnp.where(crosses, c, jnp.where(grafts, g, own)),
+                mother,
+                crossed,
+                grafted,
+            )
+            return embodied(child, mother)
+
+        def mutate(key: jax.Array, genotype: Genotype) -> Genotype:
+            return embodied(kin.mutate(key, genotype), genotype)
+
+        def embodied(child: Genotype, mother: Genotype) -> Genotype:
+            graph = jax.tree.map(
+                lambda own, of_mother: jnp.where(settings.drawn, of_mother, own),
+                child.graph,
+                mother.graph,
+            )
+            return dataclasses.replace(child, graph=graph)
+
+        return Variation(create, cross, mutate)
+
+    def genes(self, genomes: Genotype, settings: BrainConfig) -> np.ndarray:
+        """See `Controller`: any other kind or flag is a difference."""
+        leaves = [np.asarray(leaf, float) for leaf in jax.tree.leaves(genomes)]
+        return np.concatenate([leaf.reshape(len(leaf), -1) for leaf in leaves], axis=1)
+
+    def numbers(self, genomes: Genotype) -> Mapping[str, np.ndarray]:
+        """See `Controller`: of how many parts they are, without tracing what no program needs."""
+        names = [field.name for field in dataclasses.fields(genomes.graph)]
+        graph = {f"graph.{name}": np.asarray(getattr(genomes.graph, name)) for name in names}
+        counts = [
+            len(grow({n: a[i] for n, a in graph.items()}, self.capacity.parts, self.capacity.links))
+            for i in range(len(graph["graph.half"]))
+        ]
+        return {"parts": np.array(counts)}
+
+    def prepare(self, genome: Genotype, settings: BrainConfig) -> Brain:
+        """See `Controller`: the wires of the body that the genome grows into."""
+        body = body_of(genome.graph, self.capacity)
+        return wired(genome.nerves, genome.centre, body, self.room)
+
+    def load(self, plan: Brain) -> None:
+        """See `Controller`: the same for all."""
+
+    def init(self) -> Mind:
+        """See `Controller`."""
+        return blank(self.capacity.parts * self.room.local + self.room.central)
+
+    def act(self, plan: Brain, memory: Mind, senses: Senses) -> tuple[jax.Array, Mind]:
+        """See `Controller`: N·m of the links' hinges, the root's left out."""
+        links = self.capacity.links
+        light = senses[LIGHT] if LIGHT in self.reads else jnp.zeros((links, 3))
+        angles = jnp.concatenate([jnp.zeros(1), senses["joint_pos"]])
+        perceived = Perceived(angles, senses["contact"], light)
+        torque, memory = thought(plan, memory, perceived, self.pause)
+        return torque[1:], memory

@@ -1,0 +1,214 @@
+"""From a graph to the parts of a body: breadth first, in the order of the connections.
+
+Letters: see `genotype`. A part that does not fit any more, because parts or links are used up or there
+are other blocks where it would be, does not grow, and nothing grows on it.
+"""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from mjxgait.controllers.sims_brain.genotype import Capacity, Graph
+from mjxgait.controllers.sims_brain.reference_body.material import (
+    AXES,
+    LARGEST,
+    ROOM,
+    SMALLEST,
+)
+from mjxgait.controllers.sims_brain.room import Boxes, inside
+from mjxgait.types import pytree
+
+HINGES = np.array([len(axes) for axes in AXES])
+"""How many hinges each of `JOINTS` has."""
+
+
+@pytree
+class Parts:
+    """A grown body, part by part; parents come first, the root is part 0.
+
+    exists: [P]. node, parent: [P]. copies: [P], 1 for a mirror image of what its node describes,
+    0 else. half: [P, 3] m. place: [P, 3] m of the joint in the parent's frame; turn: [P, 3, 3] the
+    axes (rows) of the part there, before the joint turns. last: [P] the link that carries the part's
+    block, the first being one per hinge before it. depth: [P] how often the node has followed itself.
+    """
+
+    exists: jax.Array
+    node: jax.Array
+    parent: jax.Array
+    copies: jax.Array
+    half: jax.Array
+    place: jax.Array
+    turn: jax.Array
+    last: jax.Array
+    depth: jax.Array
+
+
+@pytree
+class _Growing:
+    """parts so far, where their blocks are at rest, their number [], links used [], how often each
+    node is on a part's branch [P, N], and the scale [P] of each part."""
+
+    parts: Parts
+    boxes: Boxes
+    count: jax.Array
+    links: jax.Array
+    branch: jax.Array
+    scale: jax.Array
+
+
+def grown(graph: Graph, capacity: Capacity) -> Parts:
+    """The body of a graph."""
+    connections = graph.target.shape[1]
+
+    def step(turn: jax.Array, growing: _Growing) -> _Growing:
+        part, connection = turn // connections, turn % connections
+        place = growing.parts.node[part], connection
+        grows = _grows(graph, capacity, growing, part, place)
+        mirror = graph.mirror[place]
+        before, room = growing, jnp.bool_(True)
+        for image in (0, 1):
+            wanted = grows & ((mirror == image) | (mirror == 2))
+            growing, fits = _with_part(graph, growing, part, place, image, wanted)
+            room = room & fits
+        return jax.tree.map(lambda a, b: jnp.where(room, a, b), growing, before)
+
+    growing = jax.lax.fori_loop(0, capacity.parts * connections, step, _seed(graph, capacity))
+    return growing.parts
+
+
+def _seed(graph: Graph, capacity: Capacity) -> _Growing:
+    """The root alone."""
+    most = capacity.parts
+    one = jnp.arange(most) == 0
+    none = jnp.zeros(most, jnp.int32)
+    half = jnp.ones((most, 3)).at[0].set(_size(graph.half[0], jnp.float32(1.0)))
+    axes, nowhere = jnp.tile(jnp.eye(3), (most, 1, 1)), jnp.zeros((most, 3))
+    return _Growing(
+        Parts(
+            exists=one,
+            node=none,
+            parent=none,
+            copies=none,
+            half=half * one[:, None],
+            place=nowhere,
+            turn=axes,
+            last=none,
+            depth=none,
+        ),
+        boxes=Boxes(nowhere, half, axes),
+        count=jnp.int32(1),
+        links=jnp.int32(1),
+        branch=jnp.zeros((most, graph.half.shape[0]), jnp.int32).at[0, 0].set(1),
+        scale=jnp.ones(most),
+    )
+
+
+Place = tuple[jax.Array, jax.Array]
+"""A connection: its node, and which of the node's."""
+
+
+def _grows(
+    graph: Graph, capacity: Capacity, growing: _Growing, part: jax.Array, place: Place
+) -> jax.Array:
+    """Whether [] a connection grows on a part; a pair grows together or not at all."""
+    source, target = place[0], graph.target[place]
+    times, limit = growing.branch[part], graph.recursion + 1
+    allowed = (times[target] < limit[target]) & (
+        ~graph.terminal[place] | (times[source] >= limit[source])
+    )
+    images = jnp.where(graph.mirror[place] == 2, 2, 1)
+    room = (growing.count + images <= capacity.parts) & (
+        growing.links + images * _links(graph, target) <= capacity.links
+    )
+    return growing.parts.exists[part] & graph.used[place] & allowed & room
+
+
+def _links(graph: Graph, node: jax.Array) -> jax.Array:
+    """How many links a part of this node needs."""
+    return jnp.maximum(jnp.asarray(HINGES)[graph.joint[node]], 1)
+
+
+def _with_part(
+    graph: Graph,
+    growing: _Growing,
+    part: jax.Array,
+    at: Place,
+    image: int,
+    grows: jax.Array,
+) -> tuple[_Growing, jax.Array]:
+    """With one more part where it grows, and whether [] there was room if it does.
+
+    image: 1 for the mirrored copy.
+    """
+    parts, boxes = growing.parts, growing.boxes
+    target, times = graph.target[at], growing.branch[part]
+    needed = _links(graph, target)
+    place = jnp.where(grows, growing.count, len(parts.node))  # out of bounds: dropped
+    copies = parts.copies[part] ^ image
+    scale = growing.scale[part] * graph.scale[at]
+    joint, axes = joined(parts.half[part], graph.place[at], graph.turn[at])
+    # A frame is where the part hangs, its block's middle half a block further; the root hangs nowhere.
+    outward = jnp.array([1.0, 0.0, 0.0]) * jnp.where(part > 0, parts.half[part, 0], 0.0)
+    flip = jnp.where(copies > 0, jnp.array([1.0, -1.0, 1.0]), 1.0)
+    joint, turn = joint * flip, axes * flip[:, None] * flip
+    box = _hung(boxes, part, _size(graph.half[target], scale), joint, turn)
+    crowded = (inside(box, boxes) > ROOM) & parts.exists & (jnp.arange(len(parts.node)) != part)
+
+    def put(array: jax.Array, value: jax.Array) -> jax.Array:
+        return array.at[place].set(value, mode="drop")
+
+    grown = _Growing(
+        Parts(
+            exists=put(parts.exists, jnp.bool_(True)),
+            node=put(parts.node, target),
+            parent=put(parts.parent, part),
+            copies=put(parts.copies, copies),
+            half=put(parts.half, box.half),
+            place=put(parts.place, joint + outward),
+            turn=put(parts.turn, turn),
+            last=put(parts.last, growing.links + needed - 1),
+            depth=put(parts.depth, times[target]),
+        ),
+        boxes=jax.tree.map(put, boxes, box),
+        count=growing.count + grows,
+        links=growing.links + jnp.where(grows, needed, 0),
+        branch=put(growing.branch, times.at[target].add(1)),
+        scale=put(growing.scale, scale),
+    )
+    return grown, ~(grows & crowded.any())
+
+
+def _hung(
+    boxes: Boxes, part: jax.Array, half: jax.Array, joint: jax.Array, turn: jax.Array
+) -> Boxes:
+    """A child's block at rest; joint: m from the middle of its parent's."""
+    axes = turn @ boxes.axes[part]
+    middle = boxes.middle[part] + joint @ boxes.axes[part] + half[0] * axes[0]
+    return Boxes(middle, half, axes)
+
+
+def joined(half: jax.Array, place: jax.Array, turn: jax.Array) -> tuple[jax.Array, jax.Array]:
+    """Where [3] m from a block's middle a child is joined, and the child's axes [3, 3] (rows) there.
+
+    Its first axis leaves the face at a right angle, until it is turned: by `turn[0]` about that
+    axis, then about its second and its third.
+    """
+    steepest = jnp.argmax(jnp.abs(place))
+    sign = jnp.where(place[steepest] < 0, -1.0, 1.0)
+    reach = jnp.maximum(jnp.abs(place[steepest]), 1e-6)
+    outward = jnp.eye(3)[steepest] * sign
+    second = jnp.eye(3)[(steepest + 1) % 3]
+    base = jnp.stack([outward, second, jnp.cross(outward, second)])
+    return half * place / reach, _about(2, turn[2]) @ _about(1, turn[1]) @ _about(0, turn[0]) @ base
+
+
+def _about(axis: int, angle: jax.Array) -> jax.Array:
+    """Rows: the axes after a turn about one of them."""
+    sin, cos = jnp.sin(angle), jnp.cos(angle)
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    matrix = jnp.eye(3).at[i, i].set(cos).at[j, j].set(cos)
+    return matrix.at[i, j].set(sin).at[j, i].set(-sin)
+
+
+def _size(half: jax.Array, scale: jax.Array) -> jax.Array:
+    return jnp.clip(half * scale, SMALLEST, LARGEST)

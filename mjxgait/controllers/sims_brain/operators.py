@@ -1,0 +1,257 @@
+"""How graphs with nerves vary: mutation, crossover and grafting (Sims 1994, section 5).
+
+Letters: `N` nodes, `C` connections of each. Everything that belongs to a node has `N` in front, so
+nodes move as wholes.
+"""
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+
+from mjxgait.controllers.sims_brain.chance import normal, numbered, numbers
+from mjxgait.controllers.sims_brain.config import BrainConfig
+from mjxgait.controllers.sims_brain.genotype import (
+    Capacity,
+    Graph,
+    Ranges,
+    random_graph,
+)
+from mjxgait.controllers.sims_brain.nerves import (
+    Centre,
+    NerveRoom,
+    Nerves,
+    random_centre,
+    random_nerves,
+)
+from mjxgait.types import pytree
+
+
+@pytree
+class Genotype:
+    """A creature's: its body's graph, its nodes' nerves, and its central neurons."""
+
+    graph: Graph
+    nerves: Nerves
+    centre: Centre
+
+
+@dataclasses.dataclass(frozen=True)
+class Rates:
+    """How a mutation changes a genotype.
+
+    value: chance of each number, kind and flag of what grows, divided by how many there are, so
+    that it is how many change on average. sigma: of a number's change, as a share of its range.
+    connection: chance of one more or one less. node: of a new node. strength: from and to which
+    factor each mutation draws one of its own, all magnitudes alike, by which more or less changes;
+    the chances of connections and nodes are never larger than told (Doerr et al. 2017, "Fast genetic
+    algorithms", for why few large changes among many small ones).
+    """
+
+    value: float = BrainConfig.values
+    sigma: float = BrainConfig.sigma
+    connection: float = BrainConfig.connect
+    node: float = BrainConfig.grow
+    strength: tuple[float, float] = BrainConfig.strength
+
+
+@dataclasses.dataclass(frozen=True)
+class Kin:
+    """What all genotypes of a population share."""
+
+    capacity: Capacity
+    room: NerveRoom
+    ranges: Ranges
+    rates: Rates = Rates()
+
+    def create(self, key: jax.Array) -> Genotype:
+        """One drawn at random."""
+        body, nerves, centre = jax.random.split(key, 3)
+        return Genotype(
+            random_graph(body, self.capacity, self.ranges),
+            random_nerves(nerves, self.capacity.nodes, self.room),
+            random_centre(centre, self.room),
+        )
+
+    def mutate(self, key: jax.Array, genotype: Genotype) -> Genotype:
+        """Values change, connections come and go, an unconnected node is drawn anew."""
+        value, fresh, connect, node = jax.random.split(key, 4)
+        other, strength = self.create(fresh), self._strength(jax.random.fold_in(key, 4))
+        often = jnp.minimum(strength, 1.0)
+        changed = _with_new_node(node, genotype, other, often * self.rates.node)
+        graph = _reconnected(connect, changed.graph, other.graph, often * self.rates.connection)
+        changed = dataclasses.replace(changed, graph=graph)
+        return self._moved(value, changed, other, strength)
+
+    def cross(self, key: jax.Array, mother: Genotype, father: Genotype) -> Genotype:
+        """The first nodes of one, the others of the other, up to two points of crossing over."""
+        nodes = self.capacity.nodes
+        points = numbered(jax.random.uniform(key, (2,)), nodes + 1)
+        low, high = points.min(), points.max()
+        order = jnp.arange(nodes)
+        return _chosen((order < low) | (order >= high), mother, father)
+
+    def graft(self, key: jax.Array, mother: Genotype, father: Genotype) -> Genotype:
+        """The father's graph, as far as there is room among the mother's unconnected nodes, hung
+        on one of the mother's connections.
+        """
+        nodes, connections = mother.graph.target.shape
+        free = ~reachable(mother.graph)
+        place = jnp.argsort(~free, stable=True)  # of the father's nodes, the free ones first
+        has_room = jnp.arange(nodes) < free.sum()
+        source = jnp.zeros(nodes, int).at[place].set(jnp.arange(nodes))
+        graph, nerves = jax.tree.map(lambda leaf: leaf[source], (father.graph, father.nerves))
+        kept = graph.used & has_room[graph.target]
+        graph = dataclasses.replace(graph, target=place[graph.target], used=kept)
+        hung = _chosen(~free, mother, Genotype(graph, nerves, mother.centre))
+        chance = jax.random.uniform(key, (nodes, connections))
+        at = _one_of(chance, jnp.broadcast_to(~free[:, None], chance.shape))
+        graph = hung.graph
+        joined = dataclasses.replace(
+            graph,
+            target=graph.target.at[at].set(place[0]),
+            used=graph.used.at[at].set(True),
+        )
+        grafted = dataclasses.replace(hung, graph=joined)
+        return jax.tree.map(lambda a, b: jnp.where(free.any(), a, b), grafted, mother)
+
+    def _strength(self, key: jax.Array) -> jax.Array:
+        """The factor [] of one mutation."""
+        least, most = self.rates.strength
+        share: jax.Array = least * (most / least) ** jax.random.uniform(key)
+        return share
+
+    def _moved(
+        self, key: jax.Array, genotype: Genotype, other: Genotype, strength: jax.Array
+    ) -> Genotype:
+        """Numbers shifted by a normal step, kinds and flags drawn anew, a few of each."""
+        alive = reachable(genotype.graph)
+        varied = _without_used(genotype)
+        leaves, shape = jax.tree.flatten(varied)
+        fresh = jax.tree.leaves(_without_used(other))
+        of_nodes = jax.tree.leaves((varied.graph, varied.nerves))
+        size = jnp.sum(alive) * sum(leaf[0].size for leaf in of_nodes)
+        chance = strength * self.rates.value / size
+        places = range(len(leaves))
+        drawn = numbers(
+            key, {(use, i): leaves[i].shape for i in places for use in ("which", "how")}
+        )
+        bounds = self._bounds(shape)
+        moved = [
+            jnp.where(
+                drawn["which", i] < chance,
+                _shifted(leaves[i], fresh[i], drawn["how", i], self.rates.sigma, bounds[i]),
+                leaves[i],
+            )
+            for i in places
+        ]
+        found = jax.tree.unflatten(shape, moved)
+        return dataclasses.replace(
+            found, graph=dataclasses.replace(found.graph, used=genotype.graph.used)
+        )
+
+    def _bounds(self, shape: jax.tree_util.PyTreeDef) -> list[tuple[float, float]]:
+        """Lowest and highest value of each leaf; of kinds they do not matter."""
+        ranges, names = self.ranges, {"half": self.ranges.half, "swing": self.ranges.swing}
+        names |= {"scale": ranges.scale, "turn": (-ranges.turn, ranges.turn), "place": (-1.0, 1.0)}
+        placed = jax.tree.unflatten(shape, range(shape.num_leaves))
+        found = [(-4.0, 4.0)] * shape.num_leaves
+        for name, bounds in names.items():
+            found[getattr(placed.graph, name)] = bounds
+        return found
+
+
+def reachable(graph: Graph) -> jax.Array:
+    """Whether [N] a node is connected to the first."""
+    nodes = graph.target.shape[0]
+    leads = jnp.any(
+        (graph.target[:, :, None] == jnp.arange(nodes)) & graph.used[:, :, None], axis=1
+    )
+
+    def wider(_: int, known: jax.Array) -> jax.Array:
+        return known | jnp.any(leads & known[:, None], axis=0)
+
+    return jax.lax.fori_loop(0, nodes, wider, jnp.arange(nodes) == 0)
+
+
+def _one_of(chance: jax.Array, allowed: jax.Array) -> tuple[jax.Array, jax.Array]:
+    """A place [N, C] that is allowed, all alike; any where none is."""
+    choice = jnp.argmax(jnp.where(allowed, chance, -1.0))
+    return choice // chance.shape[1], choice % chance.shape[1]
+
+
+def _with_new_node(
+    key: jax.Array, genotype: Genotype, other: Genotype, chance: jax.Array
+) -> Genotype:
+    """One node that is not connected, drawn anew, and a connection to it."""
+    alive = reachable(genotype.graph)
+    nodes, connections = genotype.graph.target.shape
+    drawn = numbers(key, {"happens": (), "node": (nodes,), "slot": (nodes, connections)})
+    free = jnp.argmax(jnp.where(alive, -1.0, drawn["node"]))
+    new = _chosen(jnp.arange(nodes) != free, genotype, other)
+    # What the new node is connected to is itself new.
+    target = new.graph.target.at[free].set(0)
+    used = new.graph.used.at[free].set(False)
+    spare = alive[:, None] & ~used
+    at = _one_of(drawn["slot"], spare)
+    graph = dataclasses.replace(
+        new.graph, target=target.at[at].set(free), used=used.at[at].set(True)
+    )
+    new = dataclasses.replace(new, graph=graph)
+    ok = (drawn["happens"] < chance) & ~alive.all() & spare.any()
+    return jax.tree.map(lambda a, b: jnp.where(ok, a, b), new, genotype)
+
+
+def _reconnected(key: jax.Array, graph: Graph, other: Graph, chance: jax.Array) -> Graph:
+    """One connection more or less, the new one drawn at random between nodes that are connected."""
+    alive = reachable(graph)
+    nodes, connections = graph.target.shape
+    shapes = {"happens": (), "adds": (), "slot": (nodes, connections), "target": (nodes,)}
+    drawn = numbers(key, shapes)
+    adds = drawn["adds"] < 0.5
+    open_slots = alive[:, None] & jnp.where(adds, ~graph.used, graph.used)
+    chosen = _one_of(drawn["slot"], open_slots)
+    here = jnp.zeros((nodes, connections), bool).at[chosen].set(drawn["happens"] < chance)
+    here = here & open_slots
+    node = jnp.argmax(jnp.where(alive, drawn["target"], -1.0))
+    names = ("place", "turn", "scale", "mirror", "terminal")
+    fresh = {
+        name: jnp.where(
+            here.reshape(*here.shape, *[1] * (getattr(graph, name).ndim - 2)) & adds,
+            getattr(other, name),
+            getattr(graph, name),
+        )
+        for name in names
+    }
+    return dataclasses.replace(
+        graph,
+        used=jnp.where(here, adds, graph.used),
+        target=jnp.where(here & adds, node, graph.target),
+        **fresh,
+    )
+
+
+def _shifted(
+    leaf: jax.Array, new: jax.Array, how: jax.Array, sigma: float, bounds: tuple[float, float]
+) -> jax.Array:
+    """Numbers moved by a normal step, within their bounds; of anything else the new."""
+    if not jnp.issubdtype(leaf.dtype, jnp.floating):
+        return new
+    low, high = bounds
+    return jnp.clip(leaf + sigma * (high - low) * normal(how), low, high)
+
+
+def _without_used(genotype: Genotype) -> Genotype:
+    """Which connections are used is changed elsewhere; None is no leaf."""
+    graph = dataclasses.replace(genotype.graph, used=None)  # type: ignore[arg-type]
+    return dataclasses.replace(genotype, graph=graph)
+
+
+def _chosen(first: jax.Array, one: Genotype, other: Genotype) -> Genotype:
+    """Node by node [N] the one's or the other's; the central neurons are the one's."""
+
+    def pick(a: jax.Array, b: jax.Array) -> jax.Array:
+        return jnp.where(first.reshape(-1, *[1] * (a.ndim - 1)), a, b)
+
+    graph, nerves = jax.tree.map(pick, (one.graph, one.nerves), (other.graph, other.nerves))
+    return Genotype(graph, nerves, one.centre)

@@ -1,0 +1,208 @@
+"""The brain of a creature of blocks, neuron by neuron, written from docs/blocks.md.
+
+Letters: `S` simulations, `J` hinges in the model's order. A neuron is known by its owner, the number
+of a part or `CENTRE`, and which of the owner's it is.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+
+from mjxgait.controllers.sims_brain.reference_body.material import NEURONS, SENSORS
+from mjxgait.controllers.sims_brain.reference_body.parts import Part
+from mjxgait.reference.controllers.protocol import Command, Memory
+
+CENTRE = -1
+TICKS = 2
+MOST, LOUDEST = 10.0, 100.0
+Neuron = tuple[int, int]
+Values = Any
+"""An array [S, ...] of neurons of a kind."""
+
+
+def _following(a: Values, memory: Values, dt: float) -> Values:
+    return memory + (a - memory) * (1 - np.exp(-5.0 * dt))
+
+
+def _phase(b: Values, memory: Values, dt: float) -> Values:
+    return np.mod(memory + dt * b, 1.0)
+
+
+def _log(a: Values) -> Values:
+    return np.log(np.maximum(np.abs(a), 1e-3))
+
+
+def _over(a: Values, b: Values) -> Values:
+    small = np.abs(b) < 1e-3
+    return np.where(small, 0.0, a / np.where(small, 1.0, b))
+
+
+FUNCTIONS: Mapping[str, Callable[..., Values]] = {
+    "sum": lambda a, b, c, m, dt: a + b + c,
+    "product": lambda a, b, c, m, dt: a * b * c,
+    "divide": lambda a, b, c, m, dt: _over(a, b),
+    "sum-threshold": lambda a, b, c, m, dt: np.where(a + b > c, 1.0, 0.0),
+    "greater-than": lambda a, b, c, m, dt: np.where(a > b, 1.0, 0.0),
+    "sign-of": lambda a, b, c, m, dt: np.sign(a),
+    "min": lambda a, b, c, m, dt: np.minimum(a, b),
+    "max": lambda a, b, c, m, dt: np.maximum(a, b),
+    "abs": lambda a, b, c, m, dt: np.abs(a),
+    "if": lambda a, b, c, m, dt: np.where(a > 0, b, c),
+    "interpolate": lambda a, b, c, m, dt: a + (b - a) * np.clip(c, 0.0, 1.0),
+    "sin": lambda a, b, c, m, dt: np.sin(a),
+    "cos": lambda a, b, c, m, dt: np.cos(a),
+    "atan": lambda a, b, c, m, dt: np.arctan(a),
+    "log": lambda a, b, c, m, dt: _log(a),
+    "expt": lambda a, b, c, m, dt: np.exp(np.clip(b * _log(a), -MOST, np.log(MOST))),
+    "sigmoid": lambda a, b, c, m, dt: 1 / (1 + np.exp(-a)),
+    "integrate": lambda a, b, c, m, dt: m + dt * a,
+    "differentiate": lambda a, b, c, m, dt: (a - m) / dt,
+    "smooth": lambda a, b, c, m, dt: _following(a, m, dt),
+    "memory": lambda a, b, c, m, dt: np.where(b > 0, a, m),
+    "oscillate-wave": lambda a, b, c, m, dt: np.sin(2 * np.pi * (_phase(b, m, dt) + a)),
+    "oscillate-saw": lambda a, b, c, m, dt: 2 * np.mod(_phase(b, m, dt) + a, 1.0) - 1,
+}
+"""Of three inputs, the memory and the time of a tick in s."""
+KEPT: Mapping[str, Callable[..., Values]] = {
+    "integrate": FUNCTIONS["integrate"],
+    "differentiate": lambda a, b, c, m, dt: a,
+    "smooth": FUNCTIONS["smooth"],
+    "memory": FUNCTIONS["memory"],
+    "oscillate-wave": lambda a, b, c, m, dt: _phase(b, m, dt),
+    "oscillate-saw": lambda a, b, c, m, dt: _phase(b, m, dt),
+}
+"""What a neuron remembers of a tick; the others remember nothing."""
+
+
+def fire(kind: str, inputs: Sequence[Values], memory: Values, dt: float) -> tuple[Values, Values]:
+    """Output and memory of a neuron. dt: s of a tick."""
+    a, b, c = (np.clip(x, -LOUDEST, LOUDEST) for x in inputs)
+    kept = KEPT[kind](a, b, c, memory, dt) if kind in KEPT else memory
+    output = FUNCTIONS[kind](a, b, c, memory, dt)
+    return np.clip(output, -MOST, MOST), np.clip(kept, -MOST, MOST)
+
+
+class BrainTwin:
+    """See `Twin`.
+
+    genome: its arrays by name. parts: grown from it. hinges: of each joint of the model, its part
+    and which of the part's it is. step: s of the simulation. every: of them from one command to the
+    next.
+    A wire leads from a column of what is known to a neuron or to a hinge: nothing, the constant 1,
+    the angles of all hinges, contact and light of all parts, the values of all neurons.
+    """
+
+    command: ClassVar[Command] = "torque"
+    reads: ClassVar[tuple[str, ...]] = ("joint_pos", "contact", "light")
+
+    def __init__(
+        self,
+        genome: Mapping[str, np.ndarray],
+        parts: Sequence[Part],
+        hinges: Sequence[tuple[int, int]],
+        step: float,
+        every: int = 1,
+    ) -> None:
+        self.genome, self.parts, self.hinges = genome, parts, tuple(hinges)
+        self.every, self.pause = every, step * every
+        self.local = genome["nerves.kind"].shape[1]
+        owned = [(p, q) for p in range(len(parts)) for q in range(self.local)]
+        neurons = [*owned, *((CENTRE, q) for q in range(len(genome["centre.kind"])))]
+        first = 2 + len(hinges) + 4 * len(parts)
+        self.place = {neuron: first + i for i, neuron in enumerate(neurons)}
+        self.child: dict[int, int] = {}
+        for number, part in enumerate(parts):
+            self.child.setdefault(part.parent, number)
+        kinds = [NEURONS[int(self._gene("kind", neuron))] for neuron in neurons]
+        self.alike = {kind: np.flatnonzero(np.array(kinds) == kind) for kind in set(kinds)}
+        wires = [self._wires(neuron) for neuron in neurons]
+        self.column = np.array([[column for column, _ in three] for three in wires])
+        self.weight = np.array([[weight for _, weight in three] for three in wires])
+        pulls = [self._pull(part, hinge) for part, hinge in self.hinges]
+        self.driver = np.array([column for column, _, _ in pulls])
+        self.gain = np.array([gain for _, gain, _ in pulls])
+        self.strength = np.array([strength for _, _, strength in pulls])
+
+    def init(self, count: int) -> Memory:
+        """See `Twin`."""
+        shape = (count, len(self.place))
+        # Two arrays: whoever keeps them writes into each.
+        return {"values": np.zeros(shape), "memory": np.zeros(shape)}
+
+    def act(self, memory: Memory, senses: Mapping[str, np.ndarray]) -> tuple[np.ndarray, Memory]:
+        """See `Twin`."""
+        values, kept, dt = memory["values"], memory["memory"], self.pause / TICKS
+        sensed = self._sensed(senses)
+        for _ in range(TICKS):
+            inputs = np.concatenate([sensed, values], axis=1)[:, self.column] * self.weight
+            after, kept_after = np.empty_like(values), np.empty_like(kept)
+            for kind, these in self.alike.items():
+                three = np.moveaxis(inputs[:, these], 2, 0)
+                after[:, these], kept_after[:, these] = fire(kind, three, kept[:, these], dt)
+            values, kept = after, kept_after
+        wanted = self.gain * np.concatenate([sensed, values], axis=1)[:, self.driver]
+        torque = self.strength * np.clip(wanted, -1.0, 1.0)
+        return torque, {"values": values, "memory": kept}
+
+    def phase(self, memory: Memory) -> np.ndarray:
+        """See `Twin`: it has no cycle."""
+        return np.full(len(memory["values"]), np.nan)
+
+    def _sensed(self, senses: Mapping[str, np.ndarray]) -> np.ndarray:
+        """The columns before the neurons'. Where there is no light, nothing is seen."""
+        count = len(senses["joint_pos"])
+        dark = np.zeros((count, len(self.parts), 3))
+        light = senses.get("light", dark).reshape(count, -1)
+        ends = np.tile([0.0, 1.0], (count, 1))
+        return np.concatenate([ends, senses["joint_pos"], senses["contact"], light], axis=1)
+
+    def _gene(self, name: str, neuron: Neuron) -> Any:
+        owner, which = neuron
+        if owner == CENTRE:
+            return self.genome[f"centre.{name}"][which]
+        return self.genome[f"nerves.{name}"][self.parts[owner].node][which]
+
+    def _wires(self, neuron: Neuron) -> list[tuple[int, float]]:
+        """Column and weight of a neuron's inputs; the central ones have the root's sources."""
+        sources, weights = self._gene("source", neuron), self._gene("weight", neuron)
+        found = [self._source(max(neuron[0], 0), int(code)) for code in sources]
+        return [(column, sign * w) for (column, sign), w in zip(found, weights, strict=True)]
+
+    def _source(self, part: int, code: int) -> tuple[int, float]:
+        """The column that a part finds behind a source's number, and its sign."""
+        if code == 0:
+            return 1, 1.0
+        if code <= SENSORS:
+            return self._sensor(part, code - 1)
+        code -= 1 + SENSORS
+        owners = (part, self.parts[part].parent if part else None, self.child.get(part))
+        if code >= 3 * self.local:
+            return self.place[CENTRE, code - 3 * self.local], 1.0
+        owner = owners[code // self.local]
+        return (0, 1.0) if owner is None else (self.place[owner, code % self.local], 1.0)
+
+    def _sensor(self, part: int, sensor: int) -> tuple[int, float]:
+        """Three hinges, contact, the light along three axes; seen in a mirror by a mirror image."""
+        own, joints, count = self.parts[part], len(self.hinges), len(self.parts)
+        if sensor < 3:
+            if (part, sensor) not in self.hinges:
+                return 0, 1.0
+            return 2 + self.hinges.index((part, sensor)), _sign(own, sensor)
+        if sensor == 3:
+            return 2 + joints + part, 1.0
+        flip = -1.0 if own.mirrored and sensor == 5 else 1.0
+        return 2 + joints + count + 3 * part + sensor - 4, flip
+
+    def _pull(self, part: int, hinge: int) -> tuple[int, float, float]:
+        """Column and weight of what drives a hinge, and N·m of it at the most."""
+        own = self.parts[part]
+        code = int(self.genome["nerves.effect_source"][own.node, hinge])
+        column, sign = self._source(part, code)
+        weight = sign * float(self.genome["nerves.effect_weight"][own.node, hinge])
+        return column, weight, own.strength * _sign(own, hinge)
+
+
+def _sign(part: Part, hinge: int) -> float:
+    """-1 where a mirror image turns the other way: about all its axes but the one it is mirrored along."""
+    return -1.0 if part.mirrored and part.hinges[hinge] != 1 else 1.0

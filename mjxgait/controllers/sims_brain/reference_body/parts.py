@@ -1,0 +1,172 @@
+"""Growth as a list that grows while it is read.
+
+A genome is its arrays by name, as checkpoints and champions have them: `graph.half`, … (see
+`mjxgait.controllers.sims_brain.genotype.Graph`).
+"""
+
+import dataclasses
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+
+from mjxgait.controllers.sims_brain.reference_body.material import (
+    AXES,
+    JOINTS,
+    LARGEST,
+    ROOM,
+    SMALLEST,
+    STRENGTH,
+)
+from mjxgait.controllers.sims_brain.reference_body.room import Box, inside
+
+MIRROR = np.diag([1.0, -1.0, 1.0])
+IMAGES = ((False,), (True,), (False, True))
+"""Which copies grow: as it is, mirrored, both."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Part:
+    """A block and its joint.
+
+    node: of the graph. parent: number of the part it is joined to, -1 for the root. mirrored:
+    whether it is the mirror image of what its node describes. half: [3] m. place: [3] m of the joint
+    in the parent's frame. axes: [3, 3] the part's own (columns) there, before the joint turns.
+    kind: of the joint. swing: [hinges] rad to either side. branch: how often each node is on the way
+    from the root to here. scale: of its node's sizes. box: its block at rest.
+    """
+
+    node: int
+    parent: int
+    mirrored: bool
+    half: np.ndarray
+    place: np.ndarray
+    axes: np.ndarray
+    kind: int
+    swing: np.ndarray
+    branch: Mapping[int, int]
+    scale: float
+    box: Box
+
+    @property
+    def hinges(self) -> tuple[int, ...]:
+        """The part's own axes that its hinges turn about."""
+        return () if self.parent < 0 else AXES[self.kind]
+
+    @property
+    def joint(self) -> str:
+        """What joins it to its parent."""
+        return "none" if self.parent < 0 else JOINTS[self.kind]
+
+    @property
+    def middle(self) -> np.ndarray:
+        """[3] m, of its block, from where it hangs; the root hangs nowhere."""
+        return np.array([0.0 if self.parent < 0 else self.half[0], 0.0, 0.0])
+
+    @property
+    def strength(self) -> float:
+        """N·m, of each of its hinges."""
+        return float(STRENGTH * 4 * self.half[1] * self.half[2])
+
+
+def grow(genome: Mapping[str, np.ndarray], most_parts: int, most_links: int) -> list[Part]:
+    """The parts of a genome, parents first; what has no room does not grow."""
+    graph = {n.removeprefix("graph."): a for n, a in genome.items() if n.startswith("graph.")}
+    parts = [_root(graph)]
+    links = 1
+    for number, part in enumerate(parts):
+        for place in _growing(graph, part):
+            node, images = int(graph["target"][place]), IMAGES[int(graph["mirror"][place])]
+            needed = len(images) * max(len(AXES[int(graph["joint"][node])]), 1)
+            if len(parts) + len(images) > most_parts or links + needed > most_links:
+                continue
+            children = [_child(graph, part, number, place, image) for image in images]
+            if _crowded(parts, children, number):
+                continue
+            links += needed
+            parts += children
+    return parts
+
+
+def _crowded(parts: Sequence[Part], children: Sequence[Part], parent: int) -> bool:
+    """Whether one of the children would stand in another block than its parent's."""
+    boxes = [part.box for number, part in enumerate(parts) if number != parent]
+    new = [child.box for child in children]
+    pairs = [*itertools.product(boxes, new), *itertools.combinations(new, 2)]
+    return any(inside(one, other) > ROOM for one, other in pairs)
+
+
+def _growing(graph: Mapping[str, np.ndarray], part: Part) -> Iterator[tuple[int, int]]:
+    """The connections that a part's recursion allows, each as (node, which of its own)."""
+    for own in np.flatnonzero(graph["used"][part.node]):
+        place = part.node, int(own)
+        target = int(graph["target"][place])
+        may_recur = part.branch.get(target, 0) <= graph["recursion"][target]
+        at_the_end = part.branch[part.node] > graph["recursion"][part.node]
+        if may_recur and (at_the_end or not graph["terminal"][place]):
+            yield place
+
+
+def _root(graph: Mapping[str, np.ndarray]) -> Part:
+    half = np.clip(graph["half"][0], SMALLEST, LARGEST)
+    return Part(
+        node=0,
+        parent=-1,
+        mirrored=False,
+        half=half,
+        place=np.zeros(3),
+        axes=np.eye(3),
+        kind=0,
+        swing=np.zeros(0),
+        branch={0: 1},
+        scale=1.0,
+        box=Box(np.zeros(3), half, np.eye(3)),
+    )
+
+
+def _child(
+    graph: Mapping[str, np.ndarray], parent: Part, number: int, at: tuple[int, int], image: bool
+) -> Part:
+    node = int(graph["target"][at])
+    scale = parent.scale * float(graph["scale"][at])
+    place, axes = joined(parent.half, graph["place"][at], graph["turn"][at])
+    mirrored = parent.mirrored != image
+    if mirrored:
+        place, axes = MIRROR @ place, MIRROR @ axes @ MIRROR
+    kind = int(graph["joint"][node])
+    half = np.clip(graph["half"][node] * scale, SMALLEST, LARGEST)
+    on, own = parent.box, parent.box.axes @ axes
+    return Part(
+        node=node,
+        parent=number,
+        mirrored=mirrored,
+        half=half,
+        place=place + parent.middle,
+        axes=axes,
+        kind=kind,
+        swing=graph["swing"][node][: len(AXES[kind])],
+        branch={**parent.branch, node: parent.branch.get(node, 0) + 1},
+        scale=scale,
+        box=Box(on.middle + on.axes @ place + half[0] * own[:, 0], half, own),
+    )
+
+
+def joined(half: np.ndarray, place: np.ndarray, turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where [3] m from a block's middle a child is joined, and the child's axes [3, 3] (columns).
+
+    A ray from the block's middle along `place`, in half sizes, leaves it there. The first axis
+    leaves the face at a right angle, until it is turned about itself, the second and the third.
+    """
+    face = int(np.argmax(np.abs(place)))
+    outward = (-1.0 if place[face] < 0 else 1.0) * np.eye(3)[face]
+    side = np.eye(3)[(face + 1) % 3]
+    frame = np.column_stack([outward, side, np.cross(outward, side)])
+    turned = frame @ _about(0, turn[0]) @ _about(1, turn[1]) @ _about(2, turn[2])
+    return half * place / max(abs(place[face]), 1e-6), turned
+
+
+def _about(axis: int, angle: float) -> np.ndarray:
+    """A rotation matrix, by Rodrigues' formula."""
+    x, y, z = np.eye(3)[axis]
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross

@@ -1,0 +1,104 @@
+"""A grown body as a MuJoCo model with true blocks and hinges, which opens in any MuJoCo tool."""
+
+import xml.etree.ElementTree as ET
+from collections.abc import Iterable, Sequence
+
+import mujoco
+import numpy as np
+
+from mjxgait.controllers.sims_brain.reference_body.material import (
+    DAMPING,
+    DENSITY,
+    HARDEST,
+    ROTOR,
+)
+from mjxgait.controllers.sims_brain.reference_body.parts import Part
+
+SPIN, ROLL = 0.005, 0.0001
+"""MuJoCo's own torsional and rolling friction, which contacts of three dimensions do not use."""
+
+
+def body_xml(
+    parts: Sequence[Part],
+    step: float,
+    gravity: float,
+    friction: float | None,
+    height: float = 1.0,
+    keyframe: str = "",
+) -> str:
+    """The model's text. Parts are called `part0` (the root), … and their hinges `part1_0`, ….
+
+    step: s. gravity: m/s². friction: of a floor at z = 0; None for one that nothing touches. height:
+    m, of the root's middle. keyframe: name of one with all angles at 0.
+    """
+    root = ET.Element("mujoco", model="blocks")
+    ET.SubElement(root, "compiler", angle="radian")
+    down = _text((0, 0, -gravity))
+    option = ET.SubElement(root, "option", timestep=f"{step:g}", gravity=down)
+    ET.SubElement(option, "flag", eulerdamp="disable")
+    world = ET.SubElement(root, "worldbody")
+    sticking = {}
+    if friction is not None:
+        hard = {"solref": _text((HARDEST * step, 1.0))}
+        sticking = {"friction": _text((friction, SPIN, ROLL)), **hard}
+    touched = "0" if friction is None else "1"
+    plane = {"type": "plane", "size": "0 0 1", "contype": "0", "conaffinity": touched}
+    ET.SubElement(world, "geom", {"name": "floor", **plane, **sticking})
+    bodies: list[ET.Element] = []
+    for number, part in enumerate(parts):
+        if part.parent < 0:
+            own = ET.SubElement(world, "body", name="part0", pos=_text((0, 0, height)))
+            ET.SubElement(own, "freejoint", name="root")
+        else:
+            own = ET.SubElement(
+                bodies[part.parent],
+                "body",
+                name=f"part{number}",
+                pos=_text(part.place),
+                quat=_text(_quaternion(part.axes)),
+            )
+        _with_joints_and_block(own, number, part, sticking)
+        bodies.append(own)
+    if keyframe:
+        hinges = sum(len(part.hinges) for part in parts)
+        place = _text((0, 0, height, 1, 0, 0, 0, *[0] * hinges))
+        ET.SubElement(ET.SubElement(root, "keyframe"), "key", name=keyframe, qpos=place)
+    ET.indent(root)
+    return ET.tostring(root, encoding="unicode")
+
+
+def _with_joints_and_block(
+    own: ET.Element, number: int, part: Part, sticking: dict[str, str]
+) -> None:
+    damping = DAMPING * part.strength
+    for hinge, (axis, swing) in enumerate(zip(part.hinges, part.swing, strict=True)):
+        ET.SubElement(
+            own,
+            "joint",
+            name=f"part{number}_{hinge}",
+            axis=_text(np.eye(3)[axis]),
+            limited="true",
+            range=_text((-swing, swing)),
+            armature=_text((ROTOR * damping,)),
+            damping=_text((damping,)),
+        )
+    block = {
+        "name": f"block{number}",
+        "type": "box",
+        "size": _text(part.half),
+        "pos": _text(part.middle),
+        "density": f"{DENSITY:g}",
+        "contype": "1",
+        "conaffinity": "1",
+    }
+    ET.SubElement(own, "geom", {**block, **sticking})
+
+
+def _quaternion(axes: np.ndarray) -> np.ndarray:
+    found = np.zeros(4)
+    mujoco.mju_mat2Quat(found, np.ascontiguousarray(axes, float).reshape(9))
+    return found
+
+
+def _text(values: Iterable[float]) -> str:
+    return " ".join(f"{float(value):.9g}" for value in values)

@@ -1,0 +1,75 @@
+"""Genomes of bodies and brains that grow, as their file has them, and the body that one grows into."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from mjxgait.config.tables import build
+from mjxgait.controllers.sims_brain.config import BrainConfig
+from mjxgait.controllers.sims_brain.reference_body.folder import body_files
+from mjxgait.controllers.sims_brain.reference_body.material import FRICTION, GRAVITY, IN_WATER
+from mjxgait.controllers.sims_brain.reference_body.parts import grow
+from mjxgait.creature import Creature
+from mjxgait.creature.scale import load_files
+from mjxgait.errors import UserError
+
+
+class GraphCodec:
+    """See `Codec`: arrays as nested lists under their names."""
+
+    def settled(
+        self, genome: Mapping[str, np.ndarray], creature: Creature
+    ) -> dict[str, np.ndarray]:
+        """See `Codec`: numbers as a file has them, so that the same body grows from it."""
+        return {
+            name: array.astype(float) if np.issubdtype(array.dtype, np.floating) else array
+            for name, array in genome.items()
+        }
+
+    def document(
+        self, genome: Mapping[str, np.ndarray], settings: BrainConfig, creature: Creature
+    ) -> dict[str, Any]:
+        """See `Codec`."""
+        return {name: np.asarray(array).tolist() for name, array in genome.items()}
+
+    def genome(self, document: Mapping[str, Any], creature: Creature) -> dict[str, np.ndarray]:
+        """See `Codec`."""
+        return {name: np.array(values) for name, values in document.items()}
+
+    def settings(self, table: Mapping[str, Any], where: str) -> BrainConfig:
+        """See `Codec`."""
+        return build(BrainConfig, table, where)
+
+    def check(self, genome: Mapping[str, np.ndarray], creature: Creature) -> None:
+        """See `Codec`."""
+        for name, array in genome.items():
+            if not np.isfinite(array).all():
+                raise UserError(
+                    f"the genome's {name} has numbers that are not finite: nothing grows from it; "
+                    "take a champion of another generation"
+                )
+
+    def shapes(self, settings: BrainConfig, creature: Creature) -> dict[str, tuple[int, ...]]:
+        """See `Codec`."""
+        each = (settings.nodes, settings.connections)
+        return {"graph.half": (settings.nodes, 3), "graph.target": each}
+
+    def embodied(
+        self,
+        genome: Mapping[str, np.ndarray],
+        settings: BrainConfig,
+        task: str,
+        creature: Creature,
+    ) -> Creature:
+        """See `Codec`: what grows from the genome, in the water or on the ground of its task."""
+        wet = task in IN_WATER
+        files = body_files(
+            grow(genome, settings.parts, settings.links),
+            creature.name,
+            float(creature.model.opt.timestep),
+            gravity=0.0 if wet else GRAVITY,
+            friction=None if wet else FRICTION,
+            around="in water" if wet else "on land",
+        )
+        return load_files(files)

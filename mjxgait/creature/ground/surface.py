@@ -1,0 +1,251 @@
+"""The ground in the compiled program: height, slope and contact as pure functions of its numbers.
+
+All is analytic and without a table: a wave is made of parabolas, which cost five operations where a
+sine costs twenty-five. Numbers and places broadcast against each other, so the same code serves one
+creature ([] and [n]) and lanes innermost ([L] and [n, L]). What each kind is: docs/ground.md.
+"""
+
+from typing import Any, NamedTuple, Protocol
+
+import jax.numpy as jnp
+import numpy as np
+
+from mjxgait.creature.ground.spec import GroundSpec, Place
+from mjxgait.types import Number, pytree
+
+TREAD = 1.0
+"""Hip heights; the length of a step."""
+RISER = 0.2
+"""Share of the tread over which a step rises."""
+LENGTHS = {"bumps": (2.0, 2.0), "rough": (1.5, 2.0, 2.7, 3.6, 4.8)}
+"""Hip heights; of each wave."""
+DRAWS = max(len(lengths) for lengths in LENGTHS.values())
+"""Pairs of random numbers that a ground takes, whatever its kind."""
+
+
+class Relief(Protocol):
+    """Heights seen from the start: ahead and to the left of it, in m."""
+
+    def rise(self, ahead: Any, left: Any, level: Any) -> tuple[Any, Any, Any]:
+        """Height in m, and its change per metre ahead and to the left.
+
+        level: m around the start that are level.
+        """
+        ...
+
+
+@pytree
+class Ground:
+    """One trial's ground. start: [2] m. forward: [2]. level: [] m around the start."""
+
+    start: Number
+    forward: Number
+    level: Number
+    relief: Any
+
+
+@pytree
+class Slope:
+    """along, across: [] rise per metre ahead and to the left."""
+
+    along: Number
+    across: Number
+
+    def rise(self, ahead: Any, left: Any, level: Any) -> tuple[Any, Any, Any]:
+        """See `Relief`; a slope along the way begins as a parabola a `level` long."""
+        beyond = ahead - level
+        bend = jnp.clip(beyond, 0.0, level)
+        height = self.along * (0.5 * bend * bend / level + jnp.maximum(beyond - level, 0.0))
+        full, by_ahead, by_left = _full(ahead, left, level)
+        side = self.across * left
+        return (
+            height + side * full,
+            self.along * bend / level + side * by_ahead,
+            side * by_left + self.across * full,
+        )
+
+
+@pytree
+class Steps:
+    """Stairs: height, tread: [] m of a step. offset: [] share of a tread before the first."""
+
+    height: Number
+    tread: Number
+    offset: Number
+
+    def rise(self, ahead: Any, left: Any, level: Any) -> tuple[Any, Any, Any]:
+        """See `Relief`."""
+        treads = jnp.maximum((ahead - level) / self.tread - self.offset, 0.0)
+        whole = jnp.floor(treads)
+        up = jnp.clip((treads - whole - (1 - RISER)) / RISER, 0.0, 1.0)
+        steep = 6 * up * (1 - up) / (RISER * self.tread)
+        height = self.height * (whole + up * up * (3 - 2 * up))
+        return height, self.height * steep, jnp.zeros_like(left)
+
+
+@pytree
+class Waves:
+    """Plane waves. size: [W] m. along, across: [W] cycles per metre. phase: [W] cycles."""
+
+    size: Number
+    along: Number
+    across: Number
+    phase: Number
+
+    def rise(self, ahead: Any, left: Any, level: Any) -> tuple[Any, Any, Any]:
+        """See `Relief`."""
+        height = by_ahead = by_left = jnp.zeros_like(ahead)
+        for w in range(self.size.shape[0]):
+            cycles = self.along[w] * ahead + self.across[w] * left + self.phase[w]
+            turn = cycles - jnp.round(cycles)
+            bow = 1 - 2 * jnp.abs(turn)
+            height = height + self.size[w] * 8 * turn * bow
+            steep = self.size[w] * 8 * (2 * bow - 1)
+            by_ahead = by_ahead + steep * self.along[w]
+            by_left = by_left + steep * self.across[w]
+        full, full_ahead, full_left = _full(ahead, left, level)
+        return (
+            height * full,
+            by_ahead * full + height * full_ahead,
+            by_left * full + height * full_left,
+        )
+
+
+@pytree
+class Together:
+    """One on another: the sum of their heights."""
+
+    slope: Slope
+    waves: Waves
+
+    def rise(self, ahead: Any, left: Any, level: Any) -> tuple[Any, Any, Any]:
+        """See `Relief`."""
+        height, by_ahead, by_left = self.slope.rise(ahead, left, level)
+        more, more_ahead, more_left = self.waves.rise(ahead, left, level)
+        return height + more, by_ahead + more_ahead, by_left + more_left
+
+
+def _full(ahead: Any, left: Any, level: Any) -> tuple[Any, Any, Any]:
+    """0 within `level` of the start, 1 from twice as far on; and its changes per metre."""
+    width = 3 * level * level
+    share = jnp.clip((ahead * ahead + left * left) / width - 1 / 3, 0.0, 1.0)
+    change = 12 * share * (1 - share) / width
+    return share * share * (3 - 2 * share), change * ahead, change * left
+
+
+def lay_ground(spec: GroundSpec, place: Place, draws: Any) -> Ground | None:
+    """The ground of a spec under a creature; None where it is flat.
+
+    draws: [DRAWS, 2] in [0, 1): direction and phase of each wave, see `named_draws`.
+    """
+    if spec.flat:
+        return None
+    sign = -1.0 if spec.direction == "down" else 1.0
+    hip, size = place.hip_height, sign * spec.size
+    relief: Relief
+    if spec.kind == "slope":
+        aside = spec.direction == "across"
+        along, across = (0.0, size) if aside else (size, 0.0)
+        relief = Slope(jnp.float32(along), jnp.float32(across))
+    elif spec.kind == "steps":
+        relief = Steps(jnp.float32(size * hip), jnp.float32(TREAD * hip), jnp.float32(draws[0, 1]))
+    else:
+        relief = _waves(spec, hip, jnp.asarray(draws))
+    return _laid(place, relief)
+
+
+def lay_uneven(place: Place, slope: Any, rough: float, draws: Any) -> Ground:
+    """Rough ground on a slope to any side.
+
+    slope: [2] rise per metre ahead and to the left. rough: hip heights, the most that it rises and
+    falls besides. draws: see `lay_ground`.
+    """
+    waves = _waves(GroundSpec("rough", rough), place.hip_height, jnp.asarray(draws))
+    return _laid(place, Together(Slope(*jnp.float32(slope)), waves))
+
+
+def _laid(place: Place, relief: Relief) -> Ground:
+    return Ground(
+        jnp.asarray(place.start[:2], jnp.float32),
+        jnp.asarray(place.forward[:2], jnp.float32),
+        jnp.float32(place.body_length),
+        relief,
+    )
+
+
+def _waves(spec: GroundSpec, hip: float, draws: Any) -> Waves:
+    """Of equal steepness. Rough ground's directions are drawn, bumps lie crosswise."""
+    lengths = np.array(LENGTHS[spec.kind]) * hip
+    count = len(lengths)
+    drawn = draws[:count, 0] if spec.kind == "rough" else 0.5
+    angle = np.pi / count * (np.arange(count) + drawn)
+    return Waves(
+        size=jnp.float32(spec.size * hip * lengths / lengths.sum()),
+        along=jnp.float32(jnp.cos(angle) / lengths),
+        across=jnp.float32(jnp.sin(angle) / lengths),
+        phase=jnp.float32(draws[:count, 1]),
+    )
+
+
+def named_draws(seed: int) -> np.ndarray:
+    """[DRAWS, 2] of the ground of a seed, from NumPy's frozen Mersenne twister."""
+    return np.random.RandomState(seed).random_sample((DRAWS, 2))
+
+
+def height(ground: Ground, x: Any, y: Any) -> Any:
+    """m at places in m."""
+    return _surface(ground, x, y)[0]
+
+
+def normal(ground: Ground, x: Any, y: Any) -> tuple[Any, Any, Any]:
+    """Unit vector out of the ground at places in m: three components."""
+    return _normal(*_surface(ground, x, y)[1:])
+
+
+def clearance(ground: Ground, x: Any, y: Any, z: Any, radius: Any) -> Any:
+    """m from spheres at these centres to the ground, as to the plane under the centre."""
+    below, by_x, by_y = _surface(ground, x, y)
+    return (z - below) * _normal(by_x, by_y)[2] - radius
+
+
+class Contact(NamedTuple):
+    """Of spheres with the ground: distance in m (negative inside), and the contact's three axes."""
+
+    distance: Any
+    normal: tuple[Any, Any, Any]
+    first: tuple[Any, Any, Any]
+    second: tuple[Any, Any, Any]
+
+
+def contact(ground: Ground, x: Any, y: Any, z: Any, radius: Any) -> Contact:
+    """Of spheres at these centres with the ground, as with a plane where it is nearest to them.
+
+    That plane is found in two looks: under the centre, and at the foot of the perpendicular on the
+    plane there. Tangents are those that MuJoCo makes of a normal alone (`mju_makeFrame`).
+    """
+    below, by_x, by_y = _surface(ground, x, y)
+    nx, ny, nz = _normal(by_x, by_y)
+    apart = (z - below) * nz
+    foot_x, foot_y = x - nx * apart, y - ny * apart
+    below, by_x, by_y = _surface(ground, foot_x, foot_y)
+    nx, ny, nz = _normal(by_x, by_y)
+    distance = (x - foot_x) * nx + (y - foot_y) * ny + (z - below) * nz - radius
+    # The world's y less its part along the normal; no ground is so steep that y would be it.
+    flat = 1 / jnp.sqrt(1 - ny * ny)
+    first = -nx * ny * flat, (1 - ny * ny) * flat, -nz * ny * flat
+    second = -nz * flat, jnp.zeros_like(nx), nx * flat
+    return Contact(distance, (nx, ny, nz), first, second)
+
+
+def _normal(by_x: Any, by_y: Any) -> tuple[Any, Any, Any]:
+    up = 1 / jnp.sqrt(1 + by_x * by_x + by_y * by_y)
+    return -by_x * up, -by_y * up, up
+
+
+def _surface(ground: Ground, x: Any, y: Any) -> tuple[Any, Any, Any]:
+    """Height in m, and its change per metre along the world's x and y."""
+    east, north = x - ground.start[0], y - ground.start[1]
+    cos, sin = ground.forward[0], ground.forward[1]
+    ahead, left = cos * east + sin * north, cos * north - sin * east
+    rise, by_ahead, by_left = ground.relief.rise(ahead, left, ground.level)
+    return rise, by_ahead * cos - by_left * sin, by_ahead * sin + by_left * cos

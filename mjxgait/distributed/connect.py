@@ -1,0 +1,100 @@
+"""To the cluster that the user names, and nowhere else."""
+
+import contextlib
+import logging
+import os
+import socket
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+from mjxgait.config.shipped import install_command
+from mjxgait.distributed.scheduler import Crew
+from mjxgait.errors import UserError
+
+LOOPBACK = ("127.0.0.1", "localhost")
+AUTO = "auto"
+NEVER_LEAVE_LOOPBACK = {"RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0"}
+"""Read as Ray is imported. Without it Ray takes this machine's outer address for 127.0.0.1."""
+QUIET = {"RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0", "RAY_DEDUP_LOGS_SKIP_REGEX": "."}
+"""Read as Ray is imported. Else it announces what it will do in a later version, and explains every
+lost worker in a paragraph."""
+PATIENCE = 5.0
+"""Seconds for the head to answer."""
+
+
+@contextlib.contextmanager
+def connected(
+    address: str, tell: Callable[[str], object], watch: Callable[[Crew], object] = lambda crew: None
+) -> Iterator[Crew]:
+    """The crew of a cluster of Ray; whatever it runs for us ends with the block.
+
+    Args:
+      address: HOST:PORT, or auto for the cluster that this machine is a part of.
+      tell, watch: see `Crew`.
+
+    Raises:
+      UserError: Ray is not installed, nobody answers, or a machine has other versions than this one.
+    """
+    place = _place(address)
+    host, _, port = place.rpartition(":")
+    _must_answer(address, host, port)
+    if host in LOOPBACK:
+        os.environ.update(NEVER_LEAVE_LOOPBACK)
+    ray = _ray()
+    try:
+        ray.init(address=place, log_to_driver=False, logging_level=logging.CRITICAL)
+    except (ConnectionError, RuntimeError, ValueError) as error:
+        reason = (str(error).strip().splitlines() or [type(error).__name__])[0]
+        raise UserError(
+            f"--cluster {address}: {reason} (is this machine a part of it, by `ray start`? "
+            "Has it the token, if there is one?)"
+        ) from None
+    from mjxgait.distributed.ray_backend import Machines
+
+    try:
+        yield Crew(Machines(tell), tell, watch)
+    finally:
+        ray.shutdown()
+
+
+def _ray() -> Any:
+    os.environ.update({name: os.environ.get(name, value) for name, value in QUIET.items()})
+    try:
+        import ray
+    except ImportError:
+        raise UserError(
+            f"--cluster needs Ray: {install_command('cluster')}, on every machine of the cluster"
+        ) from None
+    # What its threads say of lost machines is said in a sentence of ours.
+    logging.getLogger("ray").setLevel(logging.CRITICAL)
+    return ray
+
+
+def _place(address: str) -> str:
+    """HOST:PORT of the cluster that is meant."""
+    if address == AUTO:
+        running = Path(os.environ.get("RAY_TMPDIR", "/tmp")) / "ray" / "ray_current_cluster"
+        address = os.environ.get("RAY_ADDRESS") or (
+            running.read_text().strip() if running.is_file() else ""
+        )
+        if not address:
+            raise UserError(
+                "--cluster auto: this machine is no part of a cluster; start one with "
+                "`ray start --head --node-ip-address 127.0.0.1 --port 6379` (docs/cluster.md)"
+            )
+    host, colon, port = address.rpartition(":")
+    if not (host and colon and port.isdigit()):
+        raise UserError(f"--cluster {address}: give auto or HOST:PORT, such as 10.0.0.5:6379")
+    return address
+
+
+def _must_answer(address: str, host: str, port: str) -> None:
+    """Ray itself would try for minutes."""
+    try:
+        socket.create_connection((host, int(port)), PATIENCE).close()
+    except (OSError, OverflowError) as error:
+        raise UserError(
+            f"--cluster {address}: nobody answers at {host}:{port} ({error}); is the head running, "
+            "and the port open for this machine?"
+        ) from None

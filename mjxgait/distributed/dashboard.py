@@ -1,0 +1,79 @@
+"""All machines on one screen: a live table in a terminal, one line per arrival and loss elsewhere."""
+
+import contextlib
+import time
+from collections import Counter
+from collections.abc import Iterator
+from types import TracebackType
+from typing import Self
+
+from rich.console import Console
+from rich.live import Live
+from rich.table import Table
+
+from mjxgait.distributed.connect import connected
+from mjxgait.distributed.local import Here
+from mjxgait.distributed.scheduler import Crew
+
+A_SECOND = 4
+"""Looks at the crew; with thousands of workers one takes as long as handing out work."""
+
+
+@contextlib.contextmanager
+def crew_at(address: str | None, console: Console | None = None) -> Iterator[Crew]:
+    """Those of the cluster at an address, all on the screen; without one this process alone.
+
+    Raises:
+      UserError: see `connected`.
+    """
+    if address is None:
+        yield Crew(Here())
+        return
+    with Board(console) as board, connected(address, board.tell, board.watch) as crew:
+        yield crew
+
+
+class Board:
+    """What each machine is doing."""
+
+    def __init__(self, console: Console | None = None) -> None:
+        self.console = console or Console(highlight=False, soft_wrap=True, markup=False)
+        self._live = Live(console=self.console, transient=True, refresh_per_second=A_SECOND)
+        self._shown = 0.0
+
+    def __enter__(self) -> Self:
+        if self.console.is_terminal:
+            self._live.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        at: TracebackType | None,
+    ) -> None:
+        self._live.stop()
+
+    def tell(self, said: str) -> None:
+        """A line of its own."""
+        self.console.print(f"cluster: {said}")
+
+    def watch(self, crew: Crew) -> None:
+        """Shows how things stand."""
+        if self.console.is_terminal and time.monotonic() - self._shown > 1 / A_SECOND:
+            self._shown = time.monotonic()
+            self._live.update(table(crew))
+
+
+def table(crew: Crew) -> Table:
+    """A row per machine: workers, how many of them work, and what has come back from it."""
+    busy = Counter(worker.node for worker in crew.busy)
+    there = busy + Counter(worker.node for worker in crew.idle)
+    shown = Table("machine", box=None, pad_edge=False)
+    for heading in ("workers", "at work", "done"):
+        shown.add_column(heading, justify="right")
+    for node in sorted(there.keys() | crew.done.keys()):
+        counts = (there[node], busy[node], crew.done.get(node, 0))
+        shown.add_row(node, *map(str, counts))
+    shown.caption = f"pieces of work left: {crew.open}"
+    return shown

@@ -1,0 +1,156 @@
+"""What can be handed out: pure work on one recipe, the same bits whoever of a kind of machine does it."""
+
+import dataclasses
+import time
+from collections.abc import Iterator, Mapping
+from typing import Any, Protocol
+
+import jax
+import numpy as np
+
+from mjxgait.champion import Champion
+from mjxgait.distributed.programs import Programs
+from mjxgait.distributed.recipe import Recipe
+from mjxgait.evolution.state import EvolutionState, GenerationMetrics, stop_reason
+from mjxgait.tasks.starts import Starts
+from mjxgait.training.experiment import Batch, Step
+from mjxgait.training.loop import followed, metrics_line, versions
+from mjxgait.training.packed import Packed, pack
+from mjxgait.types import Asked, Judged
+
+Lines = list[dict[str, Any]]
+
+
+class Job(Protocol):
+    """Work on a recipe."""
+
+    def do(self, programs: Programs, recipe: Recipe) -> Any:
+        """Its result, in NumPy."""
+        ...
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Advanced:
+    """Where evolution has come to.
+
+    lines: of the metrics, a list [B] per generation. champions: of rows that have come to their
+    end. note: see `Experiment.plant_note`. reason: why it is over, if it is. seconds: that the
+    generations took, without compilation. steps: creature-steps lived in them.
+    """
+
+    packed: Packed
+    lines: list[Lines]
+    note: str
+    seconds: float
+    steps: int
+    champions: Mapping[int, Champion] = dataclasses.field(default_factory=dict)
+    reason: str | None = None
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class AdvanceRows:
+    """Runs side by side, from a state or from the beginning, until a generation.
+
+    planted: arrays [B, P, ...] of the genomes by name, to begin with instead of random ones.
+    """
+
+    state: Packed | None
+    until: int
+    planted: Mapping[str, np.ndarray] | None = None
+
+    def do(self, programs: Programs, recipe: Recipe) -> Advanced:
+        """See `Job`."""
+        batch = programs.batch(recipe)
+        way = _Way(programs.step(recipe), batch, self._begun(batch), self.until)
+        champions: dict[int, Champion] = {}
+        for _ in way:
+            for row, experiment in enumerate(batch.experiments):
+                if way.generation == experiment.config.evolution.generations:
+                    champions[row] = experiment.champion(_row(way.states, row), versions())
+        return way.advanced(pack(way.states), champions=champions)
+
+    def _begun(self, batch: Batch) -> EvolutionState:
+        if self.state is None and self.planted is None:
+            return batch.init()
+        begun = self.state or pack(batch.init()).with_arrays(self.planted or {})
+        return begun.state(batch.abstract(), "a state of these runs")
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class AdvanceIsland:
+    """One population of a run, from a state or from the beginning, until a generation or its end."""
+
+    state: Packed | None
+    until: int
+    island: int
+
+    def do(self, programs: Programs, recipe: Recipe) -> Advanced:
+        """See `Job`. The state is packed without a row's axis, as a run's checkpoint has it."""
+        batch = programs.batch(recipe)
+        one = batch.experiments[0]
+        begun = self.state and self.state.state(one.abstract(), "an island's state")
+        state, reason = begun or one.init(self.island), None
+        alone = jax.tree.map(lambda leaf: leaf[None], state)
+        way = _Way(programs.step(recipe), batch, alone, self.until)
+        for lines in way:
+            state = jax.tree.map(lambda leaf: leaf[0], way.states)
+            lines[0] |= followed(one.simulator.controller.numbers(state.genomes))
+            if reason := stop_reason(state, one.config.evolution):
+                break
+        return way.advanced(pack(state), reason=reason)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Judge:
+    """Genomes [1, N, ...] on starts [1, R], with leaves in NumPy. asked: see `Evaluator`."""
+
+    genomes: Any
+    starts: Starts
+    asked: Asked | None = None
+
+    def do(self, programs: Programs, recipe: Recipe) -> Judged:
+        """See `Job`."""
+        judged: Judged = programs.judge(recipe, self.genomes, self.starts, self.asked)
+        return judged
+
+
+class _Way:
+    """The generations of one job, one after the other, and what there is to tell of them.
+
+    states: of the latest.
+    """
+
+    def __init__(self, step: Step, batch: Batch, states: EvolutionState, until: int) -> None:
+        self.step, self.batch, self.until = step, batch, until
+        self.states = batch.place(states)
+        self.generation = int(np.max(states.generation))
+        self.seconds, self.steps = 0.0, 0
+        self.lines: list[Lines] = []
+
+    def __iter__(self) -> Iterator[Lines]:
+        """The lines [B] of each generation."""
+        task = self.batch.experiments[0].simulator.task
+        while self.generation < self.until:
+            began = time.perf_counter()
+            self.states, found = self.step(self.states)
+            metrics: GenerationMetrics = jax.device_get(found)
+            seconds = time.perf_counter() - began
+            self.seconds += seconds
+            self.generation = int(np.max(metrics.generation))
+            if self.generation < 0:
+                continue
+            self.steps += int(metrics.sim_steps.sum())
+            each = (jax.tree.map(lambda a, i=i: a[i], metrics) for i in range(len(metrics.best)))
+            self.lines.append([metrics_line(one, seconds, task) for one in each])
+            yield self.lines[-1]
+
+    def advanced(self, packed: Packed, **also: Any) -> Advanced:
+        """All of it."""
+        note = self.batch.experiments[0].plant_note
+        return Advanced(packed, self.lines, note, self.seconds, self.steps, **also)
+
+
+def _row(states: EvolutionState, row: int) -> EvolutionState:
+    """One row's state; its key, which cannot be taken out like the rest, is not asked for."""
+    plain = dataclasses.replace(states, key=states.generation)
+    return jax.tree.map(lambda leaf: leaf[row], plain)

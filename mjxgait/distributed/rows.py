@@ -1,0 +1,136 @@
+"""Whole runs as rows of one program, each with a run folder of its own."""
+
+import json
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mjxgait.config.schema import Config
+from mjxgait.creature import Creature
+from mjxgait.distributed.jobs import Advanced, AdvanceRows
+from mjxgait.distributed.recipe import Recipe
+from mjxgait.distributed.scheduler import Crew
+from mjxgait.training.checkpoint import Checkpoints
+from mjxgait.training.disk import disk_errors
+from mjxgait.training.folder import METRICS, open_run, truncate_metrics
+from mjxgait.training.packed import Packed, side_by_side
+
+Tell = Callable[[int, int, Advanced | None], object]
+"""Called with the generation, the last one, and what has come back, if something has."""
+
+
+class Rows:
+    """Runs that go on together, from the folders that they were made in.
+
+    Attributes:
+      sources: see `build_batch`. images: a row's second folder, where there is one, with what is
+        written there in place of its state.
+      keep_every: see `Checkpoints`; by default no generation stays but the latest.
+      together: so many rows are one piece of work; 0: all, as those with sources must be.
+    """
+
+    def __init__(
+        self,
+        creature: Creature,
+        folders: Sequence[Path],
+        sources: Sequence[Sequence[int]] = (),
+        images: Mapping[Path, tuple[Path, Callable[[Packed], Packed]]] | None = None,
+        keep_every: int | None = None,
+        together: int = 0,
+    ) -> None:
+        self.creature, self.folders, self.images = creature, list(folders), images or {}
+        self.configs: list[Config] = [open_run(folder)[1] for folder in folders]
+        size = together or len(self.folders)
+        self.pieces = [slice(at, at + size) for at in range(0, len(self.folders), size)]
+        self.recipes = [Recipe.of(creature, self.configs[piece], sources) for piece in self.pieces]
+        self.last = self.configs[0].evolution.generations
+        self.keep_every = keep_every or self.last + 1
+
+    def to_the_end(
+        self,
+        begin: Mapping[str, np.ndarray] | None,
+        crew: Crew,
+        tell: Tell,
+        stopped: Callable[[], bool],
+    ) -> Packed | None:
+        """The states [B] of the last generation; None when told to stop. begin: see `AdvanceRows`."""
+        seconds = [folder for folder, _ in self.images.values()]
+        stores = {path: Checkpoints(path, self.keep_every) for path in [*self.folders, *seconds]}
+        try:
+            state = self._stored(stores)
+            stride = self.configs[0].checkpoint_every
+            generation = -1 if state is None else state.generation
+            if generation < self.last:
+                tell(generation, self.last, None)
+            while generation < self.last:
+                until = min((max(generation, 0) // stride + 1) * stride, self.last)
+                if (done := crew.all(self._work(state, begin, until), stopped)) is None:
+                    return None
+                advanced = _joined(done)
+                state, generation = advanced.packed, until
+                self._keep(stores, advanced)
+                tell(generation, self.last, advanced)
+            return state
+        finally:
+            for store in stores.values():
+                store.close()
+
+    def _work(
+        self, state: Packed | None, begin: Mapping[str, np.ndarray] | None, until: int
+    ) -> Iterator[tuple[Recipe, AdvanceRows]]:
+        for recipe, piece in zip(self.recipes, self.pieces, strict=True):
+            if state is not None:
+                yield recipe, AdvanceRows(state.rows(piece), until)
+            else:
+                planted = begin and {name: array[piece] for name, array in begin.items()}
+                yield recipe, AdvanceRows(None, until, planted)
+
+    def _stored(self, stores: Mapping[Path, Checkpoints]) -> Packed | None:
+        """What was left by the latest generation that all have a checkpoint of."""
+        known = set.intersection(*(set(store.generations()) for store in stores.values()))
+        common = max(known, default=-1)
+        for folder, store in stores.items():
+            store.drop_after(common)
+            truncate_metrics(folder / METRICS, common)
+        if common < 0:
+            return None
+        return side_by_side(
+            [stores[folder].read(self.creature.digest, common) for folder in self.folders]
+        )
+
+    def _keep(self, stores: Mapping[Path, Checkpoints], advanced: Advanced) -> None:
+        for row, folder in enumerate(self.folders):
+            state = advanced.packed.row(row)
+            lines = [line[row] for line in advanced.lines]
+            self._write(stores, folder, state, lines)
+            if folder in self.images:
+                second, image = self.images[folder]
+                self._write(stores, second, image(state), lines)
+
+    def _write(
+        self,
+        stores: Mapping[Path, Checkpoints],
+        folder: Path,
+        state: Packed,
+        lines: Iterable[Mapping[str, Any]],
+    ) -> None:
+        """First the log, for a resumed run takes lines out, last the state."""
+        path = folder / METRICS
+        with disk_errors(folder), path.open("a", encoding="utf-8") as log:
+            log.writelines(json.dumps(line) + "\n" for line in lines)
+        stores[folder].keep(state, self.creature.name, self.creature.digest)
+
+
+def _joined(pieces: Sequence[Advanced]) -> Advanced:
+    """Pieces that were worked on at the same time, as one."""
+    rows = [piece.packed.row(row) for piece in pieces for row in range(piece.packed.count)]
+    return Advanced(
+        side_by_side(rows),
+        [list(chain(*lines)) for lines in zip(*(piece.lines for piece in pieces), strict=True)],
+        pieces[0].note,
+        max(piece.seconds for piece in pieces),
+        sum(piece.steps for piece in pieces),
+    )

@@ -1,0 +1,358 @@
+"""The genetic algorithm: one generation as a pure function of its state, whatever a genome drives.
+
+A run begins with a population that nobody has judged (`seeding`): the first call judges it, so that
+the physics is traced and compiled once. Forced evolution (Wilson) is another way to fill the same
+offspring slots, chosen by a flag in the state.
+"""
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+
+from mjxgait.config.evolution import EvolutionConfig
+from mjxgait.config.traced import chosen
+from mjxgait.evolution import forced
+from mjxgait.evolution.breeding import Nursery, parents, proportional_parents
+from mjxgait.evolution.copies import first_of_kind, together
+from mjxgait.evolution.families import families, with_share
+from mjxgait.evolution.metrics import metrics
+from mjxgait.evolution.state import (
+    NOBODY,
+    EvolutionState,
+    GenerationMetrics,
+    Origin,
+    Proposal,
+)
+from mjxgait.evolution.variation import Variation
+from mjxgait.types import Judged
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Evolution:
+    """The algorithm with its parts, around whoever judges: `propose`, then `absorb` the verdict.
+
+    config: plain or traced. rank: terms [..., R, F], generation [] -> fitness [...], higher is
+    better.
+    """
+
+    config: EvolutionConfig
+    variation: Variation
+    rank: Callable[[jax.Array, jax.Array], jax.Array]
+
+    def init(self, key: jax.Array, trials: int, terms: int, outcomes: int) -> EvolutionState:
+        """The state before anybody has been judged. trials, terms, outcomes: R, F, O."""
+        key, key_create = jax.random.split(key)
+        count, window = self.config.population, self.config.forced.window
+        integer = jnp.zeros((), jnp.int32)
+        return EvolutionState(
+            genomes=self.variation.begin(key_create, count),
+            terms=jnp.zeros((count, trials, terms)),
+            outcome=jnp.zeros((count, trials, outcomes)),
+            fitness=jnp.full(count, -jnp.inf, jnp.float32),
+            born=jnp.zeros(count, jnp.int32),
+            origin=jnp.full(count, int(Origin.INITIAL), jnp.int32),
+            key=key,
+            generation=jnp.int32(-1),
+            seeded=integer,
+            best_history=jnp.full(window + 1, -jnp.inf, jnp.float32),
+            mean_history=jnp.full(window + 1, -jnp.inf, jnp.float32),
+            quiet=integer,
+            forced=jnp.zeros((), bool),
+            spell_age=integer,
+            refreshed=integer,
+            spell_best=jnp.float32(-jnp.inf),
+            barren=integer,
+            rounds=jnp.ones(count) if self.config.remember else None,
+            family=jnp.arange(count) if self.config.family < 1 else None,
+        )
+
+    def propose(self, state: EvolutionState) -> Proposal:
+        """The offspring of a generation."""
+        key, key_offspring = jax.random.split(state.key)
+        offspring, origin, mothers = self._offspring(key_offspring, state, self._seeding(state))
+        born = jnp.full(self.config.offspring, state.generation + 1)
+        return self._with_elite(state, Proposal(key, offspring, origin, born, mothers))
+
+    def _with_elite(self, state: EvolutionState, proposal: Proposal) -> Proposal:
+        """With the best parents in the first places, to be judged once more."""
+        count, now = self._again(state)
+        if not count:
+            return proposal
+        children = self._seeding(state) | ~now
+
+        def kept(leaf: jax.Array, old: jax.Array) -> jax.Array:
+            first = jnp.where(children, leaf[:count], old[:count])
+            return leaf.at[:count].set(first)
+
+        return dataclasses.replace(
+            proposal,
+            offspring=jax.tree.map(kept, proposal.offspring, state.genomes),
+            origin=kept(proposal.origin, state.origin),
+            born=kept(proposal.born, state.born),
+            mothers=None if proposal.mothers is None else kept(proposal.mothers, _own(state)),
+        )
+
+    def _again(self, state: EvolutionState) -> tuple[int, jax.Array]:
+        """How many of the best are judged again beside the children, and whether they are now."""
+        if self.config.elites or state.stale is None:
+            return self.config.elites, jnp.ones((), bool)
+        return min(self.config.population, self.config.offspring), state.stale
+
+    def _stay(self, state: EvolutionState) -> jax.Array:
+        """Whether [] parents live on although only children survive otherwise.
+
+        A forced generation replaces the worst of the population and no more. Its parents keep the
+        fitness of the generation before.
+        """
+        if not self.config.elites:
+            return jnp.zeros((), bool)
+        return state.forced if state.stale is None else state.forced & ~state.stale
+
+    def promising(
+        self, state: EvolutionState, proposal: Proposal, judged: Judged, share: float
+    ) -> jax.Array:
+        """Who [M] is worth more trials than the first, which alone has been judged: that share of all,
+        and whoever is judged once more.
+        """
+        generation = jnp.maximum(state.generation + 1, 0)
+        worth = self._fitness(proposal.offspring, judged.terms[:, :1], generation)
+        place = jnp.argsort(jnp.argsort(-worth))
+        best = (place < round(share * len(place))) & jnp.isfinite(worth)
+        count, now = self._again(state)
+        return best | ((jnp.arange(len(place)) < count) & now & ~self._seeding(state))
+
+    def absorb(
+        self, state: EvolutionState, proposal: Proposal, judged: Judged
+    ) -> tuple[EvolutionState, GenerationMetrics]:
+        """The rest of a generation: survival, and the decision whether the next one is forced."""
+        seeding = self._seeding(state)
+        recalled, rounds = self._recalled(state, judged)
+        generation = jnp.where(seeding, jnp.where(self._filled(state), 0, -1), state.generation + 1)
+        grown, mothers = self._survive(state, proposal, recalled, judged.terms, rounds, generation)
+        planted = self._plant(state, proposal, judged, generation)
+        state = jax.tree.map(
+            lambda a, b: jnp.where(seeding, a, b), _without_key(planted), _without_key(grown)
+        )
+        was_forced = state.forced
+        state = dataclasses.replace(state, key=proposal.key, generation=generation)
+        state = forced.decided(self.config, state)
+        told = None
+        if self.config.lineage and mothers is not None:
+            told = jnp.where(seeding, NOBODY, mothers)
+        return state, metrics(self.config, state, judged, was_forced, told)
+
+    def _recalled(self, state: EvolutionState, judged: Judged) -> tuple[Judged, jax.Array | None]:
+        """The verdict, in which those that are judged once more have the mean of all their rounds; and
+        how many [M] these are.
+        """
+        if state.rounds is None:
+            return judged, None
+        count = self.config.elites
+        rounds = jnp.ones(self.config.offspring).at[:count].add(state.rounds[:count])
+        share = (1 / rounds[:count])[:, None, None]
+        mean = share * judged.terms[:count] + (1 - share) * state.terms[:count]
+        return dataclasses.replace(judged, terms=judged.terms.at[:count].set(mean)), rounds
+
+    @property
+    def _candidates(self) -> jax.Array:
+        """[] who is judged for the first generation."""
+        return jnp.asarray(self.config.initial_choice * self.config.population)
+
+    def _fitness(self, genomes: Any, terms: jax.Array, generation: jax.Array) -> jax.Array:
+        worth, price = self.rank(terms, generation), self.variation.price
+        return worth if price is None else worth - price(genomes)
+
+    def _seeding(self, state: EvolutionState) -> jax.Array:
+        return state.seeded < self._candidates
+
+    def _filled(self, state: EvolutionState) -> jax.Array:
+        return state.seeded + self.config.offspring >= self._candidates
+
+    def _offspring(
+        self, key: jax.Array, state: EvolutionState, seeding: jax.Array
+    ) -> tuple[Any, jax.Array, jax.Array | None]:
+        """Genomes [M, ...], their origins and their mothers' places [M]: the unjudged initial
+        population, forced ones, or children.
+        """
+        key_children, key_forced = jax.random.split(key)
+        places = state.seeded + jnp.arange(self.config.offspring)
+        keys_forced = jax.random.split(key_forced, 2 + self.config.forced.mutations)
+        created = self.variation.create(keys_forced[0], self.config.offspring)
+        known = jax.tree.map(lambda leaf: leaf[places % self.config.population], state.genomes)
+        initial = _pick(places < self.config.population, known, created)
+        children, child_origin, of_child = self._children(key_children, state)
+        mutants, forced_origin, of_mutant = self._forced(keys_forced[1:], state, created)
+
+        def pick(first: jax.Array, second: jax.Array, third: jax.Array) -> jax.Array:
+            return jnp.where(seeding, first, jnp.where(state.forced, second, third))
+
+        genomes = jax.tree.map(pick, initial, mutants, children)
+        origin = pick(jnp.zeros_like(child_origin), forced_origin, child_origin)
+        if not self.config.follows or of_child is None:
+            return genomes, origin, None
+        of_mutant = jnp.where(forced_origin == int(Origin.NEWCOMER), NOBODY, of_mutant)
+        return genomes, origin, pick(jnp.full_like(origin, NOBODY), of_mutant, of_child)
+
+    def _children(
+        self, key: jax.Array, state: EvolutionState
+    ) -> tuple[Any, jax.Array, jax.Array | None]:
+        """Genomes, origins and mothers' places, which are not followed of those born in turn."""
+        config, count = self.config, self.config.offspring
+        if config.pool == "growing" or config.unique_children:
+            bred, of_two = Nursery(config, self.variation).children(key, state.genomes)
+            origin = jnp.where(of_two, int(Origin.CROSSOVER), int(Origin.MUTATION))
+            return bred, origin, None
+        key_parents, key_cross, key_whether, key_mutate, key_mutated = jax.random.split(key, 5)
+        if config.proportional:
+            mothers, fathers = proportional_parents(key_parents, count, state.fitness)
+        else:
+            mothers, fathers = parents(
+                key_parents, count, config.population, config.selection, config.rivals
+            )
+        mother, father = (
+            jax.tree.map(lambda leaf, i=i: leaf[i], state.genomes) for i in (mothers, fathers)
+        )
+        crossed = jax.vmap(self.variation.cross)(jax.random.split(key_cross, count), mother, father)
+        crosses = jax.random.bernoulli(key_whether, config.crossover, (count,))
+        child = _pick(crosses, crossed, mother)
+        mutated = jax.vmap(self.variation.mutate)(jax.random.split(key_mutate, count), child)
+        # A child of one parent that is not mutated would be a duplicate, unless the algorithm knows
+        # no mutation at all.
+        mutates = jax.random.bernoulli(key_mutated, config.mutation_rate, (count,)) | (
+            ~crosses & (config.mutation_rate > 0)
+        )
+        origin = jnp.where(crosses, int(Origin.CROSSOVER), int(Origin.MUTATION))
+        return _pick(mutates, mutated, child), origin, mothers
+
+    def _forced(
+        self, keys: jax.Array, state: EvolutionState, created: Any
+    ) -> tuple[Any, jax.Array, jax.Array]:
+        """Newcomers and often mutated ones, origins, and whose mutants they are. keys: [1 +
+        mutations].
+        """
+        config, count = self.config.forced, self.config.offspring
+        newcomers = jnp.round(config.newcomers * count)
+        drawn = jax.random.randint(keys[0], (count,), 0, self.config.population)
+        mutants = jax.tree.map(lambda leaf: leaf[drawn], state.genomes)
+
+        def mutated(mutants: Any, key: jax.Array) -> tuple[Any, None]:
+            return jax.vmap(self.variation.mutate)(jax.random.split(key, count), mutants), None
+
+        mutants, _ = jax.lax.scan(mutated, mutants, keys[1:])
+        is_new = jnp.arange(count) < newcomers
+        genomes = _pick(is_new, created, mutants)
+        return genomes, jnp.where(is_new, int(Origin.NEWCOMER), int(Origin.MUTATION)), drawn
+
+    def _plant(
+        self, state: EvolutionState, proposal: Proposal, judged: Judged, generation: jax.Array
+    ) -> EvolutionState:
+        """The best P of the judged candidates, then those that nobody has judged yet, in order."""
+        count = self.config.population
+        pool = together(
+            (state.genomes, state.terms, state.outcome),
+            (proposal.offspring, judged.terms, judged.outcome),
+        )
+        seeded = jnp.minimum(state.seeded + self.config.offspring, self._candidates)
+        places, offspring = jnp.arange(count), jnp.arange(self.config.offspring)
+        known = jnp.append(places < state.seeded, state.seeded + offspring < seeded)
+        waiting = jnp.append(places >= seeded, jnp.zeros_like(offspring, bool))
+        worth = self._fitness(pool[0], pool[1], jnp.maximum(generation, 0))
+        fitness = jnp.where(known, worth, -jnp.inf)
+        turn = jnp.where(known, 2, jnp.where(waiting, 1, 0))
+        kept = jnp.lexsort((-fitness, -turn))[:count]
+        genomes, terms, outcome = jax.tree.map(lambda leaf: leaf[kept], pool)
+        return dataclasses.replace(
+            state,
+            genomes=genomes,
+            terms=terms,
+            outcome=outcome,
+            fitness=fitness[kept],
+            seeded=seeded.astype(jnp.int32),
+        )
+
+    def _survive(
+        self,
+        state: EvolutionState,
+        proposal: Proposal,
+        judged: Judged,
+        verdicts: jax.Array,
+        rounds: jax.Array | None,
+        generation: jax.Array,
+    ) -> tuple[EvolutionState, jax.Array | None]:
+        """The P best of the grown population, without duplicates, and the places of their mothers;
+        in a forced generation what was fit enough goes before the old. verdicts: [M, R, F] of this
+        round alone.
+        """
+        count = self.config.population
+        pool = together(
+            (state.genomes, state.terms, state.outcome, state.born, state.origin, state.rounds),
+            (
+                proposal.offspring,
+                judged.terms,
+                judged.outcome,
+                proposal.born,
+                proposal.origin,
+                rounds,
+            ),
+        )
+        fitness = self._fitness(pool[0], pool[1], generation)
+        fresh = jnp.arange(fitness.shape[0]) >= count
+        again, now = self._again(state)
+        anew = now if again else jnp.zeros((), bool)
+        first = first_of_kind(self.config.same, self.variation, state, proposal, verdicts, anew)
+        distinct = first | jnp.logical_not(self.config.remove_duplicates)
+        children = jnp.arange(fitness.shape[0]) >= count + self.config.elites
+        admitted = forced.admitted(self.config, state, fitness, children & distinct)
+        stay = self._stay(state)
+        if again:  # The old were not simulated in this round.
+            fitness = jnp.where(fresh | stay | ~now, fitness, -jnp.inf)
+        lives = distinct & (fresh | stay | chosen(self.config.survival, "best"))
+        tier = jnp.where(state.forced & children, jnp.where(admitted, 2, 0), jnp.where(lives, 1, 0))
+        if not self.config.elites:  # the best is never lost, whatever the tiers say
+            best = jnp.arange(fitness.shape[0]) == jnp.argmax(fitness)
+            tier = jnp.where(best & distinct, 3, tier)
+        family = families(state, proposal.mothers)
+        if family is not None:
+            most = max(round(self.config.family * count), 1)
+            fit = distinct & (admitted | ~(state.forced & fresh))
+            tier = with_share(family, most, tier, fitness, fit)
+        kept = jnp.lexsort((-fitness, -tier))[:count]
+        kept = kept[jnp.argsort(-fitness[kept], stable=True)]
+        genomes, terms, outcome, born, origin, rounds = jax.tree.map(lambda leaf: leaf[kept], pool)
+        refreshed = state.refreshed + jnp.where(state.forced, jnp.sum(admitted[kept]), 0)
+        mothers = proposal.mothers
+        if mothers is not None:
+            mothers = jnp.append(_own(state), mothers)[kept]
+        survivors = dataclasses.replace(
+            state,
+            genomes=genomes,
+            terms=terms,
+            outcome=outcome,
+            born=born,
+            origin=origin,
+            fitness=fitness[kept],
+            rounds=rounds,
+            family=None if family is None else family[kept],
+            refreshed=refreshed.astype(jnp.int32),
+        )
+        return survivors, mothers
+
+
+def _own(state: EvolutionState) -> jax.Array:
+    """[P] everybody's own place."""
+    return jnp.arange(state.fitness.shape[0])
+
+
+def _pick(condition: jax.Array, yes: Any, no: Any) -> Any:
+    """Row by row [M] from one or the other pytree of leaves [M, ...]."""
+    return jax.tree.map(
+        lambda a, b: jnp.where(condition.reshape(-1, *[1] * (a.ndim - 1)), a, b), yes, no
+    )
+
+
+def _without_key(state: EvolutionState) -> EvolutionState:
+    """Typed keys cannot be chosen between with `where`; the caller sets the next one."""
+    return dataclasses.replace(state, key=jnp.zeros(()))

@@ -1,0 +1,83 @@
+"""Forced evolution (Wilson): when it begins and ends, and whom it takes in."""
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+
+from mjxgait.config.evolution import EvolutionConfig
+from mjxgait.evolution.metrics import finite_mean
+from mjxgait.evolution.state import EvolutionState
+
+
+def admitted(
+    config: EvolutionConfig, state: EvolutionState, fitness: jax.Array, candidates: jax.Array
+) -> jax.Array:
+    """Which of the candidates [P + M] a forced generation takes in: fit enough, best first,
+    as many as the spell has room for.
+    """
+    old = jnp.sort(fitness[: config.population])
+    enough = old[
+        jnp.floor(config.forced.accept * jnp.float32(config.population - 1)).astype(jnp.int32)
+    ]
+    fit = candidates & (fitness >= enough) & jnp.isfinite(fitness)
+    place = jnp.argsort(jnp.argsort(jnp.where(fit, -fitness, jnp.inf), stable=True))
+    return fit & (place < _room(config) - state.refreshed)
+
+
+def _room(config: EvolutionConfig) -> jax.Array:
+    return jnp.clip(
+        jnp.round(config.forced.refresh * jnp.float32(config.population)),
+        1,
+        config.population - 1,
+    )
+
+
+def decided(whole: EvolutionConfig, state: EvolutionState) -> EvolutionState:
+    """Begins a spell of forced evolution when best and mean have stalled over the window;
+    ends it when it has done its work.
+    """
+    config = whole.forced
+    best, mean = state.fitness[0], finite_mean(state.fitness)
+    bests, means = (
+        jnp.append(state.best_history[1:], best),
+        jnp.append(state.mean_history[1:], mean),
+    )
+    age = jnp.where(state.forced, state.spell_age + 1, 0)
+    spent = (jnp.asarray(config.limit) > 0) & (age >= config.limit)
+    ends = state.forced & (spent | (state.refreshed >= _room(whole)))
+    quiet = jnp.where(state.forced | (state.generation <= 0), 0, state.quiet + 1)
+    stalled = (quiet >= config.window) & ~_grown(bests, config.gain) & ~_grown(means, config.gain)
+    begins = stalled & ~state.forced & config.enabled
+    first = ~jnp.isfinite(state.spell_best)
+    pays = first | _grown(jnp.stack([state.spell_best, best]), config.gain)
+    return dataclasses.replace(
+        state,
+        best_history=bests,
+        mean_history=means,
+        quiet=quiet,
+        forced=begins | (state.forced & ~ends),
+        spell_age=jnp.where(begins, 0, age).astype(jnp.int32),
+        refreshed=jnp.where(begins, 0, state.refreshed).astype(jnp.int32),
+        spell_best=jnp.where(begins, best, state.spell_best),
+        barren=jnp.where(begins, jnp.where(pays, 0, state.barren + 1), state.barren).astype(
+            jnp.int32
+        ),
+    )
+
+
+def begun_anew(state: EvolutionState, now: jax.Array) -> EvolutionState:
+    """Where now [], what growth was before counts no more: everybody is worth something else.
+
+    The window then begins with the next generation, for this one's best was still worth the old.
+    """
+    return dataclasses.replace(
+        state,
+        quiet=jnp.where(now, -1, state.quiet),
+        barren=jnp.where(now, 0, state.barren),
+        spell_best=jnp.where(now, -jnp.inf, state.spell_best),
+    )
+
+
+def _grown(history: jax.Array, gain: jax.Array | float) -> jax.Array:
+    return history[-1] - history[0] > gain * jnp.maximum(jnp.abs(history[0]), 1.0)

@@ -1,0 +1,184 @@
+"""How genomes are made from nothing and from other genomes: arrays in, arrays out.
+
+Functions for one genome, mapped over the offspring where they are called. What every kind of genome
+may use is here; operators of a kind of its own are beside its controller.
+"""
+
+import dataclasses
+import math
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from mjxgait.config.evolution import EvolutionConfig
+from mjxgait.config.traced import chosen
+from mjxgait.evolution.chance import key_of
+from mjxgait.types import pytree
+
+
+@pytree
+class Box:
+    """Lowest and highest value of each gene; leaves shaped as in one genome."""
+
+    low: Any
+    high: Any
+
+
+@dataclasses.dataclass(frozen=True)
+class Variation:
+    """The operators that evolution calls; it knows a genome only as a pytree.
+
+    create: key, count -> genomes [count, ...]. cross: key, genome, genome -> genome. mutate: key,
+    genome -> genome. price: genomes [N, ...] -> [N], by which fitness is less; None: free.
+    long: whether they walk along a genome place by place, and so are worth some of the compiler's time.
+    first: genomes [G, ...] that take the first places of the first generation; None: all are drawn.
+    """
+
+    create: Callable[[jax.Array, int], Any]
+    cross: Callable[[jax.Array, Any, Any], Any]
+    mutate: Callable[[jax.Array, Any], Any]
+    price: Callable[[Any], jax.Array] | None = None
+    long: bool = False
+    first: Any = None
+
+    def begin(self, key: jax.Array, count: int) -> Any:
+        """Genomes [count, ...] of the first generation: those given, and others created."""
+        created = self.create(key, count)
+        if self.first is None:
+            return created
+        return jax.tree.map(lambda own, leaf: leaf.at[: len(own)].set(own), self.first, created)
+
+
+def creation(box: Box, config: EvolutionConfig) -> Callable[[jax.Array, int], Any]:
+    """How the first genomes are drawn from a box: uniformly or as a Latin hypercube."""
+
+    def create(key: jax.Array, count: int) -> Any:
+        return jax.tree.map(
+            partial(jnp.where, chosen(config.initial, "uniform")),
+            uniform(key, box, count),
+            latin_hypercube(key, box, count),
+        )
+
+    return create
+
+
+def real_variation(box: Box, config: EvolutionConfig) -> Variation:
+    """Operators of genomes that are nothing but reals in a box: uniform crossover, Gaussian jumps."""
+
+    def cross(key: jax.Array, mother: Any, father: Any) -> Any:
+        def mixed(key: jax.Array, a: jax.Array, b: jax.Array) -> jax.Array:
+            return jnp.where(jax.random.bernoulli(key, 0.5, a.shape), a, b)
+
+        return _leafwise(key, mixed, mother, father)
+
+    def mutate(key: jax.Array, genome: Any) -> Any:
+        def moved(key: jax.Array, values: jax.Array, low: jax.Array, high: jax.Array) -> jax.Array:
+            return jittered(key, values, low, high, config.tuning_rate, config.sigma)
+
+        return _leafwise(key, moved, genome, box.low, box.high)
+
+    middle = narrowed(box, config.initial_spread)
+    return Variation(create=creation(middle, config), cross=cross, mutate=mutate)
+
+
+def _leafwise(key: jax.Array, function: Callable[..., jax.Array], *trees: Any) -> Any:
+    """The function of a key and one array of each tree, with a key of its own for each."""
+    leaves, shape_of = jax.tree.flatten(trees[0])
+    columns = zip(jax.random.split(key, len(leaves)), *map(jax.tree.leaves, trees), strict=True)
+    return jax.tree.unflatten(shape_of, [function(*column) for column in columns])
+
+
+def narrowed(box: Box, share: jax.Array | float) -> Box:
+    """The middle of a box, `share` of its width in every gene."""
+
+    def edge(near: Any, far: Any) -> Any:
+        return jax.tree.map(lambda a, b: a + 0.5 * (1 - share) * (b - a), near, far)
+
+    return Box(edge(box.low, box.high), edge(box.high, box.low))
+
+
+def in_ranges(genomes: Any, box: Box) -> np.ndarray:
+    """Genomes [N, ...] as rows [N, genes], each gene in units of its range."""
+    scaled = jax.tree.map(
+        lambda leaf, low, high: np.asarray((leaf - low) / jnp.maximum(high - low, 1e-9)),
+        genomes,
+        box.low,
+        box.high,
+    )
+    return np.concatenate([leaf.reshape(len(leaf), -1) for leaf in jax.tree.leaves(scaled)], 1)
+
+
+def uniform(key: jax.Array, box: Box, count: int) -> Any:
+    """Genomes [count, ...] drawn uniformly from the box."""
+    return _draw(key, box, count, lambda key, shape: jax.random.uniform(key, shape))
+
+
+def latin_hypercube(key: jax.Array, box: Box, count: int) -> Any:
+    """Genomes [count, ...] with one value of every gene in each of `count` slices of its range
+    (McKay, Beckman & Conover 1979).
+    """
+
+    def draw(key: jax.Array, shape: tuple[int, ...]) -> jax.Array:
+        key_slice, key_within = jax.random.split(key)
+        slices = jax.random.permutation(
+            key_slice,
+            jnp.broadcast_to(jnp.arange(count)[:, None], (count, math.prod(shape[1:]))),
+            independent=True,
+        )
+        return ((slices + jax.random.uniform(key_within, slices.shape)) / count).reshape(shape)
+
+    return _draw(key, box, count, draw)
+
+
+def jittered(
+    key: jax.Array,
+    values: jax.Array,
+    low: jax.Array,
+    high: jax.Array,
+    rate: jax.Array | float,
+    sigma: jax.Array | float,
+) -> jax.Array:
+    """Values [E], each moved with probability `rate` by a Gaussian of `sigma` ranges; never
+    leaves the box.
+    """
+    key_which, key_by = jax.random.split(key)
+    moved = values + sigma * (high - low) * jax.random.normal(key_by, values.shape)
+    return jnp.clip(
+        jnp.where(jax.random.bernoulli(key_which, rate, values.shape), moved, values), low, high
+    )
+
+
+def first_occurrence(genomes: Any) -> jax.Array:
+    """Whether each genome [N] (leaves [N, ...]) is the first of its kind: a later equal one is a
+    duplicate.
+
+    Sorts by a random projection, so the cost grows as N log N; equal genomes have equal
+    projections, and neighbours are compared in full.
+    """
+    rows = jnp.concatenate(
+        [leaf.reshape(leaf.shape[0], -1) for leaf in jax.tree.leaves(genomes)], axis=1
+    )
+    # Elementwise product and sum, row by row alike: a matrix product may round equal rows
+    # differently at different places.
+    projection = jnp.sum(rows * jax.random.normal(key_of(0), (rows.shape[1],)), axis=1)
+    order = jnp.argsort(projection, stable=True)
+    in_order = rows[order]
+    repeats = jnp.concatenate([jnp.array([False]), jnp.all(in_order[1:] == in_order[:-1], axis=1)])
+    return jnp.zeros(len(order), bool).at[order].set(~repeats)
+
+
+def _draw(
+    key: jax.Array, box: Box, count: int, draw: Callable[[jax.Array, tuple[int, ...]], jax.Array]
+) -> Any:
+    lows, shape_of = jax.tree.flatten(box.low)
+    highs = jax.tree.leaves(box.high)
+    keys = jax.random.split(key, len(lows))
+    leaves = [
+        low + (high - low) * draw(k, (count, *low.shape))
+        for k, low, high in zip(keys, lows, highs, strict=True)
+    ]
+    return jax.tree.unflatten(shape_of, leaves)

@@ -1,0 +1,1 @@
+"""Many runs, a table and a picture: ablations, repertoires, several seeds."""

@@ -1,0 +1,202 @@
+"""One number per run and measure: from its log, and from C MuJoCo, where all variants are judged
+alike whatever they evolved for.
+"""
+
+import dataclasses
+import functools
+import json
+import math
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mjxgait.certification import certify
+from mjxgait.certification.config import CertificateConfig
+from mjxgait.certification.simulate import simulate
+from mjxgait.certification.tasks import demands_of
+from mjxgait.champion import Champion, read_champion
+from mjxgait.cores import process_per_core, survivable
+from mjxgait.creature import Creature, load_creature
+from mjxgait.experiments.ablation.plan import Plan, Run, Study
+from mjxgait.experiments.ablation.rows import GROUPS, champion_path
+from mjxgait.plugins.user_code import load_all, loaded
+from mjxgait.reference.starts import join, nominal_starts, perturbed_starts
+from mjxgait.training.disk import disk_errors
+from mjxgait.training.folder import (
+    CREATURE,
+    METRICS,
+    read_metrics,
+    read_records,
+    write_lines,
+)
+from mjxgait.training.stored import is_number
+
+MEASURED = "measured.jsonl"
+SECONDS, STARTS, SEED = 22.0, 16, 1000
+"""Of the walk that judges every champion: perturbed as in the certificate, from starts that no
+evolution has seen.
+"""
+
+
+Ways = dict[str, tuple[float, float]]
+"""`walk` and `up` of a champion on each ground."""
+Judged = tuple[Ways, bool | None]
+"""Of a champion: its ways, and `certified` of its `Result`."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Result:
+    """What became of a run.
+
+    walk: body lengths per second covered before the fall or the end, mean over unseen perturbed
+    starts. up: share of them that stay up and do what criterion 4 asks of the task besides.
+    certified: whether the champion passes the whole certificate; None when nobody asked. fitness:
+    best at the end. area: mean of the best over the generations. generations: until the best
+    reached the study's threshold, one more than there were if it never did.
+    steps: creature-steps that the run lived. finite: whether it found anybody who could be judged.
+    elsewhere: `walk` and `up` on the study's further grounds.
+    """
+
+    variant: str
+    seed: int
+    walk: float
+    up: float
+    certified: bool | None
+    fitness: float
+    area: float
+    generations: int
+    steps: int
+    finite: bool
+    elsewhere: Ways = dataclasses.field(default_factory=dict)
+
+    def value(self, measure: str) -> float:
+        """Of a measure, as a number."""
+        return float(getattr(self, measure) or 0.0)
+
+    def on(self, ground: str) -> "Result":
+        """With `walk` and `up` of one of the further grounds."""
+        walk, up = self.elsewhere[ground]
+        return dataclasses.replace(self, walk=walk, up=up, certified=None)
+
+
+def read_logs(folder: Path) -> list[dict[str, Any]]:
+    """Every generation of every run that a study has logged so far."""
+    found = (folder / GROUPS).glob(f"*/{METRICS}")
+    known = [file for file in found if is_number(file.parent.name)]
+    files = sorted(known, key=lambda file: int(file.parent.name))
+    return [line for file in files for line in read_metrics(file)]
+
+
+def measure(folder: Path, plan: Plan, tell: Callable[[int, int], None]) -> list[Result]:
+    """The result of every run, in the order of the plan, by one process per core.
+
+    What has been measured before is not measured again.
+
+    Raises:
+      UserError: a process was killed from outside, or the folder cannot be written.
+    """
+    measured = _measured(folder)
+    if measured:  # a last line that was cut off goes, or the next would be written behind it
+        with disk_errors(folder):
+            write_lines(folder / MEASURED, measured)
+    known = {(line["variant"], line["seed"]): Result(**line) for line in measured}
+    lines: dict[tuple[str, int], list[dict[str, Any]]] = {}
+    for line in read_logs(folder):
+        lines.setdefault((line["variant"], line["seed"]), []).append(line)
+    missing = [run for run in plan.runs if (run.variant, run.seed) not in known]
+    if missing:
+        tell(0, len(missing))
+    prepare = partial(load_all, loaded())
+    again = f"mjxgait ablate --resume {folder}"
+    with survivable(folder, again), process_per_core(len(missing), prepare) as pool:
+        found = pool.map(
+            partial(_judge, folder / CREATURE, plan.study.grounds, plan.study.certify),
+            [champion_path(folder, plan, run) for run in missing],
+            [_found_somebody(lines[run.variant, run.seed]) for run in missing],
+        )
+        for number, (run, judged) in enumerate(zip(missing, found, strict=True), 1):
+            result = _result(plan.study, run, lines[run.variant, run.seed], judged)
+            known[result.variant, result.seed] = result
+            with disk_errors(folder), (folder / MEASURED).open("a", encoding="utf-8") as log:
+                log.write(json.dumps(dataclasses.asdict(result)) + "\n")
+            tell(number, len(missing))
+    return [known[run.variant, run.seed] for run in plan.runs]
+
+
+def _measured(folder: Path) -> list[dict[str, Any]]:
+    return read_records(folder / MEASURED, Result)
+
+
+def _result(study: Study, run: Run, lines: Sequence[Mapping[str, Any]], judged: Judged) -> Result:
+    ways, certified = judged
+    walk, up = ways[study.grounds[0]]
+    best = [-math.inf if line["best"] is None else line["best"] for line in lines]
+    finite, threshold = _found_somebody(lines), study.threshold
+    reached = [i for i, value in enumerate(best) if threshold is not None and value >= threshold]
+    return Result(
+        variant=run.variant,
+        seed=run.seed,
+        walk=walk,
+        up=up,
+        certified=certified,
+        fitness=best[-1] if finite else -1e9,
+        area=float(np.mean([value for value in best if math.isfinite(value)])) if finite else -1e9,
+        generations=reached[0] if reached else run.generations + 1,
+        steps=sum(line["sim_steps"] for line in lines),
+        finite=finite,
+        elsewhere={ground: ways[ground] for ground in study.grounds[1:]},
+    )
+
+
+def _found_somebody(lines: Sequence[Mapping[str, Any]]) -> bool:
+    """Whether the best at the end could be judged."""
+    return lines[-1]["best"] is not None
+
+
+def _judge(
+    creature_folder: Path, grounds: Sequence[str], examine: bool, path: Path, finite: bool
+) -> Judged:
+    """In a process of its own: the walk of the champion at `path` on each ground, and if `examine`
+    the verdict on the first.
+
+    What is sent there is small. The pool of Python 3.11 hangs where a process is killed while it
+    is sent more than a pipe holds.
+    """
+    creature = _creature(creature_folder)
+    champion = read_champion(path, creature)
+    body = champion.embodied(creature)
+    walks = {g: walked(body.on(g), champion) if finite else (0.0, 0.0, 0.0) for g in grounds}
+    # One that falls or lags this far behind the speed that the certificate of a walk asks for cannot
+    # pass, so the long examination is spared.
+    worth = champion.task != "walk" or walks[grounds[0]][2] > 0.4
+    ways = {ground: (walk, up) for ground, (walk, up, _) in walks.items()}
+    if not examine:
+        return ways, None
+    return ways, worth and certify(body.on(grounds[0]), champion, threads=1).passed
+
+
+@functools.cache
+def _creature(folder: Path) -> Creature:
+    """Loaded once in each process."""
+    return load_creature(folder)
+
+
+def walked(creature: Creature, champion: Champion) -> tuple[float, float, float]:
+    """Mean speed and share that succeeds over the unseen starts, and the speed from the undisturbed
+    start (0 if it falls).
+    """
+    config, rng = CertificateConfig(), np.random.default_rng(SEED)
+    demands = demands_of(champion.task, champion.wish)
+    unseen = demands.aimed(perturbed_starts(creature, STARTS, rng), config, rng)
+    starts = demands.aimed(join(nominal_starts(creature, 1), unseen), config)
+    fall = demands.fall(config)
+    outcome = simulate(creature, champion, starts, SECONDS, fall=fall, threads=1)
+    speed = outcome.travel[:, 0] / creature.frame.body_length / SECONDS
+    return (
+        float(speed[1:].mean()),
+        float(demands.succeeded(outcome, starts, config)[1:].mean()),
+        float(speed[0] * outcome.stayed_up[0]),
+    )

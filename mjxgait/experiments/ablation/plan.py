@@ -1,0 +1,304 @@
+"""What a study compares: its file, checked, as variants with the full config of every run."""
+
+import contextlib
+import dataclasses
+import itertools
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import pydantic
+
+from mjxgait.config.rollout import GroundText, Physics
+from mjxgait.config.schema import Config
+from mjxgait.config.shipped import data_folder
+from mjxgait.config.tables import (
+    STRICT,
+    Count,
+    Finite,
+    Whole,
+    build,
+    merge,
+    read_toml,
+)
+from mjxgait.creature import Creature
+from mjxgait.creature.ground.spec import FLAT
+from mjxgait.errors import UserError, did_you_mean
+from mjxgait.plugins import resolve_config
+from mjxgait.tasks.walk.targets import Wishes, wished
+from mjxgait.training.folder import check_parts
+
+Measure = Literal["walk", "up", "certified", "fitness", "area", "generations"]
+
+
+@dataclasses.dataclass(frozen=True)
+class VariantTable:
+    """One variant: what it is called, the config keys that it changes, and its own number of
+    generations where it needs one.
+
+    config: file or name of a shipped config that it runs instead of the study's config and base.
+    gait: that it is asked for, as `train --gait` asks.
+    """
+
+    __pydantic_config__ = STRICT
+    name: Annotated[str, pydantic.Field(min_length=1, max_length=60)]
+    settings: dict[str, Any] = dataclasses.field(default_factory=dict)
+    generations: Count | None = None
+    config: str | None = None
+    gait: str | None = None
+
+
+@dataclasses.dataclass(frozen=True)
+class Study:
+    """A study file.
+
+    Attributes:
+      question: what it asks; the report's title.
+      env: creature. config: file or name of a shipped config, laid under the variants.
+      seeds: so many, from first_seed on. generations: of every run.
+      measure: what the variants are compared by (docs/ablations.md). threshold: of fitness, for the
+        measure `generations`.
+      certify: whether every run's champion is examined for its certificate, about 10 s for each
+        that may pass.
+      grounds: that every champion is tried on, whatever it evolved on (docs/ground.md); `walk`, `up`
+        and `certified` are of the first, and each further one has a table of its own.
+      paired: whether all variants use the same seeds; else each has its own.
+      allow_equal: whether two variants may be equal, as in a test of the method itself.
+      rows: so many runs of one shape are side by side in one program; 0: all of them, which is best on one
+        machine. A cluster hands out so many at a time. With other neighbours the fast step's last
+        bits may differ.
+      physics: of all runs, as `train --physics` has it; by default as the settings say.
+      base: config keys of all variants.
+      variant: the first is the base that the others are compared with. grid: dotted config keys and
+        their values, instead of variants.
+    """
+
+    __pydantic_config__ = STRICT
+    question: str
+    env: str = "tall_quadruped"
+    config: str | None = None
+    seeds: Annotated[int, pydantic.Field(ge=2)] = 16
+    first_seed: Whole = 0
+    generations: Count = 30
+    measure: Measure = "walk"
+    threshold: Finite | None = None
+    certify: bool = False
+    grounds: tuple[GroundText, ...] = (FLAT,)
+    paired: bool = True
+    allow_equal: bool = False
+    rows: Whole = 0
+    physics: Physics | None = None
+    base: dict[str, Any] = dataclasses.field(default_factory=dict)
+    variant: tuple[VariantTable, ...] = ()
+    grid: dict[str, tuple[Any, ...]] = dataclasses.field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if bool(self.variant) == bool(self.grid):
+            raise ValueError("give either [[variant]] tables or a [grid], not both and not neither")
+        if not self.grounds or len(set(self.grounds)) < len(self.grounds):
+            raise ValueError("grounds must name at least one ground, and none twice")
+        if self.measure == "certified" and not self.certify:
+            raise ValueError('measure = "certified" needs certify = true')
+        if self.measure == "generations" and self.threshold is None:
+            raise ValueError('measure = "generations" counts up to a fitness: set threshold')
+
+
+@dataclasses.dataclass(frozen=True)
+class Run:
+    """One evolution run of a study."""
+
+    variant: str
+    seed: int
+    generations: int
+    config: Config
+
+
+@dataclasses.dataclass(frozen=True)
+class Plan:
+    """A study with all its runs, variant by variant; the first variant is the base."""
+
+    study: Study
+    variants: tuple[str, ...]
+    runs: tuple[Run, ...]
+
+    def of(self, variant: str) -> list[Run]:
+        """The runs of a variant, by seed."""
+        return [run for run in self.runs if run.variant == variant]
+
+    def upper_bound(self, creature: Creature) -> int:
+        """Creature-steps when nobody ever falls."""
+        return sum(_most_steps(run, creature) for run in self.runs)
+
+
+def read_study(file: Path, over: Mapping[str, Any]) -> Study:
+    """The study in a file or shipped under this name, with options laid over it.
+
+    With other generations than the file's, variants that have their own keep their share of
+    evaluations, the initial population's included.
+
+    Raises:
+      UserError: names the file and the key.
+    """
+    path = _find(file)
+    given = build(Study, read_toml(path), str(path))
+    study = build(
+        Study,
+        merge(
+            dataclasses.asdict(given),
+            {key: value for key, value in over.items() if value is not None},
+        ),
+        str(path),
+    )
+    scale = (study.generations + 1) / (given.generations + 1)
+    scaled = [
+        dataclasses.replace(
+            v, generations=v.generations and max(1, round((v.generations + 1) * scale) - 1)
+        )
+        for v in study.variant
+    ]
+    return dataclasses.replace(study, variant=tuple(scaled))
+
+
+def make_plan(study: Study, creature: Creature, where: str) -> Plan:
+    """Every run with its full config.
+
+    Raises:
+      UserError: an unknown key, a bad value, two variants of one name, or two that are equal.
+    """
+    tables = list(study.variant) or _grid(study, where)
+    configs: dict[str, Config] = {}
+    for table in tables:
+        if table.name in configs:
+            raise UserError(f'{where}: two variants are called "{table.name}"; name them apart')
+        new = _config(study, table, creature, where)
+        equal = next((name for name, other in configs.items() if other == new), None)
+        if equal is not None and not study.allow_equal:
+            raise UserError(
+                f'{where}: the variants "{equal}" and "{table.name}" are equal; change one, or set '
+                "allow_equal = true"
+            )
+        configs[table.name] = new
+    if len(configs) < 2:
+        raise UserError(f"{where}: a comparison needs two variants")
+    runs = []
+    for place, (name, variant) in enumerate(configs.items()):
+        first = study.first_seed + (0 if study.paired else place * study.seeds)
+        for seed in range(first, first + study.seeds):
+            runs.append(
+                Run(
+                    name,
+                    seed,
+                    variant.evolution.generations,
+                    dataclasses.replace(variant, seed=seed),
+                )
+            )
+    return Plan(study, tuple(configs), tuple(runs))
+
+
+def check_variants(plan: Plan, creature: Creature, where: str) -> None:
+    """Refuse a study with a variant whose runs could not be examined in the end.
+
+    Raises:
+      UserError: names the variant and says why; see `check_parts`.
+    """
+    for variant in plan.variants:
+        with _told_of(f'{where}: variant "{variant}"'):
+            check_parts(creature, plan.of(variant)[0].config)
+
+
+def _config(study: Study, table: VariantTable, creature: Creature, where: str) -> Config:
+    """What all runs of a variant have, but for their seeds."""
+    here = f'{where}: variant "{table.name}"'
+    use = {**study.base.get("use", {}), **table.settings.get("use", {})}
+    file = table.config or study.config
+    with _told_of(here):
+        config = resolve_config(
+            creature.settings.train, creature.name, Path(file) if file else None, use
+        )
+    if not table.config:
+        config = _lay(config, study.base, f"{where}: [base]")
+    config = _lay(config, table.settings, here)
+    if study.physics is not None:
+        config = _lay(config, {"rollout": {"physics": study.physics}}, where)
+    with _told_of(here):
+        config = wished(config, creature, Wishes(gait=table.gait))
+    return _settled(config, table.generations or study.generations)
+
+
+@contextlib.contextmanager
+def _told_of(where: str) -> Iterator[None]:
+    """A mistake that is found here is told with where it is."""
+    try:
+        yield
+    except UserError as error:
+        raise UserError(f"{where}: {error}") from None
+
+
+def _settled(config: Config, generations: int) -> Config:
+    """All runs go on for all their generations: one that stopped early would be compared with
+    others that had more.
+    """
+    evolution = dataclasses.replace(
+        config.evolution,
+        target=None,
+        generations=generations,
+        forced=dataclasses.replace(config.evolution.forced, patience=0),
+    )
+    return dataclasses.replace(config, evolution=evolution)
+
+
+def _lay(config: Config, table: Mapping[str, Any], where: str) -> Config:
+    if "seed" in table or "generations" in table.get("evolution", {}):
+        raise UserError(
+            f"{where}: seeds and generations are the study's own keys, not settings of a variant"
+        )
+    laid = build(type(config), merge(dataclasses.asdict(config), table), where)
+    if laid.evolution.islands.count > 1:
+        raise UserError(
+            f"{where}: a run of a study is one population; evolution.islands.count must be 1"
+        )
+    return laid
+
+
+def _grid(study: Study, where: str) -> list[VariantTable]:
+    """The base and every combination of the grid's values."""
+    rows = [VariantTable("base")]
+    for values in itertools.product(*study.grid.values()):
+        settings: dict[str, Any] = {}
+        for key, value in zip(study.grid, values, strict=True):
+            settings = merge(settings, _nested(key, value))
+        rows.append(
+            VariantTable(
+                ", ".join(
+                    f"{key.split('.')[-1]} = {value}"
+                    for key, value in zip(study.grid, values, strict=True)
+                ),
+                settings,
+            )
+        )
+    return rows
+
+
+def _nested(key: str, value: Any) -> dict[str, Any]:
+    first, _, rest = key.partition(".")
+    return {first: _nested(rest, value) if rest else value}
+
+
+def _most_steps(run: Run, creature: Creature) -> int:
+    rollout, evolution = run.config.rollout, run.config.evolution
+    seeding = -(-evolution.population // evolution.offspring)
+    episodes = (run.generations + seeding) * evolution.offspring * rollout.starts
+    return episodes * round(rollout.seconds / creature.model.opt.timestep)
+
+
+def _find(file: Path) -> Path:
+    folder = data_folder("configs") / "ablations"
+    shipped = folder / f"{file}.toml"
+    if file.exists():
+        return file
+    if shipped.exists():
+        return shipped
+    known = sorted(path.stem for path in folder.glob("*.toml"))
+    raise UserError(
+        f"{file}: no such file and no shipped study of that name; {did_you_mean(str(file), known)}"
+    )

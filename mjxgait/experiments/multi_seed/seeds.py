@@ -1,0 +1,117 @@
+"""Which runs a zoo is of, and where they lie."""
+
+import dataclasses
+from pathlib import Path
+
+from mjxgait.config.schema import Config
+from mjxgait.config.tables import (
+    STRICT,
+    Whole,
+    build,
+    dump_toml,
+    read_toml,
+)
+from mjxgait.creature import Creature
+from mjxgait.errors import UserError
+from mjxgait.files import write_text
+from mjxgait.training.disk import disk_errors
+from mjxgait.training.folder import (
+    check_parts,
+    create_run,
+    is_taken,
+    new_run_folder,
+)
+
+ZOO = "zoo.toml"
+
+
+@dataclasses.dataclass(frozen=True)
+class Seeds:
+    """Of the runs of a folder, in order.
+
+    together: so many are rows of one program, which decides on their last bits; 0: all.
+    """
+
+    __pydantic_config__ = STRICT
+    seeds: tuple[int, ...]
+    together: Whole = 0
+
+    def folders(self, zoo: Path) -> list[Path]:
+        """A run folder for each."""
+        return [zoo / f"seed{seed}" for seed in self.seeds]
+
+
+def is_zoo(folder: Path) -> bool:
+    """Whether several runs lie in it, rather than one."""
+    return (folder / ZOO).is_file()
+
+
+def read_seeds(zoo: Path) -> Seeds:
+    """The runs of a folder.
+
+    Raises:
+      UserError: what says which they are cannot be read, or names none.
+    """
+    seeds = build(Seeds, read_toml(zoo / ZOO), str(zoo / ZOO))
+    if not seeds.seeds:
+        raise UserError(f"{zoo / ZOO}: seeds: there is none")
+    return seeds
+
+
+def folders_of(zoo: Path) -> list[Path]:
+    """Their folders; see `read_seeds`."""
+    return read_seeds(zoo).folders(zoo)
+
+
+def check_zoo(zoo: Path | None, creature: Creature, config: Config, runs: int) -> Path:
+    """Return the folder that several new runs may have; by default a new one under runs/. Writes
+    nothing.
+
+    Raises:
+      UserError: fewer than two runs, or islands, which have rows of their own; see `check_parts`.
+    """
+    if runs < 2:
+        raise UserError(f"--runs {runs}: give 2 or more, or leave it out for a single run")
+    if config.evolution.islands.count > 1:
+        raise UserError(
+            "--runs: runs with islands do not go side by side; start them one by one,"
+            " or give --evolution.islands.count 1"
+        )
+    check_parts(creature, config)
+    zoo = zoo or new_run_folder(f"{creature.name}-zoo", config.seed)
+    if is_taken(zoo):
+        raise UserError(
+            f"{zoo}: holds something already; name another folder with --out, or go on with "
+            f"--resume {zoo}"
+        )
+    return zoo
+
+
+def create_zoo(
+    zoo: Path | None, creature: Creature, config: Config, runs: int, together: int = 0
+) -> Path:
+    """Make a folder with a run folder for each seed, from the config's on; by default a new one
+    under runs/. together: see `Seeds`.
+
+    Raises:
+      UserError: see `check_zoo` and `check_plan`; or the folder cannot be written.
+    """
+    from mjxgait.training.blueprint import check_plan  # JAX takes a second to import
+
+    zoo = check_zoo(zoo, creature, config, runs)
+    check_plan(creature, config)
+    seeds = Seeds(tuple(range(config.seed, config.seed + runs)), together)
+    for seed, folder in zip(seeds.seeds, seeds.folders(zoo), strict=True):
+        create_run(folder, creature, to_the_last(dataclasses.replace(config, seed=seed)))
+    # Last: what is whole can be gone on with.
+    with disk_errors(zoo):
+        write_text(zoo / ZOO, dump_toml(seeds))
+    return zoo
+
+
+def to_the_last(config: Config) -> Config:
+    """Without what ends a run before its last generation: the rows of a program go on together."""
+    forced = dataclasses.replace(config.evolution.forced, patience=0)
+    examination = dataclasses.replace(config.examination, every=0)
+    evolution = dataclasses.replace(config.evolution, target=None, forced=forced)
+    return dataclasses.replace(config, evolution=evolution, examination=examination)

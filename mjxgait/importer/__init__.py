@@ -1,0 +1,11 @@
+"""From somebody's model file (MJCF or URDF) to a creature folder."""
+
+from mjxgait.importer.convert import (
+    TOML,
+    WRITTEN,
+    ImportChoices,
+    Imported,
+    import_model,
+)
+
+__all__ = ["TOML", "WRITTEN", "ImportChoices", "Imported", "import_model"]

@@ -1,0 +1,294 @@
+"""`import_model`: from a model file to the texts of a creature folder, step by step."""
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from mjxgait.animation.clips.clip import ELSEWHERE
+from mjxgait.creature import geometry
+from mjxgait.errors import UserError
+from mjxgait.importer.balance import steady_balance
+from mjxgait.importer.body import Puppet
+from mjxgait.importer.find import find_anatomy
+from mjxgait.importer.left_out import tell_dropped, tell_left_out
+from mjxgait.importer.manner import manner
+from mjxgait.importer.mjcf import clean_mjcf
+from mjxgait.importer.notes import Notes, listed
+from mjxgait.importer.orient import (
+    find_forward,
+    find_mirror,
+    is_planar,
+    yaw_to,
+)
+from mjxgait.importer.parts import one_line, plain_names, rotation
+from mjxgait.importer.rigged import RIGS, model_of
+from mjxgait.importer.root import in_plane
+from mjxgait.importer.same import check_same
+from mjxgait.importer.skeleton import build_bodies
+from mjxgait.importer.source import Places, Source, parse_xml
+from mjxgait.importer.stance import stance_of
+from mjxgait.importer.standing import (
+    Candidate,
+    first_pose,
+    offered_poses,
+    standing,
+)
+from mjxgait.importer.urdf import clean_urdf
+from mjxgait.importer.worker import (
+    GIGABYTES,
+    SECONDS,
+    compile_apart,
+    compile_here,
+)
+from mjxgait.importer.write_toml import creature_toml
+from mjxgait.importer.write_xml import creature_xml
+
+XML, TOML, README = WRITTEN = ("creature.xml", "creature.toml", "README.md")
+"""The files of a creature folder that an import makes."""
+
+
+@dataclasses.dataclass(frozen=True)
+class ImportChoices:
+    """What the user says about a model.
+
+    keep, freeze: patterns of joint names. height: m, of a skeleton at rest. apart: whether to
+    compile in a process of its own, which may take so many seconds and gigabytes.
+    """
+
+    name: str | None = None
+    search: tuple[Path, ...] = ()
+    keep: tuple[str, ...] = ()
+    freeze: tuple[str, ...] = ()
+    up: str | None = None
+    forward: str | None = None
+    height: float | None = None
+    apart: bool = True
+    seconds: float = SECONDS
+    gigabytes: float = GIGABYTES
+
+
+@dataclasses.dataclass(frozen=True)
+class Imported:
+    """files: name and text of each file of the creature folder.
+
+    stands: whether it stood for two seconds.
+    """
+
+    name: str
+    files: dict[str, str]
+    notes: Notes
+    stands: bool
+
+
+def import_model(path: Path, choices: ImportChoices | None = None) -> Imported:
+    """A creature from somebody's MJCF or URDF file, or from a skeleton (BVH, skinned GLB).
+
+    Raises:
+      UserError: it cannot be read, or is nothing that could walk; names the element and the way
+        out.
+    """
+    choices, notes = choices or ImportChoices(), Notes()
+    try:
+        return _import(path, choices, notes)
+    except UserError as error:
+        text = str(error)
+        raise UserError(text if str(path) in text else f"{path}: {text}") from None
+    except (
+        np.linalg.LinAlgError,
+        FloatingPointError,
+        OverflowError,
+        mujoco.FatalError,
+        MemoryError,
+    ) as error:
+        raise UserError(
+            f"{path}: its numbers cannot be computed with ({error}); correct the file"
+        ) from None
+
+
+def _import(path: Path, choices: ImportChoices, notes: Notes) -> Imported:
+    source = _read(path, choices, notes)
+    parts = source.tree, source.assets, source.missing
+    if choices.apart:
+        model, changes = compile_apart(*parts, choices.seconds, choices.gigabytes)
+    else:
+        model, changes = compile_here(*parts)
+    for what, why in changes:
+        notes.change(what, why)
+    tell_dropped(model, notes)
+    up = source.up.value if source.up else choices.up
+    anatomy = find_anatomy(model, source.coupled, choices.keep, choices.freeze, up, notes)
+    if source.up:
+        notes.guess("up", source.up.value, source.up.confidence, source.up.reason)
+    tell_left_out(model, anatomy, notes)
+    bodies = build_bodies(model, anatomy, source.efforts, notes)
+    puppet = Puppet(
+        bodies, [anatomy.bodies.index(b) for b in anatomy.feet], in_plane(model, anatomy.root)
+    )
+    start = first_pose(puppet, model, anatomy)
+    puppet.turn(yaw_to(find_forward(puppet, start, choices.forward, notes)))
+    rest = puppet.qpos(np.zeros(len(puppet.joints))) if source.up else None
+    planar = is_planar(puppet, start) is not None
+    mirror = find_mirror(puppet, start, planar, notes)
+    best = standing(
+        puppet, offered_poses(puppet, model, anatomy, source, start), mirror, planar, notes
+    )
+    if best.held.height < 0:
+        raise UserError(
+            f'"{model.body(anatomy.root).name}" lies on the floor, and all of it that is not a foot '
+            "falls through: this has no legs to walk on"
+        )
+    feet = {name for foot in best.feet for name in foot}
+    steady_balance(best.drive, best.puppet.names, best.model, best.qpos, feet, best.notes)
+    name = plain_names([choices.name or path.stem], ["creature"])[0]
+    check_same(model, anatomy, best.puppet, best.model)
+    if rest is not None:
+        rest[:3] = best.qpos[:3]
+    return _folder(name, one_line(path.name), best, mirror, planar, rest)
+
+
+def _read(path: Path, choices: ImportChoices, notes: Notes) -> Source:
+    """The tree of a model file, or the one that a skeleton is given."""
+    kind = path.suffix.lower()
+    if kind in ELSEWHERE:
+        raise UserError(f'{path}: cannot read "{kind}"; {ELSEWHERE[kind]}')
+    if kind not in RIGS:
+        if choices.height is not None:
+            raise UserError(
+                f"--height is for skeletons ({', '.join(RIGS)}); {path} has its lengths"
+            )
+        return read_source(path, choices.search, notes)
+    tree, up = model_of(path, choices.up, choices.height, notes)
+    return Source(tree, up=up)
+
+
+def read_source(path: Path, search: Sequence[Path], notes: Notes) -> Source:
+    """The cleaned tree of a file.
+
+    Raises:
+      UserError: it cannot be read, or is neither MJCF nor URDF.
+    """
+    source = Source(parse_xml(path))
+    places = Places(path, search)
+    match source.tree.tag:
+        case "mujoco":
+            clean_mjcf(source, path, places, notes)
+        case "robot":
+            clean_urdf(source, path, places, notes)
+        case other:
+            raise UserError(
+                f"{path}: begins with <{other[:40]}>; a model file begins with <mujoco> (MJCF) or <robot> (URDF)"
+            )
+    return source
+
+
+def _folder(
+    name: str,
+    origin: str,
+    best: Candidate,
+    mirror: tuple[np.ndarray, np.ndarray] | None,
+    planar: bool,
+    rest: np.ndarray | None,
+) -> Imported:
+    """rest: [nq] the pose in which a skeleton rests, None of other models."""
+    puppet, notes = best.puppet, best.notes
+    feet = [geom for foot in best.feet for geom in foot]
+    trunk = puppet.bodies[0].name
+    notes.guess("trunk", trunk, "high", "the body that all limbs hang on")
+    notes.guess(
+        "feet",
+        f"{len(best.feet)} feet",
+        "high" if math.isfinite(best.held.up) and best.held.stands else "low",
+        "limbs that end lowest",
+    )
+    pairs = {} if mirror is None else _stated_pairs(puppet, best.q, mirror, planar)
+    forward = rotation(puppet.bodies[0].quat).T @ [1.0, 0.0, 0.0]
+    if stopped := [joint.name for joint in puppet.joints if joint.stopped]:
+        notes.change(
+            f"limits act on {listed(stopped)} only",
+            "these stand at the end of their range and rest on it",
+        )
+    puppet.pose(best.q)
+    passing = planar and bool(geometry.parallel(puppet.data.xaxis[1:]).all())
+    length = _stated_length(best)
+    train = _train(best, mirror is not None, length)
+    toml = creature_toml(
+        name,
+        origin,
+        trunk,
+        forward,
+        feet,
+        puppet.names,
+        best.drive,
+        (mirror is not None, pairs),
+        length,
+        passing,
+        train,
+        notes,
+    )
+    report = (
+        f"# {name}\n\nMade by `mjxgait import` from {origin}.\n\n```text\n{notes.text()}\n```\n"
+    )
+    files = {
+        XML: creature_xml(name, puppet.bodies, best.qpos, rest),
+        TOML: toml,
+        README: report,
+    }
+    return Imported(name, files, notes, best.held.stands)
+
+
+def _stated_pairs(
+    puppet: Puppet, q: np.ndarray, mirror: tuple[np.ndarray, np.ndarray], planar: bool
+) -> dict[str, tuple[str, int]]:
+    """Partner and sign by joint, of those that nobody could tell from the geometry alone.
+
+    Those are joints that are not quite each other's image, and all of a body in a plane, whose legs
+    are in one place.
+    """
+    partner, sign = mirror
+    found, turned = puppet.images(np.array([1.0, 0.0, 0.0]), q, slack=0.5)
+    known = (found == partner) & (turned == sign) & (not planar)
+    return {
+        name: (puppet.names[partner[j]], int(sign[j]))
+        for j, name in enumerate(puppet.names)
+        if not known[j]
+    }
+
+
+def _train(best: Candidate, symmetric: bool, stated_length: float | None) -> dict[str, Any]:
+    """The table `[train]`. stated_length: m, that of a body which is shorter than its legs."""
+    model, data = best.model, mujoco.MjData(best.model)
+    data.qpos[:] = best.qpos
+    mujoco.mj_kinematics(model, data)
+    length = stated_length or geometry.body_length(model, data, np.array([1.0, 0.0, 0.0]))
+    hip = stance_of(best.puppet, best.qpos[7:]).hip
+    steps = bool(best.drive.ahead or best.drive.aside)
+    step = float(model.opt.timestep)
+    rotor = float(np.median([joint.armature for joint in best.puppet.joints]))
+    legs, hinges, mass = len(best.puppet.feet), len(best.puppet.joints), best.puppet.mass
+    return manner(steps, legs, hinges, symmetric, hip, length, mass, step, rotor, best.notes)
+
+
+def _stated_length(best: Candidate) -> float | None:
+    """m, of a body that is shorter than its legs, such as a biped's; None for all others.
+
+    Speeds are wanted and judged in body lengths. A biped, measured from its back to its toes, would
+    be praised for shuffling.
+    """
+    model, data = best.model, mujoco.MjData(best.model)
+    data.qpos[:] = best.qpos
+    mujoco.mj_kinematics(model, data)
+    hip = stance_of(best.puppet, best.qpos[7:]).hip
+    if geometry.body_length(model, data, np.array([1.0, 0.0, 0.0])) >= hip:
+        return None
+    best.notes.guess(
+        "body_length",
+        f"{hip:.3g}",
+        "medium",
+        "the hip height: the body is shorter than its legs, and speeds count in it",
+    )
+    return hip

@@ -1,0 +1,288 @@
+"""How strong the joints are and how far they swing, and which of them steer and balance.
+
+`J` active joints.
+"""
+
+import dataclasses
+
+import mujoco
+import numpy as np
+
+from mjxgait.importer.body import Puppet
+from mjxgait.importer.notes import Notes, listed
+from mjxgait.importer.soles import Stance
+
+GRAVITY = 9.81
+STIFFNESS, LEAST_STIFFNESS, MOST_STIFFNESS = 12.0, 2.5, 6.0
+"""kp in units of weight times hip height: the first shared among the feet, within the other two."""
+STRENGTH, LEAST_STRENGTH, MOST_STRENGTH = 2.0, 0.5, 1.0
+"""Torque limit, likewise."""
+DAMPING = 0.015
+"""kd in units of kp, s. Stable PD needs 0.0075 at a step of 5 ms."""
+QUICKNESS = 5.0
+"""Least natural frequency of a joint, in units of a pendulum's of the hips' height: a slower
+joint cannot follow a stride.
+"""
+SWING = 0.35
+"""rad, amplitude at which a joint's own inertia must be swung at that frequency within the
+torque limit.
+"""
+LEAST_DAMPING = 0.5
+"""Damping ratio of a joint on its own."""
+LEAST_INERTIA = 2.0
+"""Of a joint, in units of time step times kd.
+
+Stable PD does not know what the floor holds, and so gives way by I / (I + h kd).
+"""
+RANGES = {
+    "stride": 40.0,
+    "lift": 40.0,
+    "side": 15.0,
+    "twist": 12.0,
+    "ankle": 25.0,
+    "spine": 15.0,
+    "distal": 20.0,
+    "other": 20.0,
+}
+"""deg to both sides of the standing angle, by what a joint does. Distal is what swings a foot below two
+joints that do, as hocks and pasterns: limbs flail that swing widely in all of them. Who has one leg hops with all
+of it."""
+SWINGING = 2
+"""Joints of a leg that swing it widely."""
+STEPPERS, APART = 2, 0.5
+"""Feet of a body that must step under its fall; with more, or so many hip heights one behind the
+other, it stands."""
+WEAKEST = 0.3
+"""m that a joint moves its foot per rad and hip height, to be one that takes the foot somewhere."""
+ENDLESS = 6.0
+"""rad, width of a range from which it is none."""
+LEAST_BEND = 3.0
+"""deg that a knee stays away from straight."""
+UPRIGHT = 0.7
+"""Cosine to the vertical from which a joint turns what hangs on it."""
+ROLES = ("stride", "side", "lift")
+
+
+@dataclasses.dataclass(eq=False)
+class Drive:
+    """role: of each joint.
+
+    kp, kd, torque: [J]. ranges: [J, 2] deg. The dicts map joint names to weights
+    (docs/controller.md).
+    """
+
+    role: list[str]
+    kp: np.ndarray
+    kd: np.ndarray
+    torque: np.ndarray
+    ranges: np.ndarray
+    bend: dict[str, float] = dataclasses.field(default_factory=dict)
+    stride: dict[str, float] = dataclasses.field(default_factory=dict)
+    pitch: dict[str, float] = dataclasses.field(default_factory=dict)
+    roll: dict[str, float] = dataclasses.field(default_factory=dict)
+    ahead: dict[str, float] = dataclasses.field(default_factory=dict)
+    aside: dict[str, float] = dataclasses.field(default_factory=dict)
+    turn: dict[str, float] = dataclasses.field(default_factory=dict)
+
+
+def plan_drive(puppet: Puppet, q: np.ndarray, stance: Stance, planar: bool, notes: Notes) -> Drive:
+    """The drive of a body that faces +x in its standing pose [J]."""
+    feet = len(puppet.feet)
+    roles, moves = _roles(puppet, q, stance)
+    weight, inertia = puppet.mass * GRAVITY * stance.hip, _own_inertia(puppet)
+    quick = QUICKNESS**2 * GRAVITY / stance.hip * inertia
+    kp = np.maximum(
+        weight * float(np.clip(STIFFNESS / feet, LEAST_STIFFNESS, MOST_STIFFNESS)), quick
+    )
+    kd = np.maximum(DAMPING * kp, 2 * LEAST_DAMPING * np.sqrt(kp * inertia))
+    own = np.maximum(
+        weight * float(np.clip(STRENGTH / feet, LEAST_STRENGTH, MOST_STRENGTH)), SWING * quick
+    )
+    stated = np.array([joint.effort for joint in puppet.joints])
+    # The file's number is taken where it is one that a walk could need; 0 and 1000 N·m often only
+    # mean "not known".
+    torque = np.where(np.isfinite(stated) & (stated > 0.15 * own), np.minimum(stated, 3 * own), own)
+    drive = Drive(roles, kp, kd, torque, _ranges(puppet, q, roles))
+    _bend_one_way(puppet, q, drive, notes)
+    _add_armature(puppet, drive, inertia, notes)
+    reason = f"weight {puppet.mass * GRAVITY:.3g} N times hip height {stance.hip:.3g} m"
+    reason += "; more where a joint's own inertia needs it" if (kp == quick).any() else ""
+    notes.guess("kp, kd", f"{np.median(kp):.3g}, {np.median(kd):.3g}", "medium", reason)
+    used = np.isfinite(stated) & (torque == stated)
+    notes.guess("torque_limit", f"{torque.min():.3g} to {torque.max():.3g}", "high" if used.all() else "medium",
+                f"stated for {used.sum()} of {len(q)} joints; else from weight times hip height")  # fmt: skip
+    notes.guess(
+        "range", "by what each joint does", "low", "40 degrees and less, within the file's limits"
+    )
+    if not planar:
+        _steering(puppet, stance, drive, moves)
+    _balance(puppet, stance, drive, moves, planar)
+    if _must_step(puppet, stance):
+        _stepping(puppet, stance, drive, moves, planar)
+    return drive
+
+
+def _own_inertia(puppet: Puppet) -> np.ndarray:
+    """[J] kg m², what each joint moves when the body floats free in the latest pose; with the
+    armature.
+    """
+    mujoco.mj_forward(puppet.model, puppet.data)
+    mass = np.zeros((puppet.model.nv, puppet.model.nv))
+    mujoco.mj_fullM(puppet.model, puppet.data, mass)
+    return 1 / np.diag(np.linalg.inv(mass))[6:]
+
+
+def _add_armature(puppet: Puppet, drive: Drive, own: np.ndarray, notes: Notes) -> None:
+    """Gives light joints, of inertia `own` [J], the rotor of a motor of such strength, so that
+    stable PD can hold the weight with them.
+    """
+    least = LEAST_INERTIA * puppet.model.opt.timestep * drive.kd
+    raised = []
+    for joint, has, wants in zip(puppet.joints, own, least, strict=True):
+        if has < wants:
+            joint.armature += float(wants - has)
+            raised.append(joint.name)
+    if raised:
+        notes.change(
+            f"armature of {listed(raised)} raised to {float(least.max()):.2g} kg m² or less",
+            "lighter joints cannot hold the weight with stable PD",
+        )
+
+
+def _roles(puppet: Puppet, q: np.ndarray, stance: Stance) -> tuple[list[str], np.ndarray]:
+    """What each joint does, and the mean way [J, 3] m/rad that it moves its feet."""
+    soles = puppet.sole_points(*puppet.pose(q))
+    middles = [sole[sole[:, 2] < sole[:, 2].min() + 0.03 * stance.hip].mean(0) for sole in soles]
+    moves = np.array([puppet.jacobian(f, middle) for f, middle in enumerate(middles)])
+    carried = np.abs(moves).sum(2) > 0
+    mean = moves.sum(0) / np.maximum(carried.sum(0), 1)[:, None]
+    axes = np.abs(puppet.data.xaxis[1:])
+    roles = []
+    for j in range(len(q)):
+        size = float(np.linalg.norm(mean[j]))
+        legs = [f for f in range(len(puppet.feet)) if j in puppet.leg(f)]
+        if not legs:
+            roles.append("other")
+        elif len(legs) > 1:
+            roles.append("spine")
+        elif size < 0.2 * stance.hip:
+            roles.append("ankle" if axes[j][1] > 0.7 else "twist")
+        else:
+            roles.append(
+                ROLES[int((np.abs(mean[j]) * [1.3, 1.0, 1.0]).argmax())]
+            )  # a tie is a stride
+    chains = [puppet.leg(f) for f in range(len(puppet.feet))]
+    for leg in chains if len(chains) > 1 else []:
+        for j in [j for j in leg if roles[j] in ("stride", "lift")][SWINGING:]:
+            roles[j] = "distal"
+    return roles, mean
+
+
+def _ranges(puppet: Puppet, q: np.ndarray, roles: list[str]) -> np.ndarray:
+    """[J, 2] deg about the standing angle, within the limits."""
+    half = np.array([RANGES[role] for role in roles])
+    low = np.maximum(-half, np.degrees(np.where(np.isfinite(puppet.low), puppet.low, -1e3) - q))
+    high = np.minimum(half, np.degrees(np.where(np.isfinite(puppet.high), puppet.high, 1e3) - q))
+    return np.stack([np.minimum(low, 0.0), np.maximum(high, 0.0)], 1)
+
+
+def _bend_one_way(puppet: Puppet, q: np.ndarray, drive: Drive, notes: Notes) -> None:
+    """Keeps a knee whose file states no limits on the side to which it is bent in the stance."""
+    sided = []
+    soles = puppet.sole_points(*puppet.pose(q))
+    for f, sole in enumerate(soles):
+        leg = puppet.leg(f)
+        path = np.concatenate([puppet.data.xanchor[[j + 1 for j in leg]], sole.mean(0)[None]])
+        parts = np.diff(path, axis=0)
+        sizes = np.linalg.norm(parts, axis=1)
+        if len(sizes) < 2:
+            continue
+        k = int((sizes[:-1] + sizes[1:]).argmax())
+        knee, axis = leg[k + 1], puppet.data.xaxis[leg[k + 1] + 1]
+        if puppet.high[knee] - puppet.low[knee] < ENDLESS:
+            continue
+        thigh, shank = parts[k], parts[k + 1]
+        straight = np.degrees(np.arctan2(axis @ np.cross(shank, thigh), shank @ thigh))
+        if abs(straight) < LEAST_BEND:
+            continue
+        end = straight - np.sign(straight) * LEAST_BEND
+        low, high = drive.ranges[knee]
+        drive.ranges[knee] = (low, min(high, end)) if straight > 0 else (max(low, end), high)
+        if (drive.ranges[knee] != (low, high)).any():
+            sided.append(puppet.names[knee])
+    if sided:
+        notes.guess(
+            "side of knees",
+            "as they stand",
+            "medium",
+            f"the file has no limits for {listed(sided)}: no further than straight",
+        )
+
+
+def _steering(puppet: Puppet, stance: Stance, drive: Drive, moves: np.ndarray) -> None:
+    """Left legs stride longer than right ones; a yaw joint between fore and hind legs bends."""
+    for f in range(len(puppet.feet)):
+        side = float(puppet.data.xpos[puppet.feet[f][0] + 1][1])
+        own = [j for j in puppet.leg(f) if drive.role[j] == "stride"]
+        if own and abs(side) > 0.02 * stance.hip:
+            drive.stride[puppet.names[own[0]]] = 0.5 if side > 0 else -0.5
+    spine = [
+        j
+        for j, role in enumerate(drive.role)
+        if role == "spine" and abs(puppet.data.xaxis[j + 1][2]) > UPRIGHT
+    ]
+    behind = [j for j in spine if puppet.data.xanchor[j + 1][0] < puppet.data.xpos[1][0]]
+    if behind:
+        # The hind part swings to the left with positive yaw about -z, which curves the body to the
+        # right.
+        drive.bend[puppet.names[behind[0]]] = 0.5 * float(
+            np.sign(puppet.data.xaxis[behind[0] + 1][2])
+        )
+
+
+def _must_step(puppet: Puppet, stance: Stance) -> bool:
+    """Whether it stands on one foot in each step: two, and not one behind the other."""
+    ahead = [puppet.data.xpos[group[0] + 1][0] for group in puppet.feet]
+    return len(puppet.feet) <= STEPPERS and bool(np.ptp(ahead) < APART * stance.hip)
+
+
+def _stepping(
+    puppet: Puppet, stance: Stance, drive: Drive, moves: np.ndarray, planar: bool
+) -> None:
+    """The highest joints that swing a foot forward, and to the side, take it under the fall; the
+    highest upright one turns it.
+    """
+    for f in range(len(puppet.feet)):
+        for role, axis, table in (("stride", 0, drive.ahead), ("side", 1, drive.aside)):
+            if role == "side" and planar:
+                continue
+            way = {j: float(moves[j][axis]) / stance.hip for j in puppet.leg(f)}
+            own = [j for j in way if drive.role[j] == role and abs(way[j]) > WEAKEST]
+            if own:
+                table[puppet.names[own[0]]] = round(1 / way[own[0]], 3)
+        shared = {j for other in range(len(puppet.feet)) if other != f for j in puppet.leg(other)}
+        upright = {j: float(puppet.data.xaxis[j + 1][2]) for j in puppet.leg(f) if j not in shared}
+        if turns := [j for j in upright if abs(upright[j]) > UPRIGHT]:
+            drive.turn[puppet.names[turns[0]]] = float(np.sign(upright[turns[0]]))
+
+
+def _balance(puppet: Puppet, stance: Stance, drive: Drive, moves: np.ndarray, planar: bool) -> None:
+    """Nose down: front feet push down, hind feet give way, toes press; right side down: the feet
+    go right, under the fall.
+    """
+    middle = np.mean([puppet.data.xpos[g[0] + 1][0] for g in puppet.feet])
+    for f, group in enumerate(puppet.feet):
+        leg, ahead = puppet.leg(f), float(puppet.data.xpos[group[0] + 1][0] - middle)
+        sides = [j for j in leg if drive.role[j] == "side"]
+        if sides and not planar:
+            drive.roll[puppet.names[sides[0]]] = -float(np.sign(moves[sides[0]][1]))
+        ankles = [j for j in leg if drive.role[j] == "ankle"]
+        if len(puppet.feet) <= 2 and ankles:
+            drive.pitch[puppet.names[ankles[-1]]] = float(
+                np.sign(puppet.data.xaxis[ankles[-1] + 1][1])
+            )
+        elif abs(ahead) > 0.2 * stance.hip:
+            own = [j for j in leg if drive.role[j] in ("lift", "stride")]
+            if own:
+                j = max(own, key=lambda j: abs(float(moves[j][2])))
+                drive.pitch[puppet.names[j]] = -float(np.sign(moves[j][2]) * np.sign(ahead))

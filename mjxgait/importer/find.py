@@ -1,0 +1,190 @@
+"""Finds what a compiled model consists of, and refuses what cannot be a creature."""
+
+import fnmatch
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+
+from mjxgait.creature.geometry import ancestors
+from mjxgait.errors import UserError
+from mjxgait.importer.anatomy import Anatomy, measured
+from mjxgait.importer.legs import (
+    NoLegs,
+    find_feet,
+    lowered_limbs,
+    movable_joints,
+)
+from mjxgait.importer.notes import Notes, listed
+from mjxgait.importer.parts import HINGE, SLIDE
+from mjxgait.importer.root import (
+    find_root,
+    tell_root_joints,
+    unit_length,
+    up_axis,
+)
+
+MOST_BODIES, MOST_JOINTS = 400, 60
+ENOUGH = 6
+"""Joints that a leg keeps where all legs together have more than can move."""
+
+
+def find_anatomy(
+    model: mujoco.MjModel,
+    coupled: Sequence[str],
+    keep: Sequence[str],
+    freeze: Sequence[str],
+    up: str | None,
+    notes: Notes,
+) -> Anatomy:
+    """The anatomy of a compiled model.
+
+    Args:
+      coupled: names of joints that follow others. keep, freeze: patterns of joints that the user
+        wants active or frozen.
+
+    Raises:
+      UserError: no creature that can walk, and why.
+    """
+    _check_size(model)
+    root = find_root(model)
+    bodies = [b for b in range(1, model.nbody) if root in ancestors(model, b)]
+    scale = unit_length(model, bodies, notes)
+    qpos = _reference_pose(model)
+    axis = up_axis(model, bodies, root, qpos, up, notes)
+    anatomy = measured(model, qpos, axis, root, bodies, scale)
+    tell_root_joints(model, root, notes)
+    movable = movable_joints(model, anatomy, coupled, freeze, notes)
+    try:
+        anatomy.feet = find_feet(model, anatomy, movable)
+    except NoLegs as error:
+        anatomy = measured(model, lowered_limbs(model, anatomy, movable), axis, root, bodies, scale)
+        anatomy.lowered = True
+        anatomy.feet = find_feet(model, anatomy, movable)
+        if len(anatomy.feet) < 2:  # an arm on its base can reach down too
+            raise UserError(str(error)) from None
+    _choose_joints(model, anatomy, movable, keep, notes)
+    _check_loops(model, anatomy)
+    return anatomy
+
+
+def _reference_pose(model: mujoco.MjModel) -> np.ndarray:
+    """[nq]: the file's zero pose, with each joint that may not be there in the middle of its
+    range.
+    """
+    qpos = model.qpos0.copy()
+    for j in range(model.njnt):
+        a, (low, high) = int(model.jnt_qposadr[j]), model.jnt_range[j]
+        if int(model.jnt_type[j]) in (HINGE, SLIDE) and low < high and not low <= qpos[a] <= high:
+            qpos[a] = (low + high) / 2
+    return qpos
+
+
+def _check_size(model: mujoco.MjModel) -> None:
+    if model.nbody > MOST_BODIES:
+        raise UserError(
+            f"the model has {model.nbody} bodies; more than {MOST_BODIES} is not one creature"
+        )
+    arrays = (
+        model.body_pos,
+        model.body_mass,
+        model.body_inertia,
+        model.jnt_range,
+        model.geom_size,
+        model.geom_pos,
+        model.qpos0,
+    )
+    if not all(
+        np.isfinite(a).all() and np.abs(a, dtype=float).max(initial=0) < 1e9 for a in arrays
+    ):
+        raise UserError(
+            "the model has numbers that are infinite, not a number or absurdly large; correct them "
+            "in the file"
+        )
+
+
+def _choose_joints(
+    model: mujoco.MjModel, anatomy: Anatomy, movable: list[int], keep: Sequence[str], notes: Notes
+) -> None:
+    """Active are the joints between the trunk and a foot, and those that the user keeps."""
+    on_legs = {b for foot in anatomy.feet for b in ancestors(model, foot)}
+    frozen = []
+    for j in movable:
+        wanted = any(fnmatch.fnmatchcase(model.joint(j).name, pattern) for pattern in keep)
+        if model.jnt_bodyid[j] in on_legs or wanted:
+            anatomy.active.append(j)
+        else:
+            frozen.append(model.joint(j).name or f"joint {j}")
+    if frozen:
+        notes.change(
+            f"joints {listed(frozen)} frozen",
+            "no leg hangs on them, so they have no part in walking (--keep PATTERN keeps some)",
+        )
+    if len(anatomy.active) > MOST_JOINTS:
+        _freeze_least(model, anatomy, keep, notes)
+    if len(anatomy.active) > MOST_JOINTS:
+        raise UserError(
+            f"{len(anatomy.active)} joints would move; freeze those that do not matter with "
+            f"--freeze (at most {MOST_JOINTS})"
+        )
+
+
+def _freeze_least(
+    model: mujoco.MjModel, anatomy: Anatomy, keep: Sequence[str], notes: Notes
+) -> None:
+    """Leaves each leg the joints that swing its end farthest, such as an insect's without those
+    of its toes.
+    """
+    data = mujoco.MjData(model)
+    data.qpos[:] = anatomy.qpos
+    mujoco.mj_kinematics(model, data)
+    kept = set()
+    for foot in anatomy.feet:
+        chain = ancestors(model, foot)
+        leg = [j for j in anatomy.active if int(model.jnt_bodyid[j]) in chain]
+        below = [b for b in anatomy.bodies if foot in ancestors(model, b)]
+        ends = data.xpos[below]
+
+        def reach(joint: int, ends: np.ndarray = ends) -> float:
+            arms = ends - data.xanchor[joint]
+            return float(np.linalg.norm(np.cross(data.xaxis[joint], arms), axis=1).max())
+
+        kept.update(sorted(leg, key=reach, reverse=True)[:ENOUGH])
+    kept.update(
+        j
+        for j in anatomy.active
+        if any(fnmatch.fnmatchcase(model.joint(j).name, pattern) for pattern in keep)
+    )
+    frozen = [model.joint(j).name or f"joint {j}" for j in anatomy.active if j not in kept]
+    notes.change(
+        f"joints {listed(frozen)} frozen",
+        f"of {len(anatomy.active)} joints of the legs those that swing a foot least "
+        "(--keep PATTERN keeps some)",
+    )
+    anatomy.active = [j for j in anatomy.active if j in kept]
+
+
+def _check_loops(model: mujoco.MjModel, anatomy: Anatomy) -> None:
+    """Refuses a loop that a moving joint is part of."""
+    moved = {
+        b
+        for b in anatomy.bodies
+        if any(int(model.jnt_bodyid[j]) in ancestors(model, b) for j in anatomy.active)
+    }
+    for e in range(model.neq):
+        if int(model.eq_type[e]) not in (
+            int(mujoco.mjtEq.mjEQ_CONNECT),
+            int(mujoco.mjtEq.mjEQ_WELD),
+        ):
+            continue
+        objects = [int(model.eq_obj1id[e]), int(model.eq_obj2id[e])]
+        if int(model.eq_objtype[e]) == int(mujoco.mjtObj.mjOBJ_SITE):
+            objects = [int(model.site_bodyid[o]) for o in objects]
+        if any(o in moved for o in objects):
+            a, b = (model.body(max(o, 0)).name for o in objects)
+            name = model.equality(e).name or f"equality constraint {e}"
+            raise UserError(
+                f'"{name}" closes a loop between "{a}" and "{b}", and only trees can be simulated '
+                "here; "
+                "take one of the two rods out, or the constraint, and import again"
+            )

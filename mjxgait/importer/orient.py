@@ -1,0 +1,275 @@
+"""Finds where the front is, whether the body lives in a plane, and which joints mirror each
+other.
+"""
+
+import re
+
+import numpy as np
+
+from mjxgait.importer.body import Puppet
+from mjxgait.importer.notes import Confidence, Notes, listed
+
+FRONT_WORDS, BACK_WORDS = (
+    ("front", "fore", "head", "nose", "neck", "snout"),
+    ("hind", "rear", "back", "tail"),
+)
+FRONT_CORNERS, BACK_CORNERS = (
+    {"fl", "fr", "lf", "rf"},
+    {"hl", "hr", "rl", "rr", "bl", "br", "lh", "rh", "lb", "rb"},
+)
+"""Whole words of a name, as between underscores."""
+CLEARLY, MOSTLY = 1.1, 2.0
+"""How much farther hinges swing the feet along one axis than along the other for it to be the way
+that the body walks, where both axes are alike; and where symmetry speaks for the other."""
+SHANK = 0.25
+"""Share of a leg's length from which its last part is a shank, not a foot."""
+ROUGHLY = 5.0
+"""How much less exact than usual the two sides of a body may be each other's image."""
+MOST_ALONE = 0.25
+"""Share of the joints that may have no mirror image in a body that still counts as symmetric."""
+WIDEST = 1.4
+"""rad, of a hinge's range; a leg swings no farther in a stride."""
+FORWARDS = {
+    "x": np.array([1.0, 0, 0]),
+    "-x": np.array([-1.0, 0, 0]),
+    "y": np.array([0, 1.0, 0]),
+    "-y": np.array([0, -1.0, 0]),
+}
+
+
+def yaw_to(forward: np.ndarray) -> np.ndarray:
+    """[3, 3] rotation about z that takes a horizontal forward [3] to +x."""
+    x, y = forward[:2] / np.linalg.norm(forward[:2])
+    return np.array([[x, y, 0.0], [-y, x, 0.0], [0.0, 0.0, 1.0]])
+
+
+def find_forward(puppet: Puppet, q: np.ndarray, told: str | None, notes: Notes) -> np.ndarray:
+    """[3] unit vector in the world of the pose."""
+    xpos, _ = puppet.pose(q)
+    if told:
+        notes.guess("forward", told, "high", "as told")
+        return FORWARDS[told]
+    name, sure, why = _axis(puppet, q)
+    sign, evidence = _front(puppet, xpos, FORWARDS[name])
+    if sign < 0:
+        name = f"-{name}"
+    notes.guess(
+        "forward",
+        name,
+        "medium" if sure == "high" and not evidence else sure,
+        why + (f"; {evidence}" if evidence else ""),
+    )
+    return FORWARDS[name]
+
+
+def _axis(puppet: Puppet, q: np.ndarray) -> tuple[str, Confidence, str]:
+    """Whether it walks along x or y, how sure that is, and why."""
+    axes = puppet.data.xaxis[1:]
+    if is_planar(puppet, q) is not None:
+        lateral = int(np.abs(axes[0][:2]).argmax())
+        return ("x", "y")[1 - lateral], "high", "all hinges turn about the other axis"
+    alike = {name: _two_sided(puppet, FORWARDS[name], q) for name in ("x", "y")}
+    along_x, along_y = swings(puppet, q)
+    name, other = ("x", "y") if along_x >= along_y else ("y", "x")
+    farther = max(along_x, along_y) / max(min(along_x, along_y), 1e-9)
+    swung = f"the hinges swing the feet {min(farther, 99):.1f} times as far along {name}"
+    if alike["x"] == alike["y"]:
+        if farther > CLEARLY:
+            return name, "high" if alike["x"] else "medium", swung
+        if alike["x"]:
+            return "x", "low", "symmetry and hinges are as good along y; x is the convention"
+        spread = np.ptp(puppet.data.xpos[1:], axis=0)
+        name = "x" if spread[0] >= 0.8 * spread[1] else "y"
+        return name, "low", "no plane of symmetry was found; the longer side"
+    if farther > MOSTLY and not alike[name]:
+        return name, "medium", f"{swung}, though the body is its own mirror image about {other}"
+    return ("x" if alike["x"] else "y"), "high", "the body is its own mirror image about it"
+
+
+def _two_sided(puppet: Puppet, forward: np.ndarray, q: np.ndarray) -> bool:
+    """Whether the sides are each other's image. A biped is its own image from the side, too, but
+    there each of its legs is its own.
+    """
+    found = puppet.mirror(forward, q)
+    return found is not None and bool((found[0] != np.arange(len(found[0]))).any())
+
+
+def swings(puppet: Puppet, q: np.ndarray) -> tuple[float, float]:
+    """m that the hinges of the legs can swing the feet along x and along y, summed over them."""
+    soles = puppet.sole_points(*puppet.pose(q))
+    width = np.minimum(puppet.high - puppet.low, WIDEST)[:, None]
+    ways = [
+        np.abs(puppet.jacobian(f, sole[sole[:, 2].argmin()])) * width
+        for f, sole in enumerate(soles)
+    ]
+    x, y, _ = np.sum(ways, axis=(0, 1))
+    return float(x), float(y)
+
+
+def _front(puppet: Puppet, xpos: np.ndarray, axis: np.ndarray) -> tuple[int, str]:
+    """Which end is the front, and what says so."""
+    score = 0.0
+    for body, at in zip(puppet.bodies, xpos, strict=True):
+        score += _named_front(body.name) * float((at - xpos[0]) @ axis)
+    if abs(score) > 1e-3:
+        return int(np.sign(score)), "the names of front and rear parts"
+    if len(puppet.feet) > 2:
+        return 1, ""
+    # Toes reach forward from the ankle; where a leg ends in a shank, it hangs back from the knee.
+    toes = shanks = 0.0
+    poses = puppet.pose(puppet.data.qpos[7:])
+    for f, sole in enumerate(puppet.sole_points(*poses)):
+        anchors = puppet.data.xanchor[[j + 1 for j in puppet.leg(f)]]
+        last = sole.mean(0) - anchors[-1]
+        length = np.linalg.norm(np.diff(anchors, axis=0), axis=1).sum() + np.linalg.norm(last)
+        if np.linalg.norm(last) > SHANK * length:
+            shanks += float(last @ axis)
+        else:
+            toes += float(last @ axis)
+    least = 0.02 * max(float(np.ptp(xpos[:, 2])), 1e-6) * len(puppet.feet)
+    for reach, evidence in ((toes, "toes point that way"), (-shanks, "knees point that way")):
+        if abs(reach) > least:
+            return int(np.sign(reach)), evidence
+    return 1, ""
+
+
+def _named_front(name: str) -> int:
+    """1 for the name of a front part, -1 for that of a rear one, else 0."""
+    name = name.lower()
+    words = set(re.split(r"[^a-z]+", name))
+    front = any(w in name for w in FRONT_WORDS) or bool(words & FRONT_CORNERS)
+    back = any(w in name for w in BACK_WORDS) or bool(words & BACK_CORNERS)
+    return front - back
+
+
+def is_planar(puppet: Puppet, q: np.ndarray) -> np.ndarray | None:
+    """The lateral axis [3] of a body whose hinges are all parallel and whose feet are, or are
+    kept, in one plane; else None.
+    """
+    poses = puppet.pose(q)
+    axes = puppet.data.xaxis[1:]
+    if np.abs(axes @ axes[0]).min() < 0.99 or abs(axes[0][2]) > 0.1:
+        return None
+    middles = [
+        float((sole.max(0) + sole.min(0)) @ axes[0]) / 2 for sole in puppet.sole_points(*poses)
+    ]
+    height = max(float(np.ptp(poses[0][:, 2])), 1e-6)
+    return axes[0] if np.ptp(middles) < (0.4 if puppet.in_plane else 0.05) * height else None
+
+
+def planar_pairs(puppet: Puppet, q: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+    """Partner and sign [J] of a planar body with two alike legs from one hip; None when it has
+    none.
+    """
+    if len(puppet.feet) != 2:
+        return None
+    puppet.pose(q)
+    one, other = (puppet.leg(f) for f in range(2))
+    partner, sign = np.arange(len(puppet.joints)), np.ones(len(puppet.joints), dtype=int)
+    own, others = [j for j in one if j not in other], [j for j in other if j not in one]
+    if len(own) != len(others) or not own:
+        return None
+    for a, b in zip(own, others, strict=True):
+        apart = (puppet.data.xanchor[a + 1] - puppet.data.xanchor[b + 1])[[0, 2]]
+        same = (
+            puppet.joints[a].low == puppet.joints[b].low
+            and puppet.joints[a].high == puppet.joints[b].high
+        )
+        if (
+            np.linalg.norm(apart) > 0.05 * float(np.ptp(puppet.data.xpos[1:], axis=0).max() + 1e-6)
+            or not same
+        ):
+            return None
+        partner[a], partner[b] = b, a
+        sign[a] = sign[b] = int(np.sign(puppet.data.xaxis[a + 1] @ puppet.data.xaxis[b + 1]))
+    return partner, sign
+
+
+def find_mirror(
+    puppet: Puppet, q: np.ndarray, planar: bool, notes: Notes
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """Partner and sign [J] of a body that faces +x, or None for one that is not symmetric."""
+    if planar:
+        found = planar_pairs(puppet, q)
+        notes.guess(
+            "mirror",
+            "two alike legs" if found else "none",
+            "high",
+            "the legs of a body in a plane are compared",
+        )
+        return found
+    found, lone = puppet.mirror(np.array([1.0, 0, 0]), q), ""
+    if found is None:
+        found, lone = _nearly_mirrored(puppet, q)
+    if found is not None and not _mirrors(puppet, q, *found):
+        found = None
+        reason = "the joints pair up, but equal angles do not mirror the pose (their zeros differ)"
+    elif found is not None and _names_disagree(puppet.names, found[0]):
+        found = None
+        reason = "the geometry and the names left and right contradict each other"
+    else:
+        reason = lone or "partners found from the anchors and axes of the joints"
+    sure: Confidence = "high" if found and not lone else "medium"
+    notes.guess("mirror", "symmetric" if found else "none", sure, reason)
+    return found
+
+
+def _nearly_mirrored(
+    puppet: Puppet, q: np.ndarray
+) -> tuple[tuple[np.ndarray, np.ndarray] | None, str]:
+    """Partner and sign [J] of a body whose sides are not each other's exact image, and how they
+    differ in words; None where too many joints have no image at all.
+
+    Those pair up by their names; who has no partner then keeps its own angle in the mirrored half
+    of a cycle.
+    """
+    partner, sign = puppet.images(np.array([1.0, 0, 0]), q, ROUGHLY)
+    lone = np.flatnonzero(partner < 0)
+    if len(lone) > MOST_ALONE * len(partner):
+        return None, f"{listed([puppet.names[j] for j in lone])}: without a mirror image"
+    axes = puppet.data.xaxis[1:]
+    alone = []
+    for j in lone:
+        other = _other_side(puppet.names[j])
+        partner[j] = k = puppet.names.index(other) if other in puppet.names else j
+        if k == j:
+            alone.append(puppet.names[j])
+            sign[j] = 1
+        else:
+            sign[j] = 1 if axes[j] * [-1, 1, -1] @ axes[k] >= 0 else -1
+    rough = [puppet.names[j] for j in lone if puppet.names[j] not in alone]
+    said = [f"{listed(rough)} are paired by their names, not each other's image"] if rough else []
+    said += (
+        [f"{listed(alone)} has no partner, its angle is the same in both halves"] if alone else []
+    )
+    return (partner, sign), "; ".join(
+        said
+    ) or "partners found, though the sides are not quite alike"
+
+
+def _mirrors(puppet: Puppet, q: np.ndarray, partner: np.ndarray, sign: np.ndarray) -> bool:
+    """Whether mirrored angles give the mirrored pose, tried on a random pose.
+
+    What is beside the plane of symmetry and has no partner is not looked at.
+    """
+    trial = q + np.random.default_rng(1).uniform(-0.3, 0.3, len(q))
+    puppet.pose(trial)
+    anchors = puppet.data.xanchor[1:] - puppet.data.xpos[1]
+    puppet.pose(sign * trial[partner])
+    image = puppet.data.xanchor[1:] - puppet.data.xpos[1]
+    off = np.linalg.norm(image[partner] * [1, -1, 1] - anchors, axis=1)
+    most = 0.05 * float(np.ptp(anchors, axis=0).max()) + 1e-6
+    lone = (partner == np.arange(len(q))) & (np.abs(anchors[:, 1]) > most)
+    return bool(off[~lone].max(initial=0.0) < most)
+
+
+def _names_disagree(names: list[str], partner: np.ndarray) -> bool:
+    return any(
+        _other_side(name) in names and _other_side(name) not in (name, names[partner[j]])
+        for j, name in enumerate(names)
+    )
+
+
+def _other_side(name: str) -> str:
+    """The name with left and right exchanged."""
+    return name.replace("left", "\0").replace("right", "left").replace("\0", "right")

@@ -1,0 +1,198 @@
+"""What the bones of a skeleton at rest are, by where they lie: trunk, limbs, ears, toes, feet.
+
+Letters: `B` bones.
+"""
+
+from functools import cached_property
+
+import numpy as np
+
+from mjxgait.animation.clips.rig import Rig
+
+MIDDLE = 0.02
+"""Share of the skeleton's span within which a bone begins in the middle."""
+SHORT = 0.04
+"""Share of the height below which a bone does not bend on its own."""
+TOE = 0.5
+"""Share of the longest toe that another one reaches, or it is a spur."""
+LIMB, LOW = 0.4, 0.1
+"""Share that a limb reaches of the longest one, or it is an ear; of the height within which it ends at the
+floor."""
+FOOT, ANKLE_HIGH, HEEL = 0.3, 0.1, 0.25
+"""Share of its length that a foot points forward; of the height below which an ankle lies; of a foot's
+length that its heel is behind the ankle."""
+
+
+class Plan:
+    """A skeleton in metres and what its limbs are. up: number of the axis that points up."""
+
+    def __init__(self, up: int, rig: Rig) -> None:
+        self.up, self.rig = up, rig
+        spots = np.concatenate([rig.places, *rig.ends])
+        self.span = float(np.ptp(spots, axis=0).max())
+        self.height = float(np.ptp(np.concatenate([spots, *rig.skins])[:, up])) or self.span
+        level = [axis for axis in range(3) if axis != up]  # the side is X, as usual, if both are
+        self.side = min(level, key=self._unlike)
+        self.ahead = next(axis for axis in level if axis != self.side)
+
+    def _unlike(self, axis: int) -> float:
+        """m, how far the joints are from their images across an axis, at most."""
+        places = self.rig.places - self.rig.places[0]
+        images = places * np.where(np.arange(3) == axis, -1.0, 1.0)
+        return float(np.linalg.norm(places[:, None] - images, axis=2).min(1).max())
+
+    def in_middle(self, bone: int) -> bool:
+        """Whether a bone begins between left and right."""
+        apart = self.rig.places[bone, self.side] - self.rig.places[0, self.side]
+        return abs(float(apart)) < MIDDLE * self.span
+
+    def carries(self, bone: int) -> bool:
+        """Whether it is the root, or in the middle with limbs of both sides below it."""
+        return bone == 0 or (self.in_middle(bone) and len(self.sides_below[bone]) > 1)
+
+    @cached_property
+    def sides_below(self) -> list[set[float]]:
+        """Of each bone the sides of limbs that it or one below it begins."""
+        found: list[set[float]] = [set() for _ in self.rig.names]
+        for bone in self.limbs:
+            apart = self.rig.places[bone, self.side] - self.rig.places[0, self.side]
+            found[bone].add(float(np.sign(apart)))
+        for bone in reversed(range(1, len(found))):
+            found[self.rig.parents[bone]] |= found[bone]
+        return found
+
+    @cached_property
+    def half_width(self) -> float:
+        """m, mean distance from the middle at which limbs begin."""
+        rig = self.rig
+        apart = np.abs(rig.places[self.limbs, self.side] - rig.places[0, self.side])
+        return float(apart.mean()) if self.limbs else 0.0
+
+    def leaves_middle(self, bone: int) -> bool:
+        """Whether a limb, or an ear, leaves the trunk there."""
+        parent = self.rig.parents[bone]
+        return not self.in_middle(bone) and (parent < 0 or self.in_middle(parent))
+
+    def is_limb(self, bone: int) -> bool:
+        """Whether a limb begins there: what is short is an ear, an eye, a handle."""
+        return self.leaves_middle(bone) and self.reach(bone) > LIMB * self.longest
+
+    @cached_property
+    def limbs(self) -> list[int]:
+        """The first bone of each."""
+        return [bone for bone in range(len(self.rig.names)) if self.is_limb(bone)]
+
+    @cached_property
+    def longest(self) -> float:
+        """m, that what leaves the middle reaches at most."""
+        firsts = filter(self.leaves_middle, range(len(self.rig.names)))
+        return max(map(self.reach, firsts), default=0.0)
+
+    def reach(self, first: int) -> float:
+        """m, from where a limb, or what is left of it, begins to its end."""
+        return float(np.linalg.norm(self.tips[first] - self.rig.places[first]))
+
+    @cached_property
+    def tips(self) -> np.ndarray:
+        """[B, 3] where the limb ends that a bone belongs to."""
+        found = self.rig.places + [self.way(bone) for bone in range(len(self.rig.names))]
+        for bone in reversed(range(len(found))):
+            if below := self.rig.children(bone):
+                found[bone] = found[max(below, key=self._length)]
+        return found
+
+    def _length(self, bone: int) -> float:
+        return float(np.linalg.norm(self.way(bone)))
+
+    @cached_property
+    def stands(self) -> float:
+        """m, that limbs which end at the floor come down in all: much where up is up."""
+        tips = self.tips[self.limbs, self.up]
+        drops = np.maximum(self.rig.places[self.limbs, self.up] - tips, 0.0)
+        return float(drops[tips - self.floor < LOW * self.height].sum())
+
+    def segments(self, bone: int) -> list[tuple[np.ndarray, np.ndarray]]:
+        """From where a bone begins to where it ends, [3] each, those within the trunk left out."""
+        rig, start = self.rig, self.rig.places[bone]
+        below = rig.children(bone)
+        if self.in_middle(bone):
+            below = [b for b in below if not self.leaves_middle(b)] or below
+        ends = [*rig.places[below], *rig.ends[bone]]
+        if not ends and len(rig.skins[bone]):
+            ends = [start + 1.8 * (rig.skins[bone].mean(0) - start)]
+        return [(start, end) for end in ends if np.linalg.norm(end - start) > 1e-4 * self.span]
+
+    def way(self, bone: int) -> np.ndarray:
+        """[3] m from where a bone begins to its farthest end; zeros where it has none."""
+        ways = [end - start for start, end in self.segments(bone)]
+        return max(ways, key=lambda way: float(way @ way), default=np.zeros(3))
+
+    def limb(self, first: int) -> list[int]:
+        """A limb's bones from its first one down, along the longest."""
+        chain = [first]
+        while below := self.rig.children(chain[-1]):
+            chain.append(max(below, key=self._length))
+        return chain
+
+    def has_toes(self, bone: int) -> bool:
+        """Whether a limb goes on from there as several of about one length, as fingers do."""
+        reaches = sorted(map(self.reach, self.rig.children(bone)), reverse=True)
+        return len(reaches) > 1 and reaches[1] > TOE * reaches[0]
+
+    @cached_property
+    def feet(self) -> list[int]:
+        """Bones below the ankles of a body on two feet, which needs heels to stand; else none."""
+        rig, floor = self.rig, self.floor
+        found = []
+        for first in self.limbs:
+            for bone in self.limb(first):
+                low = rig.places[bone, self.up] - floor < ANKLE_HIGH * self.height
+                if low and toes(self, bone):
+                    found.append(bone)
+                    break
+        return found if len(found) == 2 else []
+
+    @cached_property
+    def floor(self) -> float:
+        """m, of the lowest place."""
+        return float(np.concatenate([self.rig.places, *self.rig.ends])[:, self.up].min())
+
+    def capsules(self, bone: int, radius: float) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Ends [3], [3] of a bone's capsules; toes have none of their own where there is a sole."""
+        above = self.rig.parents[bone]
+        while above >= 0 and above not in self.feet:
+            above = self.rig.parents[above]
+        return [] if above >= 0 else self.sole(bone, radius) or self.segments(bone)
+
+    def sole(self, bone: int, radius: float) -> list[tuple[np.ndarray, np.ndarray]]:
+        """From heel to toe on the floor, of the bone below an ankle; nothing of any other."""
+        if bone not in self.feet:
+            return []
+        spots = self.spots_below(bone)
+        ahead = toes(self, bone) * spots[:, self.ahead]
+        heel, toe = spots[0].copy(), spots[ahead.argmax()].copy()
+        heel[self.ahead] -= HEEL * (toe - heel)[self.ahead]
+        if ahead.min() < toes(self, bone) * heel[self.ahead]:
+            heel[self.ahead] = spots[ahead.argmin(), self.ahead]
+        heel[self.up] = toe[self.up] = self.floor + radius
+        return [(heel, toe)]
+
+    def spots_below(self, bone: int) -> np.ndarray:
+        """[n, 3] where a bone, and all that hangs on it, begins and ends."""
+        below = {bone}
+        for other in range(bone + 1, len(self.rig.names)):
+            if self.rig.parents[other] in below:
+                below.add(other)
+        order = sorted(below)
+        return np.concatenate([self.rig.places[order], *[self.rig.ends[b] for b in order]])
+
+    def moves(self, bone: int) -> bool:
+        """Whether it is long enough to bend on its own."""
+        return self._length(bone) > SHORT * self.height
+
+
+def toes(plan: Plan, foot: int) -> float:
+    """Where a foot points along the way: 1, -1, or 0 where it does not."""
+    way = plan.way(foot)
+    share = float(way[plan.ahead]) / max(float(np.linalg.norm(way)), 1e-9)
+    return float(np.sign(share)) if abs(share) > FOOT else 0.0

@@ -1,0 +1,171 @@
+"""Reads a model file and what it refers to.
+
+It is untrusted: only its folder and the search paths are read, and all is bounded.
+"""
+
+import dataclasses
+import io
+import math
+import re
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from mjxgait.errors import UserError
+from mjxgait.files import read_bytes
+from mjxgait.importer.notes import Guess, Notes
+
+MOST_XML = 4_000_000
+MOST_MESH = 30_000_000
+MOST_MESHES = 120_000_000
+"""bytes of one XML file, of one mesh, of all meshes together."""
+MOST_ELEMENTS, MOST_ATTRIBUTES, MOST_DEPTH, MOST_INCLUDES = 20_000, 100, 200, 40
+"""Of all elements together, of each, and within each other; MuJoCo's own have up to 40 attributes."""
+READABLE_MESHES = (".stl", ".obj", ".msh")
+
+
+@dataclasses.dataclass
+class Source:
+    """A model file on its way to MuJoCo: its cleaned tree refers to meshes by their keys in
+    `assets` and to no file.
+
+    efforts: N·m, largest torque by joint name, where the file says so outside of MuJoCo's elements.
+    coupled: joints that follow others.
+    poses: standing poses that the file offers outside of keyframes.
+    missing: names of meshes that cannot be had, with the file that each should be in; MJCF only.
+    up: axis that points up, of a skeleton.
+    """
+
+    tree: ET.Element
+    assets: dict[str, bytes] = dataclasses.field(default_factory=dict)
+    efforts: dict[str, float] = dataclasses.field(default_factory=dict)
+    coupled: list[str] = dataclasses.field(default_factory=list)
+    poses: list[list[float]] = dataclasses.field(default_factory=list)
+    missing: dict[str, str] = dataclasses.field(default_factory=dict)
+    up: Guess | None = None
+
+    @property
+    def urdf(self) -> bool:
+        """Whether it is a URDF rather than an MJCF file."""
+        return self.tree.tag == "robot"
+
+
+class Places:
+    """The folders that may be read. `packages` are searched for `package://` paths."""
+
+    def __init__(self, model: Path, search: Sequence[Path]) -> None:
+        self.home = model.resolve().parent
+        self.roots = [self.home, *(folder.resolve() for folder in search)]
+
+    def find(self, reference: str, folders: Sequence[str] = ("",)) -> Path | None:
+        """The file that a reference means, or None when it is missing or outside of the folders
+        that may be read.
+        """
+        if "\0" in reference or len(reference) > 1000:
+            return None
+        uri = re.match(r"(?:package|model|file)://(.*)", reference)
+        path = uri.group(1) if uri else reference.replace("\\", "/")
+        tries = [self.home / folder / path for folder in folders]
+        for root in self.roots:
+            tries += (
+                [root / path, root.parent / path]
+                if path.split("/")[0] == root.name
+                else [root / path]
+            )
+            if uri and "/" in path:
+                tries.append(root / path.split("/", 1)[1])
+        for candidate in tries:
+            try:
+                real = candidate.resolve()
+                if real.is_file() and any(real.is_relative_to(root) for root in self.roots):
+                    return real
+            except (OSError, RuntimeError, ValueError):
+                continue
+        return None
+
+
+def parse_xml(path: Path) -> ET.Element:
+    """The root element of a file.
+
+    Raises:
+      UserError: missing, too large, not XML, with a document type (entities can refer to files and
+        grow without bound) or too deep.
+    """
+    data = read_bytes(path, MOST_XML)
+    if b"<!DOCTYPE" in data or b"<!ENTITY" in data or b"\0" in data:
+        raise UserError(
+            f"{path}: has a document type, entities or zero bytes, which are not read; save it as "
+            "plain UTF-8 XML without them"
+        )
+    data = data[max(data.find(b"<?xml"), 0) :]  # some files have a comment before it
+    try:
+        return _bounded(path, ET.iterparse(io.BytesIO(data), ("start", "end")))
+    except (ET.ParseError, ValueError, LookupError) as error:
+        raise UserError(f"{path}: not valid XML ({error})") from None
+
+
+def _bounded(path: Path, events: Iterator[tuple[str, ET.Element]]) -> ET.Element:
+    depth, count = 0, 0
+    root: ET.Element | None = None
+    for event, element in events:
+        root = element if root is None else root
+        depth += 1 if event == "start" else -1
+        count += event == "start"
+        if count > MOST_ELEMENTS or depth > MOST_DEPTH:
+            raise UserError(
+                f"{path}: more than {MOST_ELEMENTS} elements, or nested deeper than {MOST_DEPTH}; "
+                "this is not a creature"
+            )
+        if len(element.attrib) > MOST_ATTRIBUTES:
+            raise UserError(
+                f"{path}: <{element.tag[:40]}> has {len(element.attrib)} attributes, more than "
+                f"{MOST_ATTRIBUTES}; take out those that MuJoCo does not know"
+            )
+    if root is None:
+        raise UserError(f"{path}: empty")
+    return root
+
+
+def load_mesh(
+    source: Source, places: Places, reference: str, folders: Sequence[str], notes: Notes
+) -> str | None:
+    """Key of a mesh in `source.assets`, or None with a note when it cannot be used."""
+    suffix = Path(reference).suffix.lower()
+    if suffix not in READABLE_MESHES:
+        notes.change(
+            f'mesh "{reference}" dropped',
+            f'MuJoCo cannot read "{suffix or "no suffix"}" (it reads STL, OBJ and MSH)',
+        )
+        return None
+    path = places.find(reference, folders)
+    if path is None:
+        notes.change(
+            f'mesh "{reference}" dropped',
+            "not found in the model's folder or a search path (name more with --search)",
+        )
+        return None
+    size = path.stat().st_size
+    if size > MOST_MESH or size + sum(map(len, source.assets.values())) > MOST_MESHES:
+        notes.change(f'mesh "{reference}" dropped', "too large")
+        return None
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        notes.change(f'mesh "{reference}" dropped', f"cannot be read ({error.strerror})")
+        return None
+    key = next(
+        (k for k, v in source.assets.items() if v == data), f"asset{len(source.assets)}{suffix}"
+    )
+    source.assets[key] = data
+    return key
+
+
+def numbers(text: str | None) -> list[float] | None:
+    """The numbers in an attribute; None when there is none, or something that is not a finite
+    number.
+    """
+    try:
+        values = [float(part) for part in (text or "").split()]
+    except ValueError:
+        return None
+    return values if values and all(map(math.isfinite, values)) else None

@@ -1,0 +1,231 @@
+"""Finds a standing pose: the file's own where it stands, else leg bends that put the feet level
+under the weight.
+
+Letters: `J` active joints, `F` feet.
+"""
+
+import numpy as np
+
+from mjxgait.importer.body import Puppet
+from mjxgait.importer.parts import quaternion, rotation
+from mjxgait.importer.skeleton import height_of
+from mjxgait.importer.soles import Stance
+
+SPREADS = (0.4, 1.0, 1.6)
+"""rad, how far from the file's pose the search begins."""
+FIRST, SAMPLES, ROUNDS, ELITE = 400, 40, 25, 10
+MARGIN = 0.25
+"""rad that a joint should be from its limit."""
+NEUTRAL = 0.9
+"""Straightness of a leg that cannot bend."""
+
+
+def symmetric(q: np.ndarray, mirror: tuple[np.ndarray, np.ndarray] | None) -> np.ndarray:
+    """The mean [J] of a pose and its mirror image."""
+    return q if mirror is None else (q + mirror[1] * q[mirror[0]]) / 2
+
+
+def level(puppet: Puppet, q: np.ndarray) -> None:
+    """Tilts the trunk so that the feet are level; where two feet leave a tilt open it stays."""
+    lowest = np.array([sole[sole[:, 2].argmin()] for sole in puppet.sole_points(*puppet.pose(q))])
+    if len(lowest) < 2:
+        return
+    centred = lowest - lowest.mean(0)
+    flat = centred[:, :2]
+    size = float(np.abs(flat).max()) + 1e-9
+    slope = np.linalg.solve(flat.T @ flat + 1e-2 * size**2 * np.eye(2), flat.T @ centred[:, 2])
+    if np.linalg.norm(slope) < 0.01 or np.linalg.norm(slope) > 1.0:
+        return
+    up = np.array([-slope[0], -slope[1], 1.0])
+    up /= np.linalg.norm(up)
+    axis = np.cross(up, [0.0, 0.0, 1.0])
+    sine = float(np.linalg.norm(axis))
+    half = np.arcsin(min(sine, 1.0)) / 2
+    puppet.turn(rotation(np.concatenate([[np.cos(half)], np.sin(half) * axis / max(sine, 1e-9)])))
+
+
+def drop(puppet: Puppet, q: np.ndarray, sink: float = 0.0) -> None:
+    """Moves the trunk over the origin, with the lowest foot point on the floor, or sink m in it."""
+    lowest = min(float(sole[:, 2].min()) for sole in puppet.sole_points(*puppet.pose(q)))
+    root = puppet.bodies[0]
+    root.pos = np.array([0.0, 0.0, root.pos[2] - lowest - sink])
+
+
+def stance_of(puppet: Puppet, q: np.ndarray) -> Stance:
+    """Where everything is; the hip height is the mean height of each leg's first joint."""
+    xpos, xrot = puppet.pose(q)
+    floor = min(float(sole[:, 2].min()) for sole in puppet.sole_points(xpos, xrot))
+    shared = {
+        j
+        for f in range(len(puppet.feet))
+        for g in range(f)
+        for j in puppet.leg(f)
+        if j in puppet.leg(g)
+    }
+    hips = []
+    for f in range(len(puppet.feet)):
+        own = [j for j in puppet.leg(f) if j not in shared] or puppet.leg(f)
+        hips.append(max(float(puppet.data.xanchor[j + 1][2]) for j in own) - floor)
+    reach = float(np.ptp(xpos, axis=0).max())
+    return Stance(xpos, xrot, floor, max(float(np.mean(hips)), 0.02 * reach, 1e-3))
+
+
+def _leg_length(puppet: Puppet, foot: int) -> float:
+    """m from joint to joint down to the sole, in the latest pose."""
+    anchors = puppet.data.xanchor[[j + 1 for j in puppet.leg(foot)]]
+    sole = puppet.sole_points(puppet.data.xpos[1:], puppet.data.xmat[1:].reshape(-1, 3, 3))[foot]
+    path = np.concatenate([anchors, sole.mean(0)[None]])
+    return max(float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum()), 1e-3)
+
+
+def across(sole: np.ndarray) -> np.ndarray:
+    """[3] the way up from a sole [n, 3] that lies nearly flat: at right angles to its longest side."""
+    along = np.linalg.svd(sole - sole.mean(0))[2][0]
+    up = np.array([0.0, 0.0, 1.0]) - along[2] * along
+    return np.asarray(up / np.linalg.norm(up))
+
+
+def straightness(path: np.ndarray) -> float:
+    """Of thigh and shank, the two longest parts in a row of a path [n, 3] from joint to joint to
+    the sole: 1 is a straight leg.
+    """
+    parts = np.linalg.norm(np.diff(path, axis=0), axis=1)
+    if len(parts) < 2:
+        return NEUTRAL
+    k = int((parts[:-1] + parts[1:]).argmax())
+    return float(np.linalg.norm(path[k + 2] - path[k])) / max(float(parts[k] + parts[k + 1]), 1e-9)
+
+
+class Search:
+    """Looks for a pose by the cross-entropy method; poses are symmetric where the body is."""
+
+    def __init__(
+        self,
+        puppet: Puppet,
+        start: np.ndarray,
+        mirror: tuple[np.ndarray, np.ndarray] | None,
+        planar: bool,
+    ) -> None:
+        self.puppet, self.mirror, self.planar = puppet, mirror, planar
+        self.start = symmetric(np.clip(start, puppet.low, puppet.high), mirror)
+        stance = stance_of(puppet, self.start)
+        self.hip = 0.85 * float(np.mean([_leg_length(puppet, f) for f in range(len(puppet.feet))]))
+        self.segments = [
+            s for s in puppet.segments() if not any(set(s) & set(group) for group in puppet.feet)
+        ]
+        lying = self._lying(stance, straight=False)
+        if not lying and len(puppet.feet) == 1:
+            # Who has one foot to stand on needs all of it, though the shank reach down to the floor.
+            lying = self._lying(stance_of(puppet, self._straightest()), straight=True)
+            above = {puppet.bodies[puppet.feet[f][0]].parent for f in lying} - {0}
+            self.segments = [s for s in self.segments if not set(s) & above]
+        self.flat, self.ups = list(lying), list(lying.values())
+        self.legs = [puppet.leg(f) for f in range(len(puppet.feet))]
+
+    def _straightest(self) -> np.ndarray:
+        """[J] the pose with all joints as near to 0 as they come."""
+        nearest = np.clip(np.zeros_like(self.start), self.puppet.low, self.puppet.high)
+        return symmetric(nearest, self.mirror)
+
+    def _lying(self, stance: Stance, straight: bool) -> dict[int, np.ndarray]:
+        """Which feet lie on a broad sole, below an ankle, and the way up [3] in their own axes;
+        straight: across the sole, which may be a little tilted there.
+        """
+        up = np.array([0.0, 0.0, 1.0])
+        found = {}
+        for f, sole in enumerate(self.puppet.sole_points(stance.xpos, stance.xrot)):
+            low = sole[sole[:, 2] < sole[:, 2].min() + 0.03 * self.hip]
+            broad = len(low) > 1 and np.ptp(low[:, :2], axis=0).max() > 0.12 * self.hip
+            if broad and all(tip.far.all() for tip in self.puppet.tips[f]):
+                found[f] = stance.xrot[self.puppet.feet[f][0]].T @ (across(low) if straight else up)
+        return found
+
+    def run(self, spread: float, seed: int) -> tuple[np.ndarray, float]:
+        """The best pose [J] found, and its cost."""
+        rng = np.random.default_rng(seed)
+        mean, width = self.start.copy(), np.full(len(self.start), spread)
+        best, least = mean, self.cost(mean)
+        for i in range(ROUNDS):
+            shape = (SAMPLES, len(mean))
+            drawn = mean + width * (
+                rng.normal(size=shape) if i else rng.uniform(-1, 1, (FIRST, len(mean)))
+            )
+            poses = [
+                symmetric(np.clip(q, self.puppet.low, self.puppet.high), self.mirror) for q in drawn
+            ]
+            costs = np.array([self.cost(q) for q in poses])
+            order = costs.argsort()[:ELITE]
+            if costs[order[0]] < least:
+                best, least = poses[order[0]], float(costs[order[0]])
+            elite = np.array([poses[i] for i in order])
+            mean, width = elite.mean(0), elite.std(0) + 1e-3
+        return best, least
+
+    def stretch(self, q: np.ndarray) -> float:
+        """Mean straightness of the legs in a pose [J]."""
+        soles = self.puppet.sole_points(*self.puppet.pose(q))
+        ratios = []
+        for sole, leg in zip(soles, self.legs, strict=True):
+            path = np.concatenate(
+                [self.puppet.data.xanchor[[j + 1 for j in leg]], sole.mean(0)[None]]
+            )
+            ratios.append(straightness(path))
+        return float(np.mean(ratios))
+
+    def cost(self, q: np.ndarray) -> float:
+        """How bad a stance is.
+
+        Uneven feet, weight beside them, other parts low, stretched legs, feet within the hips,
+        limits near, far from the file's pose.
+        """
+        puppet, hip = self.puppet, self.hip
+        xpos, xrot = puppet.pose(q)
+        soles = puppet.sole_points(xpos, xrot)
+        lows = np.array([sole[:, 2].min() for sole in soles])
+        floor = float(lows.min())
+        middles = np.array(
+            [sole[sole[:, 2] < sole[:, 2].min() + 0.03 * hip].mean(0) for sole in soles]
+        )
+        beside = (puppet.centre_of_mass() - middles.mean(0))[:2] / hip
+        others = [height_of(puppet.bodies, xpos, xrot, s) - floor for s in self.segments]
+        others.append(puppet.shank_height(xpos, xrot) - floor)
+        crouched = sum(max(0.2 - h / hip, 0.0) for h in others)
+        stretched = beneath = narrow = ahead = 0.0
+        for f, leg in enumerate(self.legs):
+            anchors = puppet.data.xanchor[[j + 1 for j in leg]]
+            path = np.concatenate([anchors, middles[f][None]])
+            beneath += max(float(np.linalg.norm(path[-1][:2] - path[0][:2])) / hip - 0.3, 0.0)
+            ahead += (float(path[-1][0] - path[0][0]) / hip) ** 2
+            side = float(anchors[np.abs(anchors[:, 1]).argmax(), 1])
+            narrow += max(abs(side) - float(middles[f][1]) * np.sign(side), 0.0) / hip
+            ratio = straightness(path)
+            stretched += max(ratio - 0.94, 0.0) + max(0.75 - ratio, 0.0)
+        near = np.maximum(MARGIN - np.minimum(q - puppet.low, puppet.high - q), 0.0) / MARGIN
+        tilted = sum(
+            1 - float((xrot[puppet.feet[f][0]] @ up)[2])
+            for f, up in zip(self.flat, self.ups, strict=True)
+        )
+        low_trunk = max(0.6 - (xpos[0][2] - floor) / hip, 0.0)
+        return float(
+            400 * (((lows - floor) / hip) ** 2).sum()
+            + 40 * (beside[0] ** 2 + (0 if self.planar else beside[1] ** 2))
+            + 20 * crouched
+            + 40 * stretched
+            + 0.3 * (near**2).mean()
+            + 3 * beneath
+            # A leg steps as far forward as back from beneath its hip; but two feet must be beneath
+            # the weight.
+            + (10 * ahead if len(self.legs) > 2 else 0)
+            + (0 if self.planar else 20 * narrow)  # feet within the hips: what steps so tips over
+            + 200 * tilted
+            + 5 * low_trunk
+            + 0.2 * ((q - self.start) ** 2).mean()
+        )
+
+
+def upright_quat(quat: np.ndarray) -> np.ndarray:
+    """[4] the same tilt without the turn about z."""
+    matrix = rotation(quat)
+    yaw = float(np.arctan2(matrix[1, 0], matrix[0, 0]))
+    back = np.array([[np.cos(yaw), np.sin(yaw), 0], [-np.sin(yaw), np.cos(yaw), 0], [0, 0, 1.0]])
+    return quaternion(back @ matrix)

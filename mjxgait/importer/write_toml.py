@@ -1,0 +1,146 @@
+"""Writes creature.toml: the guesses, each with its confidence beside it."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import tomli_w
+
+from mjxgait.importer.drive import Drive
+from mjxgait.importer.notes import Notes
+from mjxgait.importer.parts import one_line
+
+KEYS = {"forward": "forward", "feet": "feet", "trunk": "trunk"}
+
+
+def creature_toml(
+    name: str,
+    origin: str,
+    trunk: str,
+    forward: np.ndarray,
+    feet: list[str],
+    joints: list[str],
+    drive: Drive,
+    mirror: tuple[bool, dict[str, tuple[str, int]]],
+    body_length: float | None,
+    planar: bool,
+    train: Mapping[str, Any],
+    notes: Notes,
+) -> str:
+    """The text of creature.toml.
+
+    Args:
+      origin: the model file's name, in one line. forward: [3] in the trunk's frame. feet: names of
+        geoms.
+      mirror: whether it is symmetric, and stated pairs: joint to partner and sign.
+      planar: whether its legs are in one plane and pass each other. train: settings that are not the usual ones.
+      body_length: m, None where the loader shall measure it.
+    """
+    remark = {
+        guess.what: f"  # {guess.confidence}: {one_line(guess.reason)}" for guess in notes.guesses
+    }
+    symmetric, pairs = mirror
+    about = f"imported from {origin}: {len(joints)} joints"
+    lines = [
+        f"# Made by `mjxgait import` from {origin}. The words after each guess say how sure it is; "
+        "change what is wrong.",
+        "# `mjxgait check` draws it. Mass, inertias, joint axes and positions in creature.xml are "
+        f"those of {origin}.",
+        "[creature]",
+        f"name = {_quoted(name)}",
+        f"description = {_quoted(about)}",
+        f"trunk = {_quoted(trunk)}{remark.get('trunk', '')}",
+        f"forward = {[round(float(v), 6) + 0.0 for v in forward]}{remark.get('forward', '')}",
+        f"feet = [{', '.join(_quoted(foot) for foot in feet)}]{remark.get('feet', '')}",
+        'keyframe = "stand"',
+    ]
+    if body_length is not None:
+        lines.append(f"body_length = {body_length:.4g}{remark.get('body_length', '')}")
+    if planar:
+        lines.append("planar = true  # high: its legs are drawn in one plane, and pass each other")
+    lines += ["", *_joints(joints, drive, remark), *_mirror(symmetric, pairs, remark)]
+    lines += [*_corrections(drive), "[termination]", "min_up = 0.5", "height = [0.5, 1.5]"]
+    heading, *settings = tomli_w.dumps({"train": train}).splitlines()
+    lines += ["touch = true", "", heading + remark.get("train", ""), *settings, ""]
+    return "\n".join(lines)
+
+
+def _joints(joints: list[str], drive: Drive, remark: Mapping[str, str]) -> list[str]:
+    """What most joints have, and what each has of its own."""
+    kp, kd, torque, ranges = (
+        np.round(v, 4) for v in (drive.kp, drive.kd, drive.torque, drive.ranges)
+    )
+    lines = [
+        "[joints]",
+        f"kp = {_usual(kp)}{remark.get('kp, kd', '')}",
+        f"kd = {_usual(kd)}",
+        f"torque_limit = {_usual(torque)}{remark.get('torque_limit', '')}",
+        "range = [-40, 40]",
+        "",
+    ]
+    for j, joint in enumerate(joints):
+        low, high = (round(float(v), 1) for v in ranges[j])
+        lines += [
+            "[[joint]]",
+            f"match = {_quoted(joint)}",
+            f"range = [{low}, {high}]  # low: what it does: {drive.role[j]}",
+        ]
+        if torque[j] != _usual(torque):
+            lines.append(f"torque_limit = {float(torque[j])}")
+        if kp[j] != _usual(kp) or kd[j] != _usual(kd):
+            lines += [f"kp = {float(kp[j])}", f"kd = {float(kd[j])}"]
+        lines.append("")
+    return lines
+
+
+def _mirror(
+    symmetric: bool, pairs: Mapping[str, tuple[str, int]], remark: Mapping[str, str]
+) -> list[str]:
+    lines = ["[mirror]", f"symmetric = {str(symmetric).lower()}{remark.get('mirror', '')}"]
+    rows = [
+        f"    {{ joint = {_quoted(a)}, partner = {_quoted(b)}, sign = {sign} }},"
+        for a, (b, sign) in pairs.items()
+    ]
+    return [*lines, *(["pairs = [", *rows, "]"] if rows else ["pairs = []"]), ""]
+
+
+def _corrections(drive: Drive) -> list[str]:
+    """How joints steer, keep it level and step under a fall."""
+    lines = [
+        "[steering]  # low: from which way each joint moves its foot",
+        f"bend = {_table(drive.bend)}",
+        f"stride = {_table(drive.stride)}",
+        "",
+        "[balance]  # low: likewise",
+        f"pitch = {_table(drive.pitch)}",
+        f"roll = {_table(drive.roll)}",
+        "",
+    ]
+    if drive.ahead or drive.aside:
+        lines += [
+            "[stepping]  # low: likewise; two feet and less must step under a fall",
+            f"ahead = {_table(drive.ahead)}",
+            f"aside = {_table(drive.aside)}",
+            f"turn = {_table(drive.turn)}",
+            "",
+        ]
+    return lines
+
+
+def _usual(values: np.ndarray) -> float:
+    """The commonest value."""
+    found, counts = np.unique(values, return_counts=True)
+    return float(found[counts.argmax()])
+
+
+def _quoted(text: str) -> str:
+    """As TOML writes it, which is not as JSON does: it knows no halves of an emoji, no raw 0x7f."""
+    return tomli_w.dumps({"_": text}).removeprefix("_ = ").removesuffix("\n")
+
+
+def _table(weights: dict[str, float]) -> str:
+    return (
+        "{ " + ", ".join(f"{_quoted(k)} = {v}" for k, v in weights.items()) + " }"
+        if weights
+        else "{}"
+    )

@@ -1,5 +1,0 @@
-"""From somebody's model file (MJCF or URDF) to a creature folder."""
-
-from mjxgait.importing.convert import TOML, WRITTEN, ImportChoices, Imported, import_model
-
-__all__ = ["TOML", "WRITTEN", "ImportChoices", "Imported", "import_model"]

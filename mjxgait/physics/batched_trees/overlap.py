@@ -1,0 +1,50 @@
+"""How deep blocks are in each other that no joint joins.
+
+Letters: `n` links, `L` lanes.
+"""
+
+from collections.abc import Sequence
+
+import jax
+import jax.numpy as jnp
+
+from mjxgait.physics.batched_trees.motion import centres, frames
+from mjxgait.physics.batched_trees.tree import FAR, Tree
+from mjxgait.physics.lane_major.kinematics import Pose
+from mjxgait.physics.lane_major.lanes import dot, turn_each
+
+
+def deepest(tree: Tree, poses: Sequence[Pose]) -> jax.Array:
+    """[L] how deep the deepest two are, of the smaller one's size; negative where all are apart.
+
+    A size is the cube root of a volume.
+
+    Two blocks are apart where one of their six normals separates them. Where only a line along two
+    edges would, they count as in each other: never less than the least way out.
+    """
+    rot, centre = frames(poses), centres(tree, poses)
+    normals = [turn_each(rot, tree.axes[:, k]) for k in range(3)]
+    apart = [c[:, None] - c[None] for c in centre]
+    along = []
+    for k, normal in enumerate(normals):
+        own = [x[:, None] for x in normal]
+        reach = [abs(dot(own, [x[None] for x in other])) for other in normals]
+        other = dot(reach, [tree.half[None, :, j] for j in range(3)])
+        along.append(tree.half[:, None, k] + other - abs(dot(own, apart)))
+    depth = jnp.minimum(jnp.minimum(along[0], along[1]), along[2])
+    depth = jnp.minimum(depth, jnp.swapaxes(depth, 0, 1))
+    size = sizes(tree)
+    share = depth / jnp.minimum(size[:, None], size[None])
+    return jnp.max(jnp.where(_counts(tree), share, -FAR), axis=(0, 1))
+
+
+def sizes(tree: Tree) -> jax.Array:
+    """[n, L] m, the cube root of each block's volume."""
+    return 2 * jnp.cbrt(tree.half[:, 0] * tree.half[:, 1] * tree.half[:, 2])
+
+
+def _counts(tree: Tree) -> jax.Array:
+    """[n, n, L] pairs of blocks with two joints or more between them."""
+    joint = tree.solid * tree.moves
+    between = abs(tree.above[:, None] - tree.above[None])
+    return (jnp.sum(between * joint, axis=2) > 1) & (tree.solid[:, None] * tree.solid[None] > 0)

@@ -1,0 +1,239 @@
+"""Contacts with the ground and joint limits as MuJoCo's soft constraints.
+
+A contact of MuJoCo's pyramidal cone has four edges, normal plus or minus friction times each tangent. Here it is kept in its three
+directions (normal, first, second tangent), of which the edges are combinations, and the friction enters late.
+All contacts' values lie side by side in arrays [C, L], the limits' in [M, L].
+Formulas: see `springs`.
+"""
+
+import dataclasses
+from collections.abc import Sequence
+from itertools import groupby
+from typing import Any, Protocol
+
+import jax
+import jax.numpy as jnp
+
+from mjxgait.creature.ground.surface import Ground, contact
+from mjxgait.physics.lane_major.carriers import Carriers
+from mjxgait.physics.lane_major.dynamics import root_axes
+from mjxgait.physics.lane_major.footing import Footing, Moves, Touch
+from mjxgait.physics.lane_major.frames import (
+    Directions,
+    Frames,
+    Level,
+    Tilted,
+    Turned,
+)
+from mjxgait.physics.lane_major.kinematics import Motion, Pose
+from mjxgait.physics.lane_major.lanes import Pin, add, turn
+from mjxgait.physics.lane_major.springs import Springs, contact_terms, limit_terms
+from mjxgait.physics.lane_major.structure import Structure, scalars
+from mjxgait.physics.lane_major.treematrix import Rows, Sparsity
+
+
+class Limited(Protocol):
+    """A limit."""
+
+    @property
+    def dof(self) -> int:
+        """The degree of freedom that it stops."""
+        ...
+
+
+class Shape(Protocol):
+    """What shapes the solver's program."""
+
+    @property
+    def pattern(self) -> Sparsity:
+        """Of the mass matrix, and of what contacts add to it."""
+        ...
+
+    @property
+    def limits(self) -> Sequence[Limited]:
+        """In the order of their values."""
+        ...
+
+    @property
+    def iterations(self) -> int:
+        """Newton steps at most."""
+        ...
+
+    @property
+    def line_iterations(self) -> int:
+        """Steps of a line search at most."""
+        ...
+
+
+class Operators(Protocol):
+    """The Jacobian J of all contacts, however it is stored."""
+
+    def along(self, vector: Sequence[jax.Array]) -> Directions:
+        """J x for x [nv] of [L]."""
+        ...
+
+    def gathered(self, force: Directions) -> dict[int, jax.Array]:
+        """J^T f: per degree of freedom that moves a contact, [L]."""
+        ...
+
+    def stiffened(self, mass: Rows, stiffness: Sequence[jax.Array]) -> Rows:
+        """Rows of M + J^T D J; of each contact D along nn, n1, n2, 11 and 22."""
+        ...
+
+
+@dataclasses.dataclass(frozen=True)
+class Constraints:
+    """All that the solver needs to know.
+
+    structure: its shape. footing: the contacts' Jacobian, None without contacts. friction: [C, L].
+    reference: what the accelerations along normal and tangents are compared with.
+    weight: [C, L] inverse regulariser of an edge, zero where there is no contact.
+    sign, limit_reference, limit_weight: [M, L], the same of limits.
+    """
+
+    structure: Shape
+    footing: Operators | None
+    friction: jax.Array
+    reference: Directions
+    weight: jax.Array
+    sign: jax.Array
+    limit_reference: jax.Array
+    limit_weight: jax.Array
+
+    def along(self, vector: Sequence[jax.Array]) -> tuple[jax.Array, ...]:
+        """J x of contacts along normal and tangents, three [C, L], and of limits [M, L]."""
+        contact = self.footing.along(vector) if self.footing else self.reference
+        limits = self.structure.limits
+        if not limits:
+            return (*contact, self.limit_reference)
+        return (*contact, self.sign * jnp.stack([vector[limit.dof] for limit in limits]))
+
+
+def touch(
+    structure: Structure,
+    poses: Sequence[Pose],
+    freedom: Motion,
+    paths: dict[int, jax.Array],
+    pin: Pin,
+    ground: Ground | None = None,
+) -> Touch | None:
+    """Where all contacts are and what moves them.
+
+    paths: see `dynamics.motion_paths`. ground: None for the plane z = 0.
+    """
+    if not structure.contacts:
+        return None
+    numbered = enumerate(structure.contacts)
+    places = [
+        _placed(structure, [n for n, _ in contacts], poses[body])
+        for body, contacts in groupby(numbered, key=lambda c: c[1].body)
+    ]
+    x, y, z, *origin, radius = (
+        pin(jnp.concatenate(column)) for column in zip(*places, strict=True)
+    )
+    moves = _moves(structure.carriers, freedom, paths, pin)
+    # MuJoCo puts the contact point half way between the two surfaces.
+    if ground is None:
+        distance = pin(origin[2] + z - radius)
+        points = pin((x, y, z - radius - 0.5 * distance))
+        return Touch(distance, points, _level(structure, poses, pin), moves)
+    found = contact(ground, origin[0] + x, origin[1] + y, origin[2] + z, radius)
+    distance, frames = pin((found.distance, Tilted(*found[1:])))
+    deep = radius + 0.5 * distance
+    (nx, ny, nz) = frames.normal
+    return Touch(distance, pin((x - nx * deep, y - ny * deep, z - nz * deep)), frames, moves)
+
+
+def _moves(tree: Carriers, freedom: Motion, paths: dict[int, jax.Array], pin: Pin) -> Moves:
+    """Of the degrees of freedom that move contacts."""
+    first = 6 if tree.root >= 0 else 0
+    packed = jnp.stack(freedom.parts, axis=1)
+    return Moves(
+        turns=pin(root_axes(freedom)) if first else None,
+        freedom=pin(jnp.stack([packed[k] for k in tree.dofs])) if tree.dofs else None,
+        paths=tuple(paths[k][first:] for k in tree.leaves),
+    )
+
+
+def _placed(structure: Structure, places: Sequence[int], pose: Pose) -> tuple[jax.Array, ...]:
+    """Centres from the origin, the origin and radii of the contacts of one body, [c, L] each."""
+    own = slice(places[0], places[-1] + 1)
+    local, radius = structure.columns.contacts.center[own], structure.columns.contacts.radius[own]
+    x, y, z = (
+        add(*(pose.rot[j][i] * local[:, j] for j in range(3)), _component(pose.pos, i))
+        for i in range(3)
+    )
+    like = jnp.ones_like(x)
+    return x, y, z, *(like * _component(pose.origin, i) for i in range(3)), like * radius
+
+
+def _component(vector: Any, i: int) -> Any:
+    return vector if isinstance(vector, float) else vector[i]
+
+
+def _level(structure: Structure, poses: Sequence[Pose], pin: Pin) -> Frames:
+    """The first tangent along a capsule's axis as seen from above.
+
+    The world's y where it stands upright, and x for a sphere.
+    """
+    contacts = structure.contacts
+    if not any(slot.capsule for slot in contacts):
+        return Level()
+    like = poses[contacts[0].body].rot[0][0]
+
+    def heading(n: int) -> tuple[jax.Array, jax.Array]:
+        if not contacts[n].capsule:
+            return jnp.ones_like(like), jnp.zeros_like(like)
+        axis = turn(poses[contacts[n].body].rot, scalars(structure.exact.contacts.axis[n]))
+        return axis[0], axis[1]
+
+    headings = map(heading, range(len(contacts)))
+    x, y = pin(tuple(jnp.stack(part) for part in zip(*headings, strict=True)))
+    length = jnp.sqrt(x * x + y * y)
+    upright = length < 0.5
+    safe = jnp.where(upright, 1.0, length)
+    return pin(Turned(jnp.where(upright, 0.0, x / safe), jnp.where(upright, 1.0, y / safe)))
+
+
+def make_constraints(
+    structure: Structure,
+    touch: Touch | None,
+    friction: jax.Array,
+    qpos: jax.Array,
+    qvel: jax.Array,
+    pin: Pin,
+) -> Constraints | None:
+    """The constraints of the current state, None for a model without any."""
+    if not structure.contacts and not structure.limits:
+        return None
+    empty = jnp.zeros((0, friction.shape[-1]), friction.dtype)
+    limit = _limit_terms(structure, qpos, qvel, pin) if structure.limits else (empty, empty, empty)
+    if touch is None:
+        return Constraints(structure, None, empty, (empty, empty, empty), empty, *limit)
+    footing = Footing(structure, touch, pin)
+    mu, reference, weight = _contact_terms(footing, friction, qvel)
+    return Constraints(structure, footing, mu, reference, weight, *limit)
+
+
+def _contact_terms(
+    footing: Footing, friction: jax.Array, qvel: jax.Array
+) -> tuple[jax.Array, Directions, jax.Array]:
+    structure, contacts = footing.structure, footing.structure.columns.contacts
+    return contact_terms(
+        Springs(contacts.softness, structure.topology.contact_power, contacts.weight),
+        footing.touch.distance,
+        contacts.friction * friction,
+        footing.along(list(qvel)),
+        footing.pin,
+        structure.impratio,
+    )
+
+
+def _limit_terms(
+    structure: Structure, qpos: jax.Array, qvel: jax.Array, pin: Pin
+) -> tuple[jax.Array, jax.Array, jax.Array]:
+    slots, limits = structure.limits, structure.columns.limits
+    pos = jnp.stack([qpos[limit.qpos] for limit in slots])
+    vel = jnp.stack([qvel[limit.dof] for limit in slots])
+    springs = Springs(limits.softness, structure.topology.limit_power, limits.weight)
+    return limit_terms(springs, pos - limits.low, limits.high - pos, vel, pin)

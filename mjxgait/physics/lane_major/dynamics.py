@@ -1,0 +1,255 @@
+"""Mass matrix and bias forces, by the composite-rigid-body and the recursive Newton-Euler algorithm.
+
+Featherstone, "Rigid Body Dynamics Algorithms", chapters 5 and 6, with all bodies in the one frame of `kinematics` as in MuJoCo's
+computation chapter: then the only recursions are sums along the tree, `down` and `up`, and all else is done for all bodies at once.
+Bodies' or degrees of freedom's values are [n, L] per component, or packed for the sums as [n, components, L].
+"""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Protocol
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from mjxgait.physics.lane_major.kinematics import Motion, Pose
+from mjxgait.physics.lane_major.lanes import (
+    Pin,
+    Scalar,
+    Vector,
+    axes,
+    column,
+    cross,
+    dot,
+    minus,
+    plus,
+    scale,
+    table,
+    total,
+    turn_each,
+)
+from mjxgait.physics.lane_major.slots import (
+    BALL,
+    FREE,
+    HINGE,
+    SLIDE,
+    BodySlot,
+)
+from mjxgait.physics.lane_major.structure import Structure
+from mjxgait.physics.lane_major.treematrix import Rows, on_pivot
+from mjxgait.types import Number
+
+CARRIES = {FREE: ((0, 3), (3, 3)), BALL: ((0, 3),), SLIDE: ((0, 1),), HINGE: ((0, 1),)}
+"""Per joint type the groups (first, count) of its degrees of freedom in the order in which one group carries the next."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Inertia:
+    """Spatial inertia about the origin. turning: xx, yy, zz, xy, xz, yz in kg m^2; moment: mass times centre in kg m; mass in kg."""
+
+    turning: tuple[Scalar, ...]
+    moment: Vector
+    mass: Scalar
+
+    def times(self, motion: Motion) -> Motion:
+        """Momentum of a velocity, or force of an acceleration: (moment about the origin, force)."""
+        xx, yy, zz, xy, xz, yz = self.turning
+        turned = (
+            dot((xx, xy, xz), motion.spin),
+            dot((xy, yy, yz), motion.spin),
+            dot((xz, yz, zz), motion.spin),
+        )
+        shifted = minus(scale(self.mass, motion.shift), cross(self.moment, motion.spin))
+        return Motion(plus(turned, cross(self.moment, motion.shift)), shifted)
+
+
+class Masses(Protocol):
+    """How heavy bodies are and where: see `Parameters`, with the lanes innermost."""
+
+    @property
+    def mass(self) -> Number:
+        """[B, L] kg."""
+        ...
+
+    @property
+    def com(self) -> Number:
+        """[B, 3, L] m."""
+        ...
+
+    @property
+    def axes(self) -> Number:
+        """[B, 2 or 3, 3, L] principal axes."""
+        ...
+
+    @property
+    def inertia(self) -> Number:
+        """[B, 3, L] kg m^2."""
+        ...
+
+
+def inertias(x: Masses, poses: Sequence[Pose], like: jax.Array, pin: Pin) -> Inertia:
+    """Of all bodies."""
+    pos = pin(table([pose.pos for pose in poses], like))
+    rot = [pin(table([pose.rot[j] for pose in poses], like)) for j in range(3)]
+    center = pin(plus(axes(pos), turn_each(rot, x.com)))
+    first, second = pin((turn_each(rot, x.axes[:, 0]), turn_each(rot, x.axes[:, 1])))
+    # Two principal axes carry what their moments differ from the third; the third's goes to the identity.
+    least, mass = x.inertia[:, 2], x.mass
+    a, b = x.inertia[:, 0] - least, x.inertia[:, 1] - least
+
+    def entry(i: int, j: int) -> jax.Array:
+        own = a * first[i] * first[j] + b * second[i] * second[j] - mass * center[i] * center[j]
+        return own + (least + mass * dot(center, center)) if i == j else own
+
+    turning = tuple(entry(i, j) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)))
+    return Inertia(pin(turning), pin(scale(mass, center)), mass)
+
+
+def pack(parts: Sequence[jax.Array], pin: Pin) -> jax.Array:
+    """Components [n, L] each as one array [n, components, L]."""
+    return pin(jnp.stack(parts, axis=1))
+
+
+def unpack(packed: jax.Array) -> Motion:
+    """The six components of [n, 6, L]."""
+    return Motion(axes(packed), axes(packed[:, 3:]))
+
+
+def down(
+    structure: Structure, steps: jax.Array, start: Number, pin: Pin
+) -> tuple[list[jax.Array], jax.Array]:
+    """Sums from the root: per body its sum [6, L], and per degree of freedom the sum before it [nv, 6, L].
+
+    steps: [nv, 6, L], what each degree of freedom adds. start: [6, 1 or L], of the world.
+    """
+    after: list[jax.Array] = []
+    before: list[jax.Array] = []
+    for body in structure.topology.bodies:
+        value = jnp.broadcast_to(start, steps.shape[1:]) if body.parent < 0 else after[body.parent]
+        for group in _groups(body):
+            before.extend([value] * len(group))
+            value = pin(total([value, *(steps[k] for k in group)]))
+        after.append(value)
+    return after, pin(jnp.stack(before))
+
+
+def up(structure: Structure, own: jax.Array, pin: Pin) -> list[jax.Array]:
+    """Per body the sum [components, L] over itself and all below; own: [B, components, L]."""
+    sums = list(own)
+    for b in reversed(range(len(sums))):
+        below = [sums[c] for c, body in enumerate(structure.topology.bodies) if body.parent == b]
+        sums[b] = pin(total([own[b], *below])) if below else own[b]
+    return sums
+
+
+def _groups(body: BodySlot) -> list[range]:
+    return [
+        range(j.dof + first, j.dof + first + count)
+        for j in body.joints
+        for first, count in CARRIES[j.kind]
+    ]
+
+
+def motion_cross(a: Motion, b: Motion) -> Motion:
+    """Rate of change of a motion b carried along by a."""
+    return Motion(cross(a.spin, b.spin), plus(cross(a.spin, b.shift), cross(a.shift, b.spin)))
+
+
+def force_cross(a: Motion, force: Motion) -> Motion:
+    """Rate of change of a momentum carried along by a."""
+    return Motion(
+        plus(cross(a.spin, force.spin), cross(a.shift, force.shift)), cross(a.spin, force.shift)
+    )
+
+
+def bias_force(
+    structure: Structure, body: Inertia, freedom: Motion, qvel: jax.Array, pin: Pin
+) -> tuple[jax.Array, list[jax.Array]]:
+    """Coriolis, centrifugal and gravity force (`qfrc_bias`) [nv, L], and every body's velocity [6, L]."""
+    steps = Motion(scale(qvel, freedom.spin), scale(qvel, freedom.shift))
+    moving, before = down(structure, pack(steps.parts, pin), np.zeros((6, 1), qvel.dtype), pin)
+    carried = motion_cross(unpack(before), steps)
+    upwards = -column((0.0, 0.0, 0.0, *structure.gravity), qvel.dtype)
+    swept, _ = down(structure, pack(carried.parts, pin), upwards, pin)
+    velocity = unpack(pin(jnp.stack(moving)))
+    momentum = body.times(velocity)
+    momentum = Motion(pin(momentum.spin), pin(momentum.shift))
+    inert, whirling = body.times(unpack(pin(jnp.stack(swept)))), force_cross(velocity, momentum)
+    own = [a + b for a, b in zip(inert.parts, whirling.parts, strict=True)]
+    force = unpack(by_dof(structure, up(structure, pack(own, pin), pin), pin))
+    return dot(freedom.parts, force.parts), moving
+
+
+def by_dof(structure: Structure, bodies: Sequence[jax.Array], pin: Pin) -> jax.Array:
+    """Per degree of freedom the value [components, L] of the body it moves."""
+    return pin(jnp.stack([bodies[b] for b in structure.topology.dof_body]))
+
+
+def mass_rows(
+    structure: Structure, body: Inertia, freedom: Motion, paths: dict[int, jax.Array], pin: Pin
+) -> Rows:
+    """Rows of the mass matrix; paths: see `motion_paths`."""
+    like = body.moment[0]
+    mass = jnp.broadcast_to(body.mass, like.shape)
+    composite = by_dof(
+        structure, up(structure, pack([*body.turning, *body.moment, mass], pin), pin), pin
+    )
+    parts = [composite[:, c] for c in range(10)]
+    force = pin(
+        Inertia(tuple(parts[:6]), (parts[6], parts[7], parts[8]), parts[9]).times(freedom).parts
+    )
+    first = root_freedoms(structure)
+    head = rooted(force, root_axes(freedom), pin) if first else None
+    rows = []
+    for k, chain in enumerate(structure.pattern.chains):
+        path = paths[k][first : len(chain)]
+        row = total([f[k] * path[:, c] for c, f in enumerate(force)])
+        if head is not None:
+            row = head[k, : k + 1] if k < first else jnp.concatenate([head[k], row])
+        rows.append(on_pivot(row, structure.columns.armature[k]))
+    return tuple(rows)
+
+
+def root_freedoms(structure: Structure) -> int:
+    """How many degrees of freedom a free root has that everything hangs on; 0 for another root."""
+    bodies = structure.topology.bodies
+    alone = sum(body.parent < 0 for body in bodies) == 1
+    return 6 if alone and [j.kind for j in bodies[0].joints] == [FREE] else 0
+
+
+def root_axes(freedom: Motion) -> jax.Array:
+    """The axes [3, 3, L] about which a free root turns; it shifts along the world's."""
+    return jnp.stack([part[3:6] for part in freedom.spin], axis=1)
+
+
+def rooted(force: Sequence[jax.Array], turns: jax.Array, pin: Pin) -> jax.Array:
+    """What forces [n, L] (moment before force) do along the six motions of a free root: [n, 6, L].
+
+    A third of the work of six inner products, for most entries of the root's unit motions are zero.
+    """
+    turned = total([force[c][:, None] * turns[None, :, c] for c in range(3)])
+    return pin(jnp.concatenate([jnp.stack(force[3:], axis=1), turned], axis=1))
+
+
+def motion_paths(structure: Structure, freedom: Motion, pin: Pin) -> dict[int, jax.Array]:
+    """Per degree of freedom the motions [n, 6, L] along a chain that starts with its own; degrees of freedom below each other share one."""
+    packed = pack(freedom.parts, pin)
+    paths: dict[int, jax.Array] = {}
+    for k in reversed(range(len(structure.pattern.chains))):
+        if k not in paths:
+            chain = structure.pattern.chains[k]
+            path = pin(jnp.concatenate([packed[i : i + n] for i, n in _runs(chain)]))
+            paths.update({i: path for i in chain if i not in paths})
+    return paths
+
+
+def _runs(chain: Sequence[int]) -> list[tuple[int, int]]:
+    """Successive numbers as (first, count)."""
+    runs: list[tuple[int, int]] = []
+    for i in chain:
+        if runs and i == sum(runs[-1]):
+            runs[-1] = (runs[-1][0], runs[-1][1] + 1)
+        else:
+            runs.append((i, 1))
+    return runs

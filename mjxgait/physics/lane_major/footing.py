@@ -1,0 +1,193 @@
+"""The Jacobian J of all contacts, never written out.
+
+Each contact is a point of a body, and bodies move as the tree moves them. J x is the velocity of
+the points when the tree is moved by x: a sum down the tree. J^T f is the points' forces, gathered
+at their bodies and summed up the tree. J^T D J is the mass matrix's own recursion with the
+contacts' stiffness in the place of inertia (Featherstone, "Rigid Body Dynamics Algorithms",
+chapter 6). So a further contact on a body costs a few dozen operations, however long its chain.
+
+Contacts' values are [C, L] along normal and two tangents; a body's are slabs [6, L], angular
+before linear, or [21, L].
+"""
+
+import dataclasses
+from collections.abc import Sequence
+
+import jax
+import jax.numpy as jnp
+
+from mjxgait.physics.lane_major.carriers import Carriers
+from mjxgait.physics.lane_major.dynamics import rooted
+from mjxgait.physics.lane_major.frames import Directions, Frames
+from mjxgait.physics.lane_major.kinematics import Motion
+from mjxgait.physics.lane_major.lanes import (
+    Pin,
+    axes,
+    cross,
+    dot,
+    parts,
+    plus,
+    total,
+)
+from mjxgait.physics.lane_major.structure import Structure
+from mjxgait.physics.lane_major.treematrix import Rows
+
+
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass(frozen=True)
+class Moves:
+    """Unit motions of degrees of freedom, about and through the tree's origin.
+
+    turns: [3, 3, L] axes of a free root, which turns about the origin and shifts along the world's
+      axes; None for another root.
+    freedom: [n, 6, L] of the other degrees of freedom.
+    paths: [m, 6, L] along chains of them.
+    """
+
+    turns: jax.Array | None
+    freedom: jax.Array | None
+    paths: tuple[jax.Array, ...]
+
+    def along_chains(self, tree: Carriers, force: Sequence[jax.Array], pin: Pin) -> list[jax.Array]:
+        """What the force [n, L] of each degree of freedom does along its chain from the root."""
+        head = None if self.turns is None else rooted(force, self.turns, pin)
+        rows = []
+        for place, length in enumerate(tree.lengths):
+            path = self.paths[tree.path_of[place]]
+            own = total([f[place] * path[:length, c] for c, f in enumerate(force)])
+            rows.append(own if head is None else jnp.concatenate([head[place], own]))
+        return rows
+
+
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass(frozen=True)
+class Touch:
+    """Geometry of all contacts.
+
+    distance: [C, L] m. points: x, y, z from the tree's origin, [C, L] m.
+    frames: the contacts' axes.
+    moves: of the degrees of freedom that move contacts.
+    """
+
+    distance: jax.Array
+    points: tuple[jax.Array, jax.Array, jax.Array]
+    frames: Frames
+    moves: Moves
+
+
+@dataclasses.dataclass(frozen=True)
+class Footing:
+    """The operators of one state."""
+
+    structure: Structure
+    touch: Touch
+    pin: Pin
+
+    def along(self, vector: Sequence[jax.Array]) -> Directions:
+        """J x for x [nv] list of [L]."""
+        tree, moves = self.structure.carriers, self.touch.moves
+        turns, freedom = moves.turns, moves.freedom
+        moving: dict[int, jax.Array] = {}
+        if turns is not None:
+            spin = total([turns[j] * vector[3 + j] for j in range(3)])
+            moving[tree.root] = self.pin(jnp.concatenate([spin, jnp.stack(vector[:3])]))
+        steps: list[jax.Array] = []
+        if freedom is not None:
+            own = jnp.stack([vector[k] for k in tree.dofs])[:, None]
+            steps = list(self.pin(freedom * own))
+        for body, parent, places in tree.bodies:
+            above = [moving[parent]] if parent in moving else []
+            moving[body] = self.pin(total([*above, *(steps[place] for place in places)]))
+        slabs = [jnp.broadcast_to(moving[b], (n, *moving[b].shape)) for b, n in tree.contacts]
+        motion = self.pin(jnp.concatenate(slabs))
+        velocity = plus(axes(motion[:, 3:]), cross(axes(motion), self.touch.points))
+        return self.pin(self.touch.frames.into(velocity))
+
+    def gathered(self, force: Directions) -> dict[int, jax.Array]:
+        """J^T f: per degree of freedom that moves a contact, [L]."""
+        pull = self.touch.frames.out(force)
+        tree, moves = self.structure.carriers, self.touch.moves
+        wrench = self._summed((*cross(self.touch.points, pull), *pull))
+        shares: dict[int, jax.Array] = {}
+        if moves.turns is not None:
+            whole = wrench[tree.root]
+            shares = {k: whole[3 + k] for k in range(3)}
+            shares |= {3 + j: dot(parts(moves.turns[j]), parts(whole)) for j in range(3)}
+        if moves.freedom is not None:
+            product = moves.freedom * jnp.stack([wrench[b] for b in tree.body_of])
+            share = self.pin(total([product[:, c] for c in range(6)]))
+            shares |= {k: share[place] for place, k in enumerate(tree.dofs)}
+        return shares
+
+    def stiffened(self, mass: Rows, stiffness: Sequence[jax.Array]) -> Rows:
+        """Rows of M + J^T D J.
+
+        stiffness: of each contact D along nn, n1, n2, 11 and 22 (D is zero along 12), [C, L].
+        """
+        tree, moves = self.structure.carriers, self.touch.moves
+        held = self._summed(spatial(self.touch.frames.stiffness(stiffness), self.touch.points))
+        rows = dict(enumerate(mass))
+        if moves.turns is not None:
+            xx, yy, zz, xy, xz, yz = held[tree.root][15:]
+            slides = [jnp.stack([xx]), jnp.stack([xy, yy]), jnp.stack([xz, yz, zz])]
+            turning = Motion(axes(moves.turns), (0.0, 0.0, 0.0))
+            held_root = [held[tree.root][c] for c in range(21)]
+            turned = rooted(resistance(held_root, turning), moves.turns, self.pin)
+            rows |= {k: mass[k] + slides[k] for k in range(3)}
+            rows |= {3 + j: mass[3 + j] + turned[j, : 4 + j] for j in range(3)}
+        if moves.freedom is not None:
+            below = jnp.stack([held[b] for b in tree.body_of])
+            motion = Motion(axes(moves.freedom), axes(moves.freedom[:, 3:]))
+            force = self.pin(resistance([below[:, c] for c in range(21)], motion))
+            added = moves.along_chains(tree, force, self.pin)
+            rows |= {k: mass[k] + row for k, row in zip(tree.dofs, added, strict=True)}
+        return tuple(rows[k] for k in range(len(mass)))
+
+    def _summed(self, values: Sequence[jax.Array]) -> dict[int, jax.Array]:
+        """Contacts' components [C, L] summed over each body and all below: [components, L]."""
+        tree, packed = self.structure.carriers, self.pin(jnp.stack(values, axis=1))
+        own: dict[int, list[jax.Array]] = {}
+        first = 0
+        for body, count in tree.contacts:
+            own[body] = [packed[c] for c in range(first, first + count)]
+            first += count
+        sums: dict[int, jax.Array] = {}
+        root = [] if self.touch.moves.turns is None else [tree.root]
+        for body in [*(b for b, _, _ in reversed(tree.bodies)), *root]:
+            below = [sums[b] for b, parent, _ in tree.bodies if parent == body]
+            sums[body] = self.pin(total([*own.get(body, []), *below]))
+        return sums
+
+
+def spatial(stiffness: Sequence[jax.Array], points: Sequence[jax.Array]) -> list[jax.Array]:
+    """A spring's stiffness at a point, as felt at the origin: 6 angular, 9 mixed, 6 linear.
+
+    The mixed ones are the force along x, y, z per turn about x, then about y, then about z.
+    """
+    xx, yy, zz, xy, xz, yz = stiffness
+    x, y, z = points
+    columns = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
+    # A turn about x moves the point by (0, -z, y), about y by (z, 0, -x), about z by (-y, x, 0).
+    turns = [
+        [columns[2][i] * y - columns[1][i] * z for i in range(3)],
+        [columns[0][i] * z - columns[2][i] * x for i in range(3)],
+        [columns[1][i] * x - columns[0][i] * y for i in range(3)],
+    ]
+    moments = [cross((x, y, z), (force[0], force[1], force[2])) for force in turns]
+    angular = [moments[j][i] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
+    return [*angular, *(component for force in turns for component in force), *stiffness]
+
+
+def resistance(stiffness: Sequence[jax.Array], motion: Motion) -> tuple[jax.Array, ...]:
+    """Moment and force of a spatial stiffness, ordered as by `spatial`, against a motion."""
+    sxx, syy, szz, sxy, sxz, syz = stiffness[:6]
+    about = (stiffness[6:9], stiffness[9:12], stiffness[12:15])
+    lxx, lyy, lzz, lxy, lxz, lyz = stiffness[15:]
+    spin, shift = motion.spin, motion.shift
+    moment = plus(
+        (dot((sxx, sxy, sxz), spin), dot((sxy, syy, syz), spin), dot((sxz, syz, szz), spin)),
+        tuple(dot(column, shift) for column in about),
+    )
+    turned = tuple(dot([about[j][i] for j in range(3)], spin) for i in range(3))
+    pushed = (dot((lxx, lxy, lxz), shift), dot((lxy, lyy, lyz), shift), dot((lxz, lyz, lzz), shift))
+    return (*moment, *plus(turned, pushed))

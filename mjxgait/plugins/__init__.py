@@ -1,0 +1,6 @@
+"""Who can take part in a run: the shipped controllers and tasks, and those of a user's own file."""
+
+from mjxgait.plugins.registry import make_controller, make_task
+from mjxgait.plugins.settings import build_config, config_class, resolve_config
+
+__all__ = ["build_config", "config_class", "make_controller", "make_task", "resolve_config"]

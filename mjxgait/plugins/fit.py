@@ -1,0 +1,93 @@
+"""Whether those that take part fit the creature."""
+
+from typing import Any
+
+from mjxgait.config.schema import Config
+from mjxgait.controllers.expressions.written import check_programs
+from mjxgait.controllers.sims_brain.reference_body.material import IN_WATER, ON_LAND
+from mjxgait.creature import Creature
+from mjxgait.creature.ground.spec import FLAT
+from mjxgait.errors import UserError
+from mjxgait.plugins.registry import SHIPPED, find
+
+
+def check_fit(creature: Creature, config: Config) -> None:
+    """Refuses who cannot do with this body what is asked.
+
+    Raises:
+      UserError: says why, and the way out.
+    """
+    controller, task, name = config.use.controller, config.use.task, creature.name
+    kind: Any = find("controller", controller)
+    if config.examination.level != "walks" and task != "walk":
+        raise UserError(
+            f"examination.level = {config.examination.level}: only who is to walk can walk there, and "
+            f"this is to {task}"
+        )
+    if config.evolution.family < 1 and config.evolution.islands.count > 1:
+        raise UserError(
+            f"{name}: evolution.family is for one population, and islands are several as they are; "
+            "take --evolution.family 1"
+        )
+    if around := getattr(config.controller, "around", ()):
+        wanted = config.controller.key_poses * len(creature.joints.names)
+        if len(around) != wanted:
+            raise UserError(
+                f"controller.around has {len(around)} angles; {config.controller.key_poses} key poses "
+                f"of {name} have {wanted}; --gait auto begins with no poses that were drawn"
+            )
+    if controller == "program":
+        check_programs(creature, config)
+    if not creature.settings.creature.grows:
+        if config.rollout.step:
+            raise UserError(
+                f"{name}: rollout.step is for bodies that grow; creature.xml has this one's step"
+            )
+        if getattr(kind, "grows", False):
+            raise UserError(
+                f"{name}: its body is there already, and a {controller} grows with its own; take "
+                "--env blocks, or another controller"
+            )
+        if task in (*IN_WATER, *ON_LAND):
+            raise UserError(
+                f"{name}: only bodies that grow {task}; take --env blocks, or another task"
+            )
+        return
+    if not getattr(kind, "grows", False):
+        raise UserError(
+            f"{name}: its body grows with its brain, so {controller} has nothing to move; leave "
+            "--controller out"
+        )
+    if task in SHIPPED["task"] and task not in (*IN_WATER, *ON_LAND):
+        known = ", ".join((*IN_WATER, *ON_LAND))
+        raise UserError(f"{name}: bodies that grow cannot {task}, only {known}")
+    step = float(creature.model.opt.timestep)
+    if config.rollout.step not in (0.0, step):
+        raise UserError(
+            f"{name}: rollout.step = {config.rollout.step:g}, but its creature.xml has {step:g} s; "
+            "whoever is compared or goes on has one step"
+        )
+    _check_settings(name, config)
+
+
+def _check_settings(name: str, config: Config) -> None:
+    """Refuse what needs a body that is there, and episodes of which nothing would count."""
+    rollout = config.rollout
+    settle = getattr(config.fitness, "settle", 0.0)
+    if settle >= rollout.seconds:
+        raise UserError(
+            f"{name}: fitness.settle = {settle:g} s do not count, and an episode lasts "
+            f"{rollout.seconds:g} s; make rollout.seconds longer or fitness.settle shorter"
+        )
+    needs = {
+        "evolution.body": config.evolution.body != 1.0,
+        "evolution.pose_span": config.evolution.pose_span != 0.0,
+        "rollout.ground": rollout.ground != FLAT,
+        "rollout.slope or rollout.rough": rollout.uneven,
+        "rollout.masses": rollout.masses != 0.0,
+        "rollout.body": rollout.body != "constants",
+        "rollout.physics": rollout.physics != "auto",
+    }
+    for key, given in needs.items():
+        if given:
+            raise UserError(f"{name}: {key} is for a body that is there; this one grows")

@@ -1,0 +1,1 @@
+"""The reference simulator: C MuJoCo and NumPy, free of JAX."""

@@ -1,0 +1,206 @@
+"""The bodies that one thread simulates on C MuJoCo: their arrays, what is seen of them, who is down.
+
+Letters: `S` simulations, `J` actuated joints, `F` feet, `nq nv` as in MuJoCo.
+"""
+
+from collections.abc import Collection
+
+import mujoco
+import numpy as np
+
+from mjxgait.creature import Creature
+from mjxgait.reference.batch import batch_of
+from mjxgait.reference.layout import (
+    Layout,
+    LowestPoint,
+    colliding_geoms,
+    foot_middles,
+    per_foot,
+    start_frame,
+)
+from mjxgait.reference.outcome import Fall
+from mjxgait.reference.starts import Starts
+from mjxgait.reference.state import FOOT_SENSES, State
+from mjxgait.reference.terrain import terrain_of
+from mjxgait.reference.water import Bath
+
+VELOCITY_STAGE = int(mujoco.mjtStage.mjSTAGE_VEL)
+
+BLOWN_UP = 1e4
+"""m/s or rad/s, from which a simulation is stopped: beyond any walk, and before MuJoCo itself
+complains in a log file.
+"""
+
+
+class Bodies:
+    """The simulations at their starts, on land raised until none stands deeper in the floor than it
+    should.
+
+    reads: the senses that the controller asks for; what nobody asks for is not computed. drag: of
+    the water, 0 on land.
+    """
+
+    def __init__(
+        self,
+        creature: Creature,
+        model: mujoco.MjModel,
+        starts: Starts,
+        reads: Collection[str],
+        drag: float,
+    ) -> None:
+        self.creature, self.starts = creature, starts
+        self.start, self.terrain = start_frame(creature), terrain_of(creature)
+        self.batch, self.layout = batch_of(creature, model, starts), Layout(model)
+        feet, watched = creature.feet, len(creature.feet.foot_of)
+        self.solid = LowestPoint(model, colliding_geoms(model), self.terrain)
+        self.feet = LowestPoint(model, feet.watched[:watched], self.terrain)
+        self.forbidden = LowestPoint(model, feet.watched[watched:], self.terrain)
+        bind = self.batch.bind
+        self.qpos, self.qvel, self.applied = bind("qpos"), bind("qvel"), bind("qfrc_applied")
+        self.warm_start = bind("qacc_warmstart")
+        self.xpos, self.xmat, self.mass = bind("xpos"), bind("xmat"), bind("M")
+        self.bias, self.passive = bind("qfrc_bias"), bind("qfrc_passive")
+        self.constraint = bind("qfrc_constraint")
+        self.geom_xpos, self.geom_xmat = bind("geom_xpos"), bind("geom_xmat")
+        self.subtree_com = bind("subtree_com")
+        # Of the step before, which the next one overwrites.
+        self.last_force = np.zeros_like(self.qvel)
+        self.sees_feet = any(name in FOOT_SENSES for name in reads)
+        self.sees_light = "light" in reads
+        self.bath = Bath(model, self.batch, drag) if drag else None
+        if self.bath is None:
+            self._lift(model)
+        self.batch.forward(stage=VELOCITY_STAGE)
+
+    def step(self, rows: np.ndarray) -> None:
+        """One step of physics, to the new moment and its velocities."""
+        if self.bath:
+            self.bath.press(rows)
+        self.batch.step(rows, stage=VELOCITY_STAGE)
+
+    def push(self, rows: np.ndarray) -> None:
+        """Changes each one's velocity by its push."""
+        root = self.layout.root_dof
+        self.qvel[rows, root : root + 2] += self.starts.push[rows]
+        self.batch.forward(rows, stage=VELOCITY_STAGE)
+
+    def follow(self, rows: np.ndarray, leader: int) -> None:
+        """Puts simulations where another one is."""
+        for state in (self.qpos, self.qvel, self.warm_start, self.last_force):
+            state[rows] = state[leader]
+
+    def state(self, rows: np.ndarray, step: int, goal: np.ndarray) -> State:
+        """What a controller may know at a control step.
+
+        M and bias belong to the current state: each step ends with the velocity stage of the new
+        one. goal: [rows] m ahead of the start.
+        """
+        creature, velocity = self.creature, self.qvel[rows]
+        rot, root = self.xmat[rows, creature.trunk].reshape(-1, 3, 3), self.layout.root_dof
+        return State(
+            start=self.start,
+            ground=self.terrain,
+            time=np.full(len(rows), step * creature.model.opt.timestep),
+            joint_pos=self.qpos[rows[:, None], creature.joints.qpos_adr],
+            velocity=velocity,
+            trunk_pos=self.xpos[rows, creature.trunk],
+            trunk_rot=rot,
+            trunk_vel=velocity[:, root : root + 3],
+            # A free joint's angular velocity is in the body's own frame.
+            trunk_angvel=(rot * velocity[:, None, root + 3 : root + 6]).sum(2),
+            foot_height=self.foot_height(rows),
+            foot_pos=self.foot_pos(rows),
+            mass_matrix=self.layout.dense(self.mass[rows]),
+            bias=self.bias[rows] - self.passive[rows],
+            constraint_force=self.last_force[rows],
+            light=self.light(rows),
+            goal=goal,
+            bar=self.starts.bar[rows, 0],
+        )
+
+    def foot_height(self, rows: np.ndarray) -> np.ndarray:
+        """[rows, F] m above the floor; empty where nobody asks."""
+        if not self.sees_feet:
+            return np.zeros((len(rows), 0))
+        if self.bath:
+            return np.full((len(rows), len(self.creature.feet.names)), np.inf)
+        low = self.feet.heights(self.geom_xpos[rows], self.geom_xmat[rows])
+        return per_foot(self.creature, low)
+
+    def foot_pos(self, rows: np.ndarray) -> np.ndarray:
+        """[rows, F, 3] m, the middle of each foot; empty where nobody asks."""
+        if not self.sees_feet:
+            return np.zeros((len(rows), 0, 3))
+        return foot_middles(self.creature, self.geom_xpos[rows])
+
+    def light(self, rows: np.ndarray) -> np.ndarray:
+        """[rows, F, 3], its direction in each foot's own axes; empty where nobody asks."""
+        if not self.sees_light:
+            return np.zeros((len(rows), 0, 3))
+        light = self.starts.light[rows][:, None]
+        there = self.start.place + light - self.geom_xpos[rows][:, self.feet.geoms]
+        there = np.where(light.any(2, keepdims=True), there, 0.0)
+        there /= np.maximum(np.linalg.norm(there, axis=2, keepdims=True), 1e-9)
+        rot = self.geom_xmat[rows][:, self.feet.geoms].reshape(*there.shape, 3)
+        seen: np.ndarray = (there[:, :, None] @ rot)[:, :, 0]
+        return seen
+
+    def travel(self, rows: np.ndarray) -> np.ndarray:
+        """[rows, 3] m ahead, to the left and up from the start."""
+        moved = self.xpos[rows, self.creature.trunk] - self.start.place
+        return np.stack([moved @ self.start.forward, moved @ self.start.left, moved[:, 2]], 1)
+
+    def middle(self, rows: np.ndarray) -> np.ndarray:
+        """[rows, 3] m in the world's axes, from where the trunk starts to the centre of all mass."""
+        moved: np.ndarray = self.subtree_com[rows, self.creature.trunk] - self.start.place
+        return moved
+
+    def astray(self, rows: np.ndarray, told: np.ndarray) -> np.ndarray:
+        """[rows] rad that the nose is off the heading that was told."""
+        rot = self.xmat[rows, self.creature.trunk].reshape(-1, 3, 3)
+        nose = rot @ self.creature.frame.forward
+        return wrapped(np.arctan2(nose @ self.start.left, nose @ self.start.forward) - told)
+
+    def height(self, rows: np.ndarray) -> np.ndarray:
+        """[rows] m above the ground, of the lowest part."""
+        return self.solid.lowest(self.geom_xpos[rows], self.geom_xmat[rows])
+
+    def sane(self, rows: np.ndarray) -> np.ndarray:
+        """[rows] whether it has not blown up; false for NaN."""
+        return (np.abs(self.qvel[rows]) < BLOWN_UP).all(1)
+
+    def down(self, rows: np.ndarray, fall: Fall) -> np.ndarray:
+        """[rows] Negated comparisons, so that a simulation that is NaN counts as down."""
+        trunk = self.creature.trunk
+        up = self.xmat[rows, trunk].reshape(-1, 3, 3)[:, 2] @ self.creature.frame.up
+        x, y, z = self.xpos[rows, trunk].T
+        above = z - self.terrain.height(x, y) if self.terrain else z
+        height = above / self.creature.frame.stand_height
+        fine = (
+            self.sane(rows)
+            & (up > fall.min_up)
+            & (height > fall.height[0])
+            & (height < fall.height[1])
+        )
+        if fall.touch:
+            fine &= self.forbidden.lowest(self.geom_xpos[rows], self.geom_xmat[rows]) > 0
+        return ~fine
+
+    def _lift(self, model: mujoco.MjModel) -> None:
+        """Raises each start until no part is deeper in the floor than when standing; else joint
+        noise would begin with a kick.
+        """
+        self.batch.forward(stage=VELOCITY_STAGE)
+        standing = mujoco.MjData(model)
+        standing.qpos[:] = self.creature.stand_qpos
+        mujoco.mj_kinematics(model, standing)
+        usual = self.solid.lowest(standing.geom_xpos[None], standing.geom_xmat[None])
+        self.qpos[:, self.layout.root_qpos + 2] += np.maximum(
+            usual - self.solid.lowest(self.geom_xpos, self.geom_xmat), 0
+        )
+
+
+def wrapped(angle: np.ndarray) -> np.ndarray:
+    """The same directions in rad from -pi to pi."""
+    turned: np.ndarray = np.remainder(angle + np.pi, 2 * np.pi) - np.pi
+    return turned

@@ -1,0 +1,82 @@
+"""A walker that is told to walk otherwise: from a moment on another controller takes over.
+
+Letters: `S` simulations, `J` actuated joints.
+"""
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+
+from mjxgait.champion import Champion
+from mjxgait.controllers.key_poses.reference import PoseTwin
+from mjxgait.creature import Creature
+from mjxgait.reference.controllers.protocol import Command, Memory
+
+ROUNDING = 1e-6
+"""Positions by which sums of steps may fall short of the next one."""
+
+
+class ChangingTwin:
+    """Two controllers of key poses, of which one gives way to the other; both are at the same place of
+    their cycles all the time. Its memory: `cycles` [S] done, `steps` [S], and `change` [S] s.
+
+    changes: [S] s, when each is told. seconds: that it takes.
+    """
+
+    command: ClassVar[Command] = "pose"
+    every: ClassVar[int] = 1
+
+    def __init__(
+        self,
+        creature: Creature,
+        before: Champion,
+        after: Champion,
+        step: float,
+        changes: np.ndarray,
+        seconds: float,
+    ) -> None:
+        self.before, self.after = (
+            PoseTwin(creature, champion, step) for champion in (before, after)
+        )
+        self.reads = tuple(dict.fromkeys((*self.before.reads, *self.after.reads)))
+        self.step, self.changes, self.seconds = step, changes, seconds
+
+    def init(self, count: int) -> Memory:
+        """See `Twin`; there must be as many as are told to change."""
+        assert count == len(self.changes), "a change for each simulation"
+        return {
+            "cycles": np.zeros(count),
+            "steps": np.zeros(count, dtype=int),
+            "change": self.changes.copy(),
+        }
+
+    def phase(self, memory: Memory) -> np.ndarray:
+        """See `Twin`."""
+        return memory["cycles"] % 1.0
+
+    def act(self, memory: Memory, senses: Mapping[str, np.ndarray]) -> tuple[np.ndarray, Memory]:
+        """See `Twin`."""
+        since = memory["steps"] * self.step - memory["change"]
+        share = np.clip(since / self.seconds, 0.0, 1.0)
+        old, new = (
+            twin.target(self._position(twin, memory), senses, memory["steps"])
+            for twin in (self.before, self.after)
+        )
+        target = old + share[:, None] * (new - old)
+        slow, fast = (
+            self._rate(twin, target, senses["joint_pos"]) for twin in (self.before, self.after)
+        )
+        cycles = memory["cycles"] + slow + share * (fast - slow)
+        return target, {**memory, "cycles": cycles, "steps": memory["steps"] + 1}
+
+    def _position(self, twin: PoseTwin, memory: Memory) -> np.ndarray:
+        place = np.floor(self.phase(memory) * twin.length + ROUNDING)
+        return place.astype(int) % twin.length
+
+    def _rate(self, twin: PoseTwin, target: np.ndarray, joint_pos: np.ndarray) -> np.ndarray:
+        """[S] cycles per step; target, joint_pos: [S, J]."""
+        if twin.settings.advance == "clock":
+            return np.full(len(target), self.step / twin.tuning["period"])
+        error = np.sqrt(((target - joint_pos) ** 2).mean(1))
+        return (error < twin.tuning["threshold"]) / twin.length

@@ -1,0 +1,215 @@
+"""From a recorded trajectory to what the criteria need: contacts, slip, clearance, power.
+
+Letters: `T` frames, `J` actuated joints, `N` feet, `B` bodies.
+"""
+
+import dataclasses
+
+import mujoco
+import numpy as np
+
+from mjxgait.creature import Creature
+from mjxgait.reference.grown import Grown, seen_grown
+from mjxgait.reference.layout import foot_middles, level_nose, start_frame
+from mjxgait.reference.outcome import Trajectory
+from mjxgait.reference.overlap import overlaps
+from mjxgait.reference.sight import Sight
+from mjxgait.reference.starts import Starts
+from mjxgait.reference.terrain import terrain_of
+
+CARRIES = 1e-3
+"""Share of the body weight from which a foot counts as in contact; less is the solver's residue."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Dimensions:
+    """The sizes against which a gait is judged, in m, kg, m/s².
+
+    torque_limit: N·m per joint. joint_range: rad per joint, infinite where it has none.
+    foot_places: forward and left of the trunk when standing, in m per foot.
+    crawler: whether other parts than feet may touch the floor.
+    partner: joint on the other side, per joint; empty for a body without two like sides.
+    stand_tilt: deg of the trunk's up axis when standing.
+    """
+
+    stand_height: float
+    hip_height: float
+    body_length: float
+    mass: float
+    gravity: float
+    torque_limit: tuple[float, ...]
+    joint_range: tuple[tuple[float, float], ...]
+    foot_names: tuple[str, ...]
+    foot_places: tuple[tuple[float, float], ...]
+    crawler: bool = False
+    partner: tuple[int, ...] = ()
+    stand_tilt: float = 0.0
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Recording:
+    """One simulation, frame by frame.
+
+    time_step: s.
+    trunk_pos: [T, 3] m along the start's forward and left, and above the ground.
+    trunk_up: [T] trunk's up axis . world up. pitch, roll: [T] rad.
+    joint_pos, joint_vel, torque: [T, J] rad, rad/s, N·m.
+    foot_force: [T, N] N, normal. foot_slip: [T, N] m/s, tangential, of the foot's material at the
+    contact; 0 without contact.
+    foot_height: [T, N] m, lowest point above the ground.
+    touch: [T] whether a part that is neither foot nor ground contact touches the ground.
+    penetration: [T] m, of the deepest contact with the floor.
+    body_speed: [T] m/s, of the fastest body's centre of mass.
+    heading: [T] rad of the trunk, left of the start's forward, without jumps.
+    goal: m ahead of the start; 0 where the task has none.
+    light: [3] m where it is in the world; None where the task has none.
+    clearance: [T] m to the bar, `bar.FAR` at most; None where the task has none.
+    grown: what else is seen of a body of blocks; None of others.
+    foot_ahead: [T, N] m along the trunk's nose from the trunk to the foot; None where nobody looked.
+    overlap_pairs: P names of parts that are ever in each other. overlap: [T, P] m, how deep.
+    """
+
+    dimensions: Dimensions
+    time_step: float
+    trunk_pos: np.ndarray
+    trunk_up: np.ndarray
+    pitch: np.ndarray
+    roll: np.ndarray
+    joint_pos: np.ndarray
+    joint_vel: np.ndarray
+    torque: np.ndarray
+    foot_force: np.ndarray
+    foot_slip: np.ndarray
+    foot_height: np.ndarray
+    touch: np.ndarray
+    penetration: np.ndarray
+    body_speed: np.ndarray
+    overlap_pairs: tuple[tuple[str, str], ...]
+    overlap: np.ndarray
+    heading: np.ndarray | None = None
+    goal: float = 0.0
+    clearance: np.ndarray | None = None
+    grown: Grown | None = None
+    light: np.ndarray | None = None
+    foot_ahead: np.ndarray | None = None
+
+    @property
+    def contact(self) -> np.ndarray:
+        """[T, N] whether the foot carries weight."""
+        return self.foot_force > CARRIES * self.dimensions.mass * self.dimensions.gravity
+
+    def window(self, begin: float, end: float = np.inf) -> "Recording":
+        """The frames from `begin` to `end` in s."""
+        frames = slice(
+            round(begin / self.time_step), None if np.isinf(end) else round(end / self.time_step)
+        )
+        arrays = {
+            f.name: getattr(self, f.name)[frames]
+            for f in dataclasses.fields(self)
+            if isinstance(getattr(self, f.name), np.ndarray) and f.name != "light"
+        }
+        grown = self.grown and self.grown.window(frames)
+        return dataclasses.replace(self, **arrays, grown=grown)
+
+
+def dimensions(creature: Creature) -> Dimensions:
+    """The sizes of a creature."""
+    model = creature.model
+    data = mujoco.MjData(model)
+    data.qpos[:] = creature.stand_qpos
+    mujoco.mj_kinematics(model, data)
+    axes = data.xmat[creature.trunk].reshape(3, 3) @ np.stack(
+        [creature.frame.forward, creature.frame.left], 1
+    )
+    up = data.xmat[creature.trunk].reshape(3, 3) @ creature.frame.up
+    feet = foot_middles(creature, data.geom_xpos[None])[0]
+    middles = (feet - data.xpos[creature.trunk]) @ axes
+    return Dimensions(
+        stand_height=creature.frame.stand_height,
+        hip_height=creature.frame.hip_height,
+        body_length=creature.frame.body_length,
+        mass=creature.frame.mass,
+        gravity=creature.gravity,
+        torque_limit=tuple(map(float, creature.gains.torque_limit)),
+        joint_range=tuple(
+            (float(low), float(high))
+            for low, high in zip(creature.joints.low, creature.joints.high, strict=True)
+        ),
+        foot_names=creature.feet.names,
+        foot_places=tuple((float(forward), float(left)) for forward, left in middles),
+        crawler=len(creature.feet.ground) > 0,
+        partner=creature.mirror.partners if creature.mirror.symmetric else (),
+        stand_tilt=float(np.degrees(np.arccos(min(up[2], 1.0)))),
+    )
+
+
+def measure(
+    creature: Creature,
+    trajectory: Trajectory,
+    row: int = 0,
+    inside: bool = True,
+    aimed: Starts | None = None,
+    drag: float | None = None,
+) -> Recording:
+    """Looks at one undisturbed simulation again: every stored frame is given to C MuJoCo, whose
+    contacts are then read.
+
+    Frames after a simulation blew up are NaN, which no criterion accepts.
+
+    Args:
+      inside: whether to look for parts in each other, which takes a quarter of the time with
+        meshes.
+      aimed: how the simulations began, where the task has a goal or a bar.
+      drag: N·s/m³ of the water around a body of blocks, 0 on land; None for other bodies. Of what
+        has grown it is excused in no pose that parts are in each other.
+    """
+    start = start_frame(creature)
+    qpos, qvel, torque = trajectory.qpos[row], trajectory.qvel[row], trajectory.torque[row]
+    bar = None if aimed is None or np.isinf(aimed.bar[row, 0]) else aimed.bar[row]
+    lit = aimed is not None and aimed.light[row].any()
+    sight = Sight(creature, len(qpos), bar)
+    for k in range(len(qpos)):
+        if not (np.isfinite(qpos[k]).all() and np.isfinite(qvel[k]).all()):
+            break
+        sight.look(k, qpos[k], qvel[k], torque[k])
+    sight.finish()
+    forward, left, up = (
+        sight.trunk_rot @ axis
+        for axis in (creature.frame.forward, creature.frame.left, creature.frame.up)
+    )
+    moved = sight.trunk_pos - start.place * [1, 1, 0]
+    ground = terrain_of(creature)
+    above = moved[:, 2] - (ground.height(*sight.trunk_pos[:, :2].T) if ground else 0.0)
+    crossed = overlaps(creature, qpos if inside else qpos[:0], excused=drag is None)
+    return Recording(
+        dimensions=dimensions(creature),
+        time_step=trajectory.time_step,
+        trunk_pos=np.stack([moved @ start.forward, moved @ start.left, above], 1),
+        trunk_up=up[:, 2],
+        pitch=-np.arcsin(np.clip(forward[:, 2], -1, 1)),
+        roll=np.arcsin(np.clip(left[:, 2], -1, 1)),
+        joint_pos=qpos[:, creature.joints.qpos_adr],
+        joint_vel=qvel[:, creature.joints.dof_adr],
+        torque=torque,
+        foot_force=sight.foot_force,
+        foot_slip=sight.foot_slip,
+        foot_height=sight.foot_height,
+        touch=sight.touch,
+        penetration=sight.penetration,
+        body_speed=sight.body_speed,
+        overlap_pairs=crossed.pairs,
+        heading=np.unwrap(np.arctan2(forward @ start.left, forward @ start.forward)),
+        overlap=crossed.depth if inside else np.zeros((len(qpos), 0)),
+        goal=0.0 if aimed is None else float(aimed.goal[row]),
+        clearance=None if bar is None else sight.clearance,
+        light=start.place + aimed.light[row] if aimed is not None and lit else None,
+        grown=None if drag is None else seen_grown(creature, qpos, qvel, drag),
+        foot_ahead=_ahead(sight),
+    )
+
+
+def _ahead(sight: Sight) -> np.ndarray:
+    """[T, N] m from the trunk to each foot, along the level direction of its nose."""
+    apart = foot_middles(sight.creature, sight.geom_xpos) - sight.trunk_pos[:, None]
+    found: np.ndarray = np.einsum("tnx,tx->tn", apart, level_nose(sight.creature, sight.trunk_rot))
+    return found

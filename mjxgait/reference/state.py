@@ -1,0 +1,140 @@
+"""What the examiner knows of a moment, and the senses by name, written from docs/controller.md.
+
+Letters: `S` simulations, `J` actuated joints, `F` feet, `nv` degrees of freedom.
+"""
+
+import dataclasses
+from collections.abc import Callable, Collection, Mapping
+
+import numpy as np
+
+from mjxgait.creature import Creature
+from mjxgait.reference.layout import Ground, StartFrame, level_nose
+
+CONTACT_GAP = 0.002
+"""m; a foot nearer to the floor is in contact for a controller."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class State:
+    """Many simulations at one moment.
+
+    start: where all of them stood first. ground: under them; None for the plane z = 0.
+    time: [S] s since the start. joint_pos: [S, J] rad. velocity: [S, nv] m/s, rad/s.
+    trunk_pos: [S, 3] m. trunk_rot: [S, 3, 3], columns are the trunk's axes in the world.
+    trunk_vel: [S, 3] m/s, trunk_angvel: [S, 3] rad/s, world frame.
+    foot_height: [S, F] m, lowest point above the floor; empty where nobody asks.
+    foot_pos: [S, F, 3] m, the middle of each foot; likewise.
+    mass_matrix: [S, nv, nv]. bias: [S, nv], Coriolis and gravity less passive forces.
+    constraint_force: [S, nv], of the previous step's solve.
+    light: [S, F, 3] its direction in the own axes of each foot's geom, 0 where there is none; empty
+    where nobody asks.
+    goal, bar: [S] m ahead of the start; None where the task has none.
+    """
+
+    start: StartFrame
+    ground: Ground | None
+    time: np.ndarray
+    joint_pos: np.ndarray
+    velocity: np.ndarray
+    trunk_pos: np.ndarray
+    trunk_rot: np.ndarray
+    trunk_vel: np.ndarray
+    trunk_angvel: np.ndarray
+    foot_height: np.ndarray
+    mass_matrix: np.ndarray
+    bias: np.ndarray
+    constraint_force: np.ndarray
+    goal: np.ndarray | None = None
+    bar: np.ndarray | None = None
+    light: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros((0, 0, 3)))
+    foot_pos: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros((0, 0, 3)))
+
+
+Sense = Callable[[Creature, State], np.ndarray]
+
+
+def _heading(creature: Creature, state: State) -> np.ndarray:
+    nose = state.trunk_rot @ creature.frame.forward
+    return np.arctan2(nose @ state.start.left, nose @ state.start.forward)
+
+
+def _along(state: State, axis: np.ndarray) -> np.ndarray:
+    return (state.trunk_pos - state.start.place) @ axis
+
+
+def _height(state: State) -> np.ndarray:
+    x, y, z = state.trunk_pos.T
+    return z if state.ground is None else z - state.ground.height(x, y)
+
+
+def _nose_down(creature: Creature, state: State) -> np.ndarray:
+    return -np.arcsin(np.clip((state.trunk_rot @ creature.frame.forward)[:, 2], -1, 1))
+
+
+def _right_down(creature: Creature, state: State) -> np.ndarray:
+    return np.arcsin(np.clip((state.trunk_rot @ creature.frame.left)[:, 2], -1, 1))
+
+
+def _nose(creature: Creature, state: State) -> tuple[np.ndarray, np.ndarray]:
+    """[S, 3] horizontal unit vectors along the nose and to its left."""
+    nose = level_nose(creature, state.trunk_rot)
+    return nose, np.cross([0.0, 0.0, 1.0], nose)
+
+
+SENSES: Mapping[str, Sense] = {
+    "time": lambda creature, state: state.time,
+    "beat": lambda creature, state: 2 * np.mod(state.time, 1.0) - 1,
+    "joint_pos": lambda creature, state: state.joint_pos,
+    "joint_vel": lambda creature, state: state.velocity[:, creature.joints.dof_adr],
+    "foot_height": lambda creature, state: state.foot_height,
+    "contact": lambda creature, state: (state.foot_height < CONTACT_GAP).astype(float),
+    "trunk_pos": lambda creature, state: state.trunk_pos,
+    "trunk_height": lambda creature, state: _height(state),
+    "trunk_rot": lambda creature, state: state.trunk_rot,
+    "trunk_vel": lambda creature, state: state.trunk_vel,
+    "trunk_angvel": lambda creature, state: state.trunk_angvel,
+    "heading": _heading,
+    "forward": lambda creature, state: _along(state, state.start.forward),
+    "aside": lambda creature, state: _along(state, state.start.left),
+    "forward_vel": lambda creature, state: state.trunk_vel @ state.start.forward,
+    "nose_vel": lambda creature, state: np.stack(
+        [(state.trunk_vel * axis).sum(1) for axis in _nose(creature, state)], 1
+    ),
+    "foot_place": lambda creature, state: np.stack(
+        [
+            ((state.foot_pos - state.trunk_pos[:, None]) * axis[:, None]).sum(2)
+            for axis in _nose(creature, state)
+        ],
+        2,
+    ),
+    "up_vel": lambda creature, state: state.trunk_vel[:, 2],
+    "pitch": _nose_down,
+    "roll": _right_down,
+    "pitch_rate": lambda creature, state: (
+        state.trunk_angvel * (state.trunk_rot @ creature.frame.left)
+    ).sum(1),
+    "roll_rate": lambda creature, state: (
+        state.trunk_angvel * (state.trunk_rot @ creature.frame.forward)
+    ).sum(1),
+}
+
+
+def _left(state: State, place: np.ndarray | None) -> np.ndarray:
+    return (0.0 if place is None else place) - _along(state, state.start.forward)
+
+
+ADDED: Mapping[str, Sense] = {
+    "goal_distance": lambda creature, state: _left(state, state.goal),
+    "light": lambda creature, state: state.light,
+    "bar_distance": lambda creature, state: _left(state, state.bar),
+}
+"""Those that a shipped task adds (docs/hop.md, docs/limbo.md, docs/follow.md)."""
+FOOT_SENSES = ("foot_height", "contact", "foot_place")
+"""Those for which `foot_height` and `foot_pos` must be told."""
+
+
+def sense(creature: Creature, state: State, names: Collection[str]) -> dict[str, np.ndarray]:
+    """The senses of these names, each [S, ...]."""
+    known = {**SENSES, **ADDED}
+    return {name: known[name](creature, state) for name in names if name in known}

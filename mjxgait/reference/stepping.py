@@ -1,0 +1,226 @@
+"""Steps the simulations of one thread on C MuJoCo, under the twin of the champion's controller.
+
+Letters: `S` simulations, `R` recorded ones (the first of the `S`), `T` control steps, `J` actuated
+joints, `nq nv` as in MuJoCo.
+"""
+
+import copy
+from collections.abc import Callable
+from typing import Protocol
+
+import mujoco
+import numpy as np
+
+from mjxgait.champion import Champion
+from mjxgait.creature import Creature
+from mjxgait.reference.bar import Clearance
+from mjxgait.reference.bodies import Bodies, wrapped
+from mjxgait.reference.controllers import Twin, twin_of
+from mjxgait.reference.drive import Drive
+from mjxgait.reference.outcome import (
+    Fall,
+    Outcome,
+    Trajectory,
+    blank_film,
+    blank_outcome,
+)
+from mjxgait.reference.starts import Starts
+from mjxgait.reference.state import State, sense
+from mjxgait.reference.terrain import grounded_model
+
+LOOK = 10
+"""Control steps from one look at who can no longer succeed to the next."""
+
+
+def examined_model(creature: Creature) -> mujoco.MjModel:
+    """The creature's own body on its ground, with a converged contact solver."""
+    model = copy.copy(grounded_model(creature))
+    model.opt.iterations, model.opt.ls_iterations = 100, 50
+    model.opt.tolerance = 1e-8
+    # A simulation that blows up must not be put back on its feet in silence.
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    return model
+
+
+class Around(Protocol):
+    """What a simulation must know of the task; see `tasks.Demands`."""
+
+    drag: float
+    grown: bool
+    leaps: bool
+
+    def onward(self, goal: np.ndarray, first: np.ndarray, way: np.ndarray) -> np.ndarray:
+        """See `tasks.Demands`."""
+        ...
+
+    def lost(self, outcome: Outcome, starts: Starts, steps: int) -> np.ndarray:
+        """See `tasks.Demands`."""
+        ...
+
+
+class Stepping:
+    """The simulations of one thread, of which the first `record` are recorded."""
+
+    def __init__(
+        self,
+        creature: Creature,
+        champion: Champion,
+        starts: Starts,
+        record: int,
+        fall: Fall,
+        task: Around,
+        twin: Twin | None = None,
+    ) -> None:
+        self.creature, self.starts, self.fall = creature, starts, fall
+        self.record, self.goal, self.task = record, starts.goal.copy(), task
+        step = float(creature.model.opt.timestep)
+        self.twin = twin or twin_of(creature, champion, step)
+        self.drive = Drive(creature, champion.drive, self.twin.command, step)
+        model = examined_model(creature)
+        self.bodies = Bodies(creature, model, starts, self.twin.reads, task.drag)
+        self.memory = dict(self.twin.init(len(starts)))
+        self.command = np.zeros_like(starts.stiffness)
+        self.bar = Clearance(creature) if np.isfinite(starts.bar).any() else None
+        self.finest = int(starts.refine.max())
+        # What the controller has sent last, for those whose torques come late.
+        self.sent = np.zeros((int(starts.delay.max()) + 1, *starts.stiffness.shape))
+
+    def to_the_end(
+        self,
+        steps: int,
+        heading: np.ndarray | None,
+        tell: Callable[[np.ndarray], bool] | None = None,
+    ) -> Outcome:
+        """Steps until the end, leaving out what has fallen and is not recorded.
+
+        heading: [S, T] rad that each is told; None where nobody is told any. tell: is told now and
+        then who [S] can no longer succeed, and says whether all may end.
+        """
+        count, time_step = len(self.starts), self.creature.model.opt.timestep
+        film = blank_film(self.creature, time_step, self.record, steps)
+        told = heading is not None
+        middle, low = self.task.grown, self.task.leaps
+        seen = blank_outcome(count, steps, film, told=told, middle=middle, low=low)
+        leader, waiting = self._alike(heading)
+        running = np.setdiff1d(np.arange(count), waiting)
+        for k in range(steps):
+            if not len(running):
+                break
+            if tell is not None and k % LOOK == 0 and tell(self.task.lost(seen, self.starts, k)):
+                break
+            if len(waiting) and np.isinf(seen.fell[leader]):
+                released = waiting[self._pushed(waiting, k)]
+                self._follow(released, leader)
+                seen.copy(leader, released)
+                running, waiting = np.union1d(running, released), np.setdiff1d(waiting, released)
+            pushed = running[self._pushed(running, k)]
+            if len(pushed):
+                self.bodies.push(pushed)
+            wanted = None if heading is None else heading[running, k]
+            self._control_step(running, k, wanted, film)
+            down = self._watch(seen, running, k, wanted)
+            watched = (k + 1) * time_step < self.starts.end[running]
+            if down.any() or not watched.all():
+                running = running[
+                    watched
+                    & self.bodies.sane(running)
+                    & ((running < self.record) | np.isinf(seen.fell[running]))
+                ]
+        seen.copy(leader, waiting)
+        return seen
+
+    def _watch(
+        self, seen: Outcome, running: np.ndarray, k: int, told: np.ndarray | None
+    ) -> np.ndarray:
+        """Writes down what came of a control step; which of the running [running] are down."""
+        bodies, now = self.bodies, (k + 1) * self.creature.model.opt.timestep
+        seen.travel[running] = bodies.travel(running)
+        seen.path[running, k], seen.aside[running, k] = seen.travel[running, :2].T
+        if told is not None:
+            seen.astray[running, k] = bodies.astray(running, told)
+        if self.bar is not None:
+            clear = self.bar.of(
+                bodies.geom_xpos[running], bodies.geom_xmat[running], self.starts.bar[running]
+            )
+            seen.clearance[running] = np.minimum(seen.clearance[running], clear)
+        if self.task.grown:
+            seen.middle[running, k] = bodies.middle(running)
+        if self.task.leaps:
+            seen.low[running, k] = bodies.height(running)
+        down = bodies.down(running, self.fall)
+        seen.fell[running[down]] = np.minimum(seen.fell[running[down]], now)
+        return down
+
+    def _alike(self, heading: np.ndarray | None) -> tuple[int, np.ndarray]:
+        """One simulation that stands for others until they are pushed, and those others.
+
+        Nothing tells them apart before, so a quarter of all steps need not be taken.
+        """
+        starts, alike = self.starts, np.flatnonzero(self.starts.undisturbed)
+        aims = np.column_stack([starts.goal, starts.bar, starts.light])
+        if heading is not None and np.ptp(heading, axis=0).any():
+            alike = alike[:0]
+        if not len(alike):
+            return 0, alike
+        alike = alike[(aims[alike] == aims[alike[0]]).all(1)]
+        leader = int(alike[starts.push_time[alike].argmax()])
+        return leader, alike[(alike != leader) & (alike >= self.record)]
+
+    def _follow(self, rows: np.ndarray, leader: int) -> None:
+        """Puts simulations where another one is."""
+        self.bodies.follow(rows, leader)
+        for state in (self.goal, self.command, *self.memory.values()):
+            state[rows] = state[leader]
+        self.sent[:, rows] = self.sent[:, [leader]]
+
+    def _control_step(
+        self, running: np.ndarray, k: int, heading: np.ndarray | None, film: Trajectory
+    ) -> None:
+        kept = running[running < self.record]
+        film.qpos[kept, k], film.qvel[kept, k] = self.bodies.qpos[kept], self.bodies.qvel[kept]
+        film.phase[kept, k] = self.twin.phase({n: m[kept] for n, m in self.memory.items()})
+        command, torque = self._physics_step(running, k, heading)
+        film.torque[kept, k] = torque[: len(kept)]
+        if self.twin.command == "pose":
+            film.target[kept, k] = command[: len(kept)]
+        for taken in range(1, self.finest):
+            self.bodies.step(running[self.starts.refine[running] > taken])
+
+    def _physics_step(
+        self, running: np.ndarray, k: int, heading: np.ndarray | None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The command, and the torque that acts, [running, J] each."""
+        state, starts = self.bodies.state(running, k, self.goal[running]), self.starts
+        if k % self.twin.every == 0:
+            self.command[running] = self._act(running, state, heading)
+        command = self.command[running]
+        first, way = self.starts.goal[running], self.bodies.travel(running)[:, 0]
+        self.goal[running] = self.task.onward(self.goal[running], first, way)
+        self.sent[k % len(self.sent), running] = self.drive.torque(
+            command, state, starts.stiffness[running], starts.damping[running]
+        )
+        # Before the first torque has arrived it acts already, as if the body had been held so.
+        arrived = np.maximum(k - starts.delay[running], 0) % len(self.sent)
+        torque = self.sent[arrived, running]
+        self.bodies.applied[running[:, None], self.creature.joints.dof_adr] = torque
+        self.bodies.step(running)
+        self.bodies.last_force[running] = self.bodies.constraint[running]
+        return command, torque
+
+    def _act(self, running: np.ndarray, state: State, heading: np.ndarray | None) -> np.ndarray:
+        """The command [running, J]; the twin's memory moves on."""
+        senses = sense(self.creature, state, self.twin.reads)
+        if heading is not None:
+            # Told where to go, it does not come back to the line that it left.
+            senses["heading"] = wrapped(senses["heading"] - heading)
+            senses["aside"] = np.zeros_like(senses["aside"])
+        before = {name: values[running] for name, values in self.memory.items()}
+        command, after = self.twin.act(before, senses)
+        for name, values in after.items():
+            self.memory[name][running] = values
+        return command
+
+    def _pushed(self, rows: np.ndarray, k: int) -> np.ndarray:
+        """Which of some simulations are pushed at a step."""
+        time_step = self.creature.model.opt.timestep
+        return np.floor(self.starts.push_time[rows] / time_step) == k

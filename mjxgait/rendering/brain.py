@@ -1,0 +1,119 @@
+"""A brain of blocks as a picture: a band for each part, from what is sensed on the left to the hinges."""
+
+from collections import Counter
+from collections.abc import Mapping
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+
+from mjxgait.rendering.network import Cell, Network, owner_name
+from mjxgait.rendering.style import (
+    ACCENT,
+    DARK,
+    MIDDLE,
+    PALE,
+)
+
+COLUMN, ROW = 2.5, 0.42
+"""Inches from one cell to the next."""
+MARGIN = 1.1
+"""Inches for the bands' names."""
+HEADING = 0.6
+NEAR = 0.62
+"""Of a wire's way, where its weight stands, so that those from one cell do not meet."""
+LOOKS = {
+    "hinge": {"facecolor": DARK, "edgecolor": DARK, "boxstyle": "round,pad=0.3"},
+    "neuron": {"facecolor": PALE, "edgecolor": DARK, "boxstyle": "round,pad=0.3"},
+    "sensor": {"facecolor": "white", "edgecolor": DARK, "boxstyle": "round4,pad=0.3"},
+}
+Place = tuple[float, float]
+
+
+def shape(network: Network) -> tuple[float, float]:
+    """Inches of the figure."""
+    rows = sum(_rows(network).values())
+    return MARGIN + COLUMN * (_deepest(network) + 1), HEADING + ROW * (rows + 1)
+
+
+def draw_brain(drawing: Figure, network: Network) -> None:
+    """Cells in columns by how many wires they are from a hinge, wires with their weights."""
+    axes = drawing.subplots()
+    below = 0
+    for band, (owner, count) in enumerate(_rows(network).items()):
+        above = below - count
+        axes.axhspan(above, below, color="0.96" if band % 2 else "white", zorder=0)
+        axes.text(-0.95 - _deepest(network), (above + below) / 2, owner_name(owner), va="center")
+        below = above
+    boxes = {n: _boxed(axes, network.cells[n], at) for n, at in _places(network).items()}
+    for wire in network.wires:
+        _draw_wire(axes, wire.weight, boxes[wire.source], boxes[wire.target])
+    axes.set(xlim=(-1.0 - _deepest(network), 0.5), ylim=(below, 0.0))
+    axes.set_axis_off()
+    axes.set_title("the brain: what reaches a hinge; dashed wires turn the sign")
+
+
+def _deepest(network: Network) -> int:
+    return max(cell.depth for cell in network.cells.values())
+
+
+def _rows(network: Network) -> Mapping[int, int]:
+    """By owner, the centre first, how many cells stand above each other."""
+    counts = Counter((cell.owner, cell.depth) for cell in network.cells.values())
+    owners = sorted({owner for owner, _ in counts})
+    return {o: max(count for (owner, _), count in counts.items() if owner == o) for o in owners}
+
+
+def _places(network: Network) -> Mapping[int, Place]:
+    """Of each cell: columns from the hinges, rows from above."""
+    places: dict[int, Place] = {}
+    top = 0.0
+    for owner, rows in _rows(network).items():
+        columns: dict[int, list[int]] = {}
+        for number, cell in network.cells.items():
+            if cell.owner == owner:
+                columns.setdefault(cell.depth, []).append(number)
+        for depth, numbers in columns.items():
+            for k, number in enumerate(numbers):
+                places[number] = -float(depth), top - (k + 0.5) * rows / len(numbers)
+        top -= rows
+    return places
+
+
+def _boxed(axes: Axes, cell: Cell, at: Place) -> Text:
+    return axes.text(
+        *at,
+        cell.label,
+        color="white" if cell.kind == "hinge" else DARK,
+        fontsize=8,
+        ha="center",
+        va="center",
+        bbox={"linewidth": 0.7, **LOOKS[cell.kind]},
+        zorder=3,
+    )
+
+
+def _draw_wire(axes: Axes, weight: float, source: Text, target: Text) -> None:
+    """From box to box, to the right; backwards, or to itself, in a bow."""
+    (x, y), (to_x, to_y) = start, end = source.get_position(), target.get_position()
+    arrow: dict[str, Any] = {
+        "arrowstyle": "->",
+        "color": MIDDLE,
+        "linestyle": "--" if weight < 0 else "-",
+        "linewidth": 0.6 + min(abs(weight), 3.0) / 2,
+        "connectionstyle": f"arc3,rad={0.0 if to_x > x else 0.4}",
+    }
+    if source is target:
+        start, end = (x - 0.12, y), (x + 0.12, y)
+        arrow |= {"connectionstyle": "arc3,rad=-2.0", "shrinkA": 8, "shrinkB": 8}
+    else:
+        arrow |= {"patchA": source.get_bbox_patch(), "patchB": target.get_bbox_patch()}
+    axes.annotate("", end, start, arrowprops=arrow)
+    said = f"{weight:.2f}"
+    if source is target:
+        axes.text(x, y + 0.42, said, color=ACCENT, fontsize=7, ha="center", va="center", zorder=4)
+    else:
+        place = ((1 - NEAR) * x + NEAR * to_x, (1 - NEAR) * y + NEAR * to_y)
+        box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.5}
+        axes.text(*place, said, color=ACCENT, fontsize=7, ha="center", va="center", bbox=box)

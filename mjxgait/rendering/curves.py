@@ -1,0 +1,190 @@
+"""Plots of a run over its generations: fitness, what the terms give, diversity.
+
+lines: of `metrics.jsonl`.
+"""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patheffects import withStroke
+from matplotlib.ticker import MaxNLocator, PercentFormatter
+
+from mjxgait.files import replaced
+from mjxgait.rendering.style import (
+    ACCENT,
+    DARK,
+    MIDDLE,
+    PALE,
+    Figures,
+    figure,
+)
+
+Lines = Sequence[Mapping[str, Any]]
+MAIN_TERMS = 7
+"""Drawn one by one; the others are drawn together."""
+GREYS = ("0.25", "0.62", "0.82", "0.45", "0.92", "0.72", "0.35", "0.98")
+HATCHES = ("", "///", "", "...", "\\\\\\", "xxx", "---", "")
+
+
+def plot_fitness(lines: Lines, path: Path) -> None:
+    """The fitness curve as one PNG, which every run has in its folder."""
+    with figure((8, 4.5)) as drawing:
+        draw_fitness(drawing.subplots(), lines)
+        with replaced(path) as beside:
+            drawing.savefig(beside)
+
+
+def draw_fitness(axes: Axes, lines: Lines) -> None:
+    """Best, mean, and quartiles where the log tells of them; spells of forced evolution shaded."""
+    column = columns(lines)
+    generation = column["generation"]
+    lower, upper = column["lower_quartile"], column["upper_quartile"]
+    if np.isfinite(lower).any():
+        axes.fill_between(generation, lower, upper, color=PALE, label="middle half")
+    axes.plot(generation, column["best"], "-", color=DARK, linewidth=2, label="best")
+    axes.plot(generation, column["mean"], "--", color=DARK, linewidth=1.2, label="mean")
+    shade_forced(axes, column)
+    axes.set(ylabel="fitness (higher is better)", title="fitness of the population")
+    _label_generations(axes, generation)
+    axes.legend(loc="best")
+
+
+def draw_terms(axes: Axes, lines: Lines, weights: Mapping[str, np.ndarray]) -> None:
+    """What each term gives to (above zero) and takes from (below) the best individual's fitness.
+
+    weights: signed, one array [generations] per term.
+    """
+    column = columns(lines)
+    generation = column["generation"]
+    logged = {name: weight for name, weight in weights.items() if f"term_{name}" in column}
+    given = {
+        name: np.nan_to_num(weight * column[f"term_{name}"]) for name, weight in logged.items()
+    }
+    order = sorted(
+        (name for name in given if np.abs(given[name]).max() > 1e-3),
+        key=lambda name: -np.abs(given[name]).sum(),
+    )
+    main, others = order[:MAIN_TERMS], order[MAIN_TERMS:]
+    parts = {name: given[name] for name in main}
+    if others:
+        parts[f"{len(others)} others"] = np.sum([given[name] for name in others], axis=0)
+    above, below = np.zeros(len(generation)), np.zeros(len(generation))
+    for (name, value), grey, hatch in zip(parts.items(), GREYS, HATCHES, strict=False):
+        gain, loss = np.maximum(value, 0), np.minimum(value, 0)
+        label = name.replace("_", " ")
+        for base, part in ((above, gain), (below, loss)):
+            if part.any():
+                axes.fill_between(
+                    generation,
+                    base,
+                    base + part,
+                    facecolor=grey,
+                    hatch=hatch,
+                    edgecolor="0.15",
+                    linewidth=0.4,
+                    label=label,
+                )
+                label = "_"
+        above, below = above + gain, below + loss
+    outline = [withStroke(linewidth=5, foreground="white")]
+    axes.plot(generation, above + below, color=DARK, linewidth=2, label="sum", path_effects=outline)
+    axes.axhline(0, color=DARK, linewidth=0.8)
+    axes.set(
+        ylabel="weight times term",
+        title="what the terms give to the best individual (mean of its starts)",
+    )
+    _label_generations(axes, generation)
+    axes.legend(loc="center left", bbox_to_anchor=(1, 0.5))
+
+
+def draw_diversity(axes: Axes, lines: Lines) -> None:
+    """Share of different genomes, and the mean spread of a gene."""
+    column = columns(lines)
+    generation = column["generation"]
+    population = max(float(np.nanmax(column["unique"])), 1.0)
+    axes.plot(
+        generation,
+        column["unique"] / population,
+        "-",
+        color=DARK,
+        linewidth=2,
+        label="different genomes (left)",
+    )
+    shade_forced(axes, column)
+    axes.set(ylabel="share of the population", ylim=(0, 1.05), title="diversity")
+    axes.yaxis.set_major_formatter(PercentFormatter(1.0))
+    spread = axes.twinx()
+    spread.plot(
+        generation,
+        column["spread"],
+        "--",
+        color=MIDDLE,
+        linewidth=1.6,
+        label="spread of a gene (right)",
+    )
+    spread.set(ylabel="mean standard deviation (rad)")
+    spread.set_ylim(bottom=0)
+    spread.grid(False)
+    spread.spines["right"].set_visible(True)
+    _label_generations(axes, generation)
+    handles = [part for each in (axes, spread) for part in each.get_legend_handles_labels()[0]]
+    axes.legend(handles=handles, loc="lower left")
+
+
+def draw_size(axes: Axes, lines: Lines) -> None:
+    """Nodes of all expressions of an individual: of the best, and in the mean."""
+    column = columns(lines)
+    generation = column["generation"]
+    axes.plot(generation, column["nodes_best"], "-", color=DARK, linewidth=2, label="best")
+    axes.plot(generation, column["nodes_mean"], "--", color=DARK, linewidth=1.2, label="mean")
+    shade_forced(axes, column)
+    axes.set(ylabel="nodes of all expressions", title="size of the programs")
+    axes.set_ylim(bottom=0)
+    _label_generations(axes, generation)
+    axes.legend(loc="best")
+
+
+def progress_figures(lines: Lines, weights: Mapping[str, np.ndarray]) -> Figures:
+    """The plots of this file by file name."""
+    size: Figures = {"size": ((8, 3.5), lambda drawing: draw_size(drawing.subplots(), lines))}
+    return {
+        "fitness": ((8, 4.5), lambda drawing: draw_fitness(drawing.subplots(), lines)),
+        "terms": ((9.5, 4.5), lambda drawing: draw_terms(drawing.subplots(), lines, weights)),
+        "diversity": ((8, 3.5), lambda drawing: draw_diversity(drawing.subplots(), lines)),
+        **(size if "nodes_mean" in lines[0] else {}),
+    }
+
+
+def columns(lines: Lines) -> dict[str, np.ndarray]:
+    """Each metric over the generations; what is missing or not finite is NaN."""
+    return {
+        key: np.array(
+            [np.nan if (value := line.get(key)) is None else value for line in lines], float
+        )
+        for key in lines[0]
+    }
+
+
+def shade_forced(axes: Axes, column: Mapping[str, np.ndarray]) -> None:
+    """Shades the generations that were forced."""
+    for i, at in enumerate(column["generation"][column["forced"] == 1]):
+        label = "_" if i else "forced evolution"
+        axes.axvspan(
+            at - 0.5,
+            at + 0.5,
+            facecolor=ACCENT,
+            alpha=0.25,
+            hatch="//",
+            edgecolor="0.5",
+            linewidth=0,
+            label=label,
+        )
+
+
+def _label_generations(axes: Axes, generation: np.ndarray) -> None:
+    axes.set_xlabel("generation")
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.set_xlim(generation[0] - 0.5, max(generation[-1], generation[0] + 1) + 0.5)

@@ -1,0 +1,171 @@
+"""Plots of one walk: footfalls, joint angles against their targets, trunk height and speed."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+
+from mjxgait.rendering.style import (
+    ACCENT,
+    DARK,
+    MIDDLE,
+    Figures,
+)
+from mjxgait.rendering.walk import Walk
+
+STRIDES = 2
+"""Shown of the gait."""
+FALLBACK = 2.0
+"""s shown of a walk that has no steady strides."""
+ROW = 0.28
+"""Half the height of a footfall bar."""
+
+
+def gait_window(walk: Walk, strides: int = STRIDES) -> tuple[slice, str]:
+    """The frames to show and what to call them: steady strides, or the beginning of a walk that
+    has none.
+    """
+    found = walk.steady_strides(strides)
+    if found:
+        return slice(*found), f"{strides} strides from {found[0] * walk.time_step:.2f} s on"
+    last = min(len(walk.qpos), round(FALLBACK / walk.time_step))
+    what = (
+        f"it fell after {walk.fell:.2f} s" if np.isfinite(walk.fell) else "it has no steady stride"
+    )
+    return slice(0, last), f"the first {last * walk.time_step:.2f} s; {what}"
+
+
+def draw_footfalls(axes: Axes, walk: Walk) -> None:
+    """A bar while a foot carries weight (Hildebrand's diagram)."""
+    window, what = gait_window(walk)
+    contact, step = walk.recording.contact[window], walk.time_step
+    names = walk.creature.feet.names
+    share = contact.mean(0)
+    for row, foot in enumerate(contact.T):
+        padded = np.diff(np.concatenate([[0], foot.astype(int), [0]]))
+        for begin, end in zip(
+            np.flatnonzero(padded == 1), np.flatnonzero(padded == -1), strict=True
+        ):
+            axes.add_patch(
+                Rectangle(
+                    (begin * step, row - ROW),
+                    (end - begin) * step,
+                    2 * ROW,
+                    facecolor=DARK,
+                    linewidth=0,
+                )
+            )
+        axes.text(len(contact) * step * 1.01, row, f"{share[row]:.0%}", va="center")
+    labels = [_plain(name).removesuffix(" foot").removesuffix(" lower") for name in names]
+    axes.set(
+        xlim=(0, len(contact) * step),
+        ylim=(len(names) - 0.5, -0.5),
+        xlabel="time (s)",
+        title=f"footfalls, with each foot's duty factor; {what}",
+    )
+    axes.set_yticks(range(len(names)), labels)
+    axes.grid(False, axis="y")
+    _mark_strides(axes, walk, window)
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(loc="lower left", bbox_to_anchor=(0.75, 1.0))
+
+
+def draw_joints(drawing: Figure, walk: Walk) -> None:
+    """Angle and target of every joint, mirror partners on one row."""
+    window, what = gait_window(walk)
+    order = _partner_order(walk)
+    columns = 2 if len(order) <= 20 else 4
+    axes = drawing.subplots(-(-len(order) // columns), columns, sharex=True, squeeze=False)
+    angles, targets = (
+        np.degrees(walk.recording.joint_pos[window]),
+        np.degrees(walk.trajectory.target[0][window]),
+    )
+    time = np.arange(len(angles)) * walk.time_step
+    for place, panel in enumerate(axes.flat):
+        if place >= len(order):
+            panel.set_visible(False)
+            continue
+        j = order[place]
+        panel.plot(time, targets[:, j], "--", color=MIDDLE, linewidth=1.2, label="target")
+        panel.plot(time, angles[:, j], "-", color=DARK, linewidth=1.5, label="angle")
+        panel.set_title(_plain(walk.creature.joints.names[j]), fontsize=9)
+        _mark_strides(panel, walk, window)
+        panel.set_xlim(0, time[-1])
+        panel.tick_params(labelsize=8)
+    drawing.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=3)
+    drawing.supxlabel("time (s)", fontsize=10)
+    drawing.supylabel("joint angle (°)", fontsize=10)
+    drawing.suptitle(f"joint angles and their targets; {what}", fontsize=11, x=0.01, ha="left")
+
+
+def draw_trunk(drawing: Figure, walk: Walk) -> None:
+    """Height and forward speed of the trunk over the whole walk."""
+    recording, step = walk.recording, walk.time_step
+    time = np.arange(len(recording.trunk_pos)) * step
+    above, below = drawing.subplots(2, 1, sharex=True)
+    above.plot(time, recording.trunk_pos[:, 2], "-", color=DARK, linewidth=1)
+    above.axhline(walk.creature.frame.stand_height, color=MIDDLE, linestyle=":", label="standing")
+    above.set(ylabel="height (m)", title="trunk: height above the floor and forward speed")
+    above.set_ylim(
+        0, max(1.35 * np.nanmax(recording.trunk_pos[:, 2]), 1.4 * walk.creature.frame.stand_height)
+    )
+    speed = np.gradient(recording.trunk_pos[:, 0], step)
+    below.plot(time, speed, "-", color="0.7", linewidth=0.8, label="at each moment")
+    if (starts := walk.stride_frames()).size > 1:
+        way = np.diff(recording.trunk_pos[starts, 0]) / (np.diff(starts) * step)
+        below.step(
+            starts * step,
+            [*way, way[-1]],
+            where="post",
+            color=DARK,
+            linewidth=1.8,
+            label="mean of each stride",
+        )
+    below.axhline(0, color=DARK, linewidth=0.8)
+    below.set(xlabel="time (s)", ylabel="speed (m/s)", xlim=(0, time[-1]))
+    low, high = np.nanpercentile(speed, [1, 99])
+    below.set_ylim(min(1.2 * low, -0.05), max(1.5 * high, 0.1))
+    for panel in (above, below):
+        if np.isfinite(walk.fell):
+            panel.axvline(
+                walk.fell, color=ACCENT, linewidth=1.5, label=f"fell at {walk.fell:.2f} s"
+            )
+        panel.legend(loc="upper right", ncols=3)
+
+
+def gait_figures(walk: Walk) -> Figures:
+    """The plots of this file by file name."""
+    rows = -(-len(_partner_order(walk)) // 2)
+    return {
+        "footfalls": (
+            (9, 0.9 + 0.42 * len(walk.creature.feet.names)),
+            lambda drawing: draw_footfalls(drawing.subplots(), walk),
+        ),
+        "joints": ((9, 1.0 + 1.15 * rows), lambda drawing: draw_joints(drawing, walk)),
+        "trunk": ((9, 4.5), lambda drawing: draw_trunk(drawing, walk)),
+    }
+
+
+def _mark_strides(axes: Axes, walk: Walk, window: slice) -> None:
+    """A line where a new stride begins."""
+    for frame in walk.stride_frames():
+        if window.start < frame < window.stop:
+            axes.axvline(
+                (frame - window.start) * walk.time_step,
+                color=ACCENT,
+                linewidth=1.2,
+                zorder=3,
+                label="a new stride begins",
+            )
+
+
+def _partner_order(walk: Walk) -> list[int]:
+    """Joints left and right beside each other, then those of the middle."""
+    partner = walk.creature.mirror.partner
+    pairs = [(j, int(p)) for j, p in enumerate(partner) if j < p]
+    paired = [j for pair in pairs for j in pair]
+    return paired + [j for j, p in enumerate(partner) if j == p]
+
+
+def _plain(name: str) -> str:
+    return name.replace("_", " ")

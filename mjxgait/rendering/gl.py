@@ -1,0 +1,169 @@
+"""Pictures by MuJoCo's own renderer where GL works, which a process of its own finds out."""
+
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import Image, ImageDraw
+
+from mjxgait.errors import UserError
+from mjxgait.processes import python_command, safe_environment
+from mjxgait.rendering.floor import band_lines, number_bands
+from mjxgait.rendering.painter import lamp_direction
+from mjxgait.rendering.stage import Stage
+
+WORKER = "mjxgait.rendering.gl_worker"
+OFF = ("disable", "disabled", "off", "false", "0")
+"""Values of MUJOCO_GL that ask for no GL."""
+GROUND_CELL = 0.08
+"""Hip heights; of the field that stands for ground that is no plane."""
+PATIENCE = 60.0
+"""s that a first picture may take."""
+
+
+def working_backend(stage: Stage, wanted: str | None = None) -> tuple[str | None, str]:
+    """The GL backend that can draw this stage, or None; and a sentence that says what was tried.
+
+    Args:
+      wanted: the value of MUJOCO_GL: the only backend to try, or that there is to be none.
+    """
+    if wanted and wanted.lower() in OFF:
+        return None, f"drawn without GL, as MUJOCO_GL={wanted} says"
+    if not stage.alike:
+        return None, "drawn without GL, which draws several creatures of one kind only"
+    candidates = (
+        [wanted] if wanted else ["egl", "osmesa"] if sys.platform == "linux" else ["default"]
+    )
+    reasons = []
+    for backend in candidates:
+        with tempfile.TemporaryDirectory() as folder:
+            try:
+                done = subprocess.run(
+                    _command(stage, [0], Path(folder)),
+                    env=_environment(backend),
+                    capture_output=True,
+                    timeout=PATIENCE,
+                )
+            except subprocess.TimeoutExpired:
+                reasons.append(f"{backend}: no picture in {PATIENCE:g} s")
+                continue
+        if (
+            done.returncode == 0
+            and len(done.stdout) == 3 * stage.width * stage.height
+            and any(done.stdout)
+        ):
+            return backend, f"drawn by MuJoCo with {backend}"
+        lines = done.stderr.decode(errors="replace").strip().splitlines()
+        reasons.append(
+            f"{backend}: {lines[-1][:100] if lines else f'ended with code {done.returncode}'}"
+        )
+    return None, f"drawn without GL, as it does not work here ({'; '.join(reasons)})"
+
+
+def gl_pictures(stage: Stage, frames: Sequence[int], backend: str) -> Iterator[Image.Image]:
+    """The moments of these frames.
+
+    Raises:
+      UserError: the renderer stopped half way.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        command = _command(stage, frames, Path(folder))
+        worker = subprocess.Popen(
+            command, env=_environment(backend), stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+        )
+        assert worker.stdout is not None
+        try:
+            for frame in frames:
+                raw = worker.stdout.read(3 * stage.width * stage.height)
+                if len(raw) < 3 * stage.width * stage.height:
+                    raise UserError(
+                        f"the GL renderer ({backend}) stopped in the middle; add --renderer painter"
+                    )
+                picture = Image.frombytes("RGB", (stage.width, stage.height), raw)
+                draw = ImageDraw.Draw(picture)
+                number_bands(draw, stage.camera(frame), stage.origin, stage.relief)
+                yield picture
+        finally:
+            worker.kill()
+            worker.wait()
+            worker.stdout.close()
+
+
+def scene_file(stage: Stage, frames: Sequence[int], path: Path) -> None:
+    """Writes all that the worker needs: poses [F, N, nq] with each creature in its lane, and the
+    camera of every frame.
+    """
+    walk = stage.entrants[0].walk
+    spec, creature = walk.marked, walk.creature
+    cameras = [stage.camera(frame) for frame in frames]
+    first = cameras[0]
+    into = first.axes[2]
+    place = creature.root_qpos
+    times = [frame * stage.time_step for frame in frames]
+    poses = np.array([[one.walk.qpos[one.frame(time)] for one in stage.entrants] for time in times])
+    poses[..., place : place + 3] += stage.lanes
+    numbers = {
+        int(n) for camera in (first, cameras[-1]) for n in band_lines(camera, stage.origin)[0]
+    }
+    step = band_lines(first, stage.origin)[1]
+    dark = [n for n in range(min(numbers), max(numbers)) if n % 2 and stage.relief is None]
+    np.savez(
+        path,
+        xml=np.array(spec.to_xml() if spec else creature.files["creature.xml"]),
+        size=np.array([stage.width, stage.height]),
+        extent=np.array(stage.height / first.scale),
+        view=np.array(
+            [
+                np.degrees(np.arctan2(into[1], into[0])),
+                -np.degrees(first.elevation),
+                20 * creature.frame.body_length,
+            ]
+        ),
+        centre=np.array([camera.centre for camera in cameras]),
+        qpos=poses,
+        bands=np.array([stage.origin + (n + 0.5) * step * stage.forward for n in dark]),
+        band_width=np.array(step),
+        forward=stage.forward,
+        lamp=lamp_direction(stage.forward),
+        **_ground(stage),
+    )
+
+
+def _ground(stage: Stage) -> dict[str, Any]:
+    """Ground that is no plane as a height field around all that is seen; nothing for a plane.
+
+    heights: [rows, columns] m, rows to the left. ground_at: [2] m, its middle; ground_half: [2] m.
+    """
+    if stage.relief is None:
+        return {}
+    room = 2.5 * stage.width / stage.camera(0).scale
+    hip_height = stage.entrants[0].walk.creature.frame.hip_height
+    cell, lanes = GROUND_CELL * hip_height, stage.lanes @ stage.left
+    ahead = np.arange(stage.way[:, 0].min() - room, stage.way[:, 0].max() + room, cell)
+    aside = stage.way[:, 1]
+    left = np.arange(aside.min() + lanes.min() - room, aside.max() + lanes.max() + 2 * room, cell)
+    x, y = (
+        stage.origin[i] + ahead[None, :] * stage.forward[i] + left[:, None] * stage.left[i]
+        for i in range(2)
+    )
+    middle = (ahead[0] + ahead[-1]) / 2 * stage.forward + (left[0] + left[-1]) / 2 * stage.left[:2]
+    return {
+        "heights": stage.relief(x, y),
+        "ground_at": stage.origin + middle,
+        "ground_half": np.array([np.ptp(ahead), np.ptp(left)]) / 2,
+    }
+
+
+def _command(stage: Stage, frames: Sequence[int], folder: Path) -> list[str]:
+    path = folder / "scene.npz"
+    scene_file(stage, frames, path)
+    return python_command(WORKER, str(path))
+
+
+def _environment(backend: str) -> dict[str, str]:
+    chosen = {} if backend == "default" else {"MUJOCO_GL": backend, "PYOPENGL_PLATFORM": backend}
+    return {key: value for key, value in safe_environment().items() if key != "MUJOCO_GL"} | chosen

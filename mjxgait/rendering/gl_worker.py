@@ -1,0 +1,136 @@
+"""Draws with MuJoCo's own renderer in a process of its own: a GL library that is missing or crashes
+takes nothing else with it.
+
+`python -m mjxgait.rendering.gl_worker SCENE.npz` writes raw RGB frames to its standard output.
+Letters: `F` frames, `N` creatures.
+"""
+
+import sys
+
+import mujoco
+import numpy as np
+from PIL import Image
+
+FLOOR_GREY = 0.86
+BAND_GREY = 0.81
+BAND_HEIGHT = 1e-3
+"""m above the floor, so that the two do not flicker."""
+SMOOTH = 2
+"""Rendered pixels per pixel and direction: smoother than GL's own samples, and faster where a
+CPU does the work.
+"""
+SHADOW = 2048
+
+
+def main(path: str) -> None:
+    """Draws every frame of a scene file; see `gl.scene_file`."""
+    with np.load(path) as scene:
+        parts = {name: scene[name] for name in scene.files}
+    model = _prepared(_compiled(parts), parts)
+    width, height = (SMOOTH * int(n) for n in parts["size"])
+    data = [mujoco.MjData(model) for _ in range(parts["qpos"].shape[1])]
+    camera, option = mujoco.MjvCamera(), mujoco.MjvOption()
+    camera.azimuth, camera.elevation, camera.distance = (float(n) for n in parts["view"])
+    with mujoco.Renderer(model, height, width, max_geom=20_000) as renderer:
+        for poses, centre in zip(parts["qpos"], parts["centre"], strict=True):
+            camera.lookat[:] = centre
+            for one, qpos in zip(data, poses, strict=True):
+                one.qpos[:] = qpos
+                mujoco.mj_forward(model, one)
+            renderer.update_scene(data[0], camera, option)
+            moving = int(mujoco.mjtCatBit.mjCAT_DYNAMIC)
+            for other in data[1:]:
+                mujoco.mjv_addGeoms(
+                    model, other, option, mujoco.MjvPerturb(), moving, renderer.scene
+                )
+            _add_lamp(renderer.scene, centre, parts["lamp"], 0.25 * camera.distance)
+            _keep_floor_out_of_shadows(renderer.scene, model.geom("floor").id)
+            _add_bands(renderer.scene, parts["bands"], float(parts["band_width"]), parts["forward"])
+            sys.stdout.buffer.write(Image.fromarray(renderer.render()).reduce(SMOOTH).tobytes())
+
+
+def _compiled(parts: dict[str, np.ndarray]) -> mujoco.MjModel:
+    """The model, its floor a height field where the ground is no plane."""
+    if "heights" not in parts:
+        return mujoco.MjModel.from_xml_string(str(parts["xml"]))
+    heights, spec = parts["heights"], mujoco.MjSpec.from_string(str(parts["xml"]))
+    low, span = heights.min(), max(np.ptp(heights), 1e-6)
+    rows, columns = heights.shape
+    spec.add_hfield(
+        name="ground",
+        nrow=rows,
+        ncol=columns,
+        size=[*parts["ground_half"], span, 1.0],
+        userdata=np.zeros(heights.size),
+    )
+    floor, turn = spec.geom("floor"), np.arctan2(*parts["forward"][::-1]) / 2
+    floor.type, floor.hfieldname = mujoco.mjtGeom.mjGEOM_HFIELD, "ground"
+    floor.pos, floor.quat = [*parts["ground_at"], low], [np.cos(turn), 0, 0, np.sin(turn)]
+    model = spec.compile()
+    model.hfield_data[:] = ((heights - low) / span).ravel()
+    return model
+
+
+def _prepared(model: mujoco.MjModel, parts: dict[str, np.ndarray]) -> mujoco.MjModel:
+    """Parallel rays, a plain floor for the bands to lie on, and none of the model's own lamps:
+    all creatures are lit alike.
+    """
+    width, height = (SMOOTH * int(n) for n in parts["size"])
+    model.vis.global_.offwidth, model.vis.global_.offheight = width, height
+    model.vis.global_.orthographic, model.vis.global_.fovy = 1, float(parts["extent"])
+    model.vis.quality.offsamples, model.vis.quality.shadowsize = 0, SHADOW
+    model.light_active[:] = 0
+    head = model.vis.headlight
+    head.active, head.ambient[:], head.diffuse[:], head.specular[:] = 1, 0.42, 0.18, 0.05
+    floor = model.geom("floor").id
+    model.geom_matid[floor] = -1
+    model.geom_rgba[floor] = [FLOOR_GREY, FLOOR_GREY, FLOOR_GREY, 1]
+    if model.geom_type[floor] == mujoco.mjtGeom.mjGEOM_PLANE:
+        model.geom_size[floor, :2] = 0
+    return model
+
+
+def _add_lamp(
+    scene: mujoco.MjvScene, centre: np.ndarray, towards: np.ndarray, distance: float
+) -> None:
+    """A lamp far away that throws shadows. towards: [3] unit."""
+    lamp = scene.lights[scene.nlight]
+    lamp.type = int(mujoco.mjtLightType.mjLIGHT_DIRECTIONAL)
+    lamp.headlight, lamp.castshadow = 0, 1
+    lamp.pos[:], lamp.dir[:] = centre + distance * towards, -towards
+    lamp.ambient[:], lamp.diffuse[:], lamp.specular[:] = 0.0, 0.6, 0.1
+    scene.nlight += 1
+
+
+def _keep_floor_out_of_shadows(scene: mujoco.MjvScene, floor: int) -> None:
+    """Decoration throws no shadow; else the floor would speckle itself with its own."""
+    for geom in scene.geoms[: scene.ngeom]:
+        if geom.objtype == mujoco.mjtObj.mjOBJ_GEOM and geom.objid == floor:
+            geom.category = int(mujoco.mjtCatBit.mjCAT_DECOR)
+
+
+def _add_bands(
+    scene: mujoco.MjvScene, middles: np.ndarray, width: float, forward: np.ndarray
+) -> None:
+    """Bands across the way at points [n, 2] m."""
+    turn = np.array([[forward[0], -forward[1], 0], [forward[1], forward[0], 0], [0, 0, 1]])
+    for middle in middles:
+        geom = scene.geoms[scene.ngeom]
+        size, colour = (
+            np.array([width / 2, 50.0, BAND_HEIGHT / 2]),
+            np.array([BAND_GREY, BAND_GREY, BAND_GREY, 1], np.float32),
+        )
+        mujoco.mjv_initGeom(
+            geom,
+            mujoco.mjtGeom.mjGEOM_BOX,
+            size,
+            np.append(middle, BAND_HEIGHT / 2),
+            turn.ravel(),
+            colour,
+        )
+        geom.category = int(mujoco.mjtCatBit.mjCAT_DECOR)
+        scene.ngeom += 1
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

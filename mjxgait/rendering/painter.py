@@ -1,0 +1,215 @@
+"""Draws creatures on a floor with NumPy and Pillow alone: no GPU, no GL library, on any machine.
+
+Every primitive is hit by its own rays and kept by depth; meshes are filled triangle by triangle.
+Letters: `G` geoms.
+"""
+
+import dataclasses
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+from PIL import Image, ImageDraw, ImageFilter
+
+from mjxgait.rendering.camera import Camera
+from mjxgait.rendering.floor import draw_floor
+from mjxgait.rendering.relief import LIGHT as TOWARDS_LAMP
+from mjxgait.rendering.relief import Relief
+from mjxgait.rendering.shapes import Silhouettes, hit
+from mjxgait.rendering.triangles import fill_mesh
+
+SMOOTH = 2
+"""Rays per pixel and direction."""
+LIGHT = TOWARDS_LAMP / np.linalg.norm(TOWARDS_LAMP)
+"""Towards the lamp, as (forward, left, up) of the creature's way."""
+SHADOW_GREY = 0.30
+OUTLINE = 0.45
+HAZE = np.array([224, 226, 228], dtype=np.float32)
+"""What parts on the far side fade into, so that left and right limbs can be told apart."""
+MOST_HAZE = 0.42
+COMPASS = np.stack(
+    [
+        np.cos(np.linspace(0, 2 * np.pi, 28, endpoint=False)),
+        np.sin(np.linspace(0, 2 * np.pi, 28, endpoint=False)),
+    ],
+    1,
+)
+SEEN_GROUPS = 3
+"""MuJoCo shows geom groups 0 to 2 unless told otherwise."""
+
+
+class Painter:
+    """What is needed to draw one kind of creature, anywhere."""
+
+    def __init__(self, model: mujoco.MjModel) -> None:
+        """`far` [G] may be set: 1 for parts on the creature's far side, which are drawn paler; 0
+        for those on its near side.
+        """
+        self.model = model
+        self.geoms = seen_geoms(model)
+        self.colours = geom_colours(model)[self.geoms, :3]
+        self.outlines = Silhouettes(model, self.geoms)
+        self.far = np.zeros(len(self.geoms))
+
+    def shadows(self, pos: np.ndarray, rot: np.ndarray) -> np.ndarray:
+        """[geoms, points, 3] m: what hides the floor from light that falls straight down.
+
+        pos, rot: world positions [ngeom, 3] m and rotations [ngeom, 3, 3] of its geoms.
+        """
+        directions = np.column_stack([COMPASS, np.zeros(len(COMPASS))])
+        return self.outlines.outermost(pos[self.geoms], rot[self.geoms], directions)
+
+    def draw(self, canvas: "_Canvas", pos: np.ndarray, rot: np.ndarray, first: int = 0) -> None:
+        """Onto a canvas whose bodies are numbered from `first` on."""
+        pos, rot = pos[self.geoms], rot[self.geoms]
+        right, up, _ = canvas.camera.axes
+        rims = canvas.camera.pixels(
+            self.outlines.outermost(pos, rot, np.stack([right, up, -right, -up]))
+        )
+        for i, geom in enumerate(self.geoms):
+            body = first + int(self.model.geom_bodyid[geom])
+            paint = _Paint(self.colours[i], float(self.far[i]), body)
+            kind = int(self.model.geom_type[geom])
+            if kind == mujoco.mjtGeom.mjGEOM_MESH:
+                fill_mesh(canvas, self.model, int(geom), pos[i], rot[i], paint)
+            else:
+                canvas.primitive(kind, self.model.geom_size[geom], pos[i], rot[i], rims[i], paint)
+
+
+def paint(
+    camera: Camera,
+    creatures: Sequence[tuple[Painter, np.ndarray, np.ndarray]],
+    origin: np.ndarray,
+    relief: Relief | None = None,
+) -> Image.Image:
+    """One frame.
+
+    Args:
+      creatures: the painter of each, and world positions [ngeom, 3] m and rotations [ngeom, 3, 3]
+        of its geoms.
+      origin: [2] m, where the scale on the floor is zero.
+      relief: of ground that is no plane.
+    """
+    fine = camera.enlarged(SMOOTH)
+    picture = draw_floor(camera, origin, relief).resize(
+        (fine.width, fine.height), Image.Resampling.BICUBIC
+    )
+    rims = [painter.shadows(pos, rot) for painter, pos, rot in creatures]
+    _shade_floor(picture, fine, rims, relief)
+    canvas, first = _Canvas(np.asarray(picture, dtype=np.float32).copy(), fine), 0
+    for painter, pos, rot in creatures:
+        painter.draw(canvas, pos, rot, first)
+        first += painter.model.nbody
+    return canvas.image().reduce(SMOOTH)
+
+
+def _shade_floor(
+    picture: Image.Image, camera: Camera, rims: Sequence[np.ndarray], relief: Relief | None
+) -> None:
+    """Darkens the floor where the light from above does not reach it."""
+    mask = Image.new("L", picture.size)
+    draw = ImageDraw.Draw(mask)
+    for points in rims:
+        points[..., 2] = 0.0 if relief is None else relief(points[..., 0], points[..., 1])
+        for polygon in camera.pixels(points):
+            draw.polygon([tuple(p) for p in polygon], fill=round(255 * SHADOW_GREY))
+    mask = mask.filter(ImageFilter.BoxBlur(max(camera.scale * 0.012, 1)))
+    picture.paste((40, 44, 52), mask=mask)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Paint:
+    """colour: [3] 0 to 1. far: 0 to 1, see `Painter`. body: for the outline between parts."""
+
+    colour: np.ndarray
+    far: float
+    body: int
+
+
+class _Canvas:
+    """A picture [height, width, 3] that knows how far away each of its pixels is."""
+
+    def __init__(self, pixels: np.ndarray, camera: Camera) -> None:
+        self.pixels, self.camera = pixels, camera
+        self.depth = np.full(pixels.shape[:2], np.inf)
+        self.body = np.full(pixels.shape[:2], -1, dtype=np.int32)
+        self.light = lamp_direction(camera.forward)
+
+    def primitive(
+        self,
+        kind: int,
+        size: np.ndarray,
+        pos: np.ndarray,
+        rot: np.ndarray,
+        rim: np.ndarray,
+        paint: _Paint,
+    ) -> None:
+        """Draws a geom whose outline lies between the pixels in rim [4, 2]."""
+        x0, y0 = np.maximum(np.floor(rim.min(0)).astype(int) - 1, 0)
+        x1, y1 = np.minimum(
+            np.ceil(rim.max(0)).astype(int) + 2, [self.camera.width, self.camera.height]
+        )
+        if x0 >= x1 or y0 >= y1:
+            return
+        rays = self.camera.rays(np.arange(x0, x1), np.arange(y0, y1)).reshape(-1, 3)
+        distance, normal = hit(kind, size, (rays - pos) @ rot, self.camera.axes[2] @ rot)
+        shape = (y1 - y0, x1 - x0)
+        self.cover(
+            (slice(y0, y1), slice(x0, x1)),
+            distance.reshape(shape),
+            (normal @ rot.T).reshape(*shape, 3),
+            paint,
+        )
+
+    def cover(
+        self, place: tuple[slice, slice], distance: np.ndarray, normal: np.ndarray, paint: _Paint
+    ) -> None:
+        """Paints a rectangle where it is nearer than what is there.
+
+        distance: [h, w] m; normal: [h, w, 3] in the world.
+        """
+        nearer = distance < self.depth[place]
+        self.depth[place][nearer] = distance[nearer]
+        self.body[place][nearer] = paint.body
+        n = normal[nearer]
+        # A lamp, the sky above and a little light from the floor.
+        bright = 0.30 + 0.52 * np.maximum(n @ self.light, 0) + 0.20 * (0.5 + 0.5 * n[:, 2])
+        colour = 255 * np.clip(bright[:, None] * (0.06 + 0.94 * paint.colour), 0, 1)
+        self.pixels[place][nearer] = colour + MOST_HAZE * paint.far * (HAZE - colour)
+
+    def image(self) -> Image.Image:
+        """The picture, with dark lines where one part ends before another."""
+        edge = np.zeros(self.depth.shape, dtype=bool)
+        for axis in (0, 1):
+            here, there = (
+                np.take(self.body, range(a, self.body.shape[axis] - 1 + a), axis) for a in (0, 1)
+            )
+            differs = here != there
+            inner = tuple(slice(None, -1) if i == axis else slice(None) for i in range(2))
+            edge[inner] |= differs
+        self.pixels[edge] *= OUTLINE
+        return Image.fromarray(self.pixels.astype(np.uint8))
+
+
+def lamp_direction(forward: np.ndarray) -> np.ndarray:
+    """[3] unit vector in the world towards the lamp. forward: [2] the creature's way."""
+    return LIGHT @ np.array([[*forward, 0.0], [-forward[1], forward[0], 0.0], [0.0, 0.0, 1.0]])
+
+
+def seen_geoms(model: mujoco.MjModel) -> np.ndarray:
+    """Ids of the geoms that belong to a creature and can be seen."""
+    alpha = geom_colours(model)[:, 3] if model.ngeom else np.zeros(0)
+    flat = np.isin(model.geom_type, [mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD])
+    return np.flatnonzero(
+        (model.geom_bodyid != 0) & (model.geom_group < SEEN_GROUPS) & ~flat & (alpha > 0)
+    )
+
+
+def geom_colours(model: mujoco.MjModel) -> np.ndarray:
+    """[ngeom, 4] red, green, blue, opacity, each 0 to 1: of the material where a geom has one."""
+    material = model.geom_matid
+    return np.where(
+        (material >= 0)[:, None],
+        model.mat_rgba[np.maximum(material, 0)] if model.nmat else 0.0,
+        model.geom_rgba,
+    )

@@ -1,0 +1,121 @@
+"""All plots of a run, as PNG and SVG: the one function that the end of training and `mjxgait
+plot` call.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import jax.numpy as jnp
+import numpy as np
+
+from mjxgait.config.schema import Config
+from mjxgait.controllers.sims_brain.reference import BrainTwin
+from mjxgait.controllers.sims_brain.reference_body.material import IN_LIGHT
+from mjxgait.creature import Creature
+from mjxgait.errors import UserError
+from mjxgait.plugins import make_task
+from mjxgait.plugins.registry import what_ends
+from mjxgait.reference.controllers.registry import twin_of
+from mjxgait.rendering import (
+    brain,
+    grown,
+    strobe,
+    trees,
+)
+from mjxgait.rendering.cast import LOOP_SECONDS, champion_of
+from mjxgait.rendering.curves import Lines, progress_figures
+from mjxgait.rendering.filmstrip import draw_filmstrip
+from mjxgait.rendering.gaitplots import gait_figures
+from mjxgait.rendering.network import network_of
+from mjxgait.rendering.style import (
+    FORMATS,
+    Figures,
+    figure,
+    save,
+)
+from mjxgait.rendering.walk import Walk
+from mjxgait.training.disk import disk_errors
+from mjxgait.training.folder import (
+    CHAMPION,
+    METRICS,
+    PLOTS,
+    open_run,
+    read_metrics,
+)
+from mjxgait.training.lock import why_empty
+from mjxgait.training.own import command
+
+
+def plot_run(run: Path, out: Path | None = None, formats: Sequence[str] = FORMATS) -> list[Path]:
+    """Writes every plot there is something to draw for into RUN/plots (or `out`); returns the
+    files.
+
+    Raises:
+      UserError: not a run folder, nothing to plot yet, or the folder cannot be written.
+    """
+    creature, config = open_run(run)
+    lines = read_metrics(run / METRICS)
+    if not lines:
+        raise UserError(f"{run}: nothing to plot; {why_empty(run)}")
+    out = out or run / PLOTS
+    with disk_errors(out, "the run itself is safe", "draw again"):
+        out.mkdir(parents=True, exist_ok=True)
+    figures = dict(progress_figures(lines, _weights(creature, config, lines)))
+    if (run / CHAMPION).exists():
+        walk = champion_of(run, LOOP_SECONDS).walk
+        figures |= dict(gait_figures(walk)) | {
+            "filmstrip": ((12, 4.8), lambda drawing: draw_filmstrip(drawing, walk))
+        }
+        figures |= {**_of_goals(walk), **_of_programs(walk), **_of_grown(run, walk)}
+    files = []
+    with disk_errors(
+        out, "the run itself is safe", f"draw it with {command('plot', run, run=run)}"
+    ):
+        for name, (size, compose) in figures.items():
+            with figure(size) as drawing:
+                compose(drawing)
+                files += save(drawing, out / name, formats)
+    return files
+
+
+def _of_goals(walk: Walk) -> Figures:
+    """The way to a goal; nothing where there is none."""
+    if walk.marked is None:
+        return {}
+    picture = strobe.strobe(walk)
+    shape = strobe.shape(picture)
+    return {"strobe": (shape, lambda drawing: strobe.draw_strobe(drawing, walk, picture))}
+
+
+def _of_programs(walk: Walk) -> Figures:
+    """The champion's expressions; nothing where it has none."""
+    if walk.champion.controller != "program":
+        return {}
+    found = trees.expressions_of(walk.creature, walk.champion)
+    return {"expressions": (trees.shape(found), lambda drawing: trees.draw_trees(drawing, found))}
+
+
+def _of_grown(run: Path, walk: Walk) -> Figures:
+    """Graph and body, brain, and ancestors; nothing where the body did not grow."""
+    if "graph.half" not in walk.champion.genome:
+        return {}
+    row = grown.bodies_of(run, walk.champion)
+    twin = twin_of(walk.creature, walk.champion, walk.time_step)
+    assert isinstance(twin, BrainTwin)
+    thoughts = network_of(twin, walk.champion.task in IN_LIGHT)
+    return {
+        "graph": ((10, 4.6), lambda drawing: grown.draw_graph(drawing, walk)),
+        "brain": (brain.shape(thoughts), lambda drawing: brain.draw_brain(drawing, thoughts)),
+        "bodies": (
+            (2.2 * max(len(row.bodies), 2), 2.4),
+            lambda drawing: grown.draw_bodies(drawing, row),
+        ),
+    }
+
+
+def _weights(creature: Creature, config: Config, lines: Lines) -> dict[str, np.ndarray]:
+    """Signed weight of each term of the run's task, [generations]."""
+    step, ends = float(creature.model.opt.timestep), what_ends(creature, config.rollout)
+    task = make_task(creature, step, ends, config)
+    rows = [task.weights(config.fitness, jnp.int32(line["generation"])) for line in lines]
+    return {name: np.array([float(row[name]) for row in rows]) for name in task.terms}

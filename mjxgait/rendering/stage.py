@@ -1,0 +1,160 @@
+"""One or several walks on one floor, and the camera that goes along with them."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from PIL import Image
+
+from mjxgait.rendering.camera import Camera, view_of
+from mjxgait.rendering.entrant import Entrant
+from mjxgait.rendering.painter import paint
+from mjxgait.rendering.relief import Relief
+from mjxgait.rendering.walk import Walk
+
+ROOM = 1.35
+"""Of the picture, in units of the creature."""
+LANE, LONG_LANE = 1.25, 0.6
+"""Least width of a lane in units of the creature's width and length."""
+RACE_ELEVATION = np.radians(33.0)
+LAG = 0.15
+"""Of the picture's width that the first in a race is ahead of its middle."""
+SMOOTH_SECONDS = 0.6
+"""Over which the camera's way is averaged, so that it does not shake with each step."""
+
+
+class Stage:
+    """Walks in lanes side by side, the first one nearest, seen from the side.
+
+    Frames are control steps of the first. view: a name in `camera.VIEWS`; by default a little from
+    the front and from above.
+    """
+
+    def __init__(
+        self, walks: Sequence[Walk], width: int, height: int, view: str | None = None
+    ) -> None:
+        self.width, self.height, self.time_step = width, height, walks[0].time_step
+        self.origin, self.forward = walks[0].trunk_pos[0, :2], walks[0].forward
+        self.left = np.array([-self.forward[1], self.forward[0], 0.0])
+        self.entrants = [Entrant(walk, self.origin, self.forward) for walk in walks]
+        self.frames = max(round(walk.seconds / self.time_step) for walk in walks)
+        usual = {} if len(walks) == 1 else {"elevation": float(RACE_ELEVATION)}
+        self.view = usual if view is None else view_of(view)
+        self.lanes = self._lanes()
+        self._choose_view()
+
+    @property
+    def alike(self) -> bool:
+        """Whether all are one creature, with the same things on its way."""
+        first = self.entrants[0].walk
+        return all(_same_scene(first, entrant.walk) for entrant in self.entrants[1:])
+
+    def picture(self, frame: int) -> Image.Image:
+        """The moment of a frame; a walk that is over stays as it ended."""
+        shown = []
+        for entrant, lane in zip(self.entrants, self.lanes, strict=True):
+            pos, rot = entrant.poses(frame * self.time_step)
+            shown.append((entrant.painter, pos + lane, rot))
+        return paint(self.camera(frame), shown, self.origin, self.relief)
+
+    def pictures(self, frames: Sequence[int]) -> Iterator[Image.Image]:
+        """The moments of several frames."""
+        return map(self.picture, frames)
+
+    def camera(self, frame: int) -> Camera:
+        """Goes along with the one in front."""
+        way = self.way[min(frame, len(self.way) - 1)]
+        centre = np.append(
+            self.origin + way[0] * self.forward + way[1] * self.left[:2], self.middle + way[2]
+        )
+        return Camera(
+            centre + self.shift, self.forward, self.scale, self.width, self.height, **self.view
+        )
+
+    def behind(self, frame: int, place: int) -> np.ndarray:
+        """[2] pixels, right behind the creature in a lane and half as high as it stands."""
+        entrant = self.entrants[place]
+        trunk = entrant.trunk(frame * self.time_step) + self.lanes[place]
+        point = trunk[:2] + entrant.back * self.forward
+        level = float(self.relief(*point)) if self.relief else 0.0
+        middle = trunk[2] if entrant.walk.afloat else 0.5 * entrant.top + level
+        return self.camera(frame).pixels(np.append(point, middle))
+
+    @property
+    def relief(self) -> Relief | None:
+        """The ground, if it is no plane; each lane has that of its own walk."""
+        if all(entrant.walk.ground is None for entrant in self.entrants):
+            return None
+        return self._height
+
+    def _height(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """m at places of the world, seen from the nearest lane."""
+        places = np.stack(np.broadcast_arrays(x, y), -1).reshape(-1, 2)
+        aside = (places - self.origin) @ self.left[:2]
+        nearest = np.abs(aside[:, None] - self.lanes @ self.left).argmin(-1)
+        heights = np.zeros(len(places))
+        for lane, entrant in enumerate(self.entrants):
+            mine = nearest == lane
+            heights[mine] = entrant.ground_heights(places[mine] - self.lanes[lane, :2])
+        return heights.reshape(np.shape(x))
+
+    def _lanes(self) -> np.ndarray:
+        """[lanes, 3] m from the middle of all."""
+        widths = np.array([max(LANE * one.across, LONG_LANE * one.along) for one in self.entrants])
+        places = np.cumsum(widths) - widths / 2
+        return (places - places[[0, -1]].mean())[:, None] * self.left
+
+    def _choose_view(self) -> None:
+        """Scale and height at which all lanes fill the picture well."""
+        flat = Camera(np.append(self.origin, 0.0), self.forward, 1.0, 0, 0, **self.view)
+        outlines = [one.outline + lane for one, lane in zip(self.entrants, self.lanes, strict=True)]
+        seen = flat.pixels(np.concatenate(outlines))
+        size = np.ptp(seen, axis=0)
+        self.scale = float(min(self.width / (ROOM * size[0]), self.height / (ROOM * size[1])))
+        self.shift = float(seen[:, 0].max() + seen[:, 0].min()) / 2 * flat.axes[0]
+        # The middle of what is seen, a little lower for the numbers on the floor.
+        self.middle = (
+            float(-seen[:, 1].min() - 0.5 * size[1]) / np.cos(flat.elevation)
+            - 0.03 * self.height / self.scale
+        )
+        everyone = np.array([self._path(entrant) for entrant in self.entrants])
+        # In a race there is room behind the one in front.
+        behind = 0.0 if len(everyone) == 1 else LAG * self.width / self.scale
+        front = np.column_stack(
+            [everyone[..., 0].max(0) - behind, everyone[..., 1].mean(0), everyone[..., 2].mean(0)]
+        )
+        self.way = smooth(front, round(SMOOTH_SECONDS / self.time_step))
+
+    def _path(self, entrant: Entrant) -> np.ndarray:
+        """[frames, 3] m: ahead of the start, to its left, and the ground's height there; of who is
+        afloat how far it has risen.
+        """
+        steps = [entrant.frame(frame * self.time_step) for frame in range(self.frames)]
+        trunk = entrant.walk.trunk_pos[steps]
+        places = entrant.placed(trunk)[:, :2]
+        moved = places - self.origin
+        afloat = entrant.walk.afloat
+        level = trunk[:, 2] - trunk[0, 2] if afloat else entrant.ground_heights(places)
+        return np.column_stack([moved @ self.forward, moved @ self.left[:2], level])
+
+
+def _same_scene(first: Walk, other: Walk) -> bool:
+    """Whether one model shows both."""
+    if first.creature.files["creature.xml"] != other.creature.files["creature.xml"]:
+        return False
+    specs = [walk.marked for walk in (first, other)]
+    return len({None if spec is None else spec.to_xml() for spec in specs}) == 1
+
+
+def smooth(path: np.ndarray, frames: int) -> np.ndarray:
+    """A path [T, D] averaged over so many frames."""
+    frames = max(min(frames, len(path)), 1)
+    padded = np.concatenate(
+        [
+            np.repeat(path[:1], frames // 2, 0),
+            path,
+            np.repeat(path[-1:], frames - 1 - frames // 2, 0),
+        ]
+    )
+    return np.column_stack(
+        [np.convolve(column, np.ones(frames) / frames, mode="valid") for column in padded.T]
+    )

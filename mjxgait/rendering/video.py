@@ -1,0 +1,188 @@
+"""Moving pictures: one champion, or several walks as a race, written as WebP, GIF, MP4 or PNG."""
+
+import dataclasses
+import itertools
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import Image, ImageDraw
+
+from mjxgait.config.shipped import install_command
+from mjxgait.errors import UserError
+from mjxgait.files import replaced
+from mjxgait.rendering.floor import DARK_INK, font
+from mjxgait.rendering.gl import gl_pictures
+from mjxgait.rendering.stage import Stage
+from mjxgait.rendering.walk import Walk
+from mjxgait.training.disk import require_writable
+
+FORMATS = (".webp", ".gif", ".mp4", ".png")
+PAPER = (255, 255, 255, 200)
+LABEL_GAP = 8
+"""Pixels between a creature and its label."""
+EDGE = 8
+"""Pixels between a label and the picture's edge."""
+GIF_HUNDREDTHS = 100
+"""A GIF counts the time of a frame in hundredths of a second."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Runner:
+    """A walk and what is written above it; empty for a walk that is shown alone."""
+
+    walk: Walk
+    label: str = ""
+
+
+def moving_pictures(
+    runners: Sequence[Runner], stage: Stage, fps: int, slow: float = 1.0, backend: str | None = None
+) -> Iterator[Image.Image]:
+    """The frames of a video.
+
+    slow: how many times slower than life. backend: of GL; None draws without.
+    """
+    step = stage.time_step
+    count = max(int(stage.frames * step * slow * fps), 1)
+    frames = [min(round(i / fps / slow / step), stage.frames - 1) for i in range(count)]
+    pictures = gl_pictures(stage, frames, backend) if backend else stage.pictures(frames)
+    for frame, picture in zip(frames, pictures, strict=True):
+        write_captions(picture, stage, runners, frame, slow)
+        yield picture
+
+
+def write_captions(
+    picture: Image.Image, stage: Stage, runners: Sequence[Runner], frame: int, slow: float = 1.0
+) -> None:
+    """Name, speed and time; in a race also who is who."""
+    draw = ImageDraw.Draw(picture, "RGBA")
+    size, now = max(stage.height // 20, 13), frame * stage.time_step
+    lead = runners[0].walk
+    if len({runner.walk.creature.name for runner in runners}) == 1:
+        draw.text((12, 10), spoken(lead), fill=DARK_INK, font=font(size))
+    time = f"{now:.1f} s" + (f"  (slowed {slow:g} times)" if slow != 1 else "")
+    draw.text((stage.width - 12, 10), time, fill=DARK_INK, font=font(size), anchor="ra")
+    if len(runners) == 1:
+        draw.text(
+            (12, 14 + size), condition(lead, now), fill=DARK_INK, font=font(round(0.8 * size))
+        )
+        return
+    for place, runner in reversed(list(enumerate(runners))):
+        x, y = stage.behind(frame, place) - [LABEL_GAP, 0]
+        text = f"{runner.label}: {condition(runner.walk, now)}"
+        letters = font(round(0.7 * size))
+        box = draw.textbbox((x, y), text, font=letters, anchor="rm")
+        # Whoever has been left behind keeps a label at the edge.
+        x += max(EDGE - box[0], 0) + min(stage.width - EDGE - box[2], 0)
+        y += max(EDGE - box[1], 0) + min(stage.height - EDGE - box[3], 0)
+        left, top, right, bottom = draw.textbbox((x, y), text, font=letters, anchor="rm")
+        draw.rectangle((left - 4, top - 3, right + 4, bottom + 3), fill=PAPER)
+        draw.text((x, y), text, fill=DARK_INK, font=letters, anchor="rm")
+
+
+def spoken(walk: Walk) -> str:
+    """The creature's name as it is written in pictures."""
+    return walk.creature.name.replace("_", " ")
+
+
+def condition(walk: Walk, time: float) -> str:
+    """The mean forward speed of the last second at s since the start, or that it fell."""
+    if time >= walk.fell:
+        return f"fell at {walk.fell:.1f} s"
+    frame = min(round(time / walk.time_step), len(walk.qpos) - 1)
+    before = max(frame - round(1.0 / walk.time_step), 0)
+    if frame == before:
+        return "0.00 m/s"
+    moved = (walk.trunk_pos[frame] - walk.trunk_pos[before])[:2] @ walk.forward
+    return f"{moved / ((frame - before) * walk.time_step):.2f} m/s"
+
+
+def write_video(pictures: Iterable[Image.Image], path: Path, fps: int) -> None:
+    """Writes the frames in the format that the name of the file asks for.
+
+    Raises:
+      UserError: another format, MP4 without the extra, or a file that cannot be written.
+    """
+    writers = {".mp4": _write_mp4, ".webp": _write_webp, ".gif": _write_gif}
+    if (write := writers.get(path.suffix.lower())) is None:
+        raise UserError(
+            f'{path}: cannot write "{path.suffix}"; end the name with {", ".join(FORMATS)}'
+        )
+    try:
+        with replaced(path) as beside:
+            write(pictures, beside, fps)
+    except OSError as error:
+        raise UserError(f"{path}: cannot be written ({error.strerror or error})") from None
+
+
+def require_writer(path: Path) -> None:
+    """Says before the long work whether the file can be written.
+
+    Raises:
+      UserError: see `write_video`.
+    """
+    if path.suffix.lower() not in FORMATS:
+        raise UserError(
+            f'{path}: cannot write "{path.suffix}"; end the name with {", ".join(FORMATS)}'
+        )
+    if path.suffix.lower() == ".mp4":
+        _import_av(path)
+    require_writable(path)
+
+
+def _write_webp(pictures: Iterable[Image.Image], path: Path, fps: int) -> None:
+    first, *others = pictures
+    first.save(
+        path,
+        save_all=True,
+        append_images=others,
+        duration=round(1000 / fps),
+        loop=0,
+        quality=75,
+        method=3,
+    )
+
+
+def _write_gif(given: Iterable[Image.Image], path: Path, fps: int) -> None:
+    pictures = list(given)
+    # One palette for all, so that still parts do not flicker.
+    samples = pictures[:: max(len(pictures) // 6, 1)]
+    joined = Image.fromarray(np.concatenate([np.asarray(sample) for sample in samples]))
+    palette = joined.quantize(128, method=Image.Quantize.MEDIANCUT)
+    frames = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
+    duration = 10 * max(round(GIF_HUNDREDTHS / fps), 2)
+    frames[0].save(
+        path, save_all=True, append_images=frames[1:], duration=duration, loop=0, optimize=False
+    )
+
+
+def _write_mp4(pictures: Iterable[Image.Image], path: Path, fps: int) -> None:
+    av = _import_av(path)
+    frames = iter(pictures)
+    first = next(frames)
+    # H.264 wants even sizes.
+    width, height = first.width // 2 * 2, first.height // 2 * 2
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("libx264", rate=fps)
+        stream.width, stream.height, stream.pix_fmt, stream.options = (
+            width,
+            height,
+            "yuv420p",
+            {"crf": "20"},
+        )
+        for picture in itertools.chain([first], frames):
+            container.mux(
+                stream.encode(av.VideoFrame.from_image(picture.crop((0, 0, width, height))))
+            )
+        container.mux(stream.encode())
+
+
+def _import_av(path: Path) -> Any:
+    try:
+        import av
+    except ImportError:
+        raise UserError(
+            f"{path}: MP4 needs an extra: {install_command('video')}; WebP and GIF need none"
+        ) from None
+    return av

@@ -1,0 +1,180 @@
+"""A champion's undisturbed walk, simulated once in C MuJoCo: what every picture, video and
+animation is made of.
+
+Letters: `T` frames (control steps), `J` joints, `G` geoms, `nq` as in MuJoCo.
+"""
+
+import dataclasses
+from functools import cached_property
+
+import mujoco
+import numpy as np
+
+from mjxgait.certification.config import CertificateConfig
+from mjxgait.certification.simulate import simulate
+from mjxgait.certification.tasks import how_simulated
+from mjxgait.champion import Champion
+from mjxgait.creature import Creature
+from mjxgait.reference.layout import Ground
+from mjxgait.reference.measure import Recording, measure
+from mjxgait.reference.outcome import Trajectory
+from mjxgait.reference.starts import Starts, nominal_starts
+from mjxgait.reference.strides import stride_starts
+from mjxgait.reference.terrain import terrain_of
+from mjxgait.rendering.marks import marked
+
+WARMUP = 2.0
+"""s until a gait has settled; strides are taken from after it where there are enough."""
+AFTERMATH = 0.7
+"""s that are still shown after a fall."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Walk:
+    """One walk.
+
+    qpos: [T, nq]. fell: s, infinite when it stayed up. It ends with the time asked for, or soon
+    after the fall. start: how it began, with its goal and its bar where the task has them.
+    """
+
+    creature: Creature
+    champion: Champion
+    trajectory: Trajectory
+    fell: float
+    start: Starts | None = None
+
+    @property
+    def time_step(self) -> float:
+        """Between frames, s."""
+        return self.trajectory.time_step
+
+    @property
+    def qpos(self) -> np.ndarray:
+        """[T, nq] m, quaternions, rad."""
+        return self.trajectory.qpos[0]
+
+    @property
+    def seconds(self) -> float:
+        """Length of the walk."""
+        return len(self.qpos) * self.time_step
+
+    @cached_property
+    def recording(self) -> Recording:
+        """What a look at every frame measured."""
+        return measure(self.creature, self.trajectory)
+
+    @cached_property
+    def shown(self) -> mujoco.MjModel:
+        """The creature's model, and after its own bodies and geoms what stands on its way."""
+        spec = self.marked
+        return self.creature.model if spec is None else spec.compile()
+
+    @cached_property
+    def marked(self) -> mujoco.MjSpec | None:
+        """What `shown` is made of; None where nothing stands on its way."""
+        if self.start is None:
+            return None
+        goals, bar = self._goals(self.start.goal[:1]), self.start.bar[0]
+        over = bar if np.isfinite(bar).all() else None
+        if not len(goals) and over is None:
+            return None
+        places = self.creature.frame.stand_pos[:2] + np.outer(goals, self.forward)
+        return marked(self.creature, goals, self.ground_heights(places), over)
+
+    def _goals(self, first: np.ndarray) -> np.ndarray:
+        """[goals] m ahead of the start, all that it ever had."""
+        goals, onward = list(first[first > 0]), how_simulated(self.champion.task).onward
+        farthest = ((self.trunk_pos[:, :2] - self.trunk_pos[0, :2]) @ self.forward).max()
+        while len(goals) and (after := onward(goals[-1], goals[0], farthest)) > goals[-1]:
+            goals.append(after)
+        return np.array(goals)
+
+    @cached_property
+    def forward(self) -> np.ndarray:
+        """[2] horizontal unit vector, in the world, in which the creature starts out."""
+        axis = (self.creature.frame.stand_rot @ self.creature.frame.forward)[:2]
+        return axis / np.linalg.norm(axis)
+
+    @cached_property
+    def trunk_pos(self) -> np.ndarray:
+        """[T, 3] m in the world."""
+        return self.body_poses()[0][:, self.creature.trunk]
+
+    @property
+    def afloat(self) -> bool:
+        """Whether it is in water, where nothing holds it at a height."""
+        return how_simulated(self.champion.task, self.champion.wish).drag > 0
+
+    @cached_property
+    def ground(self) -> Ground | None:
+        """What it walks on; None for the plane z = 0."""
+        return terrain_of(self.creature)
+
+    def ground_heights(self, places: np.ndarray) -> np.ndarray:
+        """[T] m of the ground at places [T, 2] m in the world."""
+        return self.ground.height(*places.T) if self.ground else np.zeros(len(places))
+
+    def stride_frames(self) -> np.ndarray:
+        """Frames at which the controller's cycle begins anew, while the creature is up: a loop of
+        whole cycles has no seam, which one of footfalls would have. Footfalls where it has none.
+        """
+        phase = self.trajectory.phase[0]
+        cyclic = np.isfinite(phase).all()
+        starts = np.flatnonzero(np.diff(phase) < 0) + 1 if cyclic else stride_starts(self.recording)
+        return starts[starts * self.time_step < self.fell]
+
+    def steady_strides(self, count: int) -> tuple[int, int] | None:
+        """First and last frame of `count` strides in a row whose durations are nearest to the
+        usual; None when there are not so many.
+        """
+        starts = self.stride_frames()
+        settled = starts[starts * self.time_step >= WARMUP]
+        starts = settled if len(settled) > count else starts
+        if len(starts) <= count:
+            return None
+        lengths = starts[count:] - starts[:-count]
+        chosen = int(np.argmin(np.abs(lengths - np.median(lengths))))
+        return int(starts[chosen]), int(starts[chosen + count])
+
+    def body_poses(self, frames: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """World positions [T, nbody, 3] m and rotations [T, nbody, 3, 3] of the bodies."""
+        return _poses(
+            self.creature.model,
+            self.qpos if frames is None else self.qpos[frames],
+            ("xpos", "xmat"),
+        )
+
+    def geom_poses(self, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """World positions [T, G, 3] m and rotations [T, G, 3, 3] of all that is shown."""
+        return _poses(self.shown, self.qpos[frames], ("geom_xpos", "geom_xmat"))
+
+
+def record_walk(creature: Creature, champion: Champion, seconds: float) -> Walk:
+    """Simulates the champion on the creature's ground, without noise or pushes."""
+    task = how_simulated(champion.task, champion.wish)
+    start = task.aimed(nominal_starts(creature, 1), CertificateConfig())
+    outcome = simulate(creature, champion, start, seconds, record=1, threads=1)
+    film, fell = outcome.trajectory, float(outcome.fell[0])
+    finite = np.isfinite(film.qpos[0]).all(1) & np.isfinite(film.qvel[0]).all(1)
+    last = len(finite) if finite.all() else int(np.argmin(finite))
+    last = min(last, round((fell + AFTERMATH) / film.time_step)) if np.isfinite(fell) else last
+    # One that blew up at once is shown standing.
+    frames = np.minimum(np.arange(max(last, 2)), max(last, 1) - 1)
+    kept = {
+        name: getattr(film, name)[:, frames]
+        for name in ("qpos", "qvel", "torque", "target", "phase")
+    }
+    return Walk(creature, champion, dataclasses.replace(film, **kept), fell, start)
+
+
+def _poses(
+    model: mujoco.MjModel, qpos: np.ndarray, names: tuple[str, str]
+) -> tuple[np.ndarray, np.ndarray]:
+    data = mujoco.MjData(model)
+    where, how = ([] for _ in names)
+    for row in qpos:
+        data.qpos[:] = row
+        mujoco.mj_kinematics(model, data)
+        where.append(getattr(data, names[0]).copy())
+        how.append(getattr(data, names[1]).reshape(-1, 3, 3).copy())
+    return np.array(where), np.array(how)

@@ -1,0 +1,94 @@
+"""What tasks with a goal have in common in the examination."""
+
+import abc
+import dataclasses
+
+import numpy as np
+
+from mjxgait.certification.config import CertificateConfig
+from mjxgait.certification.criteria import (
+    Criterion,
+    at_least,
+    at_most,
+    parts,
+    physics,
+)
+from mjxgait.certification.tasks.staying import Unasked
+from mjxgait.champion import Champion
+from mjxgait.reference.measure import Recording
+from mjxgait.reference.outcome import Fall
+from mjxgait.reference.starts import Starts
+from mjxgait.tasks.hop.thresholds import GoalConfig
+
+HIGHEST = 1e3
+"""Standing heights: a trunk that hops may be anywhere, as long as no part of it lies."""
+
+
+class GoalDemands(Unasked, abc.ABC):
+    """See `Demands`. It is not asked to bear pushes: in half of a hop nothing can be done."""
+
+    drag: float = 0.0
+    pushed: bool = True
+    by_pushes: bool = False
+    grown: bool = False
+    leaps: bool = False
+    worth: float = 1.0
+    share: str
+    """What the share of criterion 4 does."""
+
+    @abc.abstractmethod
+    def wanted(self, config: CertificateConfig) -> GoalConfig:
+        """The thresholds of this task."""
+
+    @abc.abstractmethod
+    def second(self, whole: Recording, config: CertificateConfig) -> Criterion:
+        """Criterion 2: what has been done of the way."""
+
+    def fall(self, config: CertificateConfig) -> Fall:
+        """See `Demands`: a head or an elbow on the floor, or a base on its edge."""
+        return Fall(min_up=self.wanted(config).min_up, height=(0.0, HIGHEST), touch=True)
+
+    def aimed(
+        self, starts: Starts, config: CertificateConfig, rng: np.random.Generator | None = None
+    ) -> Starts:
+        """See `Demands`: a goal for each that has none yet."""
+        wanted = self.wanted(config)
+        drawn = wanted.nominal if rng is None else rng.uniform(*wanted.goals, len(starts))
+        return dataclasses.replace(starts, goal=np.where(starts.goal > 0, starts.goal, drawn))
+
+    def undisturbed(
+        self, whole: Recording, halved: Recording, config: CertificateConfig
+    ) -> tuple[Criterion, ...]:
+        """See `Demands`: 1 and 2, both at half the time step too, 8, 9; from the first moment on."""
+        basic, repeated = (self.basic(each, config) for each in (whole, halved))
+        failed = sum(not m.passed for c in repeated for m in c.measures)
+        of = " and ".join(str(c.number) for c in basic)
+        return (
+            *basic,
+            Criterion(6, "half the time step", (at_most(f"failures in {of}", failed, 0.0),)),
+            physics(whole, config.physics),
+            parts(whole, config.parts),
+        )
+
+    def kept(
+        self, champion: Champion, whole: Recording, config: CertificateConfig
+    ) -> tuple[Criterion, ...]:
+        """See `Demands`: evolution has promised nothing."""
+        return ()
+
+    def onward(self, goal: np.ndarray, first: np.ndarray, way: np.ndarray) -> np.ndarray:
+        """See `Demands`: the same."""
+        return goal
+
+    def disturbed(
+        self, started: float, pushed: float, config: CertificateConfig
+    ) -> tuple[Criterion, ...]:
+        """See `Demands`: 4. The report has what pushes do."""
+        share = at_least(self.share, started, self.wanted(config).arrive, 1.0)
+        return (Criterion(4, "perturbed starts and other goals", (share,)),)
+
+    def basic(self, whole: Recording, config: CertificateConfig) -> tuple[Criterion, ...]:
+        """What one recording decides, at whatever time step: 1 and 2."""
+        up = at_least("least upright", whole.trunk_up.min(), self.wanted(config).min_up, 1.0)
+        lies = at_most("time on wrong parts", whole.touch.mean(), 0.0)
+        return (Criterion(1, "stays up", (up, lies)), self.second(whole, config))

@@ -1,0 +1,149 @@
+"""What a way to a goal leaves behind, updated once per step for one creature."""
+
+import dataclasses
+from collections.abc import Sequence
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from mjxgait.controllers.observations import forward_way, sideways
+from mjxgait.creature.body import Body
+from mjxgait.tasks import base as protocol
+from mjxgait.tasks.falls import touches
+from mjxgait.tasks.hop.config import NEAR
+from mjxgait.tasks.work import positive_work
+from mjxgait.types import Sensed, pytree
+
+SLOW, SLOW_TURN = 0.0005, 0.005
+"""m/s and rad/s; who is slower than that stands still."""
+
+
+@pytree
+class Tally(protocol.Tally):
+    """Over the steps that a creature was up.
+
+    reason: a `falls.Reason`. goal: [] m ahead of the start. left: [] m from the latest position to
+    the goal along the start's forward axis, negative beyond it. aside: [] m to the left of the
+    start, latest. arrived: [] steps until it first was near the goal; as many as an
+    episode has if it never was. after: [] m, path of the trunk since then.
+    ground: [] steps on which a part touched the floor that must not. bent: [J] rad, how far the
+    joints are from standing, latest. fastest: [] rad/s, of all joints. still: [] steps since it last
+    moved. work: [] J that the joints have done; None where it counts nothing. closest: [G] m, the
+    smallest distance to each sub-goal; None where there is none.
+    """
+
+    goal: jax.Array
+    left: jax.Array
+    aside: jax.Array
+    arrived: jax.Array
+    after: jax.Array
+    ground: jax.Array
+    bent: jax.Array
+    fastest: jax.Array
+    still: jax.Array
+    work: jax.Array | None
+    closest: jax.Array | None
+
+
+@pytree
+class Standards:
+    """rest: [] steps without motion that end an episode; never if 0."""
+
+    rest: jax.Array
+
+
+def empty(creature: Body, horizon: int, energy: bool = False, sub_goals: int = 0) -> Tally:
+    """Tally of an individual that has not moved, whatever its goal.
+
+    energy: whether work counts. sub_goals: how many there are.
+    """
+    none, zero, one = jnp.zeros((), jnp.int32), jnp.zeros(()), jnp.ones(())
+    return Tally(
+        steps=none,
+        reason=none,
+        overlap=zero,
+        goal=one,
+        left=one,
+        aside=zero,
+        arrived=jnp.full((), horizon, jnp.int32),
+        after=zero,
+        ground=zero,
+        bent=jnp.zeros(len(creature.joints.names)),
+        fastest=zero,
+        still=none,
+        work=zero if energy else None,
+        closest=jnp.full(sub_goals, jnp.inf) if sub_goals else None,
+    )
+
+
+def goal_distance(creature: Body, goal: jax.Array, sensed: Sensed) -> jax.Array:
+    """From the trunk to the goal [] in m along the start's forward axis; positive when ahead."""
+    return goal - forward_way(creature, sensed)
+
+
+def distance(left: jax.Array, aside: jax.Array) -> jax.Array:
+    """Distance [] in m to a goal in the plane, of which so much lies ahead and to the side."""
+    return jnp.sqrt(left * left + aside * aside)
+
+
+def away(tally: Tally) -> jax.Array:
+    """Distance [] in m from the latest position to the goal, measured in the plane."""
+    return distance(tally.left, tally.aside)
+
+
+def updated(creature: Body, step: float, tally: Tally, sensed: Sensed, goal: jax.Array) -> Tally:
+    """The tally after one more step in s. goal: [] m."""
+    left = goal_distance(creature, goal, sensed)
+    aside = sideways(creature, sensed)
+    near = distance(left, aside) <= NEAR * goal
+    arrived = jnp.where(near, jnp.minimum(tally.arrived, tally.steps), tally.arrived)
+    moved = jnp.linalg.norm(sensed.trunk_vel) * step
+    return dataclasses.replace(
+        tally,
+        steps=tally.steps + 1,
+        goal=goal,
+        left=left,
+        aside=aside,
+        arrived=arrived,
+        after=tally.after + jnp.where(arrived < tally.steps, moved, 0.0),
+        ground=tally.ground + touches(creature, sensed),
+        bent=jnp.abs(sensed.joint_pos - creature.joints.stand.astype(np.float32)),
+        fastest=jnp.maximum(tally.fastest, jnp.max(jnp.abs(sensed.joint_vel), initial=0.0)),
+        still=jnp.where(moves(sensed), 0, tally.still + 1),
+    )
+
+
+def with_extras(
+    tally: Tally, sensed: Sensed, torque: jax.Array, step: float, sub_goals: Sequence[float]
+) -> Tally:
+    """The tally with what only some settings count: work, and distances to sub-goals.
+
+    torque: [J] N·m. step: s. sub_goals: [G] shares of the straight way to the goal.
+    """
+    if tally.work is not None:
+        done = tally.work + positive_work(torque, sensed, step)
+        tally = dataclasses.replace(tally, work=done)
+    if tally.closest is not None:
+        way = tally.goal - tally.left
+        apart = distance(jnp.array(sub_goals) * tally.goal - way, tally.aside)
+        tally = dataclasses.replace(tally, closest=jnp.minimum(tally.closest, apart))
+    return tally
+
+
+def moves(sensed: Sensed) -> jax.Array:
+    """Whether [] anything moves that one would see."""
+    turning = jnp.append(sensed.joint_vel, sensed.trunk_angvel)
+    return (jnp.max(jnp.abs(sensed.trunk_vel)) > SLOW) | (jnp.max(jnp.abs(turning)) > SLOW_TURN)
+
+
+def rested(tally: Tally, horizon: int, rest: jax.Array, touching: jax.Array) -> Tally:
+    """The tally, at the end of the episode if nothing has moved for `rest` steps [], unless that is 0.
+
+    touching: [] whether a part is on the floor that must not.
+    """
+    over = (rest > 0) & (tally.still >= rest)
+    left = jnp.where(over, horizon - tally.steps, 0)
+    return dataclasses.replace(
+        tally, steps=tally.steps + left, ground=tally.ground + left * touching
+    )

@@ -1,0 +1,250 @@
+"""What is demanded of all bodies of blocks: to do here what evolution said, as a machine could.
+
+Letters: `T` frames.
+"""
+
+import abc
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from mjxgait.certification.config import CertificateConfig
+from mjxgait.certification.criteria import (
+    Criterion,
+    Measure,
+    at_least,
+    at_most,
+    joint_overrun,
+    steady,
+)
+from mjxgait.certification.describe import worst_overlap
+from mjxgait.certification.tasks.staying import StaysUp, to_the_end
+from mjxgait.champion import Champion
+from mjxgait.creature import Creature
+from mjxgait.reference.grown import Grown
+from mjxgait.reference.measure import Recording
+from mjxgait.reference.outcome import Fall, Outcome
+from mjxgait.reference.starts import Starts
+from mjxgait.tasks.modular.thresholds import BlocksConfig, GoingConfig
+
+UNITS = {"speed": "m/s", "height": "m"}
+
+
+class BlocksDemands(StaysUp, abc.ABC):
+    """See `Demands`. No body has a right way up, so none falls, and nobody is pushed."""
+
+    pushed = by_pushes = False
+    grown = True
+    revision = 1
+    """Criterion 4 measured the root from the first moment on, and of jumpers one leap."""
+    verb: str
+    """What one that passes does."""
+    promised: str
+    """The term by which evolution said how much it does."""
+    evidence = "way"
+    """The outcome of a trial in evolution that shows how much it does."""
+
+    @abc.abstractmethod
+    def wanted(self, config: CertificateConfig) -> BlocksConfig:
+        """The thresholds of this task."""
+
+    @abc.abstractmethod
+    def second(self, window: Recording, config: CertificateConfig) -> Criterion:
+        """Criterion 2: what was to be done."""
+
+    @abc.abstractmethod
+    def done(self, window: Recording) -> float:
+        """How much was done of what was promised, in its unit."""
+
+    def promise(self, champion: Champion, seconds: float, config: CertificateConfig) -> float:
+        """How much evolution said it does in a trial of so many seconds."""
+        return champion.terms.get(self.promised, np.nan)
+
+    @abc.abstractmethod
+    def enough(self, seconds: float, config: CertificateConfig) -> float:
+        """What `evidence` must be at least in a trial of so many seconds to be clearly more than is
+        demanded.
+        """
+
+    def since(self, champion: Champion, config: CertificateConfig) -> float:
+        """s from which on evolution counted what was done."""
+        return config.warmup
+
+    def managed(
+        self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
+    ) -> np.ndarray:
+        """See `Demands`: to the end, and clearly more than is demanded."""
+        lived = to_the_end(outcome, seconds, creature)
+        enough: np.ndarray = outcome[self.evidence] >= self.enough(seconds, CertificateConfig())
+        return lived & enough
+
+    def alone(self, window: Recording, config: CertificateConfig) -> tuple[Criterion, ...]:
+        """What is demanded of this task alone."""
+        return ()
+
+    def fall(self, config: CertificateConfig) -> Fall:
+        """See `Demands`: never."""
+        return Fall(min_up=-2.0, height=(-np.inf, np.inf), touch=False)
+
+    def undisturbed(
+        self, whole: Recording, halved: Recording, config: CertificateConfig
+    ) -> tuple[Criterion, ...]:
+        """See `Demands`: 2, 6, 8, 9, and the task's own."""
+        window, other = whole.window(config.warmup), halved.window(config.warmup)
+        does, repeated = (self.second(each, config) for each in (window, other))
+        failed = sum(not m.passed for m in repeated.measures)
+        done, halved_done = self.done(window), self.done(other)
+        change = abs(halved_done / done - 1) if done else np.inf
+        halves = (
+            at_most("failures in 2", failed, 0.0),
+            at_most("change", change, config.half_step.distance),
+        )
+        wanted = self.wanted(config)
+        return (
+            does,
+            Criterion(6, "half the time step", halves),
+            machine(window, config, wanted),
+            apart(window, wanted, on_land=not self.drag),
+            *self.alone(window, config),
+        )
+
+    def kept(
+        self, champion: Champion, whole: Recording, config: CertificateConfig
+    ) -> tuple[Criterion, ...]:
+        """Return criterion 10: as much as evolution said, in as many seconds as evolution saw.
+
+        It fails where the episode had ended before anything counted.
+        """
+        seconds = champion.origin.get("nominal", {}).get("seconds", np.inf)
+        told = self.promise(champion, seconds, config)
+        window = whole.window(self.since(champion, config), seconds)
+        done = self.done(window) if len(window.trunk_pos) > 1 else np.nan
+        change = abs(done / told - 1) if told > 0 else np.nan
+        again = at_most("change", change, self.wanted(config).again)
+        return (Criterion(10, "as in evolution", (again,)),)
+
+    def disturbed(
+        self, started: float, pushed: float, config: CertificateConfig
+    ) -> tuple[Criterion, ...]:
+        """See `Demands`: 4."""
+        share = at_least(f"share that {self.verb}", started, self.wanted(config).arrive, 1.0)
+        return (Criterion(4, "perturbed starts", (share,)),)
+
+    def report(self, whole: Recording, config: CertificateConfig) -> dict[str, Any]:
+        """See `Demands`: how much it does, and of what it is."""
+        window = whole.window(config.warmup)
+        done, parts, unit = self.done(window), len(seen(whole).sizes), UNITS[self.promised]
+        return {
+            self.promised: done,
+            "parts": parts,
+            "mass": whole.dimensions.mass,
+            "overlap": worst_overlap(window),
+            "summary": f"{parts} blocks, {done:.2f} {unit}",
+        }
+
+
+class GoingDemands(BlocksDemands):
+    """See `BlocksDemands`: to get on, straight, at a speed."""
+
+    promised = "speed"
+    axes = 3
+    """Along how many of the world's axes a way counts: two where heights do not."""
+
+    @abc.abstractmethod
+    def wanted(self, config: CertificateConfig) -> GoingConfig:
+        """See `BlocksDemands`."""
+
+    def second(self, window: Recording, config: CertificateConfig) -> Criterion:
+        """See `BlocksDemands`."""
+        return gets_on(self.verb, self._middle(window), window.time_step, self.wanted(config))
+
+    def done(self, window: Recording) -> float:
+        """See `BlocksDemands`: m/s."""
+        return float(flight(self._middle(window), window.time_step))
+
+    def succeeded(self, outcome: Outcome, starts: Starts, config: CertificateConfig) -> np.ndarray:
+        """See `Demands`: those that are as fast as criterion 2 wants, measured in the same way."""
+        middle = counted(outcome.middle, outcome, config)[..., : self.axes]
+        fast = flight(middle, outcome.trajectory.time_step) >= self.wanted(config).speed
+        return outcome.stayed_up & fast
+
+    def enough(self, seconds: float, config: CertificateConfig) -> float:
+        """See `BlocksDemands`: m in the seconds that count, as far as it must get in all."""
+        return self.wanted(config).speed * seconds
+
+    def _middle(self, window: Recording) -> np.ndarray:
+        return seen(window).middle[:, : self.axes]
+
+
+def gets_on(name: str, middle: np.ndarray, time_step: float, config: GoingConfig) -> Criterion:
+    """2. It gets away from where it was, straight, and does not slow down; middle: [T, 2 or 3] m."""
+    half = len(middle) // 2
+    first, second = (
+        float(np.linalg.norm(way)) for way in (middle[half] - middle[0], middle[-1] - middle[half])
+    )
+    path = np.linalg.norm(np.diff(middle, axis=0), axis=1).sum()
+    straight = np.linalg.norm(middle[-1] - middle[0]) / path if path > 0 else np.nan
+    return Criterion(
+        2,
+        name,
+        (
+            at_least("speed (m/s)", float(flight(middle, time_step)), config.speed),
+            at_least("way / path", straight, config.straight, 1.0),
+            steady(first, second, config.second_half),
+        ),
+    )
+
+
+def machine(window: Recording, config: CertificateConfig, wanted: BlocksConfig) -> Criterion:
+    """8. No physics exploit: speeds, angles and torques of a machine that could exist."""
+    limit = window.dimensions.torque_limit
+    overrun, fastest = joint_overrun(window).max(), np.abs(window.joint_vel).max()
+    return Criterion(
+        8,
+        "physics",
+        (
+            at_most("joint speed (rad/s)", fastest, config.physics.joint_speed),
+            at_most("joint past its range (rad)", overrun, config.physics.joint_overrun),
+            at_most("body speed (m/s)", window.body_speed.max(), wanted.body_speed),
+            Measure(
+                "torque / limit",
+                float((np.abs(window.torque) / limit).max()),
+                "<=",
+                config.physics.torque,
+                0.0,
+            ),
+        ),
+    )
+
+
+def apart(window: Recording, config: BlocksConfig, on_land: bool) -> Criterion:
+    """9. No block stands in another that it is not joined to, as it grew or by moving, nor in the
+    ground.
+    """
+    sizes = seen(window).sizes
+    least = np.array([min(sizes[one], sizes[other]) for one, other in window.overlap_pairs])
+    deepest = (window.overlap / least).max(initial=0.0)
+    inside = [at_most("overlap / smaller block's size", deepest, config.overlap)]
+    if on_land:
+        buried = seen(window).buried.max()
+        inside.append(at_most("depth in the ground / block's size", buried, config.overlap))
+    return Criterion(9, "parts", tuple(inside))
+
+
+def flight(middle: np.ndarray, time_step: float) -> np.ndarray:
+    """[...] m/s in a straight line from the first frame to the last; middle: [..., T, 2 or 3] m."""
+    way = np.linalg.norm(middle[..., -1, :] - middle[..., 0, :], axis=-1)
+    speed: np.ndarray = way / ((middle.shape[-2] - 1) * time_step)
+    return speed
+
+
+def counted(frames: np.ndarray, outcome: Outcome, config: CertificateConfig) -> np.ndarray:
+    """Those of the frames [S, T, ...] of disturbed simulations that come after the warm-up."""
+    return frames[:, round(config.warmup / outcome.trajectory.time_step) :]
+
+
+def seen(recording: Recording) -> Grown:
+    """What was seen of a body of blocks."""
+    assert recording.grown is not None
+    return recording.grown

@@ -1,0 +1,112 @@
+"""Following as a task of bodies that grow: to get nearer to a light, wherever it is.
+
+Each trial has a light of its own, too far away to be reached. A brain senses its direction in the
+own axes of each block.
+"""
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from mjxgait.config.rollout import RolloutConfig
+from mjxgait.controllers.sims_brain.reference_body.material import LIGHT
+from mjxgait.creature import Creature
+from mjxgait.tasks.modular.roam import Roam
+from mjxgait.tasks.modular.swim import Swim
+from mjxgait.tasks.modular.task import GoingTask, length
+from mjxgait.tasks.starts import Starts
+from mjxgait.types import Sensed
+
+
+class Following(GoingTask):
+    """See `Task`: what followers in water and on land have in common. A way is what the distance to
+    the light has become less by.
+    """
+
+    adds: ClassVar[tuple[str, ...]] = ("light",)
+    outcomes = (*GoingTask.outcomes, "since")
+    dark = np.zeros(3, np.float32)
+
+    def trials(self, key: jax.Array, creature: Creature, settings: RolloutConfig) -> Starts:
+        """See `Task`: the first light is ahead, and in each round the others are elsewhere.
+
+        All of a round cancel out: who only swims on gets as much farther from some as nearer to the
+        others.
+        """
+        rounds = settings.variety
+        others = (settings.starts - 1) // rounds
+        keys = jax.random.split(jax.random.fold_in(key, 6), rounds)
+        drawn = jax.vmap(lambda key: balanced(key, others, self.axes))(keys)
+        lights = LIGHT * jnp.vstack([jnp.array([[1.0, 0.0, 0.0]]), drawn.reshape(-1, 3)])
+        return dataclasses.replace(super().trials(key, creature, settings), light=lights)
+
+    def aim(self, trial: Starts) -> jax.Array:
+        """See `Task`: [3] m, where the light is."""
+        assert trial.light is not None
+        return trial.qpos[:3] + trial.light
+
+    def senses(self, aim: jax.Array, sensed: Sensed) -> Mapping[str, jax.Array]:
+        """See `Task`: [G, 3] the light's direction in the own axes of each block."""
+        assert sensed.geom_rot is not None
+        there = aim - sensed.geom_pos
+        there = there / jnp.sqrt(jnp.sum(there**2, axis=1, keepdims=True))
+        return {"light": jnp.sum(sensed.geom_rot * there[:, None], axis=2)}
+
+    def update(
+        self, tally: Any, sensed: Sensed, torque: jax.Array, standards: Any, aim: jax.Array
+    ) -> Any:
+        """See `Task`."""
+        after = super().update(tally, sensed, torque, standards, aim)
+        return dataclasses.replace(after, light=aim, since=standards)
+
+    def way(self, tally: Any) -> jax.Array:
+        """See `GoingTask`."""
+        before, now = (
+            length((tally.light - place)[: self.axes]) for place in (tally.settled, tally.place)
+        )
+        return before - now
+
+    def outcome(self, tally: Any) -> Mapping[str, jax.Array]:
+        """See `Task`: s from which on the way counted, besides."""
+        return {**super().outcome(tally), "since": tally.since * self.step}
+
+
+class FollowInWater(Following, Swim):
+    """See `Task`."""
+
+
+class FollowOnLand(Following, Roam):
+    """See `Task`."""
+
+
+def balanced(key: jax.Array, count: int, axes: int) -> jax.Array:
+    """Directions [count, 3] that cancel out together with the one ahead, along so many axes.
+
+    Up to two, in space up to three, are a ring about the way, as far behind as balances it (one alone
+    is behind); what is left are opposite ones in any direction. In space the ring is turned anyhow,
+    and three are as often one behind and two square to the way.
+    """
+    key_turn, key_which = jax.random.split(key)
+    most = 3 if axes == 3 else 1
+    ring = min(count, most if count % 2 else 2)
+    turn = jax.random.uniform(key_turn, maxval=2 * jnp.pi) if axes == 3 else 0.0
+    first = _ring(ring, -1 / max(ring, 1), turn)
+    if ring == 3:
+        cross = jnp.vstack([_ring(1, -1.0, turn), _ring(2, 0.0, turn)])
+        first = jnp.where(jax.random.bernoulli(key_which), first, cross)
+    one = jax.random.normal(jax.random.fold_in(key, 1), ((count - ring) // 2, 3))
+    one = one.at[:, axes:].set(0.0)
+    one = one / jnp.linalg.norm(one, axis=1, keepdims=True)
+    return jnp.vstack([first, one, -one])
+
+
+def _ring(count: int, ahead: float, turn: jax.Array | float) -> jax.Array:
+    """[count, 3] of length 1, evenly about the way ahead, so far along it; turn: rad, of the first."""
+    about = turn + 2 * jnp.pi * jnp.arange(count) / max(count, 1)
+    aside = float(np.sqrt(1 - ahead**2))
+    along = jnp.full(count, ahead)
+    return jnp.stack([along, aside * jnp.cos(about), aside * jnp.sin(about)], axis=1)

@@ -1,0 +1,89 @@
+"""What is demanded of followers: to get nearer to lights that nobody has seen."""
+
+import dataclasses
+
+import numpy as np
+
+from mjxgait.certification.config import CertificateConfig
+from mjxgait.certification.criteria import Criterion, at_least
+from mjxgait.champion import Champion
+from mjxgait.controllers.sims_brain.reference_body.material import LIGHT
+from mjxgait.reference.measure import Recording
+from mjxgait.reference.outcome import Outcome
+from mjxgait.reference.starts import Starts
+from mjxgait.tasks.modular.criteria import BlocksDemands, counted, seen
+from mjxgait.tasks.modular.roam_criteria import balanced
+from mjxgait.tasks.modular.swim_criteria import by_water
+from mjxgait.tasks.modular.thresholds import FollowConfig
+
+
+class FollowDemands(BlocksDemands):
+    """See `Demands`. drag: 0 on land."""
+
+    verdict = "it follows a light"
+    verb = "follows"
+    promised = "speed"
+
+    def __init__(self, drag: float) -> None:
+        self.drag = drag
+        self.axes = 3 if drag else 2
+
+    def wanted(self, config: CertificateConfig) -> FollowConfig:
+        """See `BlocksDemands`."""
+        return config.follow
+
+    def second(self, window: Recording, config: CertificateConfig) -> Criterion:
+        """See `BlocksDemands`."""
+        nearer = at_least("speed towards it (m/s)", self.done(window), config.follow.speed)
+        return Criterion(2, "follows", (nearer,))
+
+    def alone(self, window: Recording, config: CertificateConfig) -> tuple[Criterion, ...]:
+        """See `BlocksDemands`: what is demanded of who swims or walks."""
+        if self.drag:
+            return (by_water(window, config.swim),)
+        return (balanced(window, config.roam),)
+
+    def done(self, window: Recording) -> float:
+        """See `BlocksDemands`: m/s, by which the distance becomes less."""
+        assert window.light is not None
+        apart = (seen(window).middle - window.light)[:, : self.axes]
+        return float(approach(apart, window.time_step))
+
+    def promise(self, champion: Champion, seconds: float, config: CertificateConfig) -> float:
+        """See `BlocksDemands`: of the light that it is recorded with, not of all."""
+        way = champion.origin.get("nominal", {}).get("way", np.nan)
+        return float(way / (seconds - self.since(champion, config)))
+
+    def since(self, champion: Champion, config: CertificateConfig) -> float:
+        """See `BlocksDemands`."""
+        return float(champion.origin.get("nominal", {}).get("since", config.warmup))
+
+    def aimed(
+        self, starts: Starts, config: CertificateConfig, rng: np.random.Generator | None = None
+    ) -> Starts:
+        """See `Demands`: a light for each that has none, the nominal one ahead."""
+        ahead = np.tile([1.0, 0.0, 0.0], (len(starts), 1))
+        drawn = ahead if rng is None else rng.normal(size=(len(starts), 3))
+        drawn[:, self.axes :] = 0.0
+        drawn *= LIGHT / np.linalg.norm(drawn, axis=1, keepdims=True)
+        return dataclasses.replace(
+            starts, light=np.where(starts.light.any(1, keepdims=True), starts.light, drawn)
+        )
+
+    def succeeded(self, outcome: Outcome, starts: Starts, config: CertificateConfig) -> np.ndarray:
+        """See `Demands`: those that approach as fast as criterion 2 wants, measured in the same way."""
+        middle = counted(outcome.middle, outcome, config)
+        apart = (middle - starts.light[:, None])[..., : self.axes]
+        nearer = approach(apart, outcome.trajectory.time_step)
+        return outcome.stayed_up & (nearer >= config.follow.speed)
+
+    def enough(self, seconds: float, config: CertificateConfig) -> float:
+        """See `BlocksDemands`: m in the seconds that count, as much nearer as it must get in all."""
+        return config.follow.speed * seconds
+
+
+def approach(apart: np.ndarray, time_step: float) -> np.ndarray:
+    """[...] m/s by which a distance becomes less; apart: [..., T, 2 or 3] m from the light."""
+    first, last = (np.linalg.norm(apart[..., k, :], axis=-1) for k in (0, -1))
+    speed: np.ndarray = (first - last) / ((apart.shape[-2] - 1) * time_step)
+    return speed

@@ -1,0 +1,174 @@
+"""The starts on which every individual is judged: the first nominal, the others perturbed."""
+
+import dataclasses
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from mjxgait.config.rollout import RolloutConfig
+from mjxgait.creature import Creature
+from mjxgait.creature.frame import horizontal_freedoms, start_place
+from mjxgait.creature.ground.spec import Place, parse_ground
+from mjxgait.creature.ground.surface import (
+    DRAWS,
+    Ground,
+    lay_ground,
+    lay_uneven,
+    named_draws,
+)
+from mjxgait.types import pytree
+
+NEVER = -1
+
+
+@pytree
+class Starts:
+    """Initial states and disturbances.
+
+    qpos: [R, nq]. qvel: [R, nv]. friction: [R] factor on the floor's friction.
+    push: [R, nv] added to qvel at step push_step [R] (never when it is `NEVER`).
+    stiffness, damping: [R, J] factors on the joints' kp and kd.
+    heaviness: [R, nbody - 1] factors on the parts' masses and inertias; None where all are 1.
+    numbers: leaves [R, ...], the bodies that follow from it, as the plant reads them.
+    ground: leaves [R, ...], each trial's own; None where all are flat.
+    goal: [R] m ahead of the start; None where the task has none.
+    raised: [R] m by which a bar is higher than it will be; None where there is no bar.
+    light: [R, 3] m from where the root starts; None where there is none.
+    turn: [R] rad/s by which the commanded heading grows; None where nobody is told to turn.
+    delay: [R] control steps by which torques come late; None where they never do.
+    """
+
+    qpos: jax.Array
+    qvel: jax.Array
+    friction: jax.Array
+    push: jax.Array
+    push_step: jax.Array
+    stiffness: jax.Array
+    damping: jax.Array
+    ground: Ground | None = None
+    heaviness: jax.Array | None = None
+    numbers: Any = None
+    goal: jax.Array | None = None
+    raised: jax.Array | None = None
+    light: jax.Array | None = None
+    turn: jax.Array | None = None
+    delay: jax.Array | None = None
+
+
+def draw_starts(key: jax.Array, creature: Creature, config: RolloutConfig) -> Starts:
+    """R starts; the same key gives the same starts. Perturbations are uniform within the half widths of the config."""
+    count = config.starts
+    key_pos, key_vel, key_friction, key_direction, key_moment = jax.random.split(key, 5)
+    key_stiffness, key_damping = jax.random.split(jax.random.fold_in(key, 1))
+    perturbed = (jnp.arange(count) > 0)[:, None]
+    joints = len(creature.joints.names)
+    qpos = jnp.tile(jnp.asarray(creature.stand_qpos, jnp.float32), (count, 1))
+    noise = (
+        perturbed * config.joint_noise * jax.random.uniform(key_pos, (count, joints), minval=-1.0)
+    )
+    spin = (
+        perturbed
+        * config.velocity_noise
+        * jax.random.uniform(key_vel, (count, joints), minval=-1.0)
+    )
+    friction = jax.random.uniform(
+        key_friction, (count,), minval=config.friction[0], maxval=config.friction[1]
+    )
+    angle = jax.random.uniform(key_direction, (count,), maxval=2 * jnp.pi)
+    direction = perturbed * jnp.stack([jnp.cos(angle), jnp.sin(angle)], axis=1)
+    speed = config.push * float(np.sqrt(creature.gravity * creature.frame.hip_height))
+    steps = round(config.seconds / creature.model.opt.timestep)
+    moment = jax.random.randint(
+        key_moment, (count,), steps // 4, max(3 * steps // 4, steps // 4 + 1)
+    )
+
+    def factors(key: jax.Array) -> jax.Array:
+        spread = jax.random.uniform(key, (count, joints), minval=-1.0)
+        return 1.0 + perturbed * config.gains * spread
+
+    return Starts(
+        qpos=qpos.at[:, creature.joints.qpos_adr].add(noise),
+        qvel=jnp.zeros((count, creature.model.nv)).at[:, creature.joints.dof_adr].set(spin),
+        friction=jnp.where(perturbed[:, 0], friction, 1.0),
+        push=speed * direction @ horizontal_freedoms(creature),
+        push_step=jnp.where(perturbed[:, 0], moment, NEVER),
+        stiffness=factors(key_stiffness),
+        damping=factors(key_damping),
+        heaviness=_heaviness(jax.random.fold_in(key, 3), creature, config),
+        ground=draw_grounds(jax.random.fold_in(key, 2), creature, config),
+        delay=_delay(jax.random.fold_in(key, 6), config),
+    )
+
+
+def milder(starts: Starts, share: jax.Array) -> Starts:
+    """The starts with this share [] of their disturbances; bodies, ground and what is asked of each
+    stay.
+    """
+
+    def part(leaf: jax.Array, usual: jax.Array | float) -> jax.Array:
+        return usual + share * (leaf - usual)
+
+    late = starts.delay
+    return dataclasses.replace(
+        starts,
+        qpos=part(starts.qpos, starts.qpos[:1]),
+        qvel=share * starts.qvel,
+        friction=part(starts.friction, 1.0),
+        push=share * starts.push,
+        stiffness=part(starts.stiffness, 1.0),
+        damping=part(starts.damping, 1.0),
+        delay=late if late is None else jnp.floor(share * late).astype(late.dtype),
+    )
+
+
+def _delay(key: jax.Array, config: RolloutConfig) -> jax.Array | None:
+    if not config.latency:
+        return None
+    return jax.random.randint(key, (config.starts,), 0, config.latency + 1).at[0].set(0)
+
+
+def _heaviness(key: jax.Array, creature: Creature, config: RolloutConfig) -> jax.Array | None:
+    if not config.masses:
+        return None
+    parts = creature.model.nbody - 1
+    spread = jax.random.uniform(key, (config.starts, parts), minval=-1.0).at[0].set(0.0)
+    # What is welded to a part is as much heavier as the part.
+    carrier = np.maximum(creature.model.body_weldid[1:] - 1, 0)
+    return 1.0 + config.masses * spread[:, carrier]
+
+
+def draw_grounds(key: jax.Array, creature: Creature, config: RolloutConfig) -> Ground | None:
+    """Leaves [R, ...]: the nominal start has the ground that the config names, the others others
+    of its kind, or uneven ones of their own; None where all are flat.
+    """
+    spec, place = parse_ground(config.ground), start_place(creature)
+    if spec.flat and not config.uneven:
+        return None
+    draws = jax.random.uniform(key, (config.starts, DRAWS, 2)).at[0].set(named_draws(spec.seed))
+    if spec.flat:
+        return _stacked(_uneven(jax.random.fold_in(key, 1), place, config, draws))
+    return _stacked([lay_ground(spec, place, each) for each in draws])
+
+
+def _stacked(grounds: list[Ground | None]) -> Ground:
+    stacked: Ground = jax.tree.map(lambda *leaves: jnp.stack(leaves), *grounds)
+    return stacked
+
+
+def _uneven(
+    key: jax.Array, place: Place, config: RolloutConfig, draws: jax.Array
+) -> list[Ground | None]:
+    """Level for the nominal start; for the others slopes spread evenly to all sides, from any first
+    one on, more of them steep than not: evenly over the disc of all that may be.
+    """
+    others = max(config.starts - 1, 1)
+    side = (jnp.arange(config.starts) + jax.random.uniform(key)) / others
+    steep = jnp.sqrt(jax.random.uniform(jax.random.fold_in(key, 1), (config.starts,)))
+    rise, turn = np.tan(np.radians(config.slope)) * steep, 2 * jnp.pi * side
+    slopes = rise[:, None] * jnp.stack([jnp.cos(turn), jnp.sin(turn)], axis=1)
+    return [
+        lay_uneven(place, slopes[i] if i else (0.0, 0.0), config.rough if i else 0.0, draws[i])
+        for i in range(config.starts)
+    ]

@@ -1,0 +1,292 @@
+"""What is demanded of a walk.
+
+Letters: `T` frames, `N` feet.
+"""
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from mjxgait.certification.buzz import buzz
+from mjxgait.certification.config import (
+    CertificateConfig,
+    GaitConfig,
+    PeriodConfig,
+    ProgressConfig,
+)
+from mjxgait.certification.criteria import (
+    Criterion,
+    Measure,
+    at_least,
+    at_most,
+    distance,
+    parts,
+    physics,
+    ratio,
+    speed,
+    steady,
+    upright,
+)
+from mjxgait.certification.describe import describe, slip_distance
+from mjxgait.certification.likeness import patter
+from mjxgait.certification.obstacle import obstacle
+from mjxgait.certification.sides import amplitudes_apart, duties_apart, sides
+from mjxgait.certification.tasks.staying import StaysUp, to_the_end
+from mjxgait.creature import Creature
+from mjxgait.reference.measure import Dimensions, Recording
+from mjxgait.reference.outcome import Fall, Outcome
+from mjxgait.reference.strides import clearances, stride_frequency, stride_starts
+from mjxgait.tasks.walk.gaits import gait_of, transition
+from mjxgait.tasks.walk.target_criteria import (
+    as_asked,
+    draw_commands,
+    following,
+    heading_off,
+    posture,
+    steered,
+    told_heading,
+    unrolled,
+)
+
+SPARE = 1.2
+"""How much faster than the certificate's least speed a gait should be in evolution before it is
+worth an examination.
+"""
+
+
+STARTED = (0.75, 1.15)
+"""Range of the way in evolution over that at the speed asked for, with standing at its beginning,
+that is worth an examination.
+"""
+
+
+class WalkDemands(StaysUp):
+    """See `Demands`: steady strides that lead forward, in the manner of an animal."""
+
+    verdict = "it walks"
+    revision = 1
+    """Flicker, buzz, tilt, heading and a limp were in no criterion."""
+
+    def __init__(self, wish: Mapping[str, Any] | None = None) -> None:
+        self.wish = dict(wish or {})
+
+    def asked(self, wish: Mapping[str, Any]) -> "WalkDemands":
+        """See `Demands`."""
+        return WalkDemands(wish) if wish else self
+
+    def told(self, steps: int, time_step: float) -> np.ndarray | None:
+        """See `Demands`."""
+        return told_heading(self.wish, steps, time_step)
+
+    def commands(
+        self, config: CertificateConfig, steps: int, time_step: float, rng: np.random.Generator
+    ) -> np.ndarray | None:
+        """See `Demands`."""
+        if "steer" not in self.wish:
+            return None
+        return draw_commands(self.wish["steer"], config.wishes.commands, steps, time_step, rng)
+
+    def obeyed(
+        self, outcome: Outcome, told: np.ndarray, config: CertificateConfig
+    ) -> tuple[Criterion, ...]:
+        """See `Demands`: 11."""
+        return (steered(outcome, told, config.wishes),)
+
+    def undisturbed(
+        self, whole: Recording, halved: Recording, config: CertificateConfig
+    ) -> tuple[Criterion, ...]:
+        """See `Demands`: all but 4 and 5, and 10 where more is asked."""
+        config = following(config, self.wish, whole.dimensions)
+        whole, halved = (unrolled(recording, self.wish) for recording in (whole, halved))
+        window = whole.window(config.warmup)
+        wishes = (as_asked(window, self.wish, config),) if self.wish else ()
+        return (
+            *basic(whole, config),
+            half_step(whole, halved, config),
+            gait(window, config.gait, self.wish),
+            physics(window, config.physics),
+            parts(window, config.parts),
+            *wishes,
+        )
+
+    def report(self, whole: Recording, config: CertificateConfig) -> dict[str, Any]:
+        """See `Demands`."""
+        whole = unrolled(whole, self.wish)
+        window = whole.window(config.warmup)
+        told = describe(window, config.gait.clearance) | {"sides": sides(window)}
+        if self.wish:
+            told |= {"asked": self.wish, "posture": posture(window)}
+        found = {"obstacle": obstacle(whole, config)}
+        return told | found | {"summary": f"{told['gait']}, {told['speed']:.2f} m/s"}
+
+    def managed(
+        self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
+    ) -> np.ndarray:
+        """See `Demands`: up to the end, and clearly faster than it must be."""
+        lived = to_the_end(outcome, seconds, creature)
+        if "speed" in self.wish:
+            came = outcome["forward"] / seconds / self.wish["speed"]
+            return lived & (came > STARTED[0]) & (came < STARTED[1])
+        wanted = SPARE * CertificateConfig().progress.speed * seconds * creature.frame.body_length
+        return lived & (outcome["forward"] >= wanted)
+
+
+def basic(whole: Recording, config: CertificateConfig) -> tuple[Criterion, Criterion, Criterion]:
+    """Criteria 1 to 3 of one recording."""
+    window = whole.window(config.warmup)
+    stays = upright(whole, window, config.upright)
+    return (
+        dataclasses.replace(stays, measures=(*stays.measures, lean(window, config.upright))),
+        progress(window, config.progress),
+        periodic(window, config.period),
+    )
+
+
+def lean(window: Recording, config: Fall) -> Measure:
+    """Of criterion 1: how far the trunk leans, beyond what it does standing."""
+    most = np.degrees(np.arccos(np.clip(window.trunk_up.min(), -1, 1)))
+    return at_most("tilt beyond standing (deg)", most - window.dimensions.stand_tilt, config.tilt)
+
+
+def progress(window: Recording, config: ProgressConfig) -> Criterion:
+    """2. Strides that all lead forward, fast enough, straight, without fading."""
+    path, starts = window.trunk_pos, stride_starts(window)
+    distance, middle = path[-1, 0] - path[0, 0], len(path) // 2
+    first, second = path[middle, 0] - path[0, 0], path[-1, 0] - path[middle, 0]
+    advance = np.diff(path[starts, 0]) if len(starts) > 1 else np.array([np.nan])
+    sideways = np.abs(path[:, 1] - path[0, 1]).max()
+    return Criterion(
+        2,
+        "progress",
+        (
+            at_least("strides", len(starts) - 1, config.strides),
+            at_least(
+                "shortest stride / mean stride", advance.min() / abs(advance.mean()), 0.0, 0.5
+            ),
+            at_least(
+                "speed (body lengths/s)",
+                speed(window) / window.dimensions.body_length,
+                config.speed,
+            ),
+            at_most("drift / distance", ratio(sideways, distance), config.drift),
+            at_most("off straight ahead (deg)", heading_off(window), config.heading),
+            steady(first, second, config.second_half),
+        ),
+    )
+
+
+def periodic(window: Recording, config: PeriodConfig) -> Criterion:
+    """3. Joints and trunk attitude repeat with the stride period, and that period is steady."""
+    periods = np.diff(stride_starts(window)).astype(float)
+    if len(periods) < 2:
+        peak = variation = np.nan
+    else:
+        signal = np.column_stack([window.joint_pos, window.pitch, window.roll])
+        peak, variation = (
+            autocorrelation_peak(signal, periods.mean()),
+            periods.std() / periods.mean(),
+        )
+    return Criterion(
+        3,
+        "periodic",
+        (
+            at_least("autocorrelation at stride period", peak, config.autocorrelation, 1.0),
+            at_most("variation of stride period", variation, config.variation),
+        ),
+    )
+
+
+def autocorrelation_peak(signal: np.ndarray, period: float) -> float:
+    """Largest correlation of the signal [T, D] with itself, shifted by 0.8 to 1.2 periods
+    (frames).
+    """
+    # Without what changes slower than a stride: a wandering signal resembles itself at any shift.
+    width = round(period)
+    sums = np.cumsum(np.pad(signal, ((1, 0), (0, 0))), axis=0)
+    signal = (
+        signal[width // 2 :][: len(signal) - width + 1] - (sums[width:] - sums[:-width]) / width
+    )
+
+    def correlation(lag: int) -> float:
+        early, late = signal[:-lag], signal[lag:]
+        norm = np.sqrt((early**2).sum() * (late**2).sum())
+        return float((early * late).sum() / norm) if norm > 0 else np.nan
+
+    lags = range(max(1, int(0.8 * period)), min(int(np.ceil(1.2 * period)) + 1, len(signal) // 2))
+    return max((correlation(lag) for lag in lags), default=np.nan)
+
+
+def half_step(whole: Recording, halved: Recording, config: CertificateConfig) -> Criterion:
+    """6. With half the time step it still passes 1 to 3 and goes as far."""
+    window = whole.window(config.warmup)
+    repeated = basic(halved, config)
+    change = distance(halved.window(config.warmup)) / distance(window) - 1
+    failed = sum(not m.passed for c in repeated for m in c.measures)
+    return Criterion(
+        6,
+        "half the time step",
+        (
+            at_most("failures in criteria 1 to 3", failed, 0.0),
+            at_most("change of distance", abs(change), config.half_step.distance),
+        ),
+    )
+
+
+def gait(window: Recording, config: GaitConfig, wish: Mapping[str, Any] | None = None) -> Criterion:
+    """7. A gait, not a buzz: slow, long strides; feet that leave the floor and do not slide on
+    it; left and right that do the same.
+    """
+    return Criterion(7, "gait", (*_strides(window, config), *_manner(window, config, wish or {})))
+
+
+def _manner(window: Recording, config: GaitConfig, wish: Mapping[str, Any]) -> tuple[Measure, ...]:
+    """The measures of 7 that tell a vibration and a limp."""
+    measures = (
+        at_most("flicker of a foot per stride", patter(window), config.flicker),
+        at_most("buzz of a joint / joint speed", buzz(window), config.buzz),
+    )
+    if not two_like_sides(wish, window.dimensions):
+        return measures
+    return (
+        *measures,
+        at_most("left and right amplitudes", amplitudes_apart(window), config.amplitudes),
+        at_most("left and right duty factors", duties_apart(window), config.duties),
+    )
+
+
+def two_like_sides(wish: Mapping[str, Any], size: Dimensions) -> bool:
+    """Whether left and right have the same to do: not on a circle, nor where a gait is asked for
+    that leads with one side.
+    """
+    leads = "gait" in wish and not gait_of(wish["gait"], len(size.foot_names)).twice
+    return bool(size.partner) and not wish.get("turn") and not leads
+
+
+def _strides(window: Recording, config: GaitConfig) -> tuple[Measure, ...]:
+    """The measures of 7 that strides and feet give."""
+    size = window.dimensions
+    frequency = stride_frequency(window, config.clearance)
+    duty = window.contact.mean(0)
+    low, high = config.duty_factor
+    return (
+        at_most("stride frequency / animal's", frequency / transition(size.mass), config.frequency),
+        at_least(
+            "stride length / hip height",
+            speed(window) / frequency / size.hip_height,
+            config.stride_length,
+        ),
+        at_least(
+            "least clearance / hip height",
+            clearances(window).min(initial=np.inf) / size.hip_height,
+            config.clearance,
+        ),
+        at_most(
+            "worst foot's slip / distance",
+            ratio(slip_distance(window).max(), distance(window)),
+            config.slip,
+        ),
+        at_least("least duty factor", duty.min(), low),
+        Measure("greatest duty factor", float(duty.max()), "<=", high, 1 - high),
+    )

@@ -1,0 +1,165 @@
+"""What an episode leaves behind: running sums, updated once per step for one creature, from which fitness is computed."""
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from mjxgait.controllers.observations import CONTACT_GAP, foot_geoms, foot_heights
+from mjxgait.creature.body import Body
+from mjxgait.tasks import base as protocol
+from mjxgait.tasks.falls import touches
+from mjxgait.tasks.work import positive_work
+from mjxgait.types import Sensed, pytree
+
+SWING = 0.03
+"""Hip heights; a foot that rises less has not left the floor, it has trembled. The certificate counts swings alike."""
+PER_FOOT = (
+    "swings",
+    "swinging",
+    "shortfall",
+    "peak",
+    "loaded",
+    "touchdowns",
+    "contact",
+    "slip",
+    "foot_down",
+)
+"""What a tally holds for each foot."""
+
+
+@pytree
+class Tally(protocol.Tally):
+    """Sums over the steps that a creature was up. `F` here counts feet, not their geoms.
+
+    reason: a `falls.Reason`. forward, left: [] m from the start to the latest position.
+    forward_half: [] m, `forward` at half time. heading: [] rad.
+    swings: [F] completed swings, swinging: [F] whether in one: a swing rises above `SWING` and
+      comes down to half of it; there it ends in a footfall.
+    shortfall: [F] missing clearance, share of the wanted, summed over swings. peak: [F] m, highest
+      since the latest footfall.
+    loaded: [F] whether it bore weight on the previous step. touchdowns: [F] how often it began to.
+    contact: [F] steps in contact. slip: [F] m slid while in contact. airborne: [] steps without any foot on the floor.
+    foot_height: [] m·steps, mean height of the feet. foot_speed: [] m/s, level, of the fastest foot
+      at its fastest. foot_pos: [F, 2], foot_down: [F] of the previous step.
+    tilt: [] of 1 - up.z. wobble: [] (rad/s)² of the trunk. touch: [] steps on which another part touches.
+    work: [] J, positive. saturation, limits: [] share of joints at their torque limit, beyond their pose range.
+    """
+
+    forward: jax.Array
+    left: jax.Array
+    forward_half: jax.Array
+    heading: jax.Array
+    swings: jax.Array
+    swinging: jax.Array
+    shortfall: jax.Array
+    peak: jax.Array
+    loaded: jax.Array
+    touchdowns: jax.Array
+    contact: jax.Array
+    slip: jax.Array
+    airborne: jax.Array
+    foot_height: jax.Array
+    foot_speed: jax.Array
+    foot_pos: jax.Array
+    foot_down: jax.Array
+    tilt: jax.Array
+    wobble: jax.Array
+    touch: jax.Array
+    work: jax.Array
+    saturation: jax.Array
+    limits: jax.Array
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Judge:
+    """Keeps the tally of one creature's episodes.
+
+    half_time: step. contact: m above the floor below which a foot is down.
+    """
+
+    creature: Body
+    step: float
+    half_time: int
+    contact: float = CONTACT_GAP
+
+    def init(self) -> Tally:
+        """The empty tally."""
+        feet = len(self.creature.feet.names)
+        values = {field.name: jnp.zeros(()) for field in dataclasses.fields(Tally)}
+        counts = {name: jnp.zeros((), jnp.int32) for name in ("steps", "reason")}
+        per_foot = {name: jnp.zeros(feet) for name in PER_FOOT}
+        return Tally(**(values | counts | per_foot | {"foot_pos": jnp.zeros((feet, 2))}))
+
+    def update(
+        self,
+        tally: Tally,
+        sensed: Sensed,
+        torque: jax.Array,
+        clearance: jax.Array,
+    ) -> Tally:
+        """The tally after one more step.
+
+        Args:
+          torque: [J] N·m. clearance: [] m wanted of each foot in each of its swings.
+        """
+        creature = self.creature
+        start_forward, start_left = creature.frame.start_axes
+        moved = sensed.trunk_pos - creature.frame.stand_pos.astype(np.float32)
+        forward_axis = sensed.trunk_rot @ creature.frame.forward.astype(np.float32)
+        up = (sensed.trunk_rot @ creature.frame.up.astype(np.float32))[2]
+        low, pos = self._feet(sensed)
+        down = (low < self.contact).astype(jnp.float32)
+        # What bears weight is a little in the floor.
+        loaded = (low < 0.0).astype(jnp.float32)
+        peak = jnp.maximum(tally.peak, low)
+        missing = jnp.clip(1.0 - peak / jnp.maximum(clearance, 1e-6), 0.0, 1.0)
+        went = jnp.linalg.norm(pos - tally.foot_pos, axis=1)
+        slid = went * down * tally.foot_down
+        speed = jnp.where(tally.steps > 0, jnp.max(went) / self.step, 0.0)
+        rise = SWING * creature.frame.hip_height
+        swinging = jnp.where(low > rise, 1.0, jnp.where(low < 0.5 * rise, 0.0, tally.swinging))
+        fallen = jnp.maximum(tally.swinging - swinging, 0.0)
+        outside = (sensed.joint_pos < creature.joints.pose_low.astype(np.float32)) | (
+            sensed.joint_pos > creature.joints.pose_high.astype(np.float32)
+        )
+        steps = tally.steps + 1
+        forward = moved @ start_forward
+        return Tally(
+            steps=steps,
+            reason=tally.reason,
+            forward=forward,
+            left=moved @ start_left,
+            forward_half=jnp.where(steps <= self.half_time, forward, tally.forward_half),
+            heading=jnp.arctan2(forward_axis @ start_left, forward_axis @ start_forward),
+            swings=tally.swings + fallen,
+            swinging=swinging,
+            shortfall=tally.shortfall + fallen * missing,
+            peak=jnp.where(fallen > 0, low, peak),
+            loaded=loaded,
+            touchdowns=tally.touchdowns + loaded * (1.0 - tally.loaded),
+            contact=tally.contact + down,
+            slip=tally.slip + slid,
+            airborne=tally.airborne + (jnp.max(down) == 0.0),
+            foot_height=tally.foot_height + jnp.mean(low),
+            foot_speed=jnp.maximum(tally.foot_speed, speed),
+            foot_pos=pos,
+            foot_down=down,
+            tilt=tally.tilt + 1.0 - up,
+            wobble=tally.wobble + sensed.trunk_angvel @ sensed.trunk_angvel,
+            touch=tally.touch + touches(creature, sensed),
+            work=tally.work + positive_work(torque, sensed, self.step),
+            saturation=tally.saturation
+            + jnp.mean(jnp.abs(torque) >= creature.gains.torque_limit.astype(np.float32)),
+            limits=tally.limits + jnp.mean(outside),
+            overlap=tally.overlap,
+        )
+
+    def _feet(self, sensed: Sensed) -> tuple[jax.Array, jax.Array]:
+        """Lowest point [F] of each foot and its horizontal position [F, 2], the mean of its geoms."""
+        low = foot_heights(self.creature, sensed)
+        pos = jnp.stack(
+            [jnp.mean(sensed.geom_pos[g, :2], axis=0) for g in foot_geoms(self.creature)]
+        )
+        return low, pos

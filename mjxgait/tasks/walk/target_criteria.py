@@ -1,0 +1,179 @@
+"""What is demanded of a walk of which more was asked: a speed, a gait, a turn, a posture.
+
+Letters: `T` frames.
+"""
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from mjxgait.certification.config import CertificateConfig, WishesConfig
+from mjxgait.certification.criteria import (
+    Criterion,
+    Measure,
+    at_least,
+    at_most,
+    speed,
+)
+from mjxgait.certification.describe import footfall_phases, gait_name
+from mjxgait.certification.likeness import likeness
+from mjxgait.reference.measure import Dimensions, Recording
+from mjxgait.reference.outcome import Outcome
+from mjxgait.tasks.walk.gaits import SHORTEST, animal_stride, gait_of
+
+Wish = Mapping[str, Any]
+
+ASKED, BOUNDS = "as asked", ("gait", "physics")
+"""Names of criteria: the wishes', and those whose numbers bound what a body can."""
+COMMANDED, TOLD_FOR = (2.0, 4.0), 12.0
+"""s, when a command comes, and for how long one is watched who is steered."""
+FAST_ENOUGH = 0.75
+"""Share of the speed asked for that is the least of a walk: by the tenth that a wish may be missed by
+the very speed that was asked for would have next to no margin."""
+HEADING_MEAN = 1.0
+"""s; within a stride the nose swings."""
+
+
+def told_heading(wish: Wish, steps: int, time_step: float) -> np.ndarray | None:
+    """[T] rad, what the controller is told; None where no turn is asked for."""
+    if not {"turn", "steer"} & set(wish):
+        return None
+    return np.radians(wish.get("turn", 0.0)) * time_step * np.arange(steps)
+
+
+def draw_commands(
+    fastest: float, count: int, steps: int, time_step: float, rng: np.random.Generator
+) -> np.ndarray:
+    """[S, T] rad that are told: straight on for a while, then a turn to the left or to the right in
+    turn, at a rate of its own.
+
+    fastest: deg/s; none is told to turn less than half as fast.
+    """
+    rate = fastest * rng.uniform(0.5, 1.0, count) * np.where(np.arange(count) % 2, -1.0, 1.0)
+    begin = rng.uniform(*COMMANDED, count)
+    since = np.maximum(time_step * np.arange(steps) - begin[:, None], 0.0)
+    told: np.ndarray = np.radians(rate)[:, None] * since
+    return told
+
+
+def steered(outcome: Outcome, told: np.ndarray, limits: WishesConfig) -> Criterion:
+    """11. It obeys: is up in the end and, from a while after each command, looks where it was told.
+
+    told: [S, T] rad.
+    """
+    step = outcome.trajectory.time_step
+    width, begins = max(round(HEADING_MEAN / step), 1), (told != 0).argmax(1)
+    sums = np.cumsum(np.pad(outcome.astray, ((0, 0), (1, 0))), axis=1)
+    off = np.degrees(np.abs(sums[:, width:] - sums[:, :-width]) / width)
+    due = np.arange(off.shape[1]) >= (begins + round(limits.delay / step))[:, None]
+    # NaN, from a fall on, obeys nobody.
+    obeys = outcome.stayed_up & (~due | (off <= limits.heading)).all(1)
+    share = at_least("share that obeys", obeys.mean(), limits.obey, 1.0)
+    return Criterion(11, "steered", (share,))
+
+
+def following(config: CertificateConfig, wish: Wish, size: Dimensions) -> CertificateConfig:
+    """The thresholds with those that depend on the speed as the speed asked for has them. Whoever is
+    to carry its nose high or low may lean by so much more.
+
+    The least speed is no more than a share of the one asked for, which is held from both sides by a
+    criterion of its own, and the least stride no more than half of an animal's at that speed: a slow
+    walk has short strides.
+    """
+    if "pitch" in wish:
+        tilt = config.upright.tilt + abs(wish["pitch"])
+        config = dataclasses.replace(config, upright=dataclasses.replace(config.upright, tilt=tilt))
+    if "speed" not in wish:
+        return config
+    asked = wish["speed"]
+    slowest = FAST_ENOUGH * asked / size.body_length
+    stride = SHORTEST * animal_stride(asked, size.hip_height) / size.hip_height
+    return dataclasses.replace(
+        config,
+        progress=dataclasses.replace(
+            config.progress, speed=float(min(config.progress.speed, slowest))
+        ),
+        gait=dataclasses.replace(
+            config.gait, stride_length=float(min(config.gait.stride_length, stride))
+        ),
+    )
+
+
+def unrolled(recording: Recording, wish: Wish) -> Recording:
+    """The walk as if its told heading had been straight ahead: each step of its way is turned back
+    by the heading that it was told then.
+    """
+    told = told_heading(wish, len(recording.trunk_pos), recording.time_step)
+    if told is None:
+        return recording
+    x, y = np.diff(recording.trunk_pos[:, :2], axis=0, prepend=recording.trunk_pos[:1, :2]).T
+    ahead, left = np.cos(told), np.sin(told)
+    way = np.stack([x * ahead + y * left, y * ahead - x * left, 0 * x], 1).cumsum(0)
+    place = way + recording.trunk_pos * [0, 0, 1]
+    heading = None if recording.heading is None else recording.heading - told
+    return dataclasses.replace(recording, trunk_pos=place, heading=heading)
+
+
+def as_asked(window: Recording, wish: Wish, config: CertificateConfig) -> Criterion:
+    """10. It does what it was asked. window: unrolled, after the warm-up."""
+    limits = config.wishes
+    found = posture(window) | likeness(window, config.gait.clearance)
+    measures: list[Measure] = []
+    if "speed" in wish:
+        off = abs(speed(window) / wish["speed"] - 1)
+        measures.append(at_most(f"off the speed of {wish['speed']:.3g} m/s", off, limits.speed))
+    if "gait" in wish:
+        size, duty = window.dimensions, window.contact.mean(0)
+        labels = gait_of(wish["gait"], len(duty)).labels
+        name = gait_name(size, duty, footfall_phases(window))
+        measures.append(
+            Measure(f"footfalls of a {wish['gait']}", float(name in labels), ">=", 1.0, 0.0)
+        )
+    if {"turn", "steer"} & set(wish):
+        measures.append(
+            at_most("off the heading it was told (deg)", heading_off(window), limits.heading)
+        )
+    for name in found:
+        if name in wish:
+            off = abs(found[name] - wish[name])
+            measures.append(
+                at_most(f"off the {name} of {wish[name]:.3g}", off, getattr(limits, name))
+            )
+    return Criterion(10, ASKED, tuple(measures))
+
+
+def in_the_way(criteria: Sequence[Criterion]) -> str | None:
+    """A sentence on the first wish that was missed, and the number that stood in its way: of gait
+    and physics that which is nearest to its limit, or farthest beyond. None where none was missed.
+    """
+    missed = [m for c in criteria if c.name == ASKED for m in c.measures if not m.passed]
+    bounds = [m for c in criteria if c.name in BOUNDS for m in c.measures if m.room]
+    if not missed or not bounds:
+        return None
+    first, nearest = missed[0], min(bounds, key=lambda m: m.margin)
+    return (
+        f"{first.name}: {first.value:.3g}, where {first.threshold:g} may be. In the way stands "
+        f"{nearest.name}: {nearest.value:.3g} where {nearest.sense} {nearest.threshold:.3g} is "
+        "asked."
+    )
+
+
+def heading_off(window: Recording) -> float:
+    """deg, farthest from the heading that it was told, mean over a second."""
+    if window.heading is None:
+        return np.nan
+    width = max(round(HEADING_MEAN / window.time_step), 1)
+    mean = np.convolve(window.heading, np.full(width, 1 / width), "valid")
+    return float(np.degrees(np.abs(mean).max()))
+
+
+def posture(window: Recording) -> dict[str, float]:
+    """How it carries its trunk: height in standing heights, bounce in hip heights, sway in deg."""
+    height, size = window.trunk_pos[:, 2], window.dimensions
+    return {
+        "height": float(height.mean() / size.stand_height),
+        "bounce": float(height.std() / size.hip_height),
+        "sway": float(np.degrees(np.sqrt((window.roll**2).mean()))),
+    }

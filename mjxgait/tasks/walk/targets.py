@@ -1,0 +1,244 @@
+"""What is asked of a walk in words: names for settings, as one layer of them (docs/wishes.md)."""
+
+import dataclasses
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from mjxgait.certification import CertificateConfig
+from mjxgait.config.layers import over_base
+from mjxgait.config.schema import Config
+from mjxgait.config.shipped import data_folder
+from mjxgait.config.tables import build, merge, read_toml
+from mjxgait.controllers.key_poses.config import unhurried
+from mjxgait.creature import Creature
+from mjxgait.errors import UserError, did_you_mean
+from mjxgait.plugins.settings import resolve_config
+from mjxgait.tasks.walk.criteria import SPARE
+from mjxgait.tasks.walk.gaits import (
+    AUTO,
+    SHORTEST,
+    animal_stride,
+    gait_of,
+)
+from mjxgait.tasks.walk.textbook_start import (
+    ORDERED,
+    drawn,
+    natural_gait,
+    top_speed,
+)
+
+SPEED = re.compile(r"(?:fr)?[0-9]*\.?[0-9]+(?:e-?[0-9]+)?(?:bl/s|m/s)?")
+
+
+@dataclasses.dataclass(frozen=True)
+class Wishes:
+    """What a user asks of a walk.
+
+    Attributes:
+      speed: such as 0.4 (m/s), 0.4bl/s (body lengths per second), or fr0.2 (Froude number).
+      gait: walk, amble, trot, pace, canter, bound, gallop, tripod, wave, hop, waddle, natural
+        (an animal's at this speed, with its strides), or auto.
+      turn: deg/s, to the left.
+      steer: deg/s, up to which it should obey turns to either side.
+      style: calm, sneaky, heavy, proud, tired, hurried, or a TOML file of settings.
+      certificate: walks, or anywhere: then it learns on uneven ground and under more disturbances,
+        and goes on until it bears what `mjxgait stress` asks.
+    """
+
+    speed: str | None = None
+    gait: str | None = None
+    turn: float | None = None
+    steer: float | None = None
+    style: str | None = None
+    certificate: str | None = None
+
+    @classmethod
+    def of(cls, given: Mapping[str, Any]) -> "Wishes":
+        """Those that were given, as text or as what they are.
+
+        Raises:
+          UserError: a turn is no number.
+        """
+        values: dict[str, Any] = {name: v for name, v in given.items() if v is not None}
+        for name, value in values.items():
+            if name not in TURNS:
+                values[name] = str(value)
+                continue
+            try:
+                values[name] = float(value)
+            except ValueError:
+                raise UserError(f"--{name} {value}: give degrees per second") from None
+        return cls(**values)
+
+
+NATURAL = "natural"
+"""The gait of an animal at this speed, whatever its name."""
+TURNS = ("turn", "steer")
+LEVELS = ("walks", "anywhere")
+WISHES = tuple(field.name for field in dataclasses.fields(Wishes))
+
+
+def configured(
+    creature: Creature, file: Path | None, use: Mapping[str, str], wishes: Wishes
+) -> Config:
+    """The settings of a run: the layers below the options, and what is asked laid over them.
+
+    Where nothing is, and no file says what is wanted, it is what this creature usually does.
+
+    Raises:
+      UserError: names the layer and the key, or the wish.
+    """
+    config = resolve_config(creature.settings.train, creature.name, file, use)
+    walks = config.use.task == "walk" and config.use.controller == "poses"
+    if wishes != Wishes() or file is not None or not walks:
+        return wished(config, creature, wishes)
+    try:
+        return wished(config, creature, Wishes(gait=creature.settings.usual.gait))
+    except UserError as error:
+        raise UserError(f"{creature.name}/creature.toml: [usual]: {error}") from None
+
+
+def wished(config: Config, creature: Creature, wishes: Wishes) -> Config:
+    """The settings with what these wishes are names for laid over them.
+
+    Raises:
+      UserError: names the wish that means nothing, or not for this body.
+    """
+    if wishes == Wishes():
+        return config
+    if config.use.task != "walk":
+        raise UserError(
+            f"--{', --'.join(WISHES)} are for walking, and this is to {config.use.task}"
+        )
+    if wishes.style is not None:
+        config = _styled(config, wishes.style)
+    if wishes.certificate is not None:
+        config = _demanded(config, wishes.certificate)
+    table: dict[str, Any] = {}
+    for layer in (
+        _pace(wishes, creature, config),
+        _turn("turn", wishes.turn),
+        _turn("steer", wishes.steer),
+    ):
+        table = merge(table, layer)
+    if config.use.controller != "poses":
+        table = {"fitness": table.get("fitness", {})}
+    return build(type(config), merge(dataclasses.asdict(config), table), "the wishes")
+
+
+def hint(config: Config) -> str | None:
+    """A sentence for whoever has set `fitness.speed` below what is called a walk, and so asks for
+    nothing that can be certified: it says up to where faster is better.
+    """
+    if config.use.task != "walk" or config.fitness.wish.speed is not None:
+        return None
+    least = SPARE * CertificateConfig().progress.speed
+    if not 0 < config.fitness.speed < least:
+        return None
+    return (
+        f"fitness.speed = {config.fitness.speed:g} says up to where faster is better, and no walk "
+        f"below {least:g} body lengths/s is looked at; to have it walk so slowly ask with --speed "
+        f"{config.fitness.speed:g}bl/s."
+    )
+
+
+def speed_of(text: str, creature: Creature) -> float:
+    """m/s of a speed in words.
+
+    Raises:
+      UserError: it is none.
+    """
+    plain = text.strip().lower().replace(" ", "")
+    if not SPEED.fullmatch(plain) or (plain.startswith("fr") and plain.endswith("/s")):
+        raise UserError(
+            f"--speed {text}: give m/s, such as 0.4, body lengths per second, 0.4bl/s, or a Froude "
+            "number, fr0.2"
+        )
+    value = float(plain.removeprefix("fr").removesuffix("bl/s").removesuffix("m/s"))
+    if not value > 0:
+        raise UserError(f"--speed {text}: must be more than 0; who is to stand still needs no walk")
+    if plain.startswith("fr"):
+        return float((value * creature.gravity * creature.frame.hip_height) ** 0.5)
+    return value * creature.frame.body_length if plain.endswith("bl/s") else value
+
+
+def _pace(wishes: Wishes, creature: Creature, config: Config) -> dict[str, Any]:
+    """The speed and the gait, and a cycle drawn after both, near which evolution begins."""
+    asked, name = wishes.speed, wishes.gait or AUTO
+    if asked is None and name == AUTO:
+        return {}
+    speed = top_speed(creature, config) if asked is None else speed_of(asked, creature)
+    usual = natural_gait(creature, speed)
+    wish = _natural(usual) if name == NATURAL else _named(name, creature)
+    if asked is not None:
+        wish = merge(wish, _speed(round(speed, 6), creature))
+    begins = drawn(usual if name in (AUTO, NATURAL) else name, speed, creature, config)
+    return merge(merge(wish, {"evolution": ORDERED}), begins)
+
+
+def _speed(speed: float, creature: Creature) -> dict[str, Any]:
+    """A speed in m/s, and a cycle of at least as many steps as the shortest strides there may be at
+    that speed.
+
+    Ten steps from pose to pose, a fifth of a second for all four, let whoever moves little run
+    through them far too often.
+    """
+    shortest = SHORTEST * animal_stride(speed, creature.frame.hip_height) / speed
+    steps = unhurried(shortest, float(creature.model.opt.timestep))
+    return {"fitness": {"wish": {"speed": speed}}, "controller": {"interpolation": steps}}
+
+
+def _natural(name: str) -> dict[str, Any]:
+    """Footfalls by name, an animal's strides and duty factor, feet below their hips, level."""
+    like = {"gait": name, "stride": 1.0, "duty_factor": 1.0, "reach": 0.0, "pitch": 0.0}
+    return {"fitness": {"wish": like}}
+
+
+def _named(name: str, creature: Creature) -> dict[str, Any]:
+    if name == AUTO:
+        return {}
+    try:
+        gait = gait_of(name, len(creature.feet.names))
+    except ValueError as error:
+        raise UserError(f"--gait {name}: {creature.name}: {error}, and {NATURAL}") from None
+    whole: dict[str, Any] = {"mirror": False, "key_poses": 4}
+    wish = {"gait": name} | ({} if gait.sway is None else {"sway": gait.sway})
+    return {"fitness": {"wish": wish}} | ({} if gait.twice else {"controller": whole})
+
+
+def _turn(name: str, rate: float | None) -> dict[str, Any]:
+    if rate is None:
+        return {}
+    controller = {"tuning": {"steer": [0.0, 6.0]}, "steering": 3.0}
+    return {"fitness": {"wish": {name: rate}}, "controller": controller}
+
+
+def _styled(config: Config, name: str) -> Config:
+    """The settings with a style's laid over them.
+
+    Raises:
+      UserError: there is none of that name and no file, or it holds what is no setting.
+    """
+    folder = data_folder("configs") / "styles"
+    known = [path.stem for path in folder.glob("*.toml")]
+    if name not in known and Path(name).suffix != ".toml":
+        raise UserError(f"--style {name}: {did_you_mean(name, known)}; or give a FILE.toml")
+    path = folder / f"{name}.toml" if name in known else Path(name)
+    return build(type(config), merge(dataclasses.asdict(config), read_toml(path)), str(path))
+
+
+def _demanded(config: Config, level: str) -> Config:
+    """The settings with those laid over them by which a level of the certificate is reached.
+
+    Raises:
+      UserError: there is no such level.
+    """
+    if level not in LEVELS:
+        raise UserError(f"--certificate {level}: {did_you_mean(level, LEVELS)}")
+    if level == "walks":
+        return config
+    where = f"--certificate {level}"
+    table = over_base({"base": level}, where)
+    return build(type(config), merge(dataclasses.asdict(config), table), where)

@@ -1,0 +1,247 @@
+"""What the simulator of a run is made of, and the body's numbers where they are inputs of the program."""
+
+import dataclasses
+import functools
+from functools import partial
+from typing import Any, Protocol
+
+import jax
+import numpy as np
+from jax.sharding import Mesh
+
+from mjxgait.config.rollout import RolloutConfig
+from mjxgait.config.schema import Config
+from mjxgait.controllers.base import Controller
+from mjxgait.controllers.drive import Drive
+from mjxgait.controllers.observations import check_senses
+from mjxgait.controllers.sims_brain.anatomy import anatomy
+from mjxgait.controllers.sims_brain.controller import capacity_of
+from mjxgait.controllers.sims_brain.reference_body.material import (
+    DRAG,
+    FRICTION,
+    GRAVITY,
+    HARDEST,
+    IN_WATER,
+)
+from mjxgait.controllers.sized_body import BodiedController
+from mjxgait.creature import Creature
+from mjxgait.creature.body import (
+    Body,
+    Ends,
+    GivenBody,
+    given_body,
+    given_ends,
+)
+from mjxgait.creature.settings import Termination
+from mjxgait.physics import make_plant
+from mjxgait.physics.batched_trees.plant import TreePlant
+from mjxgait.physics.batched_trees.tree import Surroundings
+from mjxgait.plugins import make_controller, make_task
+from mjxgait.plugins.fit import check_fit
+from mjxgait.plugins.registry import what_ends
+from mjxgait.simulation.rollout import AXIS, Simulator
+from mjxgait.tasks.base import Task
+from mjxgait.tasks.starts import Starts
+from mjxgait.training.growth import (
+    GraphGrowth,
+    Growth,
+    SizeGrowth,
+    growth_of,
+)
+from mjxgait.types import ModelPlant, Plant, pytree
+
+LANES = 64
+"""Simulations of blocks per device."""
+
+
+@pytree
+class Numbers:
+    """All of a body that the program reads. plant: as `Plant.parameters` has them."""
+
+    body: GivenBody
+    ends: Ends
+    plant: Any
+
+
+class Plan(Protocol):
+    """What the host knows of a program before it is traced."""
+
+    @property
+    def creature(self) -> Creature:
+        """Under the settings that shape its program."""
+        ...
+
+    @property
+    def numbers(self) -> Numbers | None:
+        """What to hand to the program; None where the body is a constant of it, or grows."""
+        ...
+
+    @property
+    def own(self) -> Simulator:
+        """With all constants in it: what the host asks about the program."""
+        ...
+
+    def embodied(self, starts: Starts) -> Starts:
+        """The starts with the bodies that follow from them."""
+        ...
+
+    def simulator(self, numbers: Numbers | None = None) -> Simulator:
+        """Of the creature itself, or of whatever body has these numbers."""
+        ...
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Blueprint:
+    """A creature under the settings that shape its program. plant, lanes: see `make_plant`.
+
+    growth: of the body, where it evolves.
+    """
+
+    creature: Creature
+    config: Config
+    plant: ModelPlant
+    lanes: int
+    growth: SizeGrowth | None = None
+
+    @property
+    def numbers(self) -> Numbers | None:
+        """What to hand to the program; None where the body is a constant of it."""
+        if self.config.rollout.body == "constants":
+            return None
+        ends = what_ends(self.creature, self.config.rollout)
+        single = jax.tree.map(lambda x: np.asarray(x, np.float32), self.plant.parameters)
+        return Numbers(given_body(self.creature), given_ends(ends), single)
+
+    @functools.cached_property
+    def own(self) -> Simulator:
+        """With the creature's numbers as constants: what the host asks about the program."""
+        return self.simulator()
+
+    def embodied(self, starts: Starts) -> Starts:
+        """The starts with the bodies that their heaviness makes."""
+        if starts.heaviness is None:
+            return starts
+        one, heavier = self.plant.parameters, self.plant.heavier
+        every = jax.vmap(lambda factors: heavier(one, factors))
+        return dataclasses.replace(starts, numbers=every(starts.heaviness))
+
+    def simulator(self, numbers: Numbers | None = None) -> Simulator:
+        """Of the creature itself, or of whatever body has these numbers."""
+        if numbers is None:
+            ends = what_ends(self.creature, self.config.rollout)
+            return self._simulator(self.creature, ends, self.plant)
+        return self._simulator(
+            numbers.body, numbers.ends, self.plant.with_parameters(numbers.plant)
+        )
+
+    def _simulator(self, body: Body, ends: Termination | Ends, plant: ModelPlant) -> Simulator:
+        step = float(self.creature.model.opt.timestep)
+        controller = make_controller(body, step, self.config)
+        if self.growth is not None:
+            sizes = len(self.growth.proportions.names)
+            controller = BodiedController(controller, sizes, self.config.evolution.body)
+        task = make_task(body, step, ends, self.config)
+        growth, rollout = self.growth, self.config.rollout
+        return _assembled(body, step, plant, controller, task, rollout, self.lanes, growth)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class GrownBlueprint:
+    """See `Plan`: every genome grows a body of its own. creature: lends its settings and its step."""
+
+    creature: Creature
+    config: Config
+
+    @property
+    def numbers(self) -> None:
+        """See `Plan`."""
+        return None
+
+    @functools.cached_property
+    def own(self) -> Simulator:
+        """See `Plan`."""
+        return self.simulator()
+
+    def embodied(self, starts: Starts) -> Starts:
+        """See `Plan`."""
+        return starts
+
+    def simulator(self, numbers: Numbers | None = None) -> Simulator:
+        """See `Plan`."""
+        config, step = self.config, float(self.creature.model.opt.timestep)
+        settings: Any = config.controller
+        capacity = capacity_of(settings)
+        body = anatomy(capacity.links)
+        ends = what_ends(self.creature, config.rollout)
+        controller = make_controller(body, step, config)
+        task = make_task(body, step, ends, config)
+        wet = config.use.task in IN_WATER
+        around = Surroundings(
+            step=step,
+            friction=FRICTION,
+            contact=HARDEST * step,
+            floor=not wet,
+            gravity=0.0 if wet else GRAVITY,
+            drag=DRAG if wet else 0.0,
+            lit="light" in task.adds,
+        )
+        plant, growth = TreePlant(around), GraphGrowth(capacity)
+        return _assembled(body, step, plant, controller, task, config.rollout, LANES, growth)
+
+
+def _assembled(
+    body: Body,
+    step: float,
+    plant: Plant,
+    controller: Controller,
+    task: Task,
+    rollout: RolloutConfig,
+    lanes: int,
+    growth: Growth | None,
+) -> Simulator:
+    """Of parts that belong together. lanes: where the settings leave them open.
+
+    Raises:
+      UserError: the controller reads what nobody senses.
+    """
+    check_senses(controller.reads, task.adds)
+    return Simulator(
+        creature=body,
+        plant=plant,
+        controller=controller,
+        drive=Drive(body, step, controller.command),
+        task=task,
+        steps=max(round(rollout.seconds / step), 1),
+        lanes=rollout.lanes or lanes,
+        mesh=Mesh(np.array(jax.devices()), (AXIS,)),
+        bodies=None if growth is None else partial(growth.body, plant),
+    )
+
+
+def draw_up(creature: Creature, config: Config) -> Plan:
+    """The blueprint of a run.
+
+    Raises:
+      UserError: the physics does not support the creature's model, or who takes part does not fit.
+    """
+    check_fit(creature, config)
+    if creature.settings.creature.grows:
+        return GrownBlueprint(creature, config)
+    return _of_model(creature, config)
+
+
+def check_plan(creature: Creature, config: Config) -> None:
+    """Refuse what a program for these settings cannot be made of. Compiles and writes nothing.
+
+    Raises:
+      UserError: see `draw_up`; or the controller reads an observation that the body does not have.
+    """
+    draw_up(creature, config).simulator()
+
+
+def _of_model(creature: Creature, config: Config) -> Blueprint:
+    creature = creature.spanned(config.evolution.pose_span)
+    touch = what_ends(creature, config.rollout).touch
+    inputs = config.rollout.body == "inputs"
+    plant, lanes = make_plant(creature, config.rollout.physics, touch, roomy=inputs)
+    return Blueprint(creature, config, plant, lanes, growth_of(creature, config))

@@ -1,0 +1,311 @@
+"""Wires the rooms into a run."""
+
+import dataclasses
+from collections.abc import Callable, Hashable, Iterator, Sequence
+from functools import cached_property, partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from mjxgait.champion import Champion
+from mjxgait.config.schema import Config
+from mjxgait.config.traced import traced
+from mjxgait.creature import Creature
+from mjxgait.errors import UserError
+from mjxgait.evolution.chance import key_of
+from mjxgait.evolution.state import EvolutionState, GenerationMetrics
+from mjxgait.plugins import make_task
+from mjxgait.plugins.registry import what_ends
+from mjxgait.simulation.evaluator import Evaluator
+from mjxgait.simulation.rollout import Episodes, Simulator
+from mjxgait.tasks.starts import Starts
+from mjxgait.training.blueprint import Numbers, Plan, draw_up
+from mjxgait.training.devices import everywhere
+from mjxgait.training.generation import Row, first_state, judge
+from mjxgait.training.shape import shape_of
+from mjxgait.training.stages import (
+    Stages,
+    Turn,
+    at_once,
+    begin,
+    compile_stages,
+    embodied,
+    lower_stages,
+    lowered,
+)
+from mjxgait.types import Asked
+
+Step = Callable[[EvolutionState], tuple[EvolutionState, GenerationMetrics]]
+"""A compiled generation."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Experiment:
+    """One creature under one config: the pure functions of a run. The starts follow from the seed.
+
+    creature: as its files have it, on the ground of the run. `blueprint.creature` also has the pose
+    ranges that the settings state.
+    """
+
+    creature: Creature
+    config: Config
+    blueprint: Plan
+    row: Row
+
+    @cached_property
+    def simulator(self) -> Simulator:
+        """See `Blueprint.own`."""
+        return self.blueprint.own
+
+    @property
+    def starts(self) -> Starts:
+        """The starts on which individuals are judged, [R] in each generation."""
+        return self.row.starts
+
+    @property
+    def plant_note(self) -> str:
+        """What a user should know about the physics; empty if there is nothing to say."""
+        return self.simulator.plant.note
+
+    @property
+    def shape(self) -> Hashable:
+        """What decides on its compiled programs; see `Shape`."""
+        return shape_of(self.creature, self.config), jax.tree.structure(self.row)
+
+    def init(self, island: int = 0) -> EvolutionState:
+        """The state of generation -1: a population that nobody has judged.
+
+        island: other populations on the same starts are those of other islands; the run's own is 0.
+        """
+        return begin(self.blueprint, *self._origin(island))
+
+    def abstract(self) -> EvolutionState:
+        """Shapes and types of a state."""
+        shapes: EvolutionState = jax.eval_shape(
+            partial(first_state, self.blueprint), *self._origin()
+        )
+        return shapes
+
+    def _origin(self, island: int = 0) -> tuple[Numbers | None, Config, jax.Array]:
+        """What the first state follows from."""
+        key = jax.random.fold_in(key_of(self.config.seed), 0)
+        known = (self.blueprint.numbers, self.row.settings)
+        return *known, jax.random.fold_in(key, island) if island else key
+
+    def simulate(self, genomes: Any, starts: Starts | None = None) -> Episodes:
+        """Genomes [N, ...] on the starts [R] of this run or on others: episodes with leaves [N, R, ...]."""
+        rows = _lone((genomes, starts or self.starts, self.row.settings))
+        episodes = self.simulator.simulate(*rows)
+        return Episodes(_only(episodes.tally), episodes.computed_steps)
+
+    def compile(self, evaluator: Evaluator | None = None) -> Step:
+        """A generation by compiled programs; an evaluator elsewhere may judge."""
+        return self.step(self.stages(judges=evaluator is None), evaluator)
+
+    def stages(self, judges: bool = True) -> Stages:
+        """See `Batch.stages`."""
+        return Batch((self,)).stages(judges)
+
+    def step(self, stages: Stages, evaluator: Evaluator | None = None) -> Step:
+        """A generation by programs of this shape."""
+        together = Batch((self,)).bound(stages, evaluator)
+
+        def alone(state: EvolutionState) -> tuple[EvolutionState, GenerationMetrics]:
+            return _only(together(_lone(state)))
+
+        return alone
+
+    def candidates(self, state: EvolutionState) -> list[int]:
+        """Ranks of the best individuals that differ from each other, as many as the config asks for; best first.
+
+        Of equal fitness are those that did the same: programs differ in what changes nothing.
+        """
+        rows = self.simulator.controller.genes(state.genomes, self.config.controller)
+        fitness, settings = np.asarray(state.fitness), self.config.examination
+        chosen: list[int] = []
+        for rank in np.flatnonzero(np.isfinite(fitness)):
+            apart = np.sqrt(np.mean((rows[chosen] - rows[rank]) ** 2, axis=1))
+            differs = (apart > settings.difference).all() and fitness[rank] not in fitness[chosen]
+            if differs and len(chosen) < settings.candidates:
+                chosen.append(int(rank))
+        return chosen
+
+    def place(self, state: EvolutionState) -> EvolutionState:
+        """The state on all devices, where the compiled program wants it."""
+        return jax.device_put(state, everywhere(self.simulator))
+
+    def champion(self, state: EvolutionState, versions: dict[str, str], rank: int = 0) -> Champion:
+        """An individual of a state; rank 0 is the best."""
+        # One transfer instead of one per array: it happens in every generation.
+        genomes, every_term, outcome, fitness, born, generation = jax.device_get(
+            (state.genomes, state.terms, state.outcome, state.fitness, state.born, state.generation)
+        )
+        task = self.simulator.task
+        best = jax.tree.map(lambda leaf: leaf[rank], genomes)
+        terms = every_term[rank].mean(axis=0)
+        origin = {
+            "generation": int(generation),
+            "born": int(born[rank]),
+            "seed": self.config.seed,
+            "nominal": dict(zip(task.outcomes, map(float, outcome[rank, 0]), strict=True)),
+            "versions": versions,
+        }
+        return Champion.of(
+            self.creature,
+            self.config,
+            arrays_of(best),
+            fitness=float(fitness[rank]),
+            terms=dict(zip(task.terms, map(float, terms), strict=True)),
+            origin=origin,
+        )
+
+
+def arrays_of(genome: Any) -> dict[str, np.ndarray]:
+    """The arrays of a genome by dotted name, as checkpoints have them."""
+    leaves = jax.tree_util.tree_leaves_with_path(genome)
+    return {
+        jax.tree_util.keystr(path, simple=True, separator="."): np.asarray(leaf)
+        for path, leaf in leaves
+    }
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Batch:
+    """Evolution runs of one creature, side by side as rows `B` of one computation: they share the lanes and are compiled once."""
+
+    experiments: tuple[Experiment, ...]
+
+    @cached_property
+    def rows(self) -> Row:
+        """Settings and starts, leaves [B, ...]."""
+        return _stack([experiment.row for experiment in self.experiments])
+
+    def init(self) -> EvolutionState:
+        """The states before anybody has been judged, leaves [B, ...]."""
+        return _stack([experiment.init() for experiment in self.experiments])
+
+    def abstract(self) -> EvolutionState:
+        """Shapes and types of the states."""
+        count, one = len(self.experiments), self.experiments[0].abstract()
+        return jax.tree.map(
+            lambda leaf: jax.ShapeDtypeStruct((count, *leaf.shape), leaf.dtype), one
+        )
+
+    def compile(self, evaluator: Evaluator | None = None) -> Step:
+        """A generation of all rows: states and metrics have leaves [B, ...]. evaluator: who judges, if not
+        this machine.
+        """
+        return self.bound(self.stages(judges=evaluator is None), evaluator)
+
+    def stages(self, judges: bool = True, turn: Turn = at_once) -> Stages:
+        """See `compile_stages`."""
+        first = self.experiments[0]
+        settings = first.config.controller, first.config.evolution
+        long = first.simulator.controller.variation(*settings).long
+        return compile_stages(self.lower(judges), turn, long)
+
+    def lower(self, judges: bool = True) -> Iterator[tuple[str, jax.stages.Lowered]]:
+        """The programs of a generation, see `lower_stages`; the same for all settings of the same shape."""
+        return lower_stages(self._blueprint, self.rows, self.abstract(), judges)
+
+    def bound(self, stages: Stages, evaluator: Evaluator | None = None) -> Step:
+        """The generation of these rows by programs of their shape."""
+        return partial(stages.step, *self.known, evaluator=evaluator)
+
+    def lower_judge(
+        self, genomes: Any, starts: Starts, asked: Asked | None = None
+    ) -> jax.stages.Lowered:
+        """The program that judges so many genomes [B, N, ...]; see `generation.judge`."""
+        given = (self.rows.settings, starts, genomes)
+        return lowered(self._blueprint, judge, *given, *([] if asked is None else [asked]))
+
+    @property
+    def _blueprint(self) -> Plan:
+        return self.experiments[0].blueprint
+
+    @cached_property
+    def known(self) -> tuple[Numbers | None, Row]:
+        """What the programs read of the body and of the rows, on all devices."""
+        one = self.experiments[0]
+        known: tuple[Numbers | None, Row] = jax.device_put(
+            (one.blueprint.numbers, self.rows), everywhere(one.simulator)
+        )
+        return known
+
+    def place(self, states: EvolutionState) -> EvolutionState:
+        """The states on all devices, where the compiled program wants them."""
+        return jax.device_put(states, everywhere(self.experiments[0].simulator))
+
+
+def build_experiment(creature: Creature, config: Config) -> Experiment:
+    """Joins the rooms: creature and config to simulator, settings and starts.
+
+    Raises:
+      UserError: the physics does not support the creature's model.
+    """
+    return _experiment(creature, draw_up(creature, config), config)
+
+
+def build_batch(
+    creature: Creature,
+    configs: Sequence[Config],
+    blueprint: Plan | None = None,
+    sources: Sequence[Sequence[int]] = (),
+) -> Batch:
+    """Runs of one creature whose configs differ in nothing that shapes the program.
+
+    Args:
+      blueprint: of this creature under settings of the same shape, where it has been drawn up.
+      sources: for each run the others whose best are judged among its children; by default nobody's.
+
+    Raises:
+      UserError: two configs need different programs, or the physics does not support the creature's model.
+    """
+    if len({jax.tree.structure(traced(config)) for config in configs}) != 1:
+        raise UserError(
+            "these settings need programs of different shapes: run them in batches of their own"
+        )
+    blueprint = blueprint or draw_up(creature, configs[0])
+    experiments = [_experiment(creature, blueprint, config) for config in configs]
+    if any(sources):
+        experiments = [
+            dataclasses.replace(one, row=dataclasses.replace(one.row, sources=jnp.int32(rows)))
+            for one, rows in zip(experiments, _filled_up(sources), strict=True)
+        ]
+    return Batch(tuple(experiments))
+
+
+def _filled_up(sources: Sequence[Sequence[int]]) -> list[list[int]]:
+    """All as long as the longest; a row's own number stands for nobody."""
+    most = max(map(len, sources))
+    return [[*rows, *[own] * (most - len(rows))] for own, rows in enumerate(sources)]
+
+
+def _experiment(creature: Creature, blueprint: Plan, config: Config) -> Experiment:
+    creature = creature.on(config.rollout.ground)
+    key = jax.random.fold_in(key_of(config.seed), 1)
+    rollout = config.rollout
+    drawn = dataclasses.replace(rollout, starts=1 + (rollout.starts - 1) * rollout.variety)
+    # Each run's own task: what is told in a trial is not the same for all rows of a program.
+    step, ends = float(creature.model.opt.timestep), what_ends(creature, rollout)
+    task = make_task(blueprint.own.creature, step, ends, config)
+    starts = task.trials(key, creature, drawn)
+    if starts.heaviness is not None:
+        starts = embodied(blueprint, starts)
+    return Experiment(creature, config, blueprint, Row(traced(config), starts))
+
+
+def _lone(tree: Any) -> Any:
+    """One row [1, ...] of everything."""
+    return jax.tree.map(lambda leaf: leaf[None], tree)
+
+
+def _only(tree: Any) -> Any:
+    """The only row of everything."""
+    return jax.tree.map(lambda leaf: leaf[0], tree)
+
+
+def _stack(trees: Sequence[Any]) -> Any:
+    return jax.tree.map(lambda *leaves: jnp.stack(leaves), *trees)

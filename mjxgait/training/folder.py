@@ -1,0 +1,220 @@
+"""The run folder: what lies where, how it is made and opened."""
+
+import dataclasses
+import json
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+import pydantic
+
+from mjxgait.certification.check_body import check_body
+from mjxgait.champion import Champion, DamagedChampion, read_champion
+from mjxgait.config.schema import Config
+from mjxgait.config.tables import (
+    STORED,
+    Flag,
+    Index,
+    Number,
+    check,
+    check_whole,
+    dump_toml,
+    read_toml,
+)
+from mjxgait.creature import Creature, load_creature
+from mjxgait.creature.proportions import extreme_bodies
+from mjxgait.errors import NotLoaded, UserError
+from mjxgait.files import (
+    TAKE_OUT,
+    DamagedFile,
+    read_lines,
+    write_text,
+)
+from mjxgait.plugins import build_config
+from mjxgait.plugins.fit import check_fit
+from mjxgait.training.own import (
+    CONFIG,
+    command,
+    keep_places,
+    with_options,
+)
+
+CREATURE, METRICS, CHAMPION = "creature", "metrics.jsonl", "champion.json"
+CERTIFICATE, STRESS, EXAMS = "certificate.json", "stress.json", "exams.jsonl"
+PLOT, PLOTS, BODY = "fitness.png", "plots", "body"
+MOTHERS = "mothers"
+"""In a line of the log, of everybody in the population the place that it had itself, or its mother,
+in the generation before."""
+ISLANDS, MIGRATIONS = "islands", "migrations.jsonl"
+
+
+@dataclasses.dataclass(frozen=True)
+class Numbered:
+    """Schema of a line of a file that a resumed run takes lines out of."""
+
+    __pydantic_config__ = STORED
+    generation: Annotated[int, pydantic.Field(strict=True)]
+
+
+@dataclasses.dataclass(frozen=True)
+class _Metrics:
+    """Schema of a line of `metrics.jsonl`; all else in it is numbers."""
+
+    __pydantic_config__ = STORED
+    generation: Index
+    best: Number | None
+    mean: Number | None
+    forced: Flag
+    mothers: list[int] = dataclasses.field(default_factory=list)
+
+
+def check_run(folder: Path | None, creature: Creature, config: Config) -> Path:
+    """Return the folder that a new run may have; by default a new one under runs/. Writes nothing.
+
+    Raises:
+      UserError: the folder holds something already; controller or task does not fit the creature;
+        or the creature's body cannot be examined.
+    """
+    check_parts(creature, config)
+    folder = folder or new_run_folder(creature.name, config.seed)
+    if is_taken(folder):
+        holds = "another run" if (folder / CONFIG).exists() else "something else"
+        raise UserError(
+            f"{folder}: holds {holds}; name another folder with --out, or go on with --resume "
+            f"{folder}"
+        )
+    return folder
+
+
+def check_parts(creature: Creature, config: Config) -> None:
+    """Refuse a controller or task that does not fit the creature, and a body that cannot be examined.
+
+    Bodies that grow are checked one by one when they are examined. Of bodies whose sizes evolve the
+    smallest and the largest are checked.
+
+    Raises:
+      UserError: says which, and the way out.
+    """
+    check_fit(creature, config)
+    if creature.settings.creature.grows:
+        return
+    pose_span = config.evolution.pose_span
+    for body in (creature, *extreme_bodies(creature, config.evolution.body)):
+        check_body(body.spanned(pose_span), pose_span)
+
+
+def is_taken(folder: Path) -> bool:
+    """Return whether a folder holds something, or is a file.
+
+    Raises:
+      UserError: it cannot be read.
+    """
+    try:
+        return folder.exists() and (not folder.is_dir() or any(folder.iterdir()))
+    except OSError as error:
+        raise UserError(f"{folder}: cannot be read ({error.strerror})") from None
+
+
+def create_run(folder: Path | None, creature: Creature, config: Config) -> Path:
+    """Make the run folder with the exact creature and settings; by default a new one under runs/.
+
+    Raises:
+      UserError: see `check_run`; or the folder cannot be written.
+    """
+    folder = check_run(folder, creature, config)
+    try:
+        keep_body(folder / CREATURE, creature)
+        keep_places(folder, config.use)
+        write_text(folder / CONFIG, dump_toml(config))
+    except OSError as error:
+        raise UserError(f"{folder}: cannot be written ({error.strerror})") from None
+    return folder
+
+
+def keep_body(folder: Path, creature: Creature) -> None:
+    """Writes a creature folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in creature.files.items():
+        write_text(folder / name, text)
+
+
+def new_run_folder(creature: str, seed: int) -> Path:
+    """The first folder under runs/ that is not there yet."""
+    names = (
+        f"{creature}-seed{seed}{suffix}" for suffix in ("", *(f"-{i}" for i in range(2, 10_000)))
+    )
+    return next(folder for name in names if not (folder := Path("runs") / name).exists())
+
+
+def open_run(folder: Path) -> tuple[Creature, Config]:
+    """The creature, on the ground of the run, and the settings of a run folder.
+
+    Raises:
+      UserError: it is not a run folder, or its controller or task was not named.
+    """
+    if not (folder / CONFIG).exists():
+        raise UserError(f"{folder}: not a run folder (it has no {CONFIG})")
+    try:
+        table = read_toml(folder / CONFIG)
+        config = build_config(table, str(folder / CONFIG))
+    except NotLoaded as error:
+        raise with_options(error, folder) from None
+    check_whole(config, table, str(folder / CONFIG))
+    return load_creature(folder / CREATURE).on(config.rollout.ground), config
+
+
+def open_champion(folder: Path) -> tuple[Creature, Champion]:
+    """The best individual of a run folder, and the body that it has.
+
+    Raises:
+      UserError: it is not a run folder, or has no champion yet.
+    """
+    creature, _ = open_run(folder)
+    champion = kept_champion(folder, creature)
+    return champion.embodied(creature), champion
+
+
+def kept_champion(folder: Path, creature: Creature) -> Champion:
+    """Return what `champion.json` of a run folder holds.
+
+    Raises:
+      UserError: there is none, it is damaged, or it is of another body.
+    """
+    try:
+        return read_champion(folder / CHAMPION, creature)
+    except DamagedChampion as error:
+        again = command("train", "--resume", folder, run=folder)
+        raise UserError(f"{error}; write it anew with: {again}") from None
+
+
+def read_metrics(path: Path) -> list[dict[str, Any]]:
+    """The lines of a `metrics.jsonl`; a last line that was cut off by a kill is left out.
+
+    Raises:
+      UserError: it is damaged; names the line.
+    """
+    lines = read_records(path, _Metrics)
+    for number, line in enumerate(lines, 1):
+        for name, value in line.items():
+            if not isinstance(value, int | float | None) and name not in (MOTHERS, "variant"):
+                raise DamagedFile(f"{path}, line {number}: {name} is not a number; {TAKE_OUT}")
+    return lines
+
+
+def read_records(path: Path, schema: type) -> list[dict[str, Any]]:
+    """The lines of a file that grows, each as its schema says; see `files.read_lines`."""
+    lines = read_lines(path)
+    for number, line in enumerate(lines, 1):
+        check(schema, line, f"{path}, line {number}", TAKE_OUT)
+    return lines
+
+
+def truncate_metrics(path: Path, generation: int) -> None:
+    """Takes out the lines after a generation, as a resumed run will write them again."""
+    kept = [line for line in read_records(path, Numbered) if line["generation"] <= generation]
+    write_lines(path, kept)
+
+
+def write_lines(path: Path, lines: Iterable[Mapping[str, Any]]) -> None:
+    """Write a file with an object in each line in one go."""
+    write_text(path, "".join(json.dumps(line) + "\n" for line in lines))

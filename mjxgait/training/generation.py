@@ -1,0 +1,218 @@
+"""The parts of a generation of evolution runs side by side: propose, judge (and promote), absorb.
+
+Row by row but for the simulations, so that a row reads nothing of its neighbours, unless it is told
+to have theirs judged among its own.
+"""
+
+import dataclasses
+from functools import partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from mjxgait.config.schema import Config
+from mjxgait.evolution.evolution import Evolution
+from mjxgait.evolution.forced import begun_anew
+from mjxgait.evolution.state import (
+    NOBODY,
+    EvolutionState,
+    GenerationMetrics,
+    Proposal,
+)
+from mjxgait.simulation.evaluator import Local
+from mjxgait.simulation.rollout import Simulator
+from mjxgait.tasks.base import Task
+from mjxgait.tasks.score import in_order, score
+from mjxgait.tasks.starts import Starts
+from mjxgait.training.blueprint import Numbers, Plan
+from mjxgait.types import Asked, Judged, pytree
+
+LEADERS = 16
+"""Of the best of a row, those that decide whether trials become harder."""
+SENT = 4
+"""Of the best of a row, those that it sends to others, one in each generation in turn."""
+
+
+@pytree
+class Row:
+    """What tells one evolution run from another in the same compiled program: its traced settings, and all its starts.
+
+    sources: [S] rows whose best are judged among its children; its own number stands for nobody.
+    None where rows know nothing of each other.
+    """
+
+    settings: Config
+    starts: Starts
+    sources: jax.Array | None = None
+
+
+def evolution_of(simulator: Simulator, settings: Config) -> Evolution:
+    """The genetic algorithm under settings, plain or traced."""
+    task = simulator.task
+
+    def rank(terms: jax.Array, generation: jax.Array) -> jax.Array:
+        weights = in_order(task.weights(settings.fitness, generation), task.terms)
+        return score(terms, weights, settings.rollout.worst, settings.rollout.caution)
+
+    variation = simulator.controller.variation(settings.controller, settings.evolution)
+    return Evolution(settings.evolution, variation, rank)
+
+
+def first_state(
+    blueprint: Plan, numbers: Numbers | None, settings: Config, key: jax.Array
+) -> EvolutionState:
+    """That of a run, before anybody has been judged."""
+    simulator = blueprint.simulator(numbers)
+    task, trials = simulator.task, settings.rollout.starts
+    state = evolution_of(simulator, settings).init(key, trials, len(task.terms), len(task.outcomes))
+    if not task.climbs:
+        return state
+    return dataclasses.replace(state, level=jnp.int32(0), stale=jnp.zeros((), bool))
+
+
+def propose(
+    blueprint: Plan, numbers: Numbers | None, rows: Row, states: EvolutionState
+) -> tuple[Proposal, Starts]:
+    """What the rows [B] want judged, and on which starts [B, R]."""
+    simulator = blueprint.simulator(numbers)
+
+    def of_row(pair: tuple[Row, EvolutionState]) -> Proposal:
+        row, state = pair
+        return evolution_of(simulator, row.settings).propose(state)
+
+    proposals = jax.lax.map(of_row, (rows, states))
+    if rows.sources is not None:
+        proposals = with_guests(rows.sources, states, proposals)
+    return proposals, jax.vmap(partial(next_starts, simulator.task))(rows, states)
+
+
+def with_guests(sources: jax.Array, states: EvolutionState, proposals: Proposal) -> Proposal:
+    """The proposals [B] with one of the best of each source [B, S] in the place of a last child.
+
+    Rows differ in what they ask for, so a guest is judged anew. Nobody comes before the rows have
+    been judged themselves.
+    """
+    count, own = sources.shape[1], jnp.arange(len(sources))[:, None]
+    judged = states.generation[:, None] >= 0
+    comes, rank = (sources != own) & judged, states.generation[:, None] % SENT
+
+    def seated(children: jax.Array, best: jax.Array) -> jax.Array:
+        guests, last = best[sources, rank % best.shape[1]], children[:, -count:]
+        who = comes.reshape(*comes.shape, *[1] * (guests.ndim - 2))
+        return children.at[:, -count:].set(jnp.where(who, guests, last))
+
+    mothers = proposals.mothers
+    if mothers is not None:
+        mothers = seated(mothers, jnp.full_like(states.origin, NOBODY))
+    return dataclasses.replace(
+        proposals,
+        offspring=jax.tree.map(seated, proposals.offspring, states.genomes),
+        origin=seated(proposals.origin, states.origin),
+        mothers=mothers,
+    )
+
+
+def judge(
+    blueprint: Plan,
+    numbers: Numbers | None,
+    settings: Config,
+    starts: Starts,
+    genomes: object,
+    asked: Asked | None = None,
+) -> Judged:
+    """The verdict on genomes [B, N, ...] as this machine gives it."""
+    return Local(blueprint.simulator(numbers)).judge(genomes, starts, settings, asked)
+
+
+def first_trials(states: EvolutionState, proposals: Proposal) -> Asked:
+    """Everybody's first trial, of whom nothing is known yet; reads nothing but shapes."""
+    shape = (*proposals.born.shape, states.terms.shape[2])
+
+    def nothing(values: jax.Array) -> Any:
+        return np.full((*shape, values.shape[-1]), np.nan, np.float32)
+
+    failed: Any = np.zeros(shape, bool)
+    spent: Any = np.zeros(shape[0], np.int32)
+    known = Judged(nothing(states.terms), nothing(states.outcome), failed, spent, spent)
+    return Asked(np.broadcast_to(np.arange(shape[2]) == 0, shape), known)
+
+
+def promote(
+    blueprint: Plan,
+    numbers: Numbers | None,
+    rows: Row,
+    states: EvolutionState,
+    proposals: Proposal,
+    judged: Judged,
+) -> Asked:
+    """The other trials of those who did best in the first, and of those who are judged once more."""
+    simulator = blueprint.simulator(numbers)
+
+    def of_row(given: tuple[Row, EvolutionState, Proposal, Judged]) -> jax.Array:
+        row, state, proposal, judged = given
+        share = row.settings.rollout.promote
+        return evolution_of(simulator, row.settings).promising(state, proposal, judged, share)
+
+    wanted = jax.lax.map(of_row, (rows, states, proposals, judged))
+    others = jnp.arange(states.terms.shape[2]) > 0
+    return Asked(wanted[..., None] & others, judged)
+
+
+def absorb(
+    blueprint: Plan,
+    numbers: Numbers | None,
+    rows: Row,
+    states: EvolutionState,
+    proposals: Proposal,
+    judged: Judged,
+) -> tuple[EvolutionState, GenerationMetrics]:
+    """The rest of the rows' generation."""
+    simulator = blueprint.simulator(numbers)
+
+    def of_row(
+        given: tuple[Row, EvolutionState, Proposal, Judged],
+    ) -> tuple[EvolutionState, GenerationMetrics]:
+        row, state, proposal, judged = given
+        after, told = evolution_of(simulator, row.settings).absorb(state, proposal, judged)
+        after = climbed(simulator.task, row.settings.fitness, after)
+        return after, dataclasses.replace(told, level=after.level)
+
+    return jax.lax.map(of_row, (rows, states, proposals, judged))
+
+
+def climbed(task: Task, settings: Any, state: EvolutionState) -> EvolutionState:
+    """The state after a generation, one level higher if most of the best have mastered theirs and
+    there is a higher one.
+
+    What they were worth at the old level is then forgotten, for it was easier: of those that live
+    on all are judged again, and that they are worth less is no stall.
+    """
+    if state.level is None:
+        return state
+    best = dict(zip(task.terms, jnp.mean(state.terms[:LEADERS], axis=1).T, strict=True))
+    known = (state.generation >= 0) & jnp.isfinite(state.fitness[:LEADERS])
+    ready = jnp.mean(jax.vmap(task.mastered)(best) & known) > 0.5
+    higher = ready & (state.level < task.levels(settings))
+    rounds = None if state.rounds is None else jnp.where(higher, 0.0, state.rounds)
+    after = begun_anew(state, higher)
+    return dataclasses.replace(after, level=state.level + higher, stale=higher, rounds=rounds)
+
+
+def next_starts(task: Task, row: Row, state: EvolutionState) -> Starts:
+    """The starts [R] of the next generation, as hard as they are by then."""
+    starts = row.starts
+    if row.settings.rollout.variety > 1:
+        starts = _of_round(row, jnp.maximum(state.generation + 1, 0))
+    if state.level is None:
+        return starts
+    return task.harder(starts, row.settings.fitness, state.level)
+
+
+def _of_round(row: Row, generation: jax.Array) -> Starts:
+    """The nominal one, and the next of all others in turn."""
+    others = row.settings.rollout.starts - 1
+    turn = 1 + (generation * others + jnp.arange(others)) % (row.starts.friction.shape[0] - 1)
+    places = jnp.append(0, turn)
+    return jax.tree.map(lambda leaf: leaf[places], row.starts)

@@ -1,0 +1,217 @@
+"""What a run says while it works: a live line in a terminal, one plain line per generation
+elsewhere.
+"""
+
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.status import Status
+from rich.table import Table
+
+from mjxgait.certification import Certificate
+from mjxgait.certification.likeness import in_words
+from mjxgait.certification.tasks import demands_of
+from mjxgait.config.schema import Config
+from mjxgait.creature.ground.spec import FLAT
+from mjxgait.tasks.walk.target_criteria import in_the_way
+from mjxgait.training.folder import (
+    CHAMPION,
+    CONFIG,
+    CREATURE,
+    METRICS,
+    PLOT,
+)
+from mjxgait.training.own import command
+
+
+class Screen:
+    """Prints the progress of one run."""
+
+    def __init__(self, console: Console | None = None) -> None:
+        self.console = console or Console(highlight=False, soft_wrap=True, markup=False)
+        self._status: Status | None = None
+        self._walls: list[float] = []
+        self._first: tuple[float, int] | None = None
+
+    @contextmanager
+    def compiling(self, what: str, experiment: Any) -> Iterator[None]:
+        """Says that the program is being compiled, with the time it takes."""
+        config = experiment.config
+        self.console.print(
+            f"{what}: population {config.evolution.population}, {config.rollout.starts} starts of "
+            f"{config.rollout.seconds:g} s, seed {config.seed}"
+        )
+        began = time.perf_counter()
+        if self.console.is_terminal:
+            columns = (SpinnerColumn(), TextColumn("Compiling…"), TimeElapsedColumn())
+            with Progress(*columns, console=self.console, transient=True) as progress:
+                progress.add_task("compile")
+                yield
+        else:
+            self.console.print("Compiling…")
+            yield
+        self.console.print(f"Compiled in {time.perf_counter() - began:.1f} s")
+
+    def say(self, text: str) -> None:
+        """A line of its own."""
+        self.console.print(text)
+
+    def generation(self, line: Mapping[str, Any], config: Config) -> None:
+        """Show a generation of a run with these settings; see `metrics_line`."""
+        last, sooner = config.evolution.generations, what_ends_sooner(config)
+        if not self._walls:
+            self.say(
+                "best, mean: fitness; alive: the share of the episodes that end without a fall"
+            )
+            if sooner:
+                self.say(f"time left: up to generation {last}; the run ends sooner {sooner}")
+        left = duration((last - line["generation"]) * self._seconds(line))
+        best, mean = (
+            f"{line[key]:.3f}" if line[key] is not None else "none" for key in ("best", "mean")
+        )
+        episodes = max(line["episodes"], 1)
+        text = (
+            f"generation {line['generation']:>3}/{last}  best {best}  mean {mean}  "
+            f"alive {1 - line['failures'] / episodes:>4.0%}  {line['steps_per_second']:>7,} "
+            f"steps/s  {'at most ' if sooner else ''}{left} left"
+            + ("  forced evolution" if line["forced"] else "")
+        )
+        if self.console.is_terminal:
+            if self._status is None:
+                self._status = self.console.status(text)
+                self._status.start()
+            self._status.update(text)
+        else:
+            self.console.print(text)
+
+    def _seconds(self, line: Mapping[str, Any]) -> float:
+        """Return what a generation takes: as the latest ones did, and with the examinations between
+        them, which the log does not count.
+        """
+        self._walls = [*self._walls[-4:], line["wall_s"]]
+        now = time.perf_counter(), int(line["generation"])
+        self._first = self._first or now
+        since = (now[0] - self._first[0]) / max(now[1] - self._first[1], 1)
+        return max(since, sum(self._walls) / len(self._walls))
+
+    def close(self) -> None:
+        """Ends the live line, if there is one."""
+        if self._status:
+            self._status.stop()
+            self._status = None
+
+    def certificate(self, certificate: Certificate) -> None:
+        """The verdict, measure by measure."""
+        table = Table(*("criterion", "measure", "value", "threshold", ""), box=None, pad_edge=False)
+        for row in certificate.rows():
+            table.add_row(*row, style="bold" if row[-1] == "FAIL" else None)
+        self.console.print(table)
+        report, does = certificate.report, demands_of(certificate.task).verdict
+        found = certificate.verdict
+        verdict = f"Certified: {does}" if found.certified else "Not certified"
+        if found.passed and found.reservation:
+            verdict = f"Not certified; it passes {found.reservation}"
+        ground = report.get("ground", FLAT)
+        where = "" if ground == FLAT else f" on {ground}"
+        if certificate.attempts > 1:
+            self.console.print(f"This was examination {certificate.attempts} of its run.")
+        crossed = any(c.name == "parts" and not c.passed for c in certificate.criteria)
+        if crossed and (worst := report["overlap"]):
+            one, other = worst["parts"]
+            self.console.print(
+                f"{other} stands up to {1000 * worst['depth']:.0f} mm deep in {one}, "
+                f"and in it in {worst['share']:.0%} of the frames."
+            )
+        if said := in_the_way(certificate.criteria):
+            self.console.print(said)
+        # Of a motion that strides nowhere the numbers mean little.
+        if stopped := report.get("obstacle"):
+            self.console.print(f"{verdict}: it {stopped}{where}; {certificate.seconds:.0f} s.")
+            return
+        self.console.print(
+            f"{verdict} (margin {certificate.margin:.2f}). {report['summary']}{where}; "
+            f"{certificate.seconds:.0f} s."
+        )
+        if like := in_words(report):
+            self.console.print(like)
+        self.console.print(
+            "The margin is that of the tightest measure: 0 just passes, 1 is far from its threshold."
+        )
+
+    def report(
+        self, folder: Path, why: str, last: Mapping[str, Any], seconds: float, interrupted: bool
+    ) -> None:
+        """The table at the end: how it went and where everything is.
+
+        last: the last line of the metrics.
+        """
+        self.close()
+        self.console.print(f"{why[0].upper()}{why[1:]}; {seconds:.0f} s.")
+        table = Table(box=None, show_header=False, pad_edge=False)
+        rows = {
+            "best fitness": _best(last),
+            "outcome": _outcome(last),
+            "champion": f"{folder / CHAMPION}, the best individual",
+            "metrics": f"{folder / METRICS}, {folder / PLOT}",
+            "settings": f"{folder / CONFIG}, {folder / CREATURE}/",
+        }
+        for name, value in rows.items():
+            table.add_row(name, value)
+        self.console.print(table)
+        if interrupted:
+            again = command("train", "--resume", folder, run=folder)
+            self.console.print(f"To go on: {again}", markup=False)
+
+    def next_steps(self, folder: Path, certified: bool) -> None:
+        """Print commands that lead on from a run that has ended."""
+        steps: dict[tuple[object, ...], str] = {
+            ("render", folder, "--out", "walk.webp"): "films it",
+            ("share", folder, "--out", "walk.html"): "makes a page to give away",
+            ("export", folder, "--out", "walk.glb"): "writes it for animation tools",
+        }
+        if not certified:
+            steps["inspect", folder] = "tells how evolution went; another --seed may do better"
+        self.console.print("Next:")
+        for words, what in steps.items():
+            self.console.print(f"  {command(*words, run=folder)}   {what}", markup=False)
+
+
+def what_ends_sooner(config: Config) -> str:
+    """Return what can end a run before its last generation, in words; empty where nothing can."""
+    evolution, look = config.evolution, config.examination
+    reasons = {
+        f"once a look at its best, every {look.every} generations, leads to a certificate": bool(
+            look.every and look.candidates
+        ),
+        f"at a fitness of {evolution.target}": evolution.target is not None,
+        "when forced evolution no longer pays": evolution.forced.enabled
+        and bool(evolution.forced.patience),
+    }
+    return ", or ".join(reason for reason, holds in reasons.items() if holds)
+
+
+def duration(seconds: float) -> str:
+    """Return a time in the unit that suits it."""
+    if seconds < 120:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"
+
+
+def _best(last: Mapping[str, Any]) -> str:
+    """The best fitness in words; a generation that nobody could be judged in has none."""
+    if last["best"] is None:
+        return f"none: nobody could be judged in generation {last['generation']}"
+    return f"{last['best']:.3f} in generation {last['generation']}"
+
+
+def _outcome(last: Mapping[str, Any]) -> str:
+    """What the best has done, in units of the world: m, s or how often."""
+    prefix = "outcome_"
+    named = {k.removeprefix(prefix): v for k, v in last.items() if k.startswith(prefix)}
+    told = (f"{name} {'-' if value is None else f'{value:.2f}'}" for name, value in named.items())
+    return ", ".join(told) + " per episode, mean of the starts"
