@@ -22,6 +22,8 @@ AIMS = 3
 """The purpose of what a task draws: goals."""
 COMMANDS = 4
 """Of turns that are told."""
+STEERED_FOR = 12.0
+"""s, length of a simulation that is steered."""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -3,12 +3,11 @@
 from mjxgait.certification import draws
 from mjxgait.certification.config import CertificateConfig
 from mjxgait.certification.criteria import Criterion
-from mjxgait.certification.draws import COMMANDS, Draw
+from mjxgait.certification.draws import COMMANDS, STEERED_FOR, Draw
 from mjxgait.certification.simulate import simulate
 from mjxgait.certification.tasks import demands_of
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
-from mjxgait.tasks.walk.target_criteria import TOLD_FOR
 
 
 def told_to_turn(
@@ -16,13 +15,13 @@ def told_to_turn(
 ) -> tuple[Criterion, ...]:
     """Whether one that is to be steered follows headings of a draw, from perturbed starts."""
     demands, step = demands_of(champion.task, champion.wish), creature.model.opt.timestep
-    steps = round(TOLD_FOR / step)
+    steps = round(STEERED_FOR / step)
     told = demands.commands(config, steps, step, draw.generator(COMMANDS))
     if told is None:
         return ()
     starts = draws.starts(creature, config, draw, len(told))
     fall = demands.fall(config)
     outcome = simulate(
-        creature, champion, starts, TOLD_FOR, heading=told, fall=fall, threads=threads
+        creature, champion, starts, STEERED_FOR, heading=told, fall=fall, threads=threads
     )
     return demands.obeyed(outcome, told, config)

@@ -7,10 +7,9 @@ from mjxgait.champion.record import (
     split_genome,
     write_champion,
 )
-from mjxgait.champion.serializers import CODECS, Codec, codec_of
+from mjxgait.champion.serializers import Codec, codec_of
 
 __all__ = [
-    "CODECS",
     "Champion",
     "Codec",
     "DamagedChampion",

@@ -4,15 +4,13 @@ A genome is a handful of named arrays; that is all that evolution, checkpoints a
 file ask of it. Shapes and names are the controller's own.
 """
 
+import functools
 from collections.abc import Mapping
 from typing import Any, Protocol
 
 import numpy as np
 
 from mjxgait.champion.plain import Genome, PlainCodec
-from mjxgait.controllers.expressions.serialize import ProgramCodec
-from mjxgait.controllers.key_poses.serialize import PoseCodec
-from mjxgait.controllers.sims_brain.serialize import GraphCodec
 from mjxgait.creature import Creature
 
 
@@ -56,14 +54,16 @@ class Codec(Protocol):
         ...
 
 
-CODECS: Mapping[str, Codec] = {
-    "poses": PoseCodec(),
-    "program": ProgramCodec(),
-    "brain": GraphCodec(),
-}
-"""By the name of the controller."""
+@functools.cache
+def codecs() -> Mapping[str, Codec]:
+    """Return the codecs by the name of the controller; imported late, for each imports this package."""
+    from mjxgait.controllers.expressions.serialize import ProgramCodec
+    from mjxgait.controllers.key_poses.serialize import PoseCodec
+    from mjxgait.controllers.sims_brain.serialize import GraphCodec
+
+    return {"poses": PoseCodec(), "program": ProgramCodec(), "brain": GraphCodec()}
 
 
 def codec_of(controller: str) -> Codec:
     """That of a controller."""
-    return CODECS.get(controller, PlainCodec())
+    return codecs().get(controller, PlainCodec())

@@ -1,16 +1,14 @@
 """How each kind of genome is told of."""
 
+import functools
 from collections.abc import Mapping
 from typing import Any, Protocol
 
 import numpy as np
 from rich.console import Console
 
-from mjxgait.controllers.expressions.report import ProgramView
-from mjxgait.controllers.key_poses.report import PoseView, shared, title
-from mjxgait.controllers.sims_brain.report import GraphView
-from mjxgait.inspect.snapshot import Snapshot
-from mjxgait.inspect.tables import titled_table
+from mjxgait.inspect.snapshot import Snapshot, shared
+from mjxgait.inspect.tables import title, titled_table
 
 
 class GenomeView(Protocol):
@@ -77,17 +75,19 @@ class PlainView:
         _print_arrays("champion: from A to B", found["champion_moved"], console)
 
 
-VIEWS: Mapping[str, GenomeView] = {
-    "poses": PoseView(),
-    "program": ProgramView(),
-    "brain": GraphView(),
-}
-"""By the name of the controller."""
+@functools.cache
+def views() -> Mapping[str, GenomeView]:
+    """Return the views by the name of the controller; imported late, for each imports this package."""
+    from mjxgait.controllers.expressions.report import ProgramView
+    from mjxgait.controllers.key_poses.report import PoseView
+    from mjxgait.controllers.sims_brain.report import GraphView
+
+    return {"poses": PoseView(), "program": ProgramView(), "brain": GraphView()}
 
 
 def view_of(controller: str) -> GenomeView:
     """That of a controller's genomes."""
-    return VIEWS.get(controller, PlainView())
+    return views().get(controller, PlainView())
 
 
 def _print_arrays(heading: str, arrays: Mapping[str, Any], console: Console) -> None:

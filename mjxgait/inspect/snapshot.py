@@ -206,3 +206,9 @@ def _versions(run: Path) -> dict[str, str]:
         return dict(read_json(run / CHAMPION)["origin"]["versions"])
     except (UserError, ValueError, LookupError, TypeError):
         return {}
+
+
+def shared(a: Snapshot, b: Snapshot) -> int:
+    """How many genomes are in both populations."""
+    mine, other = ({row.tobytes() for row in s.rows} for s in (a, b))
+    return len(mine & other)

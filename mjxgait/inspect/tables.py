@@ -42,3 +42,8 @@ def print_columns(title: str, rows: Mapping[str, list[Any]], console: Console) -
     for key, (x, y) in rows.items():
         table.add_row(key.replace("_", " ") if title == "fitness" else key, str(x), str(y))
     console.print(table)
+
+
+def title(individual: Mapping[str, Any]) -> str:
+    """What to call an individual."""
+    return "champion" if individual["rank"] == 1 else f"individual {individual['rank']}"

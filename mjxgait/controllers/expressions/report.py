@@ -13,9 +13,8 @@ from mjxgait.controllers.expressions.text import (
     terminals,
     to_text,
 )
-from mjxgait.controllers.key_poses.report import shared, title
-from mjxgait.inspect.snapshot import Snapshot
-from mjxgait.inspect.tables import titled_table
+from mjxgait.inspect.snapshot import Snapshot, shared
+from mjxgait.inspect.tables import title, titled_table
 
 
 class ProgramView:

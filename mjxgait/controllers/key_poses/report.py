@@ -8,8 +8,8 @@ import numpy as np
 from rich.console import Console
 
 from mjxgait.controllers.key_poses.config import gene_names
-from mjxgait.inspect.snapshot import Snapshot
-from mjxgait.inspect.tables import print_columns, titled_table
+from mjxgait.inspect.snapshot import Snapshot, shared
+from mjxgait.inspect.tables import print_columns, title, titled_table
 
 
 class PoseView:
@@ -97,17 +97,6 @@ class PoseView:
         pairs = found["champion_tuning"].items()
         changed = {name: [f"{x:.3g}", f"{y:.3g}"] for name, (x, y) in pairs if x != y}
         print_columns("champion's tuning", changed, console)
-
-
-def shared(a: Snapshot, b: Snapshot) -> int:
-    """How many genomes are in both populations."""
-    mine, other = ({row.tobytes() for row in s.rows} for s in (a, b))
-    return len(mine & other)
-
-
-def title(individual: Mapping[str, Any]) -> str:
-    """What to call an individual."""
-    return "champion" if individual["rank"] == 1 else f"individual {individual['rank']}"
 
 
 def _moved(a: Snapshot, b: Snapshot) -> dict[str, list[float]]:

@@ -9,8 +9,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from mjxgait.champion import Champion
 from mjxgait.controllers.sims_brain.reference_body.material import NEURONS, SENSORS
-from mjxgait.controllers.sims_brain.reference_body.parts import Part
+from mjxgait.controllers.sims_brain.reference_body.parts import Part, grow
+from mjxgait.creature import Creature
 from mjxgait.reference.controllers.protocol import Command, Memory
 
 CENTRE = -1
@@ -206,3 +208,11 @@ class BrainTwin:
 def _sign(part: Part, hinge: int) -> float:
     """-1 where a mirror image turns the other way: about all its axes but the one it is mirrored along."""
     return -1.0 if part.mirrored and part.hinges[hinge] != 1 else 1.0
+
+
+def brain_twin(creature: Creature, champion: Champion, step: float) -> BrainTwin:
+    """Return the brain of a champion; its creature has grown and calls its hinges `part3_0`."""
+    parts = grow(champion.genome, champion.settings.parts, champion.settings.links)
+    names = [name.removeprefix("part").split("_") for name in creature.joints.names]
+    hinges = [(int(part), int(hinge)) for part, hinge in names]
+    return BrainTwin(champion.genome, parts, hinges, step, champion.settings.every)

@@ -6,10 +6,9 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
-from mjxgait.controllers.key_poses.report import shared, title
 from mjxgait.controllers.sims_brain.reference_body.parts import Part, grow
-from mjxgait.inspect.snapshot import Snapshot
-from mjxgait.inspect.tables import titled_table
+from mjxgait.inspect.snapshot import Snapshot, shared
+from mjxgait.inspect.tables import title, titled_table
 
 COLUMNS = ("part", "node", "on part", "joint", "size (cm)", "swing (deg)", "strength (N·m)")
 

@@ -1,12 +1,9 @@
 """Which twin moves which kind of champion."""
 
-from collections.abc import Callable
+import functools
+from collections.abc import Callable, Mapping
 
 from mjxgait.champion import Champion
-from mjxgait.controllers.expressions.reference import ProgramTwin
-from mjxgait.controllers.key_poses.reference import PoseTwin
-from mjxgait.controllers.sims_brain.reference import BrainTwin
-from mjxgait.controllers.sims_brain.reference_body.parts import grow
 from mjxgait.creature import Creature
 from mjxgait.errors import not_loaded
 from mjxgait.reference.controllers.protocol import Twin
@@ -15,20 +12,22 @@ Maker = Callable[[Creature, Champion, float], Twin]
 """From creature, champion and step in s."""
 
 
-def _brain(creature: Creature, champion: Champion, step: float) -> Twin:
-    """creature: the champion's own, which has grown. Its hinges are called `part3_0`."""
-    parts = grow(champion.genome, champion.settings.parts, champion.settings.links)
-    names = [name.removeprefix("part").split("_") for name in creature.joints.names]
-    hinges = [(int(part), int(hinge)) for part, hinge in names]
-    return BrainTwin(champion.genome, parts, hinges, step, champion.settings.every)
+_OWN: dict[str, Maker] = {}
 
 
-_TWINS: dict[str, Maker] = {"poses": PoseTwin, "program": ProgramTwin, "brain": _brain}
+@functools.cache
+def _shipped() -> Mapping[str, Maker]:
+    """Return the makers of shipped twins; imported late, for each of them imports this package."""
+    from mjxgait.controllers.expressions.reference import ProgramTwin
+    from mjxgait.controllers.key_poses.reference import PoseTwin
+    from mjxgait.controllers.sims_brain.reference import brain_twin
+
+    return {"poses": PoseTwin, "program": ProgramTwin, "brain": brain_twin}
 
 
 def register_twin(controller: str, make: Maker) -> None:
     """Makes the twins of a kind of controller known."""
-    _TWINS[controller] = make
+    _OWN[controller] = make
 
 
 def twin_of(creature: Creature, champion: Champion, step: float) -> Twin:
@@ -38,6 +37,7 @@ def twin_of(creature: Creature, champion: Champion, step: float) -> Twin:
       UserError: the champion is not finite, or code of the user's own that was not named.
     """
     champion.check_finite(creature)
-    if champion.controller not in _TWINS:
+    make = _OWN.get(champion.controller) or _shipped().get(champion.controller)
+    if make is None:
         raise not_loaded("controller", champion.controller)
-    return _TWINS[champion.controller](creature, champion, step)
+    return make(creature, champion, step)

@@ -27,8 +27,8 @@ Wish = Mapping[str, Any]
 
 ASKED, BOUNDS = "as asked", ("gait", "physics")
 """Names of criteria: the wishes', and those whose numbers bound what a body can."""
-COMMANDED, TOLD_FOR = (2.0, 4.0), 12.0
-"""s, when a command comes, and for how long one is watched who is steered."""
+COMMANDED = (2.0, 4.0)
+"""s, when a command comes."""
 FAST_ENOUGH = 0.75
 """Share of the speed asked for that is the least of a walk: by the tenth that a wish may be missed by
 the very speed that was asked for would have next to no margin."""
