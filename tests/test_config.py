@@ -13,8 +13,8 @@ from mjxgait.config.schema import Config, UseConfig
 from mjxgait.config.shipped import data_folder, find_creature
 from mjxgait.config.tables import build, dump_toml, read_toml
 from mjxgait.errors import UserError
+from mjxgait.kinds import controllers, tasks
 from mjxgait.plugins import resolve_config
-from mjxgait.plugins.registry import SHIPPED
 from mjxgait.plugins.settings import build_config, config_class
 
 
@@ -338,8 +338,8 @@ def tables_of(cls: type) -> list[type]:
     return [cls, *(found for t in inner for found in tables_of(t))]
 
 
-@pytest.mark.parametrize("controller", SHIPPED["controller"])
-@pytest.mark.parametrize("task", SHIPPED["task"])
+@pytest.mark.parametrize("controller", list(controllers()))
+@pytest.mark.parametrize("task", list(tasks()))
 def test_every_key_is_explained_under_its_own_name(controller: str, task: str):
     """`train --help` takes its words from here; what a class inherits its base explains."""
     for cls in tables_of(config_class(UseConfig(controller, task))):

@@ -125,9 +125,9 @@ def test_it_takes_part_in_studies(folder: Path, monkeypatch: pytest.MonkeyPatch)
 
 
 def test_no_code_is_loaded_from_a_run(trained: Path, capfd, monkeypatch):
-    from mjxgait.plugins import registry
+    from mjxgait import kinds
 
-    monkeypatch.setattr(registry, "_OWN", {})
+    monkeypatch.setattr(kinds, "_OWN", {})
     monkeypatch.chdir(trained.parents[1])
     assert call(f"inspect {trained} --task=my.py:Stand") == 2
     said, whole = capfd.readouterr().err.splitlines()
@@ -171,7 +171,7 @@ def test_the_page_that_follows_a_run_is_given_the_same_code(folder: Path, traine
 
     def start(words: list[str], **_: object) -> SimpleNamespace:
         started.append(words)
-        return SimpleNamespace(terminate=lambda: None, wait=lambda: None)
+        return SimpleNamespace(terminate=lambda: None, communicate=lambda: None)
 
     monkeypatch.setattr("subprocess.Popen", start)
     with following(trained):
@@ -194,7 +194,7 @@ def test_the_page_that_follows_a_run_is_given_the_same_code(folder: Path, traine
         ("--controller rare.py:Rare", "Rare.every = 3: must be one of 1, 2, 4, 8, 16"),
         ("--controller posse", 'did you mean "poses"'),
         ("--task my.py", "give FILE.py:CLASS"),
-        ("--task", "name one of walk"),
+        ("--task", "name one of hop"),
         ("--use.controller my.py:Other", "name it with --controller FILE.py:CLASS"),
         ("--controller wild.py:Wild", 'there is no sense "jont_pos"'),
     ],

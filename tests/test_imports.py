@@ -49,7 +49,7 @@ FLOORS = (
     ("creature",),
     ("config", "controllers/*/config", "tasks/*/*config", "tasks/walk/gaits"),
     ("creature/ground", "animation/clips"),
-    ("types", "cores", "processes"),
+    ("types", "cores", "processes", "kinds"),
     ("files",),
     ("errors",),
 )

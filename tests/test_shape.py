@@ -5,6 +5,7 @@ import dataclasses
 import pytest
 from helpers import small_config
 
+from mjxgait import kinds
 from mjxgait.creature import Creature
 from mjxgait.plugins import registry
 from mjxgait.training.shape import shape_of
@@ -28,5 +29,6 @@ def test_code_of_the_same_name_that_was_defined_anew_is_other_code(
     before = shape_of(stool, small_config())
     name = getattr(small_config().use, kind)
     own = type(name, (registry.find(kind, name),), {})
-    monkeypatch.setitem(registry._OWN, (kind, name), own)
+    shipped = kinds.shipped(kind)[name]
+    monkeypatch.setitem(kinds._OWN, (kind, name), dataclasses.replace(shipped, **{kind: own}))
     assert shape_of(stool, small_config()) != before

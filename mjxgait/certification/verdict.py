@@ -12,17 +12,7 @@ import numpy as np
 from mjxgait.certification.config import CertificateConfig
 from mjxgait.certification.criteria import Criterion, Measure
 from mjxgait.config.tables import flat
-
-TASKS = {
-    "hop": {"hop"},
-    "limbo": {"limbo"},
-    "travel": {"travel"},
-    "swim": {"swim", "follow"},
-    "roam": {"roam", "follow", "follow-on-land"},
-    "jump": {"jump"},
-    "follow": {"follow", "follow-on-land"},
-}
-"""Tables of thresholds that count for some tasks only."""
+from mjxgait.kinds import known_task, tasks
 
 
 @dataclasses.dataclass(frozen=True)
@@ -100,10 +90,11 @@ def other_rules(document: Mapping[str, Any]) -> Iterator[str]:
     if not isinstance(document.get("config"), Mapping):
         yield "thresholds that it does not state"
         return
-    task, own = document.get("task"), flat(document["config"])
+    kind, own = known_task(document.get("task", "")), flat(document["config"])
+    others = {table for one in tasks().values() for table in one.tables}
+    others -= set(kind.tables if kind else ())
     for key, shipped in flat(dataclasses.asdict(CertificateConfig())).items():
-        counts = task in TASKS.get(key.split(".")[0], {task})
-        if counts and key in own and own[key] != shipped:
+        if key.split(".")[0] not in others and key in own and own[key] != shipped:
             yield f"{key} = {own[key]} instead of {shipped}"
 
 

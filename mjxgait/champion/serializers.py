@@ -12,6 +12,7 @@ import numpy as np
 
 from mjxgait.champion.plain import Genome, PlainCodec
 from mjxgait.creature import Creature
+from mjxgait.kinds import ControllerKind, known_controller
 
 
 class Codec(Protocol):
@@ -54,16 +55,13 @@ class Codec(Protocol):
         ...
 
 
-@functools.cache
-def codecs() -> Mapping[str, Codec]:
-    """Return the codecs by the name of the controller; imported late, for each imports this package."""
-    from mjxgait.controllers.expressions.serialize import ProgramCodec
-    from mjxgait.controllers.key_poses.serialize import PoseCodec
-    from mjxgait.controllers.sims_brain.serialize import GraphCodec
-
-    return {"poses": PoseCodec(), "program": ProgramCodec(), "brain": GraphCodec()}
-
-
 def codec_of(controller: str) -> Codec:
-    """That of a controller."""
-    return codecs().get(controller, PlainCodec())
+    """Return the serializer of a kind of controller; of one without, its arrays as they are."""
+    kind = known_controller(controller)
+    return _made(kind) if kind and kind.serializer else PlainCodec()
+
+
+@functools.cache
+def _made(kind: ControllerKind) -> Codec:
+    made: Codec = kind.part("serializer")()
+    return made

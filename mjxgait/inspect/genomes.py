@@ -1,6 +1,5 @@
 """How each kind of genome is told of."""
 
-import functools
 from collections.abc import Mapping
 from typing import Any, Protocol
 
@@ -9,6 +8,7 @@ from rich.console import Console
 
 from mjxgait.inspect.snapshot import Snapshot, shared
 from mjxgait.inspect.tables import title, titled_table
+from mjxgait.kinds import known_controller
 
 
 class GenomeView(Protocol):
@@ -75,19 +75,11 @@ class PlainView:
         _print_arrays("champion: from A to B", found["champion_moved"], console)
 
 
-@functools.cache
-def views() -> Mapping[str, GenomeView]:
-    """Return the views by the name of the controller; imported late, for each imports this package."""
-    from mjxgait.controllers.expressions.report import ProgramView
-    from mjxgait.controllers.key_poses.report import PoseView
-    from mjxgait.controllers.sims_brain.report import GraphView
-
-    return {"poses": PoseView(), "program": ProgramView(), "brain": GraphView()}
-
-
 def view_of(controller: str) -> GenomeView:
-    """That of a controller's genomes."""
-    return views().get(controller, PlainView())
+    """Return the report of a kind of controller's genomes; of one without, its arrays as they are."""
+    kind = known_controller(controller)
+    view: GenomeView = kind.part("report")() if kind and kind.report else PlainView()
+    return view
 
 
 def _print_arrays(heading: str, arrays: Mapping[str, Any], console: Console) -> None:

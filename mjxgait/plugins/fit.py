@@ -1,14 +1,11 @@
 """Whether those that take part fit the creature."""
 
-from typing import Any
-
 from mjxgait.config.schema import Config
 from mjxgait.controllers.expressions.written import check_programs
-from mjxgait.controllers.sims_brain.reference_body.material import IN_WATER, ON_LAND
 from mjxgait.creature import Creature
 from mjxgait.creature.ground.spec import FLAT
 from mjxgait.errors import UserError
-from mjxgait.plugins.registry import SHIPPED, find
+from mjxgait.kinds import controller_kind, known_task, tasks
 
 
 def check_fit(creature: Creature, config: Config) -> None:
@@ -18,7 +15,7 @@ def check_fit(creature: Creature, config: Config) -> None:
       UserError: says why, and the way out.
     """
     controller, task, name = config.use.controller, config.use.task, creature.name
-    kind: Any = find("controller", controller)
+    grows, kind = controller_kind(controller).grows, known_task(task)
     if config.examination.level != "walks" and task != "walk":
         raise UserError(
             f"examination.level = {config.examination.level}: only who is to walk can walk there, and "
@@ -43,23 +40,23 @@ def check_fit(creature: Creature, config: Config) -> None:
             raise UserError(
                 f"{name}: rollout.step is for bodies that grow; creature.xml has this one's step"
             )
-        if getattr(kind, "grows", False):
+        if grows:
             raise UserError(
                 f"{name}: its body is there already, and a {controller} grows with its own; take "
                 "--env blocks, or another controller"
             )
-        if task in (*IN_WATER, *ON_LAND):
+        if kind and kind.modular:
             raise UserError(
                 f"{name}: only bodies that grow {task}; take --env blocks, or another task"
             )
         return
-    if not getattr(kind, "grows", False):
+    if not grows:
         raise UserError(
             f"{name}: its body grows with its brain, so {controller} has nothing to move; leave "
             "--controller out"
         )
-    if task in SHIPPED["task"] and task not in (*IN_WATER, *ON_LAND):
-        known = ", ".join((*IN_WATER, *ON_LAND))
+    if task in tasks() and not tasks()[task].modular:
+        known = ", ".join(name for name, one in tasks().items() if one.modular)
         raise UserError(f"{name}: bodies that grow cannot {task}, only {known}")
     step = float(creature.model.opt.timestep)
     if config.rollout.step not in (0.0, step):

@@ -4,17 +4,16 @@ import importlib.util
 import inspect
 import sys
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 from typing import cast
 
-from mjxgait.certification.tasks import register_demands
-from mjxgait.certification.tasks.plain import HasCriteria
+from mjxgait.certification.tasks.plain import HasCriteria, PlainDemands
 from mjxgait.config.schema import UseConfig
 from mjxgait.controllers.key_poses.config import holds
 from mjxgait.errors import UserError, did_you_mean
-from mjxgait.plugins.registry import SHIPPED, add_own
-from mjxgait.reference.controllers import register_twin
+from mjxgait.kinds import ControllerKind, TaskKind, register, shipped
 
 KINDS = ("controller", "task")
 _LOADED: dict[tuple[str, str], str] = {}
@@ -37,7 +36,7 @@ def take_own(arguments: Sequence[str]) -> tuple[list[str], dict[str, str]]:
             rest.append(flag + equals + value)
             continue
         if not equals and not waiting:
-            raise UserError(f"{flag}: name one of {', '.join(SHIPPED[kind])}, or FILE.py:CLASS")
+            raise UserError(f"{flag}: name one of {', '.join(shipped(kind))}, or FILE.py:CLASS")
         named[kind] = load(kind, value if equals else waiting.pop(0))
     return rest, named
 
@@ -48,12 +47,12 @@ def load(kind: str, text: str) -> str:
     Raises:
       UserError: says what is wrong with the file or the class.
     """
-    if text in SHIPPED[kind]:
+    if text in shipped(kind):
         return text
     place, colon, name = text.rpartition(":")
     if not colon or not name or not place.endswith(".py"):
         raise UserError(
-            f"--{kind} {text}: {did_you_mean(text, SHIPPED[kind])}; or give FILE.py:CLASS for one "
+            f"--{kind} {text}: {did_you_mean(text, shipped(kind))}; or give FILE.py:CLASS for one "
             "of your own"
         )
     path = Path(place)
@@ -71,14 +70,14 @@ def load(kind: str, text: str) -> str:
     except ValueError as error:
         raise UserError(f"{path}: {name}.every = {every}: {error}") from None
     known = f"{path.name}:{name}"
-    add_own(kind, known, cls)
     _LOADED[kind, known] = f"{path.resolve()}:{name}"
     if kind == "controller":
         from mjxgait.plugins.same_code import SameCode
 
-        register_twin(known, SameCode)
+        register(ControllerKind(known, cls.__module__, controller=cls, reference=SameCode))
     else:
-        register_demands(known, cast(HasCriteria, cls))
+        criteria = partial(PlainDemands, cast(HasCriteria, cls))
+        register(TaskKind(known, cls.__module__, task=cls, criteria=criteria))
     return known
 
 

@@ -21,7 +21,6 @@ from mjxgait.controllers.sims_brain.reference_body.material import (
     FRICTION,
     GRAVITY,
     HARDEST,
-    IN_WATER,
 )
 from mjxgait.controllers.sized_body import BodiedController
 from mjxgait.creature import Creature
@@ -33,6 +32,7 @@ from mjxgait.creature.body import (
     given_ends,
 )
 from mjxgait.creature.settings import Termination
+from mjxgait.kinds import in_water
 from mjxgait.physics import make_plant
 from mjxgait.physics.batched_trees.plant import TreePlant
 from mjxgait.physics.batched_trees.tree import Surroundings
@@ -175,7 +175,7 @@ class GrownBlueprint:
         ends = what_ends(self.creature, config.rollout)
         controller = make_controller(body, step, config)
         task = make_task(body, step, ends, config)
-        wet = config.use.task in IN_WATER
+        wet = in_water(config.use.task)
         around = Surroundings(
             step=step,
             friction=FRICTION,

@@ -1,5 +1,6 @@
 """A run whose bodies grow is made of the same parts as every other."""
 
+import dataclasses
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +15,9 @@ from mjxgait.controllers.sims_brain.reference_body.material import DRAG, GRAVITY
 from mjxgait.creature import Creature
 from mjxgait.creature.step import at_step
 from mjxgait.errors import UserError
+from mjxgait.kinds import controller_kind, register
 from mjxgait.physics.batched_trees.tree import Surroundings
-from mjxgait.plugins.registry import add_own, find
+from mjxgait.plugins.registry import find
 from mjxgait.plugins.settings import build_config, resolve_config
 from mjxgait.simulation.rollout import Simulator
 from mjxgait.tasks.modular.config import RoamConfig
@@ -37,7 +39,7 @@ def simulator(controller: str, task: str = "swim") -> Simulator:
 
 
 def test_a_brain_reads_only_what_there_is_to_sense():
-    add_own("controller", "smelling", Smelling)
+    register(dataclasses.replace(controller_kind("brain"), name="smelling", controller=Smelling))
     assert simulator("brain").controller.reads == ("joint_pos", "contact")
     assert simulator("brain", "follow").controller.reads == ("joint_pos", "contact", "light")
     with pytest.raises(UserError, match='there is no sense "contcat"'):
@@ -126,7 +128,7 @@ def test_a_creature_says_things_to_one_task_only():
         (
             "blocks",
             {"use": {"controller": "brain", "task": "hop"}},
-            "cannot hop, only swim, follow, roam",
+            "cannot hop, only swim, roam, jump",
         ),
         (
             "blocks",

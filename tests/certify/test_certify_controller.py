@@ -301,16 +301,15 @@ def test_the_senses_that_tasks_add_are_those_of_evolution(tiny):
     """
     import jax.numpy as jnp
 
-    from mjxgait.controllers.sims_brain.reference_body.material import IN_WATER, ON_LAND
-    from mjxgait.plugins.registry import SHIPPED
+    from mjxgait.kinds import tasks
 
     state, sensed = askew(tiny)
     state = dataclasses.replace(state, goal=np.array([0.8]), bar=np.array([0.6]))
     found = {}
-    for name, make in SHIPPED["task"].items():
-        if name in (*IN_WATER, *ON_LAND):
+    for kind in tasks().values():
+        if kind.modular:
             continue
-        task = make()(tiny, STEP, 1000, tiny.settings.termination)
+        task = kind.part("task")(tiny, STEP, 1000, tiny.settings.termination)
         aim = task.aim(SimpleNamespace(goal=jnp.float32(0.8), raised=jnp.float32(0.0)))
         found |= task.senses(aim, sensed)
         assert set(task.adds) <= set(found)

@@ -17,13 +17,14 @@ from mjxgait.config.shipped import data_folder, shipped_configs, shipped_creatur
 from mjxgait.creature import Creature, load_creature
 from mjxgait.creature.step import at_step
 from mjxgait.errors import UserError
+from mjxgait.kinds import tasks
 from mjxgait.plugins import resolve_config
 from mjxgait.plugins.fit import check_fit
-from mjxgait.plugins.registry import OF_BODIES_THAT_GROW, SHIPPED, find
+from mjxgait.plugins.registry import find
 
 ROOT = Path(__file__).parents[2]
 CREATURES, CONFIGS = shipped_creatures(), shipped_configs()
-TASKS = [name for name in SHIPPED["task"] if name not in OF_BODIES_THAT_GROW.values()]
+TASKS = [name for name, kind in tasks().items() if not kind.called]
 """By the names that a user gives them."""
 STYLES = sorted(path.stem for path in (data_folder("configs") / "styles").glob("*.toml"))
 STUDIES = sorted(path.stem for path in (data_folder("configs") / "ablations").glob("*.toml"))

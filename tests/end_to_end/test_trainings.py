@@ -32,8 +32,8 @@ from helpers import STOOL, said_by
 from mjxgait.certification import CertificateConfig, glance
 from mjxgait.champion import Champion, write_champion
 from mjxgait.controllers.key_poses.config import gene_names
+from mjxgait.kinds import meant_of_grown
 from mjxgait.plugins import resolve_config
-from mjxgait.plugins.registry import OF_BODIES_THAT_GROW
 from mjxgait.training.folder import (
     CERTIFICATE,
     CHAMPION,
@@ -90,7 +90,7 @@ def test_a_training_ends_with_a_certificate(way: Way, tmp_path: Path, capsys, to
     asked = way.task or (way.config and read_config(way.config).get("use", {}).get("task"))
     task = asked or use_of(way.creature).task
     if creature_of(way.creature).settings.creature.grows:
-        task = OF_BODIES_THAT_GROW.get(task, task)
+        task = meant_of_grown(task)
     assert config.use.task == document["task"] == task
 
 

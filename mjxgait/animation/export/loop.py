@@ -8,8 +8,8 @@ import dataclasses
 import mujoco
 import numpy as np
 
-from mjxgait.controllers.sims_brain.reference_body.material import IN_WATER
 from mjxgait.errors import UserError
+from mjxgait.kinds import in_water
 from mjxgait.rendering.walk import Walk
 
 RATES = (24, 30, 60)
@@ -62,7 +62,7 @@ def walk_loop(walk: Walk, rate: int = 30, most: int = MOST_STRIDES) -> WalkLoop:
       UserError: the walk has no steady stride.
     """
     chosen = _fitting_strides(walk, rate, most)
-    if chosen is None and walk.champion.task in IN_WATER:
+    if chosen is None and in_water(walk.champion.task):
         raise UserError(
             f"{walk.creature.name}: a swimmer has no strides to make a loop of; `mjxgait render` "
             "shows it"

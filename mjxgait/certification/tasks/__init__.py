@@ -1,6 +1,6 @@
 """What each task demands of its champion."""
 
 from mjxgait.certification.tasks.protocol import Demands, promising
-from mjxgait.certification.tasks.registry import demands_of, how_simulated, register_demands
+from mjxgait.certification.tasks.registry import demands_of, how_simulated
 
-__all__ = ["Demands", "demands_of", "how_simulated", "promising", "register_demands"]
+__all__ = ["Demands", "demands_of", "how_simulated", "promising"]

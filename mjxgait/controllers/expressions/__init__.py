@@ -1,1 +1,14 @@
-"""Controllers that are expressions, one per joint (Gritz & Hahn 1995, 1997): trees as arrays."""
+"""One expression tree per joint (Gritz & Hahn 1995, 1997)."""
+
+from mjxgait.kinds import ControllerKind
+
+KINDS = (
+    ControllerKind(
+        name="program",
+        home=__name__,
+        controller="controller:Programs",
+        reference="reference:ProgramTwin",
+        serializer="serialize:ProgramCodec",
+        report="report:ProgramView",
+    ),
+)

@@ -1,1 +1,14 @@
-"""Controllers that track key poses (Wilson)."""
+"""Key poses that stable PD tracks (Wilson)."""
+
+from mjxgait.kinds import ControllerKind
+
+KINDS = (
+    ControllerKind(
+        name="poses",
+        home=__name__,
+        controller="controller:PoseTracker",
+        reference="reference:PoseTwin",
+        serializer="serialize:PoseCodec",
+        report="report:PoseView",
+    ),
+)

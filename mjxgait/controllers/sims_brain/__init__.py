@@ -1,1 +1,15 @@
-"""Brains of evolved creatures: networks of Sims' neurons."""
+"""Bodies and brains that grow from one graph (Sims 1994)."""
+
+from mjxgait.kinds import ControllerKind
+
+KINDS = (
+    ControllerKind(
+        name="brain",
+        home=__name__,
+        controller="controller:Brains",
+        reference="reference:brain_twin",
+        serializer="serialize:GraphCodec",
+        report="report:GraphView",
+        grows=True,
+    ),
+)

@@ -8,11 +8,12 @@ import numpy as np
 from mjxgait.config.tables import build
 from mjxgait.controllers.sims_brain.config import BrainConfig
 from mjxgait.controllers.sims_brain.reference_body.folder import body_files
-from mjxgait.controllers.sims_brain.reference_body.material import FRICTION, GRAVITY, IN_WATER
+from mjxgait.controllers.sims_brain.reference_body.material import FRICTION, GRAVITY
 from mjxgait.controllers.sims_brain.reference_body.parts import grow
 from mjxgait.creature import Creature
 from mjxgait.creature.scale import load_files
 from mjxgait.errors import UserError
+from mjxgait.kinds import in_water
 
 
 class GraphCodec:
@@ -63,7 +64,7 @@ class GraphCodec:
         creature: Creature,
     ) -> Creature:
         """See `Codec`: what grows from the genome, in the water or on the ground of its task."""
-        wet = task in IN_WATER
+        wet = in_water(task)
         files = body_files(
             grow(genome, settings.parts, settings.links),
             creature.name,

@@ -1,6 +1,6 @@
 """Each kind of controller a second time, in NumPy and float64, for many simulations at once."""
 
 from mjxgait.reference.controllers.protocol import Command, Memory, Twin
-from mjxgait.reference.controllers.registry import register_twin, twin_of
+from mjxgait.reference.controllers.registry import twin_of
 
-__all__ = ["Command", "Memory", "Twin", "register_twin", "twin_of"]
+__all__ = ["Command", "Memory", "Twin", "twin_of"]

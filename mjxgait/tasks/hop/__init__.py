@@ -1,1 +1,21 @@
-"""Hopping to a goal: the tally of an episode, and the terms of the fitness."""
+"""Get to a goal: hop there, pass beneath a bar, or travel from goal to goal."""
+
+from mjxgait.kinds import TaskKind
+
+KINDS = (
+    TaskKind("hop", __name__, task="task:Hop", criteria="criteria:HopDemands", tables=("hop",)),
+    TaskKind(
+        "limbo",
+        __name__,
+        task="limbo:Limbo",
+        criteria="limbo_criteria:LimboDemands",
+        tables=("limbo",),
+    ),
+    TaskKind(
+        "travel",
+        __name__,
+        task="travel:Travel",
+        criteria="travel_criteria:TravelDemands",
+        tables=("travel",),
+    ),
+)

@@ -1,1 +1,33 @@
-"""What bodies that grow are to do."""
+"""What bodies that grow do (Sims 1994): swim, walk, jump, follow a light."""
+
+from functools import partial
+
+from mjxgait.kinds import TaskKind
+
+_kind = partial(TaskKind, home=__name__, modular=True)
+KINDS = (
+    _kind(
+        "swim", task="swim:Swim", criteria="swim_criteria:SwimDemands", water=True, tables=("swim",)
+    ),
+    _kind(
+        "roam",
+        task="roam:Roam",
+        criteria="roam_criteria:RoamDemands",
+        called="walk",
+        tables=("roam",),
+    ),
+    _kind("jump", task="jump:Jump", criteria="jump_criteria:JumpDemands", tables=("jump",)),
+    _kind(
+        "follow",
+        task="follow:FollowInWater",
+        criteria="follow_criteria:in_water",
+        water=True,
+        tables=("swim", "roam", "follow"),
+    ),
+    _kind(
+        "follow-on-land",
+        task="follow:FollowOnLand",
+        criteria="follow_criteria:on_land",
+        tables=("roam", "follow"),
+    ),
+)

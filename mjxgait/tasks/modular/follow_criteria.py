@@ -7,7 +7,7 @@ import numpy as np
 from mjxgait.certification.config import CertificateConfig
 from mjxgait.certification.criteria import Criterion, at_least
 from mjxgait.champion import Champion
-from mjxgait.controllers.sims_brain.reference_body.material import LIGHT
+from mjxgait.controllers.sims_brain.reference_body.material import DRAG, LIGHT
 from mjxgait.reference.measure import Recording
 from mjxgait.reference.outcome import Outcome
 from mjxgait.reference.starts import Starts
@@ -87,3 +87,13 @@ def approach(apart: np.ndarray, time_step: float) -> np.ndarray:
     first, last = (np.linalg.norm(apart[..., k, :], axis=-1) for k in (0, -1))
     speed: np.ndarray = (first - last) / ((apart.shape[-2] - 1) * time_step)
     return speed
+
+
+def in_water() -> FollowDemands:
+    """Return the criteria of a swimmer that follows a light."""
+    return FollowDemands(DRAG)
+
+
+def on_land() -> FollowDemands:
+    """Return the criteria of a walker that follows a light."""
+    return FollowDemands(0.0)

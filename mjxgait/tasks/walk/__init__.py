@@ -1,1 +1,5 @@
-"""Walking: the tally of an episode, and the terms of the fitness."""
+"""Walk forward, in a gait, at a speed or on a turn that may be requested."""
+
+from mjxgait.kinds import TaskKind
+
+KINDS = (TaskKind("walk", __name__, task="task:Walk", criteria="criteria:WalkDemands"),)

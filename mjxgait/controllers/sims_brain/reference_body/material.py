@@ -33,8 +33,6 @@ HARDEST = 2.0
 """Steps, the time constant of a touch (`solref`): the least that MuJoCo simulates as it is given."""
 DRAG = 500.0
 """N·s/m³, what water does to a face per area and normal velocity."""
-IN_WATER, ON_LAND = ("swim", "follow"), ("roam", "jump", "follow-on-land")
-"""Tasks that are done there."""
 IN_LIGHT = ("follow", "follow-on-land")
 """Tasks in which there is a light; in all others nobody sees any."""
 LIGHT = 10.0
