@@ -1,1 +1,1 @@
-"""Controllers that track key poses (Wilson)."""
+"""Controller that tracks key poses (Wilson)."""
