@@ -43,7 +43,7 @@ class Controller(Protocol):
         ...
 
     def genes(self, genomes: Any, settings: Any) -> np.ndarray:
-        """Return genomes [N, ...] as rows [N, genes] in units of gene ranges, to measure diversity."""
+        """Return genomes [N, ...] as rows [N, genes], in gene ranges, to measure diversity."""
         ...
 
     def numbers(self, genomes: Any) -> Mapping[str, np.ndarray]:
@@ -51,7 +51,7 @@ class Controller(Protocol):
         ...
 
     def prepare(self, genome: Any, settings: Any) -> Any:
-        """Return the plan: what an episode needs of a genome under the settings, plain or traced."""
+        """Return the plan: an episode's data from genome and settings, plain or traced."""
         ...
 
     def load(self, plan: Any) -> jax.Array | None:

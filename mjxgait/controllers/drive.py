@@ -48,7 +48,7 @@ class Drive:
     command: Command
 
     def rules(self, settings: DriveConfig, stiffness: jax.Array, damping: jax.Array) -> Rules:
-        """Return an episode's rules from the settings, plain or traced, and its gain factors [J]."""
+        """Return an episode's rules from settings, plain or traced, and gain factors [J]."""
         return Rules(
             stable=chosen(settings.law, "spd"),
             constraint_forces=jnp.asarray(settings.constraint_forces),

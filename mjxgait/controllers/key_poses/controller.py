@@ -285,7 +285,7 @@ def stepping(creature: Body, genes: jax.Array, senses: Senses) -> jax.Array:
 
 
 def off_the_way(creature: Body, senses: Senses) -> jax.Array:
-    """Return the deviation [] in rad to the left of the path: heading plus scaled lateral offset."""
+    """Return the deviation [] in rad left of the path: heading plus scaled lateral offset."""
     aside = senses["aside"] / (2 * creature.frame.body_length)
     return senses["heading"] + aside
 
