@@ -102,7 +102,7 @@ def mutated(key: jax.Array, tree: Tree, words: Words, settings: Any) -> Tree:
 
 
 def chosen_node(key: jax.Array, code: jax.Array, at_functions: Any) -> jax.Array:
-    """Draw the index [] of a node: with chance `at_functions` a function, if any, else a terminal."""
+    """Draw a node's index []: with chance `at_functions` a function, if any, else a terminal."""
     key_kind, key_node = jax.random.split(key)
     inner = (code != EMPTY) & (arity(code) > 0)
     ends = (code != EMPTY) & (arity(code) == 0)

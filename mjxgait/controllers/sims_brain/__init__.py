@@ -1,1 +1,1 @@
-"""Brains of evolved creatures: networks of Sims' neurons."""
+"""Brains of modular bodies: networks of Sims' neurons."""
