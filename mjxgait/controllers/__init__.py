@@ -1,1 +1,1 @@
-"""Controllers: from what a creature senses to what its joints are told."""
+"""Controllers: from a creature's observations to the commands of its joints."""

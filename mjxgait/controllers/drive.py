@@ -1,6 +1,6 @@
-"""The drive: from a controller's command to the torques of the joints, the same for every controller.
+"""Drive: from a controller's command to joint torques, the same for every controller.
 
-A pose is followed by stable PD (Tan, Liu & Turk 2011) or plain PD; a torque is only limited.
+Stable PD (Tan, Liu & Turk 2011) or plain PD tracks a pose; a torque is only clamped.
 """
 
 import dataclasses
@@ -27,10 +27,10 @@ from mjxgait.types import (
 
 @pytree
 class Rules:
-    """How an episode's drive differs from the creature's.
+    """Drive parameters of an episode.
 
-    stable: [] stable PD, else plain PD. constraint_forces: [] whether it counts them.
-    stiffness, damping: [J] factors on kp and kd.
+    stable: [] stable PD, else plain PD. constraint_forces: [] whether stable PD includes them.
+    stiffness, damping: [J] factors on the creature's kp and kd.
     """
 
     stable: jax.Array
@@ -41,14 +41,14 @@ class Rules:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Drive:
-    """The joints' motors of one creature. step: s between two commands."""
+    """Joint motors of one creature. step: s between two commands."""
 
     creature: Body
     step: float
     command: Command
 
     def rules(self, settings: DriveConfig, stiffness: jax.Array, damping: jax.Array) -> Rules:
-        """What an episode keeps of the settings, plain or traced, and of its factors [J] on the gains."""
+        """Return an episode's rules from settings, plain or traced, and gain factors [J]."""
         return Rules(
             stable=chosen(settings.law, "spd"),
             constraint_forces=jnp.asarray(settings.constraint_forces),
@@ -65,7 +65,7 @@ class Drive:
         workings: Any,
         command: jax.Array,
     ) -> jax.Array:
-        """Joint torques in N·m; [J] per lane, as are rules, states and command."""
+        """Return joint torques in N·m, [J] per lane, as are rules, states and command."""
         limit = self.creature.gains.torque_limit.astype(np.float32)
         if self.command == "torque":
             return per_lane(plant, lambda wanted: jnp.clip(wanted, -limit, limit))(command)
@@ -85,9 +85,9 @@ class Drive:
     def _pull(
         self, rules: Rules, pos: jax.Array, vel: jax.Array, goal: jax.Array
     ) -> tuple[jax.Array, jax.Array, jax.Array]:
-        """Force of spring and damper [J], the brake [J], and damping [nv] for the implicit solve.
+        """Return the PD force [J], the brake `h kd` [J], and damping [nv] for the implicit solve.
 
-        Plain PD is stable PD that looks no step ahead.
+        Plain PD is stable PD with `h` = 0 in the force and the brake.
         """
         kp, kd = (
             self.creature.gains.kp.astype(np.float32) * rules.stiffness,
@@ -97,7 +97,7 @@ class Drive:
         return spd.pd_force(pos, vel, goal, kp, kd, ahead), ahead * kd, self.lift(self.step * kd)
 
     def lift(self, joints: ArrayLike) -> jax.Array:
-        """Joint values [J] at their places among the degrees of freedom [nv], zero elsewhere."""
+        """Return joint values [J] at their degrees of freedom [nv], zero elsewhere."""
         adr, nv = self.creature.joints.dof_adr, self.creature.nv
         if np.array_equal(adr, np.arange(adr[0], adr[0] + len(adr))):
             return jnp.pad(jnp.asarray(joints), (adr[0], nv - adr[-1] - 1))
@@ -105,5 +105,5 @@ class Drive:
 
 
 def per_lane(plant: Plant, function: Callable[..., Any]) -> Callable[..., Any]:
-    """The function of one creature, mapped over a plant's lanes."""
+    """Map a function of one creature over a plant's lanes."""
     return jax.vmap(function, in_axes=plant.lane_axis, out_axes=plant.lane_axis)

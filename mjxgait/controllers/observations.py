@@ -1,4 +1,4 @@
-"""The senses: what a controller may know of a moment, by name.
+"""Observations that a controller may read, by name.
 
 Letters: `J` actuated joints, `F` feet.
 """
@@ -14,10 +14,10 @@ from mjxgait.errors import UserError, did_you_mean
 from mjxgait.types import Sensed
 
 CONTACT_GAP = 0.002
-"""m; a foot nearer to the floor is in contact. A resting foot sinks in by about a millimetre."""
+"""m; a foot nearer to the floor is in contact. A resting foot sinks in about a millimetre."""
 
 Sense = Callable[[Body, Sensed, jax.Array], jax.Array]
-"""From creature, state of the body and time [] in s to an array."""
+"""Function from creature, body state and time [] in s to an array."""
 
 
 def _heading(creature: Body, sensed: Sensed, time: jax.Array) -> jax.Array:
@@ -33,8 +33,9 @@ def _along(creature: Body, sensed: Sensed, axis: int) -> jax.Array:
 
 
 def _nose(creature: Body, sensed: Sensed) -> tuple[jax.Array, jax.Array]:
-    """Horizontal unit vectors [3], along the nose and to its left; zero for a nose that points
-    straight up or down.
+    """Return horizontal unit vectors [3] along the nose and to its left.
+
+    They are zero if the nose points straight up or down.
     """
     x, y, _ = sensed.trunk_rot @ creature.frame.forward.astype(np.float32)
     size = jnp.sqrt(x * x + y * y + 1e-12)
@@ -43,7 +44,7 @@ def _nose(creature: Body, sensed: Sensed) -> tuple[jax.Array, jax.Array]:
 
 
 def foot_places(creature: Body, sensed: Sensed) -> jax.Array:
-    """Places [F, 2] in m of the feet, ahead of the trunk and left of it along its nose."""
+    """Return foot positions [F, 2] in m: ahead of the trunk along its nose, and to the left."""
     axes = jnp.stack(_nose(creature, sensed), axis=1)
     middles = jnp.stack(
         [jnp.mean(sensed.geom_pos[geoms], axis=0) for geoms in foot_geoms(creature)]
@@ -52,12 +53,12 @@ def foot_places(creature: Body, sensed: Sensed) -> jax.Array:
 
 
 def _attitude(creature: Body, sensed: Sensed, axis: np.ndarray) -> jax.Array:
-    """Sine of the angle of one of the trunk's axes above the horizon."""
+    """Return the sine of the angle of a trunk axis above the horizon."""
     return jnp.clip((sensed.trunk_rot @ axis.astype(np.float32))[2], -1.0, 1.0)
 
 
 def _rate(creature: Body, sensed: Sensed, axis: np.ndarray) -> jax.Array:
-    """Angular velocity of the trunk about one of its own axes."""
+    """Return the trunk's angular velocity about one of its own axes."""
     return sensed.trunk_angvel @ (sensed.trunk_rot @ axis.astype(np.float32))
 
 
@@ -91,21 +92,21 @@ SENSES: Mapping[str, Sense] = {
     "pitch_rate": lambda creature, sensed, time: _rate(creature, sensed, creature.frame.left),
     "roll_rate": lambda creature, sensed, time: _rate(creature, sensed, creature.frame.forward),
 }
-"""Names, with shapes and units in docs/controller.md."""
+"""Observations by name; shapes and units are in docs/controller.md."""
 
 
 def sense(
     creature: Body, sensed: Sensed, time: jax.Array, names: Collection[str]
 ) -> dict[str, jax.Array]:
-    """The senses of these names."""
+    """Return the observations with these names."""
     return {name: SENSES[name](creature, sensed, time) for name in names if name in SENSES}
 
 
 def check_senses(reads: Collection[str], added: Collection[str] = ()) -> None:
-    """Refuses a name that is neither a sense nor what a task adds.
+    """Refuse names of unknown observations. added: names that a task adds.
 
     Raises:
-      UserError: names it and the nearest that there are.
+      UserError: the unknown name, with the closest known one.
     """
     known = [*SENSES, *added]
     for name in reads:
@@ -114,33 +115,33 @@ def check_senses(reads: Collection[str], added: Collection[str] = ()) -> None:
 
 
 def forward_way(creature: Body, sensed: Sensed) -> jax.Array:
-    """Way [] in m of the trunk from the start, along the start's forward axis."""
+    """Return the trunk's distance [] in m from the start, along the start's forward axis."""
     return _along(creature, sensed, 0)
 
 
 def sideways(creature: Body, sensed: Sensed) -> jax.Array:
-    """Way [] in m of the trunk from the start, to the left of the start's forward axis."""
+    """Return the trunk's distance [] in m from the start, to the left of its forward axis."""
     return _along(creature, sensed, 1)
 
 
 def trunk_height(sensed: Sensed) -> jax.Array:
-    """Height [] in m of the trunk above the ground under it."""
+    """Return the trunk's height [] in m above the ground under it."""
     height = sensed.trunk_pos[2]
     return height if sensed.floor is None else height - sensed.floor
 
 
 def foot_heights(creature: Body, sensed: Sensed) -> jax.Array:
-    """Height [F] in m of each foot's lowest point above the ground under it."""
+    """Return the height [F] in m of each foot's lowest point above the ground under it."""
     return jnp.stack([jnp.min(sensed.geom_low[geoms]) for geoms in foot_geoms(creature)])
 
 
 def contacts(creature: Body, sensed: Sensed) -> jax.Array:
-    """Whether [F] each foot touches the floor, 0 or 1."""
+    """Return 1 for each foot [F] in contact with the floor, else 0."""
     return (foot_heights(creature, sensed) < CONTACT_GAP).astype(jnp.float32)
 
 
 def foot_geoms(creature: Body) -> list[slice]:
-    """Of each foot, its places among the watched geoms."""
+    """Return each foot's slice of the watched geoms."""
     groups = [
         np.flatnonzero(creature.feet.foot_of == foot) for foot in range(len(creature.feet.names))
     ]

@@ -1,4 +1,4 @@
-"""What controllers share whose genomes are real numbers within bounds: only `act` is left to write."""
+"""Base class for controllers with genomes of bounded real numbers."""
 
 import abc
 from collections.abc import Mapping
@@ -24,11 +24,11 @@ Bounds = Mapping[str, tuple[Any, Any]]
 
 
 class RealController(abc.ABC):
-    """A controller to inherit from (docs/extending.md).
+    """Controller to inherit from (docs/extending.md).
 
-    It needs `bounds` and `act`; `reads` names the senses that `act` is given, `command` says what
-    it sends, `Settings` is a frozen dataclass of numbers that become keys of `[controller]`.
-    creature: whom it moves. step: s between two control steps.
+    A subclass defines `bounds` and `act`. `reads`: names of the observations passed to `act`.
+    `command`: the type of command. `Settings`: a frozen dataclass of numbers that become keys of
+    `[controller]`. creature: the body it moves. step: s between two control steps.
     """
 
     Settings: ClassVar[type] = NoSettings
@@ -41,13 +41,13 @@ class RealController(abc.ABC):
 
     @abc.abstractmethod
     def bounds(self, settings: Any) -> Bounds:
-        """The genome: arrays of any shape, by name."""
+        """Return the lowest and highest genome: arrays of any shape, by name."""
 
     @abc.abstractmethod
     def act(self, plan: Any, memory: Any, senses: Senses) -> tuple[jax.Array, Any]:
-        """The command [J] of this moment, and the memory of the next; see `Controller`.
+        """Return the command [J] of this control step and the next memory; see `Controller`.
 
-        plan: the genome's arrays, if `prepare` makes nothing else of them.
+        plan: the genome's arrays, unless `prepare` is overridden.
         """
 
     def prepare(self, genome: Any, settings: Any) -> Any:

@@ -1,4 +1,4 @@
-"""Any controller's genome with the sizes of the body's parts as further genes."""
+"""Extension of any controller's genome by the sizes of the body's parts."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -23,7 +23,10 @@ from mjxgait.types import pytree
 
 @pytree
 class Bodied:
-    """plan: the controller's own genome. sizes: [..., Z] logarithms of factors (`Proportions`)."""
+    """Genome with sizes.
+
+    plan: the controller's genome. sizes: [..., Z] logarithms of factors (`Proportions`).
+    """
 
     plan: Any
     sizes: jax.Array
@@ -31,7 +34,7 @@ class Bodied:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class BodiedController:
-    """See `Controller`. sizes: Z. most: how many times larger or smaller a part may become."""
+    """See `Controller`. sizes: Z. most: largest factor by which a part may grow or shrink."""
 
     controller: Controller
     sizes: int
@@ -54,12 +57,12 @@ class BodiedController:
 
     @property
     def box(self) -> Box:
-        """Of the sizes [Z]."""
+        """Box of the sizes [Z]."""
         end = jnp.full(self.sizes, np.log(self.most), jnp.float32)
         return Box(-end, end)
 
     def variation(self, settings: Any, evolution: EvolutionConfig) -> Variation:
-        """See `Controller`: sizes cross gene by gene and move as tuning genes do."""
+        """See `Controller`: sizes cross gene by gene and mutate like tuning genes."""
         own, box = self.controller.variation(settings, evolution), self.box
         draw = creation(narrowed(box, evolution.initial_spread), evolution)
 
@@ -80,7 +83,7 @@ class BodiedController:
             return Bodied(own.mutate(key_plan, genome.plan), sizes)
 
         first = own.first
-        if first is not None:  # on the body as the creature has it
+        if first is not None:  # sizes 0: the creature's own body
             count = jax.tree.leaves(first)[0].shape[0]
             first = Bodied(first, jnp.zeros((count, self.sizes)))
         return Variation(create, cross, mutate, long=own.long, first=first)

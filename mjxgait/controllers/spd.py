@@ -1,8 +1,8 @@
 """Stable proportional-derivative control (Tan, Liu & Turk 2011, eq. 12).
 
-"Stable proportional-derivative controllers" in two elementwise parts, which serve one creature or a
-batch. What lies between them, the solve with `M + h diag(kd)`, belongs to whoever holds the mass
-matrix: `drive.Drive.torque` joins all three.
+"Stable proportional-derivative controllers" in two elementwise parts, for one creature or a batch.
+The solve with `M + h diag(kd)` between them needs the mass matrix; `drive.Drive.torque` joins all
+three.
 """
 
 import jax
@@ -13,7 +13,7 @@ from jax.typing import ArrayLike
 def pd_force(
     pos: jax.Array, vel: jax.Array, target: jax.Array, kp: ArrayLike, kd: ArrayLike, step: ArrayLike
 ) -> jax.Array:
-    """Spring and damper at the end of the coming step: `-kp (q + h v - target) - kd v` in N·m.
+    """Return the PD force at the end of the step: `-kp (q + h v - target) - kd v` in N·m.
 
     All [J]; step in s, 0 gives plain PD.
     """
@@ -23,9 +23,9 @@ def pd_force(
 def limited_torque(
     force: jax.Array, acceleration: jax.Array, brake: ArrayLike, limit: ArrayLike
 ) -> jax.Array:
-    """The torque [J], `force - brake acc` with `brake = h kd`, clamped to the limit.
+    """Return the torque [J]: `force - brake acc` with `brake = h kd`, clamped to the limit.
 
-    Clamping comes last, or the damping would be that of a stronger joint.
+    Clamping comes last; otherwise the damping would be that of a stronger joint.
     """
     return jnp.clip(
         force - jnp.asarray(brake) * acceleration, -jnp.asarray(limit), jnp.asarray(limit)

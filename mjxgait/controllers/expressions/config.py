@@ -27,11 +27,12 @@ FUNCTIONS = {
     "sin": 1,
     "cos": 1,
 }
-"""How many arguments each takes. `/` is protected; `ifltz` gives its second where the first is
-below zero, else its third (docs/programs.md).
+"""Functions with their number of arguments (docs/programs.md).
+
+`/` is protected. `ifltz` returns its second argument if the first is below zero, else its third.
 """
 MOST_NODES = 1024
-"""That an expression may ever have."""
+"""Upper limit of the setting `nodes`."""
 
 
 def _known(names: tuple[str, ...]) -> tuple[str, ...]:
@@ -45,27 +46,28 @@ def _known(names: tuple[str, ...]) -> tuple[str, ...]:
 
 @dataclasses.dataclass(frozen=True)
 class ProgramConfig:
-    """The controller whose genome is one expression per joint (Gritz & Hahn 1997).
+    """Settings of controllers with one expression per joint as genome (Gritz & Hahn 1997).
 
     Attributes:
-      functions: that an expression may use; besides them constants and senses.
-      every: control steps from one evaluation to the next; in between the angles stay.
-      senses: patterns of the names of senses that it may use; docs/programs.md lists them.
-      nodes: the most that an expression may have.
-      depth: the most that it may be deep.
-      initial_depth: of the first expressions, half of them full and half grown.
+      functions: functions that an expression may use, besides constants and observations.
+      every: control steps per evaluation; in between the angles stay.
+      senses: name patterns of the observations that it may use; docs/programs.md lists them.
+      nodes: most nodes of an expression.
+      depth: greatest depth of an expression.
+      initial_depth: depth range of the first expressions, half of them full and half grown.
       constants: range of the random constants.
-      functions_cross: share of crossing points at functions, where there is one (Koza: 0.9).
-      subtree: how often, relative to the other four, a mutation puts a new subtree.
-      point: how often another function or sense.
-      hoist: how often a subtree in place of the whole.
-      constant: how often a moved constant.
-      nudge: how often a small constant is added to a subtree, or one near 1 multiplied with it.
-      constant_sigma: by how much constants move and subtrees are nudged, in units of the range;
-        a hundredth of it is as likely.
-      parsimony: fitness that each node costs.
-      expressions: programs that the first generation begins with, each as `(list EXPRESSION ...)`
-        with one expression per joint; the others are drawn. `mjxgait train --expressions` fills
+      functions_cross: share of crossover points at functions, in trees that have one (Koza: 0.9).
+      subtree: weight, relative to the other four, of mutations that insert a new subtree.
+      point: weight of mutations that change a function or an observation.
+      hoist: weight of mutations that replace the whole by a subtree.
+      constant: weight of mutations that move a constant.
+      nudge: weight of mutations that add a small constant to a subtree, or multiply it by one
+        near 1.
+      constant_sigma: size of constant moves and nudges, in units of the range; a hundredth of it
+        is as likely.
+      parsimony: fitness cost of each node.
+      expressions: initial programs, each as `(list EXPRESSION ...)` with one expression per
+        joint; the rest of the first generation is drawn. `mjxgait train --expressions` fills
         them in.
     """
 

@@ -1,4 +1,4 @@
-"""A controller whose genome is one expression per joint (Gritz & Hahn 1995, 1997)."""
+"""Controller with one expression per joint as genome (Gritz & Hahn 1995, 1997)."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
@@ -27,9 +27,9 @@ from mjxgait.evolution.variation import Variation
 
 
 class Programs:
-    """See `Controller`: an expression's value is the angle in rad that its joint is pulled to.
+    """See `Controller`: an expression's value is its joint's target angle in rad.
 
-    settings: those that shape the program. added: names of the senses that the task adds.
+    settings: those that shape the program. added: names of the observations that the task adds.
     """
 
     Settings: ClassVar[type] = ProgramConfig
@@ -39,7 +39,7 @@ class Programs:
     def told(
         cls, creature: Body, step: float, settings: ProgramConfig, added: Sequence[str]
     ) -> "Programs":
-        """For a body, under these settings, with the senses that the task adds."""
+        """Return the controller of a body. added: names of the observations that the task adds."""
         return cls(creature, step, settings, added)
 
     def __init__(
@@ -64,12 +64,12 @@ class Programs:
         return program_variation(self.words, len(self.creature.joints.names), settings, first)
 
     def genes(self, genomes: Trees, settings: ProgramConfig) -> np.ndarray:
-        """See `Controller`: any other node is a difference."""
+        """See `Controller`: nodes either match or differ."""
         code, value = (np.asarray(leaf) for leaf in (genomes.code, genomes.value))
         return np.concatenate([leaf.reshape(len(leaf), -1) for leaf in (code, value)], axis=1)
 
     def numbers(self, genomes: Trees) -> Mapping[str, np.ndarray]:
-        """See `Controller`: nodes of all expressions."""
+        """See `Controller`: the nodes of all expressions."""
         return {"nodes": (np.asarray(genomes.code) != EMPTY).sum(axis=(1, 2))}
 
     def prepare(self, genome: Trees, settings: ProgramConfig) -> Listing:
@@ -77,7 +77,7 @@ class Programs:
         return listed(genome, self.words)
 
     def load(self, plan: Listing) -> jax.Array:
-        """See `Controller`: the functions of its longest expression."""
+        """See `Controller`: the number of functions in the longest expression."""
         return jnp.max(plan.count)
 
     def init(self) -> Any:
@@ -85,7 +85,7 @@ class Programs:
         return ()
 
     def act(self, plan: Listing, memory: Any, senses: Senses) -> tuple[jax.Array, Any]:
-        """See `Controller`: within the range of each joint's poses."""
+        """See `Controller`: clipped to each joint's pose range."""
         seen = [
             senses[t.sense] if t.index is None else senses[t.sense][t.index] for t in self.known
         ]

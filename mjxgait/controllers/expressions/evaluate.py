@@ -1,11 +1,11 @@
-"""What programs give: many at a time, every lane another one.
+"""Evaluation of programs in batches, with a different program in each lane.
 
-A tree becomes a list of its functions, the last in prefix order first, so that arguments are there
-before they are wanted. Each row of a table is a number: first the senses, then the tree's nodes,
-of which constants are filled in, then what each function of the list gives. Ends cost nothing, and
-the list is as long as the longest of the batch.
+A tree becomes a list of its functions in reverse prefix order, so that arguments are computed
+before they are needed. Each row of a table is a number: first the observations, then the tree's
+nodes (constants filled in), then the results of the functions. Terminals cost nothing. The loop
+runs as long as the longest list of the batch.
 
-Letters: `C` nodes, `Q` functions at most, `J` trees, `S` senses.
+Letters: `C` nodes, `Q` functions at most, `J` trees, `S` observations.
 """
 
 import dataclasses
@@ -48,13 +48,13 @@ class Listing:
 
 
 def most_functions(words: Words) -> int:
-    """Q: with two arguments each there is one end more than functions."""
+    """Return Q: without unary functions a tree has more terminals than functions."""
     unary = any(ARITY[code] == 1 for code in words.functions)
     return words.capacity if unary else max((words.capacity - 1) // 2, 1)
 
 
 def listed(trees: Trees, words: Words) -> Listing:
-    """The list of every tree [J, C]."""
+    """Return the function lists of trees [J, C]."""
     one = jax.vmap(lambda code: _list_tree(code, words), out_axes=-1)(trees.code)
     return dataclasses.replace(one, constants=trees.value.T)
 
@@ -98,8 +98,9 @@ Evaluate = Callable[[Listing, jax.Array], jax.Array]
 
 @functools.cache
 def evaluator(functions: tuple[int, ...]) -> Evaluate:
-    """What gives the values [J] in rad of programs under the senses [S], of programs that have these
-    functions and no others.
+    """Return the function from programs and observations [S] to values [J] in rad.
+
+    The programs have these functions and no others.
     """
 
     @custom_vmap
@@ -124,7 +125,7 @@ def evaluator(functions: tuple[int, ...]) -> Evaluate:
 
 
 def _evaluate_lanes(functions: tuple[int, ...], listing: Listing, senses: jax.Array) -> jax.Array:
-    """[J, L] with the lanes innermost everywhere: neighbours in memory are neighbours in work."""
+    """Return values [J, L], lanes innermost, so that neighbouring lanes are adjacent in memory."""
     most, joints, lanes = listing.function.shape
     width = joints * lanes
     flat = jax.tree.map(lambda x: x.reshape(*x.shape[:-2], width), listing)

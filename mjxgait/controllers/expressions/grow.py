@@ -1,4 +1,4 @@
-"""First programs: ramped half-and-half (Koza 1992), grown node by node in prefix order."""
+"""Initial programs: ramped half-and-half (Koza 1992), grown node by node in prefix order."""
 
 import dataclasses
 from functools import partial
@@ -15,7 +15,7 @@ from mjxgait.types import pytree
 
 @dataclasses.dataclass(frozen=True)
 class Words:
-    """What a program is made of. functions, senses: codes. capacity: C."""
+    """Primitives of a program. functions, senses: codes. capacity: C, most nodes."""
 
     functions: tuple[int, ...]
     senses: tuple[int, ...]
@@ -23,14 +23,18 @@ class Words:
 
     @property
     def terminal_share(self) -> float:
-        """Of all kinds of nodes, constants being one kind: how often a grown tree ends at a node."""
+        """Chance of a terminal in a grown tree: the share of terminals, with constants as one."""
         ends = len(self.senses) + 1
         return ends / (ends + len(self.functions))
 
 
 @pytree
 class Growing:
-    """pending: [C] depths of the arguments that are still wanted, the next one last; open: [] how many."""
+    """State of growth.
+
+    pending: [C] depths of missing arguments, the next one last. open: [] their number.
+    used: [] nodes so far.
+    """
 
     pending: jax.Array
     open: jax.Array
@@ -40,7 +44,7 @@ class Growing:
 def half_and_half(
     key: jax.Array, words: Words, depth: tuple[int, int], constants: Any
 ) -> tuple[jax.Array, jax.Array]:
-    """A tree [C]: full or grown, each with a chance of a half, up to a depth drawn from a range."""
+    """Draw a tree [C], full or grown with equal chance, up to a depth drawn from a range."""
     key_kind, key_depth, key_grow = jax.random.split(key, 3)
     least, most = depth
     deep = jax.random.randint(key_depth, (), least, most + 1)
@@ -51,9 +55,9 @@ def half_and_half(
 def grown(
     key: jax.Array, words: Words, deep: jax.Array, least: jax.Array, constants: Any
 ) -> tuple[jax.Array, jax.Array]:
-    """A tree [C] no deeper than `deep` [], whose ends are no nearer to its root than `least` [].
+    """Draw a tree [C] with depth at most `deep` [] and terminals at depth `least` [] or more.
 
-    Where its place runs out every argument that is wanted becomes an end.
+    Once the capacity is used up, every missing argument becomes a terminal.
     """
     capacity = words.capacity
     begin = Growing(jnp.zeros(capacity, jnp.int32), jnp.int32(1), jnp.int32(0))
@@ -77,7 +81,7 @@ def _next_node(
     room = state.used + state.open + wants <= words.capacity
     ends = (here >= deep) | ~room
     ends |= (here >= least) & jax.random.bernoulli(key_end, words.terminal_share)
-    # A constant is as likely as any one sense.
+    # A constant is as likely as any one observation.
     end = jax.random.choice(key_sense, np.array([CONSTANT, *words.senses], np.int32))
     code = jnp.where(ends, end, function)
     value = jax.random.uniform(key_value, (), minval=constants[0], maxval=constants[1])

@@ -1,4 +1,4 @@
-"""How programs cross and mutate: trees in, trees out, never larger or deeper than they may be."""
+"""Crossover and mutation of programs, within the limits on size and depth."""
 
 import dataclasses
 from functools import partial
@@ -26,19 +26,19 @@ from mjxgait.controllers.expressions.trees import (
 from mjxgait.evolution.variation import Variation
 
 Tree = tuple[jax.Array, jax.Array]
-"""code, value [C]."""
+"""Arrays code and value [C]."""
 GRAFT = 3
-"""Depth of a new subtree in mutation."""
+"""Greatest depth of a new subtree in mutation."""
 NEUTRAL = {FUNCTION_CODES["+"]: 0.0, FUNCTION_CODES["*"]: 1.0}
-"""Functions, and the second argument with which each gives its first."""
+"""Functions, each with the second argument that leaves the first unchanged."""
 FINEST = 0.01
-"""Share of the largest change of a constant."""
+"""Smallest scale of constant changes, as a share of the largest."""
 
 
 def program_variation(
     words: Words, joints: int, settings: Any, first: Trees | None = None
 ) -> Variation:
-    """The operators; settings: `ProgramConfig`, plain or traced. first: see `Variation`."""
+    """Return the operators. settings: `ProgramConfig`, plain or traced. first: see `Variation`."""
 
     def create(key: jax.Array, count: int) -> Trees:
         keys = jax.random.split(key, count * joints)
@@ -71,8 +71,9 @@ def program_variation(
 
 
 def crossed(key: jax.Array, mother: Tree, father: Tree, settings: Any) -> Tree:
-    """The mother with a subtree of the father in place of one of hers (Koza 1992); herself where
-    that would be too large or too deep.
+    """Return the mother with one subtree replaced by one of the father's (Koza 1992).
+
+    The mother stays unchanged if the child would be too large or too deep.
     """
     key_here, key_there = jax.random.split(key)
     here = chosen_node(key_here, mother[0], settings.functions_cross)
@@ -81,7 +82,7 @@ def crossed(key: jax.Array, mother: Tree, father: Tree, settings: Any) -> Tree:
 
 
 def mutated(key: jax.Array, tree: Tree, words: Words, settings: Any) -> Tree:
-    """With one change of a kind that is drawn by the settings' shares."""
+    """Return the tree with one change; its kind is drawn by the weights of the settings."""
     key_kind, key_place, key_change = jax.random.split(key, 3)
     place = jax.random.randint(key_place, (), 0, jnp.maximum(size(tree[0]), 1))
     deep = jnp.int32(GRAFT)
@@ -101,7 +102,7 @@ def mutated(key: jax.Array, tree: Tree, words: Words, settings: Any) -> Tree:
 
 
 def chosen_node(key: jax.Array, code: jax.Array, at_functions: Any) -> jax.Array:
-    """[] the place of a node: of a function with this chance, where there is one, else of an end."""
+    """Draw a node's index []: with chance `at_functions` a function, if any, else a terminal."""
     key_kind, key_node = jax.random.split(key)
     inner = (code != EMPTY) & (arity(code) > 0)
     ends = (code != EMPTY) & (arity(code) == 0)
@@ -113,8 +114,10 @@ def chosen_node(key: jax.Array, code: jax.Array, at_functions: Any) -> jax.Array
 def spliced(
     host: Tree, here: jax.Array, donor: Tree, there: jax.Array, deepest: jax.Array | int
 ) -> Tree:
-    """The host with the donor's subtree at `there` [] in place of its own at `here` []; the host
-    itself where that would be too large or too deep. An empty host becomes the subtree.
+    """Replace the host's subtree at `here` [] by the donor's at `there` [].
+
+    The host stays unchanged if the result would be too large or too deep. An empty host becomes the
+    subtree.
     """
     places = np.arange(host[0].shape[0])
     lost, gained = subtree_sizes(host[0])[here], subtree_sizes(donor[0])[there]
@@ -134,7 +137,7 @@ def spliced(
 
 
 def _another(key: jax.Array, tree: Tree, place: jax.Array, words: Words) -> Tree:
-    """With another function of as many arguments at a place, or another sense."""
+    """Return the tree with a node redrawn: a function of as many arguments, or an observation."""
     functions = np.array(words.functions, np.int32)
     wanted = arity(tree[0])[place]
     key_function, key_sense = jax.random.split(key)
@@ -146,12 +149,12 @@ def _another(key: jax.Array, tree: Tree, place: jax.Array, words: Words) -> Tree
 
 
 def functions_at(key: jax.Array, functions: np.ndarray, allowed: jax.Array) -> jax.Array:
-    """[] one of the allowed codes."""
+    """Draw one [] of the allowed codes."""
     return jnp.asarray(functions)[jax.random.categorical(key, jnp.where(allowed, 0.0, -jnp.inf))]
 
 
 def _moved(key: jax.Array, tree: Tree, settings: Any) -> Tree:
-    """With one of its constants moved; itself where it has none."""
+    """Return the tree with one constant moved; unchanged if it has none."""
     key_which, key_by = jax.random.split(key)
     constants = tree[0] == CONSTANT
     place = jax.random.categorical(key_which, jnp.where(constants, 0.0, -jnp.inf))
@@ -160,8 +163,9 @@ def _moved(key: jax.Array, tree: Tree, settings: Any) -> Tree:
 
 
 def _nudged(key: jax.Array, tree: Tree, place: jax.Array, words: Words, settings: Any) -> Tree:
-    """With what is at a place [] a little more or less, or larger or smaller; itself where it has
-    neither sums nor products.
+    """Return the tree with a small constant added to the subtree at a place [], or a factor near 1.
+
+    The tree stays unchanged if the settings allow neither sums nor products.
     """
     ways = [(code, at) for code, at in NEUTRAL.items() if code in words.functions]
     if not ways:
@@ -176,7 +180,7 @@ def _nudged(key: jax.Array, tree: Tree, place: jax.Array, words: Words, settings
 
 
 def _step(key: jax.Array, settings: Any) -> jax.Array:
-    """[] Gaussian, and as often fine as coarse: nobody knows how sensitive an expression is."""
+    """Draw a Gaussian change [], as often fine as coarse: the sensitivity is unknown."""
     key_fine, key_by = jax.random.split(key)
     low, high = settings.constants
     fine = FINEST ** jax.random.uniform(key_fine)

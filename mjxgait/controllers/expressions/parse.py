@@ -1,8 +1,8 @@
-"""Expressions in text, read into arrays: one at a time, or whole programs of one per joint.
+"""Parser from text to arrays, for single expressions and for programs of one per joint.
 
-An expression is a number, the name of a sense, or `(function argument ...)`. A program is
+An expression is a number, the name of an observation, or `(function argument ...)`. A program is
 `(list EXPRESSION ...)`, one per joint in the order of the joints, or lines `JOINT = EXPRESSION`.
-What follows `#` or `;` on a line is a comment.
+Comments run from `#` or `;` to the end of a line.
 """
 
 import dataclasses
@@ -21,18 +21,18 @@ from mjxgait.controllers.expressions.text import (
 from mjxgait.errors import UserError, did_you_mean
 
 DEEPEST = 400
-"""Functions that may be within each other: an expression is read by recursion."""
+"""Most nested functions; limited because the parser recurses."""
 SPELLINGS = {"%": "/"}
-"""Other names of functions: Koza (1992) writes the protected division so, and many after him."""
+"""Other names of functions: Koza (1992) and many later authors write protected division as `%`."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Vocabulary:
-    """What expressions may be made of, and how large they may be.
+    """Allowed parts and size of expressions.
 
-    known: senses that there are. nodes: most of an expression. senses, functions: names of those
-    that the settings allow; None allows all. patterns: the setting that allows the senses. depth:
-    most functions within each other.
+    known: existing observations. nodes: most per expression. senses, functions: names that the
+    settings allow; None allows all. patterns: the setting that allows the observations. depth:
+    most nested functions.
     """
 
     known: tuple[Terminal, ...]
@@ -45,14 +45,14 @@ class Vocabulary:
 
 @dataclasses.dataclass(frozen=True)
 class Word:
-    """A word of a text and the line that it is on, from 1."""
+    """Word of a text and its line number, from 1."""
 
     text: str
     line: int
 
 
 def words_of(text: str) -> list[Word]:
-    """The words of a text without its comments; parentheses and equals signs are words."""
+    """Return the words of a text without comments; parentheses and equals signs are words."""
     return [
         Word(word, number)
         for number, line in enumerate(text.splitlines(), 1)
@@ -63,10 +63,10 @@ def words_of(text: str) -> list[Word]:
 def to_arrays(
     text: str, known: Sequence[Terminal], nodes: int, where: str
 ) -> tuple[np.ndarray, np.ndarray]:
-    """code and value [nodes] of one expression in text.
+    """Return code and value [nodes] of one expression in text.
 
     Raises:
-      UserError: names what is wrong with it; `where` says whose it is.
+      UserError: names the mistake; `where` is the name of the expression in the message.
     """
     reader = Reader(text, Vocabulary(tuple(known), nodes), where, numbered=False)
     found = reader.expression()
@@ -78,11 +78,10 @@ def to_arrays(
 def read_programs(
     text: str, joints: Sequence[str], vocabulary: Vocabulary, where: str, numbered: bool = True
 ) -> list[tuple[np.ndarray, np.ndarray]]:
-    """code and value [J, nodes] of each program in a text.
+    """Return code and value [J, nodes] of each program in a text.
 
     Args:
-      joints: J names. where: what to call the text in errors. numbered: whether its lines have
-        numbers there.
+      joints: J names. where: name of the text in errors. numbered: whether errors give the line.
 
     Raises:
       UserError: names the first mistake.
@@ -102,7 +101,7 @@ def read_programs(
 
 
 class Reader:
-    """Takes the words of a text one after the other. place: the index of the next one."""
+    """Reader that takes the words of a text in order. place: index of the next one."""
 
     def __init__(self, text: str, vocabulary: Vocabulary, where: str, numbered: bool) -> None:
         self.words, self.place, self.vocabulary = words_of(text), 0, vocabulary
@@ -112,21 +111,21 @@ class Reader:
 
     @property
     def next(self) -> str:
-        """The text of the next word; empty at the end."""
+        """Text of the next word; empty at the end."""
         return self.words[self.place].text if self.place < len(self.words) else ""
 
     @property
     def last(self) -> Word:
-        """The word taken last."""
+        """Word taken last."""
         return self.words[self.place - 1] if self.place else Word("", 1)
 
     def wrong(self, said: str, word: Word | None = None) -> UserError:
-        """A mistake at a word, by default at the one taken last."""
+        """Return the error for a mistake at a word, by default the one taken last."""
         line = f", line {(word or self.last).line}" if self.numbered else ""
         return UserError(f"{self.where}{line}: {said}")
 
     def listed(self, joints: Sequence[str]) -> list[tuple[np.ndarray, np.ndarray]]:
-        """The expressions of `(list ...)`, one per joint."""
+        """Read the expressions of `(list ...)`, one per joint."""
         self._take()
         if self.next != "list":
             raise self.wrong('a program begins with "(list" or with "JOINT ="')
@@ -145,7 +144,7 @@ class Reader:
         return rows
 
     def assigned(self, joints: Sequence[str]) -> list[tuple[np.ndarray, np.ndarray]]:
-        """The expressions of `JOINT = EXPRESSION`, once for each joint in any order."""
+        """Read the expressions of `JOINT = EXPRESSION`, one per joint in any order."""
         rows: dict[str, tuple[np.ndarray, np.ndarray]] = {}
         while len(rows) < len(joints):
             missing = next(name for name in joints if name not in rows)
@@ -168,7 +167,7 @@ class Reader:
         return [rows[name] for name in joints]
 
     def expression(self) -> tuple[np.ndarray, np.ndarray]:
-        """code and value [nodes] of the next expression."""
+        """Read code and value [nodes] of the next expression."""
         limits, own = self.vocabulary, self.words[self.place : self._end()]
         count = sum(word.text not in "()" for word in own)
         if count > limits.nodes:
@@ -182,7 +181,7 @@ class Reader:
         return code, value
 
     def _end(self) -> int:
-        """The place after the next expression, as far as its parentheses tell."""
+        """Return the place after the next expression, judging by its parentheses."""
         unclosed = 0
         for place in range(self.place, len(self.words)):
             word = self.words[place].text
@@ -192,7 +191,7 @@ class Reader:
         return len(self.words)
 
     def _nodes(self, depth: int) -> list[tuple[int, float]]:
-        """code and value of each node. depth: functions around it."""
+        """Read code and value of each node. depth: number of enclosing functions."""
         word = self._take().text
         if word == ")":
             raise self.wrong("a closing parenthesis too many")
@@ -218,12 +217,12 @@ class Reader:
 
     @property
     def _cut_off(self) -> bool:
-        """Whether the text ends here, or goes on with the next `JOINT =`."""
+        """True at the end of the text and before the next `JOINT =`."""
         following = self.words[self.place : self.place + 2]
         return not following or "=" in [word.text for word in following]
 
     def _function(self) -> str:
-        """The name of the function that comes next."""
+        """Read the name of a function."""
         word = self._take().text
         name, allowed = SPELLINGS.get(word, word), self.vocabulary.functions
         if word in self.codes or _is_number(word):

@@ -1,4 +1,4 @@
-"""The controller of expressions, written from docs/programs.md: a plain reading of their text.
+"""Reference controller for expressions, written from docs/programs.md: interprets their text.
 
 Letters: `S` simulations, `J` actuated joints.
 """
@@ -15,7 +15,7 @@ from mjxgait.creature import Creature
 from mjxgait.reference.controllers.protocol import Command, Memory
 
 Expression = str | float | tuple[Any, ...]
-"""The name of a sense, a number, or a function with its arguments."""
+"""Name of an observation, a number, or a function with its arguments."""
 NAMED = {
     "t": "time",
     "vx": "forward_vel",
@@ -27,7 +27,7 @@ NAMED = {
     "b0": "bar_distance",
 }
 PARTS = {"a": "joint_pos", "w": "joint_vel", "c": "contact"}
-"""By the letter before the number of a joint or a foot."""
+"""Observations by the letter before the number of a joint or a foot."""
 
 
 def _over(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -51,7 +51,7 @@ MOST = 1e9
 
 
 def read(text: str) -> Expression:
-    """The expression in a text that is known to be one."""
+    """Parse an expression from valid text."""
     words = re.findall(r"[()]|[^\s()]+", text)
 
     def next_one() -> Expression:
@@ -69,21 +69,21 @@ def read(text: str) -> Expression:
 
 @functools.cache
 def sense_of(name: str) -> tuple[str, int | None]:
-    """Which sense a name means, and which of its numbers."""
+    """Return the observation that a name means, and the index in it."""
     if found := re.fullmatch(r"([awc])(\d+)", name):
         return PARTS[found[1]], int(found[2])
     return NAMED.get(name, name), None
 
 
 def names_in(expression: Expression) -> set[str]:
-    """Of the senses that it reads."""
+    """Return the names of the observations that an expression reads."""
     if isinstance(expression, tuple):
         return set().union(*(names_in(part) for part in expression[1:]))
     return {expression} if isinstance(expression, str) else set()
 
 
 def value_of(expression: Expression, senses: Mapping[str, np.ndarray]) -> np.ndarray:
-    """[S] under these senses, by name."""
+    """Return the value [S] of an expression under observations by name."""
     if isinstance(expression, float):
         return np.array(expression)
     if isinstance(expression, str):
@@ -96,7 +96,7 @@ def value_of(expression: Expression, senses: Mapping[str, np.ndarray]) -> np.nda
 
 
 class ProgramTwin:
-    """See `Twin`. It remembers nothing but how many there are."""
+    """See `Twin`. Its memory holds only the number of simulations."""
 
     command: ClassVar[Command] = "pose"
 
@@ -106,7 +106,7 @@ class ProgramTwin:
         self.creature, self.every = creature, int(champion.settings.every)
         self.expressions = [read(texts[joint]) for joint in creature.joints.names]
         names = set().union(*map(names_in, self.expressions))
-        # The time tells how many there are, whatever else it reads.
+        # The time is always read, to give the number of simulations.
         self.reads = tuple(sorted({"time", *(sense_of(name)[0] for name in names)}))
 
     def init(self, count: int) -> Memory:

@@ -1,4 +1,4 @@
-"""What there is to tell of genomes of expressions."""
+"""Reports on genomes of expressions."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -18,7 +18,7 @@ from mjxgait.inspect.tables import title, titled_table
 
 
 class ProgramView:
-    """An expression per joint; see `GenomeView`."""
+    """Expressions by joint; see `GenomeView`."""
 
     def facts(self, snapshot: Snapshot, i: int) -> dict[str, Any]:
         """See `GenomeView`."""
@@ -82,12 +82,12 @@ def _texts(snapshot: Snapshot, i: int) -> dict[str, str]:
 
 
 def _mattering(snapshot: Snapshot, i: int) -> list[int]:
-    """[J] nodes that are left of each expression when what makes no difference is gone."""
+    """Return the number of nodes [J] left in each expression after simplification."""
     genome = {name: array[i] for name, array in snapshot.genomes.items()}
     settled = codec_of("program").settled(genome, snapshot.creature)
     return [int(count) for count in (settled["code"] != EMPTY).sum(axis=1)]
 
 
 def _nodes(snapshot: Snapshot) -> np.ndarray:
-    """[P, J]."""
+    """Return the nodes [P, J] of each expression."""
     return np.asarray((snapshot.genomes["code"] != EMPTY).sum(axis=2))

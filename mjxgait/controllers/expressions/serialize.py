@@ -1,4 +1,4 @@
-"""Genomes of expressions, one per joint, as people read and write them."""
+"""Serializer for genomes of expressions, one per joint, as text."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -29,12 +29,12 @@ from mjxgait.errors import UserError
 
 
 class ProgramCodec(PlainCodec):
-    """Of genomes with `code` and `value` [J, C]; see `Codec`."""
+    """Serializer for genomes with `code` and `value` [J, C]; see `Codec`."""
 
     def document(
         self, genome: Mapping[str, np.ndarray], settings: ProgramConfig, creature: Creature
     ) -> dict[str, Any]:
-        """See `Codec`. expressions: by joint. nodes: the most that one may have."""
+        """See `Codec`. expressions: by joint. nodes: most per expression."""
         known = terminals(creature, tuple(ADDED.values()))
         rows = zip(creature.joints.names, genome["code"], genome["value"], strict=True)
         return {
@@ -45,7 +45,7 @@ class ProgramCodec(PlainCodec):
     def settled(
         self, genome: Mapping[str, np.ndarray], creature: Creature
     ) -> dict[str, np.ndarray]:
-        """See `Codec`: simplified, as it is written and read."""
+        """See `Codec`: simplified, then written as text and read back."""
         known, nodes = terminals(creature, tuple(ADDED.values())), genome["code"].shape[1]
         pairs = zip(genome["code"], genome["value"], strict=True)
         rows = []
@@ -92,9 +92,9 @@ class ProgramCodec(PlainCodec):
 def vocabulary(
     body: HasParts, settings: ProgramConfig, added: Sequence[str], depth: int = DEEPEST
 ) -> Vocabulary:
-    """What a program may be made of under these settings, plain or traced.
+    """Return the vocabulary of programs under settings, plain or traced.
 
-    added: senses that the task adds. depth: most functions within each other.
+    added: observations that the task adds. depth: most nested functions.
     """
     known = terminals(body, added)
     return Vocabulary(
@@ -110,7 +110,7 @@ def vocabulary(
 def programs_to_begin_with(
     body: HasParts, settings: ProgramConfig, added: Sequence[str], depth: int = DEEPEST
 ) -> tuple[np.ndarray, np.ndarray] | None:
-    """code and value [G, J, C] of the programs that the settings name; None if they name none.
+    """Return code and value [G, J, C] of the programs in the settings; None if there are none.
 
     added, depth: see `vocabulary`.
 
@@ -128,7 +128,7 @@ def programs_to_begin_with(
 
 
 def program_text(body: HasParts, program: tuple[np.ndarray, np.ndarray]) -> str:
-    """A program, code and value [J, C], as `(list EXPRESSION ...)`."""
+    """Return a program, code and value [J, C], as `(list EXPRESSION ...)`."""
     known = terminals(body, tuple(ADDED.values()))
     rows = [to_text(code, value, known) for code, value in zip(*program, strict=True)]
     return f"(list {' '.join(rows)})"

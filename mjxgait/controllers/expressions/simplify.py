@@ -1,4 +1,4 @@
-"""Shorter expressions that do the same."""
+"""Simplification of expressions without changing their values."""
 
 import math
 
@@ -6,9 +6,9 @@ from mjxgait.controllers.expressions.text import LARGEST, LEAST_DIVISOR, Express
 
 
 def simplified(expression: Expression) -> Expression:
-    """With constants worked out, and without what makes no difference, whatever is sensed.
+    """Fold constants and remove parts that have no effect under any observations.
 
-    What is left out would have changed a value by its rounding at most.
+    Removed parts changed a value by its rounding at most.
     """
     if not isinstance(expression, tuple):
         return expression
@@ -19,7 +19,7 @@ def simplified(expression: Expression) -> Expression:
 
 
 def folded(name: str, values: list[float]) -> float:
-    """What a function gives of numbers."""
+    """Return a function's value for numbers."""
     a, b, c = (*values, 0.0, 0.0)[:3]
     results = {
         "+": lambda: a + b,

@@ -1,6 +1,6 @@
-"""Expressions: as arrays for evolution, and as text for people (`reading` reads that again).
+"""Expressions as arrays for evolution and as text for people (`parse` reads the text).
 
-An expression is arrays `code` [C] and `value` [C] in prefix order, as far as `code` is not `EMPTY`.
+An expression is arrays `code` [C] and `value` [C] in prefix order, up to the first `EMPTY` code.
 In text it is a number, a name, or `(function argument ...)`.
 """
 
@@ -18,21 +18,21 @@ EMPTY, CONSTANT, FIRST_FUNCTION, FIRST_ADDED, FIRST_SENSE = 0, 1, 2, 32, 64
 FUNCTION_CODES = {name: FIRST_FUNCTION + i for i, name in enumerate(FUNCTIONS)}
 ARITY = np.zeros(FIRST_ADDED, np.int32)
 ARITY[FIRST_FUNCTION : FIRST_FUNCTION + len(FUNCTIONS)] = list(FUNCTIONS.values())
-"""[32] by code; senses take no arguments."""
+"""Number of arguments [32] by code; observations take none."""
 LEAST_DIVISOR, LARGEST = 1e-6, 1e9
-"""`/` gives 1 where the divisor is smaller. No function gives more than the second, so that none
-gives what is not finite.
+"""`/` returns 1 if the divisor is smaller than the first. Function values are clipped to ± the
+second, to stay finite.
 """
 
 Expression = str | float | tuple[Any, ...]
-"""The name of a sense, a number, or a function with its arguments."""
+"""Name of an observation, a number, or a function with its arguments."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Terminal:
-    """A number that an expression may read: its name, and where it is among the senses.
+    """Input of an expression: its name, and the observation that holds it.
 
-    index: in the sense's array; None where that is one number.
+    index: in the observation's array; None if that is one number.
     """
 
     name: str
@@ -46,26 +46,26 @@ class Named(Protocol):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """One per part."""
+        """Names, one per part."""
         ...
 
 
 class HasParts(Protocol):
-    """What is told of a body."""
+    """Parts of a body that expressions observe."""
 
     @property
     def joints(self) -> Named:
-        """The actuated ones."""
+        """Actuated joints."""
         ...
 
     @property
     def feet(self) -> Named:
-        """Each a body, of one shape or several."""
+        """Feet, each a body of one or several shapes."""
         ...
 
 
 ADDED = {"s0": "goal_distance", "b0": "bar_distance"}
-"""Names of senses that tasks add."""
+"""Names of observations that tasks add."""
 SCALARS = {
     "t": "time",
     "beat": "beat",
@@ -83,7 +83,7 @@ SCALARS = {
 
 
 def terminals(body: HasParts, added: Sequence[str] = ()) -> tuple[Terminal, ...]:
-    """All that a body senses, and those of the senses `added` by a task that have a name."""
+    """Return the inputs from a body, and from named observations that a task adds (`added`)."""
     rows: list[tuple[str, str, int | None]] = [(n, sense, None) for n, sense in SCALARS.items()]
     for j in range(len(body.joints.names)):
         rows += [(f"a{j}", "joint_pos", j), (f"w{j}", "joint_vel", j)]
@@ -98,10 +98,10 @@ def terminals(body: HasParts, added: Sequence[str] = ()) -> tuple[Terminal, ...]
 
 
 def chosen_terminals(known: Sequence[Terminal], patterns: Sequence[str]) -> tuple[Terminal, ...]:
-    """Those whose names match a pattern.
+    """Return the terminals with names that match a pattern.
 
     Raises:
-      UserError: a pattern without a star or bracket matches none.
+      UserError: a pattern without wildcards matches none, or all patterns together match none.
     """
     names = [terminal.name for terminal in known]
     for pattern in patterns:
@@ -116,12 +116,12 @@ def chosen_terminals(known: Sequence[Terminal], patterns: Sequence[str]) -> tupl
 
 
 def to_text(code: np.ndarray, value: np.ndarray, known: Sequence[Terminal]) -> str:
-    """The expression in arrays [C]."""
+    """Return the text of an expression in arrays [C]."""
     return in_text(nested(code, value, known))
 
 
 def in_text(expression: Expression) -> str:
-    """As it is written."""
+    """Return the text of an expression."""
     if isinstance(expression, tuple):
         return f"({' '.join(map(in_text, expression))})"
     if isinstance(expression, float):
@@ -130,7 +130,7 @@ def in_text(expression: Expression) -> str:
 
 
 def nested(code: np.ndarray, value: np.ndarray, known: Sequence[Terminal]) -> Expression:
-    """The expression in arrays [C]."""
+    """Return the nested expression in arrays [C]."""
     names = {terminal.code: terminal.name for terminal in known}
     functions = {number: name for name, number in FUNCTION_CODES.items()}
     nodes = iter(range(int((np.asarray(code) != EMPTY).sum())))

@@ -1,6 +1,6 @@
-"""Trees in prefix order as arrays: what every operator asks of them.
+"""Trees in prefix order as arrays: helpers of the operators.
 
-A tree is `code` [C] and `value` [C] (`champion.expressions`); beyond its end both are zero.
+A tree is `code` [C] and `value` [C] (`text`); beyond its end both are zero.
 """
 
 import jax
@@ -18,28 +18,28 @@ from mjxgait.types import pytree
 
 @pytree
 class Trees:
-    """One per joint. code: [J, C] whole numbers. value: [J, C], of constants; else zero."""
+    """Trees, one per joint. code: [J, C] integers. value: [J, C] of constants, else zero."""
 
     code: jax.Array
     value: jax.Array
 
 
 def arity(code: jax.Array) -> jax.Array:
-    """[...] arguments that each node takes."""
+    """Return the number of arguments [...] of each node."""
     taken = jnp.asarray(ARITY)[jnp.minimum(code, FIRST_ADDED - 1)]
     return jnp.where(code < FIRST_ADDED, taken, 0)
 
 
 def size(code: jax.Array) -> jax.Array:
-    """[] nodes of a tree [C]."""
+    """Return the number of nodes [] of a tree [C]."""
     return jnp.sum(code != EMPTY)
 
 
 def subtree_sizes(code: jax.Array) -> jax.Array:
-    """[C] nodes of the subtree that begins at each place; 0 beyond the end."""
+    """Return the number of nodes [C] of the subtree at each place; 0 beyond the end."""
     places = np.arange(code.shape[0])
     used = code != EMPTY
-    # A subtree ends where all arguments that it wants have been given.
+    # A subtree ends when all its arguments are complete.
     wanted = jnp.cumsum(jnp.where(used, arity(code) - 1, 0))
     before = wanted - jnp.where(used, arity(code) - 1, 0)
     complete = (wanted[None, :] - before[:, None] == -1) & (places[None, :] >= places[:, None])
@@ -47,7 +47,7 @@ def subtree_sizes(code: jax.Array) -> jax.Array:
 
 
 def depths(code: jax.Array) -> jax.Array:
-    """[C] how many functions each node is within."""
+    """Return the depth [C] of each node: its number of enclosing functions."""
     places, sizes = np.arange(code.shape[0]), subtree_sizes(code)
     start, node = places[:, None], places[None, :]
     within = (start < node) & (node < start + sizes[:, None])
@@ -55,5 +55,5 @@ def depths(code: jax.Array) -> jax.Array:
 
 
 def canonical(code: jax.Array, value: jax.Array) -> tuple[jax.Array, jax.Array]:
-    """With zeros wherever a value means nothing."""
+    """Return code and value with zeros for values that have no meaning."""
     return code, jnp.where(code == CONSTANT, value, 0.0)

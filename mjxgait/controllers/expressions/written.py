@@ -1,4 +1,4 @@
-"""Programs that were written by hand: read from a file, and laid over the settings of a run."""
+"""Programs written by hand: read from a file and merged into the settings of a run."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -23,13 +23,13 @@ from mjxgait.errors import UserError
 from mjxgait.plugins.registry import find
 
 Program = tuple[np.ndarray, np.ndarray]
-"""code and value [J, C] of a program."""
+"""Arrays code and value [J, C] of a program."""
 
 
 def with_expressions(creature: Creature, config: Config, file: Path) -> Config:
-    """The settings of a run whose first generation begins with the programs of a file.
+    """Return the settings of a run with a file's programs at the start of the first generation.
 
-    The settings hold the programs themselves, so that the run folder needs no other file.
+    The settings hold the programs themselves, so the run folder needs no other file.
 
     Raises:
       UserError: names the file and the line of a mistake.
@@ -50,9 +50,9 @@ def with_expressions(creature: Creature, config: Config, file: Path) -> Config:
 
 
 def written_champion(creature: Creature, config: Config, file: Path) -> Champion:
-    """The program of a file as a champion that no run has evolved.
+    """Return the program of a file as a champion without a run.
 
-    It may use all functions and senses that there are.
+    It may use all functions and observations.
 
     Raises:
       UserError: names the file and the line of a mistake; or the file holds several programs.
@@ -62,14 +62,14 @@ def written_champion(creature: Creature, config: Config, file: Path) -> Champion
     if len(programs) > 1:
         raise UserError(f"{file}: holds {len(programs)} programs; leave the one to examine in it")
     code, value = programs[0]
-    # As many places as a run's: then the same program has the same fingerprint.
+    # The array length of a run, so that the same program has the same fingerprint.
     places = max(_settings(config).nodes, int((code != EMPTY).sum(1).max()))
     genome = {"code": code[:, :places], "value": value[:, :places]}
     return Champion.of(creature, config, genome, fitness=0.0, terms={}, origin={})
 
 
 def programs_in(creature: Creature, file: Path, limits: Vocabulary) -> list[Program]:
-    """The programs of a file, under these limits.
+    """Return the programs of a file, under these limits.
 
     Raises:
       UserError: names the file, and the line of a mistake.
@@ -86,10 +86,10 @@ def programs_in(creature: Creature, file: Path, limits: Vocabulary) -> list[Prog
 
 
 def check_programs(creature: Creature, config: Config) -> None:
-    """Refuses programs of the settings of the controller `program` that are wrong or too many.
+    """Refuse settings of the controller `program` with invalid or too many programs.
 
     Raises:
-      UserError: says which, and the way out.
+      UserError: names the problem and its remedy.
     """
     settings = _settings(config)
     if not settings.expressions:
@@ -99,12 +99,12 @@ def check_programs(creature: Creature, config: Config) -> None:
 
 
 def senses_added(config: Config) -> Sequence[str]:
-    """Names of the senses that the task of a config adds."""
+    """Return the names of the observations that the task of a config adds."""
     return tuple(getattr(find("task", config.use.task), "adds", ()))
 
 
 def _settings(config: Config) -> ProgramConfig:
-    """The settings of the controller `program`."""
+    """Return the settings of the controller `program`."""
     settings: Any = config.controller
     return cast(ProgramConfig, settings)
 

@@ -1,4 +1,4 @@
-"""Settings of the controllers and of the drive."""
+"""Settings of the key-pose controller and of the drive."""
 
 import dataclasses
 from typing import Annotated, Literal
@@ -16,14 +16,14 @@ from mjxgait.config.tables import (
 )
 
 HOLDS = (1, 2, 4, 8, 16)
-"""Control steps from one command to the next that there can be."""
+"""Allowed control steps per command."""
 
 
 def holds(steps: int) -> int:
-    """For how many steps a command stays.
+    """Return `steps`, the control steps per command, if allowed.
 
     Raises:
-      ValueError: not so many.
+      ValueError: it is not in `HOLDS`.
     """
     if steps not in HOLDS:
         raise ValueError(f"must be one of {', '.join(map(str, HOLDS))} control steps")
@@ -32,16 +32,16 @@ def holds(steps: int) -> int:
 
 @dataclasses.dataclass(frozen=True)
 class TuningRanges:
-    """Where the controller's own genes may lie (docs/controller.md); equal ends fix one.
+    """Ranges of the tuning genes (docs/controller.md); equal ends fix one.
 
     Attributes:
-      threshold: rad; pose error, root mean square, below which the target moves on.
-      period: s; of the cycle, where the clock moves the target on.
-      steer: how strongly turning away from the way is answered.
-      pitch: how strongly pitch is answered.
-      pitch_rate: s; how strongly its speed is.
-      roll: how strongly roll is answered.
-      roll_rate: s; how strongly its speed is.
+      threshold: rad; pose error, root mean square, below which the target advances.
+      period: s; of the cycle, if the clock advances the target.
+      steer: gain on deviation from the path (heading and lateral offset).
+      pitch: gain on pitch.
+      pitch_rate: s; gain on pitch rate.
+      roll: gain on roll.
+      roll_rate: s; gain on roll rate.
     """
 
     __pydantic_config__ = STRICT
@@ -63,21 +63,22 @@ StaticInterval = Annotated[Interval, SHAPE]
 
 @dataclasses.dataclass(frozen=True)
 class SteppingRanges:
-    """Where the genes of stepping under the fall may lie, for bodies with weights in `[stepping]`
-    (docs/controller.md); all others have no such genes. Equal ends fix one.
+    """Ranges of the genes for stepping under a fall (docs/controller.md); equal ends fix one.
+
+    Only bodies with weights in `[stepping]` have these genes.
 
     Attributes:
-      step: how far ahead the swing leg steps, for how far the trunk is ahead of its support.
-      step_rate: likewise, for how fast the trunk goes ahead.
-      side: how far to the side, for how far the trunk is beside its support.
-      side_rate: likewise, for how fast it goes to the side.
-      hold: how strongly the stance leg's hip turns the trunk back that pitches.
-      hold_rate: s; likewise, for how fast it pitches.
-      sway: how strongly the hip turns the trunk back that rolls.
-      sway_rate: s; likewise, for how fast it rolls.
-      begin: s; over how long the cycle grows out of the standing pose.
-      turn: how strongly the hip turns the trunk back, and the foot that swings, that turn away from
-        the way.
+      step: gain of the swing leg's step ahead, on the trunk's distance ahead of its support.
+      step_rate: likewise, on the trunk's speed ahead.
+      side: gain of its step to the side, on the trunk's distance beside its support.
+      side_rate: likewise, on the trunk's speed to the side.
+      hold: gain of the stance hip against trunk pitch.
+      hold_rate: s; likewise, against pitch rate.
+      sway: gain of the stance hip against trunk roll.
+      sway_rate: s; likewise, against roll rate.
+      begin: s; time in which the cycle grows out of the standing pose.
+      turn: gain on deviation from the path: the stance hip turns the trunk back, and the swing
+        foot lands turned back.
     """
 
     __pydantic_config__ = STRICT
@@ -94,31 +95,30 @@ class SteppingRanges:
 
 
 STEPPING = tuple(field.name for field in dataclasses.fields(SteppingRanges))
-"""Names of those genes; genomes hold them behind the tuning genes."""
+"""Names of those genes; genomes hold them after the tuning genes."""
 
 
 def gene_names(steps: bool) -> tuple[str, ...]:
-    """Of a genome's tuning, in its order. steps: whether the body steps under its fall."""
+    """Return the ordered names of a genome's tuning. steps: whether the body steps under a fall."""
     return TUNING + (STEPPING if steps else ())
 
 
 @dataclasses.dataclass(frozen=True)
 class PoseConfig:
-    """The controller of key poses.
+    """Settings of the key-pose controller.
 
     Attributes:
-      key_poses: K, poses of half a cycle (of the whole one for an unsymmetric creature).
+      key_poses: K, poses of half a cycle (of the whole cycle for an unsymmetric creature).
       mirror: whether the other half of a symmetric creature's cycle is the mirror image; else
         the K poses are the whole cycle.
       interpolation: n, steps between neighbouring poses.
-      steering: factor on the creature's weights of steering; turns want more than a straight way.
-      advance: the target moves on when the pose error is below the threshold, or by the
-        clock.
-      around: rad; key poses near which all others lie, pose by pose and joint by joint, as
-        `mjxgait refine` finds them; none leaves the whole pose ranges.
-      within: deg; how far from them.
-      tuning: ranges of the controller's own genes.
-      stepping: ranges of the genes of bodies that step under their fall.
+      steering: factor on the creature's steering weights; turns need more than a straight path.
+      advance: the target advances when the pose error is below the threshold, or by the clock.
+      around: rad; key poses to search around, pose by pose and joint by joint, as
+        `mjxgait refine` sets them; none leaves the whole pose ranges.
+      within: deg; largest distance from them.
+      tuning: ranges of the tuning genes.
+      stepping: ranges of the genes of bodies that step under a fall.
     """
 
     __pydantic_config__ = STRICT
@@ -134,8 +134,9 @@ class PoseConfig:
 
 
 def unhurried(seconds: float, time_step: float) -> int:
-    """Steps between poses, the usual ones at least, with which no cycle takes less than these s: it
-    moves on by a step at most every control step, of `time_step` s.
+    """Return the steps between poses for a cycle of at least `seconds`; at least the default.
+
+    The target advances at most one step per control step, of `time_step` s.
     """
     plain = PoseConfig()
     return max(round(seconds / time_step / (2 * plain.key_poses)), plain.interpolation)
@@ -143,11 +144,11 @@ def unhurried(seconds: float, time_step: float) -> int:
 
 @dataclasses.dataclass(frozen=True)
 class DriveConfig:
-    """How the joints' motors follow what a controller sends.
+    """Settings of the drive: joint motors that follow a controller's commands.
 
     Attributes:
       law: stable PD, or plain PD for comparison.
-      constraint_forces: whether stable PD counts the constraint forces of the previous step,
+      constraint_forces: whether stable PD includes the constraint forces of the previous step,
         as in DART's tutorial.
       stiffness: factor on the creature's kp.
       damping: factor on the creature's kd.

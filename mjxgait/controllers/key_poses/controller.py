@@ -1,6 +1,6 @@
-"""From a genome to the target pose of each moment: mirroring, interpolation, corrections, advance (docs/controller.md).
+"""Key-pose controller: mirroring, interpolation, corrections, advance (docs/controller.md).
 
-Every function is for one creature; the rollout maps them over its lanes.
+Every function is for one creature; the rollout maps it over its lanes.
 """
 
 import dataclasses
@@ -24,16 +24,16 @@ THRESHOLD, PERIOD, STEER, PITCH, PITCH_RATE, ROLL, ROLL_RATE = range(len(TUNING)
 READS = ("joint_pos", "heading", "aside", "pitch", "roll", "pitch_rate", "roll_rate")
 STEP_READS = ("foot_height", "foot_place", "nose_vel")
 LIFTED = 0.02
-"""Hip heights from which a foot is wholly in its swing."""
+"""Foot height, in hip heights, above which a foot is fully in swing."""
 GRAVITY = 9.81
-"""m/s²; with the hip height it makes speeds comparable between bodies."""
+"""m/s²; scales speeds by hip height, to compare bodies."""
 MAX_CORRECTION = 0.5
-"""rad, or relative stride length: the most that one correction may change the target."""
+"""rad, or relative stride length: largest change of the target by one correction."""
 
 
 @pytree
 class Genome:
-    """The evolvable values. key_poses: [..., K, J] rad; tuning: [..., E] in the order of `TUNING`."""
+    """Evolvable values. key_poses: [..., K, J] rad. tuning: [..., E] in the order of `TUNING`."""
 
     key_poses: jax.Array
     tuning: jax.Array
@@ -41,10 +41,11 @@ class Genome:
 
 @pytree
 class PoseCycle:
-    """What an episode keeps of a genome and the settings.
+    """Plan of an episode, from a genome and the settings.
 
-    poses: [C, J] rad, of which the first `count` [] are the cycle. tuning: [E]. interpolation: [] steps between neighbours.
-    clocked: [] whether the clock moves the target on. steering: factor on the weights of steering.
+    poses: [C, J] rad; the first `count` [] are the cycle. tuning: [E]. interpolation: [] steps
+    between neighbours. clocked: [] whether the clock advances the target. steering: factor on the
+    steering weights.
     """
 
     poses: jax.Array
@@ -57,7 +58,7 @@ class PoseCycle:
 
 @pytree
 class GaitState:
-    """Where the controller is: position [] in steps of interpolation, steps [] since the start."""
+    """Controller memory: position [] in interpolation steps, control steps [] since the start."""
 
     position: jax.Array
     steps: jax.Array
@@ -65,10 +66,7 @@ class GaitState:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class PoseTracker:
-    """A controller: the cycle of key poses of one creature.
-
-    step: s between two control steps.
-    """
+    """Controller that tracks a creature's cycle of key poses. step: s between two control steps."""
 
     creature: Body
     step: float
@@ -81,7 +79,7 @@ class PoseTracker:
         return READS + (STEP_READS if self.creature.corrections.steps else ())
 
     def bounds(self, config: PoseConfig) -> tuple[Genome, Genome]:
-        """Lowest and highest genome: key_poses [K, J], tuning [E]."""
+        """Return the lowest and highest genome: key_poses [K, J], tuning [E]."""
         low, high = (
             jnp.stack([jnp.float32(ends[end]) for ends in self._ranges(config)]) for end in (0, 1)
         )
@@ -101,21 +99,21 @@ class PoseTracker:
         )
 
     def _ranges(self, config: PoseConfig) -> list[tuple[Number, Number]]:
-        """Ends of each gene besides the key poses."""
+        """Return the ranges of the tuning genes."""
         usual = [getattr(config.tuning, name) for name in TUNING]
         if not self.creature.corrections.steps:
             return usual
         return [*usual, *(getattr(config.stepping, name) for name in STEPPING)]
 
     def _original(self, config: PoseConfig) -> jax.Array:
-        """The key poses [K, J] that the config names, within the pose ranges."""
+        """Return the key poses [K, J] of `config.around`, clipped to the pose ranges."""
         joints, shape = self.creature.joints, (config.key_poses, len(self.creature.joints.names))
         given = jnp.stack([jnp.float32(angle) for angle in config.around]).reshape(shape)
         low, high = (edge.astype(np.float32) for edge in (joints.pose_low, joints.pose_high))
         return jnp.clip(given, low, high)
 
     def variation(self, settings: PoseConfig, evolution: EvolutionConfig) -> Variation:
-        """See `Controller`; the first that is created has the key poses that the settings name."""
+        """See `Controller`; the first created genome has the key poses of `settings.around`."""
         usual = pose_variation(Box(*self.bounds(settings)), evolution)
         if not settings.around:
             return usual
@@ -136,7 +134,7 @@ class PoseTracker:
         return {}
 
     def prepare(self, genome: Genome, config: PoseConfig) -> PoseCycle:
-        """The whole cycle of a genome [K, J] under the settings, plain or traced."""
+        """Return the whole cycle of a genome [K, J] under the settings, plain or traced."""
         poses = pose_cycle(self.creature, genome.key_poses)
         count = jnp.where(config.mirror, poses.shape[0], config.key_poses)
         return PoseCycle(
@@ -152,13 +150,13 @@ class PoseTracker:
         """See `Controller`: the same for all."""
 
     def init(self) -> GaitState:
-        """The state at the start of an episode."""
+        """Return the state at the start of an episode."""
         return GaitState(position=jnp.zeros((), jnp.int32), steps=jnp.zeros((), jnp.int32))
 
     def act(
         self, cycle: PoseCycle, state: GaitState, senses: Senses
     ) -> tuple[jax.Array, GaitState]:
-        """Target pose [J] of this moment, and the state of the next."""
+        """Return the target pose [J] of this control step, and the next state."""
         creature = self.creature
         target = interpolate(cycle.poses, state.position, cycle.interpolation, cycle.count)
         if creature.corrections.steps:
@@ -177,7 +175,7 @@ class PoseTracker:
 
 
 def pose_cycle(creature: Body, key_poses: jax.Array) -> jax.Array:
-    """The closed cycle [C, J]: the key poses [K, J] and, for a symmetric creature, their mirror images."""
+    """Return the cycle [C, J]: key poses [K, J] and, if symmetric, their mirror images."""
     if not creature.mirror.symmetric:
         return key_poses
     return jnp.concatenate(
@@ -188,9 +186,11 @@ def pose_cycle(creature: Body, key_poses: jax.Array) -> jax.Array:
 def clock_position(
     steps: jax.Array, step: float, period: jax.Array, positions: jax.Array
 ) -> jax.Array:
-    """Position [] in a cycle of `positions` [] and `period` [] s after `steps` [] of `step` s.
+    """Return the position [] in a cycle after `steps` [] of `step` s.
 
-    In integers that overflow at the end of a cycle: float32 time would drift away from the examiner's.
+    The cycle has `positions` [] and lasts `period` [] s.
+    Uses integers that overflow at the end of a cycle: float32 time would drift away from the
+    reference controller's.
     """
     turns = step / period
     turn = ((turns - jnp.floor(turns)) * 2.0**32).astype(jnp.uint32)
@@ -202,9 +202,10 @@ def clock_position(
 def interpolate(
     poses: jax.Array, position: jax.Array, n: jax.Array | int, count: jax.Array | int
 ) -> jax.Array:
-    """Target pose [J] at a position [] of a cycle with n steps between neighbours: the first `count` [] of the poses [C, J].
+    """Return the target pose [J] at a position [] of a cycle with n steps between neighbours.
 
-    A weighted sum over all poses instead of two look-ups: with lanes innermost a look-up would be a gather per lane.
+    The cycle is the first `count` [] of the poses [C, J]. A weighted sum over all poses replaces
+    two look-ups: with lanes innermost a look-up would be a gather per lane.
     """
     places = np.arange(poses.shape[0])
     ahead = (position / n - places) % count
@@ -214,7 +215,7 @@ def interpolate(
 
 
 def begun(tuning: jax.Array, steps: jax.Array, step: float) -> jax.Array:
-    """Share [] of the cycle that has grown out of the standing pose after `steps` [] of `step` s."""
+    """Return the blend [] from standing pose (0) to cycle (1) after `steps` [] of `step` s."""
     over = tuning[len(TUNING) + STEPPING.index("begin")]
     return jnp.minimum(1.0, (steps + 1) * step / jnp.maximum(over, step))
 
@@ -226,9 +227,9 @@ def corrections(
     senses: Senses,
     steering: float = 1.0,
 ) -> jax.Array:
-    """Change [J] of the target pose by steering and balance; zero where the genes are zero.
+    """Return the change [J] of the target pose by steering and balance; zero if the genes are zero.
 
-    steering: factor on the creature's weights of steering.
+    steering: factor on the creature's steering weights.
     """
     wrong = off_the_way(creature, senses)
     steer = _clip(tuning[STEER] * wrong)
@@ -253,12 +254,12 @@ def corrections(
 
 
 def stepping(creature: Body, genes: jax.Array, senses: Senses) -> jax.Array:
-    """Change [J] of the target pose by stepping under a fall; genes: [10] in the order of
-    `STEPPING`.
+    """Return the change [J] of the target pose by stepping under a fall.
 
-    After SIMBICON (Yin, Loken & van de Panne 2007): the leg that swings goes on for where the trunk
-    is over its support and how fast it goes there, the hip of the leg that stands turns the trunk
-    back, and to its way.
+    genes: [10] in the order of `STEPPING`.
+    After SIMBICON (Yin, Loken & van de Panne 2007): the swing leg steps further, by the trunk's
+    offset from its support and its speed. The stance hip turns the trunk upright and back to its
+    path.
     """
     weights, hip = creature.corrections.stepping, creature.frame.hip_height
     assert weights is not None
@@ -284,7 +285,7 @@ def stepping(creature: Body, genes: jax.Array, senses: Senses) -> jax.Array:
 
 
 def off_the_way(creature: Body, senses: Senses) -> jax.Array:
-    """rad [] by which it looks to the left of its way, and more for how far it is to the left of it."""
+    """Return the deviation [] in rad left of the path: heading plus scaled lateral offset."""
     aside = senses["aside"] / (2 * creature.frame.body_length)
     return senses["heading"] + aside
 

@@ -1,4 +1,4 @@
-"""The operators of a genome of key poses [K, J] and tuning [E], each within its box."""
+"""Genetic operators for key poses [K, J] and tuning [E], each within its box."""
 
 import dataclasses
 from typing import Any
@@ -18,9 +18,9 @@ from mjxgait.evolution.variation import (
 
 
 def pose_variation(box: Box, config: EvolutionConfig) -> Variation:
-    """The operators of a genome of key poses and tuning, as chosen in the config, which may be plain or traced.
+    """Return the operators that the config, plain or traced, selects.
 
-    All options of a choice are computed and one is taken: they cost next to nothing beside the simulations.
+    All options are computed and one is taken: their cost is negligible beside the simulations.
     """
     poses = narrowed(box, config.pose_range)
     box = Box(
@@ -73,13 +73,13 @@ def pose_variation(box: Box, config: EvolutionConfig) -> Variation:
 
 
 def permuted_poses(key: jax.Array, mother: jax.Array, father: jax.Array) -> jax.Array:
-    """K poses [K, J] drawn without repetition from the parents' 2K, in any order (Wilson)."""
+    """Draw K poses [K, J] without repetition from the parents' 2K, in random order (Wilson)."""
     both = jnp.concatenate([mother, father])
     return jax.random.permutation(key, both)[: mother.shape[0]]
 
 
 def aligned_poses(key: jax.Array, mother: jax.Array, father: jax.Array) -> jax.Array:
-    """K poses [K, J], each from the one or the other parent, in its place."""
+    """Draw each of K poses [K, J] from either parent, at the same index."""
     return jnp.where(jax.random.bernoulli(key, 0.5, (mother.shape[0], 1)), mother, father)
 
 
@@ -92,7 +92,7 @@ def mutated_poses(
     sigma: jax.Array | float,
     redrawn: jax.Array | float = 0.5,
 ) -> jax.Array:
-    """Key poses [K, J] with a change in one of them, within the box.
+    """Return key poses [K, J] with a change in one of them, within the box.
 
     kind, sigma, redrawn: see `mutation`, `sigma` and `redrawn` of `EvolutionConfig`.
     """
@@ -117,7 +117,7 @@ def mutated_poses(
 
 
 def eight_bits(values: jax.Array, low: jax.Array, high: jax.Array) -> jax.Array:
-    """The nearest of 256 levels between low and high, as integers."""
+    """Return the nearest of 256 levels between low and high, as integers."""
     return jnp.round(
         255 * jnp.clip((values - low) / jnp.maximum(high - low, 1e-9), 0.0, 1.0)
     ).astype(jnp.int32)

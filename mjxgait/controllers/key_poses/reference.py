@@ -1,4 +1,4 @@
-"""The controller of key poses, written from docs/controller.md alone.
+"""Reference controller for key poses, written from docs/controller.md alone.
 
 Letters: `S` simulations, `J` actuated joints, `K` key poses, `C` poses in the cycle.
 """
@@ -19,7 +19,7 @@ STEP_READS = ("foot_height", "foot_place", "nose_vel")
 
 
 class PoseTwin:
-    """Tracks a champion's pose cycle. Its memory: `position` [S] in the cycle, `steps` [S]."""
+    """Reference controller of a pose cycle. Memory: `position` [S] in the cycle, `steps` [S]."""
 
     command: ClassVar[Command] = "pose"
     every: ClassVar[int] = 1
@@ -49,7 +49,7 @@ class PoseTwin:
         return target, {"position": position, "steps": steps}
 
     def planned(self, position: np.ndarray) -> np.ndarray:
-        """Uncorrected target [S, J] in rad at cycle positions [S]."""
+        """Return the uncorrected target [S, J] in rad at cycle positions [S]."""
         a, step = np.divmod(position, self.settings.interpolation)
         f = (step / self.settings.interpolation)[:, None]
         return (1 - f) * self.cycle[a] + f * self.cycle[(a + 1) % len(self.cycle)]
@@ -57,14 +57,15 @@ class PoseTwin:
     def target(
         self, position: np.ndarray, senses: Mapping[str, np.ndarray], steps: np.ndarray
     ) -> np.ndarray:
-        """Target [S, J] in rad at cycle positions [S], after so many steps [S]."""
+        """Return the target [S, J] in rad at cycle positions [S], after `steps` [S]."""
         return self.corrected(self.planned(position), senses, steps)
 
     def corrected(
         self, planned: np.ndarray, senses: Mapping[str, np.ndarray], steps: np.ndarray
     ) -> np.ndarray:
-        """A planned target [S, J] in rad with its beginning, steering and balance, within the joints'
-        ranges; steps: [S] taken before.
+        """Return a planned target [S, J] in rad with corrections, within the joint ranges.
+
+        The corrections are the start, steering and balance. steps: [S] taken before.
         """
         creature = self.creature
         if creature.corrections.steps:
@@ -85,13 +86,13 @@ class PoseTwin:
         return np.clip(target, creature.joints.low, creature.joints.high)
 
     def _begun(self, planned: np.ndarray, steps: np.ndarray) -> np.ndarray:
-        """Out of the standing pose, over as long as the genes say."""
+        """Return the target blended from the standing pose, over the time `begin`."""
         passed, begin = (steps + 1) * self.step, max(self.tuning["begin"], self.step)
         stand = self.creature.joints.stand
         return stand + np.minimum(1, passed / begin)[:, None] * (planned - stand)
 
     def stepping(self, weights: Stepping, senses: Mapping[str, np.ndarray]) -> np.ndarray:
-        """What stepping under a fall changes of the target, [S, J] rad."""
+        """Return the change of the target by stepping under a fall, [S, J] rad."""
         gain, hip = self.tuning, self.creature.frame.hip_height
         swings = np.clip(senses["foot_height"] / (0.02 * hip), 0, 1)
         stands = 1 - swings
@@ -124,7 +125,7 @@ class PoseTwin:
     def corrections(
         self, senses: Mapping[str, np.ndarray]
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """`u`, `p` and `r` of docs/controller.md, [S] each."""
+        """Return `u` (without `steering`), `p` and `r` of docs/controller.md, [S] each."""
         gain = self.tuning
         pitch = gain["pitch"] * senses["pitch"] + gain["pitch_rate"] * senses["pitch_rate"]
         roll = gain["roll"] * senses["roll"] + gain["roll_rate"] * senses["roll_rate"]
@@ -135,7 +136,7 @@ class PoseTwin:
         )
 
     def _wrong(self, senses: Mapping[str, np.ndarray]) -> np.ndarray:
-        """[S] rad of the heading, and of the place beside the way."""
+        """Return the deviation [S] in rad from the path: heading plus lateral offset."""
         wrong: np.ndarray = senses["heading"] + senses["aside"] / (
             2 * self.creature.frame.body_length
         )
@@ -144,9 +145,9 @@ class PoseTwin:
     def advance(
         self, position: np.ndarray, target: np.ndarray, joint_pos: np.ndarray, steps: np.ndarray
     ) -> np.ndarray:
-        """Positions [S] at the next control step.
+        """Return the positions [S] at the next control step.
 
-        target, joint_pos: [S, J] of this step. steps: [S] taken then, this one included.
+        target, joint_pos: [S, J] of this step. steps: [S] taken, this one included.
         """
         if self.settings.advance == "clock":
             return self._by_clock(steps)
@@ -160,9 +161,7 @@ class PoseTwin:
 
 
 def pose_cycle(key_poses: np.ndarray, creature: Creature) -> np.ndarray:
-    """[C, J] rad: the key poses [K, J], followed by their mirror images where the creature is
-    symmetric.
-    """
+    """Return the cycle [C, J] in rad: key poses [K, J] and, if symmetric, their mirror images."""
     if not creature.mirror.symmetric:
         return key_poses
     return np.concatenate([key_poses, creature.mirror.sign * key_poses[:, creature.mirror.partner]])

@@ -1,4 +1,4 @@
-"""What there is to tell of genomes of key poses. Angles in degrees."""
+"""Reports on genomes of key poses. Angles in degrees."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -32,7 +32,7 @@ class PoseView:
         }
 
     def spread(self, snapshot: Snapshot) -> dict[str, Any]:
-        """See `GenomeView`: per joint the mean over the key poses."""
+        """See `GenomeView`: the mean over the key poses, per joint."""
         poses, tuning = snapshot.genomes["key_poses"], snapshot.genomes["tuning"]
         spread = np.degrees(poses.std(axis=0).mean(axis=0))
         room = np.degrees(snapshot.creature.joints.pose_high - snapshot.creature.joints.pose_low)
@@ -43,13 +43,13 @@ class PoseView:
         }
 
     def difference(self, a: Snapshot, b: Snapshot) -> dict[str, Any]:
-        """See `GenomeView`: of the key poses only where the joints are the same."""
+        """See `GenomeView`: key poses are compared only if the joints are the same."""
         mine, other = a.genomes, b.genomes
         comparable = (
             a.creature.joints.names == b.creature.joints.names
             and mine["key_poses"].shape[1:] == other["key_poses"].shape[1:]
         )
-        # A body that steps under its fall has more genes than one that does not.
+        # Bodies that step under a fall have more genes.
         pairs = zip(_genes(a), mine["tuning"][0], other["tuning"][0], strict=False)
         return {
             "same_individuals": shared(a, b) if comparable else None,

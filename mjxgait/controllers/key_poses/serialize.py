@@ -1,4 +1,4 @@
-"""Key poses by joint name and tuning genes by name."""
+"""Serializer for key poses by joint name and tuning genes by name."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -12,18 +12,18 @@ from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 
 MOST_POSES, SHORTEST = 1000, 1e-3
-"""Key poses of a cycle, and s that one takes; evolution stays far within both."""
+"""Most key poses of a cycle, and its shortest period in s; evolution stays far within both."""
 LATER = {"begin": 0.0, "turn": 0.0}
-"""Genes that came later, and what they were before."""
+"""Genes added later, with the values that reproduce older files."""
 
 
 class PoseCodec(PlainCodec):
-    """Of genomes with `key_poses` [K, J] in rad and `tuning` [E] in the order of `gene_names`."""
+    """Serializer for `key_poses` [K, J] in rad and `tuning` [E] in the order of `gene_names`."""
 
     def document(
         self, genome: Mapping[str, np.ndarray], settings: PoseConfig, creature: Creature
     ) -> dict[str, Any]:
-        """See `Codec`. mirrored: whether the mirror images of the poses follow them."""
+        """See `Codec`. mirrored: whether the cycle includes the mirror images of the poses."""
         names = gene_names(creature.corrections.steps)
         return {
             "key_poses": [

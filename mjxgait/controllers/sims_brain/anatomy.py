@@ -1,4 +1,4 @@
-"""What controllers, tasks and senses are told of bodies that grow."""
+"""Body facts of growing bodies for controllers, tasks and observations."""
 
 import numpy as np
 
@@ -16,9 +16,9 @@ AXES = np.eye(3, dtype=np.float32)
 
 
 def anatomy(links: int) -> GivenBody:
-    """What controllers, tasks and senses are told of all bodies with so many links.
+    """Return the facts shared by all bodies with this many links.
 
-    Every link but the root's has a hinge, and every link's block is a foot.
+    Every link but the root has a hinge, and every link's block is a foot.
     """
     hinges, none = links - 1, np.zeros(links - 1, np.float32)
     endless = np.full(hinges, np.inf, np.float32)

@@ -1,4 +1,4 @@
-"""Chance, many numbers of one draw: every draw of its own costs the compiler a quarter of a second."""
+"""Random numbers from one draw: each separate draw costs 0.25 s of compile time."""
 
 import math
 from collections.abc import Hashable, Mapping
@@ -10,26 +10,26 @@ import numpy as np
 
 Name = TypeVar("Name", bound=Hashable)
 LEAST = 2.0**-24
-"""Half of what lies between zero and the next number that is drawn."""
+"""Half of the smallest positive number that is drawn."""
 
 
 def numbers(key: jax.Array, shapes: Mapping[Name, tuple[int, ...]]) -> dict[Name, jax.Array]:
-    """Uniform ones in [0, 1), by name and in these shapes."""
+    """Draw uniform numbers in [0, 1), by name, in these shapes."""
     ends = np.cumsum([math.prod(shape) for shape in shapes.values()])
     parts = jnp.split(jax.random.uniform(key, (int(ends[-1]),)), ends[:-1])
     return {n: part.reshape(shapes[n]) for n, part in zip(shapes, parts, strict=True)}
 
 
 def between(uniform: jax.Array, bounds: tuple[float, float]) -> jax.Array:
-    """From [0, 1) to a range."""
+    """Map [0, 1) to a range."""
     return bounds[0] + (bounds[1] - bounds[0]) * uniform
 
 
 def numbered(uniform: jax.Array, count: int) -> jax.Array:
-    """From [0, 1) to whole numbers from 0 on, all alike."""
+    """Map [0, 1) to the integers 0 to `count` - 1, all equally likely."""
     return jnp.floor(uniform * count).astype(jnp.int32)
 
 
 def normal(uniform: jax.Array) -> jax.Array:
-    """From [0, 1) to a normal distribution."""
+    """Map uniform numbers in [0, 1) to a normal distribution."""
     return math.sqrt(2) * jax.lax.erf_inv(2 * jnp.maximum(uniform, LEAST) - 1)

@@ -1,4 +1,4 @@
-"""Settings of creatures whose bodies and brains evolve together."""
+"""Settings of creatures with evolving bodies and brains."""
 
 import dataclasses
 from typing import Annotated
@@ -19,27 +19,25 @@ Room = Annotated[int, pydantic.Field(ge=1), SHAPE]
 
 @dataclasses.dataclass(frozen=True)
 class BrainConfig:
-    """Graphs of blocks with nerves (Sims 1994).
+    """Settings of graphs of blocks with nerves (Sims 1994).
 
     Attributes:
-      nodes: room of a graph.
-      connections: room of each node.
-      parts: room of a body.
-      links: room of a body; a part needs a link per hinge, and at least one.
+      nodes: most nodes of a graph.
+      connections: most connections of a node.
+      parts: most parts of a body.
+      links: most links of a body; a part needs a link per hinge, and at least one.
       local: neurons of each node.
       central: neurons of no node.
-      every: control steps from one command to the next; a brain takes two steps of its own
-        for each.
-      values: how many values change in a mutation, on average.
-      sigma: by how much, as a share of their ranges.
-      connect: chance of a connection more or less.
+      every: control steps per command; a brain takes two steps of its own per command.
+      values: number of values that change in a mutation, on average.
+      sigma: size of these changes, as a share of the range.
+      connect: chance of adding or removing a connection.
       grow: chance of a new node.
-      strength: from and to which factor each mutation draws one of its own, all magnitudes alike:
-        so many times as many values change, and so much as often, at most as told, a connection
-        or a node.
-      crossover: share of the offspring of two parents whose nodes are crossed over.
-      grafting: share that has a graft of its second parent; the others have one parent.
-      drawn: whether bodies stay as they were drawn, and brains alone evolve.
+      strength: range of a factor that each mutation draws, log-uniformly; it multiplies the number
+        of values that change and, up to 1, the chances `connect` and `grow`.
+      crossover: share of two-parent offspring with crossed nodes.
+      grafting: share with a graft of the second parent; the others have one parent.
+      drawn: whether bodies stay as first drawn and only brains evolve.
     """
 
     __pydantic_config__ = STRICT

@@ -1,4 +1,4 @@
-"""A controller that grows with the body it moves: blocks and neurons from one graph (Sims 1994)."""
+"""Controller that grows with its body: blocks and neurons from one graph (Sims 1994)."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -30,12 +30,12 @@ LIGHT = "light"
 
 
 def capacity_of(settings: BrainConfig) -> Capacity:
-    """The room for graphs and bodies."""
+    """Return the capacity for graphs and bodies."""
     return Capacity(settings.nodes, settings.connections, settings.parts, settings.links)
 
 
 class Brains:
-    """See `Controller`: its commands are the torques of all hinges that its body may have."""
+    """See `Controller`: a command holds the torques of all hinges that a body may have."""
 
     Settings: ClassVar[type] = BrainConfig
     command: ClassVar[Command] = "torque"
@@ -45,7 +45,7 @@ class Brains:
     def told(
         cls, creature: Body, step: float, settings: BrainConfig, added: Sequence[str]
     ) -> "Brains":
-        """Under these settings, with the senses that the task adds."""
+        """Return the controller. added: names of the observations that the task adds."""
         return cls(step, settings, added)
 
     def __init__(self, step: float, settings: BrainConfig, added: Sequence[str] = ()) -> None:
@@ -55,7 +55,7 @@ class Brains:
         self.reads = ("joint_pos", "contact", *([LIGHT] if LIGHT in added else []))
 
     def variation(self, settings: BrainConfig, evolution: EvolutionConfig) -> Variation:
-        """See `Controller`: of the offspring some have one parent, some are crossed, some grafted."""
+        """See `Controller`: offspring are crossed, grafted, or have one parent."""
         rates = Rates(
             settings.values, settings.sigma, settings.connect, settings.grow, settings.strength
         )
@@ -91,12 +91,12 @@ class Brains:
         return Variation(create, cross, mutate)
 
     def genes(self, genomes: Genotype, settings: BrainConfig) -> np.ndarray:
-        """See `Controller`: any other kind or flag is a difference."""
+        """See `Controller`: kinds and flags either match or differ."""
         leaves = [np.asarray(leaf, float) for leaf in jax.tree.leaves(genomes)]
         return np.concatenate([leaf.reshape(len(leaf), -1) for leaf in leaves], axis=1)
 
     def numbers(self, genomes: Genotype) -> Mapping[str, np.ndarray]:
-        """See `Controller`: of how many parts they are, without tracing what no program needs."""
+        """See `Controller`: the number of parts, without tracing code that no program needs."""
         names = [field.name for field in dataclasses.fields(genomes.graph)]
         graph = {f"graph.{name}": np.asarray(getattr(genomes.graph, name)) for name in names}
         counts = [
@@ -106,7 +106,7 @@ class Brains:
         return {"parts": np.array(counts)}
 
     def prepare(self, genome: Genotype, settings: BrainConfig) -> Brain:
-        """See `Controller`: the wires of the body that the genome grows into."""
+        """See `Controller`: the wiring of the body that grows from the genome."""
         body = body_of(genome.graph, self.capacity)
         return wired(genome.nerves, genome.centre, body, self.room)
 
@@ -118,7 +118,7 @@ class Brains:
         return blank(self.capacity.parts * self.room.local + self.room.central)
 
     def act(self, plan: Brain, memory: Mind, senses: Senses) -> tuple[jax.Array, Mind]:
-        """See `Controller`: N·m of the links' hinges, the root's left out."""
+        """See `Controller`: N·m of the links' hinges, without the root."""
         links = self.capacity.links
         light = senses[LIGHT] if LIGHT in self.reads else jnp.zeros((links, 3))
         angles = jnp.concatenate([jnp.zeros(1), senses["joint_pos"]])

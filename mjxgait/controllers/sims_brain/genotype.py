@@ -1,7 +1,7 @@
-"""The graph that a body grows from.
+"""Graph from which a body grows.
 
-Letters: `N` nodes, `C` connections that leave each, `P` parts that may grow, `n` links
-(`physics.trees`).
+Letters: `N` nodes, `C` outgoing connections of each, `P` parts that may grow, `n` links
+(`physics.batched_trees`).
 """
 
 import dataclasses
@@ -18,9 +18,9 @@ from mjxgait.types import pytree
 
 @dataclasses.dataclass(frozen=True)
 class Capacity:
-    """How much room there is: nodes, connections that leave each, parts and links of a body.
+    """Most nodes, outgoing connections of each, parts and links of a body.
 
-    A part needs as many links as its joint has hinges, and at least one.
+    A part needs one link per hinge of its joint, and at least one.
     """
 
     nodes: int = BrainConfig.nodes
@@ -31,7 +31,7 @@ class Capacity:
 
 @dataclasses.dataclass(frozen=True)
 class Ranges:
-    """What values a genotype may have. half: m; swing: rad; recursion: times a node may recur."""
+    """Ranges of a genotype's values. half: m; swing: rad; recursion: times a node may recur."""
 
     half: tuple[float, float] = (0.03, 0.3)
     swing: tuple[float, float] = (0.2, 1.6)
@@ -42,16 +42,15 @@ class Ranges:
 
 @pytree
 class Graph:
-    """A body's genotype. Node 0 is where growth begins.
+    """Genotype of a body. Growth begins at node 0.
 
-    Nodes: half [N, 3] m, half of a block's sizes; joint [N], to the parent, a place in
-    `champion.blocks.material.JOINTS`;
-    swing [N, 3] rad, how far each hinge turns either way; recursion [N], how often a node may
-    follow itself on one branch.
+    Nodes: half [N, 3] m, half sizes of a block; joint [N], to the parent, an index into
+    `reference_body.material.JOINTS`; swing [N, 3] rad, range of each hinge to either side;
+    recursion [N], how often a node may recur on one branch.
     Connections, [N, C]: target, a node; used; place [N, C, 3], a direction from the parent block's
-    middle, in its half sizes, that leaves it where the child is joined; turn [N, C, 3] rad about the
-    joint's outward axis and the two others; scale; mirror, 0 as it is, 1 as its mirror image, 2
-    both; terminal, whether it grows only where its own node may recur no more.
+    middle, in its half sizes, that leaves the block at the child's joint; turn [N, C, 3] rad about
+    the joint's outward axis and the two others; scale; mirror, 0 unchanged, 1 mirrored, 2 both;
+    terminal, whether it grows only where its own node may no longer recur.
     """
 
     half: jax.Array
@@ -68,8 +67,10 @@ class Graph:
 
 
 def random_graph(key: jax.Array, capacity: Capacity, ranges: Ranges) -> Graph:
-    """A genotype drawn at random. The first connections of its first nodes make a chain of two to
-    four, and of the others one in five is used.
+    """Draw a random genotype.
+
+    The first connections of the first nodes form a chain of two to four nodes. Each other
+    connection of these nodes is used with a chance of 0.35.
     """
     nodes, connections = capacity.nodes, capacity.connections
     each = (nodes, connections)

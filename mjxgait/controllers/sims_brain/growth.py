@@ -1,7 +1,7 @@
-"""From a graph to the parts of a body: breadth first, in the order of the connections.
+"""Growth of a graph into the parts of a body: breadth first, in the order of the connections.
 
-Letters: see `genotype`. A part that does not fit any more, because parts or links are used up or there
-are other blocks where it would be, does not grow, and nothing grows on it.
+Letters: see `genotype`. A part does not grow, and nothing grows on it, if parts or links are used
+up or other blocks are in its place.
 """
 
 import jax
@@ -19,17 +19,17 @@ from mjxgait.controllers.sims_brain.room import Boxes, inside
 from mjxgait.types import pytree
 
 HINGES = np.array([len(axes) for axes in AXES])
-"""How many hinges each of `JOINTS` has."""
+"""Number of hinges of each of `JOINTS`."""
 
 
 @pytree
 class Parts:
-    """A grown body, part by part; parents come first, the root is part 0.
+    """Grown body, part by part; parents come first, the root is part 0.
 
-    exists: [P]. node, parent: [P]. copies: [P], 1 for a mirror image of what its node describes,
-    0 else. half: [P, 3] m. place: [P, 3] m of the joint in the parent's frame; turn: [P, 3, 3] the
-    axes (rows) of the part there, before the joint turns. last: [P] the link that carries the part's
-    block, the first being one per hinge before it. depth: [P] how often the node has followed itself.
+    exists: [P]. node, parent: [P]. copies: [P], 1 for a mirror image of its node, else 0.
+    half: [P, 3] m. place: [P, 3] m of the joint in the parent's frame. turn: [P, 3, 3] axes (rows)
+    of the part there, before the joint turns. last: [P] last of the part's links (one per hinge),
+    which carries the block. depth: [P] earlier occurrences of the node on the branch.
     """
 
     exists: jax.Array
@@ -45,8 +45,11 @@ class Parts:
 
 @pytree
 class _Growing:
-    """parts so far, where their blocks are at rest, their number [], links used [], how often each
-    node is on a part's branch [P, N], and the scale [P] of each part."""
+    """State of growth.
+
+    parts: so far. boxes: their blocks at rest. count: [] parts. links: [] used. branch: [P, N]
+    occurrences of each node on a part's branch. scale: [P] of each part.
+    """
 
     parts: Parts
     boxes: Boxes
@@ -57,7 +60,7 @@ class _Growing:
 
 
 def grown(graph: Graph, capacity: Capacity) -> Parts:
-    """The body of a graph."""
+    """Return the body of a graph."""
     connections = graph.target.shape[1]
 
     def step(turn: jax.Array, growing: _Growing) -> _Growing:
@@ -77,7 +80,7 @@ def grown(graph: Graph, capacity: Capacity) -> Parts:
 
 
 def _seed(graph: Graph, capacity: Capacity) -> _Growing:
-    """The root alone."""
+    """Return the state with the root alone."""
     most = capacity.parts
     one = jnp.arange(most) == 0
     none = jnp.zeros(most, jnp.int32)
@@ -104,13 +107,13 @@ def _seed(graph: Graph, capacity: Capacity) -> _Growing:
 
 
 Place = tuple[jax.Array, jax.Array]
-"""A connection: its node, and which of the node's."""
+"""Connection: its node, and its index among the node's connections."""
 
 
 def _grows(
     graph: Graph, capacity: Capacity, growing: _Growing, part: jax.Array, place: Place
 ) -> jax.Array:
-    """Whether [] a connection grows on a part; a pair grows together or not at all."""
+    """Return whether [] a connection grows on a part; a pair grows together or not at all."""
     source, target = place[0], graph.target[place]
     times, limit = growing.branch[part], graph.recursion + 1
     allowed = (times[target] < limit[target]) & (
@@ -124,7 +127,7 @@ def _grows(
 
 
 def _links(graph: Graph, node: jax.Array) -> jax.Array:
-    """How many links a part of this node needs."""
+    """Return the number of links that a part of this node needs."""
     return jnp.maximum(jnp.asarray(HINGES)[graph.joint[node]], 1)
 
 
@@ -136,7 +139,7 @@ def _with_part(
     image: int,
     grows: jax.Array,
 ) -> tuple[_Growing, jax.Array]:
-    """With one more part where it grows, and whether [] there was room if it does.
+    """Add a part if it `grows`; also return False [] if other blocks are in its place.
 
     image: 1 for the mirrored copy.
     """
@@ -147,7 +150,7 @@ def _with_part(
     copies = parts.copies[part] ^ image
     scale = growing.scale[part] * graph.scale[at]
     joint, axes = joined(parts.half[part], graph.place[at], graph.turn[at])
-    # A frame is where the part hangs, its block's middle half a block further; the root hangs nowhere.
+    # A part's frame is at its joint, its block's middle half a block further; the root has none.
     outward = jnp.array([1.0, 0.0, 0.0]) * jnp.where(part > 0, parts.half[part, 0], 0.0)
     flip = jnp.where(copies > 0, jnp.array([1.0, -1.0, 1.0]), 1.0)
     joint, turn = joint * flip, axes * flip[:, None] * flip
@@ -181,17 +184,17 @@ def _with_part(
 def _hung(
     boxes: Boxes, part: jax.Array, half: jax.Array, joint: jax.Array, turn: jax.Array
 ) -> Boxes:
-    """A child's block at rest; joint: m from the middle of its parent's."""
+    """Return a child's block at rest. joint: m from the middle of the parent's block."""
     axes = turn @ boxes.axes[part]
     middle = boxes.middle[part] + joint @ boxes.axes[part] + half[0] * axes[0]
     return Boxes(middle, half, axes)
 
 
 def joined(half: jax.Array, place: jax.Array, turn: jax.Array) -> tuple[jax.Array, jax.Array]:
-    """Where [3] m from a block's middle a child is joined, and the child's axes [3, 3] (rows) there.
+    """Return a child's joint [3] in m from a block's middle, and its axes [3, 3] (rows) there.
 
-    Its first axis leaves the face at a right angle, until it is turned: by `turn[0]` about that
-    axis, then about its second and its third.
+    The first axis is normal to the face. The axes are then turned by `turn[0]` about the first
+    axis, then about the second and the third.
     """
     steepest = jnp.argmax(jnp.abs(place))
     sign = jnp.where(place[steepest] < 0, -1.0, 1.0)
@@ -203,7 +206,7 @@ def joined(half: jax.Array, place: jax.Array, turn: jax.Array) -> tuple[jax.Arra
 
 
 def _about(axis: int, angle: jax.Array) -> jax.Array:
-    """Rows: the axes after a turn about one of them."""
+    """Return the axes (rows) after a turn about one of them."""
     sin, cos = jnp.sin(angle), jnp.cos(angle)
     i, j = (axis + 1) % 3, (axis + 2) % 3
     matrix = jnp.eye(3).at[i, i].set(cos).at[j, j].set(cos)

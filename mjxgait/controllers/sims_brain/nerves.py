@@ -1,4 +1,4 @@
-"""The nervous system's genotype: neurons that each node brings along, and some that belong to no part.
+"""Genotype of the nervous system: neurons of each node, and central neurons of no part.
 
 Letters: `N` nodes, `Q` neurons of a node, `M` central ones; 3 inputs each, 3 effectors per node.
 """
@@ -15,31 +15,31 @@ from mjxgait.controllers.sims_brain.reference_body.material import INPUTS, NEURO
 from mjxgait.types import pytree
 
 CONSTANT, WAVE = 0.3, 0.3
-"""Shares of the inputs that are drawn constant, and of the neurons that are drawn as waves. Where all
-are alike, one effector in four hundred is driven by a wave of constant frequency."""
+"""Shares of inputs drawn as constants, and of neurons drawn as waves. With uniform draws a wave of
+constant frequency drives only one effector in 400."""
 
 
 @dataclasses.dataclass(frozen=True)
 class NerveRoom:
-    """How many neurons a node has, and how many are central."""
+    """Numbers of neurons per node, and of central neurons."""
 
     local: int = BrainConfig.local
     central: int = BrainConfig.central
 
     @property
     def codes(self) -> int:
-        """How many kinds of source there are; see `Nerves`."""
+        """Number of source codes; see `Nerves`."""
         return 1 + SENSORS + 3 * self.local + self.central
 
 
 @pytree
 class Nerves:
-    """What each node brings along.
+    """Neurons and effectors of each node.
 
-    kind: [N, Q] places in `NEURONS`; source: [N, Q, 3] and weight: [N, Q, 3] of their inputs.
-    effect_source, effect_weight: [N, 3] what drives each hinge to the parent.
+    kind: [N, Q] indices into `NEURONS`. source, weight: [N, Q, 3] of their inputs.
+    effect_source, effect_weight: [N, 3] drive of each hinge to the parent.
 
-    A source is a number: 0 the constant 1; then the part's own sensors, its own neurons, its
+    A source is a number: 0 for the constant 1; then the part's own sensors, its own neurons, its
     parent's, its first child's, and the central ones.
     """
 
@@ -52,7 +52,7 @@ class Nerves:
 
 @pytree
 class Centre:
-    """The central neurons, [M], as in `Nerves`. They have the root part's sources."""
+    """Central neurons, [M], as in `Nerves`. They have the root part's sources."""
 
     kind: jax.Array
     source: jax.Array
@@ -60,7 +60,7 @@ class Centre:
 
 
 def random_nerves(key: jax.Array, nodes: int, room: NerveRoom) -> Nerves:
-    """Drawn at random: any function, any source; weights are normal."""
+    """Draw random neurons: any function, any source; weights are normal."""
     effects = {"effect_source": (nodes, 3), "effect_weight": (nodes, 3)}
     drawn = numbers(key, _shapes((nodes, room.local)) | effects)
     source = numbered(drawn["effect_source"], room.codes)
@@ -70,12 +70,12 @@ def random_nerves(key: jax.Array, nodes: int, room: NerveRoom) -> Nerves:
 
 
 def random_centre(key: jax.Array, room: NerveRoom) -> Centre:
-    """Drawn at random, as `random_nerves`."""
+    """Draw random central neurons, as `random_nerves` does."""
     return Centre(**_neurons(numbers(key, _shapes((room.central,))), room))
 
 
 def _favoured(uniform: jax.Array, share: float, one: int, count: int) -> jax.Array:
-    """From [0, 1) to whole numbers: in this share of the cases one of them, else any."""
+    """Map [0, 1) to integers: `one` in this share of the cases, else any below `count`."""
     return jnp.where(uniform < share, one, numbered((uniform - share) / (1 - share), count))
 
 

@@ -1,7 +1,7 @@
-"""What each of Sims' neurons makes of its three inputs, all of them at once.
+"""Outputs of Sims' neurons from three inputs each, all neurons at once.
 
-A neuron has one number of memory. Inputs count up to ±`LOUDEST`, values stay
-within ±`MOST`, so that nothing overflows.
+A neuron has one number of memory. Inputs are clipped to ±`LOUDEST`, values to ±`MOST`, so that
+nothing overflows.
 """
 
 import jax
@@ -12,15 +12,15 @@ from mjxgait.physics.lane_major.lanes import sin_cos
 
 MOST, LOUDEST = 10.0, 100.0
 SMALL = 1e-3
-"""What is nearer to zero is not divided by."""
+"""Smallest absolute divisor."""
 SMOOTHING = 5.0
-"""1/s, at which a smoothing neuron follows its input."""
+"""1/s; rate at which a smoothing neuron follows its input."""
 
 
 def fired(
     kind: jax.Array, inputs: jax.Array, memory: jax.Array, step: float
 ) -> tuple[jax.Array, jax.Array]:
-    """Outputs and memories [M] of neurons; inputs: [M, 3], weighted. step: s."""
+    """Return outputs and memories [M] of neurons. inputs: [M, 3], weighted. step: s."""
     a, b, c = (jnp.clip(inputs[:, i], -LOUDEST, LOUDEST) for i in range(3))
     integral, phase = memory + step * a, memory + step * b
     phase = phase - jnp.floor(phase)

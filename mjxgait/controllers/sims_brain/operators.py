@@ -1,7 +1,7 @@
-"""How graphs with nerves vary: mutation, crossover and grafting (Sims 1994, section 5).
+"""Mutation, crossover and grafting of graphs with nerves (Sims 1994, section 5).
 
-Letters: `N` nodes, `C` connections of each. Everything that belongs to a node has `N` in front, so
-nodes move as wholes.
+Letters: `N` nodes, `C` connections of each. Arrays of nodes have `N` as first axis, so nodes move
+as wholes.
 """
 
 import dataclasses
@@ -29,7 +29,7 @@ from mjxgait.types import pytree
 
 @pytree
 class Genotype:
-    """A creature's: its body's graph, its nodes' nerves, and its central neurons."""
+    """Genotype of a creature: the body's graph, the nodes' nerves, and the central neurons."""
 
     graph: Graph
     nerves: Nerves
@@ -38,14 +38,14 @@ class Genotype:
 
 @dataclasses.dataclass(frozen=True)
 class Rates:
-    """How a mutation changes a genotype.
+    """Mutation rates of a genotype.
 
-    value: chance of each number, kind and flag of what grows, divided by how many there are, so
-    that it is how many change on average. sigma: of a number's change, as a share of its range.
-    connection: chance of one more or one less. node: of a new node. strength: from and to which
-    factor each mutation draws one of its own, all magnitudes alike, by which more or less changes;
-    the chances of connections and nodes are never larger than told (Doerr et al. 2017, "Fast genetic
-    algorithms", for why few large changes among many small ones).
+    value: numbers, kinds and flags of connected nodes that change on average; divided by their
+    count, the chance of each. sigma: of a number's change, as a share of its range. connection:
+    chance of one more or one less. node: chance of a new node. strength: range of a factor that
+    each mutation draws, log-uniformly, for these chances; those of connections and nodes never
+    exceed the given ones (Doerr et al. 2017, "Fast genetic algorithms": why few large changes among
+    many small ones).
     """
 
     value: float = BrainConfig.values
@@ -57,7 +57,7 @@ class Rates:
 
 @dataclasses.dataclass(frozen=True)
 class Kin:
-    """What all genotypes of a population share."""
+    """Operators and limits that all genotypes of a population share."""
 
     capacity: Capacity
     room: NerveRoom
@@ -65,7 +65,7 @@ class Kin:
     rates: Rates = Rates()
 
     def create(self, key: jax.Array) -> Genotype:
-        """One drawn at random."""
+        """Draw a random genotype."""
         body, nerves, centre = jax.random.split(key, 3)
         return Genotype(
             random_graph(body, self.capacity, self.ranges),
@@ -74,7 +74,7 @@ class Kin:
         )
 
     def mutate(self, key: jax.Array, genotype: Genotype) -> Genotype:
-        """Values change, connections come and go, an unconnected node is drawn anew."""
+        """Change values, add or remove a connection, and draw an unconnected node anew."""
         value, fresh, connect, node = jax.random.split(key, 4)
         other, strength = self.create(fresh), self._strength(jax.random.fold_in(key, 4))
         often = jnp.minimum(strength, 1.0)
@@ -84,7 +84,7 @@ class Kin:
         return self._moved(value, changed, other, strength)
 
     def cross(self, key: jax.Array, mother: Genotype, father: Genotype) -> Genotype:
-        """The first nodes of one, the others of the other, up to two points of crossing over."""
+        """Return a child with the mother's nodes, and the father's between two crossover points."""
         nodes = self.capacity.nodes
         points = numbered(jax.random.uniform(key, (2,)), nodes + 1)
         low, high = points.min(), points.max()
@@ -92,12 +92,13 @@ class Kin:
         return _chosen((order < low) | (order >= high), mother, father)
 
     def graft(self, key: jax.Array, mother: Genotype, father: Genotype) -> Genotype:
-        """The father's graph, as far as there is room among the mother's unconnected nodes, hung
-        on one of the mother's connections.
+        """Return the mother with the father's graph attached to one of her connections.
+
+        The father's nodes take the mother's unconnected nodes, as far as there is room.
         """
         nodes, connections = mother.graph.target.shape
         free = ~reachable(mother.graph)
-        place = jnp.argsort(~free, stable=True)  # of the father's nodes, the free ones first
+        place = jnp.argsort(~free, stable=True)  # targets of the father's nodes: free ones first
         has_room = jnp.arange(nodes) < free.sum()
         source = jnp.zeros(nodes, int).at[place].set(jnp.arange(nodes))
         graph, nerves = jax.tree.map(lambda leaf: leaf[source], (father.graph, father.nerves))
@@ -116,7 +117,7 @@ class Kin:
         return jax.tree.map(lambda a, b: jnp.where(free.any(), a, b), grafted, mother)
 
     def _strength(self, key: jax.Array) -> jax.Array:
-        """The factor [] of one mutation."""
+        """Draw the factor [] of one mutation."""
         least, most = self.rates.strength
         share: jax.Array = least * (most / least) ** jax.random.uniform(key)
         return share
@@ -124,7 +125,7 @@ class Kin:
     def _moved(
         self, key: jax.Array, genotype: Genotype, other: Genotype, strength: jax.Array
     ) -> Genotype:
-        """Numbers shifted by a normal step, kinds and flags drawn anew, a few of each."""
+        """Shift a few numbers by a normal step, and draw a few kinds and flags anew."""
         alive = reachable(genotype.graph)
         varied = _without_used(genotype)
         leaves, shape = jax.tree.flatten(varied)
@@ -151,7 +152,7 @@ class Kin:
         )
 
     def _bounds(self, shape: jax.tree_util.PyTreeDef) -> list[tuple[float, float]]:
-        """Lowest and highest value of each leaf; of kinds they do not matter."""
+        """Return the lowest and highest value of each leaf; they do not matter for kinds."""
         ranges, names = self.ranges, {"half": self.ranges.half, "swing": self.ranges.swing}
         names |= {"scale": ranges.scale, "turn": (-ranges.turn, ranges.turn), "place": (-1.0, 1.0)}
         placed = jax.tree.unflatten(shape, range(shape.num_leaves))
@@ -162,7 +163,7 @@ class Kin:
 
 
 def reachable(graph: Graph) -> jax.Array:
-    """Whether [N] a node is connected to the first."""
+    """Return whether each node [N] is reachable from the first."""
     nodes = graph.target.shape[0]
     leads = jnp.any(
         (graph.target[:, :, None] == jnp.arange(nodes)) & graph.used[:, :, None], axis=1
@@ -175,7 +176,7 @@ def reachable(graph: Graph) -> jax.Array:
 
 
 def _one_of(chance: jax.Array, allowed: jax.Array) -> tuple[jax.Array, jax.Array]:
-    """A place [N, C] that is allowed, all alike; any where none is."""
+    """Choose an allowed place [N, C], all equally likely; any place if none is allowed."""
     choice = jnp.argmax(jnp.where(allowed, chance, -1.0))
     return choice // chance.shape[1], choice % chance.shape[1]
 
@@ -183,13 +184,13 @@ def _one_of(chance: jax.Array, allowed: jax.Array) -> tuple[jax.Array, jax.Array
 def _with_new_node(
     key: jax.Array, genotype: Genotype, other: Genotype, chance: jax.Array
 ) -> Genotype:
-    """One node that is not connected, drawn anew, and a connection to it."""
+    """Draw an unconnected node anew, and connect it."""
     alive = reachable(genotype.graph)
     nodes, connections = genotype.graph.target.shape
     drawn = numbers(key, {"happens": (), "node": (nodes,), "slot": (nodes, connections)})
     free = jnp.argmax(jnp.where(alive, -1.0, drawn["node"]))
     new = _chosen(jnp.arange(nodes) != free, genotype, other)
-    # What the new node is connected to is itself new.
+    # The new node has no connections of its own yet.
     target = new.graph.target.at[free].set(0)
     used = new.graph.used.at[free].set(False)
     spare = alive[:, None] & ~used
@@ -203,7 +204,7 @@ def _with_new_node(
 
 
 def _reconnected(key: jax.Array, graph: Graph, other: Graph, chance: jax.Array) -> Graph:
-    """One connection more or less, the new one drawn at random between nodes that are connected."""
+    """Add a random connection between connected nodes, or remove one."""
     alive = reachable(graph)
     nodes, connections = graph.target.shape
     shapes = {"happens": (), "adds": (), "slot": (nodes, connections), "target": (nodes,)}
@@ -234,7 +235,7 @@ def _reconnected(key: jax.Array, graph: Graph, other: Graph, chance: jax.Array) 
 def _shifted(
     leaf: jax.Array, new: jax.Array, how: jax.Array, sigma: float, bounds: tuple[float, float]
 ) -> jax.Array:
-    """Numbers moved by a normal step, within their bounds; of anything else the new."""
+    """Shift numbers by a normal step within their bounds; return `new` for other types."""
     if not jnp.issubdtype(leaf.dtype, jnp.floating):
         return new
     low, high = bounds
@@ -242,13 +243,13 @@ def _shifted(
 
 
 def _without_used(genotype: Genotype) -> Genotype:
-    """Which connections are used is changed elsewhere; None is no leaf."""
+    """Remove `used`, which is mutated elsewhere; None is no leaf."""
     graph = dataclasses.replace(genotype.graph, used=None)  # type: ignore[arg-type]
     return dataclasses.replace(genotype, graph=graph)
 
 
 def _chosen(first: jax.Array, one: Genotype, other: Genotype) -> Genotype:
-    """Node by node [N] the one's or the other's; the central neurons are the one's."""
+    """Take nodes [N] from `one` where `first`, else from `other`; central neurons from `one`."""
 
     def pick(a: jax.Array, b: jax.Array) -> jax.Array:
         return jnp.where(first.reshape(-1, *[1] * (a.ndim - 1)), a, b)

@@ -1,4 +1,4 @@
-"""From the parts of a grown body to the numbers that physics reads.
+"""Conversion of a grown body's parts to arrays for the physics.
 
 Letters: `P` parts, `n` links.
 """
@@ -21,14 +21,14 @@ from mjxgait.physics.batched_trees.weights import weighed
 from mjxgait.types import pytree
 
 TURNS_ABOUT = np.array([(*axes, *[2] * (3 - len(axes))) for axes in AXES])
-"""Per kind of joint the part's axes that its hinges turn about; 2 where there is none."""
+"""Hinge axes of each joint type, as indices of the part's axes; 2 if there is no hinge."""
 
 
 @pytree
 class Body:
-    """A phenotype. part: [n] whose part a link is; hinge: [n] which of its hinges.
+    """Phenotype. part: [n] part of a link. hinge: [n] index of its hinge in the part.
 
-    strength: [n] N·m. sign: [n], -1 where an angle is that of a mirror image.
+    strength: [n] N·m. sign: [n], -1 if the angle is that of a mirror image.
     """
 
     parts: Parts
@@ -40,7 +40,7 @@ class Body:
 
 
 def body_of(graph: Graph, capacity: Capacity) -> Body:
-    """The body that a graph grows into."""
+    """Return the body that grows from a graph."""
     parts = grown(graph, capacity)
     kind, counts = graph.joint[parts.node], jnp.asarray(HINGES)
     hinges = jnp.where(jnp.arange(capacity.parts) == 0, 0, counts[kind])
@@ -71,7 +71,7 @@ def body_of(graph: Graph, capacity: Capacity) -> Body:
 
 
 def _frames(kind: jax.Array, hinge: jax.Array) -> jax.Array:
-    """[..., 3, 3] the axes (rows) of a link in its part's frame: z is what it turns about."""
+    """Return the axes (rows) [..., 3, 3] of a link in its part's frame; it turns about z."""
     axis = jnp.asarray(TURNS_ABOUT)[kind, hinge]
     order = jnp.stack([(axis + 1) % 3, (axis + 2) % 3, axis], axis=-1)
     return jnp.eye(3)[order]
@@ -80,7 +80,7 @@ def _frames(kind: jax.Array, hinge: jax.Array) -> jax.Array:
 def _joints(
     parts: Parts, kind: jax.Array, part: jax.Array, hinge: jax.Array, there: jax.Array
 ) -> dict[str, jax.Array]:
-    """Fields of a `Tree`: which link hangs on which, and how."""
+    """Return the `Tree` fields of the links' connections."""
     links = len(part)
     numbers = jnp.arange(links)
     parent = jnp.where(hinge > 0, numbers - 1, parts.last[parts.parent[part]])
@@ -107,7 +107,7 @@ def _joints(
 def _blocks(
     parts: Parts, kind: jax.Array, part: jax.Array, solid: jax.Array
 ) -> dict[str, jax.Array]:
-    """Fields of a `Tree`: what the links weigh and how large they are."""
+    """Return the `Tree` fields of the links' masses and sizes."""
     half = parts.half[part]
     root = (jnp.arange(len(part)) == 0)[:, None]
     last = jnp.maximum(jnp.asarray(HINGES)[kind], 1) - 1
@@ -126,6 +126,6 @@ def _blocks(
 
 
 def _strength(parts: Parts, part: jax.Array) -> jax.Array:
-    """[n] N·m: in proportion to the smaller cross-section at the joint, the child's own."""
+    """Return the strength [n] in N·m, proportional to the child's cross-section at the joint."""
     half = parts.half[part]
     return STRENGTH * 4 * half[:, 1] * half[:, 2]

@@ -1,7 +1,7 @@
-"""The brain of a creature of blocks, neuron by neuron, written from docs/blocks.md.
+"""Reference controller for brains of modular bodies, neuron by neuron, from docs/blocks.md.
 
-Letters: `S` simulations, `J` hinges in the model's order. A neuron is known by its owner, the number
-of a part or `CENTRE`, and which of the owner's it is.
+Letters: `S` simulations, `J` hinges in the model's order. A neuron is identified by its owner (a
+part number or `CENTRE`) and its index there.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -20,7 +20,7 @@ TICKS = 2
 MOST, LOUDEST = 10.0, 100.0
 Neuron = tuple[int, int]
 Values = Any
-"""An array [S, ...] of neurons of a kind."""
+"""Array [S, ...] of neurons of one kind."""
 
 
 def _following(a: Values, memory: Values, dt: float) -> Values:
@@ -65,7 +65,7 @@ FUNCTIONS: Mapping[str, Callable[..., Values]] = {
     "oscillate-wave": lambda a, b, c, m, dt: np.sin(2 * np.pi * (_phase(b, m, dt) + a)),
     "oscillate-saw": lambda a, b, c, m, dt: 2 * np.mod(_phase(b, m, dt) + a, 1.0) - 1,
 }
-"""Of three inputs, the memory and the time of a tick in s."""
+"""Outputs from three inputs, the memory and the time of a tick in s."""
 KEPT: Mapping[str, Callable[..., Values]] = {
     "integrate": FUNCTIONS["integrate"],
     "differentiate": lambda a, b, c, m, dt: a,
@@ -74,11 +74,11 @@ KEPT: Mapping[str, Callable[..., Values]] = {
     "oscillate-wave": lambda a, b, c, m, dt: _phase(b, m, dt),
     "oscillate-saw": lambda a, b, c, m, dt: _phase(b, m, dt),
 }
-"""What a neuron remembers of a tick; the others remember nothing."""
+"""Memory after a tick; all other neurons have no memory."""
 
 
 def fire(kind: str, inputs: Sequence[Values], memory: Values, dt: float) -> tuple[Values, Values]:
-    """Output and memory of a neuron. dt: s of a tick."""
+    """Return a neuron's output and memory. dt: s of a tick."""
     a, b, c = (np.clip(x, -LOUDEST, LOUDEST) for x in inputs)
     kept = KEPT[kind](a, b, c, memory, dt) if kind in KEPT else memory
     output = FUNCTIONS[kind](a, b, c, memory, dt)
@@ -88,11 +88,10 @@ def fire(kind: str, inputs: Sequence[Values], memory: Values, dt: float) -> tupl
 class BrainTwin:
     """See `Twin`.
 
-    genome: its arrays by name. parts: grown from it. hinges: of each joint of the model, its part
-    and which of the part's it is. step: s of the simulation. every: of them from one command to the
-    next.
-    A wire leads from a column of what is known to a neuron or to a hinge: nothing, the constant 1,
-    the angles of all hinges, contact and light of all parts, the values of all neurons.
+    genome: its arrays by name. parts: grown from it. hinges: part and hinge index of each joint of
+    the model. step: s of the simulation. every: steps per command.
+    A wire leads from a column to a neuron or a hinge. The columns: nothing, the constant 1, the
+    angles of all hinges, contact and light of all parts, the values of all neurons.
     """
 
     command: ClassVar[Command] = "torque"
@@ -129,7 +128,7 @@ class BrainTwin:
     def init(self, count: int) -> Memory:
         """See `Twin`."""
         shape = (count, len(self.place))
-        # Two arrays: whoever keeps them writes into each.
+        # Two arrays, since callers write into each.
         return {"values": np.zeros(shape), "memory": np.zeros(shape)}
 
     def act(self, memory: Memory, senses: Mapping[str, np.ndarray]) -> tuple[np.ndarray, Memory]:
@@ -152,7 +151,7 @@ class BrainTwin:
         return np.full(len(memory["values"]), np.nan)
 
     def _sensed(self, senses: Mapping[str, np.ndarray]) -> np.ndarray:
-        """The columns before the neurons'. Where there is no light, nothing is seen."""
+        """Return the columns before the neurons'. Without a light, its columns are zero."""
         count = len(senses["joint_pos"])
         dark = np.zeros((count, len(self.parts), 3))
         light = senses.get("light", dark).reshape(count, -1)
@@ -166,13 +165,13 @@ class BrainTwin:
         return self.genome[f"nerves.{name}"][self.parts[owner].node][which]
 
     def _wires(self, neuron: Neuron) -> list[tuple[int, float]]:
-        """Column and weight of a neuron's inputs; the central ones have the root's sources."""
+        """Return column and weight of a neuron's inputs; central ones have the root's sources."""
         sources, weights = self._gene("source", neuron), self._gene("weight", neuron)
         found = [self._source(max(neuron[0], 0), int(code)) for code in sources]
         return [(column, sign * w) for (column, sign), w in zip(found, weights, strict=True)]
 
     def _source(self, part: int, code: int) -> tuple[int, float]:
-        """The column that a part finds behind a source's number, and its sign."""
+        """Return the column and sign of a part's source code."""
         if code == 0:
             return 1, 1.0
         if code <= SENSORS:
@@ -185,7 +184,10 @@ class BrainTwin:
         return (0, 1.0) if owner is None else (self.place[owner, code % self.local], 1.0)
 
     def _sensor(self, part: int, sensor: int) -> tuple[int, float]:
-        """Three hinges, contact, the light along three axes; seen in a mirror by a mirror image."""
+        """Return column and sign of a sensor: three hinges, contact, the light along three axes.
+
+        A mirror image observes mirrored values.
+        """
         own, joints, count = self.parts[part], len(self.hinges), len(self.parts)
         if sensor < 3:
             if (part, sensor) not in self.hinges:
@@ -197,7 +199,7 @@ class BrainTwin:
         return 2 + joints + count + 3 * part + sensor - 4, flip
 
     def _pull(self, part: int, hinge: int) -> tuple[int, float, float]:
-        """Column and weight of what drives a hinge, and N·m of it at the most."""
+        """Return column and weight of a hinge's drive, and its largest torque in N·m (signed)."""
         own = self.parts[part]
         code = int(self.genome["nerves.effect_source"][own.node, hinge])
         column, sign = self._source(part, code)
@@ -206,12 +208,12 @@ class BrainTwin:
 
 
 def _sign(part: Part, hinge: int) -> float:
-    """-1 where a mirror image turns the other way: about all its axes but the one it is mirrored along."""
+    """Return -1 for hinges of a mirror image, except about the axis of mirroring; else 1."""
     return -1.0 if part.mirrored and part.hinges[hinge] != 1 else 1.0
 
 
 def brain_twin(creature: Creature, champion: Champion, step: float) -> BrainTwin:
-    """Return the brain of a champion; its creature has grown and calls its hinges `part3_0`."""
+    """Return the brain of a champion; its grown creature names its hinges like `part3_0`."""
     parts = grow(champion.genome, champion.settings.parts, champion.settings.links)
     names = [name.removeprefix("part").split("_") for name in creature.joints.names]
     hinges = [(int(part), int(hinge)) for part, hinge in names]

@@ -1,4 +1,4 @@
-"""What there is to tell of genomes that grow bodies."""
+"""Reports on genomes that grow bodies."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -14,14 +14,14 @@ COLUMNS = ("part", "node", "on part", "joint", "size (cm)", "swing (deg)", "stre
 
 
 class GraphView:
-    """The parts that grow; see `GenomeView`."""
+    """Grown parts; see `GenomeView`."""
 
     def facts(self, snapshot: Snapshot, i: int) -> dict[str, Any]:
         """See `GenomeView`. size: m. swing: deg to either side. strength: N·m."""
         return {"parts": [_part(part) for part in _grown(snapshot, i)]}
 
     def spread(self, snapshot: Snapshot) -> dict[str, Any]:
-        """See `GenomeView`: how many parts there are, over the population."""
+        """See `GenomeView`: the number of parts, over the population."""
         counts = [len(_grown(snapshot, i)) for i in range(len(snapshot.genomes["graph.half"]))]
         return {"parts": {"mean": float(np.mean(counts)), "most": max(counts)}}
 

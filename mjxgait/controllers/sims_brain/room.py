@@ -1,4 +1,4 @@
-"""Whether there is room for a block among others."""
+"""Overlap of a block with others, at rest."""
 
 import jax
 import jax.numpy as jnp
@@ -8,7 +8,7 @@ from mjxgait.types import pytree
 
 @pytree
 class Boxes:
-    """Blocks at rest, in the root's frame, [..., 3] each. middle, half: m. axes: [..., 3, 3] rows."""
+    """Blocks at rest in the root's frame. middle, half: [..., 3] m. axes: [..., 3, 3] rows."""
 
     middle: jax.Array
     half: jax.Array
@@ -16,10 +16,10 @@ class Boxes:
 
 
 def inside(one: Boxes, others: Boxes) -> jax.Array:
-    """How deep [P] one block and each of the others are in each other, of the smaller one's size.
+    """Return the overlap depth [P] of one block with each other, over the smaller one's size.
 
-    Negative where one of their six normals separates them (`physics.trees.overlap`); a size is the
-    cube root of a volume.
+    Negative if one of their six normals separates them (`physics.batched_trees.overlap`). A size is
+    the cube root of a volume.
     """
     apart = others.middle - one.middle
     reach = jnp.abs(others.axes @ one.axes.T)  # [P, other's axis, own axis]
@@ -31,5 +31,5 @@ def inside(one: Boxes, others: Boxes) -> jax.Array:
 
 
 def size(half: jax.Array) -> jax.Array:
-    """[...] m, the cube root of the volume of blocks with half sizes [..., 3]."""
+    """Return the cube root [...] in m of the volume of blocks with half sizes [..., 3]."""
     return 2 * jnp.cbrt(jnp.prod(half, axis=-1))

@@ -1,4 +1,4 @@
-"""Genomes of bodies and brains that grow, as their file has them, and the body that one grows into."""
+"""Serializer for genomes of growing bodies and brains; it also builds the grown body."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -22,7 +22,7 @@ class GraphCodec:
     def settled(
         self, genome: Mapping[str, np.ndarray], creature: Creature
     ) -> dict[str, np.ndarray]:
-        """See `Codec`: numbers as a file has them, so that the same body grows from it."""
+        """See `Codec`: numbers as stored in a file, so that the same body grows from it."""
         return {
             name: array.astype(float) if np.issubdtype(array.dtype, np.floating) else array
             for name, array in genome.items()
@@ -63,7 +63,7 @@ class GraphCodec:
         task: str,
         creature: Creature,
     ) -> Creature:
-        """See `Codec`: what grows from the genome, in the water or on the ground of its task."""
+        """See `Codec`: the grown body, in the water or on the ground of its task."""
         wet = in_water(task)
         files = body_files(
             grow(genome, settings.parts, settings.links),

@@ -1,4 +1,4 @@
-"""A brain's control step: what is sensed goes in, torques come out.
+"""Control step of a brain, from observations to torques.
 
 Letters: `n` links, `K` neurons.
 """
@@ -11,12 +11,12 @@ from mjxgait.controllers.sims_brain.wiring import Brain
 from mjxgait.types import pytree
 
 TICKS = 2
-"""Steps of the brain for one command (Sims 1994, section 3.2)."""
+"""Brain steps per command (Sims 1994, section 3.2)."""
 
 
 @pytree
 class Mind:
-    """What a brain keeps: the neurons' values and memories, [K] each."""
+    """Memory of a brain: the neurons' values and memories, [K] each."""
 
     values: jax.Array
     memory: jax.Array
@@ -24,7 +24,7 @@ class Mind:
 
 @pytree
 class Perceived:
-    """angles: [n] rad. contact: [n] 0 or 1. light: [n, 3], its direction in each block's own axes."""
+    """Observations. angles: [n] rad. contact: [n] 0 or 1. light: [n, 3] direction in block axes."""
 
     angles: jax.Array
     contact: jax.Array
@@ -32,15 +32,15 @@ class Perceived:
 
 
 def blank(neurons: int) -> Mind:
-    """Before the first step."""
+    """Return the memory before the first step."""
     none = jnp.zeros(neurons)
     return Mind(none, none)
 
 
 def thought(brain: Brain, mind: Mind, perceived: Perceived, step: float) -> tuple[jax.Array, Mind]:
-    """Torques [n] N·m of the hinges, and what is kept. step: s from one command to the next.
+    """Return the torques [n] in N·m of the hinges, and the next memory. step: s per command.
 
-    All neurons fire at once, on the values of the tick before.
+    All neurons fire at once, on the values of the previous tick.
     """
     mirrored = jnp.stack([jnp.ones_like(brain.image), brain.image], axis=1)[:, jnp.array([0, 1, 0])]
     known = jnp.concatenate(

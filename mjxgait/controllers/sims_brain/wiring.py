@@ -1,8 +1,8 @@
-"""From the nerves' genotype to the wires of one grown body.
+"""Wiring of one grown body from the genotype of its nerves.
 
 Letters: `P` parts, `n` links, `Q` and `M` neurons as in `nerves`; `V` values: nothing (0), the
 constant 1, the angles, contacts and light of all links, and all neurons, part by part, the central
-ones last. A part touches and sees with the link that carries its block.
+ones last. A part's contact and light are those of the link that carries its block.
 """
 
 import jax
@@ -18,11 +18,11 @@ NOTHING, ONE = 0, 1
 
 @pytree
 class Brain:
-    """A body's own. kind: [P Q + M]; source: [P Q + M, 3] places among the values, weight the same.
+    """Brain of a body. kind: [P Q + M]. source: [P Q + M, 3] indices of values; weight: likewise.
 
-    drive: [n] which value pulls a link's hinge, gain: [n] times what, pull: [n] N·m at the most that
-    it can.
-    sign: [n] of angles, as the genes mean them; image: [n], -1 in a mirror image.
+    drive: [n] index of the value that drives a link's hinge. gain: [n] its factor. pull: [n] N·m,
+    largest torque (signed). sign: [n] factor from angles to those of the genes. image: [n], -1 in a
+    mirror image.
     """
 
     kind: jax.Array
@@ -36,17 +36,17 @@ class Brain:
 
 
 def first_neuron(links: int) -> int:
-    """The place of the first neuron among the values."""
+    """Return the index of the first neuron among the values."""
     return 2 + links + links + 3 * links
 
 
 def value_count(parts: int, links: int, room: NerveRoom) -> int:
-    """V."""
+    """Return V."""
     return first_neuron(links) + parts * room.local + room.central
 
 
 def wired(nerves: Nerves, centre: Centre, body: Body, room: NerveRoom) -> Brain:
-    """The wires of a body. What leads to a part that there is not, carries nothing."""
+    """Return the wiring of a body. Wires from missing parts carry nothing."""
     parts, exists = body.parts, body.parts.exists
     count, node = len(exists), parts.node
     places = _places(body, room)
@@ -74,7 +74,7 @@ def wired(nerves: Nerves, centre: Centre, body: Body, room: NerveRoom) -> Brain:
 
 
 def _places(body: Body, room: NerveRoom) -> jax.Array:
-    """[P, codes] where among the values each part finds each source."""
+    """Return the index [P, codes] among the values of each part's sources."""
     parts, links = body.parts, len(body.part)
     count, local = len(parts.exists), room.local
     every = jnp.arange(count)[:, None]

@@ -1,5 +1,5 @@
-"""Creatures of blocks as people and the examiner know them: grown plainly, without JAX.
+"""Reference growth of modular bodies, without JAX.
 
-What evolution grows in arrays (`mjxgait.controllers.sims_brain`) is grown here a second time, from the genome's
-arrays by name; the tests hold the two to each other.
+This is a second implementation of the growth in `mjxgait.controllers.sims_brain`, from the genome's
+arrays by name; tests compare the two.
 """

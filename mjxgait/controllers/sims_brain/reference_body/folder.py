@@ -1,4 +1,4 @@
-"""A grown body as a creature's two files, which open like any other creature's."""
+"""Export of a grown body to the two files of a creature, which open like any other creature's."""
 
 from collections.abc import Sequence
 
@@ -11,7 +11,7 @@ from mjxgait.creature.geometry import lowest
 from mjxgait.errors import UserError
 
 SOFT = 0.01
-"""1/rad: kp of a hinge over its strength. A brain sends torques, so nothing follows a pose."""
+"""1/rad: kp of a hinge over its strength. A brain sends torques, so nothing tracks a pose."""
 
 
 def body_files(
@@ -22,10 +22,10 @@ def body_files(
     friction: float | None,
     around: str,
 ) -> dict[str, str]:
-    """`creature.xml` and `creature.toml`. around: what it lives in, for the description.
+    """Return `creature.xml` and `creature.toml`. around: its medium, for the description.
 
     Raises:
-      UserError: nothing of it moves.
+      UserError: the body has no hinge.
     """
     joints = [
         (f"part{number}_{hinge}", part.strength)
@@ -57,7 +57,7 @@ def body_files(
 
 
 def _resting_height(xml: str) -> float:
-    """m of the root's middle, with the lowest corner on the ground and all angles at 0."""
+    """Return the root's height in m, with the lowest corner on the ground and all angles at 0."""
     model = mujoco.MjModel.from_xml_string(xml)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)

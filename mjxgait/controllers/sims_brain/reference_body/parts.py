@@ -1,6 +1,6 @@
-"""Growth as a list that grows while it is read.
+"""Reference growth of a body, as a list that grows while it is read.
 
-A genome is its arrays by name, as checkpoints and champions have them: `graph.half`, … (see
+A genome is its arrays by name, as checkpoints and champions store them: `graph.half`, … (see
 `mjxgait.controllers.sims_brain.genotype.Graph`).
 """
 
@@ -22,18 +22,18 @@ from mjxgait.controllers.sims_brain.reference_body.room import Box, inside
 
 MIRROR = np.diag([1.0, -1.0, 1.0])
 IMAGES = ((False,), (True,), (False, True))
-"""Which copies grow: as it is, mirrored, both."""
+"""Copies that grow (mirrored or not), by the gene `mirror`."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Part:
-    """A block and its joint.
+    """Block with its joint.
 
-    node: of the graph. parent: number of the part it is joined to, -1 for the root. mirrored:
-    whether it is the mirror image of what its node describes. half: [3] m. place: [3] m of the joint
-    in the parent's frame. axes: [3, 3] the part's own (columns) there, before the joint turns.
-    kind: of the joint. swing: [hinges] rad to either side. branch: how often each node is on the way
-    from the root to here. scale: of its node's sizes. box: its block at rest.
+    node: of the graph. parent: number of the parent part, -1 for the root. mirrored: whether it is
+    the mirror image of its node. half: [3] m. place: [3] m of the joint in the parent's frame.
+    axes: [3, 3] the part's own (columns) there, before the joint turns. kind: of the joint.
+    swing: [hinges] rad to either side. branch: occurrences of each node from the root to here.
+    scale: of its node's sizes. box: its block at rest.
     """
 
     node: int
@@ -50,27 +50,27 @@ class Part:
 
     @property
     def hinges(self) -> tuple[int, ...]:
-        """The part's own axes that its hinges turn about."""
+        """Hinge axes, as indices of the part's own axes."""
         return () if self.parent < 0 else AXES[self.kind]
 
     @property
     def joint(self) -> str:
-        """What joins it to its parent."""
+        """Type of the joint to the parent."""
         return "none" if self.parent < 0 else JOINTS[self.kind]
 
     @property
     def middle(self) -> np.ndarray:
-        """[3] m, of its block, from where it hangs; the root hangs nowhere."""
+        """Middle [3] in m of its block, from its joint; zero for the root."""
         return np.array([0.0 if self.parent < 0 else self.half[0], 0.0, 0.0])
 
     @property
     def strength(self) -> float:
-        """N·m, of each of its hinges."""
+        """Strength of each hinge in N·m."""
         return float(STRENGTH * 4 * self.half[1] * self.half[2])
 
 
 def grow(genome: Mapping[str, np.ndarray], most_parts: int, most_links: int) -> list[Part]:
-    """The parts of a genome, parents first; what has no room does not grow."""
+    """Return the parts of a genome, parents first; parts without room do not grow."""
     graph = {n.removeprefix("graph."): a for n, a in genome.items() if n.startswith("graph.")}
     parts = [_root(graph)]
     links = 1
@@ -89,7 +89,7 @@ def grow(genome: Mapping[str, np.ndarray], most_parts: int, most_links: int) -> 
 
 
 def _crowded(parts: Sequence[Part], children: Sequence[Part], parent: int) -> bool:
-    """Whether one of the children would stand in another block than its parent's."""
+    """Return whether a child would overlap a block other than its parent's."""
     boxes = [part.box for number, part in enumerate(parts) if number != parent]
     new = [child.box for child in children]
     pairs = [*itertools.product(boxes, new), *itertools.combinations(new, 2)]
@@ -97,7 +97,7 @@ def _crowded(parts: Sequence[Part], children: Sequence[Part], parent: int) -> bo
 
 
 def _growing(graph: Mapping[str, np.ndarray], part: Part) -> Iterator[tuple[int, int]]:
-    """The connections that a part's recursion allows, each as (node, which of its own)."""
+    """Yield the connections that a part's recursion allows, as (node, index of the connection)."""
     for own in np.flatnonzero(graph["used"][part.node]):
         place = part.node, int(own)
         target = int(graph["target"][place])
@@ -152,10 +152,10 @@ def _child(
 
 
 def joined(half: np.ndarray, place: np.ndarray, turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where [3] m from a block's middle a child is joined, and the child's axes [3, 3] (columns).
+    """Return a child's joint [3] in m from a block's middle, and the child's axes [3, 3] (columns).
 
-    A ray from the block's middle along `place`, in half sizes, leaves it there. The first axis
-    leaves the face at a right angle, until it is turned about itself, the second and the third.
+    A ray from the block's middle along `place`, in half sizes, leaves the block at the joint. The
+    first axis is normal to the face; the axes are then turned about the first, second and third.
     """
     face = int(np.argmax(np.abs(place)))
     outward = (-1.0 if place[face] < 0 else 1.0) * np.eye(3)[face]
@@ -166,7 +166,7 @@ def joined(half: np.ndarray, place: np.ndarray, turn: np.ndarray) -> tuple[np.nd
 
 
 def _about(axis: int, angle: float) -> np.ndarray:
-    """A rotation matrix, by Rodrigues' formula."""
+    """Return a rotation matrix, by Rodrigues' formula."""
     x, y, z = np.eye(3)[axis]
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross

@@ -1,4 +1,4 @@
-"""A grown body as a MuJoCo model with true blocks and hinges, which opens in any MuJoCo tool."""
+"""Export of a grown body to a MuJoCo model with true blocks and hinges, for any MuJoCo tool."""
 
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Sequence
@@ -15,7 +15,7 @@ from mjxgait.controllers.sims_brain.reference_body.material import (
 from mjxgait.controllers.sims_brain.reference_body.parts import Part
 
 SPIN, ROLL = 0.005, 0.0001
-"""MuJoCo's own torsional and rolling friction, which contacts of three dimensions do not use."""
+"""MuJoCo's default torsional and rolling friction, unused by contacts of three dimensions."""
 
 
 def body_xml(
@@ -26,10 +26,10 @@ def body_xml(
     height: float = 1.0,
     keyframe: str = "",
 ) -> str:
-    """The model's text. Parts are called `part0` (the root), … and their hinges `part1_0`, ….
+    """Return the model's text. Parts are named `part0` (the root), …, their hinges `part1_0`, ….
 
-    step: s. gravity: m/s². friction: of a floor at z = 0; None for one that nothing touches. height:
-    m, of the root's middle. keyframe: name of one with all angles at 0.
+    step: s. gravity: m/s². friction: of a floor at z = 0; None for a floor without contacts.
+    height: m, of the root's middle. keyframe: name of one with all angles at 0.
     """
     root = ET.Element("mujoco", model="blocks")
     ET.SubElement(root, "compiler", angle="radian")
