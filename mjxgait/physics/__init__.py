@@ -16,7 +16,7 @@ from mjxgait.physics.layout import OtherTopology, sense_layout
 from mjxgait.types import ModelPlant
 
 SLOWER = "15 to 30"
-"""Factor by which a creature-step takes longer in plain MJX (docs/performance.md)."""
+"""Factor by which plain MJX is slower per creature-step (docs/performance.md)."""
 
 
 def make_plant(

@@ -27,7 +27,7 @@ class OtherTopology(Exception):
 
 
 def sense_layout(creature: Creature) -> SenseLayout:
-    """Return the layout of a creature."""
+    """Layout of a creature."""
     return SenseLayout(
         creature.trunk,
         creature.joints.qpos_adr,

@@ -39,7 +39,7 @@ class MjxPlant:
     """Plain MJX behind the `Plant` protocol.
 
     Attributes:
-      model, data: of MJX; data is a template, and each lane replaces its state.
+      model, data: of MJX; each lane replaces the state of data.
       layout: the parts of the model that are sensed.
       parameters: of the body that all lanes share.
       crossings: the pairs of parts to check for overlap; None checks none.
@@ -112,7 +112,7 @@ class MjxPlant:
         return deepest(crossings.first, crossings.second, bars, middle, half)
 
     def _numbers(self, state: BodyState) -> ModelNumbers:
-        """Return the numbers of this lane's body: the lane's own, or else the plant's."""
+        """Numbers of this lane's body: its own, or the plant's."""
         return self.parameters if state.parameters is None else state.parameters
 
     def _model(self, state: BodyState) -> mjx.Model:
@@ -147,7 +147,7 @@ class MjxPlant:
         return sensed, data
 
     def _lows(self, state: BodyState, data: mjx.Data) -> jax.Array:
-        """Compute the heights [G] m of the watched geoms above the ground."""
+        """Heights [G] m of the watched geoms above the ground."""
         numbers, watched = self._numbers(state), self.layout.watched
         pos, rot = data.geom_xpos[watched], data.geom_xmat[watched]
         if state.ground is None:
@@ -197,7 +197,7 @@ class MjxPlant:
 
 
 def _lowest(numbers: ModelNumbers, pos: jax.Array, rot: jax.Array) -> jax.Array:
-    """Compute the heights [G] m of geoms at these places from their support functions."""
+    """Heights [G] m of geoms at these places, by their support functions."""
     down = rot[:, 2, :]
     return (
         pos[:, 2]
@@ -208,7 +208,7 @@ def _lowest(numbers: ModelNumbers, pos: jax.Array, rot: jax.Array) -> jax.Array:
 
 
 def _cores(numbers: ModelNumbers, pos: jax.Array, rot: jax.Array) -> jax.Array:
-    """Compute the lowest points [G, 3] m of geoms at these places without their radii."""
+    """Lowest points [G, 3] m of geoms at these places without their radii."""
     down = rot[:, 2, :]
     stretched = down * numbers.ellipsoid
     reach = jnp.maximum(jnp.linalg.norm(stretched, axis=1, keepdims=True), 1e-6)
@@ -219,7 +219,7 @@ def _cores(numbers: ModelNumbers, pos: jax.Array, rot: jax.Array) -> jax.Array:
 def _sense_difference(
     own: SenseLayout, other: SenseLayout, pairs: Crossings | None, others: Crossings | None
 ) -> str:
-    """Describe the first difference in what is sensed or checked; empty if there is none."""
+    """Describe the first difference in what is sensed or watched for overlap; empty if none."""
     for field in dataclasses.fields(SenseLayout):
         if not np.array_equal(getattr(own, field.name), getattr(other, field.name)):
             return f"other parts of it are sensed ({field.name})"
@@ -239,7 +239,7 @@ def mjx_plant(
     """Make a plant for any model that MJX accepts.
 
     Raises:
-      NotImplementedError: MJX does not support something; the message is MJX's own.
+      NotImplementedError: MJX does not support the model; the message is MJX's.
     """
     device_model = mjx.put_model(model, impl="jax")
     data = mjx.make_data(device_model, impl="jax")

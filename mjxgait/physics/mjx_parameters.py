@@ -36,7 +36,7 @@ NUMBERS = (
     "geom_solimp",
     *(f"{part}_{name}" for part, names in PARTS.items() for name in names),
 )
-"""Fields of a model that may differ between two models that share a program; no others may."""
+"""Fields of a model that may differ between two models of one program; no others may."""
 OPTIONS = ("gravity", "impratio")
 """Fields of a model's options that may differ likewise."""
 UNSEEN = ("cam_", "light_", "mat_", "tex_", "name", "site_", "key_", "text_", "tuple_", "numeric_")
@@ -76,7 +76,7 @@ def read_numbers(
     layout: SenseLayout,
     crossings: Crossings | None,
 ) -> ModelNumbers:
-    """Read the numbers of a model; device_model: the same model on the device."""
+    """Read the numbers of a model; device_model: the same on the device."""
     extents = [
         geometry.support_extents(model.geom_type[g], model.geom_size[g]) for g in layout.watched
     ]
@@ -184,7 +184,7 @@ def resized(
 
 
 def _below(model: mjx.Model) -> np.ndarray:
-    """Return [nbody, nbody]: 1 where the second body is the first or a descendant of it."""
+    """[nbody, nbody] matrix, 1 where the second body is the first or its descendant."""
     below = np.eye(model.nbody, dtype=np.float32)
     for b in range(model.nbody - 1, 0, -1):
         below[model.body_parentid[b]] += below[b]

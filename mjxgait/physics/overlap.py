@@ -1,4 +1,4 @@
-"""Overlap depth of a creature's parts: what both plants compute from `Crossings`."""
+"""Overlap depth of a creature's parts: what both plants compute of `Crossings`."""
 
 import dataclasses
 
@@ -58,15 +58,15 @@ def deepest(
     centre: jax.Array,
     half: jax.Array,
 ) -> jax.Array:
-    """Compute the largest depth [...] m beyond that when standing; negative if all are apart.
+    """Largest depth [...] m beyond the standing depth; negative if all are apart.
 
     Args:
       first, second: [Q] the bars of each pair.
-      bars: with as many axes as the following; an axis is 1 long where the numbers are shared.
+      bars: with as many axes as the following, 1 long where numbers are shared.
       centre, half: [S, 3, ...] m; each bar's middle, and from there to one end, in any one frame.
     """
     depth = _pair_depths(whole(first), whole(second), bars, centre, half)
-    # Fold the halves onto each other; a maximum over this axis takes three times as long on CPU.
+    # Halves are folded; a maximum over this axis takes three times as long on CPU.
     while depth.shape[0] > 1:
         rows = (depth.shape[0] + 1) // 2
         depth = jnp.maximum(depth[:rows], depth[-rows:])
@@ -76,7 +76,7 @@ def deepest(
 def _pair_depths(
     first: Number, second: Number, bars: Bars, centre: jax.Array, half: jax.Array
 ) -> jax.Array:
-    """Compute the depth [Q, ...] of each pair."""
+    """Depth [Q, ...] of each pair."""
 
     def parts(rows: jax.Array) -> tuple[jax.Array, jax.Array, jax.Array]:
         return rows[:, 0], rows[:, 1], rows[:, 2]
@@ -93,12 +93,12 @@ def _pair_depths(
 
 
 def whole(indices: ArrayLike) -> Number:
-    """Return indices as integers; those that are inputs of the program arrive as floats."""
+    """Convert indices to integers; as inputs of the program they are floats."""
     if isinstance(indices, jax.Array):
         return indices.astype(jnp.int32)
     return np.asarray(indices, int)
 
 
 def single(numbers: Number) -> Number:
-    """Return numbers with constants as float32, so that no result is widened."""
+    """Convert constants to float32, so that nothing widens."""
     return np.asarray(numbers, np.float32) if isinstance(numbers, np.ndarray) else numbers

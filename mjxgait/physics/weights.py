@@ -4,8 +4,8 @@ MuJoCo scales the softness of contacts and limits with them (`body_invweight0`, 
 computation docs, "Parameters"). They are those of the body at rest, so they change with its masses
 and lengths.
 
-One case is left out: for a body that slides on the world, turns about nothing and carries nothing,
-MuJoCo takes its inverse mass instead of the mean. No part of a creature is such a body.
+Left out: for a body that slides on the world, turns about nothing and carries nothing, MuJoCo
+takes its inverse mass instead of the mean. No part of a creature is one.
 """
 
 from collections.abc import Sequence

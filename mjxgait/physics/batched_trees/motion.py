@@ -23,7 +23,7 @@ from mjxgait.physics.lane_major.lanes import (
 
 
 def posture(tree: Tree, qpos: jax.Array, pin: Pin) -> list[Pose]:
-    """Compute the poses of all links from qpos [7 + n - 1, L] (forward kinematics)."""
+    """Forward kinematics of qpos [7 + n - 1, L]: pose of every link."""
     columns = [jnp.stack(column) for column in rotation(unit_quaternion(qpos[3:7]))]
     none = jnp.zeros_like(columns[0])
     known = [pin(jnp.concatenate([*columns, none]))]
@@ -40,7 +40,7 @@ def posture(tree: Tree, qpos: jax.Array, pin: Pin) -> list[Pose]:
 
 
 def motions(tree: Tree, poses: Sequence[Pose], pin: Pin) -> Motion:
-    """Compute the motion that each hinge at unit velocity gives its link and all below.
+    """Motion that each hinge at unit velocity gives its link and all below.
 
     Components [n, L]; zero for the root and for links that do not move.
     """
@@ -56,13 +56,13 @@ def frames(poses: Sequence[Pose]) -> list[jax.Array]:
 
 
 def centres(tree: Tree, poses: Sequence[Pose]) -> Vector:
-    """Compute the centres of all blocks, components [n, L] m from the origin."""
+    """Centres of all blocks, components [n, L] m from the origin."""
     place = jnp.stack([pose.pos for pose in poses])
     return plus(axes(place), turn_each(frames(poses), tree.com))
 
 
 def lows(tree: Tree, poses: Sequence[Pose]) -> jax.Array:
-    """Compute the height [n, L] m of each block's lowest point above z = 0; `FAR` if missing."""
+    """Height [n, L] m of each block's lowest point above z = 0; `FAR` of missing blocks."""
     rot = frames(poses)
     heights = [turn_each(rot, tree.axes[:, k])[2] for k in range(3)]
     reach = total([tree.half[:, k] * jnp.abs(height) for k, height in enumerate(heights)])
@@ -71,7 +71,7 @@ def lows(tree: Tree, poses: Sequence[Pose]) -> jax.Array:
 
 
 def root_turns(poses: Sequence[Pose]) -> jax.Array:
-    """Return the axes [3, 3, L] about which the root turns."""
+    """Axes [3, 3, L] about which the root turns."""
     return jnp.stack(poses[0].rot)
 
 
@@ -100,6 +100,6 @@ def up(tree: Tree, own: jax.Array, pin: Pin) -> jax.Array:
 
 
 def root_motion(turns: jax.Array, vector: Sequence[jax.Array]) -> jax.Array:
-    """Compute the root's motion [6, L], angular first, from the first six of [nv] velocities."""
+    """Root's motion [6, L], angular first, from the first six of [nv] velocities."""
     spin = total([turns[j] * vector[3 + j] for j in range(3)])
     return jnp.concatenate([spin, jnp.stack(vector[:3])])

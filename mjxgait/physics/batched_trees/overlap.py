@@ -15,7 +15,7 @@ from mjxgait.physics.lane_major.lanes import dot, turn_each
 
 
 def deepest(tree: Tree, poses: Sequence[Pose]) -> jax.Array:
-    """Compute the largest depth [L], as a share of the smaller block's size; negative if all apart.
+    """Largest depth [L] as a share of the smaller block's size; negative if all are apart.
 
     The size of a block is the cube root of its volume.
 
@@ -39,7 +39,7 @@ def deepest(tree: Tree, poses: Sequence[Pose]) -> jax.Array:
 
 
 def sizes(tree: Tree) -> jax.Array:
-    """Compute the cube root [n, L] m of each block's volume."""
+    """Cube root [n, L] m of each block's volume."""
     return 2 * jnp.cbrt(tree.half[:, 0] * tree.half[:, 1] * tree.half[:, 2])
 
 

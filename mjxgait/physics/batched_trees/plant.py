@@ -153,7 +153,7 @@ class TreePlant:
 def _sensed(
     tree: Tree, state: BodyState, poses: Sequence[Pose], moving: jax.Array, bias: jax.Array
 ) -> Sensed:
-    """Return what is sensed: the root as trunk, and every block; missing ones are far up."""
+    """Sense the root as trunk and every block as watched; missing blocks are far up."""
     centre = [c + state.qpos[i] for i, c in enumerate(centres(tree, poses))]
     weight, low = tree.mass / jnp.sum(tree.mass, axis=0), lows(tree, poses)
     return Sensed(

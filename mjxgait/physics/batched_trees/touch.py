@@ -93,21 +93,21 @@ class BlockFooting:
     pin: Pin
 
     def along(self, vector: Sequence[jax.Array]) -> Directions:
-        """Compute J x for x [nv] of [L]."""
+        """J x for x [nv] of [L]."""
         moving = velocities(self.tree, self.turns, self.freedom, vector, self.pin)
         motion = jnp.concatenate([moving] * CORNERS)
         velocity = plus(axes(motion[:, 3:]), cross(axes(motion), self.points))
         return self.pin(LEVEL.into((velocity[0], velocity[1], velocity[2])))
 
     def gathered(self, force: Directions) -> dict[int, jax.Array]:
-        """Compute J^T f, [L] per degree of freedom."""
+        """J^T f: [L] per degree of freedom."""
         pull = LEVEL.out(force)
         wrench = self._folded([*cross(self.points, pull), *pull])
         shares = generalised(self.tree, self.turns, self.freedom, wrench, self.pin)
         return dict(enumerate(self.pin(shares)))
 
     def stiffened(self, mass: Rows, stiffness: Sequence[jax.Array]) -> Rows:
-        """Compute the rows of M + J^T D J; stiffness as in `lane_major.footing`."""
+        """Rows of M + J^T D J; stiffness as in `lane_major.footing`."""
         held = up(
             self.tree, self._folded(spatial(LEVEL.stiffness(stiffness), self.points)), self.pin
         )
@@ -153,7 +153,7 @@ def make_constraints(
 
 
 def _softness(time_constant: float) -> Softness:
-    """Return the softness of a critically damped constraint (computation docs, "Reference")."""
+    """Softness of a critically damped constraint (computation docs, "Reference")."""
     time = float(IMPEDANCE[0, 1, 0]) * time_constant
     stiffness, damping, none = (
         np.full((1, 1), x, np.float32) for x in (1 / time**2, 2 / time, 0.0)

@@ -1,7 +1,7 @@
 """Tree of a body as data.
 
-Letters: `n` links, the root first and parents before children; `L` lanes. Every array has one more
-axis than documented, the lanes, innermost.
+Letters: `n` links, the root first and parents before children; `L` lanes. Every array has the
+lanes as one more, innermost axis.
 """
 
 import dataclasses

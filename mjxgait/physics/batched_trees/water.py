@@ -21,7 +21,7 @@ from mjxgait.physics.lane_major.lanes import (
 def drag_links(
     tree: Tree, poses: Sequence[Pose], body: Inertia, moving: jax.Array, drag: float, pin: Pin
 ) -> jax.Array:
-    """Compute the water's force on each link, [n, 6, L] about the origin; moving: [n, 6, L].
+    """Water's force on each link, [n, 6, L] about the origin; moving: [n, 6, L].
 
     Every point of a face is pushed along its normal by `drag` N·s/m³ times its velocity along it.
     Summed over the six faces of a block, this gives a force against the velocity of its centre and
