@@ -1,9 +1,9 @@
 """Arithmetic over lanes that folds the numbers of the model while tracing.
 
 All arrays have the lanes last, so that every operation is a contiguous vector instruction. A
-`Scalar` is an array ([L], or [n, L] for n bodies at once; L is 1 if all lanes share it), or a Python
-number if it is a constant: the many zeros and ones of a model then cost nothing. Three scalars make
-a `Vector`; `turn` and `plus` also serve vectors that are one array [3, L].
+`Scalar` is an array ([L], or [n, L] for n bodies at once; L is 1 if all lanes share it), or a
+Python number if it is a constant: the many zeros and ones of a model then cost nothing. Three
+scalars make a `Vector`; `turn` and `plus` also serve vectors that are one array [3, L].
 """
 
 from collections.abc import Callable, Sequence

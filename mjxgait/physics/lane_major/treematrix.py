@@ -1,11 +1,11 @@
 """Symmetric matrices with the sparsity of a kinematic tree, lanes innermost.
 
 Entry (k, i) is nonzero only if one degree of freedom moves the other: i is an ancestor of k, or k
-itself. The mass matrix has this form. So has Newton's Hessian of a body that touches only the floor,
-because a contact moves one chain of ancestors. Row k is stored as an array [n, L] over the chain
-root ... k. Eliminating from the leaves inwards creates no new entries (Featherstone, "Rigid Body
-Dynamics Algorithms", section 6.5), here in the form H = L^T L with square roots: each row is then
-one fused operation that ends in a division.
+itself. The mass matrix has this form. So has Newton's Hessian of a body that touches only the
+floor, because a contact moves one chain of ancestors. Row k is stored as an array [n, L] over the
+chain root ... k. Eliminating from the leaves inwards creates no new entries (Featherstone, "Rigid
+Body Dynamics Algorithms", section 6.5), here in the form H = L^T L with square roots: each row is
+then one fused operation that ends in a division.
 """
 
 import dataclasses
