@@ -16,20 +16,20 @@ from mjxgait.physics.layout import OtherTopology, sense_layout
 from mjxgait.types import ModelPlant
 
 SLOWER = "15 to 30"
-"""How many times as long a creature-step takes in plain MJX (docs/performance.md)."""
+"""Factor by which plain MJX is slower per creature-step (docs/performance.md)."""
 
 
 def make_plant(
     creature: Creature, physics: Physics, touch_ends: bool, roomy: bool = False
 ) -> tuple[ModelPlant, int]:
-    """The plant of a creature, and how many lanes per device suit it.
+    """Return the plant of a creature, and a suitable number of lanes per device.
 
     Args:
       touch_ends: whether an episode ends when a part touches the floor that must not.
-      roomy: whether its program is to serve bodies with other shapes too.
+      roomy: whether the program must also serve bodies with other shapes.
 
     Raises:
-      UserError: MJX does not support something in the model; in its words.
+      UserError: MJX does not support something in the model; the message quotes MJX.
     """
     model, layout = creature.model_where(touch_ends), sense_layout(creature)
     crossings = find_crossings(creature)
@@ -39,7 +39,7 @@ def make_plant(
             return fast_plant(model, layout, crossings, roomy), 64
         except UnsupportedModel as reason:
             note = _cost(reason)
-    # MJX and the geometry package that it wants take half a second to import.
+    # MJX and the geometry package that it needs take half a second to import.
     from mjxgait.physics.mjx import mjx_plant
 
     try:
@@ -51,10 +51,10 @@ def make_plant(
 
 
 def parameters_of(plant: ModelPlant, creature: Creature, touch_ends: bool) -> Any:
-    """The numbers of a creature, for the plant of another one of the same topology.
+    """Return the numbers of a creature for the plant of another one of the same topology.
 
     Raises:
-      UserError: more than numbers differs.
+      UserError: the creatures differ in more than numbers.
     """
     model, layout = creature.model_where(touch_ends), sense_layout(creature)
     try:
@@ -66,9 +66,9 @@ def parameters_of(plant: ModelPlant, creature: Creature, touch_ends: bool) -> An
 
 
 def heavier_model(model: mujoco.MjModel, factor: ArrayLike) -> mujoco.MjModel:
-    """A copy whose masses and inertias are times factor, [] or [nbody - 1].
+    """Return a copy with masses and inertias times factor, [] or [nbody - 1].
 
-    What follows from them is MuJoCo's own reckoning (`mj_setConst`).
+    MuJoCo recomputes what follows from them (`mj_setConst`).
     """
     heavy = copy.deepcopy(model)
     heavy.body_mass[1:] *= factor
@@ -78,7 +78,7 @@ def heavier_model(model: mujoco.MjModel, factor: ArrayLike) -> mujoco.MjModel:
 
 
 def fallback_note(model: mujoco.MjModel) -> str:
-    """Which element keeps a model from the fast physics, and the cost; empty if nothing does."""
+    """Describe the element that rules out the lane-major physics, and the cost; empty if none."""
     try:
         check_supported(model)
     except UnsupportedModel as reason:

@@ -1,4 +1,4 @@
-"""Which parts of a model are sensed."""
+"""Parts of a model that are sensed."""
 
 import dataclasses
 
@@ -9,10 +9,10 @@ from mjxgait.creature import Creature
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class SenseLayout:
-    """What is sensed.
+    """Parts of a model that are sensed.
 
-    trunk: body id. qpos_adr, dof_adr: [J] addresses of the actuated joints. watched: [G] geom ids, of which the
-    first `feet` are feet.
+    trunk: body id. qpos_adr, dof_adr: [J] addresses of the actuated joints.
+    watched: [G] geom ids; the first `feet` of them are feet.
     """
 
     trunk: int
@@ -23,11 +23,11 @@ class SenseLayout:
 
 
 class OtherTopology(Exception):
-    """A body does not fit a plant made for another; the message says in what."""
+    """Error for a body that does not fit a plant; the message says where they differ."""
 
 
 def sense_layout(creature: Creature) -> SenseLayout:
-    """The layout of a creature."""
+    """Layout of a creature."""
     return SenseLayout(
         creature.trunk,
         creature.joints.qpos_adr,

@@ -1,4 +1,4 @@
-"""The reference plant: MJX's own functions, mapped over lanes in front.
+"""Reference plant: MJX's own functions, mapped over lanes in front.
 
 One step is split around the controller.
 """
@@ -39,10 +39,10 @@ class MjxPlant:
     """Plain MJX behind the `Plant` protocol.
 
     Attributes:
-      model, data: of MJX; data is the template whose state each lane replaces.
-      layout: which parts of the model are sensed.
-      parameters: of the body that all lanes have.
-      crossings: which parts may be in each other; None looks at none.
+      model, data: of MJX; each lane replaces the state of data.
+      layout: the parts of the model that are sensed.
+      parameters: of the body that all lanes share.
+      crossings: the pairs of parts to check for overlap; None checks none.
       note: see `Plant.note`.
     """
 
@@ -63,7 +63,7 @@ class MjxPlant:
         told = told or _sense_difference(self.layout, layout, self.crossings, crossings)
         if told:
             raise OtherTopology(told)
-        # In NumPy, for arrays of MJX belong to one device.
+        # In NumPy, because an array of MJX belongs to one device.
         return jax.device_get(read_numbers(model, device_model, layout, crossings))
 
     def with_parameters(self, parameters: ModelNumbers) -> Self:
@@ -112,7 +112,7 @@ class MjxPlant:
         return deepest(crossings.first, crossings.second, bars, middle, half)
 
     def _numbers(self, state: BodyState) -> ModelNumbers:
-        """Of this lane's body: its own, or the plant's."""
+        """Numbers of this lane's body: its own, or the plant's."""
         return self.parameters if state.parameters is None else state.parameters
 
     def _model(self, state: BodyState) -> mjx.Model:
@@ -147,7 +147,7 @@ class MjxPlant:
         return sensed, data
 
     def _lows(self, state: BodyState, data: mjx.Data) -> jax.Array:
-        """[G] m of the watched geoms above the ground."""
+        """Heights [G] m of the watched geoms above the ground."""
         numbers, watched = self._numbers(state), self.layout.watched
         pos, rot = data.geom_xpos[watched], data.geom_xmat[watched]
         if state.ground is None:
@@ -156,10 +156,10 @@ class MjxPlant:
         return clearance(state.ground, x, y, z, numbers.radius)
 
     def _laid(self, model: mjx.Model, data: mjx.Data, ground: Ground) -> mjx.Data:
-        """The contacts with the floor moved onto the ground.
+        """Move the contacts with the floor onto the ground.
 
-        MJX has found each as with the plane z = 0: above its middle by the radius and half its
-        distance lies the centre of a sphere, or a corner of what has none.
+        MJX found each contact with the plane z = 0. The centre of a sphere, or a corner of a geom
+        without a radius, lies above the contact's middle by the radius plus half the distance.
         """
         touching = data._impl.contact
         one, other = touching.geom.T
@@ -197,7 +197,7 @@ class MjxPlant:
 
 
 def _lowest(numbers: ModelNumbers, pos: jax.Array, rot: jax.Array) -> jax.Array:
-    """[G] m of geoms at these places, by their support functions."""
+    """Heights [G] m of geoms at these places, by their support functions."""
     down = rot[:, 2, :]
     return (
         pos[:, 2]
@@ -208,7 +208,7 @@ def _lowest(numbers: ModelNumbers, pos: jax.Array, rot: jax.Array) -> jax.Array:
 
 
 def _cores(numbers: ModelNumbers, pos: jax.Array, rot: jax.Array) -> jax.Array:
-    """[G, 3] m, the lowest points of geoms at these places less their radii."""
+    """Lowest points [G, 3] m of geoms at these places without their radii."""
     down = rot[:, 2, :]
     stretched = down * numbers.ellipsoid
     reach = jnp.maximum(jnp.linalg.norm(stretched, axis=1, keepdims=True), 1e-6)
@@ -219,7 +219,7 @@ def _cores(numbers: ModelNumbers, pos: jax.Array, rot: jax.Array) -> jax.Array:
 def _sense_difference(
     own: SenseLayout, other: SenseLayout, pairs: Crossings | None, others: Crossings | None
 ) -> str:
-    """The first thing that is looked at elsewhere; empty if there is none."""
+    """Describe the first difference in what is sensed or watched for overlap; empty if none."""
     for field in dataclasses.fields(SenseLayout):
         if not np.array_equal(getattr(own, field.name), getattr(other, field.name)):
             return f"other parts of it are sensed ({field.name})"
@@ -236,10 +236,10 @@ def mjx_plant(
     crossings: Crossings | None = None,
     note: str = "",
 ) -> MjxPlant:
-    """A plant for any model that MJX accepts.
+    """Make a plant for any model that MJX accepts.
 
     Raises:
-      NotImplementedError: MJX's own words on what it does not support.
+      NotImplementedError: MJX does not support the model; the message is MJX's.
     """
     device_model = mjx.put_model(model, impl="jax")
     data = mjx.make_data(device_model, impl="jax")

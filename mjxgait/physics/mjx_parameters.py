@@ -1,4 +1,4 @@
-"""The numbers of a body as plain MJX reads them: leaves of its model, and what is sensed of it."""
+"""Numbers of a body for plain MJX: leaves of its model, and shapes of what is sensed."""
 
 import contextlib
 import dataclasses
@@ -20,7 +20,7 @@ from mjxgait.types import Number, pytree
 
 with contextlib.redirect_stdout(
     io.StringIO()
-):  # MJX prints that Warp, which nobody asked for, is not installed
+):  # MJX prints that Warp, which is not used, is not installed
     from mujoco import mjx
 
 PARTS = {
@@ -36,23 +36,24 @@ NUMBERS = (
     "geom_solimp",
     *(f"{part}_{name}" for part, names in PARTS.items() for name in names),
 )
-"""Of a model; all else must be the same in two models that share a program."""
+"""Fields of a model that may differ between two models of one program; no others may."""
 OPTIONS = ("gravity", "impratio")
-"""Of a model's options, likewise."""
+"""Fields of a model's options that may differ likewise."""
 UNSEEN = ("cam_", "light_", "mat_", "tex_", "name", "site_", "key_", "text_", "tuple_", "numeric_")
-"""Beginnings of what moves nothing."""
+"""Prefixes of fields that do not affect motion."""
 UNUSED = {
     *("geom_rgba", "geom_matid", "geom_aabb", "geom_sameframe", "geom_rbound_hfield", "dof_M0"),
     *("body_margin", "body_simple", "body_sameframe", "stat", "names", "paths", "signature"),
 }
 PARTS_OF_MODEL = {"opt", "_impl"}
-"""Which are compared by themselves."""
+"""Parts that are compared separately."""
 
 
 @pytree
 class ModelNumbers:
-    """model: `NUMBERS` and options: `OPTIONS` by name, as in MJX.
+    """Numbers of a body.
 
+    model: `NUMBERS` by name, and options: `OPTIONS` by name, as in MJX.
     radius [G], box, ellipsoid [G, 3]: of the watched geoms' support functions. bars: see `Bars`.
     """
 
@@ -64,7 +65,7 @@ class ModelNumbers:
     bars: Bars
 
     def put_in(self, model: mjx.Model) -> mjx.Model:
-        """A model with these numbers."""
+        """Return the model with these numbers."""
         numbers, options = jax.tree.map(jnp.asarray, (self.model, self.options))
         return model.replace(**numbers, opt=model.opt.replace(**options))
 
@@ -75,7 +76,7 @@ def read_numbers(
     layout: SenseLayout,
     crossings: Crossings | None,
 ) -> ModelNumbers:
-    """Of a model, and the same put on the device."""
+    """Read the numbers of a model; device_model: the same on the device."""
     extents = [
         geometry.support_extents(model.geom_type[g], model.geom_size[g]) for g in layout.watched
     ]
@@ -91,7 +92,7 @@ def read_numbers(
 
 
 def model_difference(own: mjx.Model, other: mjx.Model) -> str:
-    """The first thing but numbers in which `other` is not as `own`; empty if there is none."""
+    """Describe the first difference of `other` from `own` besides numbers; empty if none."""
     left_out = {*NUMBERS, *OPTIONS} | UNUSED | PARTS_OF_MODEL
     pairs = [(own, other), (own.opt, other.opt), (own._impl, other._impl)]
     for mine, theirs in pairs:
@@ -110,7 +111,7 @@ def _equal(a: Any, b: Any) -> bool:
 
 
 def reweighed(model: mjx.Model, data: mjx.Data, numbers: ModelNumbers) -> ModelNumbers:
-    """One body's numbers with what follows from its masses and lengths computed anew.
+    """Recompute what follows from one body's masses and lengths.
 
     data: any of this model.
     """
@@ -135,7 +136,7 @@ def _with(numbers: ModelNumbers, **changed: Number) -> ModelNumbers:
 
 
 def heavier(numbers: ModelNumbers, factor: Number) -> ModelNumbers:
-    """With masses and inertias times factor, [] or [nbody - 1]; nothing else follows yet."""
+    """Multiply masses and inertias by factor, [] or [nbody - 1]; nothing else changes yet."""
     bodies = len(numbers.model["body_mass"]) - 1
     every = jnp.concatenate([jnp.ones(1), jnp.broadcast_to(factor, (bodies,))])
     return _with(
@@ -152,8 +153,9 @@ def resized(
     numbers: ModelNumbers,
     factor: Number,
 ) -> ModelNumbers:
-    """With lengths times factor [nbody - 1], and masses and inertias as they follow; not yet the
-    weights.
+    """Multiply lengths by factor [nbody - 1], masses by its cube, inertias by its fifth power.
+
+    The weights are not recomputed yet.
     """
     every = jnp.concatenate([jnp.ones(1), jnp.asarray(factor, jnp.float32)])
     old, geom, joint = numbers.model, every[model.geom_bodyid], every[model.jnt_bodyid]
@@ -182,7 +184,7 @@ def resized(
 
 
 def _below(model: mjx.Model) -> np.ndarray:
-    """[nbody, nbody] whether the second body is the first or hangs on it."""
+    """[nbody, nbody] matrix, 1 where the second body is the first or its descendant."""
     below = np.eye(model.nbody, dtype=np.float32)
     for b in range(model.nbody - 1, 0, -1):
         below[model.body_parentid[b]] += below[b]

@@ -1,4 +1,4 @@
-"""How deep parts of a creature are in each other: what both plants compute of `Crossings`."""
+"""Overlap depth of a creature's parts: what both plants compute of `Crossings`."""
 
 import dataclasses
 
@@ -13,11 +13,11 @@ from mjxgait.types import Number, pytree
 
 @pytree
 class Bars:
-    """The numbers of `Crossings`; lanes, where they are, innermost.
+    """Numbers of `Crossings`; the lanes, if any, are innermost.
 
-    centre, half: [S, 3] m in the body's frame, a bar's middle and from there to an end.
-    radius: [S] m. reach: [Q] m; a pair's depth is this minus the distance of the two axes.
-    body: [S], first, second: [Q] as in `Crossings`, where they are no part of the topology.
+    centre, half: [S, 3] m in the body's frame; a bar's middle, and from there to one end.
+    radius: [S] m. reach: [Q] m; a pair's depth is its reach minus the distance of the two axes.
+    body: [S], first, second: [Q] as in `Crossings`; None if they are part of the topology.
     """
 
     centre: Number
@@ -30,17 +30,17 @@ class Bars:
 
 
 def read_bars(crossings: Crossings | None) -> Bars:
-    """Of these; none of None."""
+    """Read the numbers of crossings; empty arrays for None."""
     if crossings is None or not len(crossings.first):
         return Bars(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0))
     return Bars(crossings.centre, crossings.half, crossings.radius, crossings.reach)
 
 
 def resized_bars(bars: Bars, first: ArrayLike, second: ArrayLike, factor: Number) -> Bars:
-    """One body's bars with their lengths times factor [S]."""
+    """Multiply the lengths of one body's bars by factor [S]."""
     a, b = whole(first), whole(second)
     radii = factor[a] * bars.radius[a] + factor[b] * bars.radius[b]
-    # How deep two shapes stand in each other follows their mean.
+    # The allowed depth of two shapes scales with the mean of their factors.
     allowed = 0.5 * (factor[a] + factor[b]) * (bars.radius[a] + bars.radius[b] - bars.reach)
     return dataclasses.replace(
         bars,
@@ -58,15 +58,15 @@ def deepest(
     centre: jax.Array,
     half: jax.Array,
 ) -> jax.Array:
-    """[...] m; how much deeper than standing the deepest two are in each other, negative if apart.
+    """Largest depth [...] m beyond the standing depth; negative if all are apart.
 
     Args:
       first, second: [Q] the bars of each pair.
-      bars: with as many axes as the following, 1 long where the numbers are the same.
-      centre, half: [S, 3, ...] m; each bar's middle and from there to one end, in any one frame.
+      bars: with as many axes as the following, 1 long where numbers are shared.
+      centre, half: [S, 3, ...] m; each bar's middle, and from there to one end, in any one frame.
     """
     depth = _pair_depths(whole(first), whole(second), bars, centre, half)
-    # Halves laid on each other; a maximum over this axis takes three times as long on CPU.
+    # Halves are folded; a maximum over this axis takes three times as long on CPU.
     while depth.shape[0] > 1:
         rows = (depth.shape[0] + 1) // 2
         depth = jnp.maximum(depth[:rows], depth[-rows:])
@@ -76,7 +76,7 @@ def deepest(
 def _pair_depths(
     first: Number, second: Number, bars: Bars, centre: jax.Array, half: jax.Array
 ) -> jax.Array:
-    """[Q, ...] of each pair."""
+    """Depth [Q, ...] of each pair."""
 
     def parts(rows: jax.Array) -> tuple[jax.Array, jax.Array, jax.Array]:
         return rows[:, 0], rows[:, 1], rows[:, 2]
@@ -93,12 +93,12 @@ def _pair_depths(
 
 
 def whole(indices: ArrayLike) -> Number:
-    """Indices, which are numbers like all others where they are inputs of the program."""
+    """Convert indices to integers; as inputs of the program they are floats."""
     if isinstance(indices, jax.Array):
         return indices.astype(jnp.int32)
     return np.asarray(indices, int)
 
 
 def single(numbers: Number) -> Number:
-    """Numbers, constants among them as float32, so that nothing widens."""
+    """Convert constants to float32, so that nothing widens."""
     return np.asarray(numbers, np.float32) if isinstance(numbers, np.ndarray) else numbers

@@ -1,10 +1,10 @@
-"""The inverse masses that constraints see, from the numbers of a body.
+"""Inverse masses that constraints see, from the numbers of a body.
 
 MuJoCo scales the softness of contacts and limits with them (`body_invweight0`, `dof_invweight0`;
 computation docs, "Parameters"). They are those of the body at rest, so they change with its masses
 and lengths.
 
-Not followed: for a body that slides on the world, turns about nothing and carries nothing, MuJoCo
+Left out: for a body that slides on the world, turns about nothing and carries nothing, MuJoCo
 takes its inverse mass instead of the mean. No part of a creature is one.
 """
 
@@ -20,9 +20,10 @@ SHARED = {int(mujoco.mjtJoint.mjJNT_FREE): (3, 3), int(mujoco.mjtJoint.mjJNT_BAL
 
 
 def weight_groups(kinds: Sequence[int]) -> list[range]:
-    """Degrees of freedom that share a weight, of joints of MuJoCo's kinds in the model's order.
+    """Group the degrees of freedom that share a weight; kinds: MuJoCo's, in the model's order.
 
-    The three shifts of a free joint do, the three turns of a free or ball joint, and else each alone.
+    The three shifts of a free joint share one, and so do the three turns of a free or ball joint.
+    Every other degree of freedom has its own.
     """
     groups: list[range] = []
     for kind in kinds:
@@ -35,7 +36,7 @@ def weight_groups(kinds: Sequence[int]) -> list[range]:
 def inverse_weights(
     mass: jax.Array, jacobian: jax.Array, joints: Sequence[Sequence[int]]
 ) -> tuple[jax.Array, jax.Array]:
-    """As `mj_setConst` computes them: means over the axes of J M^-1 J^T.
+    """Compute the weights as `mj_setConst` does: means over the axes of J M^-1 J^T.
 
     Args:
       mass: [nv, nv] matrix at rest.
@@ -55,10 +56,10 @@ def inverse_weights(
 
 
 def _inverse(mass: jax.Array) -> jax.Array:
-    """Of a positive definite matrix [n, n], by Gauss and Jordan.
+    """Invert a positive definite matrix [n, n] by Gauss-Jordan elimination.
 
-    Not LAPACK's: XLA's CPU calls wait for threads of the pool that they run on, so two devices that
-    invert many matrices at once wait for each other for ever.
+    LAPACK is avoided: XLA's CPU calls wait for threads of the pool that they run on, so two devices
+    that invert many matrices at once deadlock.
     """
     size = len(mass)
 

@@ -1,6 +1,5 @@
-"""Physics of a mixed population: every lane has a tree of its own, as data.
+"""Physics of a mixed population: every lane has its own tree, as data.
 
-The equations are those of `physics.fast`, with the lanes innermost. What differs: whose parent a
-link has is a number too, so a sum along the tree is a sum over all links that come before, with a
-mask, and matrices are dense.
+The equations are those of `physics.lane_major`, with the lanes innermost. Here a link's parent is a
+number too, so a sum along the tree is a masked sum over all earlier links, and matrices are dense.
 """

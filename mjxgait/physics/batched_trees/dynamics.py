@@ -1,4 +1,4 @@
-"""Mass matrix and bias forces of trees that are data; compare `physics.fast.dynamics`."""
+"""Mass matrix and bias forces of trees as data; compare `lane_major.dynamics`."""
 
 from collections.abc import Sequence
 
@@ -30,7 +30,7 @@ from mjxgait.physics.lane_major.treematrix import Rows, on_pivot
 def velocities(
     tree: Tree, turns: jax.Array, freedom: Motion, vector: Sequence[jax.Array], pin: Pin
 ) -> jax.Array:
-    """[n, 6, L] of every link, about the origin; vector: [nv] of [L]."""
+    """Velocities [n, 6, L] of all links about the origin; vector: [nv] of [L]."""
     own = jnp.stack([jnp.zeros_like(vector[0]), *vector[6:]])
     steps = pack([own * part for part in freedom.parts], pin)
     return down(tree, jnp.concatenate([root_motion(turns, vector)[None], steps[1:]]), pin)
@@ -45,13 +45,13 @@ def bias_links(
     gravity: float,
     pin: Pin,
 ) -> jax.Array:
-    """The force [n, 6, L] that each link needs to move as it does, without any acceleration."""
+    """Force [n, 6, L] that each link's motion needs without acceleration."""
     velocity = unpack(moving)
     speed = jnp.concatenate([jnp.zeros_like(qvel[:1]), qvel[6:]])
     carried = motion_cross(
         velocity, Motion(scale(speed, freedom.spin), scale(speed, freedom.shift))
     )
-    # A point that moves along while the body turns: what a free joint's shift leaves out.
+    # The origin moves along while the root turns; a free joint's shift leaves this out.
     swung = cross(parts(moving[0, 3:]), parts(moving[0, :3]))
     none = jnp.zeros_like(swung[0])
     root = jnp.stack([none, none, none, swung[0], swung[1], swung[2] + gravity])
@@ -66,7 +66,7 @@ def bias_links(
 def generalised(
     tree: Tree, turns: jax.Array, freedom: Motion, force: jax.Array, pin: Pin
 ) -> list[jax.Array]:
-    """What forces [n, 6, L] on links do along the degrees of freedom, [nv] of [L]."""
+    """Project forces [n, 6, L] on links onto the degrees of freedom, [nv] of [L]."""
     below = up(tree, force, pin)
     along = dot(freedom.parts, [below[:, c] for c in range(6)])
     whole = below[0]
@@ -75,7 +75,7 @@ def generalised(
 
 
 def mass_rows(tree: Tree, turns: jax.Array, freedom: Motion, body: Inertia, pin: Pin) -> Rows:
-    """Rows of the mass matrix, armatures included; 1 where nothing moves."""
+    """Rows of the mass matrix with armatures; the pivot is 1 where nothing moves."""
     ten = up(tree, pack([*body.turning, *body.moment, body.mass], pin), pin)
     part = [ten[:, c] for c in range(10)]
     composite = Inertia(tuple(part[:6]), (part[6], part[7], part[8]), part[9])
@@ -91,10 +91,10 @@ def mass_rows(tree: Tree, turns: jax.Array, freedom: Motion, body: Inertia, pin:
 def tree_rows(
     tree: Tree, turns: jax.Array, freedom: Motion, force: Motion, root: Motion, pin: Pin
 ) -> list[jax.Array]:
-    """Rows of a matrix like the mass matrix; the first three are left to the caller.
+    """Rows of a matrix like the mass matrix; the caller fills the first three.
 
-    force: [n] against each hinge's unit motion, root: against the root's three turns; both what all
-    below a link answers with.
+    force: [n] against each hinge's unit motion, root: against the root's three turns. Both: the
+    response of a link and all below it.
     """
     turned = rooted(pin(root.parts), turns, pin)
     pushed = pin(force.parts)
@@ -108,7 +108,7 @@ def tree_rows(
 
 
 def _root(turns: jax.Array) -> Motion:
-    """The root's three unit turns; components [3, L]."""
+    """Root's three unit turns; components [3, L]."""
     spin = tuple(turns[:, c] for c in range(3))
     none = jnp.zeros_like(spin[0])
     return Motion((spin[0], spin[1], spin[2]), (none, none, none))

@@ -1,4 +1,4 @@
-"""Where the links are and how each degree of freedom moves them, about the root's own place."""
+"""Poses of the links and motions of their degrees of freedom, about the root's own place."""
 
 from collections.abc import Sequence
 
@@ -23,7 +23,7 @@ from mjxgait.physics.lane_major.lanes import (
 
 
 def posture(tree: Tree, qpos: jax.Array, pin: Pin) -> list[Pose]:
-    """Forward kinematics of qpos [7 + n - 1, L]: every link."""
+    """Forward kinematics of qpos [7 + n - 1, L]: pose of every link."""
     columns = [jnp.stack(column) for column in rotation(unit_quaternion(qpos[3:7]))]
     none = jnp.zeros_like(columns[0])
     known = [pin(jnp.concatenate([*columns, none]))]
@@ -40,9 +40,9 @@ def posture(tree: Tree, qpos: jax.Array, pin: Pin) -> list[Pose]:
 
 
 def motions(tree: Tree, poses: Sequence[Pose], pin: Pin) -> Motion:
-    """What each link's hinge does to it and all below at unit velocity; components [n, L].
+    """Motion that each hinge at unit velocity gives its link and all below.
 
-    Zero for the root, and for what does not move.
+    Components [n, L]; zero for the root and for links that do not move.
     """
     axis = jnp.stack([pose.rot[2] for pose in poses]) * tree.moves[:, None]
     place = jnp.stack([pose.pos for pose in poses])
@@ -51,18 +51,18 @@ def motions(tree: Tree, poses: Sequence[Pose], pin: Pin) -> Motion:
 
 
 def frames(poses: Sequence[Pose]) -> list[jax.Array]:
-    """The three axes of all links, [n, 3, L] each; see `turn_each`."""
+    """Stack the three axes of all links, [n, 3, L] each; see `turn_each`."""
     return [jnp.stack([pose.rot[j] for pose in poses]) for j in range(3)]
 
 
 def centres(tree: Tree, poses: Sequence[Pose]) -> Vector:
-    """The middles of all blocks, components [n, L] m from the origin."""
+    """Centres of all blocks, components [n, L] m from the origin."""
     place = jnp.stack([pose.pos for pose in poses])
     return plus(axes(place), turn_each(frames(poses), tree.com))
 
 
 def lows(tree: Tree, poses: Sequence[Pose]) -> jax.Array:
-    """[n, L] m of each block's lowest point above z = 0; `FAR` of what there is not."""
+    """Height [n, L] m of each block's lowest point above z = 0; `FAR` of missing blocks."""
     rot = frames(poses)
     heights = [turn_each(rot, tree.axes[:, k])[2] for k in range(3)]
     reach = total([tree.half[:, k] * jnp.abs(height) for k, height in enumerate(heights)])
@@ -71,12 +71,12 @@ def lows(tree: Tree, poses: Sequence[Pose]) -> jax.Array:
 
 
 def root_turns(poses: Sequence[Pose]) -> jax.Array:
-    """[3, 3, L] the axes about which the root turns."""
+    """Axes [3, 3, L] about which the root turns."""
     return jnp.stack(poses[0].rot)
 
 
 def down(tree: Tree, own: jax.Array, pin: Pin) -> jax.Array:
-    """Per link the sum [c, L] over itself and all above; own: [n, c, L]."""
+    """Sum own [n, c, L] over each link and all links above it: [c, L] per link."""
     return pin(
         jnp.stack(
             [
@@ -88,7 +88,7 @@ def down(tree: Tree, own: jax.Array, pin: Pin) -> jax.Array:
 
 
 def up(tree: Tree, own: jax.Array, pin: Pin) -> jax.Array:
-    """Per link the sum [c, L] over itself and all below; own: [n, c, L]."""
+    """Sum own [n, c, L] over each link and all links below it: [c, L] per link."""
     return pin(
         jnp.stack(
             [
@@ -100,6 +100,6 @@ def up(tree: Tree, own: jax.Array, pin: Pin) -> jax.Array:
 
 
 def root_motion(turns: jax.Array, vector: Sequence[jax.Array]) -> jax.Array:
-    """[6, L] of the root under the first six of [nv] velocities, angular before linear."""
+    """Root's motion [6, L], angular first, from the first six of [nv] velocities."""
     spin = total([turns[j] * vector[3 + j] for j in range(3)])
     return jnp.concatenate([spin, jnp.stack(vector[:3])])

@@ -1,4 +1,4 @@
-"""How deep blocks are in each other that no joint joins.
+"""Overlap depth of blocks that no joint connects.
 
 Letters: `n` links, `L` lanes.
 """
@@ -15,12 +15,12 @@ from mjxgait.physics.lane_major.lanes import dot, turn_each
 
 
 def deepest(tree: Tree, poses: Sequence[Pose]) -> jax.Array:
-    """[L] how deep the deepest two are, of the smaller one's size; negative where all are apart.
+    """Largest depth [L] as a share of the smaller block's size; negative if all are apart.
 
-    A size is the cube root of a volume.
+    The size of a block is the cube root of its volume.
 
-    Two blocks are apart where one of their six normals separates them. Where only a line along two
-    edges would, they count as in each other: never less than the least way out.
+    Two blocks are apart if one of their six normals separates them. Blocks that only a line along
+    two edges would separate count as overlapping: the depth is never less than the least way out.
     """
     rot, centre = frames(poses), centres(tree, poses)
     normals = [turn_each(rot, tree.axes[:, k]) for k in range(3)]
@@ -39,12 +39,12 @@ def deepest(tree: Tree, poses: Sequence[Pose]) -> jax.Array:
 
 
 def sizes(tree: Tree) -> jax.Array:
-    """[n, L] m, the cube root of each block's volume."""
+    """Cube root [n, L] m of each block's volume."""
     return 2 * jnp.cbrt(tree.half[:, 0] * tree.half[:, 1] * tree.half[:, 2])
 
 
 def _counts(tree: Tree) -> jax.Array:
-    """[n, n, L] pairs of blocks with two joints or more between them."""
+    """Return the pairs [n, n, L] of blocks with two joints or more between them."""
     joint = tree.solid * tree.moves
     between = abs(tree.above[:, None] - tree.above[None])
     return (jnp.sum(between * joint, axis=2) > 1) & (tree.solid[:, None] * tree.solid[None] > 0)

@@ -1,4 +1,4 @@
-"""The step of a mixed population."""
+"""Physics step of a mixed population."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -47,9 +47,9 @@ from mjxgait.types import BodyState, Sensed, pytree
 
 @pytree
 class Moment:
-    """What a step has computed of the present.
+    """Step data of the current state.
 
-    turns: [3, 3, L] the root's axes. freedom: components [n, L] of what each hinge moves.
+    turns: [3, 3, L] the root's axes. freedom: components [n, L] of each hinge's motion.
     mass: rows. bias: [nv, L]. touch: None without a floor.
     """
 
@@ -62,7 +62,7 @@ class Moment:
 
 @dataclasses.dataclass(frozen=True)
 class TreePlant:
-    """One MuJoCo step of blocks, each lane with a tree of its own in `BodyState.parameters`."""
+    """One MuJoCo step of modular bodies; `BodyState.parameters` holds each lane's own tree."""
 
     around: Surroundings
     note: str = ""
@@ -77,12 +77,12 @@ class TreePlant:
         return jnp.stack(one_kernel(_solve_damped)(workings.mass, damping, force))
 
     def overlap(self, state: BodyState) -> jax.Array:
-        """See `Plant.overlap`: in whatever pose, for nobody has drawn these bodies."""
+        """See `Plant.overlap`; any pose counts, because these bodies have no drawn pose."""
         tree: Tree = state.parameters
         return deepest(tree, posture(tree, state.qpos, pinned_by(state.friction)))
 
     def rested(self, tree: Tree, qpos: jax.Array) -> jax.Array:
-        """The start [nq] of one body, arrays without lanes, raised or lowered onto the ground."""
+        """Raise or lower the start [nq] of one body, arrays without lanes, onto the ground."""
         if not self.around.floor:
             return qpos
         lane = jax.tree.map(lambda leaf: leaf[..., None], tree)
@@ -153,7 +153,7 @@ class TreePlant:
 def _sensed(
     tree: Tree, state: BodyState, poses: Sequence[Pose], moving: jax.Array, bias: jax.Array
 ) -> Sensed:
-    """The trunk is the root; every block is watched, and what there is not is far up."""
+    """Sense the root as trunk and every block as watched; missing blocks are far up."""
     centre = [c + state.qpos[i] for i, c in enumerate(centres(tree, poses))]
     weight, low = tree.mass / jnp.sum(tree.mass, axis=0), lows(tree, poses)
     return Sensed(

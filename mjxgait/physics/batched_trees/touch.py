@@ -1,6 +1,6 @@
-"""Blocks on level ground: four corners of each that may touch it, and the Jacobian of all of them.
+"""Blocks on level ground: the four corners of each that may touch it, and their Jacobian.
 
-Contacts' values are [4 n, L], corner after corner, each of all links.
+Contacts' values are [4 n, L]: corner by corner, each of all links.
 """
 
 import dataclasses
@@ -41,14 +41,15 @@ IMPEDANCE = np.array([0.9, 0.95, 0.001, 0.5], np.float32).reshape(1, 4, 1)
 POWER = (2.0,)
 """MuJoCo's default `solimp`."""
 TIME_CONSTANT = 0.02
-"""s, MuJoCo's default `solref`, which hinges have at their limits."""
+"""s, MuJoCo's default `solref`, used for the limits of hinges."""
 LEVEL = Level()
 
 
 @pytree
 class Touch:
-    """distance: [4 n, L] m above the ground, `FAR` of what there is not.
+    """Geometry of all contacts.
 
+    distance: [4 n, L] m above the ground, `FAR` for missing blocks.
     points: x, y, z [4 n, L] m from the origin.
     """
 
@@ -57,10 +58,10 @@ class Touch:
 
 
 def lowest_corners(tree: Tree, poses: Sequence[Pose]) -> Touch:
-    """The four corners of each block that are below its centre: those that may touch a plane.
+    """Find the four corners of each block below its centre: those that may touch a plane.
 
-    With the half axes pointing down and the steepest first, K, A and B: K + A + B, K + A - B,
-    K - A + B, and K - A - B or, where that is above the centre, its opposite.
+    K, A and B are the half axes pointing down; K is the steepest. The corners are K + A + B,
+    K + A - B, K - A + B, and K - A - B or, if that is above the centre, its opposite.
     """
     rot = frames(poses)
     halves = [turn_each(rot, tree.axes[:, k] * tree.half[:, k, None]) for k in range(3)]
@@ -83,7 +84,7 @@ def lowest_corners(tree: Tree, poses: Sequence[Pose]) -> Touch:
 
 @dataclasses.dataclass(frozen=True)
 class BlockFooting:
-    """The operators of one state; compare `physics.fast.footing`."""
+    """Operators of the contact Jacobian in one state; compare `lane_major.footing`."""
 
     tree: Tree
     turns: jax.Array
@@ -99,14 +100,14 @@ class BlockFooting:
         return self.pin(LEVEL.into((velocity[0], velocity[1], velocity[2])))
 
     def gathered(self, force: Directions) -> dict[int, jax.Array]:
-        """J^T f, per degree of freedom [L]."""
+        """J^T f: [L] per degree of freedom."""
         pull = LEVEL.out(force)
         wrench = self._folded([*cross(self.points, pull), *pull])
         shares = generalised(self.tree, self.turns, self.freedom, wrench, self.pin)
         return dict(enumerate(self.pin(shares)))
 
     def stiffened(self, mass: Rows, stiffness: Sequence[jax.Array]) -> Rows:
-        """Rows of M + J^T D J; stiffness as in `physics.fast.footing`."""
+        """Rows of M + J^T D J; stiffness as in `lane_major.footing`."""
         held = up(
             self.tree, self._folded(spatial(LEVEL.stiffness(stiffness), self.points)), self.pin
         )
@@ -121,7 +122,7 @@ class BlockFooting:
         return tuple(a + b for a, b in zip(mass, rows, strict=True))
 
     def _folded(self, values: Sequence[jax.Array]) -> jax.Array:
-        """Components [4 n, L] of contacts summed over each block: [n, components, L]."""
+        """Sum contacts' components [4 n, L] over each block: [n, components, L]."""
         n = self.tree.links
         corners = [[value[k * n : (k + 1) * n] for k in range(CORNERS)] for value in values]
         return pack([total(corner) for corner in corners], self.pin)
@@ -136,7 +137,7 @@ def make_constraints(
     qpos: jax.Array,
     qvel: jax.Array,
 ) -> Constraints:
-    """Those of the current state: all corners, all limits. friction: [L], a factor."""
+    """Make the constraints of this state: all corners, all limits. friction: [L], a factor."""
     pin, shape = footing.pin, Dense(tree.links, around.iterations, around.line_iterations)
     over_low, under_high = qpos[7:] - tree.low[1:], tree.high[1:] - qpos[7:]
     hinges = Springs(_softness(max(TIME_CONSTANT, 2 * around.step)), POWER, tree.dof_weight[1:])
@@ -152,7 +153,7 @@ def make_constraints(
 
 
 def _softness(time_constant: float) -> Softness:
-    """Of a constraint critically damped (MuJoCo's computation docs, "Reference")."""
+    """Softness of a critically damped constraint (computation docs, "Reference")."""
     time = float(IMPEDANCE[0, 1, 0]) * time_constant
     stiffness, damping, none = (
         np.full((1, 1), x, np.float32) for x in (1 / time**2, 2 / time, 0.0)

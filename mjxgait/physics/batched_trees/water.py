@@ -21,11 +21,11 @@ from mjxgait.physics.lane_major.lanes import (
 def drag_links(
     tree: Tree, poses: Sequence[Pose], body: Inertia, moving: jax.Array, drag: float, pin: Pin
 ) -> jax.Array:
-    """What the water does to each link, [n, 6, L] about the origin; moving: [n, 6, L].
+    """Water's force on each link, [n, 6, L] about the origin; moving: [n, 6, L].
 
     Every point of a face is pushed along its normal by `drag` N·s/m³ times its velocity along it.
-    Over the six faces of a block that adds up to a force against the velocity of its centre, and a
-    moment against its turning, both diagonal in the block's own axes.
+    Summed over the six faces of a block, this gives a force against the velocity of its centre and
+    a moment against its rotation, both diagonal in the block's own axes.
     """
     velocity = unpack(moving)
     mass = jnp.where(tree.solid > 0, tree.mass, 1.0)
@@ -38,7 +38,7 @@ def drag_links(
         axis, (i, j) = turn_each(rot, tree.axes[:, k]), ((k + 1) % 3, (k + 2) % 3)
         a, b, c = (tree.half[:, n] for n in (k, i, j))
         slow = -8 * drag * b * c * tree.solid * dot(axis, drift)
-        # Faces i and j move along their normals by how far a point is from the axis.
+        # A point of face i or j moves along the normal in proportion to its distance from the axis.
         still = -8 / 3 * drag * a * (b**3 + c**3) * tree.solid * dot(axis, velocity.spin)
         push = [p + slow * x for p, x in zip(push, axis, strict=True)]
         twist = [t + still * x for t, x in zip(twist, axis, strict=True)]

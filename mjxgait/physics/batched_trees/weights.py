@@ -1,4 +1,4 @@
-"""The inverse masses that constraints see, of a tree at rest."""
+"""Inverse masses that constraints see, for a tree at rest."""
 
 import dataclasses
 
@@ -14,7 +14,7 @@ from mjxgait.physics.weights import inverse_weights
 
 
 def weighed(tree: Tree) -> Tree:
-    """One body, arrays without lanes, with the weights of its blocks and hinges."""
+    """Return one body, arrays without lanes, with the weights of its blocks and hinges."""
     lane = jax.tree.map(lambda x: jnp.asarray(x, jnp.float32)[..., None], tree)
     links, like = tree.links, jnp.ones(1, jnp.float32)
     rest = jnp.zeros((links + 6, 1), jnp.float32).at[3].set(1.0)

@@ -1,6 +1,7 @@
-"""MuJoCo's step for walking creatures, written for many lanes at once: the same physics as MJX, several times faster on CPU.
+"""MuJoCo's step for walking creatures over many lanes: MJX's physics, several times faster on CPU.
 
-Trees of bodies whose spheres and capsules touch one floor; anything else raises `UnsupportedModel`.
+It supports trees of bodies with spheres and capsules that touch one floor. Anything else raises
+`UnsupportedModel`.
 """
 
 from mjxgait.physics.lane_major.kernel import one_kernel

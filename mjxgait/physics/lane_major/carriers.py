@@ -1,4 +1,4 @@
-"""The part of a tree that moves contacts."""
+"""Part of a tree that moves contacts."""
 
 import dataclasses
 from collections import Counter
@@ -15,14 +15,14 @@ from mjxgait.physics.lane_major.treematrix import Sparsity
 
 @dataclasses.dataclass(frozen=True)
 class Carriers:
-    """The part of the tree that moves contacts.
+    """Part of the tree that moves contacts.
 
-    root: the body of a free root, -1 where there is none; it is not among the following.
+    root: the body of a free root, -1 if there is none; the fields below leave it out.
     bodies: (body, parent, places of its own degrees of freedom in `dofs`), parents first.
-    dofs: degrees of freedom; per one of them body_of: its body, lengths: of its chain down to it,
-      path_of: the place in `leaves` of a chain that it belongs to.
+    dofs: degrees of freedom; for each, body_of: its body, lengths: of its chain down to it,
+      path_of: the place in `leaves` of a chain that contains it.
     leaves: the last degrees of freedom of chains that together hold all of `dofs`.
-    contacts: (body, how many contacts it has), in the order of the contacts.
+    contacts: (body, number of its contacts), in the order of the contacts.
     """
 
     root: int
@@ -38,7 +38,7 @@ class Carriers:
 def find_carriers(
     bodies: Sequence[BodySlot], pattern: Sparsity, contacts: Sequence[ContactSlot]
 ) -> Carriers:
-    """Of a tree with these contacts."""
+    """Find the part of a tree that moves these contacts."""
     counts = Counter(contact.body for contact in contacts)
     moved: set[int] = set()
     for body in counts:

@@ -1,9 +1,9 @@
 """Contacts with the ground and joint limits as MuJoCo's soft constraints.
 
-A contact of MuJoCo's pyramidal cone has four edges, normal plus or minus friction times each tangent. Here it is kept in its three
-directions (normal, first, second tangent), of which the edges are combinations, and the friction enters late.
-All contacts' values lie side by side in arrays [C, L], the limits' in [M, L].
-Formulas: see `springs`.
+A contact of MuJoCo's pyramidal cone has four edges, normal plus or minus friction times each
+tangent. Here it is kept in its three directions (normal, first, second tangent). Edges are
+combinations of these, and friction enters late. Values of all contacts lie side by side in arrays
+[C, L], those of limits in [M, L]. Formulas: see `springs`.
 """
 
 import dataclasses
@@ -33,62 +33,62 @@ from mjxgait.physics.lane_major.treematrix import Rows, Sparsity
 
 
 class Limited(Protocol):
-    """A limit."""
+    """Joint limit."""
 
     @property
     def dof(self) -> int:
-        """The degree of freedom that it stops."""
+        """Degree of freedom that the limit stops."""
         ...
 
 
 class Shape(Protocol):
-    """What shapes the solver's program."""
+    """Properties that determine the solver's program."""
 
     @property
     def pattern(self) -> Sparsity:
-        """Of the mass matrix, and of what contacts add to it."""
+        """Sparsity of the mass matrix, and of what contacts add to it."""
         ...
 
     @property
     def limits(self) -> Sequence[Limited]:
-        """In the order of their values."""
+        """Limits, in the order of their values."""
         ...
 
     @property
     def iterations(self) -> int:
-        """Newton steps at most."""
+        """Maximum number of Newton steps."""
         ...
 
     @property
     def line_iterations(self) -> int:
-        """Steps of a line search at most."""
+        """Maximum number of steps of a line search."""
         ...
 
 
 class Operators(Protocol):
-    """The Jacobian J of all contacts, however it is stored."""
+    """Jacobian J of all contacts, stored in any way."""
 
     def along(self, vector: Sequence[jax.Array]) -> Directions:
         """J x for x [nv] of [L]."""
         ...
 
     def gathered(self, force: Directions) -> dict[int, jax.Array]:
-        """J^T f: per degree of freedom that moves a contact, [L]."""
+        """J^T f: [L] per degree of freedom that moves a contact."""
         ...
 
     def stiffened(self, mass: Rows, stiffness: Sequence[jax.Array]) -> Rows:
-        """Rows of M + J^T D J; of each contact D along nn, n1, n2, 11 and 22."""
+        """Rows of M + J^T D J; D of each contact along nn, n1, n2, 11 and 22."""
         ...
 
 
 @dataclasses.dataclass(frozen=True)
 class Constraints:
-    """All that the solver needs to know.
+    """Constraints of one state, as the solver needs them.
 
-    structure: its shape. footing: the contacts' Jacobian, None without contacts. friction: [C, L].
+    structure: the shape. footing: the contacts' Jacobian, None without contacts. friction: [C, L].
     reference: what the accelerations along normal and tangents are compared with.
     weight: [C, L] inverse regulariser of an edge, zero where there is no contact.
-    sign, limit_reference, limit_weight: [M, L], the same of limits.
+    sign, limit_reference, limit_weight: [M, L], the same for limits.
     """
 
     structure: Shape
@@ -117,7 +117,7 @@ def touch(
     pin: Pin,
     ground: Ground | None = None,
 ) -> Touch | None:
-    """Where all contacts are and what moves them.
+    """Find the places of all contacts and the motions that move them.
 
     paths: see `dynamics.motion_paths`. ground: None for the plane z = 0.
     """
@@ -145,7 +145,7 @@ def touch(
 
 
 def _moves(tree: Carriers, freedom: Motion, paths: dict[int, jax.Array], pin: Pin) -> Moves:
-    """Of the degrees of freedom that move contacts."""
+    """Collect the motions of the degrees of freedom that move contacts."""
     first = 6 if tree.root >= 0 else 0
     packed = jnp.stack(freedom.parts, axis=1)
     return Moves(
@@ -156,7 +156,7 @@ def _moves(tree: Carriers, freedom: Motion, paths: dict[int, jax.Array], pin: Pi
 
 
 def _placed(structure: Structure, places: Sequence[int], pose: Pose) -> tuple[jax.Array, ...]:
-    """Centres from the origin, the origin and radii of the contacts of one body, [c, L] each."""
+    """Place one body's contacts: centres from the origin, the origin and radii, [c, L] each."""
     own = slice(places[0], places[-1] + 1)
     local, radius = structure.columns.contacts.center[own], structure.columns.contacts.radius[own]
     x, y, z = (
@@ -172,9 +172,9 @@ def _component(vector: Any, i: int) -> Any:
 
 
 def _level(structure: Structure, poses: Sequence[Pose], pin: Pin) -> Frames:
-    """The first tangent along a capsule's axis as seen from above.
+    """Frames with the first tangent along a capsule's axis as seen from above.
 
-    The world's y where it stands upright, and x for a sphere.
+    The world's y for an upright capsule, and x for a sphere.
     """
     contacts = structure.contacts
     if not any(slot.capsule for slot in contacts):
@@ -203,7 +203,7 @@ def make_constraints(
     qvel: jax.Array,
     pin: Pin,
 ) -> Constraints | None:
-    """The constraints of the current state, None for a model without any."""
+    """Make the constraints of the current state; None for a model without any."""
     if not structure.contacts and not structure.limits:
         return None
     empty = jnp.zeros((0, friction.shape[-1]), friction.dtype)

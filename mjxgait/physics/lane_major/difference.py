@@ -1,4 +1,4 @@
-"""How two topologies differ, in words."""
+"""Differences of two topologies, in words."""
 
 import dataclasses
 from collections.abc import Iterator
@@ -28,7 +28,7 @@ WORDS = {
 
 
 def difference(own: Topology, other: Topology) -> str:
-    """The first thing in which `other` is not as `own`, as a sentence; empty if they are equal."""
+    """Describe the first difference of `other` from `own`, as a sentence; empty if none."""
     return next(_differences(own, other), "")
 
 
@@ -56,7 +56,7 @@ def _differences(own: Topology, other: Topology) -> Iterator[str]:
 
 
 def _slots(own: Topology, other: Topology, b: int, name: str) -> Iterator[str]:
-    """Contacts, limits and watched geoms of a body."""
+    """Compare the contacts, limits and watched geoms of a body."""
     ends = {True: "capsule ends", False: "spheres"}
     for capsule, word in ends.items():
         had, has = (

@@ -1,8 +1,9 @@
-"""Mass matrix and bias forces, by the composite-rigid-body and the recursive Newton-Euler algorithm.
+"""Mass matrix and bias forces: composite-rigid-body and recursive Newton-Euler algorithms.
 
-Featherstone, "Rigid Body Dynamics Algorithms", chapters 5 and 6, with all bodies in the one frame of `kinematics` as in MuJoCo's
-computation chapter: then the only recursions are sums along the tree, `down` and `up`, and all else is done for all bodies at once.
-Bodies' or degrees of freedom's values are [n, L] per component, or packed for the sums as [n, components, L].
+Featherstone, "Rigid Body Dynamics Algorithms", chapters 5 and 6. All bodies are in the one frame of
+`kinematics`, as in MuJoCo's computation chapter. The only recursions are then sums along the tree,
+`down` and `up`; everything else is done for all bodies at once. Values of bodies or degrees of
+freedom are [n, L] per component, or packed for the sums as [n, components, L].
 """
 
 import dataclasses
@@ -41,12 +42,15 @@ from mjxgait.physics.lane_major.treematrix import Rows, on_pivot
 from mjxgait.types import Number
 
 CARRIES = {FREE: ((0, 3), (3, 3)), BALL: ((0, 3),), SLIDE: ((0, 1),), HINGE: ((0, 1),)}
-"""Per joint type the groups (first, count) of its degrees of freedom in the order in which one group carries the next."""
+"""Groups (first, count) of degrees of freedom per joint type; each group carries the next."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Inertia:
-    """Spatial inertia about the origin. turning: xx, yy, zz, xy, xz, yz in kg m^2; moment: mass times centre in kg m; mass in kg."""
+    """Spatial inertia about the origin.
+
+    turning: xx, yy, zz, xy, xz, yz in kg m^2. moment: mass times centre in kg m. mass: kg.
+    """
 
     turning: tuple[Scalar, ...]
     moment: Vector
@@ -65,7 +69,7 @@ class Inertia:
 
 
 class Masses(Protocol):
-    """How heavy bodies are and where: see `Parameters`, with the lanes innermost."""
+    """Masses and inertias of bodies: see `Parameters`, with the lanes innermost."""
 
     @property
     def mass(self) -> Number:
@@ -89,12 +93,12 @@ class Masses(Protocol):
 
 
 def inertias(x: Masses, poses: Sequence[Pose], like: jax.Array, pin: Pin) -> Inertia:
-    """Of all bodies."""
+    """Spatial inertias of all bodies."""
     pos = pin(table([pose.pos for pose in poses], like))
     rot = [pin(table([pose.rot[j] for pose in poses], like)) for j in range(3)]
     center = pin(plus(axes(pos), turn_each(rot, x.com)))
     first, second = pin((turn_each(rot, x.axes[:, 0]), turn_each(rot, x.axes[:, 1])))
-    # Two principal axes carry what their moments differ from the third; the third's goes to the identity.
+    # The third moment goes to the identity, what the other two differ from it to their axes.
     least, mass = x.inertia[:, 2], x.mass
     a, b = x.inertia[:, 0] - least, x.inertia[:, 1] - least
 
@@ -107,19 +111,19 @@ def inertias(x: Masses, poses: Sequence[Pose], like: jax.Array, pin: Pin) -> Ine
 
 
 def pack(parts: Sequence[jax.Array], pin: Pin) -> jax.Array:
-    """Components [n, L] each as one array [n, components, L]."""
+    """Stack components [n, L] into one array [n, components, L]."""
     return pin(jnp.stack(parts, axis=1))
 
 
 def unpack(packed: jax.Array) -> Motion:
-    """The six components of [n, 6, L]."""
+    """Split [n, 6, L] into its six components."""
     return Motion(axes(packed), axes(packed[:, 3:]))
 
 
 def down(
     structure: Structure, steps: jax.Array, start: Number, pin: Pin
 ) -> tuple[list[jax.Array], jax.Array]:
-    """Sums from the root: per body its sum [6, L], and per degree of freedom the sum before it [nv, 6, L].
+    """Sum from the root: [6, L] per body, and [nv, 6, L] before each degree of freedom.
 
     steps: [nv, 6, L], what each degree of freedom adds. start: [6, 1 or L], of the world.
     """
@@ -135,7 +139,7 @@ def down(
 
 
 def up(structure: Structure, own: jax.Array, pin: Pin) -> list[jax.Array]:
-    """Per body the sum [components, L] over itself and all below; own: [B, components, L]."""
+    """Sum own [B, components, L] over each body and all below: [components, L] per body."""
     sums = list(own)
     for b in reversed(range(len(sums))):
         below = [sums[c] for c, body in enumerate(structure.topology.bodies) if body.parent == b]
@@ -166,7 +170,10 @@ def force_cross(a: Motion, force: Motion) -> Motion:
 def bias_force(
     structure: Structure, body: Inertia, freedom: Motion, qvel: jax.Array, pin: Pin
 ) -> tuple[jax.Array, list[jax.Array]]:
-    """Coriolis, centrifugal and gravity force (`qfrc_bias`) [nv, L], and every body's velocity [6, L]."""
+    """Bias force (`qfrc_bias`) [nv, L] and every body's velocity [6, L].
+
+    Sum of Coriolis, centrifugal and gravity forces.
+    """
     steps = Motion(scale(qvel, freedom.spin), scale(qvel, freedom.shift))
     moving, before = down(structure, pack(steps.parts, pin), np.zeros((6, 1), qvel.dtype), pin)
     carried = motion_cross(unpack(before), steps)
@@ -182,7 +189,7 @@ def bias_force(
 
 
 def by_dof(structure: Structure, bodies: Sequence[jax.Array], pin: Pin) -> jax.Array:
-    """Per degree of freedom the value [components, L] of the body it moves."""
+    """Return per degree of freedom the value [components, L] of the body that it moves."""
     return pin(jnp.stack([bodies[b] for b in structure.topology.dof_body]))
 
 
@@ -212,19 +219,19 @@ def mass_rows(
 
 
 def root_freedoms(structure: Structure) -> int:
-    """How many degrees of freedom a free root has that everything hangs on; 0 for another root."""
+    """Count the degrees of freedom of a free root that carries everything; 0 for another root."""
     bodies = structure.topology.bodies
     alone = sum(body.parent < 0 for body in bodies) == 1
     return 6 if alone and [j.kind for j in bodies[0].joints] == [FREE] else 0
 
 
 def root_axes(freedom: Motion) -> jax.Array:
-    """The axes [3, 3, L] about which a free root turns; it shifts along the world's."""
+    """Axes [3, 3, L] about which a free root turns; its shifts follow the world's."""
     return jnp.stack([part[3:6] for part in freedom.spin], axis=1)
 
 
 def rooted(force: Sequence[jax.Array], turns: jax.Array, pin: Pin) -> jax.Array:
-    """What forces [n, L] (moment before force) do along the six motions of a free root: [n, 6, L].
+    """Project forces [n, L] (moment before force) onto the six motions of a free root: [n, 6, L].
 
     A third of the work of six inner products, for most entries of the root's unit motions are zero.
     """
@@ -233,7 +240,10 @@ def rooted(force: Sequence[jax.Array], turns: jax.Array, pin: Pin) -> jax.Array:
 
 
 def motion_paths(structure: Structure, freedom: Motion, pin: Pin) -> dict[int, jax.Array]:
-    """Per degree of freedom the motions [n, 6, L] along a chain that starts with its own; degrees of freedom below each other share one."""
+    """Return per degree of freedom the motions [n, 6, L] along a chain that starts with its own.
+
+    Degrees of freedom below each other share a chain.
+    """
     packed = pack(freedom.parts, pin)
     paths: dict[int, jax.Array] = {}
     for k in reversed(range(len(structure.pattern.chains))):
@@ -245,7 +255,7 @@ def motion_paths(structure: Structure, freedom: Motion, pin: Pin) -> dict[int, j
 
 
 def _runs(chain: Sequence[int]) -> list[tuple[int, int]]:
-    """Successive numbers as (first, count)."""
+    """Group successive numbers as (first, count)."""
     runs: list[tuple[int, int]] = []
     for i in chain:
         if runs and i == sum(runs[-1]):

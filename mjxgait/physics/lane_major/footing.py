@@ -1,12 +1,12 @@
-"""The Jacobian J of all contacts, never written out.
+"""Jacobian J of all contacts, never written out.
 
 Each contact is a point of a body, and bodies move as the tree moves them. J x is the velocity of
-the points when the tree is moved by x: a sum down the tree. J^T f is the points' forces, gathered
-at their bodies and summed up the tree. J^T D J is the mass matrix's own recursion with the
-contacts' stiffness in the place of inertia (Featherstone, "Rigid Body Dynamics Algorithms",
-chapter 6). So a further contact on a body costs a few dozen operations, however long its chain.
+the points when x moves the tree: a sum down the tree. J^T f gathers the points' forces at their
+bodies and sums them up the tree. J^T D J is the mass matrix's own recursion with the contacts'
+stiffness instead of inertia (Featherstone, "Rigid Body Dynamics Algorithms", chapter 6). So a
+further contact on a body costs a few dozen operations, however long its chain.
 
-Contacts' values are [C, L] along normal and two tangents; a body's are slabs [6, L], angular
+Values of contacts are [C, L] along normal and two tangents; those of a body are [6, L], angular
 before linear, or [21, L].
 """
 
@@ -49,7 +49,7 @@ class Moves:
     paths: tuple[jax.Array, ...]
 
     def along_chains(self, tree: Carriers, force: Sequence[jax.Array], pin: Pin) -> list[jax.Array]:
-        """What the force [n, L] of each degree of freedom does along its chain from the root."""
+        """Project each degree of freedom's force [n, L] onto its chain from the root."""
         head = None if self.turns is None else rooted(force, self.turns, pin)
         rows = []
         for place, length in enumerate(tree.lengths):
@@ -77,14 +77,14 @@ class Touch:
 
 @dataclasses.dataclass(frozen=True)
 class Footing:
-    """The operators of one state."""
+    """Operators of the contact Jacobian in one state."""
 
     structure: Structure
     touch: Touch
     pin: Pin
 
     def along(self, vector: Sequence[jax.Array]) -> Directions:
-        """J x for x [nv] list of [L]."""
+        """J x for x, an [nv] list of [L]."""
         tree, moves = self.structure.carriers, self.touch.moves
         turns, freedom = moves.turns, moves.freedom
         moving: dict[int, jax.Array] = {}
@@ -104,7 +104,7 @@ class Footing:
         return self.pin(self.touch.frames.into(velocity))
 
     def gathered(self, force: Directions) -> dict[int, jax.Array]:
-        """J^T f: per degree of freedom that moves a contact, [L]."""
+        """J^T f: [L] per degree of freedom that moves a contact."""
         pull = self.touch.frames.out(force)
         tree, moves = self.structure.carriers, self.touch.moves
         wrench = self._summed((*cross(self.touch.points, pull), *pull))
@@ -122,7 +122,7 @@ class Footing:
     def stiffened(self, mass: Rows, stiffness: Sequence[jax.Array]) -> Rows:
         """Rows of M + J^T D J.
 
-        stiffness: of each contact D along nn, n1, n2, 11 and 22 (D is zero along 12), [C, L].
+        stiffness: D of each contact along nn, n1, n2, 11 and 22 (D is zero along 12), [C, L].
         """
         tree, moves = self.structure.carriers, self.touch.moves
         held = self._summed(spatial(self.touch.frames.stiffness(stiffness), self.touch.points))
@@ -144,7 +144,7 @@ class Footing:
         return tuple(rows[k] for k in range(len(mass)))
 
     def _summed(self, values: Sequence[jax.Array]) -> dict[int, jax.Array]:
-        """Contacts' components [C, L] summed over each body and all below: [components, L]."""
+        """Sum contacts' components [C, L] over each body and all below: [components, L]."""
         tree, packed = self.structure.carriers, self.pin(jnp.stack(values, axis=1))
         own: dict[int, list[jax.Array]] = {}
         first = 0
@@ -160,7 +160,7 @@ class Footing:
 
 
 def spatial(stiffness: Sequence[jax.Array], points: Sequence[jax.Array]) -> list[jax.Array]:
-    """A spring's stiffness at a point, as felt at the origin: 6 angular, 9 mixed, 6 linear.
+    """Convert a spring's stiffness at a point to the origin: 6 angular, 9 mixed, 6 linear.
 
     The mixed ones are the force along x, y, z per turn about x, then about y, then about z.
     """
@@ -179,7 +179,7 @@ def spatial(stiffness: Sequence[jax.Array], points: Sequence[jax.Array]) -> list
 
 
 def resistance(stiffness: Sequence[jax.Array], motion: Motion) -> tuple[jax.Array, ...]:
-    """Moment and force of a spatial stiffness, ordered as by `spatial`, against a motion."""
+    """Moment and force of a spatial stiffness (order: see `spatial`) against a motion."""
     sxx, syy, szz, sxy, sxz, syz = stiffness[:6]
     about = (stiffness[6:9], stiffness[9:12], stiffness[12:15])
     lxx, lyy, lzz, lxy, lxz, lyz = stiffness[15:]

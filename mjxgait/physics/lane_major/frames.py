@@ -1,4 +1,4 @@
-"""The axes of all contacts: how velocities and forces turn between them and the world's axes.
+"""Axes of all contacts, to convert velocities and forces to and from the world's axes.
 
 Values are [C, L]; a contact's own directions are normal, first and second tangent.
 """
@@ -19,24 +19,24 @@ Components = tuple[jax.Array, jax.Array, jax.Array]
 
 
 class Frames(Protocol):
-    """One of each contact."""
+    """Axes of all contacts."""
 
     def into(self, vector: Components) -> Directions:
-        """A vector of the world along a contact's directions."""
+        """Convert a vector of the world to a contact's directions."""
         ...
 
     def out(self, vector: Directions) -> Components:
-        """A vector along a contact's directions in the world."""
+        """Convert a vector along a contact's directions to the world."""
         ...
 
     def stiffness(self, along: Sequence[jax.Array]) -> tuple[jax.Array, ...]:
-        """D along xx, yy, zz, xy, xz, yz of nn, n1, n2, 11 and 22 (D is zero along 12)."""
+        """Convert D along nn, n1, n2, 11 and 22 (zero along 12) to xx, yy, zz, xy, xz, yz."""
         ...
 
 
 @pytree
 class Level:
-    """On level ground, the first tangent along the world's x: nothing is turned."""
+    """Frames on level ground with the first tangent along the world's x: nothing is turned."""
 
     def into(self, vector: Components) -> Directions:
         """See `Frames`."""
@@ -56,7 +56,7 @@ class Level:
 
 @pytree
 class Turned:
-    """On level ground. x, y: of the first tangent."""
+    """Frames on level ground. x, y: of the first tangent."""
 
     x: jax.Array
     y: jax.Array
@@ -80,7 +80,7 @@ class Turned:
 
 @pytree
 class Tilted:
-    """On other ground. normal, first, second: unit vectors in the world."""
+    """Frames on other ground. normal, first, second: unit vectors in the world."""
 
     normal: Components
     first: Components
@@ -103,7 +103,7 @@ class Tilted:
         """See `Frames`."""
         nn, n1, n2, t1, t2 = along
         n, a, b = self.normal, self.first, self.second
-        # What a shift along each axis of the world is answered with, along the three directions.
+        # Response along the three directions to a shift along each axis of the world.
         felt = [
             (
                 nn * n[i] + n1 * a[i] + n2 * b[i],

@@ -1,5 +1,6 @@
-"""A model whose welded bodies are part of those that carry them: what has no joint needs no place
-in the equations. Robots' files have many: sensors, rotors, feet.
+"""Models with welded bodies merged into those that carry them.
+
+A body without a joint needs no place in the equations. Robots have many: sensors, rotors, feet.
 """
 
 import dataclasses
@@ -13,10 +14,10 @@ from mjxgait.physics.layout import SenseLayout
 
 
 class Fused:
-    """Reads as the model does, but for its bodies and where shapes are in them.
+    """Model with merged bodies; all but bodies and places of shapes reads as in the original.
 
-    model: as it is. carrier: [nbody] the place here of each body there. kept: [n] the bodies there
-    of those here, without the world.
+    model: the original. carrier: [nbody] the body here that each original body is part of.
+    kept: [n] the original bodies of those here, without the world.
     """
 
     def __init__(self, model: mujoco.MjModel, kept: np.ndarray) -> None:
@@ -46,7 +47,7 @@ class Fused:
         return getattr(self.model, name)
 
     def body(self, place: int) -> Any:
-        """Of MuJoCo, by the place here."""
+        """Return MuJoCo's body, by its index here."""
         return self.model.body(int(np.append(0, self.kept)[place]))
 
     def _weigh(self, place: np.ndarray, turn: np.ndarray) -> None:
@@ -84,8 +85,9 @@ Model: TypeAlias = Any
 def fuse(
     model: mujoco.MjModel, layout: SenseLayout, crossings: Crossings | None
 ) -> tuple[Model, SenseLayout, Crossings | None]:
-    """All of it in fewer bodies; as it is where none is welded, or in a fluid, which resists each
-    body by itself.
+    """Merge the welded bodies; return all as it is if none is welded, or in a fluid.
+
+    A fluid resists each body by itself.
     """
     bodies = np.arange(1, model.nbody)
     kept = bodies[(model.body_jntnum[1:] > 0) | (bodies == layout.trunk)]
@@ -109,14 +111,14 @@ def fuse(
 
 
 def geom_weights(model: Model, geoms: list[int]) -> np.ndarray:
-    """[n] 1/kg, the inverse mass that a contact of each geom sees."""
+    """Inverse mass [n] 1/kg that a contact of each geom sees."""
     if isinstance(model, Fused):
         return np.array(model.geom_invweight[geoms])
     return np.array(model.body_invweight0[model.geom_bodyid[geoms], 0])
 
 
 def _carried(model: mujoco.MjModel, kept: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Whose part each body [nbody] is, and where it is in it: [nbody, 3] m, [nbody, 3, 3]."""
+    """Find the carrier [nbody] of each body, and its pose there: [nbody, 3] m, [nbody, 3, 3]."""
     carrier = np.zeros(model.nbody, int)
     place, turn = np.zeros((model.nbody, 3)), np.tile(np.eye(3), (model.nbody, 1, 1))
     for body in range(1, model.nbody):
@@ -131,7 +133,7 @@ def _carried(model: mujoco.MjModel, kept: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def _compose(turn: np.ndarray, quat: np.ndarray) -> np.ndarray:
-    """The quaternion after a turn; the same numbers where there is none."""
+    """Turn a quaternion; without a turn its numbers stay the same."""
     return quat if np.array_equal(turn, np.eye(3)) else _quaternion(turn @ _matrix(quat))
 
 

@@ -1,4 +1,4 @@
-"""One machine-code kernel out of many operations, on CPU."""
+"""Single machine-code kernel for many operations, on CPU."""
 
 import functools
 from collections.abc import Callable
@@ -9,13 +9,14 @@ from jax.experimental.xla_metadata import set_xla_metadata
 
 
 def one_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
-    """The function, compiled on CPU into a single kernel instead of one per fused operation.
+    """Compile the function on CPU into a single kernel instead of one per fused operation.
 
-    XLA's CPU runtime starts every kernel separately (70 ns or more each), and a physics step has hundreds on small arrays. XLA compiles
-    calls that carry this mark whole, as it does of its own accord with small loops. Elsewhere this changes nothing.
+    XLA's CPU runtime starts every kernel separately (70 ns or more each), and a physics step has
+    hundreds on small arrays. XLA compiles calls that carry this mark whole, as it does by default
+    with small loops. Elsewhere this changes nothing.
 
-    The function must have at least two results that are used: XLA mishandles a marked call whose only result it would
-    split over threads.
+    The function must have at least two results that are used: XLA mishandles a marked call
+    with a single result that it would split over threads.
     """
 
     @functools.wraps(function)

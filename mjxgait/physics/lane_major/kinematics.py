@@ -1,7 +1,8 @@
-"""Where the bodies are and how each degree of freedom moves them.
+"""Poses of the bodies, and motions of their degrees of freedom.
 
-All quantities are in axes parallel to the world's with the origin at the root body's own position (the world's where the root is not
-free), so that float32 stays exact however far a creature has walked. Vectors are arrays [3, L], or constants.
+All quantities are in axes parallel to the world's. The origin is the root body's own position (the
+world's if the root is not free), so that float32 stays exact however far a creature has walked.
+Vectors are arrays [3, L], or constants.
 """
 
 import dataclasses
@@ -42,7 +43,11 @@ IDENTITY: Any = tuple(np.eye(3, dtype=np.float32)[:, j : j + 1] for j in range(3
 
 @dataclasses.dataclass(frozen=True)
 class Pose:
-    """A body. origin: of its tree, in the world; pos: from the origin to the body frame; rot: the frame's three axes."""
+    """Pose of a body.
+
+    origin: of its tree, in the world. pos: from the origin to the body frame. rot: the frame's
+    three axes.
+    """
 
     origin: Any
     pos: Any
@@ -62,7 +67,10 @@ WORLD = Pose(0.0, 0.0, IDENTITY)
 
 @dataclasses.dataclass(frozen=True)
 class Freedom:
-    """A degree of freedom: a turn about `axis` through `anchor`, or a shift along `slide`; the others are zero."""
+    """Degree of freedom: a turn about `axis` through `anchor`, or a shift along `slide`.
+
+    The other fields are zero.
+    """
 
     axis: Any = 0.0
     anchor: Any = 0.0
@@ -71,7 +79,7 @@ class Freedom:
 
 @dataclasses.dataclass(frozen=True)
 class Motion:
-    """Velocities of one body or of n at once. spin: angular; shift: of the body's point at the origin."""
+    """Velocities of one body or of n. spin: angular; shift: of the body's point at the origin."""
 
     spin: tuple[Scalar, Scalar, Scalar]
     shift: tuple[Scalar, Scalar, Scalar]
@@ -83,7 +91,7 @@ class Motion:
 
 
 def posture(structure: Structure, qpos: jax.Array, pin: Pin) -> tuple[list[Pose], list[Freedom]]:
-    """Forward kinematics of qpos [nq, L]: every body and every degree of freedom."""
+    """Forward kinematics of qpos [nq, L]: pose of every body, and every degree of freedom."""
     poses: list[Pose] = []
     freedoms: list[Freedom] = []
     for body in structure.bodies:
@@ -96,7 +104,10 @@ def posture(structure: Structure, qpos: jax.Array, pin: Pin) -> tuple[list[Pose]
 
 
 def motions(freedoms: Sequence[Freedom], like: jax.Array, pin: Pin) -> Motion:
-    """The motion that each degree of freedom gives to its body and all below at unit velocity; components [nv, L]."""
+    """Motion that each degree of freedom gives its body and all below at unit velocity.
+
+    Components [nv, L].
+    """
     axis, anchor, slide = (
         table([getattr(f, part) for f in freedoms], like) for part in ("axis", "anchor", "slide")
     )
@@ -118,7 +129,7 @@ def _placed(body: Body, parent: Pose) -> Pose:
 
 
 def unit_quaternion(quat: Any) -> tuple[jax.Array, ...]:
-    """Normalised (w, x, y, z)."""
+    """Normalise a quaternion (w, x, y, z)."""
     norm = jnp.sqrt(quat[0] * quat[0] + quat[1] * quat[1] + quat[2] * quat[2] + quat[3] * quat[3])
     return tuple(q / norm for q in quat)
 
@@ -159,7 +170,10 @@ _MOVES = {FREE: _free, BALL: _ball, HINGE: _hinge, SLIDE: _slide}
 
 
 def _about(axis: Vector, sin: jax.Array, cos: jax.Array) -> list[tuple[Scalar, ...]]:
-    """Rotation about a unit axis (Rodrigues): cos 1 + sin [axis]x + (1 - cos) axis axis^T, as columns."""
+    """Rotation about a unit axis (Rodrigues), as columns.
+
+    cos 1 + sin [axis]x + (1 - cos) axis axis^T
+    """
 
     def column(unit: Vector, along: Scalar) -> tuple[Scalar, ...]:
         skew = cross(axis, unit)

@@ -1,10 +1,9 @@
-"""Arithmetic over lanes, with the numbers of the model folded in while tracing.
+"""Arithmetic over lanes that folds the numbers of the model while tracing.
 
 All arrays have the lanes last, so that every operation is a contiguous vector instruction. A
-`Scalar` is an array ([L], or [n, L] for n bodies at once; 1 for L where all lanes share it), or a
-Python number where it is a constant of the program: the many zeros and ones of a model then cost
-nothing. Three scalars make a `Vector`; `turn` and `plus` also serve vectors that are one array
-[3, L].
+`Scalar` is an array ([L], or [n, L] for n bodies at once; L is 1 if all lanes share it), or a
+Python number if it is a constant: the many zeros and ones of a model then cost nothing. Three
+scalars make a `Vector`; `turn` and `plus` also serve vectors that are one array [3, L].
 """
 
 from collections.abc import Callable, Sequence
@@ -26,13 +25,16 @@ Pin = Callable[[Any], Any]
 
 
 def constant(value: float) -> float:
-    """A model number as a Python float; values within rounding of -1, 0 and 1 become exact, so that they fold."""
+    """Return a model number as a Python float.
+
+    Values within rounding of -1, 0 and 1 become exact, so that they fold.
+    """
     nearest = float(round(float(value)))
     return nearest if abs(value - nearest) < 1e-12 and abs(nearest) <= 1 else float(value)
 
 
 def constants(values: np.ndarray) -> Any:
-    """Nested tuples of constants, the last axis innermost."""
+    """Convert values to nested tuples of constants, the last axis innermost."""
     return tuple(constants(v) for v in values) if np.ndim(values) else constant(float(values))
 
 
@@ -56,7 +58,7 @@ def _is(number: Scalar, value: float) -> bool:
 
 
 def mul(a: Scalar, b: Scalar) -> Scalar:
-    """Product; constants 0, 1 and -1 cost nothing."""
+    """Multiply; constants 0, 1 and -1 cost nothing."""
     if _is(a, 0.0) or _is(b, 0.0):
         return 0.0
     if _is(a, 1.0) or _is(b, 1.0):
@@ -67,13 +69,13 @@ def mul(a: Scalar, b: Scalar) -> Scalar:
 
 
 def add(*terms: Scalar) -> Scalar:
-    """Sum without the zeros."""
+    """Add, leaving out constant zeros."""
     counted = [t for t in terms if not _is(t, 0.0)]
     return total(counted) if counted else 0.0
 
 
 def total(terms: Sequence[Any]) -> Any:
-    """Sum of one or more terms, in their order."""
+    """Sum one or more terms in their order."""
     result = terms[0]
     for term in terms[1:]:
         result = result + term
@@ -81,7 +83,7 @@ def total(terms: Sequence[Any]) -> Any:
 
 
 def sub(a: Scalar, b: Scalar) -> Scalar:
-    """Difference."""
+    """Subtract."""
     return a if _is(b, 0.0) else -b if _is(a, 0.0) else a - b
 
 
@@ -115,32 +117,36 @@ def scale(s: Scalar, a: Sequence[Scalar]) -> Any:
 
 
 def turn(matrix: Sequence[Any], vector: Sequence[Scalar]) -> Any:
-    """Matrix times vector, the matrix given by three columns, each an array [3, L]."""
+    """Multiply a matrix and a vector; the matrix is three columns, each an array [3, L]."""
     return dot(matrix, vector)
 
 
 def turn_each(matrices: Sequence[Any], vectors: Number) -> Vector:
-    """`turn` of n vectors [n, 3, L], each by its own three columns [n, 3, L]; components [n, L]."""
+    """Apply `turn` to n vectors [n, 3, L], each with its own three columns [n, 3, L].
+
+    Components [n, L].
+    """
     x, y, z = (total([vectors[:, j] * matrices[j][:, i] for j in range(3)]) for i in range(3))
     return x, y, z
 
 
 def axes(array: jax.Array) -> Vector:
-    """Components of vectors stored together: [n, 3, L] to three [n, L]."""
+    """Split vectors stored together, [n, 3, L], into three components [n, L]."""
     return array[:, 0], array[:, 1], array[:, 2]
 
 
 def parts(vector: Any) -> Vector:
-    """Components of an array [3, L] or of zero."""
+    """Split an array [3, L], or zero, into components."""
     return (0.0, 0.0, 0.0) if isinstance(vector, float) else (vector[0], vector[1], vector[2])
 
 
 def sin_cos(angle: jax.Array) -> tuple[jax.Array, jax.Array]:
     """Sine and cosine of angles in rad, to float32's rounding up to some thousand turns.
 
-    XLA's CPU compiler calls the C library once per lane for each of the two, which took more time than the rest of the kinematics. Here
-    the angle is brought within an eighth of a turn of a multiple of a quarter (Cody & Waite 1980), where short polynomials do
-    (coefficients of the Cephes library's sinf and cosf).
+    XLA's CPU compiler calls the C library once per lane for each of the two, which took more time
+    than the rest of the kinematics. Here the angle is brought within an eighth of a turn of a
+    multiple of a quarter (Cody & Waite 1980), where short polynomials suffice (coefficients of the
+    Cephes library's sinf and cosf).
     """
     quarter = jnp.round(angle * (2 / np.pi))
     near = (
@@ -168,10 +174,11 @@ def sin_cos(angle: jax.Array) -> tuple[jax.Array, jax.Array]:
 
 
 def pinned_by(lanes: jax.Array) -> Pin:
-    """A function that makes XLA compute and store the values of a pytree once, instead of once per use.
+    """Return a function that makes XLA compute a pytree's values once, instead of once per use.
 
-    XLA's fusion copies cheap producers into each consumer: along a kinematic chain the copies multiply. It never copies a division, and a
-    division by one that the compiler cannot know to be one changes nothing else. (`optimization_barrier` is removed before fusion on CPU.)
+    XLA's fusion copies cheap producers into each consumer; along a kinematic chain the copies
+    multiply. It never copies a division, and a division by one that the compiler cannot prove to be
+    one changes nothing else. (`optimization_barrier` is removed before fusion on CPU.)
     lanes: any finite [L] array.
     """
     one = lanes * 0.0 + 1.0
@@ -179,7 +186,7 @@ def pinned_by(lanes: jax.Array) -> Pin:
 
 
 def column(values: Sequence[Scalar], dtype: np.dtype) -> Number:
-    """Scalars, constants among them, below each other: [n, 1], or [n, L] where one has lanes."""
+    """Stack scalars, constants among them: [n, 1], or [n, L] if one has lanes."""
     if all(isinstance(value, float) for value in values):
         return np.array(values, dtype)[:, None]
     wide = jnp.broadcast_shapes((1,), *(np.shape(value) for value in values))
@@ -187,7 +194,10 @@ def column(values: Sequence[Scalar], dtype: np.dtype) -> Number:
 
 
 def table(vectors: Sequence[Any], like: jax.Array) -> Any:
-    """Vectors [3, L], some of them constants ([3] or zero), as one array [n, 3, L]; [n, 3, 1] in NumPy if all are constants."""
+    """Stack vectors [3, L], some of them constants ([3] or zero), as one array [n, 3, L].
+
+    [n, 3, 1] in NumPy if all are constants.
+    """
     if all(not isinstance(v, jax.Array) for v in vectors):
         return np.array([np.broadcast_to(v, 3) for v in vectors], like.dtype)[:, :, None]
     shape = (3, like.shape[-1])

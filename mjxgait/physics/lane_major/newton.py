@@ -1,8 +1,10 @@
 """Newton's method for MuJoCo's contact problem.
 
-The acceleration a minimises `(a - a_smooth)^T M (a - a_smooth) / 2 + sum over rows of D (J a - reference)^2 / 2 where that is negative`
-(Todorov 2014; MuJoCo documentation, "Computation", "Optimization algorithms"). It is piecewise quadratic and convex: Newton with an
-exact line search ends after a few steps. The Hessian `M + J^T D J` has the tree's sparsity, see `treematrix`.
+The acceleration a minimises
+`(a - a_smooth)^T M (a - a_smooth) / 2 + sum over rows of D min(J a - reference, 0)^2 / 2`
+(Todorov 2014; MuJoCo documentation, "Computation", "Optimization algorithms"). This is piecewise
+quadratic and convex: Newton with an exact line search ends after a few steps. The Hessian
+`M + J^T D J` has the tree's sparsity, see `treematrix`.
 """
 
 import dataclasses
@@ -26,16 +28,16 @@ Lanes = jax.Array
 Search = tuple[Lanes, Lanes, Lanes, Lanes, jax.Array]
 """Bracket, length, whether the lane goes on, and the number of evaluations."""
 MANY = 32
-"""Rows of contacts, from which on sums over them are folded."""
+"""Number of constraint rows above which sums over them are folded."""
 FLAT = 1e-5
-"""Of the slope at the start: where less is left, a line search is over."""
+"""Share of the initial slope below which a line search ends."""
 Edges = list[jax.Array]
-"""One value per constraint row: four arrays [C, L] of the contacts' edges, and one [M, L] of the limits."""
+"""One value per constraint row: four [C, L] (edges of contacts) and one [M, L] (limits)."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Problem:
-    """mass: rows of M. force: [nv] list of [L], all but the constraints'."""
+    """Contact problem. mass: rows of M. force: [nv] list of [L], all but the constraints'."""
 
     mass: Rows
     force: list[Lanes]
@@ -46,7 +48,11 @@ class Problem:
 @jax.tree_util.register_dataclass
 @dataclasses.dataclass(frozen=True)
 class Iterate:
-    """acceleration a and M a, lists of nv [L]; residuals: J a - reference of contacts' three directions [C, L] and of limits [M, L]."""
+    """Point of the iteration.
+
+    acceleration: a, and inertial: M a, lists of nv [L]. residuals: J a - reference of the contacts'
+    three directions [C, L] and of the limits [M, L].
+    """
 
     acceleration: list[Lanes]
     inertial: list[Lanes]
@@ -58,8 +64,9 @@ def constrained_acceleration(
 ) -> tuple[list[Lanes], list[Lanes]]:
     """Acceleration and generalised constraint force, lists of nv [L].
 
-    guess: where to start, the previous step's acceleration. MuJoCo would try the smooth acceleration too and take the better; where no row
-    is active Newton's first step leads there from anywhere, and elsewhere the guess is the better but for a few steps in a thousand.
+    guess: the previous step's acceleration. MuJoCo also tries the smooth acceleration and takes the
+    better. Where no row is active, Newton's first step leads there from anywhere; elsewhere the
+    guess is better but for a few steps in a thousand.
     """
     inertial = problem.pin(multiply(problem.constraints.structure.pattern, problem.mass, guess))
     start = Iterate(list(guess), inertial, _residuals(problem, guess))
@@ -68,7 +75,10 @@ def constrained_acceleration(
 
 
 def _minimised(problem: Problem, start: Iterate) -> Iterate:
-    """Newton steps until no lane's active rows change any more (the step before was then exact), or the model's number of iterations."""
+    """Iterate until no lane's active rows change (the step before was then exact).
+
+    The model's number of iterations is the maximum.
+    """
     limit = problem.constraints.structure.iterations
     if limit == 1:
         return _improved(problem, start)
@@ -79,7 +89,7 @@ def _minimised(problem: Problem, start: Iterate) -> Iterate:
     def body(carry: tuple[Iterate, Lanes, jax.Array]) -> tuple[Iterate, Lanes, jax.Array]:
         at, going, count = carry
         new = _improved(problem, at)
-        # A finished lane stands still, so that its result does not depend on its neighbours.
+        # A finished lane stays fixed, so that its result does not depend on its neighbours.
         kept = jax.tree.map(lambda b, a: jnp.where(going > 0, b, a), new, at)
         return kept, _switched(problem, at, kept), count + 1
 
@@ -89,7 +99,7 @@ def _minimised(problem: Problem, start: Iterate) -> Iterate:
 
 
 def _switched(problem: Problem, before: Iterate, after: Iterate) -> Lanes:
-    """Per lane how many rows became active or inactive."""
+    """Count per lane the rows that became active or inactive."""
     c = problem.constraints
     pairs = zip(_edges(c, before.residuals), _edges(c, after.residuals), _weights(c), strict=True)
     return _total([jnp.where(((a < 0) != (b < 0)) & (w > 0), 1.0, 0.0) for a, b, w in pairs])
@@ -103,7 +113,7 @@ def _residuals(problem: Problem, acceleration: Sequence[Lanes]) -> tuple[jax.Arr
 
 
 def _edges(c: Constraints, values: Sequence[jax.Array]) -> Edges:
-    """From the three directions of the contacts to the four edges of the pyramid."""
+    """Convert the contacts' three directions to the pyramid's four edges."""
     normal, first, second, limit = values
     return [
         normal + c.friction * first,
@@ -119,7 +129,7 @@ def _weights(c: Constraints) -> Edges:
 
 
 def _total(parts: Sequence[jax.Array]) -> Lanes:
-    """Sum over all rows of all arrays [n, L]."""
+    """Sum all rows of all arrays [n, L]."""
     if max(part.shape[0] for part in parts) > MANY:
         return _folded(parts)
     rows = [part[n] for part in parts for n in range(part.shape[0])]
@@ -127,7 +137,7 @@ def _total(parts: Sequence[jax.Array]) -> Lanes:
 
 
 def _folded(parts: Sequence[jax.Array]) -> Lanes:
-    """The same by halves: a term for each of hundreds of rows is more than XLA makes fast code of."""
+    """Sum all rows by halves: from hundreds of separate terms XLA makes slow code."""
     sums: dict[int, jax.Array] = {}
     for part in parts:
         count = part.shape[0]
@@ -174,7 +184,7 @@ def _constraint_force(problem: Problem, at: Iterate) -> list[Lanes]:
 
 
 def _improved(problem: Problem, at: Iterate) -> Iterate:
-    """One Newton step with exact line search."""
+    """Take one Newton step with exact line search."""
     c, pin = problem.constraints, problem.pin
     pattern = c.structure.pattern
     uphill = _minus(_minus(at.inertial, problem.force), _constraint_force(problem, at))
@@ -194,7 +204,7 @@ def _improved(problem: Problem, at: Iterate) -> Iterate:
 
 
 def _hessian(problem: Problem, at: Iterate) -> Rows:
-    """Rows of M + J^T D J over the rows that are active."""
+    """Rows of M + J^T D J over the active rows."""
     c, pin = problem.constraints, problem.pin
     d = [
         jnp.where(r < 0, w, 0.0) for w, r in zip(_weights(c), _edges(c, at.residuals), strict=True)
@@ -218,7 +228,10 @@ def _line_search(
     inertial: Sequence[Lanes],
     change: Sequence[jax.Array],
 ) -> Lanes:
-    """The length [L] that minimises the cost along a step: Newton on its derivative, which grows piecewise linearly, kept in a bracket."""
+    """Find the length [L] that minimises the cost along a step.
+
+    Newton on its derivative, which grows piecewise linearly, kept in a bracket.
+    """
     c, pin = problem.constraints, problem.pin
     slope = pin(_dot(step, _minus(at.inertial, problem.force)))
     curvature = pin(_dot(step, inertial))
@@ -242,7 +255,7 @@ def _line_search(
         newton = length - first / jnp.maximum(second, np.finfo(slope.dtype).tiny)
         middle = jnp.where(high < jnp.inf, 0.5 * (low + high), 2.0 * length)
         found = jnp.where((newton >= low) & (newton <= high), newton, middle)
-        # A finished lane stands still, so that its result does not depend on its neighbours.
+        # A finished lane stays fixed, so that its result does not depend on its neighbours.
         going = jnp.where(jnp.abs(first) > FLAT * jnp.abs(slope), going, 0.0)
         return low, high, pin(jnp.where(going > 0, found, length)), pin(going), count + 1
 

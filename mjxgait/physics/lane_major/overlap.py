@@ -1,4 +1,4 @@
-"""Where the bars of a creature are (mjxgait/creature/overlap.py), lanes innermost."""
+"""Places of a creature's bars (mjxgait/creature/overlap.py), lanes innermost."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -14,7 +14,7 @@ from mjxgait.physics.overlap import single, whole
 def bar_places(
     structure: Structure, qpos: jax.Array, like: jax.Array
 ) -> tuple[jax.Array, jax.Array]:
-    """Middle of each bar, from its tree's origin, and from there to one end: both [S, 3, L] m.
+    """Each bar's middle, from its tree's origin, and from there to one end: [S, 3, L] m.
 
     Args:
       qpos: [nq, L]. like: any finite [L].
@@ -35,7 +35,7 @@ def bar_places(
 def _looked_up(
     structure: Structure, poses: Sequence[Pose], like: jax.Array
 ) -> tuple[jax.Array, jax.Array]:
-    """Of bars whose bodies are numbers of the program."""
+    """Look up the places of bars with body indices that are numbers of the program."""
     bars = structure.exact.bars
     assert bars.body is not None
     body = whole(bars.body[..., 0])

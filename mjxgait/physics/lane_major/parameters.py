@@ -1,8 +1,8 @@
-"""The numbers of a body: everything that may differ between two models of one topology.
+"""Numbers of a body: everything that may differ between two models of one topology.
 
 Letters: `B` bodies without the world, `N` joints, `C` contacts, `M` limits, `G` watched geoms,
-`S` bars and `Q` pairs of them (`Crossings`). One body's numbers have the shapes given here; those
-of a body per lane have one more axis, the lanes, innermost.
+`S` bars and `Q` pairs of them (`Crossings`). Shapes are those of one body; with a body per
+lane, the lanes are one more, innermost axis.
 """
 
 import dataclasses
@@ -29,7 +29,7 @@ from mjxgait.types import Number, pytree
 
 @pytree
 class Softness:
-    """Of n constraints: stiffness, damping, margin [n]; impedance [n, 4]. See `Softened`."""
+    """Softness of n constraints (`Softened`): stiffness, damping, margin [n]; impedance [n, 4]."""
 
     stiffness: Number
     damping: Number
@@ -41,8 +41,8 @@ class Softness:
 class Contacts:
     """Spheres that may touch the floor, z = 0.
 
-    center: [C, 3] m in the body's frame. axis: [C, 3] of the capsule whose end it is, along which
-    MuJoCo aligns the friction directions; no matter for a sphere. radius: [C] m. friction: [C].
+    center: [C, 3] m in the body's frame. axis: [C, 3] of the capsule that the sphere ends; MuJoCo
+    aligns the friction directions with it; unused for a sphere. radius: [C] m. friction: [C].
     weight: [C] 1/kg, body_invweight0, the inverse mass seen by the contact.
     """
 
@@ -66,7 +66,7 @@ class Limits:
 
 @pytree
 class Watched:
-    """Geoms that are sensed, each a support function (`geometry.support_extents`).
+    """Sensed geoms, each a support function (`geometry.support_extents`).
 
     pos: [G, 3] m in the body's frame. rot: [G, 3, 3] the geom's axes there. radius: [G] m.
     box, ellipsoid: [G, 3] m.
@@ -117,10 +117,10 @@ class Parameters:
 
 
 def read_parameters(model: Model, layout: SenseLayout, crossings: Crossings | None) -> Parameters:
-    """Of a model, in NumPy.
+    """Read the numbers of a model, in NumPy.
 
     Raises:
-      UnsupportedModel: the fast physics does not know something the model uses.
+      UnsupportedModel: the lane-major physics does not support something that the model uses.
     """
     bodies = range(1, model.nbody)
     joints = [j for b in bodies for j in joints_of(model, b)]
@@ -152,12 +152,12 @@ def read_parameters(model: Model, layout: SenseLayout, crossings: Crossings | No
 
 
 def _snapped(values: np.ndarray) -> np.ndarray:
-    """Numbers within rounding of -1, 0 and 1 made exact, so that as constants they fold."""
+    """Make numbers within rounding of -1, 0 and 1 exact, so that they fold as constants."""
     return np.array(constants(np.asarray(values))).reshape(np.shape(values))
 
 
 def _turned(quats: np.ndarray) -> np.ndarray:
-    """[n, 3, 3] axes of the frames of n quaternions."""
+    """Axes [n, 3, 3] of the frames of n quaternions."""
     return np.array([columns(quat) for quat in quats]).reshape(-1, 3, 3)
 
 

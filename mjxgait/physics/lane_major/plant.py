@@ -1,4 +1,4 @@
-"""The fast physics behind the `Plant` protocol."""
+"""Lane-major physics behind the `Plant` protocol."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -71,7 +71,7 @@ from mjxgait.types import (
 
 @pytree
 class Workings:
-    """mass: rows of the mass matrix. bias: [nv, L]. touch: the contacts' geometry."""
+    """Step data. mass: rows of the mass matrix. bias: [nv, L]. touch: the contacts' geometry."""
 
     mass: Rows
     bias: jax.Array
@@ -82,7 +82,7 @@ class Workings:
 class FastPlant:
     """One MuJoCo step with the lanes innermost; see the package's docstring.
 
-    parameters: of the body that all lanes have. In NumPy they are constants of the program, else
+    parameters: of the body that all lanes share. In NumPy they are constants of the program, else
       its inputs.
     """
 
@@ -93,7 +93,7 @@ class FastPlant:
 
     @property
     def structure(self) -> Structure:
-        """The body that all lanes have."""
+        """Body that all lanes share."""
         return join(self.topology, self.parameters, np.dtype(np.float32))
 
     def parameters_of(
@@ -129,18 +129,18 @@ class FastPlant:
         return self._reweighed(parameters, large)
 
     def _of_moving(self, factor: Number) -> Number:
-        """[B] of factors [] or [nbody - 1]: what is welded to a body is as the body."""
+        """Return the factors [B] from [] or [nbody - 1]; a welded body has its carrier's factor."""
         moving = np.array(self.topology.moving)
         return (
             jnp.broadcast_to(factor, np.shape(moving)) if np.ndim(factor) == 0 else factor[moving]
         )
 
     def _reweighed(self, before: Parameters, after: Parameters) -> Parameters:
-        """With the weights that follow from the change."""
+        """Update the weights after a change of numbers."""
         weighed = reweighed(self.topology, after)
         if not self.topology.welded:
             return weighed
-        # MuJoCo weighs a contact at the welded body's own centre, which is not known here any more.
+        # MuJoCo weighs a contact at the welded body's own centre, which merging has dropped.
         ratio = weighed.contacts.weight / reweighed(self.topology, before).contacts.weight
         contacts = dataclasses.replace(weighed.contacts, weight=before.contacts.weight * ratio)
         return dataclasses.replace(weighed, contacts=contacts)
@@ -155,7 +155,7 @@ class FastPlant:
 
     def advance(self, state: BodyState, workings: Workings, torque: jax.Array) -> BodyState:
         """See `Plant.advance`."""
-        # Numbers and ground do not go through the kernel, which would copy them.
+        # Numbers and ground bypass the kernel, which would copy them.
         after = one_kernel(self._advance)(state, workings, torque)
         return dataclasses.replace(after, parameters=state.parameters, ground=state.ground)
 
@@ -172,7 +172,7 @@ class FastPlant:
         return deepest(bars.first[..., 0], bars.second[..., 0], bars, *places)
 
     def _body(self, state: BodyState) -> Structure:
-        """The body of these lanes: their own, or the plant's."""
+        """Body of these lanes: their own, or the plant's."""
         if state.parameters is None:
             return join(self.topology, self.parameters, state.qpos.dtype)
         return join(self.topology, state.parameters, state.qpos.dtype, per_lane=True)
@@ -292,14 +292,14 @@ def _look(geom: Geom, poses: Sequence[Pose]) -> tuple[Any, jax.Array]:
 def _above(
     structure: Structure, poses: Sequence[Pose], ground: Ground, like: jax.Array
 ) -> jax.Array:
-    """[G, L] m, how far the lowest point of each geom is above the ground."""
+    """Height [G, L] m of each geom's lowest point above the ground."""
     cores = table([_core(geom, poses) for geom in structure.geoms], like)
     radius = column([geom.radius for geom in structure.geoms], like.dtype)
     return clearance(ground, cores[:, 0], cores[:, 1], cores[:, 2], radius)
 
 
 def _core(geom: Geom, poses: Sequence[Pose]) -> Any:
-    """The lowest point [3, L] of a geom less its radius."""
+    """Lowest point [3, L] of a geom without its radius."""
     pose = WORLD if geom.body < 0 else poses[geom.body]
     axes = [turn(pose.rot, column) for column in geom.rot]
     place = pose.far_point(geom.pos)
@@ -316,7 +316,7 @@ def _core(geom: Geom, poses: Sequence[Pose]) -> Any:
 
 
 def turned(quat: jax.Array, spin: jax.Array, step: float) -> list[jax.Array]:
-    """Quaternion [4, L] after turning at body-frame angular velocity [3, L] for a time in s."""
+    """Turn a quaternion [4, L] at body-frame angular velocity [3, L] for a time in s."""
     w, x, y, z = unit_quaternion(quat)
     speed = jnp.sqrt(spin[0] * spin[0] + spin[1] * spin[1] + spin[2] * spin[2])
     half = 0.5 * step * speed
@@ -333,7 +333,7 @@ def turned(quat: jax.Array, spin: jax.Array, step: float) -> list[jax.Array]:
 
 
 def take(rows: jax.Array, addresses: Sequence[int]) -> jax.Array:
-    """Rows at constant addresses; neighbouring ones as a slice, which costs nothing."""
+    """Take rows at constant addresses; neighbouring rows are sliced, which costs nothing."""
     first, count = addresses[0], len(addresses)
     if addresses == tuple(range(first, first + count)):
         return rows[first : first + count]
@@ -346,13 +346,13 @@ def fast_plant(
     crossings: Crossings | None = None,
     roomy: bool = False,
 ) -> FastPlant:
-    """A plant for a model that the fast physics knows.
+    """Make a plant for a model that the lane-major physics supports.
 
     Args:
-      roomy: with places to spare, so that bodies with other shapes can share its program.
+      roomy: with spare places, so that bodies with other shapes share its program.
 
     Raises:
-      UnsupportedModel: it does not; the message says why.
+      UnsupportedModel: the model is not supported; the message says why.
     """
     seen = fuse(model, layout, crossings)
     topology, parameters = read_topology(*seen), read_parameters(*seen)

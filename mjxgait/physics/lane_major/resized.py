@@ -1,4 +1,4 @@
-"""The fast physics' numbers of a body whose parts are of other sizes."""
+"""Numbers of a body with scaled parts, for the lane-major physics."""
 
 import dataclasses
 
@@ -13,7 +13,10 @@ from mjxgait.types import Number
 
 
 def resized(topology: Topology, parameters: Parameters, factor: Number) -> Parameters:
-    """With lengths times factor [B], and masses and inertias as they follow; not yet the weights."""
+    """Multiply lengths by factor [B], masses by its cube, inertias by its fifth power.
+
+    The weights are not recomputed yet.
+    """
     of_world = jnp.append(jnp.asarray(factor, jnp.float32), 1.0)
     every = of_world[:-1]
 

@@ -1,8 +1,8 @@
-"""Room for what other bodies of the same tree have: one program then serves them all.
+"""Padded topologies: one program serves all bodies of the same tree.
 
 Robots of one kind differ in how many shapes each of their parts has and in which parts come near
-each other. A roomy topology has a fixed number of places for both, and the numbers say what is in
-them. It costs a little at every step, so only a program whose body is an input has it.
+each other. A padded topology has a fixed number of places for both, and the numbers say what is in
+them. It costs a little at every step, so only a program with the body as an input has it.
 """
 
 import dataclasses
@@ -16,15 +16,16 @@ from mjxgait.physics.lane_major.topology import Topology
 from mjxgait.physics.overlap import Bars
 
 SHAPES, ON_TRUNK, BARS, PAIRS = 2, 4, 128, 256
-"""Multiples of which there are places: for shapes that are no feet on each body and on the trunk,
-for bars, for pairs of bars.
+"""Places are rounded up to multiples of these.
+
+Shapes that are no feet on each body and on the trunk; bars; pairs of bars.
 """
 FAR = 1e3
-"""m above the ground, where a place is that nothing is in."""
+"""m above the ground, the height of an empty place."""
 
 
 def make_room(topology: Topology, parameters: Parameters, feet: int) -> tuple[Topology, Parameters]:
-    """A body with places to spare. feet: shapes, the first of the watched, that stay as they are."""
+    """Pad a body with places. feet: number of first watched shapes that stay as they are."""
     slots, rows = _places(topology, feet)
     roomy = dataclasses.replace(
         topology, watched=slots, bar_body=(), first=(), second=(), open_pairs=True
@@ -37,7 +38,7 @@ def make_room(topology: Topology, parameters: Parameters, feet: int) -> tuple[To
 
 
 def _places(topology: Topology, feet: int) -> tuple[tuple[WatchedSlot, ...], list[int]]:
-    """The slots, and which of the watched shapes is in each, -1 for none."""
+    """Slots, and the watched shape in each, -1 for none."""
     slots, rows = list(topology.watched[:feet]), list(range(feet))
     for body in range(len(topology.bodies)):
         others = range(feet, len(topology.watched))
@@ -49,7 +50,7 @@ def _places(topology: Topology, feet: int) -> tuple[tuple[WatchedSlot, ...], lis
 
 
 def _room(count: int, step: int) -> int:
-    """Places for so many: a multiple of the step, at least one."""
+    """Round a count up to a multiple of the step, at least one step."""
     return max(-(-count // step), 1) * step
 
 
@@ -71,7 +72,7 @@ def _watched(known: Watched, rows: list[int]) -> Watched:
 
 
 def _bars(topology: Topology, known: Bars) -> Bars:
-    """Places that nothing is in are points, and pairs of them never come near."""
+    """Pad the bars: empty places are points, and pairs of them never come near."""
     more_bars, more_pairs = (
         _room(count, step) - count
         for count, step in ((len(topology.bar_body), BARS), (len(topology.first), PAIRS))

@@ -1,4 +1,4 @@
-"""The places of a topology: bodies, joints, contacts, limits, watched geoms; no numbers."""
+"""Slots of a topology: bodies, joints, contacts, limits, watched geoms; no numbers."""
 
 import dataclasses
 
@@ -8,13 +8,13 @@ FREE, BALL, SLIDE, HINGE = (
     int(getattr(mujoco.mjtJoint, f"mjJNT_{name}")) for name in ("FREE", "BALL", "SLIDE", "HINGE")
 )
 ANY = -1
-"""A watched shape of whatever kind: none of its numbers is known to be zero."""
+"""Any type of watched shape: none of its numbers is assumed to be zero."""
 FREEDOMS = {FREE: 6, BALL: 3, SLIDE: 1, HINGE: 1}
 
 
 @dataclasses.dataclass(frozen=True)
 class JointSlot:
-    """kind: FREE, BALL, SLIDE or HINGE. qpos, dof: addresses."""
+    """Joint. kind: FREE, BALL, SLIDE or HINGE. qpos, dof: addresses."""
 
     kind: int
     qpos: int
@@ -23,7 +23,7 @@ class JointSlot:
 
 @dataclasses.dataclass(frozen=True)
 class BodySlot:
-    """parent: index among the bodies, -1 for the world. joints: from the first that moves it."""
+    """Body. parent: index among the bodies, -1 for the world. joints: from the first to move it."""
 
     parent: int
     joints: tuple[JointSlot, ...]
@@ -31,7 +31,7 @@ class BodySlot:
 
 @dataclasses.dataclass(frozen=True)
 class ContactSlot:
-    """A sphere of a body that may touch the floor; capsule: whether it is an end of one."""
+    """Sphere of a body that may touch the floor; capsule: whether it is an end of one."""
 
     body: int
     capsule: bool
@@ -39,7 +39,7 @@ class ContactSlot:
 
 @dataclasses.dataclass(frozen=True)
 class LimitSlot:
-    """A hinge or slide whose range ends; addresses."""
+    """Hinge or slide with a limited range; addresses."""
 
     dof: int
     qpos: int
@@ -47,7 +47,7 @@ class LimitSlot:
 
 @dataclasses.dataclass(frozen=True)
 class WatchedSlot:
-    """A geom that is sensed. body: -1 for the world's. shape: MuJoCo's type, or `ANY`."""
+    """Sensed geom. body: -1 for the world's. shape: MuJoCo's type, or `ANY`."""
 
     body: int
     shape: int
@@ -55,7 +55,7 @@ class WatchedSlot:
 
 @dataclasses.dataclass(frozen=True)
 class Ends:
-    """Where a contact's numbers are: the two geoms; side: 1, -1 of a capsule, 0 of a sphere."""
+    """Places of a contact's numbers: the two geoms; side: 1, -1 of a capsule, 0 of a sphere."""
 
     floor: int
     geom: int

@@ -1,4 +1,4 @@
-"""How MuJoCo's engine softens a constraint, from the model's solref and solimp."""
+"""Solver parameters of a constraint from the model's solref and solimp, as in MuJoCo's engine."""
 
 import dataclasses
 
@@ -8,7 +8,7 @@ import numpy as np
 
 @dataclasses.dataclass(frozen=True)
 class Softened:
-    """MuJoCo's solver parameters of a constraint.
+    """Solver parameters of a constraint, as MuJoCo uses them.
 
     stiffness, damping: solref, after `refsafe`. impedance: solimp without its power: least, most,
     width in m or rad, midpoint. power: of solimp. margin: m or rad.
@@ -22,13 +22,13 @@ class Softened:
 
 
 def contact_softness(model: mujoco.MjModel, floor: int, geom: int) -> Softened:
-    """Of two geoms' contact."""
+    """Softness of two geoms' contact."""
     _, solref, solimp = mixed(model, floor, geom)
     return softened(model, solref, solimp, model.geom_margin[floor] + model.geom_margin[geom])
 
 
 def limit_softness(model: mujoco.MjModel, joint: int) -> Softened:
-    """Of a joint's limit."""
+    """Softness of a joint's limit."""
     return softened(
         model, model.jnt_solref[joint], model.jnt_solimp[joint], model.jnt_margin[joint]
     )
@@ -37,7 +37,7 @@ def limit_softness(model: mujoco.MjModel, joint: int) -> Softened:
 def softened(
     model: mujoco.MjModel, solref: np.ndarray, solimp: np.ndarray, margin: float
 ) -> Softened:
-    """The parameters as MuJoCo's engine uses them.
+    """Convert the parameters as MuJoCo's engine does.
 
     Computation docs, "Parameters"; MJX `constraint._kbi`.
     """
@@ -54,7 +54,7 @@ def softened(
 
 
 def mixed(model: mujoco.MjModel, a: int, b: int) -> tuple[float, np.ndarray, np.ndarray]:
-    """Friction, solref and solimp of two geoms' contact (modeling docs, "Contact parameters")."""
+    """Combine friction, solref and solimp of two geoms (modeling docs, "Contact parameters")."""
     if model.geom_priority[a] != model.geom_priority[b]:
         chief = a if model.geom_priority[a] > model.geom_priority[b] else b
         return model.geom_friction[chief][0], model.geom_solref[chief], model.geom_solimp[chief]

@@ -1,8 +1,8 @@
-"""How contacts and limits yield, whatever the tree: MuJoCo's soft constraints.
+"""Soft constraints of MuJoCo for contacts and limits, independent of the tree.
 
 Formulas: MuJoCo documentation, "Computation", sections "Constraint model" and "Contact", and MJX's
-constraint.py. Contacts' values are [C, L], limits' [M, L]; a contact's three directions are those
-of `frames`.
+constraint.py. Values of contacts are [C, L], of limits [M, L]; a contact's three directions are
+those of `frames`.
 """
 
 import dataclasses
@@ -20,14 +20,15 @@ from mjxgait.physics.lane_major.parameters import Softness
 from mjxgait.types import Number
 
 SMALLEST_FRICTION = 1e-5
-"""mjMINMU, under which MuJoCo's engine lets no friction coefficient fall."""
+"""mjMINMU, the lower bound of friction coefficients in MuJoCo's engine."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Springs:
-    """Of n constraints. softness: [n, 1 or L]. powers: [n] or one for all, of their impedances.
+    """Springs of n constraints.
 
-    inverse: [n, L] the inverse mass of what they hold.
+    softness: [n, 1 or L]. powers: of the impedances, [n] or one for all.
+    inverse: [n, L] inverse mass that they hold.
     """
 
     softness: Softness
@@ -61,7 +62,7 @@ def contact_terms(
 def limit_terms(
     springs: Springs, over_low: Number, under_high: Number, velocity: jax.Array, pin: Pin
 ) -> tuple[jax.Array, jax.Array, jax.Array]:
-    """Sign, reference and weight of limits, see `Constraints`, of the ways to both ends."""
+    """Sign, reference and weight of limits, see `Constraints`, from the ways to both ends."""
     sign = jnp.where(over_low < under_high, 1.0, -1.0)
     stiffness, damping = springs.softness.stiffness, springs.softness.damping
     nearer = jnp.minimum(over_low, under_high)
@@ -79,7 +80,7 @@ def _weight(impedance: Any, depth: jax.Array, inverse: Number) -> jax.Array:
 def soften(
     softness: Softness, powers: Sequence[float], distance: jax.Array
 ) -> tuple[Any, jax.Array]:
-    """Impedance and distance less margin of constraints (computation docs, "Impedance")."""
+    """Impedance, and distance less margin (computation docs, "Impedance")."""
     low, high, width, mid = (softness.impedance[:, n] for n in range(4))
     power = np.array(powers, distance.dtype)[:, None]
     depth = distance - softness.margin
@@ -92,5 +93,5 @@ def soften(
 
 
 def _power(power: np.ndarray) -> Callable[..., jax.Array]:
-    """x to the power; MuJoCo's default 2 without transcendental functions."""
+    """Power function; MuJoCo's default 2 needs no transcendental functions."""
     return (lambda x: x * x) if np.all(power == 2) else (lambda x: jnp.power(x, power))

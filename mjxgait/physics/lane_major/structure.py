@@ -1,7 +1,7 @@
-"""A body as the equations read it: its topology joined with its numbers.
+"""Body as the equations read it: its topology joined with its numbers.
 
-A number is a Python float where it is a constant of the program (zeros and ones then cost nothing,
-see `lanes`), or an array: [1] for all lanes, [L] of a body per lane.
+A number is a Python float if it is a constant of the program (zeros and ones then cost nothing,
+see `lanes`). Otherwise it is an array: [1] for all lanes, [L] with a body per lane.
 """
 
 import dataclasses
@@ -27,7 +27,7 @@ Frame = tuple[Vector, ...]
 
 @dataclasses.dataclass(frozen=True)
 class Joint:
-    """See `JointSlot` and `Parameters`; axis, anchor: in the body's frame."""
+    """Joint: see `JointSlot` and `Parameters`; axis, anchor: in the body's frame."""
 
     kind: int
     qpos: int
@@ -39,7 +39,7 @@ class Joint:
 
 @dataclasses.dataclass(frozen=True)
 class Body:
-    """parent: index among the bodies, -1 for the world. pos, rot: in the parent's frame."""
+    """Body. parent: index among the bodies, -1 for the world. pos, rot: in the parent's frame."""
 
     parent: int
     pos: Vector
@@ -49,7 +49,7 @@ class Body:
 
 @dataclasses.dataclass(frozen=True)
 class Geom:
-    """A watched geom: its body (-1: world), its place there, and its support function."""
+    """Watched geom: its body (-1: world), its place there, and its support function."""
 
     body: int
     pos: Vector
@@ -61,10 +61,10 @@ class Geom:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Structure:
-    """Made by `join`.
+    """Topology joined with numbers; made by `join`.
 
-    columns: all numbers with an axis of the lanes, 1 or L long, in the precision of the states;
-      NumPy where they are constants.
+    columns: all numbers with an axis of lanes, 1 or L long, in the precision of the states; NumPy
+      if constant.
     exact: the same, constants in double precision.
     """
 
@@ -74,37 +74,37 @@ class Structure:
 
     @property
     def pattern(self) -> Sparsity:
-        """Of the mass matrix."""
+        """Sparsity of the mass matrix."""
         return self.topology.pattern
 
     @property
     def carriers(self) -> Carriers:
-        """The part of the tree that moves contacts."""
+        """Part of the tree that moves contacts."""
         return self.topology.carriers
 
     @property
     def contacts(self) -> tuple[ContactSlot, ...]:
-        """In the order of their bodies."""
+        """Contacts, in the order of their bodies."""
         return self.topology.contacts
 
     @property
     def iterations(self) -> int:
-        """Of the contact solver."""
+        """Maximum number of iterations of the contact solver."""
         return self.topology.iterations
 
     @property
     def line_iterations(self) -> int:
-        """Of its line search."""
+        """Maximum number of steps of its line search."""
         return self.topology.line_iterations
 
     @property
     def limits(self) -> tuple[LimitSlot, ...]:
-        """Of hinges and slides."""
+        """Limits of hinges and slides."""
         return self.topology.limits
 
     @functools.cached_property
     def bodies(self) -> tuple[Body, ...]:
-        """Parents first."""
+        """Bodies, parents first."""
         x, joints = self.exact, iter(self._joints())
         return tuple(
             Body(
@@ -118,7 +118,7 @@ class Structure:
 
     @property
     def gravity(self) -> Vector:
-        """m/s²."""
+        """Gravity in m/s²."""
         x, y, z = scalars(self.exact.gravity)
         return x, y, z
 
@@ -143,7 +143,7 @@ class Structure:
 
     @functools.cached_property
     def geoms(self) -> tuple[Geom, ...]:
-        """The watched ones; what a shape has none of is zero."""
+        """Watched geoms; extents that a shape does not have are zero."""
         x = self.exact.watched
         return tuple(
             Geom(
@@ -161,9 +161,9 @@ class Structure:
 def join(
     topology: Topology, parameters: Parameters, dtype: np.dtype, per_lane: bool = False
 ) -> Structure:
-    """The body with these numbers.
+    """Join a topology with numbers.
 
-    per_lane: whether their last axis is the lanes; then they are no constants.
+    per_lane: whether the last axis of the numbers is the lanes; then they are no constants.
     """
 
     def columned(number: Number, precision: np.dtype | None = None) -> Number:
@@ -180,7 +180,7 @@ def join(
 def _extents(
     shape: int, radius: Scalar, box: Vector, ellipsoid: Vector
 ) -> tuple[Scalar, Vector, Vector]:
-    """Radius, box and ellipsoid with a plain zero where a shape has none, so that it folds."""
+    """Set what a shape does not have to a plain zero, so that it folds."""
     if shape == ANY:
         return radius, box, ellipsoid
     has_radius, has_box, has_ellipsoid = geometry.support_extents(shape, np.ones(3))
@@ -193,7 +193,7 @@ def _extents(
 
 
 def scalars(numbers: Any) -> Any:
-    """Numbers [..., 1 or L] as nested tuples of scalars, the last axis but the lanes innermost."""
+    """Convert numbers [..., 1 or L] to nested tuples of scalars, the last axis but L innermost."""
     if np.ndim(numbers) > 1:
         return tuple(scalars(numbers[n]) for n in range(numbers.shape[0]))
     return float(numbers[0]) if isinstance(numbers, np.ndarray) else numbers

@@ -1,4 +1,4 @@
-"""Which models the fast physics can simulate."""
+"""Checks for models that the lane-major physics can simulate."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -18,14 +18,14 @@ FREE, BALL = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_BALL)
 
 
 class UnsupportedModel(Exception):
-    """The fast physics does not know something that a model uses; the message says what."""
+    """Error for a model that the lane-major physics does not support; the message says why."""
 
 
 def check_supported(model: mujoco.MjModel) -> list[tuple[int, int]]:
-    """The pairs (floor, geom) of geoms that may touch.
+    """Pairs (floor, geom) of geoms that may touch.
 
     Raises:
-      UnsupportedModel: the model is outside what the fast physics knows.
+      UnsupportedModel: the lane-major physics does not support the model.
     """
     _check_options(model)
     _check_elements(model)
@@ -34,7 +34,7 @@ def check_supported(model: mujoco.MjModel) -> list[tuple[int, int]]:
 
 
 def _refuse(when: Any, reason: str, names: Sequence[str] = ()) -> None:
-    """names: of the elements that `when` [n] is about; those that it holds for are told."""
+    """Raise if `when` [n] holds anywhere, and list the names of the elements for which it holds."""
     if np.any(when):
         told = [name for name, guilty in zip(names, np.ravel(when), strict=False) if guilty]
         some = ", ".join(told[:3]) + (f" and {len(told) - 3} more" if len(told) > 3 else "")
@@ -100,7 +100,7 @@ def _check_joints(model: mujoco.MjModel) -> None:
 
 
 def _dof_names(model: mujoco.MjModel) -> list[str]:
-    """The joint of each degree of freedom."""
+    """Joint of each degree of freedom."""
     return [model.joint(j).name for j in model.dof_jntid]
 
 

@@ -1,7 +1,7 @@
-"""What shapes the program of a model: its tree, its slots for contacts and limits, its solver.
+"""Parts of a model that shape its program: tree, slots for contacts and limits, solver.
 
-Two models whose topologies are equal differ in numbers only (`parameters`): one program does for
-both. Bodies are counted without the world, which is -1.
+Two models of equal topology differ in numbers only (`parameters`), so one program serves both.
+Bodies are counted without the world, which is -1.
 """
 
 import dataclasses
@@ -33,14 +33,14 @@ class Topology:
     """All of a model that is not a number.
 
     bodies, contacts (in the order of their bodies), limits, watched: the slots.
-    dof_parent: [nv] the degree of freedom that each hangs on, -1 for none.
+    dof_parent: [nv] parent of each degree of freedom, -1 for none.
     contact_power, limit_power: per slot, the power in MuJoCo's impedance.
     trunk: body. joint_qpos, joint_dof: [J] addresses of the actuated joints.
     bar_body: [S], first, second: [Q]; see `Crossings`.
-    step: s. iterations, line_iterations: the most of Newton's method and its line search.
-    warm_start: whether the solver starts where it was a step before.
+    step: s. iterations, line_iterations: maxima of Newton's method and its line search.
+    warm_start: whether the solver starts from the previous step's solution.
     water: whether a fluid resists. open_pairs: whether bars and pairs are numbers (`roomy`).
-    names: of the bodies, for messages only. moving: [B] which of the model's bodies they are;
+    names: of the bodies, for messages only. moving: [B] their indices in the model.
     welded: whether they carry others.
     """
 
@@ -69,12 +69,12 @@ class Topology:
 
     @functools.cached_property
     def joints(self) -> tuple[JointSlot, ...]:
-        """Of all bodies, in their order."""
+        """Joints of all bodies, in their order."""
         return tuple(joint for body in self.bodies for joint in body.joints)
 
     @functools.cached_property
     def dof_body(self) -> tuple[int, ...]:
-        """[nv] the body that a degree of freedom moves."""
+        """[nv] body that each degree of freedom moves."""
         return tuple(
             b
             for b, body in enumerate(self.bodies)
@@ -84,25 +84,25 @@ class Topology:
 
     @functools.cached_property
     def dof_qpos(self) -> tuple[int, ...]:
-        """[nv] where a slide's or hinge's position is; of others a number that means nothing."""
+        """[nv] position address of a slide or hinge; meaningless for other joints."""
         return tuple(joint.qpos + n for joint in self.joints for n in range(FREEDOMS[joint.kind]))
 
     @functools.cached_property
     def pattern(self) -> Sparsity:
-        """Of the mass matrix."""
+        """Sparsity of the mass matrix."""
         return sparsity(self.dof_parent)
 
     @functools.cached_property
     def carriers(self) -> Carriers:
-        """The part of the tree that moves contacts."""
+        """Part of the tree that moves contacts."""
         return find_carriers(self.bodies, self.pattern, self.contacts)
 
 
 def read_topology(model: Model, layout: SenseLayout, crossings: Crossings | None) -> Topology:
-    """Of a model, of which `layout` is sensed and `crossings` are looked at.
+    """Read a model's topology, with what `layout` senses and the pairs in `crossings`.
 
     Raises:
-      UnsupportedModel: the fast physics does not know something the model uses.
+      UnsupportedModel: the lane-major physics does not support something that the model uses.
     """
     ends, limited = contact_ends(model), limited_joints(model)
     pairs = crossings if crossings is not None and len(crossings.first) else None
@@ -142,7 +142,7 @@ def read_topology(model: Model, layout: SenseLayout, crossings: Crossings | None
 
 
 def contact_ends(model: Model) -> list[Ends]:
-    """The spheres that may touch the floor, in the order of their bodies; a capsule is two."""
+    """Find the spheres that may touch the floor, in the order of their bodies; a capsule is two."""
     touching = check_supported(model.model if isinstance(model, Fused) else model)
     flag = mujoco.mjtDisableBit
     if model.opt.disableflags & (flag.mjDSBL_CONSTRAINT | flag.mjDSBL_CONTACT):
@@ -156,7 +156,7 @@ def contact_ends(model: Model) -> list[Ends]:
 
 
 def limited_joints(model: Model) -> list[int]:
-    """The hinges and slides that have a limit."""
+    """Find the hinges and slides that have a limit."""
     flag = mujoco.mjtDisableBit
     if model.opt.disableflags & (flag.mjDSBL_CONSTRAINT | flag.mjDSBL_LIMIT):
         return []
@@ -164,13 +164,13 @@ def limited_joints(model: Model) -> list[int]:
 
 
 def joints_of(model: Model, body: int) -> range:
-    """The joints of a body, by MuJoCo's numbers."""
+    """Return the joints of a body, by MuJoCo's numbers."""
     first = int(model.body_jntadr[body])
     return range(first, first + int(model.body_jntnum[body]))
 
 
 def integers(values: np.ndarray) -> tuple[int, ...]:
-    """A tuple of Python's own."""
+    """Convert values to a tuple of Python integers."""
     return tuple(int(value) for value in values)
 
 

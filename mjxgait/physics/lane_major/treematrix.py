@@ -1,9 +1,11 @@
 """Symmetric matrices with the sparsity of a kinematic tree, lanes innermost.
 
-Entry (k, i) is nonzero only where one degree of freedom moves the other: i an ancestor of k, or k itself. The mass matrix is such a
-matrix, and so is Newton's Hessian of a body that touches only the floor, for a contact moves one chain of ancestors. Row k is stored as an
-array [n, L] over the chain root ... k. Eliminating from the leaves inwards creates no new entries (Featherstone, "Rigid Body Dynamics
-Algorithms", section 6.5), here in the form H = L^T L with square roots: each row is then one fused operation that ends in a division.
+Entry (k, i) is nonzero only if one degree of freedom moves the other: i is an ancestor of k, or k
+itself. The mass matrix has this form. So has Newton's Hessian of a body that touches only the
+floor, because a contact moves one chain of ancestors. Row k is stored as an array [n, L] over the
+chain root ... k. Eliminating from the leaves inwards creates no new entries (Featherstone, "Rigid
+Body Dynamics Algorithms", section 6.5), here in the form H = L^T L with square roots: each row is
+then one fused operation that ends in a division.
 """
 
 import dataclasses
@@ -20,7 +22,7 @@ Rows = tuple[jax.Array, ...]
 
 @dataclasses.dataclass(frozen=True)
 class Sparsity:
-    """The nonzeros of a tree.
+    """Nonzeros of a tree.
 
     chains: per degree of freedom k its ancestors from the root, and k itself.
     below: per k all m below it, as (m, position of k in m's chain).
@@ -31,7 +33,10 @@ class Sparsity:
 
 
 def sparsity(parents: Sequence[int]) -> Sparsity:
-    """The pattern of a tree. parents: per degree of freedom its parent, -1 for none; parents come first."""
+    """Build the pattern of a tree.
+
+    parents: per degree of freedom its parent, -1 for none; parents come first.
+    """
     chains: list[tuple[int, ...]] = []
     for k, parent in enumerate(parents):
         chains.append((*(chains[parent] if parent >= 0 else ()), k))
@@ -44,14 +49,17 @@ def sparsity(parents: Sequence[int]) -> Sparsity:
 
 @dataclasses.dataclass(frozen=True)
 class Factor:
-    """L with L^T L = H. rows: of L. pivots: its diagonal, kept apart because that lets XLA compute each square root once."""
+    """Factor L with L^T L = H.
+
+    rows: of L. pivots: its diagonal, kept apart so that XLA computes each square root once.
+    """
 
     rows: Rows
     pivots: tuple[jax.Array, ...]
 
 
 def factor(pattern: Sparsity, rows: Rows) -> Factor:
-    """Factor of a symmetric positive definite H."""
+    """Factorise a symmetric positive definite H."""
     lower: dict[int, jax.Array] = {}
     pivots: dict[int, jax.Array] = {}
     for k in reversed(range(len(rows))):
@@ -66,7 +74,7 @@ def factor(pattern: Sparsity, rows: Rows) -> Factor:
 
 
 def solve(pattern: Sparsity, lower: Factor, rhs: Sequence[jax.Array]) -> list[jax.Array]:
-    """x with L^T L x = rhs; both as lists of [L]."""
+    """Solve L^T L x = rhs for x; both are lists of [L]."""
     half: dict[int, jax.Array] = {}
     for k in reversed(range(len(rhs))):
         value = rhs[k]
@@ -83,7 +91,7 @@ def solve(pattern: Sparsity, lower: Factor, rhs: Sequence[jax.Array]) -> list[ja
 
 
 def on_pivot(row: jax.Array, value: Number) -> jax.Array:
-    """A row [n, L] with something [1 or L] added to its last entry."""
+    """Add a value [1 or L] to the last entry of a row [n, L]."""
     last = np.zeros((row.shape[0], 1), row.dtype)
     last[-1] = 1.0
     return row + last * value

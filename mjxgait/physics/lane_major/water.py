@@ -1,9 +1,9 @@
-"""What a fluid at rest does to bodies that move in it: MuJoCo's inertia-box model.
+"""Forces of a fluid at rest on bodies that move in it: MuJoCo's inertia-box model.
 
-Each body is drawn as a box of its own mass and inertia, about its centre of mass and along its
-principal axes: viscosity resists as to a sphere of the box's mean side, density as to its faces
-(MuJoCo documentation, "Computation", "Fluid forces", "Inertia model"). There is no lift and no
-buoyancy; without gravity none is missed.
+Each body counts as a box of its own mass and inertia, about its centre of mass and along its
+principal axes. Viscosity acts as on a sphere of the box's mean side, density as on the box's faces
+(MuJoCo documentation, "Computation", "Fluid forces", "Inertia model"). There is no lift, and
+no buoyancy (which is zero without gravity).
 """
 
 from collections.abc import Sequence
@@ -46,7 +46,7 @@ def fluid_force(
 ) -> jax.Array:
     """Generalised force [nv, L] of the fluid.
 
-    freedom, moving: of `motions` and `bias_force`.
+    freedom, moving: from `motions` and `bias_force`.
     """
     x, velocity = structure.columns, unpack(pin(jnp.stack(moving)))
     frame = principal_axes(structure, poses, velocity.spin[0], pin)
@@ -68,14 +68,14 @@ def fluid_force(
 def principal_axes(
     structure: Structure, poses: Sequence[Pose], like: jax.Array, pin: Pin
 ) -> tuple[Vector, Vector, Vector]:
-    """The three principal axes of every body in the world, components [B, L] each."""
+    """Every body's three principal axes in the world, components [B, L] each."""
     rot = [pin(table([pose.rot[j] for pose in poses], like)) for j in range(3)]
     first, second = (turn_each(rot, structure.columns.axes[:, n]) for n in (0, 1))
     return first, second, cross(first, second)
 
 
 def box_sides(mass: Number, inertia: Number) -> tuple[Number, Number, Number]:
-    """m; the sides of the boxes of these masses [B, 1 or L] and inertias [B, 3, 1 or L]."""
+    """Sides in m of boxes of masses [B, 1 or L] and inertias [B, 3, 1 or L]."""
 
     def side(j: int) -> Number:
         left = inertia.sum(1) - 2 * inertia[:, j]
@@ -85,7 +85,7 @@ def box_sides(mass: Number, inertia: Number) -> tuple[Number, Number, Number]:
 
 
 def at_least(number: Number, least: float) -> Number:
-    """The larger; of constants a constant."""
+    """Return the larger number, a constant for constants."""
     larger = np.maximum if isinstance(number, np.ndarray) else jnp.maximum
     return larger(number, least)
 

@@ -1,4 +1,4 @@
-"""`weights` of the fast physics' own numbers."""
+"""Inverse masses (`physics.weights`) from the lane-major physics' numbers."""
 
 import dataclasses
 
@@ -17,7 +17,7 @@ from mjxgait.physics.weights import inverse_weights, weight_groups
 
 
 def reweighed(topology: Topology, parameters: Parameters) -> Parameters:
-    """One body's numbers with the weights of its contacts and limits computed anew."""
+    """Recompute the weights of one body's contacts and limits."""
     numbers = jax.tree.map(lambda x: jnp.asarray(x, jnp.float32), parameters)
     structure = join(topology, numbers, np.dtype(np.float32))
     groups = weight_groups([joint.kind for joint in topology.joints])
@@ -32,7 +32,7 @@ def reweighed(topology: Topology, parameters: Parameters) -> Parameters:
 
 
 def _at_rest(structure: Structure) -> tuple[jax.Array, jax.Array]:
-    """Mass matrix [nv, nv] and centres' Jacobian [B, 6, nv]; of one lane."""
+    """Mass matrix [nv, nv] and centres' Jacobian [B, 6, nv] of one lane at rest."""
     topology, like = structure.topology, jnp.ones(1, jnp.float32)
     pin = pinned_by(like)
     poses, freedoms = posture(structure, _rest(structure), pin)
@@ -56,7 +56,7 @@ def _at_rest(structure: Structure) -> tuple[jax.Array, jax.Array]:
 
 
 def _rest(structure: Structure) -> jax.Array:
-    """MuJoCo's qpos0 [nq, 1], with free roots at the origin, where they weigh as much."""
+    """MuJoCo's qpos0 [nq, 1], with free roots at the origin, which leaves the weights unchanged."""
     rest = []
     for joint in (joint for body in structure.bodies for joint in body.joints):
         if joint.kind == FREE:
@@ -67,7 +67,7 @@ def _rest(structure: Structure) -> jax.Array:
 
 
 def _moves(topology: Topology) -> np.ndarray:
-    """[B, nv] whether a degree of freedom moves a body."""
+    """[B, nv]: True if a degree of freedom moves a body."""
     moves = np.zeros((len(topology.bodies), len(topology.dof_parent)), bool)
     for b, body in enumerate(topology.bodies):
         if body.parent >= 0:
