@@ -1,1 +1,1 @@
-"""Walking: the tally of an episode, and the terms of the fitness."""
+"""Walk task: episode statistics, fitness terms, targets and acceptance criteria."""
