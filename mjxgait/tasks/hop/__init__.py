@@ -1,1 +1,1 @@
-"""Hopping to a goal: the tally of an episode, and the terms of the fitness."""
+"""Tasks with a goal: hop, travel and limbo."""
