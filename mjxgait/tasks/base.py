@@ -1,4 +1,4 @@
-"""Task protocol: the contract with rollout and evolution that walking, hopping and swimming share."""
+"""Task protocol: the contract with rollout and evolution, common to walking, hopping, swimming."""
 
 from collections.abc import Mapping
 from typing import Any, Protocol
@@ -11,8 +11,7 @@ from mjxgait.tasks.starts import Starts
 from mjxgait.types import Sensed, pytree
 
 FINISHED, NONFINITE = 0, -1
-"""Reasons for the end of an episode: time was up, or numbers were not finite. Tasks add their own.
-"""
+"""Reasons for the end of an episode: time was up, or numbers not finite. Tasks add their own."""
 
 
 @pytree

@@ -1,4 +1,4 @@
-"""Initial conditions of the trials, the same for all individuals: first nominal, others perturbed."""
+"""Initial conditions of the trials, shared by all individuals: first nominal, others perturbed."""
 
 import dataclasses
 from typing import Any

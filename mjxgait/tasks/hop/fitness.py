@@ -47,8 +47,7 @@ def terms_under(weights: HopWeights | TravelWeights) -> tuple[str, ...]:
 def fitness_terms(
     creature: Body, horizon: int, tally: Tally, more: Mapping[str, jax.Array] | None = None
 ) -> dict[str, jax.Array]:
-    """Return the terms [] of one episode, each without unit and before its weight; all are at least
-    zero.
+    """Return the terms [] of one episode, each without unit and before its weight; all are >= 0.
 
     Style counts in proportion to how near the episode got: attempts to learn hopping must not be
     punished. Sub-goals count in full, because standing still passes none.

@@ -59,7 +59,7 @@ class GoalDemands(Unasked, abc.ABC):
     def undisturbed(
         self, whole: Recording, halved: Recording, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
-        """See `Demands`: 1 and 2, both at half the time step too, 8, 9; from the first moment on."""
+        """See `Demands`: 1 and 2, both at half the time step too, 8, 9; without a warm-up."""
         basic, repeated = (self.basic(each, config) for each in (whole, halved))
         failed = sum(not m.passed for c in repeated for m in c.measures)
         of = " and ".join(str(c.number) for c in basic)

@@ -128,7 +128,8 @@ class Limbo(Hop):
         return fitness_terms(self.creature, self.horizon, tally, {"bar": bar})
 
     def outcome(self, tally: Any) -> dict[str, jax.Array]:
-        """See `Task`: as for hopping, and the lowest bar in m that was cleared, at least its own
-        height.
+        """See `Task`: as for hopping, and the height in m of a bar that would just be cleared.
+
+        It is at least the height of the bar itself.
         """
         return super().outcome(tally) | {"bar": tally.height + tally.bar}

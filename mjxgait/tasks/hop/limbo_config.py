@@ -41,8 +41,8 @@ class LimboConfig(HopConfig):
     Attributes:
       height: m, of the bar's lower edge above the floor.
       higher: m by which the bar is higher in the first generation.
-      lowering: steps in which the bar comes down from there, one in each generation after the best
-        individuals have passed the step before.
+      lowering: steps in which the bar comes down from there, one after each generation in which the
+        best individuals have mastered the current height.
       weights: weight of each term.
     """
 

@@ -104,7 +104,7 @@ class Hop(PlainTask):
         return fitness_terms(self.creature, self.horizon, tally)
 
     def outcome(self, tally: Tally) -> dict[str, jax.Array]:
-        """See `Task`: final distance in m and in goal distances; s to the arrival and to the end."""
+        """See `Task`: final distance in m and in goal distances; s to the arrival and the end."""
         left = away(tally)
         return {
             "left": left,

@@ -1,1 +1,1 @@
-"""What bodies that grow are to do."""
+"""Tasks for modular bodies: swim, roam, jump and follow."""
