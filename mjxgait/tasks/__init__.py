@@ -1,1 +1,1 @@
-"""What a creature is to do, what is counted of it, and what that is worth."""
+"""Tasks: initial conditions, episode statistics, fitness terms and acceptance criteria."""

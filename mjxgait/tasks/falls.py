@@ -1,4 +1,4 @@
-"""Falling: why an episode of a creature that should be on its feet ends early."""
+"""Fall detection: reasons for the early end of an episode on feet."""
 
 from enum import IntEnum
 
@@ -14,7 +14,7 @@ from mjxgait.types import Sensed
 
 
 class Reason(IntEnum):
-    """Why an episode ended."""
+    """Reasons for the end of an episode."""
 
     FINISHED = protocol.FINISHED
     TIPPED = 1
@@ -25,7 +25,7 @@ class Reason(IntEnum):
 
 
 def why_fallen(creature: Body, limits: Termination | Ends, sensed: Sensed) -> jax.Array:
-    """The `Reason` [] to end the episode at this moment; `FINISHED` while all is well."""
+    """Return the `Reason` [] to end the episode now; `FINISHED` continues it."""
     up = (sensed.trunk_rot @ creature.frame.up.astype(np.float32))[2]
     height = trunk_height(sensed) / creature.frame.stand_height
     reason = jnp.zeros((), jnp.int32)
@@ -33,12 +33,12 @@ def why_fallen(creature: Body, limits: Termination | Ends, sensed: Sensed) -> ja
         reason = jnp.where(touches(creature, sensed), Reason.TOUCHED, reason)
     reason = jnp.where(height > limits.height[1], Reason.TOO_HIGH, reason)
     reason = jnp.where(height < limits.height[0], Reason.TOO_LOW, reason)
-    # Rounding may put a trunk that is wholly upside down below -1.
+    # Rounding may put an upside-down trunk below -1.
     tipped = (up < limits.min_up) & (limits.min_up > -1.0)
     return jnp.where(tipped, Reason.TIPPED, reason)
 
 
 def touches(creature: Body, sensed: Sensed) -> jax.Array:
-    """Whether [] a part touches the floor that is neither foot nor ground contact."""
+    """Return whether [] a part touches the floor that is neither foot nor ground contact."""
     others = sensed.geom_low[len(creature.feet.foot_of) :]
     return jnp.min(others, initial=1.0) < 0.0

@@ -1,4 +1,4 @@
-"""What it costs to have parts in each other, the same for every task on a floor."""
+"""Cost of overlapping body parts, the same for every task on a floor."""
 
 import jax
 import jax.numpy as jnp
@@ -6,13 +6,15 @@ import jax.numpy as jnp
 from mjxgait.creature.body import Body
 
 TOUCHING = 0.005
-"""Hip heights; parts that are less deep in each other than this only touch."""
+"""Hip heights; parts that overlap by less only touch."""
 DEEP = 0.05
-"""Hip heights beyond `TOUCHING` at which an overlap counts half: it must not cost more than a walk
-brings."""
+"""Hip heights beyond `TOUCHING` at which the cost is half of its limit.
+
+The limit keeps an overlap from costing more than a walk earns.
+"""
 
 
 def crossed(creature: Body, overlap: jax.Array) -> jax.Array:
-    """From 0 to 1, how much parts are in each other. overlap: [] m, the deepest."""
+    """Cost of an overlap, 0 to 1. overlap: [] m, the deepest."""
     deeper = jnp.maximum(overlap / creature.frame.hip_height - TOUCHING, 0.0)
     return deeper / (deeper + DEEP)

@@ -1,4 +1,4 @@
-"""What tasks share that ask nothing special: stand at the start, do something, do not fall."""
+"""Base class of plain tasks: stand at the start, do something, do not fall."""
 
 import abc
 import dataclasses
@@ -20,11 +20,12 @@ from mjxgait.types import Sensed
 
 
 class PlainTask(abc.ABC):
-    """A task to inherit from (docs/extending.md).
+    """Base class for user-defined tasks (docs/extending.md).
 
-    It needs `counts`, the weight of each fitness term by name, and `judge`; what it must keep of
-    an episode goes into a tally of its own. `Settings` is a frozen dataclass of numbers that become
-    keys of `[fitness]`. step: s. horizon: T, steps of a full episode. ends: what a fall is.
+    A subclass needs `counts`, the weight of each fitness term by name, and `judge`. Its own
+    statistics of an episode go into a `Tally` of its own. `Settings` is a frozen dataclass of
+    numbers that become keys of `[fitness]`. step: s. horizon: T, steps of a full episode. ends:
+    definition of a fall.
     """
 
     Settings: ClassVar[type] = NoSettings
@@ -83,13 +84,13 @@ class PlainTask(abc.ABC):
         return Tally(steps=none, reason=none, overlap=jnp.zeros(()))
 
     def ended(self, sensed: Sensed, aim: Any) -> jax.Array:
-        """See `Task`: a fall ends it."""
+        """See `Task`: a fall ends the episode."""
         return why_fallen(self.creature, self.ends, sensed)
 
     def update(
         self, tally: Any, sensed: Sensed, torque: jax.Array, standards: Any, aim: Any
     ) -> Any:
-        """See `Task`: one step more."""
+        """See `Task`: one more step."""
         return dataclasses.replace(tally, steps=tally.steps + 1)
 
     @abc.abstractmethod
@@ -98,9 +99,9 @@ class PlainTask(abc.ABC):
 
     @classmethod
     def criteria(cls, window: Any) -> tuple[Any, ...]:
-        """What the examiner demands besides staying up: `certify.criteria.Criterion` of its own.
+        """Acceptance criteria besides staying up, as `certification.criteria.Criterion`.
 
-        Numbered from 10, from a `certify.measure.Recording` after its warm-up.
+        Numbered from 10, from a `reference.measure.Recording` after its warm-up.
         """
         return ()
 

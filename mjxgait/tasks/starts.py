@@ -1,4 +1,4 @@
-"""The starts on which every individual is judged: the first nominal, the others perturbed."""
+"""Initial conditions of the trials, shared by all individuals: first nominal, others perturbed."""
 
 import dataclasses
 from typing import Any
@@ -30,14 +30,15 @@ class Starts:
     qpos: [R, nq]. qvel: [R, nv]. friction: [R] factor on the floor's friction.
     push: [R, nv] added to qvel at step push_step [R] (never when it is `NEVER`).
     stiffness, damping: [R, J] factors on the joints' kp and kd.
-    heaviness: [R, nbody - 1] factors on the parts' masses and inertias; None where all are 1.
-    numbers: leaves [R, ...], the bodies that follow from it, as the plant reads them.
-    ground: leaves [R, ...], each trial's own; None where all are flat.
-    goal: [R] m ahead of the start; None where the task has none.
-    raised: [R] m by which a bar is higher than it will be; None where there is no bar.
-    light: [R, 3] m from where the root starts; None where there is none.
-    turn: [R] rad/s by which the commanded heading grows; None where nobody is told to turn.
-    delay: [R] control steps by which torques come late; None where they never do.
+    heaviness: [R, nbody - 1] mass scales, factors on the parts' masses and inertias; None if all
+      are 1.
+    numbers: leaves [R, ...], the body parameters that follow from it, as the plant reads them.
+    ground: leaves [R, ...], one per trial; None if all are flat.
+    goal: [R] m ahead of the start; None if the task has none.
+    raised: [R] m by which a bar is above its final height; None without a bar.
+    light: [R, 3] m from where the root starts; None without a light.
+    turn: [R] rad/s, rate of the commanded heading; None without a command.
+    delay: [R] control steps by which torques are late; None if they never are.
     """
 
     qpos: jax.Array
@@ -58,7 +59,10 @@ class Starts:
 
 
 def draw_starts(key: jax.Array, creature: Creature, config: RolloutConfig) -> Starts:
-    """R starts; the same key gives the same starts. Perturbations are uniform within the half widths of the config."""
+    """Draw R initial conditions; the same key gives the same ones.
+
+    Perturbations are uniform within the half widths of the config.
+    """
     count = config.starts
     key_pos, key_vel, key_friction, key_direction, key_moment = jax.random.split(key, 5)
     key_stiffness, key_damping = jax.random.split(jax.random.fold_in(key, 1))
@@ -103,8 +107,9 @@ def draw_starts(key: jax.Array, creature: Creature, config: RolloutConfig) -> St
 
 
 def milder(starts: Starts, share: jax.Array) -> Starts:
-    """The starts with this share [] of their disturbances; bodies, ground and what is asked of each
-    stay.
+    """Scale the disturbances of the initial conditions by this share [].
+
+    Bodies, ground and the goals of the trials stay.
     """
 
     def part(leaf: jax.Array, usual: jax.Array | float) -> jax.Array:
@@ -134,14 +139,16 @@ def _heaviness(key: jax.Array, creature: Creature, config: RolloutConfig) -> jax
         return None
     parts = creature.model.nbody - 1
     spread = jax.random.uniform(key, (config.starts, parts), minval=-1.0).at[0].set(0.0)
-    # What is welded to a part is as much heavier as the part.
+    # Bodies welded to a part share its mass scale.
     carrier = np.maximum(creature.model.body_weldid[1:] - 1, 0)
     return 1.0 + config.masses * spread[:, carrier]
 
 
 def draw_grounds(key: jax.Array, creature: Creature, config: RolloutConfig) -> Ground | None:
-    """Leaves [R, ...]: the nominal start has the ground that the config names, the others others
-    of its kind, or uneven ones of their own; None where all are flat.
+    """Draw the ground of each trial: leaves [R, ...]; None if all are flat.
+
+    The nominal start has the ground that the config names. The others have variants of its kind, or
+    uneven ground of their own.
     """
     spec, place = parse_ground(config.ground), start_place(creature)
     if spec.flat and not config.uneven:
@@ -160,8 +167,10 @@ def _stacked(grounds: list[Ground | None]) -> Ground:
 def _uneven(
     key: jax.Array, place: Place, config: RolloutConfig, draws: jax.Array
 ) -> list[Ground | None]:
-    """Level for the nominal start; for the others slopes spread evenly to all sides, from any first
-    one on, more of them steep than not: evenly over the disc of all that may be.
+    """Lay level ground for the nominal start and sloping, rough ground for the others.
+
+    The slopes spread evenly to all sides, from a random first one. They are uniform over the disc
+    of allowed slopes, so more of them are steep than not.
     """
     others = max(config.starts - 1, 1)
     side = (jnp.arange(config.starts) + jax.random.uniform(key)) / others

@@ -1,4 +1,4 @@
-"""Work of the joints, and what it is over weight and way."""
+"""Work of the joints, and the cost of transport."""
 
 import jax
 import jax.numpy as jnp
@@ -16,5 +16,5 @@ def positive_work(torque: jax.Array, sensed: Sensed, step: float) -> jax.Array:
 
 
 def cost_of_transport(creature: Body, work: jax.Array, way: jax.Array) -> jax.Array:
-    """Work [] in J over the body's weight and a way [] in m."""
+    """Cost of transport []: work in J over the body's weight and a distance in m."""
     return work / (creature.frame.mass * 9.81 * way)

@@ -1,4 +1,4 @@
-"""A bar across the way, which nothing in the physics touches: how deep a body reaches into it."""
+"""Bar across the path, which the physics ignores, and the depth of a body in it."""
 
 import jax
 import jax.numpy as jnp
@@ -10,23 +10,23 @@ from mjxgait.tasks.hop.limbo_config import BAR_PLACE, BAR_RADIUS
 from mjxgait.types import Sensed
 
 SLOPES = np.tan(np.radians(np.arange(-80, 81, 10))).astype(np.float32)[:, None]
-"""[slopes, 1] of the lines that are laid on the body from above."""
+"""Slopes [slopes, 1] of the lines that are laid on the body from above."""
 MARGIN = 0.01
-"""m that must be left: parts for show stand out of the watched geoms."""
+"""Required margin in m: decorative parts stick out of the watched geoms."""
 
 
 def bar_distance(creature: Body, sensed: Sensed) -> jax.Array:
-    """From the trunk to the bar [] in m along the start's forward axis; negative beyond it."""
+    """Distance [] in m to the bar along the start's forward axis; negative beyond it."""
     return BAR_PLACE - forward_way(creature, sensed)
 
 
 def intrusion(creature: Body, sensed: Sensed, height: jax.Array | float) -> jax.Array:
-    """How far [] m the body's hull is above a bar of this height [] m, where it is over the bar.
+    """Height [] in m of the body's hull above a bar of this height [] m, at the bar.
 
-    The hull is that of the watched geoms, each taken for a ball as high as it: what joins them,
-    rods and springs, lies within. It is what lies below all lines that rest on it from above, of
-    which some are laid (`SLOPES`); where they miss an edge the hull is a little too large. So it
-    counts no less to fly over the bar than to run into it. The floor must be the plane z = 0.
+    The hull is that of the watched geoms, each taken as a ball of the same height; rods and springs
+    that join them lie within. It is the space below all lines that rest on it from above, of which
+    some are laid (`SLOPES`). Where they miss an edge, the hull is slightly too large. Flying over
+    the bar counts no less than running into it. The floor must be the plane z = 0.
     """
     forward, _ = creature.frame.start_axes
     from_trunk = (sensed.geom_pos - sensed.trunk_pos) @ forward

@@ -1,4 +1,4 @@
-"""Settings of the task of hopping to a goal."""
+"""Settings of the tasks hop and travel."""
 
 import dataclasses
 from typing import Annotated
@@ -14,11 +14,11 @@ from mjxgait.config.tables import (
 )
 
 GOALS = (0.4, 2.0)
-"""m ahead of the start: the nearest and the farthest goal."""
+"""Nearest and farthest goal, in m ahead of the start."""
 NOMINAL_GOAL = 1.2
-"""m, of the trial that nobody disturbs."""
+"""Goal of the undisturbed trial, in m."""
 NEAR = 0.05
-"""Share of the goal's distance; who is nearer has arrived."""
+"""Share of the goal distance within which the goal counts as reached."""
 OnTheWay = Annotated[float, pydantic.Field(gt=0, lt=1)]
 
 
@@ -26,22 +26,22 @@ OnTheWay = Annotated[float, pydantic.Field(gt=0, lt=1)]
 class HopWeights:
     """Weight of each fitness term; all are penalties.
 
-    mjxgait/tasks/hop/fitness.py says to the letter what each measures. As long as those of
-    style, all but `distance` and `missed`, sum up to less than `distance`, getting nearer is
-    worth its manner.
+    mjxgait/tasks/hop/fitness.py has the exact definitions. As long as the style terms, all but
+    `distance` and `missed`, sum up to less than `distance`, getting nearer pays despite its style.
 
     Attributes:
       distance: goal distances that are left at the end.
-      missed: 1 for who is not within a twentieth of the goal distance.
-      time: share of the time until it arrived.
-      restless: way made after the arrival, in goal distances.
+      missed: 1 unless the end is within a twentieth of the goal distance.
+      time: share of the time until the arrival.
+      restless: distance moved after the arrival, in goal distances.
       ground: share of the time on parts that must not touch the floor.
       fall: 1 for an episode that ended with a fall.
-      neutral: how far joints are from standing in the end, in halves of their ranges.
-      fast: the fastest that a joint turned: nothing up to 14 rad/s, 1 from 20 on.
-      overlap: how deep parts are in each other.
-      energy: work of the joints per weight and way (cost of transport); 0: it is no term.
-      sub_goals: how near it came to each of `fitness.sub_goals`; 0: it is no term.
+      neutral: final distance of the joints from standing, in halves of their ranges.
+      fast: highest speed of any joint: nothing up to 14 rad/s, 1 from 20 on.
+      overlap: depth of body parts in each other.
+      energy: work of the joints per weight and distance (cost of transport); a weight of 0 removes
+        the term.
+      sub_goals: smallest distance to each of `fitness.sub_goals`; a weight of 0 removes the term.
     """
 
     __pydantic_config__ = STRICT
@@ -60,12 +60,12 @@ class HopWeights:
 
 @dataclasses.dataclass(frozen=True)
 class GoalConfig:
-    """What is wanted of every way to a goal.
+    """Parameters of every task with a goal.
 
     Attributes:
       style_ramp: generations over which the style terms grow to their full weight.
-      rest: s without motion after which the rest of an episode is not simulated: whoever senses
-        nothing new does nothing new. 0 simulates all of it.
+      rest: s without motion after which the rest of an episode is not simulated: without new
+        observations there is no new motion. 0 simulates all of it.
     """
 
     __pydantic_config__ = STRICT
@@ -75,12 +75,12 @@ class GoalConfig:
 
 @dataclasses.dataclass(frozen=True)
 class HopConfig(GoalConfig):
-    """What is wanted of the way to one goal.
+    """Parameters of the hop fitness.
 
     Attributes:
-      sub_goals: points on the straight way from the start to the goal that are to be passed, as
-        shares of that way; read only if the weight of that name is not 0.
-      weights: what each term counts.
+      sub_goals: points to pass on the straight path from the start to the goal, as shares of it;
+        read only if the weight of that name is not 0.
+      weights: weight of each term.
     """
 
     __pydantic_config__ = STRICT
@@ -97,11 +97,11 @@ class TravelWeights:
     """See `HopWeights`.
 
     Attributes:
-      distance: of the way that is left to the nominal goal, below zero beyond it.
+      distance: share left of the way to the nominal goal, negative beyond it.
       ground: share of the time on parts that must not touch the floor.
       fall: 1 for an episode that ended with a fall.
-      fast: the fastest that a joint turned: nothing up to 14 rad/s, 1 from 20 on.
-      overlap: how deep parts are in each other.
+      fast: highest speed of any joint: nothing up to 14 rad/s, 1 from 20 on.
+      overlap: depth of body parts in each other.
     """
 
     __pydantic_config__ = STRICT
@@ -114,10 +114,10 @@ class TravelWeights:
 
 @dataclasses.dataclass(frozen=True)
 class TravelConfig(GoalConfig):
-    """What is wanted of the way from goal to goal.
+    """Parameters of the travel fitness.
 
     Attributes:
-      weights: what each term counts.
+      weights: weight of each term.
     """
 
     __pydantic_config__ = STRICT

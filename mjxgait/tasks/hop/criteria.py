@@ -1,4 +1,4 @@
-"""What is demanded of who hops to a goal: to get there, whatever goal it is, and to stay."""
+"""Acceptance criteria for hopping: reach the goal, wherever it is, and stay."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -20,8 +20,8 @@ from mjxgait.tasks.hop.thresholds import HopConfig
 class HopDemands(GoalDemands):
     """See `Demands`.
 
-    worth: not all trials, for an episode is shorter than an examination, and who is slow to a far
-    goal may be there in time.
+    worth: not all trials, because an episode is shorter than the certification, and a slow hopper
+      may still reach a far goal in time.
     """
 
     worth: float = 0.6
@@ -40,7 +40,7 @@ class HopDemands(GoalDemands):
         return outcome.stayed_up & (farthest(left, starts.goal, frames) <= wanted.near)
 
     def lost(self, outcome: Outcome, starts: Starts, steps: int) -> np.ndarray:
-        """See `Demands`: who is down, or not near when it must be there."""
+        """See `Demands`: down, or away from the goal at a time that counts."""
         wanted = self.wanted(CertificateConfig())
         frames = frames_in(wanted.stay, outcome.trajectory.time_step)
         due = slice(outcome.path.shape[1] - frames, steps)
@@ -49,7 +49,7 @@ class HopDemands(GoalDemands):
         return super().lost(outcome, starts, steps) | outside.any(1)
 
     def report(self, whole: Recording, config: CertificateConfig) -> dict[str, Any]:
-        """See `Demands`: how far off it ends, and since when it is there for good."""
+        """See `Demands`: distance from the goal at the end, and time of the final arrival."""
         left = _left(whole)
         outside = np.flatnonzero(~(left <= self.wanted(config).near * whole.goal))
         begins = outside[-1] + 1 if len(outside) else 0
@@ -74,7 +74,7 @@ class HopDemands(GoalDemands):
     def managed(
         self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
     ) -> np.ndarray:
-        """See `Demands`: up to the end, and then near its goal."""
+        """See `Demands`: no early end, and near the goal at the end."""
         near: np.ndarray = outcome["off"] <= self.wanted(CertificateConfig()).near
         return to_the_end(outcome, seconds, creature) & near
 
@@ -90,7 +90,7 @@ def away(goal: np.ndarray, path: np.ndarray, aside: np.ndarray) -> np.ndarray:
 
 
 def _left(whole: Recording) -> np.ndarray:
-    """[T] m from the trunk to the goal."""
+    """Distance [T] in m from the trunk to the goal."""
     ahead, aside, _ = whole.trunk_pos.T
     return away(np.array(whole.goal), ahead, aside)
 
@@ -106,5 +106,5 @@ def farthest(left: np.ndarray, goal: np.ndarray, frames: int) -> np.ndarray:
 
 
 def frames_in(seconds: float, time_step: float) -> int:
-    """How many frames so much time is, at least one."""
+    """Number of frames in this time, at least one."""
     return max(round(seconds / time_step), 1)

@@ -1,4 +1,4 @@
-"""From the tally of a way to a goal to named fitness terms, and what each of them counts."""
+"""Fitness terms of the tasks with a goal, and their weights."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -24,22 +24,22 @@ TERMS = tuple(field.name for field in dataclasses.fields(HopWeights))
 GOAL = "distance"
 MISSED = "missed"
 AIM = (GOAL, MISSED)
-"""What counts from the first generation on."""
+"""Terms that count from the first generation on."""
 STYLE = tuple(name for name in TERMS if name not in AIM)
-"""The manner of a way, ramped in over the generations."""
+"""Style terms, ramped in over the generations."""
 OPTIONAL = ("energy", "sub_goals")
-"""Terms only where they have a weight."""
+"""Terms that exist only with a weight."""
 
 FARTHEST = 2.0
-"""Goal distances; who is farther off than that is no worse."""
+"""Cap on the distance that is left, in goal distances."""
 SHORTEST = 0.25
-"""Body lengths of the way that work is at least divided by."""
+"""Smallest distance by which work is divided, in body lengths."""
 FASTEST, FAST = 20.0, 0.7
-"""rad/s that no joint of a machine turns at, and the share of it that costs nothing."""
+"""Joint speed in rad/s that no machine reaches, and the share of it that is free."""
 
 
 def terms_under(weights: HopWeights | TravelWeights) -> tuple[str, ...]:
-    """Names of the terms that there are under these weights."""
+    """Names of the terms that these weights enable."""
     names = tuple(field.name for field in dataclasses.fields(weights))
     return tuple(n for n in names if n not in OPTIONAL or getattr(weights, n))
 
@@ -47,10 +47,10 @@ def terms_under(weights: HopWeights | TravelWeights) -> tuple[str, ...]:
 def fitness_terms(
     creature: Body, horizon: int, tally: Tally, more: Mapping[str, jax.Array] | None = None
 ) -> dict[str, jax.Array]:
-    """The terms [] of one episode, each without unit and before its weight; all are at least zero.
+    """Return the terms [] of one episode, each without unit and before its weight; all are >= 0.
 
-    Style counts in proportion to how near it got: who has yet to learn to hop must not be punished
-    for trying. Sub-goals count in full: whoever stands still has passed none.
+    Style counts in proportion to how near the episode got: attempts to learn hopping must not be
+    punished. Sub-goals count in full, because standing still passes none.
 
     Args:
       horizon: T, steps of a full episode. more: style that another task adds.
@@ -66,7 +66,7 @@ def fitness_terms(
 
 
 def style_terms(creature: Body, horizon: int, tally: Tally) -> dict[str, jax.Array]:
-    """The manner [] of one episode, however near it got."""
+    """Style terms [] of one episode, not scaled by how near it got."""
     lived = jnp.maximum(tally.steps, 1)
     half_range = 0.5 * (creature.joints.pose_high - creature.joints.pose_low).astype(jnp.float32)
     terms = {

@@ -1,4 +1,4 @@
-"""What tasks with a goal have in common in the examination."""
+"""Acceptance criteria common to the tasks with a goal."""
 
 import abc
 import dataclasses
@@ -21,11 +21,11 @@ from mjxgait.reference.starts import Starts
 from mjxgait.tasks.hop.thresholds import GoalConfig
 
 HIGHEST = 1e3
-"""Standing heights: a trunk that hops may be anywhere, as long as no part of it lies."""
+"""Height limit in standing heights: a hopping trunk may be anywhere, but no part may lie."""
 
 
 class GoalDemands(Unasked, abc.ABC):
-    """See `Demands`. It is not asked to bear pushes: in half of a hop nothing can be done."""
+    """See `Demands`. Pushes decide nothing: in half of a hop the body cannot react."""
 
     drag: float = 0.0
     pushed: bool = True
@@ -34,15 +34,15 @@ class GoalDemands(Unasked, abc.ABC):
     leaps: bool = False
     worth: float = 1.0
     share: str
-    """What the share of criterion 4 does."""
+    """Name of the share in criterion 4."""
 
     @abc.abstractmethod
     def wanted(self, config: CertificateConfig) -> GoalConfig:
-        """The thresholds of this task."""
+        """Thresholds of this task."""
 
     @abc.abstractmethod
     def second(self, whole: Recording, config: CertificateConfig) -> Criterion:
-        """Criterion 2: what has been done of the way."""
+        """Criterion 2: progress on the way."""
 
     def fall(self, config: CertificateConfig) -> Fall:
         """See `Demands`: a head or an elbow on the floor, or a base on its edge."""
@@ -51,7 +51,7 @@ class GoalDemands(Unasked, abc.ABC):
     def aimed(
         self, starts: Starts, config: CertificateConfig, rng: np.random.Generator | None = None
     ) -> Starts:
-        """See `Demands`: a goal for each that has none yet."""
+        """See `Demands`: a goal for each simulation without one."""
         wanted = self.wanted(config)
         drawn = wanted.nominal if rng is None else rng.uniform(*wanted.goals, len(starts))
         return dataclasses.replace(starts, goal=np.where(starts.goal > 0, starts.goal, drawn))
@@ -59,7 +59,7 @@ class GoalDemands(Unasked, abc.ABC):
     def undisturbed(
         self, whole: Recording, halved: Recording, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
-        """See `Demands`: 1 and 2, both at half the time step too, 8, 9; from the first moment on."""
+        """See `Demands`: 1 and 2, both at half the time step too, 8, 9; without a warm-up."""
         basic, repeated = (self.basic(each, config) for each in (whole, halved))
         failed = sum(not m.passed for c in repeated for m in c.measures)
         of = " and ".join(str(c.number) for c in basic)
@@ -83,12 +83,12 @@ class GoalDemands(Unasked, abc.ABC):
     def disturbed(
         self, started: float, pushed: float, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
-        """See `Demands`: 4. The report has what pushes do."""
+        """See `Demands`: 4. The effect of pushes is only reported."""
         share = at_least(self.share, started, self.wanted(config).arrive, 1.0)
         return (Criterion(4, "perturbed starts and other goals", (share,)),)
 
     def basic(self, whole: Recording, config: CertificateConfig) -> tuple[Criterion, ...]:
-        """What one recording decides, at whatever time step: 1 and 2."""
+        """Criteria of one recording, at any time step: 1 and 2."""
         up = at_least("least upright", whole.trunk_up.min(), self.wanted(config).min_up, 1.0)
         lies = at_most("time on wrong parts", whole.touch.mean(), 0.0)
         return (Criterion(1, "stays up", (up, lies)), self.second(whole, config))

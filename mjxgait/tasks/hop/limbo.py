@@ -1,4 +1,4 @@
-"""Limbo as a task: to a goal beneath a bar, of which every part must stay clear."""
+"""Limbo task: reach a goal beneath a bar, with every part clear of the bar."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -21,14 +21,17 @@ from mjxgait.tasks.starts import Starts
 from mjxgait.types import Sensed, pytree
 
 DEEP = 0.3
-"""Hip heights; a body so deep in the place of the bar counts whole."""
+"""Depth in the bar, in hip heights, at which the penalty is full."""
 THERE, BENEATH = 0.6, 0.05
-"""Of the terms `missed` and `bar`, means over the trials: who has no more is ready for a lower bar."""
+"""Largest means over the trials of the terms `missed` and `bar` at which the bar is lowered."""
 
 
 @pytree
 class Aim:
-    """goal: [] m ahead of the start. raised: [] m by which the bar is higher than it will be."""
+    """Goal and bar of one trial.
+
+    goal: [] m ahead of the start. raised: [] m by which the bar is above its final height.
+    """
 
     goal: jax.Array
     raised: jax.Array
@@ -36,8 +39,11 @@ class Aim:
 
 @pytree
 class Tally(hop.Tally):
-    """See `hop.Tally`. bar: [] m, the deepest that it was in the place of the bar, were that as low as
-    it will be. raised: [] m of it that nobody minds yet. height: [] m, of the bar as it will be.
+    """See `hop.Tally`.
+
+    bar: [] m, greatest depth in the bar at its final height.
+    raised: [] m of it that cost nothing yet.
+    height: [] m, of the bar in the end.
     """
 
     bar: jax.Array
@@ -53,7 +59,7 @@ class Standards(hop.Standards):
 
 
 class Limbo(Hop):
-    """One creature's way to a goal beneath a bar; see `Hop`."""
+    """Path of one creature to a goal beneath a bar; see `Hop`."""
 
     Settings = LimboConfig
     outcomes = (*Hop.outcomes, "bar")
@@ -65,7 +71,7 @@ class Limbo(Hop):
         """See `Task`.
 
         Raises:
-          UserError: the ground is not flat, where no bar has one height.
+          UserError: the ground is not flat, so a bar has no single height.
         """
         if not parse_ground(settings.ground).flat:
             raise UserError(f"rollout.ground = {settings.ground}: task limbo needs flat ground")
@@ -78,13 +84,13 @@ class Limbo(Hop):
         return steps
 
     def harder(self, trials: Starts, settings: Any, level: jax.Array) -> Starts:
-        """See `Task`: the bar comes down, so that whoever hops learns to duck little by little."""
+        """See `Task`: the bar comes down, so that hoppers learn to duck little by little."""
         left = 1.0 - ramped(settings.lowering, level)
         raised = jnp.full(trials.friction.shape, settings.higher * left)
         return dataclasses.replace(trials, raised=raised)
 
     def mastered(self, terms: Mapping[str, jax.Array]) -> jax.Array:
-        """See `Task`: who is at its goal in the end, and hardly touches the bar."""
+        """See `Task`: at the goal in the end, and hardly in the bar."""
         return (terms[MISSED] <= THERE) & (terms["bar"] <= BENEATH)
 
     def aim(self, trial: Starts) -> Any:
@@ -122,5 +128,8 @@ class Limbo(Hop):
         return fitness_terms(self.creature, self.horizon, tally, {"bar": bar})
 
     def outcome(self, tally: Any) -> dict[str, jax.Array]:
-        """See `Task`: of hopping, and how high in m a bar must be for it, at least its own."""
+        """See `Task`: as for hopping, and the height in m of a bar that would just be cleared.
+
+        It is at least the height of the bar itself.
+        """
         return super().outcome(tally) | {"bar": tally.height + tally.bar}

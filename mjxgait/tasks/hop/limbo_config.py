@@ -1,4 +1,4 @@
-"""Settings of the task of getting to a goal beneath a bar."""
+"""Settings of the limbo task."""
 
 import dataclasses
 
@@ -12,13 +12,13 @@ from mjxgait.config.tables import (
 from mjxgait.tasks.hop.config import HopConfig, HopWeights
 
 BAR_PLACE = 0.6
-"""m ahead of the start; the bar lies across the way, and ends nowhere."""
+"""m ahead of the start; the bar lies across the path and has no ends."""
 BAR_RADIUS = 0.01
 """m."""
 GOALS = (1.0, 2.0)
-"""m ahead of the start, see `settings.hop`: whoever is there has all of its body beyond the bar."""
+"""m ahead of the start, as in `hop.config`; at any goal the whole body is beyond the bar."""
 NOMINAL_GOAL = 1.4
-"""m, of the trial that nobody disturbs."""
+"""Goal of the undisturbed trial, in m."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -26,7 +26,7 @@ class LimboWeights(HopWeights):
     """See `HopWeights`.
 
     Attributes:
-      bar: how deep it was in the place of the bar and of all above it.
+      bar: greatest depth in the bar and in the space above it.
     """
 
     __pydantic_config__ = STRICT
@@ -36,14 +36,14 @@ class LimboWeights(HopWeights):
 
 @dataclasses.dataclass(frozen=True)
 class LimboConfig(HopConfig):
-    """What is wanted of the way to a goal beneath a bar.
+    """Parameters of the limbo fitness.
 
     Attributes:
       height: m, of the bar's lower edge above the floor.
-      higher: m by which it is higher in the first generation.
-      lowering: steps in which it comes down from there: one in each generation whose best have
-        mastered the step before.
-      weights: what each term counts.
+      higher: m by which the bar is higher in the first generation.
+      lowering: steps in which the bar comes down from there, one after each generation in which the
+        best individuals have mastered the current height.
+      weights: weight of each term.
     """
 
     __pydantic_config__ = STRICT

@@ -1,4 +1,4 @@
-"""What is demanded of who goes to a goal beneath a bar: what hopping demands, and to stay clear."""
+"""Acceptance criteria for limbo: those of hopping, and staying clear of the bar."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -20,7 +20,7 @@ ENOUGH = 0.01
 
 
 class LimboDemands(HopDemands):
-    """See `Demands`. Whoever is at the goal has passed the bar: goals lie beyond it."""
+    """See `Demands`. Goals lie beyond the bar, so arrival implies passing it."""
 
     verdict = "it gets to its goal beneath the bar and stays"
 
@@ -31,7 +31,7 @@ class LimboDemands(HopDemands):
     def aimed(
         self, starts: Starts, config: CertificateConfig, rng: np.random.Generator | None = None
     ) -> Starts:
-        """See `Demands`: a goal and a bar for each that has none yet."""
+        """See `Demands`: a goal and a bar for each simulation without one."""
         bar = np.array([config.limbo.place, config.limbo.height])
         given = np.where(np.isfinite(starts.bar), starts.bar, bar)
         return dataclasses.replace(super().aimed(starts, config, rng), bar=given)
@@ -42,7 +42,7 @@ class LimboDemands(HopDemands):
         return super().succeeded(outcome, starts, config) & clear
 
     def lost(self, outcome: Outcome, starts: Starts, steps: int) -> np.ndarray:
-        """See `Demands`: of hopping, and who has touched the bar."""
+        """See `Demands`: as for hopping, and any contact with the bar."""
         touched = outcome.clearance <= CertificateConfig().limbo.clearance
         return super().lost(outcome, starts, steps) | touched
 
@@ -53,7 +53,7 @@ class LimboDemands(HopDemands):
         return (*super().basic(whole, config), Criterion(3, "clear of the bar", (clear,)))
 
     def report(self, whole: Recording, config: CertificateConfig) -> dict[str, Any]:
-        """See `Demands`: of hopping, and the least clearance."""
+        """See `Demands`: as for hopping, and the least clearance."""
         told = super().report(whole, config)
         least = _least(whole)
         bar = f"a bar {config.limbo.height:g} m high {'cleared' if least > 0 else 'touched'}"
@@ -62,13 +62,14 @@ class LimboDemands(HopDemands):
     def managed(
         self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
     ) -> np.ndarray:
-        """See `Demands`: of hopping, and clear of the bar of the examination. That of evolution may
-        be lower.
+        """See `Demands`: as for hopping, and clear of the bar of the certification.
+
+        The bar in evolution may be lower.
         """
         clear = outcome["bar"] <= CertificateConfig().limbo.height
         return super().managed(outcome, seconds, creature) & clear
 
 
 def _least(whole: Recording) -> float:
-    """m of all frames; NaN where one is NaN, or where nobody looked."""
+    """Least clearance in m over all frames; NaN if one is NaN, or if none was recorded."""
     return np.nan if whole.clearance is None else float(whole.clearance.min())

@@ -1,4 +1,4 @@
-"""What a way to a goal leaves behind, updated once per step for one creature."""
+"""Episode statistics of the tasks with a goal, updated once per step for one creature."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -16,21 +16,26 @@ from mjxgait.tasks.work import positive_work
 from mjxgait.types import Sensed, pytree
 
 SLOW, SLOW_TURN = 0.0005, 0.005
-"""m/s and rad/s; who is slower than that stands still."""
+"""m/s and rad/s; anything slower stands still."""
 
 
 @pytree
 class Tally(protocol.Tally):
-    """Over the steps that a creature was up.
+    """Statistics over the steps of an episode until it ends.
 
-    reason: a `falls.Reason`. goal: [] m ahead of the start. left: [] m from the latest position to
-    the goal along the start's forward axis, negative beyond it. aside: [] m to the left of the
-    start, latest. arrived: [] steps until it first was near the goal; as many as an
-    episode has if it never was. after: [] m, path of the trunk since then.
-    ground: [] steps on which a part touched the floor that must not. bent: [J] rad, how far the
-    joints are from standing, latest. fastest: [] rad/s, of all joints. still: [] steps since it last
-    moved. work: [] J that the joints have done; None where it counts nothing. closest: [G] m, the
-    smallest distance to each sub-goal; None where there is none.
+    reason: a `falls.Reason`.
+    goal: [] m ahead of the start.
+    left: [] m from the latest position to the goal along the start's forward axis, negative beyond
+      it.
+    aside: [] m to the left of the start, latest.
+    arrived: [] steps until it first was near the goal; the length of an episode if it never was.
+    after: [] m, path of the trunk since then.
+    ground: [] steps on which a part touched the floor that must not.
+    bent: [J] rad, distance of the joints from standing, latest.
+    fastest: [] rad/s, of all joints.
+    still: [] steps since the latest motion.
+    work: [] J of the joints; None if it has no weight.
+    closest: [G] m, smallest distance to each sub-goal; None without sub-goals.
     """
 
     goal: jax.Array
@@ -48,15 +53,18 @@ class Tally(protocol.Tally):
 
 @pytree
 class Standards:
-    """rest: [] steps without motion that end an episode; never if 0."""
+    """Task parameters of an episode.
+
+    rest: [] steps without motion that end an episode; never if 0.
+    """
 
     rest: jax.Array
 
 
 def empty(creature: Body, horizon: int, energy: bool = False, sub_goals: int = 0) -> Tally:
-    """Tally of an individual that has not moved, whatever its goal.
+    """Return the statistics before any motion, whatever the goal.
 
-    energy: whether work counts. sub_goals: how many there are.
+    energy: whether work counts. sub_goals: their number.
     """
     none, zero, one = jnp.zeros((), jnp.int32), jnp.zeros(()), jnp.ones(())
     return Tally(
@@ -78,12 +86,12 @@ def empty(creature: Body, horizon: int, energy: bool = False, sub_goals: int = 0
 
 
 def goal_distance(creature: Body, goal: jax.Array, sensed: Sensed) -> jax.Array:
-    """From the trunk to the goal [] in m along the start's forward axis; positive when ahead."""
+    """Distance [] in m to the goal along the start's forward axis; positive when ahead."""
     return goal - forward_way(creature, sensed)
 
 
 def distance(left: jax.Array, aside: jax.Array) -> jax.Array:
-    """Distance [] in m to a goal in the plane, of which so much lies ahead and to the side."""
+    """Distance [] in m in the plane to a goal, from its distances ahead and to the side."""
     return jnp.sqrt(left * left + aside * aside)
 
 
@@ -93,7 +101,7 @@ def away(tally: Tally) -> jax.Array:
 
 
 def updated(creature: Body, step: float, tally: Tally, sensed: Sensed, goal: jax.Array) -> Tally:
-    """The tally after one more step in s. goal: [] m."""
+    """Return the statistics after one more step. step: s. goal: [] m."""
     left = goal_distance(creature, goal, sensed)
     aside = sideways(creature, sensed)
     near = distance(left, aside) <= NEAR * goal
@@ -117,7 +125,7 @@ def updated(creature: Body, step: float, tally: Tally, sensed: Sensed, goal: jax
 def with_extras(
     tally: Tally, sensed: Sensed, torque: jax.Array, step: float, sub_goals: Sequence[float]
 ) -> Tally:
-    """The tally with what only some settings count: work, and distances to sub-goals.
+    """Add the statistics that only some settings count: work, and distances to sub-goals.
 
     torque: [J] N·m. step: s. sub_goals: [G] shares of the straight way to the goal.
     """
@@ -132,15 +140,15 @@ def with_extras(
 
 
 def moves(sensed: Sensed) -> jax.Array:
-    """Whether [] anything moves that one would see."""
+    """Return whether [] there is visible motion."""
     turning = jnp.append(sensed.joint_vel, sensed.trunk_angvel)
     return (jnp.max(jnp.abs(sensed.trunk_vel)) > SLOW) | (jnp.max(jnp.abs(turning)) > SLOW_TURN)
 
 
 def rested(tally: Tally, horizon: int, rest: jax.Array, touching: jax.Array) -> Tally:
-    """The tally, at the end of the episode if nothing has moved for `rest` steps [], unless that is 0.
+    """Move the statistics to the end of the episode if nothing has moved for `rest` steps [].
 
-    touching: [] whether a part is on the floor that must not.
+    A `rest` of 0 never does. touching: [] whether a part is on the floor that must not.
     """
     over = (rest > 0) & (tally.still >= rest)
     left = jnp.where(over, horizon - tally.steps, 0)

@@ -1,4 +1,4 @@
-"""Hopping as a task: to a goal some way ahead, and to stay there."""
+"""Hop task: reach a goal some way ahead, and stay there."""
 
 import dataclasses
 from typing import Any, ClassVar
@@ -29,7 +29,7 @@ from mjxgait.types import Sensed
 
 
 class Hop(PlainTask):
-    """One creature's way to a goal; see `PlainTask`. Any creature with a trunk can do it."""
+    """Path of one creature to a goal; see `PlainTask`. Any creature with a trunk can do it."""
 
     Settings: ClassVar[type] = HopConfig
     outcomes: ClassVar[tuple[str, ...]] = ("left", "off", "arrival", "seconds")
@@ -52,7 +52,7 @@ class Hop(PlainTask):
     def told(
         cls, body: Body, step: float, horizon: int, ends: Termination | Ends, settings: Any
     ) -> "Hop":
-        """The task under these settings, which decide the terms."""
+        """Return the task with these settings, which decide the terms."""
         return cls(body, step, horizon, ends, settings)
 
     @property
@@ -62,14 +62,14 @@ class Hop(PlainTask):
 
     @property
     def sub_goals(self) -> tuple[float, ...]:
-        """Points that are to be passed, as shares of the way; none where they count nothing."""
+        """Points to pass, as shares of the way; none if they have no weight."""
         return self.settings.sub_goals if "sub_goals" in self.terms else ()
 
     def trials(self, key: jax.Array, creature: Creature, settings: RolloutConfig) -> Starts:
-        """See `Task`: starts as everybody's, each with a goal of its own, the first the nominal."""
+        """See `Task`: the usual starts, each with a goal of its own; the first is nominal."""
         starts = draw_starts(key, creature, settings)
         low, high = self.goals
-        # A key of its own, so that the starts are those of every other task.
+        # A separate key keeps the starts the same as those of every other task.
         drawn = jax.random.uniform(jax.random.fold_in(key, 4), (settings.starts,))
         goals = (low + (high - low) * drawn).at[0].set(self.nominal)
         return dataclasses.replace(starts, goal=goals)
@@ -104,9 +104,7 @@ class Hop(PlainTask):
         return fitness_terms(self.creature, self.horizon, tally)
 
     def outcome(self, tally: Tally) -> dict[str, jax.Array]:
-        """See `Task`: m from the goal in the end, and over the goal's distance; s until it first was
-        there, and until the end.
-        """
+        """See `Task`: final distance in m and in goal distances; s to the arrival and the end."""
         left = away(tally)
         return {
             "left": left,

@@ -1,4 +1,4 @@
-"""What is demanded of who has a goal: to hop to it, beneath a bar, or from goal to goal."""
+"""Thresholds for the tasks with a goal: hop, limbo and travel."""
 
 import dataclasses
 from typing import Annotated
@@ -15,12 +15,12 @@ from mjxgait.config.tables import (
 
 @dataclasses.dataclass(frozen=True)
 class GoalConfig:
-    """What is demanded of who has a goal, instead of 1 to 3 and 7.
+    """Thresholds common to tasks with a goal, in place of criteria 1 to 3 and 7.
 
     Attributes:
-      nominal: m, the goal of the undisturbed way. goals: m, range of the others.
-      min_up: least product of the trunk's up axis with the world's; below it, one has fallen.
-      arrive: share of the perturbed starts that must do what the task demands.
+      nominal: m, goal of the undisturbed recording. goals: m, range of the others.
+      min_up: least product of the trunk's up axis with the world's; below it the body has fallen.
+      arrive: share of the perturbed starts that must succeed.
     """
 
     __pydantic_config__ = STRICT
@@ -32,11 +32,11 @@ class GoalConfig:
 
 @dataclasses.dataclass(frozen=True)
 class HopConfig(GoalConfig):
-    """What is demanded of who hops to a goal.
+    """Thresholds for `hop`.
 
     Attributes:
-      near: share of the goal's distance within which one has arrived.
-      stay: s at the end, all of which it is there.
+      near: share of the goal distance within which the goal counts as reached.
+      stay: s at the end, all of them near the goal.
     """
 
     __pydantic_config__ = STRICT
@@ -46,11 +46,11 @@ class HopConfig(GoalConfig):
 
 @dataclasses.dataclass(frozen=True)
 class LimboConfig(HopConfig):
-    """What is demanded of who goes to a goal beneath a bar: as of who hops, and to stay clear.
+    """Thresholds for `limbo`: those of `hop`, and the clearance.
 
     Attributes:
       place: m ahead of the start, of the bar's middle. height: m, of its lower edge.
-      clearance: m that every part must stay away from it, and from all above it.
+      clearance: m between every part and the bar, or the space above it.
     """
 
     __pydantic_config__ = STRICT
@@ -63,11 +63,13 @@ class LimboConfig(HopConfig):
 
 @dataclasses.dataclass(frozen=True)
 class TravelConfig(GoalConfig):
-    """What is demanded of who travels: goals as of who hops; within which distance one is reached
-    is the task's own (docs/hop.md), and no demand.
+    """Thresholds for `travel`: goal distances as for `hop`.
+
+    The task defines the distance at which a goal counts as reached (docs/hop.md); it is no
+    threshold.
 
     Attributes:
-      speed: m/s, least. second_half: its speed over the first half's.
+      speed: m/s, least. second_half: speed of the second half over that of the first.
     """
 
     __pydantic_config__ = STRICT

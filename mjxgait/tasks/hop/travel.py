@@ -1,4 +1,4 @@
-"""Travelling as a task: to a goal that moves on as soon as it is reached."""
+"""Travel task: reach a goal that moves on as soon as it is reached."""
 
 import dataclasses
 from typing import Any, ClassVar
@@ -23,20 +23,23 @@ class Tally(hop.Tally):
 
 @pytree
 class Aim:
-    """goal: [] m ahead of the start, now. spacing: [] m from one goal to the next."""
+    """Goal of the moment.
+
+    goal: [] m ahead of the start. spacing: [] m from one goal to the next.
+    """
 
     goal: jax.Array
     spacing: jax.Array
 
 
 class Travel(Hop):
-    """One creature's way from goal to goal; see `Hop`."""
+    """Path of one creature from goal to goal; see `Hop`."""
 
     Settings: ClassVar[type] = TravelConfig
     outcomes = ("goals", "way", "seconds")
 
     def aim(self, trial: Starts) -> Any:
-        """See `Task`: the first goal is as far as all others are from each other."""
+        """See `Task`: the distance to the first goal is also the spacing of all others."""
         goal = jnp.asarray(trial.goal)
         return Aim(goal, goal)
 
@@ -63,7 +66,7 @@ class Travel(Hop):
         return dataclasses.replace(after, reached=reached)
 
     def judge(self, tally: Any, settings: Any) -> dict[str, jax.Array]:
-        """See `Task`: style counts by the share of the way to the nominal goal."""
+        """See `Task`: style counts in proportion to the share of the way to the nominal goal."""
         way = self._way(tally) / NOMINAL_GOAL
         style = style_terms(self.creature, self.horizon, tally)
         near = jnp.clip(way, 0.0, 1.0)

@@ -1,4 +1,4 @@
-"""What is demanded of who travels from goal to goal: to get on, and not to stop."""
+"""Acceptance criteria for travelling from goal to goal: advance, and do not stop."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -18,16 +18,16 @@ from mjxgait.tasks.hop.goal_criteria import GoalDemands
 from mjxgait.tasks.hop.thresholds import TravelConfig
 
 NEAR = 0.05
-"""Of a goal's distance from the one before: who is nearer has reached it (docs/hop.md)."""
+"""Share of the goal spacing within which a goal counts as reached (docs/hop.md)."""
 
 
 class TravelDemands(GoalDemands):
-    """See `Demands`. A goal that is near, or passed, moves on by as much as it was away at first."""
+    """See `Demands`. A goal that is near, or passed, moves on by its first distance."""
 
     verdict = "it travels from goal to goal"
     share = "share that travels"
     revision = 1
-    """A buzz was in no criterion."""
+    """A criterion for vibration was added."""
 
     def wanted(self, config: CertificateConfig) -> TravelConfig:
         """See `GoalDemands`."""
@@ -61,12 +61,12 @@ class TravelDemands(GoalDemands):
     def undisturbed(
         self, whole: Recording, halved: Recording, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
-        """See `Demands`: as of all that have a goal, and 7: it does not get on by a vibration."""
+        """See `Demands`: as for all tasks with a goal, and 7: no motion by vibration."""
         shakes = at_most("buzz of a joint / joint speed", buzz(whole), config.gait.buzz)
         return (*super().undisturbed(whole, halved, config), Criterion(7, "gait", (shakes,)))
 
     def report(self, whole: Recording, config: CertificateConfig) -> dict[str, Any]:
-        """See `Demands`: how far it gets, and by how many goals."""
+        """See `Demands`: distance travelled, and number of goals."""
         way, goal, goals = whole.trunk_pos[:, 0], np.array(whole.goal), 0
         for place in np.maximum.accumulate(way):
             ahead = self.onward(goal, np.array(whole.goal), place)
@@ -83,6 +83,6 @@ class TravelDemands(GoalDemands):
     def managed(
         self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
     ) -> np.ndarray:
-        """See `Demands`: up to the end and fast enough."""
+        """See `Demands`: no early end, and fast enough."""
         fast: np.ndarray = outcome["way"] >= CertificateConfig().travel.speed * seconds
         return to_the_end(outcome, seconds, creature) & fast

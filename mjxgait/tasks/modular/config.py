@@ -1,4 +1,4 @@
-"""Settings of what bodies of blocks are to do."""
+"""Settings of the tasks for modular bodies."""
 
 import dataclasses
 
@@ -7,12 +7,12 @@ from mjxgait.config.tables import STRICT, NonNegative, Positive
 
 @dataclasses.dataclass(frozen=True)
 class BlocksConfig:
-    """What all of them have.
+    """Parameters common to these tasks.
 
     Attributes:
       settle: s from the start that do not count.
-      overlap: how deep blocks are in each other or in the ground, of the smaller one's size, of
-        which half counts of what was done.
+      overlap: depth of blocks in each other or in the ground, over the smaller one's size, at which
+        half of the performance counts.
       apart: generations until that counts in full; 0: from the first on.
     """
 
@@ -24,12 +24,12 @@ class BlocksConfig:
 
 @dataclasses.dataclass(frozen=True)
 class SwimWeights:
-    """What each term counts; `overlap` and `elsewhere` are penalties.
+    """Weight of each term; `overlap` and `elsewhere` are penalties.
 
     Attributes:
-      speed: m/s of the way, as the crow flies.
-      overlap: what of the speed is lost by blocks that stand in each other.
-      elsewhere: what of the rest is lost by momentum that the water did not give.
+      speed: m/s, in a straight line.
+      overlap: part of the speed lost by blocks in each other.
+      elsewhere: part of the rest lost by momentum that the water did not give.
     """
 
     __pydantic_config__ = STRICT
@@ -40,12 +40,12 @@ class SwimWeights:
 
 @dataclasses.dataclass(frozen=True)
 class SwimConfig(BlocksConfig):
-    """The fitness of swimmers.
+    """Parameters of the swim fitness.
 
     Attributes:
-      elsewhere: share of its momentum that the water did not give, of which half the speed counts: a
-        step of finite length gives some to those that find out how.
-      weights: what each term counts.
+      elsewhere: share of the momentum that the water did not give, at which half of the speed
+        counts: a step of finite length gives some to swimmers that exploit it.
+      weights: weight of each term.
     """
 
     __pydantic_config__ = STRICT
@@ -55,12 +55,12 @@ class SwimConfig(BlocksConfig):
 
 @dataclasses.dataclass(frozen=True)
 class RoamWeights:
-    """What each term counts; `overlap` and `balance` are penalties.
+    """Weight of each term; `overlap` and `balance` are penalties.
 
     Attributes:
-      speed: m/s of the way over ground, as the crow flies.
-      overlap: what of the speed is lost by blocks that stand in each other or in the ground.
-      balance: what of the rest is lost by tipping over.
+      speed: m/s over ground, in a straight line.
+      overlap: part of the speed lost by blocks in each other or in the ground.
+      balance: part of the rest lost by tipping over.
     """
 
     __pydantic_config__ = STRICT
@@ -71,12 +71,12 @@ class RoamWeights:
 
 @dataclasses.dataclass(frozen=True)
 class RoamConfig(BlocksConfig):
-    """The fitness of blocks that walk.
+    """Parameters of the roam fitness.
 
     Attributes:
-      tilt: deg, the farthest that the root has tipped from how it lay when it had settled, of which
-        half the speed counts.
-      weights: what each term counts.
+      tilt: deg, largest tilt of the root from its settled attitude, at which half of the speed
+        counts.
+      weights: weight of each term.
     """
 
     __pydantic_config__ = STRICT
@@ -87,12 +87,13 @@ class RoamConfig(BlocksConfig):
 
 @dataclasses.dataclass(frozen=True)
 class JumpWeights:
-    """What each term counts; all but `height` are penalties.
+    """Weight of each term; all but `height` are penalties.
 
     Attributes:
       height: m, of the lowest part at the best moment, mean of the halves of the time that counts.
-      overlap: what of it is lost by blocks that stand in each other or in the ground.
-      wild: what of the rest is lost by an episode that ends early: its share that was not lived.
+      overlap: part of it lost by blocks in each other or in the ground.
+      wild: part of the rest lost by an episode that ends early: the share of the time that is
+        missing.
     """
 
     __pydantic_config__ = STRICT
@@ -103,10 +104,10 @@ class JumpWeights:
 
 @dataclasses.dataclass(frozen=True)
 class JumpConfig(BlocksConfig):
-    """The fitness of blocks that jump.
+    """Parameters of the jump fitness.
 
     Attributes:
-      weights: what each term counts.
+      weights: weight of each term.
     """
 
     __pydantic_config__ = STRICT

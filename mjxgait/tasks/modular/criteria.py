@@ -1,4 +1,4 @@
-"""What is demanded of all bodies of blocks: to do here what evolution said, as a machine could.
+"""Acceptance criteria common to modular bodies: the result of evolution, within physical limits.
 
 Letters: `T` frames.
 """
@@ -32,55 +32,53 @@ UNITS = {"speed": "m/s", "height": "m"}
 
 
 class BlocksDemands(StaysUp, abc.ABC):
-    """See `Demands`. No body has a right way up, so none falls, and nobody is pushed."""
+    """See `Demands`. These bodies have no upright pose, so there are no falls and no pushes."""
 
     pushed = by_pushes = False
     grown = True
     revision = 1
-    """Criterion 4 measured the root from the first moment on, and of jumpers one leap."""
+    """Criterion 4 no longer measures the root from the first moment on, nor one leap of jumpers."""
     verb: str
-    """What one that passes does."""
+    """Verb for what a passing body does."""
     promised: str
-    """The term by which evolution said how much it does."""
+    """Fitness term that states the performance in evolution."""
     evidence = "way"
-    """The outcome of a trial in evolution that shows how much it does."""
+    """Metric of a trial in evolution that shows the performance."""
 
     @abc.abstractmethod
     def wanted(self, config: CertificateConfig) -> BlocksConfig:
-        """The thresholds of this task."""
+        """Thresholds of this task."""
 
     @abc.abstractmethod
     def second(self, window: Recording, config: CertificateConfig) -> Criterion:
-        """Criterion 2: what was to be done."""
+        """Criterion 2: the task itself."""
 
     @abc.abstractmethod
     def done(self, window: Recording) -> float:
-        """How much was done of what was promised, in its unit."""
+        """Performance in the recording, in the unit of the promised term."""
 
     def promise(self, champion: Champion, seconds: float, config: CertificateConfig) -> float:
-        """How much evolution said it does in a trial of so many seconds."""
+        """Performance that evolution reported for a trial of so many seconds."""
         return champion.terms.get(self.promised, np.nan)
 
     @abc.abstractmethod
     def enough(self, seconds: float, config: CertificateConfig) -> float:
-        """What `evidence` must be at least in a trial of so many seconds to be clearly more than is
-        demanded.
-        """
+        """Least `evidence` in a trial of so many seconds, clearly above the threshold."""
 
     def since(self, champion: Champion, config: CertificateConfig) -> float:
-        """s from which on evolution counted what was done."""
+        """Time in s from which evolution counted the performance."""
         return config.warmup
 
     def managed(
         self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
     ) -> np.ndarray:
-        """See `Demands`: to the end, and clearly more than is demanded."""
+        """See `Demands`: no early end, and clearly more than required."""
         lived = to_the_end(outcome, seconds, creature)
         enough: np.ndarray = outcome[self.evidence] >= self.enough(seconds, CertificateConfig())
         return lived & enough
 
     def alone(self, window: Recording, config: CertificateConfig) -> tuple[Criterion, ...]:
-        """What is demanded of this task alone."""
+        """Criteria of this task alone."""
         return ()
 
     def fall(self, config: CertificateConfig) -> Fall:
@@ -112,9 +110,9 @@ class BlocksDemands(StaysUp, abc.ABC):
     def kept(
         self, champion: Champion, whole: Recording, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
-        """Return criterion 10: as much as evolution said, in as many seconds as evolution saw.
+        """Return criterion 10: the performance of evolution again, over the same number of seconds.
 
-        It fails where the episode had ended before anything counted.
+        It fails if the episode ended before anything counted.
         """
         seconds = champion.origin.get("nominal", {}).get("seconds", np.inf)
         told = self.promise(champion, seconds, config)
@@ -132,7 +130,7 @@ class BlocksDemands(StaysUp, abc.ABC):
         return (Criterion(4, "perturbed starts", (share,)),)
 
     def report(self, whole: Recording, config: CertificateConfig) -> dict[str, Any]:
-        """See `Demands`: how much it does, and of what it is."""
+        """See `Demands`: the performance, and the body."""
         window = whole.window(config.warmup)
         done, parts, unit = self.done(window), len(seen(whole).sizes), UNITS[self.promised]
         return {
@@ -145,11 +143,11 @@ class BlocksDemands(StaysUp, abc.ABC):
 
 
 class GoingDemands(BlocksDemands):
-    """See `BlocksDemands`: to get on, straight, at a speed."""
+    """See `BlocksDemands`: motion in a straight line at a speed."""
 
     promised = "speed"
     axes = 3
-    """Along how many of the world's axes a way counts: two where heights do not."""
+    """Number of world axes along which distance counts: two if height does not."""
 
     @abc.abstractmethod
     def wanted(self, config: CertificateConfig) -> GoingConfig:
@@ -164,13 +162,13 @@ class GoingDemands(BlocksDemands):
         return float(flight(self._middle(window), window.time_step))
 
     def succeeded(self, outcome: Outcome, starts: Starts, config: CertificateConfig) -> np.ndarray:
-        """See `Demands`: those that are as fast as criterion 2 wants, measured in the same way."""
+        """See `Demands`: those as fast as criterion 2 requires, measured in the same way."""
         middle = counted(outcome.middle, outcome, config)[..., : self.axes]
         fast = flight(middle, outcome.trajectory.time_step) >= self.wanted(config).speed
         return outcome.stayed_up & fast
 
     def enough(self, seconds: float, config: CertificateConfig) -> float:
-        """See `BlocksDemands`: m in the seconds that count, as far as it must get in all."""
+        """See `BlocksDemands`: the distance in m due in all seconds, within those that count."""
         return self.wanted(config).speed * seconds
 
     def _middle(self, window: Recording) -> np.ndarray:
@@ -178,7 +176,7 @@ class GoingDemands(BlocksDemands):
 
 
 def gets_on(name: str, middle: np.ndarray, time_step: float, config: GoingConfig) -> Criterion:
-    """2. It gets away from where it was, straight, and does not slow down; middle: [T, 2 or 3] m."""
+    """2. The body moves away, straight, and does not slow down; middle: [T, 2 or 3] m."""
     half = len(middle) // 2
     first, second = (
         float(np.linalg.norm(way)) for way in (middle[half] - middle[0], middle[-1] - middle[half])
@@ -197,7 +195,7 @@ def gets_on(name: str, middle: np.ndarray, time_step: float, config: GoingConfig
 
 
 def machine(window: Recording, config: CertificateConfig, wanted: BlocksConfig) -> Criterion:
-    """8. No physics exploit: speeds, angles and torques of a machine that could exist."""
+    """8. No physics exploit: speeds, angles and torques that a machine could have."""
     limit = window.dimensions.torque_limit
     overrun, fastest = joint_overrun(window).max(), np.abs(window.joint_vel).max()
     return Criterion(
@@ -219,8 +217,9 @@ def machine(window: Recording, config: CertificateConfig, wanted: BlocksConfig) 
 
 
 def apart(window: Recording, config: BlocksConfig, on_land: bool) -> Criterion:
-    """9. No block stands in another that it is not joined to, as it grew or by moving, nor in the
-    ground.
+    """9. No block is in another that it is not joined to, nor in the ground.
+
+    Overlaps count whether they come from growth or from motion.
     """
     sizes = seen(window).sizes
     least = np.array([min(sizes[one], sizes[other]) for one, other in window.overlap_pairs])
@@ -233,18 +232,20 @@ def apart(window: Recording, config: BlocksConfig, on_land: bool) -> Criterion:
 
 
 def flight(middle: np.ndarray, time_step: float) -> np.ndarray:
-    """[...] m/s in a straight line from the first frame to the last; middle: [..., T, 2 or 3] m."""
+    """Straight-line speed [...] in m/s from the first to the last frame; middle: [..., T, 2 or 3]
+    m.
+    """
     way = np.linalg.norm(middle[..., -1, :] - middle[..., 0, :], axis=-1)
     speed: np.ndarray = way / ((middle.shape[-2] - 1) * time_step)
     return speed
 
 
 def counted(frames: np.ndarray, outcome: Outcome, config: CertificateConfig) -> np.ndarray:
-    """Those of the frames [S, T, ...] of disturbed simulations that come after the warm-up."""
+    """Frames [S, T, ...] of disturbed simulations after the warm-up."""
     return frames[:, round(config.warmup / outcome.trajectory.time_step) :]
 
 
 def seen(recording: Recording) -> Grown:
-    """What was seen of a body of blocks."""
+    """Recorded data of a modular body."""
     assert recording.grown is not None
     return recording.grown

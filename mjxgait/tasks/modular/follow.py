@@ -1,7 +1,7 @@
-"""Following as a task of bodies that grow: to get nearer to a light, wherever it is.
+"""Follow task for modular bodies: get nearer to a light, wherever it is.
 
-Each trial has a light of its own, too far away to be reached. A brain senses its direction in the
-own axes of each block.
+Each trial has its own light, too far away to be reached. The brain observes its direction in the
+axes of each block.
 """
 
 import dataclasses
@@ -23,8 +23,9 @@ from mjxgait.types import Sensed
 
 
 class Following(GoingTask):
-    """See `Task`: what followers in water and on land have in common. A way is what the distance to
-    the light has become less by.
+    """See `Task`: base class for following in water and on land.
+
+    The way is the decrease of the distance to the light.
     """
 
     adds: ClassVar[tuple[str, ...]] = ("light",)
@@ -34,8 +35,8 @@ class Following(GoingTask):
     def trials(self, key: jax.Array, creature: Creature, settings: RolloutConfig) -> Starts:
         """See `Task`: the first light is ahead, and in each round the others are elsewhere.
 
-        All of a round cancel out: who only swims on gets as much farther from some as nearer to the
-        others.
+        The lights of a round cancel out with the one ahead: moving straight on gains as much on
+        some as it loses on the others.
         """
         rounds = settings.variety
         others = (settings.starts - 1) // rounds
@@ -45,12 +46,12 @@ class Following(GoingTask):
         return dataclasses.replace(super().trials(key, creature, settings), light=lights)
 
     def aim(self, trial: Starts) -> jax.Array:
-        """See `Task`: [3] m, where the light is."""
+        """See `Task`: place [3] of the light in m."""
         assert trial.light is not None
         return trial.qpos[:3] + trial.light
 
     def senses(self, aim: jax.Array, sensed: Sensed) -> Mapping[str, jax.Array]:
-        """See `Task`: [G, 3] the light's direction in the own axes of each block."""
+        """See `Task`: direction [G, 3] of the light in the axes of each block."""
         assert sensed.geom_rot is not None
         there = aim - sensed.geom_pos
         there = there / jnp.sqrt(jnp.sum(there**2, axis=1, keepdims=True))
@@ -71,7 +72,7 @@ class Following(GoingTask):
         return before - now
 
     def outcome(self, tally: Any) -> Mapping[str, jax.Array]:
-        """See `Task`: s from which on the way counted, besides."""
+        """See `Task`: also the time in s from which the way counted."""
         return {**super().outcome(tally), "since": tally.since * self.step}
 
 
@@ -86,9 +87,10 @@ class FollowOnLand(Following, Roam):
 def balanced(key: jax.Array, count: int, axes: int) -> jax.Array:
     """Directions [count, 3] that cancel out together with the one ahead, along so many axes.
 
-    Up to two, in space up to three, are a ring about the way, as far behind as balances it (one alone
-    is behind); what is left are opposite ones in any direction. In space the ring is turned anyhow,
-    and three are as often one behind and two square to the way.
+    Up to two, in space up to three, form a ring around the forward axis, far enough behind to
+    balance the one ahead (a single one is straight behind). The rest are opposite pairs in random
+    directions. In space the ring is rotated at random, and half of the rings of three become one
+    direction behind and two perpendicular to the forward axis.
     """
     key_turn, key_which = jax.random.split(key)
     most = 3 if axes == 3 else 1
@@ -105,7 +107,9 @@ def balanced(key: jax.Array, count: int, axes: int) -> jax.Array:
 
 
 def _ring(count: int, ahead: float, turn: jax.Array | float) -> jax.Array:
-    """[count, 3] of length 1, evenly about the way ahead, so far along it; turn: rad, of the first."""
+    """Unit vectors [count, 3] evenly around the forward axis, `ahead` along it; turn: rad, first
+    one.
+    """
     about = turn + 2 * jnp.pi * jnp.arange(count) / max(count, 1)
     aside = float(np.sqrt(1 - ahead**2))
     along = jnp.full(count, ahead)

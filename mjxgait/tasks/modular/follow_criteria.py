@@ -1,4 +1,4 @@
-"""What is demanded of followers: to get nearer to lights that nobody has seen."""
+"""Acceptance criteria for following: approach lights that evolution did not use."""
 
 import dataclasses
 
@@ -38,19 +38,19 @@ class FollowDemands(BlocksDemands):
         return Criterion(2, "follows", (nearer,))
 
     def alone(self, window: Recording, config: CertificateConfig) -> tuple[Criterion, ...]:
-        """See `BlocksDemands`: what is demanded of who swims or walks."""
+        """See `BlocksDemands`: the criterion of swimming or of walking."""
         if self.drag:
             return (by_water(window, config.swim),)
         return (balanced(window, config.roam),)
 
     def done(self, window: Recording) -> float:
-        """See `BlocksDemands`: m/s, by which the distance becomes less."""
+        """See `BlocksDemands`: m/s of the approach."""
         assert window.light is not None
         apart = (seen(window).middle - window.light)[:, : self.axes]
         return float(approach(apart, window.time_step))
 
     def promise(self, champion: Champion, seconds: float, config: CertificateConfig) -> float:
-        """See `BlocksDemands`: of the light that it is recorded with, not of all."""
+        """See `BlocksDemands`: for the light of the recording, not for all."""
         way = champion.origin.get("nominal", {}).get("way", np.nan)
         return float(way / (seconds - self.since(champion, config)))
 
@@ -61,7 +61,7 @@ class FollowDemands(BlocksDemands):
     def aimed(
         self, starts: Starts, config: CertificateConfig, rng: np.random.Generator | None = None
     ) -> Starts:
-        """See `Demands`: a light for each that has none, the nominal one ahead."""
+        """See `Demands`: a light for each simulation without one, the nominal one ahead."""
         ahead = np.tile([1.0, 0.0, 0.0], (len(starts), 1))
         drawn = ahead if rng is None else rng.normal(size=(len(starts), 3))
         drawn[:, self.axes :] = 0.0
@@ -71,19 +71,19 @@ class FollowDemands(BlocksDemands):
         )
 
     def succeeded(self, outcome: Outcome, starts: Starts, config: CertificateConfig) -> np.ndarray:
-        """See `Demands`: those that approach as fast as criterion 2 wants, measured in the same way."""
+        """See `Demands`: those that approach as fast as criterion 2 requires, measured alike."""
         middle = counted(outcome.middle, outcome, config)
         apart = (middle - starts.light[:, None])[..., : self.axes]
         nearer = approach(apart, outcome.trajectory.time_step)
         return outcome.stayed_up & (nearer >= config.follow.speed)
 
     def enough(self, seconds: float, config: CertificateConfig) -> float:
-        """See `BlocksDemands`: m in the seconds that count, as much nearer as it must get in all."""
+        """See `BlocksDemands`: the approach in m due in all seconds, made in those that count."""
         return config.follow.speed * seconds
 
 
 def approach(apart: np.ndarray, time_step: float) -> np.ndarray:
-    """[...] m/s by which a distance becomes less; apart: [..., T, 2 or 3] m from the light."""
+    """Speed of approach [...] in m/s; apart: [..., T, 2 or 3] m from the light."""
     first, last = (np.linalg.norm(apart[..., k, :], axis=-1) for k in (0, -1))
     speed: np.ndarray = (first - last) / ((apart.shape[-2] - 1) * time_step)
     return speed

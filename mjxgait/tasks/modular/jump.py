@@ -1,6 +1,4 @@
-"""Jumping as a task of bodies that grow: to have all of oneself as high above the ground as possible,
-over and over.
-"""
+"""Jump task for modular bodies: lift the whole body as high as possible, over and over."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -15,21 +13,24 @@ from mjxgait.tasks.modular.task import BlocksTask, lost
 from mjxgait.types import Sensed, pytree
 
 SHARPNESS = 3
-"""By how much later than a walker's a depth costs, and more from there on. Whoever falls from a height
-is in the ground for a moment, as deep as the root of that height: at a walker's price no jump above
-a tenth of a metre is worth more.
+"""Exponent of the cost of depth: small depths cost less than in walking, large ones more.
+
+A fall presses the body into the ground for a moment, as deep as the square root of its height. At
+the cost of walking no jump above a tenth of a metre would be worth more.
 """
 
 
 SPANS = 2
-"""Of the time that counts; in each of them it is to jump. Once in eight seconds somebody comes off the
-ground by chance, as high as those that are meant to, and only in the trial that it was chosen in.
+"""Spans of the time that counts; the body must jump in each.
+
+Once in eight seconds some individual leaves the ground by chance, as high as real jumpers, and only
+in the trial that it was selected by.
 """
 
 
 @pytree
 class Tally(protocol.Tally):
-    """See `protocol.Tally`. heights: [SPANS] m, the greatest of its lowest part in each."""
+    """See `protocol.Tally`. heights: [SPANS] m, greatest height of the lowest part in each."""
 
     heights: jax.Array
 
@@ -62,8 +63,11 @@ class Jump(BlocksTask):
         )
 
     def judge(self, tally: Tally, settings: JumpConfig) -> Mapping[str, jax.Array]:
-        """See `Task`: m; what of it is lost by blocks that stand in each other or in the ground; and
-        of the rest by an end before the end, for the wildest leap is the last.
+        """See `Task`: m; the part lost by overlapping blocks; the part of the rest lost by an early
+        end.
+
+        Blocks overlap each other or the ground. An early end costs, because the wildest leap is the
+        last.
         """
         height = jnp.mean(tally.heights)
         inside = lost((tally.overlap / settings.overlap) ** SHARPNESS)

@@ -1,4 +1,4 @@
-"""Acceptance criteria for modular bodies that jump: the whole body off the ground, as high as in evolution.
+"""Acceptance criteria for jumping: the whole body off the ground, as high as in evolution.
 
 Letters: `T` frames, `P` spans of time.
 """
@@ -15,7 +15,7 @@ from mjxgait.tasks.modular.criteria import BlocksDemands, counted, seen
 from mjxgait.tasks.modular.thresholds import JumpConfig
 
 SPAN = 2.0
-"""s; the body must jump in each span of this length, as in evolution. A single highest leap is chance."""
+"""Length of a span in s; the body must jump in each. A single highest leap is chance."""
 
 
 class JumpDemands(BlocksDemands):
@@ -36,26 +36,26 @@ class JumpDemands(BlocksDemands):
         return Criterion(2, "jumps", (height,))
 
     def done(self, window: Recording) -> float:
-        """See `BlocksDemands`: m of its lowest part at the best moment, mean of the spans."""
+        """See `BlocksDemands`: m, of the lowest part at the best moment, mean of the spans."""
         return float(np.mean(highest(seen(window).low, window.time_step)))
 
     def promise(self, champion: Champion, seconds: float, config: CertificateConfig) -> float:
-        """See `BlocksDemands`: of the trial that nothing disturbs, not of all."""
+        """See `BlocksDemands`: for the undisturbed trial, not for all."""
         return float(champion.origin.get("nominal", {}).get("height", np.nan))
 
     def succeeded(self, outcome: Outcome, starts: Starts, config: CertificateConfig) -> np.ndarray:
-        """See `Demands`: those whose median span has a leap that is high enough."""
+        """See `Demands`: those with a high enough leap in the median span."""
         low = counted(outcome.low, outcome, config)
         middling = np.median(highest(low, outcome.trajectory.time_step), axis=-1)
         return outcome.stayed_up & (middling >= config.jump.height)
 
     def enough(self, seconds: float, config: CertificateConfig) -> float:
-        """See `BlocksDemands`: m, a quarter higher than it must be."""
+        """See `BlocksDemands`: m, a quarter above the threshold."""
         return 1.25 * config.jump.height
 
 
 def highest(low: np.ndarray, time_step: float) -> np.ndarray:
-    """[..., P] m, greatest height of the lowest part in each span; low: [..., T] m."""
+    """Greatest height [..., P] in m of the lowest part in each span; low: [..., T] m."""
     count = max(round(low.shape[-1] * time_step / SPAN), 1)
     spans = np.array_split(low, count, axis=-1)
     return np.stack([np.maximum(span.max(axis=-1), 0.0) for span in spans], axis=-1)

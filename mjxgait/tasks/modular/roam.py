@@ -1,7 +1,7 @@
-"""Walking as a task of bodies that grow: to get on over ground as far as possible, any way.
+"""Roam task for modular bodies: move over ground as far as possible, in any way.
 
-Who falls over has got somewhere too, once: so it counts from when it has settled, and costs to tip
-over from there.
+Falling over also covers distance, once. So distance counts only after settling, and tipping over
+from there costs.
 """
 
 import dataclasses
@@ -19,8 +19,10 @@ from mjxgait.types import Sensed, pytree
 
 @pytree
 class Tally(alive.Tally):
-    """See `alive.Tally`. upwards: [3] the root's own direction that was up when counting began.
-    upright: [] the least cosine of its angle with the world's since then.
+    """See `alive.Tally`.
+
+    upwards: [3] direction in the root's axes that was up when counting began.
+    upright: [] least cosine of its angle with the world's up axis since then.
     """
 
     upwards: jax.Array
@@ -28,7 +30,7 @@ class Tally(alive.Tally):
 
 
 class Roam(GoingTask):
-    """See `Task`: on land. The way is as the crow flies, and level."""
+    """See `Task`: on land. The way is a straight, level line."""
 
     Settings: ClassVar[type] = RoamConfig
     terms = tuple(field.name for field in dataclasses.fields(RoamWeights))
@@ -54,8 +56,10 @@ class Roam(GoingTask):
         )
 
     def judge(self, tally: Tally, settings: RoamConfig) -> Mapping[str, jax.Array]:
-        """See `Task`: the speed; what of it is lost by blocks that stand in each other or in the
-        ground; and of the rest by tipping over.
+        """See `Task`: the speed; the part lost by overlaps; the part of the rest lost by tipping
+        over.
+
+        Overlaps are those of blocks with each other or with the ground.
         """
         speed = self.speed(tally, settings)
         earned = jnp.maximum(speed, 0.0)

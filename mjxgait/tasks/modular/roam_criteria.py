@@ -1,4 +1,4 @@
-"""What is demanded of blocks that walk: to get on over ground, straight, without tipping over."""
+"""Acceptance criteria for modular bodies that walk: advance straight, without tipping over."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from mjxgait.tasks.modular.thresholds import RoamConfig
 
 
 class RoamDemands(GoingDemands):
-    """See `Demands`. Level ways count: who leaps up gets nowhere by that."""
+    """See `Demands`. Only level distance counts: leaping up gains nothing."""
 
     verdict = "it walks"
     verb = "walks"
@@ -21,12 +21,12 @@ class RoamDemands(GoingDemands):
         return config.roam
 
     def alone(self, window: Recording, config: CertificateConfig) -> tuple[Criterion, ...]:
-        """See `GoingDemands`: 1, the side on which it settled stays up."""
+        """See `GoingDemands`: 1, the side that was up after settling stays up."""
         return (balanced(window, config.roam),)
 
 
 def balanced(window: Recording, config: RoamConfig) -> Criterion:
-    """1. It does not tip over from how it lay when it had settled."""
+    """1. The body does not tip over from its settled attitude."""
     up = np.stack([-np.sin(window.pitch), np.sin(window.roll), window.trunk_up], axis=1)
     upright = (up @ up[0]).min()
     return Criterion(1, "balance", (at_least("least upright", upright, config.min_up, 1.0),))

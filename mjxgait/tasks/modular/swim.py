@@ -1,4 +1,4 @@
-"""Swimming as a task: to get as far as possible from where one is after a while, any way."""
+"""Swim task for modular bodies: get as far as possible after settling, in any way."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -13,14 +13,16 @@ from mjxgait.tasks.modular.task import GoingTask, length, lost
 from mjxgait.types import Sensed, pytree
 
 LITTLE = 1e-6
-"""kg·m/s; who exchanged less with the water exchanged nothing."""
+"""Lower bound of the momentum exchanged with the water, in kg·m/s."""
 
 
 @pytree
 class Tally(alive.Tally):
-    """See `alive.Tally`. began: [3] kg·m/s, its momentum when counting began. given: [3] kg·m/s of
-    the water since then; exchanged: [] the same without directions. lacking: [] kg·m/s, at most,
-    that the water did not give.
+    """See `alive.Tally`.
+
+    began: [3] kg·m/s, momentum of the body when counting began.
+    given: [3] kg·m/s, from the water since then. exchanged: [] the same without directions.
+    lacking: [] kg·m/s, the most that the water did not give.
     """
 
     began: jax.Array
@@ -30,7 +32,7 @@ class Tally(alive.Tally):
 
 
 class Swim(GoingTask):
-    """See `Task`: in water, without a floor. The way is as the crow flies."""
+    """See `Task`: in water, without a floor. The way is a straight line."""
 
     Settings: ClassVar[type] = SwimConfig
     terms = tuple(field.name for field in dataclasses.fields(SwimWeights))
@@ -67,8 +69,9 @@ class Swim(GoingTask):
         )
 
     def judge(self, tally: Tally, settings: SwimConfig) -> Mapping[str, jax.Array]:
-        """See `Task`: the speed; what of it is lost by blocks that stand in each other; and of the
-        rest by momentum from elsewhere.
+        """See `Task`: the speed; the part lost by overlapping blocks; the part lost otherwise.
+
+        The latter is a part of the rest, lost by momentum from elsewhere.
         """
         speed = self.speed(tally, settings)
         earned = jnp.maximum(speed, 0.0)

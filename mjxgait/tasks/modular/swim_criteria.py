@@ -1,4 +1,4 @@
-"""What is demanded of a swimmer: to get on, straight, as evolution said, by the water alone."""
+"""Acceptance criteria for swimming: advance straight, as in evolution, by the water alone."""
 
 import numpy as np
 
@@ -22,12 +22,12 @@ class SwimDemands(GoingDemands):
         return config.swim
 
     def alone(self, window: Recording, config: CertificateConfig) -> tuple[Criterion, ...]:
-        """See `GoingDemands`: 11, what moves it."""
+        """See `GoingDemands`: 11, the source of the momentum."""
         return (by_water(window, config.swim),)
 
 
 def by_water(window: Recording, config: SwimConfig) -> Criterion:
-    """11. Its momentum is what the water gave: nothing else pushes it, and no error of a step."""
+    """11. All momentum comes from the water: not from elsewhere, nor from the error of a step."""
     water = seen(window)
     given = np.cumsum(water.push[:-1], axis=0) * window.time_step
     lacking = np.linalg.norm(water.momentum[1:] - water.momentum[0] - given, axis=1)

@@ -1,7 +1,7 @@
-"""What all that bodies of blocks are to do has in common: from rest, any way, as something alive might.
+"""Base classes of the tasks for modular bodies: start at rest, any plausible motion counts.
 
-What they do counts from a while after the start on. A way is that of the middle of all mass: a root
-gets somewhere by bending, the whole does not.
+Physically implausible motion ends the episode. Nothing counts until the body has settled. A way is
+that of the centre of mass: bending moves the root, but not the whole body.
 """
 
 import dataclasses
@@ -23,16 +23,17 @@ from mjxgait.tasks.starts import NEVER, Starts
 from mjxgait.types import Sensed, pytree
 
 WILD = 1
-"""Why an episode ends early: faster than anything alive, or bent further than it can be."""
+"""Reason for an early end: faster than anything alive, or bent past the range of a joint."""
 FASTEST_HINGE, FASTEST, FURTHEST = 20.0, 5.0, 0.08
 """rad/s, m/s, rad past a hinge's range."""
 
 
 @pytree
 class Tally(protocol.Tally):
-    """See `protocol.Tally`. settled, place: [3] m of the middle of all mass when counting began, and
-    now. light: [3] m where it is, and since: [] the step from which on it counts; None where there is
-    none.
+    """See `protocol.Tally`.
+
+    settled, place: [3] m, centre of mass when counting began, and now.
+    light: [3] m, its place. since: [] step from which the way counts. None without a light.
     """
 
     settled: jax.Array
@@ -42,10 +43,10 @@ class Tally(protocol.Tally):
 
 
 class BlocksTask(PlainTask):
-    """See `Task`: the creature lies at rest, all but the first with bent joints."""
+    """See `Task`: the creature lies at rest, with bent joints in all trials but the first."""
 
     def trials(self, key: jax.Array, creature: Creature, settings: RolloutConfig) -> Starts:
-        """See `Task`. A root at the origin; whoever grows the body puts it on the ground."""
+        """See `Task`. The root is at the origin; growing the body puts it on the ground."""
         count, joints = settings.starts, len(self.creature.joints.names)
         bent = settings.joint_noise * jax.random.uniform(key, (count, joints), minval=-1.0)
         bent = bent * (jnp.arange(count) > 0)[:, None]
@@ -62,7 +63,7 @@ class BlocksTask(PlainTask):
         )
 
     def standards(self, settings: BlocksConfig) -> jax.Array:
-        """See `Task`: the step [] from which on it counts."""
+        """See `Task`: the first step [] that counts."""
         return jnp.round(settings.settle / self.step).astype(jnp.int32)
 
     def ended(self, sensed: Sensed, aim: Any) -> jax.Array:
@@ -73,8 +74,9 @@ class BlocksTask(PlainTask):
         return jnp.where(wild | (sensed.past > FURTHEST), WILD, FINISHED)
 
     def weights(self, settings: Any, generation: jax.Array) -> Mapping[str, jax.Array]:
-        """See `Task`: the first term is what is wanted, all others are penalties; what overlap costs
-        counts more and more.
+        """See `Task`: the first term is a reward, all others are penalties.
+
+        The weight of the overlap grows over the generations.
         """
         counts = {name: getattr(settings.weights, name) for name in self.terms}
         share = ramp(settings.apart, lambda now: now / settings.apart)(generation)
@@ -84,9 +86,9 @@ class BlocksTask(PlainTask):
 
 
 class GoingTask(BlocksTask):
-    """See `Task`: to get as far as possible.
+    """See `Task`: get as far as possible.
 
-    axes: along how many of the world's a way counts. dark: the light of an empty tally.
+    axes: number of world axes along which a way counts. dark: light of the empty statistics.
     """
 
     outcomes: ClassVar[tuple[str, ...]] = ("way", "seconds")
@@ -94,11 +96,11 @@ class GoingTask(BlocksTask):
     dark: ClassVar[np.ndarray | None] = None
 
     def way(self, tally: Any) -> jax.Array:
-        """[] m from where counting began, as the crow flies."""
+        """Straight-line distance [] in m from where counting began."""
         return length((tally.place - tally.settled)[: self.axes])
 
     def begun(self) -> dict[str, Any]:
-        """What the empty tallies of all of them have."""
+        """Empty statistics common to these tasks."""
         none, nowhere = jnp.zeros((), jnp.int32), jnp.zeros(3)
         return {
             "steps": none,
@@ -113,7 +115,7 @@ class GoingTask(BlocksTask):
     def update(
         self, tally: Any, sensed: Sensed, torque: jax.Array, standards: Any, aim: Any
     ) -> Any:
-        """See `Task`: where it is, and where it was when counting began."""
+        """See `Task`: the place now, and when counting began."""
         assert sensed.middle is not None
         return dataclasses.replace(
             tally,
@@ -123,7 +125,7 @@ class GoingTask(BlocksTask):
         )
 
     def speed(self, tally: Any, settings: BlocksConfig) -> jax.Array:
-        """[] m/s over the time that counts, whether it lived to its end or not."""
+        """Speed [] in m/s over the time that counts, even if the episode ended early."""
         return self.way(tally) / jnp.maximum(self.horizon * self.step - settings.settle, self.step)
 
     def outcome(self, tally: Any) -> Mapping[str, jax.Array]:
@@ -132,10 +134,10 @@ class GoingTask(BlocksTask):
 
 
 def length(vector: jax.Array) -> jax.Array:
-    """[] of a vector."""
+    """Length [] of a vector."""
     return jnp.sqrt(jnp.sum(vector * vector))
 
 
 def lost(much: jax.Array) -> jax.Array:
-    """The share that is lost by something, half of it at 1."""
+    """Share lost to a flaw of this size; one half at 1."""
     return 1 - 1 / (1 + much * much)

@@ -1,4 +1,4 @@
-"""What is demanded of bodies of blocks: to swim, to walk, to jump, to follow a light."""
+"""Thresholds for the tasks of modular bodies: swim, roam, jump and follow."""
 
 import dataclasses
 from typing import Annotated
@@ -15,13 +15,14 @@ from mjxgait.config.tables import (
 
 @dataclasses.dataclass(frozen=True)
 class BlocksConfig:
-    """What is demanded of all bodies of blocks, instead of 1 to 5 and 7.
+    """Thresholds common to modular bodies, in place of criteria 1 to 5 and 7.
 
     Attributes:
-      arrive: share of the perturbed starts that must do what is demanded.
-      body_speed: m/s, of the fastest block. overlap: of the smaller block's size, the cube root of
-        its volume, how deep blocks may stand in each other that no joint joins, or in the ground.
-      again: largest relative change of what evolution saw.
+      arrive: share of the perturbed starts that must succeed.
+      body_speed: m/s, of the fastest block.
+      overlap: largest depth of blocks in others that no joint joins, or in the ground, over the
+        size of the smaller one, the cube root of its volume.
+      again: largest relative change from the result of evolution.
     """
 
     __pydantic_config__ = STRICT
@@ -33,11 +34,11 @@ class BlocksConfig:
 
 @dataclasses.dataclass(frozen=True)
 class GoingConfig(BlocksConfig):
-    """What is demanded of those that are to get on.
+    """Thresholds common to tasks of getting away.
 
     Attributes:
-      speed: m/s, least, as the crow flies. straight: least way over path. second_half: its speed
-        over the first half's.
+      speed: m/s, least, in a straight line. straight: least distance over path.
+      second_half: speed of the second half over that of the first.
     """
 
     __pydantic_config__ = STRICT
@@ -48,8 +49,10 @@ class GoingConfig(BlocksConfig):
 
 @dataclasses.dataclass(frozen=True)
 class JumpConfig(BlocksConfig):
-    """What is demanded of who jumps. height: m, least, of the lowest part at the best moment of every
-    two seconds, in the mean.
+    """Thresholds for `jump`.
+
+    Attributes:
+      height: m, least, of the lowest part at the best moment of every two seconds, mean.
     """
 
     __pydantic_config__ = STRICT
@@ -58,10 +61,10 @@ class JumpConfig(BlocksConfig):
 
 @dataclasses.dataclass(frozen=True)
 class SwimConfig(GoingConfig):
-    """What is demanded of who swims.
+    """Thresholds for `swim`.
 
     Attributes:
-      elsewhere: momentum that is not the water's, as a share of all that was exchanged with it.
+      elsewhere: momentum from other sources than the water, as a share of all exchanged with it.
     """
 
     __pydantic_config__ = STRICT
@@ -70,11 +73,11 @@ class SwimConfig(GoingConfig):
 
 @dataclasses.dataclass(frozen=True)
 class RoamConfig(GoingConfig):
-    """What is demanded of blocks that walk.
+    """Thresholds for `roam`.
 
     Attributes:
-      min_up: least product of the world's up axis with the root's own direction that was up when it
-        had settled.
+      min_up: least product of the world's up axis with the direction of the root that was up after
+        settling.
     """
 
     __pydantic_config__ = STRICT
@@ -83,11 +86,11 @@ class RoamConfig(GoingConfig):
 
 @dataclasses.dataclass(frozen=True)
 class FollowConfig(BlocksConfig):
-    """What is demanded of who follows a light, besides what is of who swims or walks.
+    """Additional thresholds for `follow`, on top of those for `swim` or `roam`.
 
     Attributes:
-      speed: m/s, least, by which the light comes nearer.
-      arrive: share of the perturbed starts, each with a light of its own, in which it does.
+      speed: m/s, least, of the approach to the light.
+      arrive: share of the perturbed starts, each with its own light, that must succeed.
     """
 
     __pydantic_config__ = STRICT

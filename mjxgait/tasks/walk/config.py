@@ -1,4 +1,4 @@
-"""Settings of the task of walking."""
+"""Settings of the walk task."""
 
 import dataclasses
 from typing import Annotated
@@ -16,7 +16,7 @@ from mjxgait.config.tables import (
 from mjxgait.tasks.walk.gaits import AUTO, check_gait
 
 LIKENESS = ("stride", "duty_factor", "reach", "pitch")
-"""What a walk is compared with an animal's by."""
+"""Measures that compare a walk with an animal's."""
 WISHES = ("speed", "gait", "turn", "steer", "height", "bounce", "sway", *LIKENESS)
 GaitText = Annotated[str, pydantic.AfterValidator(check_gait)]
 
@@ -25,30 +25,29 @@ GaitText = Annotated[str, pydantic.AfterValidator(check_gait)]
 class Weights:
     """Weight of each fitness term; all but `distance` and `alive` are penalties.
 
-    mjxgait/tasks/walk/fitness.py says to the letter what each measures.
+    mjxgait/tasks/walk/fitness.py has the exact definitions.
 
     Attributes:
       distance: body lengths walked forward.
-      alive: share of the episode until it fell; a quarter of that for who goes nowhere.
-      drift: way to the side, and turning away.
-      fade: how much less far the second half of the time led than the first.
-      slip: way that the worst foot slides while it carries weight, per way walked.
+      alive: share of the episode before a fall; without forward progress a quarter of that.
+      drift: distance to the side, and turning away.
+      fade: how much less distance the second half of the time covers than the first.
+      slip: distance that the worst foot slides while it bears weight, per distance walked.
       clearance: how far feet stay below the wanted height in their swings.
-      frequency: strides per second beyond what an animal of this mass makes.
-      duty: feet that are on the floor for less than a quarter or more than four fifths of the
-        time.
+      frequency: stride frequency beyond that of an animal of this mass.
+      duty: feet that are on the floor for less than a quarter or more than four fifths of the time.
       airborne: share of the time with no foot on the floor.
-      patter: feet that lose the floor for moments while they stand.
+      patter: contact flicker, feet that lose the floor for moments during stance.
       foot_height: feet held high without need.
-      tilt: how far the trunk leans, in the mean.
-      wobble: how much the trunk turns to and fro.
+      tilt: mean lean of the trunk.
+      wobble: rotation of the trunk to and fro.
       touch: share of the time on parts that must not touch the floor.
-      energy: work of the joints per weight and way (cost of transport).
-      saturation: share of the joints at their torque limits, in the mean.
-      limits: share of the joints beyond their pose ranges, in the mean.
-      overlap: how deep parts are in each other.
+      energy: work of the joints per weight and distance (cost of transport).
+      saturation: mean share of the joints at their torque limits.
+      limits: mean share of the joints beyond their pose ranges.
+      overlap: depth of body parts in each other.
       fall: 1 for an episode that ended with a fall.
-      foot_speed: how much faster than 2.25 √(g·h) a foot ever swings; 0: it is no term.
+      foot_speed: peak speed of any foot above 2.25 √(g·h); a weight of 0 removes the term.
     """
 
     __pydantic_config__ = STRICT
@@ -76,18 +75,18 @@ class Weights:
 
 @dataclasses.dataclass(frozen=True)
 class WishWeights:
-    """What missing each wish costs at most (mjxgait/tasks/walk/target_terms.py).
+    """Largest cost of missing each target (mjxgait/tasks/walk/target_terms.py).
 
     Attributes:
       speed: a speed that is not held.
       gait: footfalls of another gait.
       height: a trunk that is too high or too low.
-      bounce: a trunk that goes up and down more, or less.
+      bounce: a trunk that moves up and down more, or less.
       sway: a trunk that rolls more, or less.
       stride: strides that are shorter or longer.
       duty_factor: feet that are on the floor for less, or more, of the time.
-      reach: feet that are ahead of or behind their hips while they stand.
-      pitch: a trunk whose nose points up more, or less.
+      reach: feet that are ahead of or behind their hips during stance.
+      pitch: a trunk with its nose higher, or lower.
     """
 
     __pydantic_config__ = STRICT
@@ -104,23 +103,23 @@ class WishWeights:
 
 @dataclasses.dataclass(frozen=True)
 class WishConfig:
-    """What is asked of a walk besides being one (docs/wishes.md); a key that is not given is free.
+    """Walk targets (docs/wishes.md); a key that is not given is free.
 
     Attributes:
-      speed: m/s, held from both sides.
-      gait: a name by its footfalls, or auto.
-      turn: deg/s, to the left; the heading that it is told to keep turns so fast.
-      steer: deg/s; in every disturbed trial the heading that it is told to keep turns at a rate of
-        its own, up to this, to the left or to the right; it must obey others too.
-      height: of the trunk while walking, in standing heights.
-      bounce: of the trunk's height about its mean, in hip heights, root mean square.
-      sway: deg, of the trunk's roll, root mean square.
-      stride: stride length over that of an animal with such legs at its own speed.
+      speed: m/s; slower and faster both miss it.
+      gait: gait name, defined by its footfalls, or auto.
+      turn: deg/s, to the left; rate at which the commanded heading turns.
+      steer: deg/s; in each disturbed trial the commanded heading turns left or right at a rate of
+        its own, up to this. The walk must obey other rates too.
+      height: trunk height while walking, in standing heights.
+      bounce: deviation of the trunk height from its mean, in hip heights, root mean square.
+      sway: deg, roll of the trunk, root mean square.
+      stride: stride length over that of an animal with such legs at the same speed.
       duty_factor: mean duty factor over that of such an animal.
-      reach: hip heights, where feet are in the middle of their stances, ahead of or behind where
-        they stand at rest; mean of the feet.
-      pitch: deg, of the trunk's nose above the horizon, mean.
-      weights: what each wish counts.
+      reach: hip heights; mean position of the feet during stance, ahead of or behind where they
+        stand at rest.
+      pitch: deg, mean angle of the trunk's nose above the horizon.
+      weights: weight of each target.
     """
 
     __pydantic_config__ = STRICT
@@ -143,36 +142,36 @@ class WishConfig:
 
     @property
     def asked(self) -> tuple[str, ...]:
-        """Names of the wishes that there are."""
+        """Names of the targets that are set."""
         values = {name: getattr(self, name) for name in WISHES}
-        # A value may be traced, which compares with nothing.
+        # A traced value cannot be compared.
         free = [n for n, v in values.items() if v is None or (isinstance(v, str) and v == AUTO)]
         return tuple(name for name in WISHES if name not in free)
 
     @property
     def table(self) -> dict[str, float | str]:
-        """The wishes that there are, by name."""
+        """Targets that are set, by name."""
         return {name: getattr(self, name) for name in self.asked}
 
 
 @dataclasses.dataclass(frozen=True)
 class WalkConfig:
-    """What is wanted of a gait.
+    """Parameters of the walk fitness.
 
     Attributes:
       speed: body lengths per second up to which faster is better; beyond it distance counts a
-        fiftieth, so that a gait gets steadier and not faster. 0 sets no limit.
+        fiftieth, so that the gait gets steadier instead of faster. 0 sets no limit.
       clearance: height in hip heights that each foot should reach in each stride.
-      frequency: share of the highest stride frequency of an animal of this mass up to which a
-        gait is not hasty.
-      contact: m above the floor below which a foot counts as down; 0: only one that bears weight
-        does, as in the examination.
-      hardening: steps in which the disturbances of the trials grow to their full size, one after
-        each generation whose best stay up; 0: in full from the first on.
-      style_ramp: generations over which the style terms (all but distance, alive, foot_height
-        and fall) grow to their full weight.
-      weights: what each term counts.
-      wish: what else is asked: a speed, a gait, a turn, a posture.
+      frequency: share of the highest stride frequency of an animal of this mass up to which there
+        is no penalty.
+      contact: m above the floor below which a foot counts as down; 0: only a foot that bears weight
+        does, as in certification.
+      hardening: steps in which the disturbances of the trials grow to full size, one after each
+        generation in which the best individuals stay up; 0: full size from the first generation on.
+      style_ramp: generations over which the style terms (all but distance, alive, foot_height and
+        fall) grow to their full weight.
+      weights: weight of each term.
+      wish: further targets: a speed, a gait, a turn, a posture.
     """
 
     __pydantic_config__ = STRICT

@@ -1,4 +1,4 @@
-"""What is demanded of a walk.
+"""Acceptance criteria of a walk.
 
 Letters: `T` frames, `N` feet.
 """
@@ -51,23 +51,22 @@ from mjxgait.tasks.walk.target_criteria import (
 )
 
 SPARE = 1.2
-"""How much faster than the certificate's least speed a gait should be in evolution before it is
-worth an examination.
-"""
+"""Factor over the certificate's minimum speed at which a gait in evolution is worth validating."""
 
 
 STARTED = (0.75, 1.15)
-"""Range of the way in evolution over that at the speed asked for, with standing at its beginning,
-that is worth an examination.
+"""Range of the distance in evolution, over that at the target speed, that is worth validating.
+
+The range allows for standing at the start.
 """
 
 
 class WalkDemands(StaysUp):
-    """See `Demands`: steady strides that lead forward, in the manner of an animal."""
+    """See `Demands`: steady forward strides, like those of an animal."""
 
     verdict = "it walks"
     revision = 1
-    """Flicker, buzz, tilt, heading and a limp were in no criterion."""
+    """Criteria for flicker, buzz, tilt, heading and limping were added."""
 
     def __init__(self, wish: Mapping[str, Any] | None = None) -> None:
         self.wish = dict(wish or {})
@@ -97,7 +96,7 @@ class WalkDemands(StaysUp):
     def undisturbed(
         self, whole: Recording, halved: Recording, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
-        """See `Demands`: all but 4 and 5, and 10 where more is asked."""
+        """See `Demands`: all but 4 and 5, and 10 if targets are set."""
         config = following(config, self.wish, whole.dimensions)
         whole, halved = (unrolled(recording, self.wish) for recording in (whole, halved))
         window = whole.window(config.warmup)
@@ -124,7 +123,7 @@ class WalkDemands(StaysUp):
     def managed(
         self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
     ) -> np.ndarray:
-        """See `Demands`: up to the end, and clearly faster than it must be."""
+        """See `Demands`: no early end, and clearly faster than required, or near a target speed."""
         lived = to_the_end(outcome, seconds, creature)
         if "speed" in self.wish:
             came = outcome["forward"] / seconds / self.wish["speed"]
@@ -145,13 +144,13 @@ def basic(whole: Recording, config: CertificateConfig) -> tuple[Criterion, Crite
 
 
 def lean(window: Recording, config: Fall) -> Measure:
-    """Of criterion 1: how far the trunk leans, beyond what it does standing."""
+    """Trunk lean beyond that of standing, part of criterion 1."""
     most = np.degrees(np.arccos(np.clip(window.trunk_up.min(), -1, 1)))
     return at_most("tilt beyond standing (deg)", most - window.dimensions.stand_tilt, config.tilt)
 
 
 def progress(window: Recording, config: ProgressConfig) -> Criterion:
-    """2. Strides that all lead forward, fast enough, straight, without fading."""
+    """2. All strides lead forward, fast enough, straight, without slowing down."""
     path, starts = window.trunk_pos, stride_starts(window)
     distance, middle = path[-1, 0] - path[0, 0], len(path) // 2
     first, second = path[middle, 0] - path[0, 0], path[-1, 0] - path[middle, 0]
@@ -199,10 +198,8 @@ def periodic(window: Recording, config: PeriodConfig) -> Criterion:
 
 
 def autocorrelation_peak(signal: np.ndarray, period: float) -> float:
-    """Largest correlation of the signal [T, D] with itself, shifted by 0.8 to 1.2 periods
-    (frames).
-    """
-    # Without what changes slower than a stride: a wandering signal resembles itself at any shift.
+    """Largest autocorrelation of the signal [T, D] at lags of 0.8 to 1.2 periods, in frames."""
+    # Remove what changes slower than a stride: a drifting signal resembles itself at any lag.
     width = round(period)
     sums = np.cumsum(np.pad(signal, ((1, 0), (0, 0))), axis=0)
     signal = (
@@ -219,7 +216,7 @@ def autocorrelation_peak(signal: np.ndarray, period: float) -> float:
 
 
 def half_step(whole: Recording, halved: Recording, config: CertificateConfig) -> Criterion:
-    """6. With half the time step it still passes 1 to 3 and goes as far."""
+    """6. With half the time step the walk still passes 1 to 3 and goes as far."""
     window = whole.window(config.warmup)
     repeated = basic(halved, config)
     change = distance(halved.window(config.warmup)) / distance(window) - 1
@@ -235,14 +232,12 @@ def half_step(whole: Recording, halved: Recording, config: CertificateConfig) ->
 
 
 def gait(window: Recording, config: GaitConfig, wish: Mapping[str, Any] | None = None) -> Criterion:
-    """7. A gait, not a buzz: slow, long strides; feet that leave the floor and do not slide on
-    it; left and right that do the same.
-    """
+    """7. A gait, not a vibration: slow, long strides; feet lift and do not slide; sides alike."""
     return Criterion(7, "gait", (*_strides(window, config), *_manner(window, config, wish or {})))
 
 
 def _manner(window: Recording, config: GaitConfig, wish: Mapping[str, Any]) -> tuple[Measure, ...]:
-    """The measures of 7 that tell a vibration and a limp."""
+    """Measures of criterion 7 that detect vibration and a limp."""
     measures = (
         at_most("flicker of a foot per stride", patter(window), config.flicker),
         at_most("buzz of a joint / joint speed", buzz(window), config.buzz),
@@ -257,15 +252,16 @@ def _manner(window: Recording, config: GaitConfig, wish: Mapping[str, Any]) -> t
 
 
 def two_like_sides(wish: Mapping[str, Any], size: Dimensions) -> bool:
-    """Whether left and right have the same to do: not on a circle, nor where a gait is asked for
-    that leads with one side.
+    """Return whether left and right should move alike.
+
+    They need not on a circle, nor in a target gait that leads with one side.
     """
     leads = "gait" in wish and not gait_of(wish["gait"], len(size.foot_names)).twice
     return bool(size.partner) and not wish.get("turn") and not leads
 
 
 def _strides(window: Recording, config: GaitConfig) -> tuple[Measure, ...]:
-    """The measures of 7 that strides and feet give."""
+    """Measures of criterion 7 on strides and feet."""
     size = window.dimensions
     frequency = stride_frequency(window, config.clearance)
     duty = window.contact.mean(0)

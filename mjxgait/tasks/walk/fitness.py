@@ -1,4 +1,4 @@
-"""From the tally of a walk to named fitness terms, and what each of them counts."""
+"""Fitness terms of a walk, from its episode statistics, and their weights."""
 
 import dataclasses
 
@@ -17,35 +17,43 @@ from mjxgait.tasks.work import cost_of_transport
 TERMS = tuple(field.name for field in dataclasses.fields(Weights))
 REWARDS = ("distance", "alive")
 OPTIONAL = "foot_speed"
-"""A term only where it has a weight."""
+"""Term that exists only with a weight."""
 STYLE = tuple(name for name in TERMS if name not in (*REWARDS, "foot_height", "fall"))
-"""What makes a gait good to look at: counted in proportion to the walk that there is, and may ramp in over generations."""
+"""Terms for how a gait looks, scaled by the share of the walk that was achieved.
+
+They may ramp in over generations.
+"""
 
 PATTER = 4.0
-"""Touchdowns too many in each stride at which a foot counts as pattering half as much as it can."""
+"""Excess touchdowns per stride at which contact flicker has half of its largest value."""
 STANDING = 0.25
-"""What it counts to stay up for who goes nowhere, as a share of what it counts for who walks all of the
-way: it teaches balance, and must not be the best there is."""
+"""Share of the `alive` reward of an individual that stands still; a full walk earns all of it.
+
+The share teaches balance, and must not make standing the best choice.
+"""
 WHIPPING = 2.25
-"""√(g·h) that a foot may reach in its swing. The certificate allows any body 3, and asks for room to
-spare; the fastest is a foot nearly always."""
+"""Speed of a foot, in √(g·h), that is free.
+
+The certificate allows any body 3 and asks for a margin; the fastest body is nearly always a foot.
+"""
 BEYOND = 0.02
-"""What a body length counts that goes beyond the wanted speed."""
+"""Value of a body length beyond the distance at the wanted speed."""
 
 
 def fitness_terms(
     creature: Body, config: WalkConfig, step: float, horizon: int, tally: Tally
 ) -> dict[str, jax.Array]:
-    """The terms [] of one episode, each without unit and before its weight. The config may be traced.
+    """Return the terms [] of one episode, each without unit and before its weight.
 
-    Every penalty is at least zero and every sum ended with the creature's life, so an individual that has died gains nothing more.
+    Every penalty is at least zero, and every sum stops when the episode ends, so nothing is gained
+    after a fall. The config may be traced.
 
     Args:
       step: s. horizon: T, steps of a full episode.
     """
     values, enough = plain_terms(creature, config, step, horizon, tally)
     length = creature.frame.body_length
-    # Style counts as far as there is a walk: a creature that has yet to learn walking must not be punished for trying.
+    # Style counts only as far as there is a walk: attempts to learn walking must not be punished.
     walked = jnp.where(
         jnp.isfinite(enough), jnp.clip(tally.forward / length / enough, 0.0, 1.0), 1.0
     )
@@ -54,21 +62,22 @@ def fitness_terms(
 
 
 def terms_under(weights: Weights) -> tuple[str, ...]:
-    """Names of the terms that there are under these weights."""
+    """Names of the terms that these weights enable."""
     return tuple(name for name in TERMS if name != OPTIONAL or getattr(weights, name))
 
 
 def plain_terms(
     creature: Body, config: WalkConfig, step: float, horizon: int, tally: Tally
 ) -> tuple[dict[str, jax.Array], jax.Array]:
-    """The same, style counted in full however little was walked; and the body lengths [] up to
-    which more is better.
+    """Return the terms with style in full, and the body lengths [] up to which farther is better.
+
+    Style is not scaled here, however short the walk.
     """
     lived = jnp.maximum(tally.steps, 1)
     length = creature.frame.body_length
     moved = jnp.maximum(tally.forward, 0.25 * length)
     rate = jnp.mean(tally.swings) / lived / step
-    # As often as the foot in the middle; one that swings less often has not left the floor.
+    # Strides of the median foot; a foot with fewer swings did not leave the floor.
     strides = jnp.sort(tally.swings)[tally.swings.shape[0] // 2]
     dragged = tally.shortfall + jnp.maximum(strides - tally.swings, 0.0)
     low_feet = jnp.mean(dragged / jnp.maximum(jnp.maximum(tally.swings, strides), 1.0))
@@ -103,13 +112,14 @@ def plain_terms(
 
 
 def _in_hip_speeds(creature: Body, speed: jax.Array) -> jax.Array:
-    """A speed [] m/s in √(g·h) of this body's hip height."""
+    """Speed [] m/s in units of √(g·h), with this body's hip height h."""
     return speed / (GRAVITY * creature.frame.hip_height) ** 0.5
 
 
 def _patter(tally: Tally) -> jax.Array:
-    """How much [F] each foot patters, 0 to 1: of its touchdowns neither the first nor those that end
-    a swing are due.
+    """Contact flicker [F] of each foot, 0 to 1.
+
+    The first touchdown and those that end a swing do not count.
     """
     strides = jnp.maximum(tally.swings, 1.0)
     repeats = jnp.maximum(tally.touchdowns - 1.0 - tally.swings, 0.0) / strides
@@ -117,17 +127,17 @@ def _patter(tally: Tally) -> jax.Array:
 
 
 def _enough(speed: jax.Array | float, seconds: float) -> jax.Array:
-    """Body lengths up to which more is better; infinite where no speed is wanted."""
+    """Body lengths up to which farther is better; infinite without a wanted speed."""
     return jnp.where(jnp.asarray(speed) > 0, speed * seconds, jnp.inf)
 
 
 def _counted(distance: jax.Array, enough: jax.Array) -> jax.Array:
-    """Distance in body lengths, of which what lies beyond `enough` counts little."""
+    """Distance in body lengths, with the part beyond `enough` scaled by `BEYOND`."""
     return jnp.minimum(distance, enough) + BEYOND * jnp.maximum(distance - enough, 0.0)
 
 
 def signed_weights(config: WalkConfig, generation: jax.Array) -> dict[str, jax.Array]:
-    """Signed weight [] of each term at a generation []: penalties negative, style terms ramped in."""
+    """Signed weight [] of each term at a generation []: penalties negative, style ramped in."""
     ramp = ramped(config.style_ramp, generation)
 
     def weight(name: str) -> jax.Array:

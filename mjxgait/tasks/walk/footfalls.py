@@ -1,8 +1,8 @@
-"""When the feet stand, against each other: the phases by which a gait has its name.
+"""Footfall phases: the relative timing of stances, which defines a gait.
 
-A phase is the middle of a foot's contact in cycles of the first foot, as the examiner has it
-(`certify.describe.footfall_phases`); a stance is what lies between two swings, for a foot that
-comes down may come off again for a moment.
+A phase is the middle of a foot's contact in cycles of the first foot, as in certification
+(`certification.describe.footfall_phases`). A stance lasts from one swing to the next, because a
+foot may lose contact for a moment after it comes down.
 """
 
 import jax
@@ -14,20 +14,21 @@ from mjxgait.tasks.walk.stats import Tally
 from mjxgait.types import pytree
 
 SPARE = 0.03
-"""Duty factor by which a gait should be away from the end of its range."""
+"""Margin in duty factor that a gait should keep from the ends of its range."""
 SHARP = 0.1
-"""Mean deviation at which a gait counts as half missed; an eighth of a cycle is 0.15 of it."""
+"""Mean deviation at which a gait counts as half missed; an eighth of a cycle deviates by 0.15."""
 
 
 @pytree
 class Footfalls:
-    """Sums over the stances that have ended, the first of each foot left out. `F` feet.
+    """Sums over completed stances, without the first of each foot. `F` feet.
 
-    landed: [F] whether it has come down from a swing yet. pressed, when: [F] steps with contact in
-    the stance that goes on, and their times summed. middle: [F] step, mean of those of the latest
-    stance that has ended.
+    landed: [F] 1 once the foot has come down from a swing.
+    pressed, when: [F] steps with contact in the current stance, and the sum of their times.
+    middle: [F] mean step of the latest completed stance.
     period: [] steps between the middles of the first foot's latest two stances; 0 before them.
-    cosine, sine: [F] of the phases, summed. stances: [F].
+    cosine, sine: [F] of the phases, summed.
+    stances: [F] number of stances.
     """
 
     landed: jax.Array
@@ -41,15 +42,15 @@ class Footfalls:
 
 
 def no_footfalls(feet: int) -> Footfalls:
-    """Before the first step."""
+    """Return the sums before the first step."""
     each = jnp.zeros(feet)
     return Footfalls(each, each, each, each, jnp.zeros(()), each, each, each)
 
 
 def stepped(falls: Footfalls, before: Tally, after: Tally) -> Footfalls:
-    """One step more: the tally before and after it says who has come down, and who has risen."""
+    """Advance by one step; the statistics before and after it show which feet landed or lifted."""
     now = after.steps.astype(jnp.float32)
-    # A first stance began before the episode did.
+    # The first stance began before the episode.
     came = (before.swinging > 0) & (after.swinging == 0)
     landed = jnp.where(came, 1.0, falls.landed)
     rose = (before.swinging == 0) & (after.swinging > 0) & (falls.pressed > 0)
@@ -74,19 +75,19 @@ def stepped(falls: Footfalls, before: Tally, after: Tally) -> Footfalls:
 def gait_missed(
     name: str, stations: tuple[tuple[int, bool], ...], falls: Footfalls, duty: jax.Array
 ) -> jax.Array:
-    """How far [] the footfalls are from those of a gait, 0 to 1.
+    """Deviation [] of the footfalls from those of a gait, 0 to 1.
 
-    Of each foot half of 1 - cos of what its phases are off, averaged over its stances; a foot that
-    stands less often than the others is off in what is missing. Halved where it is `SHARP`, plus
-    what the mean duty factor is beyond its range.
+    A foot deviates by half of 1 - cos of its phase error, averaged over its stances; a missing
+    stance counts half. The mean over the feet, plus the excess of the mean duty factor over its
+    range, is mapped to 0 to 1, with 0.5 at `SHARP`.
 
     Args:
-      stations: where the feet are. duty: [F] duty factors.
+      stations: places of the feet. duty: [F] duty factors.
     """
     gait = gait_of(name, len(stations))
     ways = 2 * np.pi * np.array(placed(gait, stations), np.float32)
     ways = ways - ways[:, :1]
-    # Two stances more or less are how an episode begins and ends.
+    # The start and end of an episode may change the count by two stances.
     due = jnp.maximum(jnp.max(falls.stances) - 2.0, 1.0)
     hits = falls.cosine * np.cos(ways) + falls.sine * np.sin(ways)
     hits = hits / jnp.maximum(falls.stances, due)

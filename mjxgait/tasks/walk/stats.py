@@ -1,4 +1,4 @@
-"""What an episode leaves behind: running sums, updated once per step for one creature, from which fitness is computed."""
+"""Episode statistics of a walk: running sums for one creature, used by the fitness."""
 
 import dataclasses
 
@@ -14,7 +14,7 @@ from mjxgait.tasks.work import positive_work
 from mjxgait.types import Sensed, pytree
 
 SWING = 0.03
-"""Hip heights; a foot that rises less has not left the floor, it has trembled. The certificate counts swings alike."""
+"""Least height of a swing in hip heights; below it a foot only trembles. As in certification."""
 PER_FOOT = (
     "swings",
     "swinging",
@@ -26,25 +26,31 @@ PER_FOOT = (
     "slip",
     "foot_down",
 )
-"""What a tally holds for each foot."""
+"""Fields with one value per foot."""
 
 
 @pytree
 class Tally(protocol.Tally):
-    """Sums over the steps that a creature was up. `F` here counts feet, not their geoms.
+    """Sums over the steps of an episode until it ends. `F` counts feet here, not their geoms.
 
-    reason: a `falls.Reason`. forward, left: [] m from the start to the latest position.
+    reason: a `falls.Reason`.
+    forward, left: [] m from the start to the latest position.
     forward_half: [] m, `forward` at half time. heading: [] rad.
-    swings: [F] completed swings, swinging: [F] whether in one: a swing rises above `SWING` and
-      comes down to half of it; there it ends in a footfall.
-    shortfall: [F] missing clearance, share of the wanted, summed over swings. peak: [F] m, highest
-      since the latest footfall.
-    loaded: [F] whether it bore weight on the previous step. touchdowns: [F] how often it began to.
-    contact: [F] steps in contact. slip: [F] m slid while in contact. airborne: [] steps without any foot on the floor.
-    foot_height: [] m·steps, mean height of the feet. foot_speed: [] m/s, level, of the fastest foot
-      at its fastest. foot_pos: [F, 2], foot_down: [F] of the previous step.
-    tilt: [] of 1 - up.z. wobble: [] (rad/s)² of the trunk. touch: [] steps on which another part touches.
-    work: [] J, positive. saturation, limits: [] share of joints at their torque limit, beyond their pose range.
+    swings: [F] completed swings.
+    swinging: [F] 1 during a swing, which rises above `SWING` and ends in a footfall at half of it.
+    shortfall: [F] missing clearance, share of the wanted, summed over swings.
+    peak: [F] m, highest point since the latest footfall.
+    loaded: [F] whether the foot bore weight on the previous step.
+    touchdowns: [F] number of times the foot began to bear weight.
+    contact: [F] steps in contact. slip: [F] m slid while in contact.
+    airborne: [] steps without any foot on the floor.
+    foot_height: [] m·steps, mean height of the feet.
+    foot_speed: [] m/s, largest horizontal speed of any foot.
+    foot_pos: [F, 2], foot_down: [F] of the previous step.
+    tilt: [] of 1 - up.z. wobble: [] (rad/s)² of the trunk.
+    touch: [] steps on which another part touches.
+    work: [] J, positive.
+    saturation, limits: [] share of joints at their torque limit, beyond their pose range.
     """
 
     forward: jax.Array
@@ -74,7 +80,7 @@ class Tally(protocol.Tally):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Judge:
-    """Keeps the tally of one creature's episodes.
+    """Accumulator of the episode statistics of one creature.
 
     half_time: step. contact: m above the floor below which a foot is down.
     """
@@ -85,7 +91,7 @@ class Judge:
     contact: float = CONTACT_GAP
 
     def init(self) -> Tally:
-        """The empty tally."""
+        """Return the empty statistics."""
         feet = len(self.creature.feet.names)
         values = {field.name: jnp.zeros(()) for field in dataclasses.fields(Tally)}
         counts = {name: jnp.zeros((), jnp.int32) for name in ("steps", "reason")}
@@ -99,10 +105,10 @@ class Judge:
         torque: jax.Array,
         clearance: jax.Array,
     ) -> Tally:
-        """The tally after one more step.
+        """Return the statistics after one more step.
 
         Args:
-          torque: [J] N·m. clearance: [] m wanted of each foot in each of its swings.
+          torque: [J] N·m. clearance: [] m, wanted in each swing of each foot.
         """
         creature = self.creature
         start_forward, start_left = creature.frame.start_axes
@@ -111,7 +117,7 @@ class Judge:
         up = (sensed.trunk_rot @ creature.frame.up.astype(np.float32))[2]
         low, pos = self._feet(sensed)
         down = (low < self.contact).astype(jnp.float32)
-        # What bears weight is a little in the floor.
+        # A foot that bears weight penetrates the floor a little.
         loaded = (low < 0.0).astype(jnp.float32)
         peak = jnp.maximum(tally.peak, low)
         missing = jnp.clip(1.0 - peak / jnp.maximum(clearance, 1e-6), 0.0, 1.0)
@@ -157,7 +163,7 @@ class Judge:
         )
 
     def _feet(self, sensed: Sensed) -> tuple[jax.Array, jax.Array]:
-        """Lowest point [F] of each foot and its horizontal position [F, 2], the mean of its geoms."""
+        """Lowest point [F] of each foot and its horizontal position [F, 2], mean of its geoms."""
         low = foot_heights(self.creature, sensed)
         pos = jnp.stack(
             [jnp.mean(sensed.geom_pos[g, :2], axis=0) for g in foot_geoms(self.creature)]

@@ -1,4 +1,4 @@
-"""What is demanded of a walk of which more was asked: a speed, a gait, a turn, a posture.
+"""Acceptance criteria for walk targets: speed, gait, turn and posture.
 
 Letters: `T` frames.
 """
@@ -26,18 +26,21 @@ from mjxgait.tasks.walk.gaits import SHORTEST, animal_stride, gait_of
 Wish = Mapping[str, Any]
 
 ASKED, BOUNDS = "as asked", ("gait", "physics")
-"""Names of criteria: the wishes', and those whose numbers bound what a body can."""
+"""Names of criteria: the one for targets, and those that bound what a body can do."""
 COMMANDED = (2.0, 4.0)
-"""s, when a command comes."""
+"""Range of the time of a command, in s."""
 FAST_ENOUGH = 0.75
-"""Share of the speed asked for that is the least of a walk: by the tenth that a wish may be missed by
-the very speed that was asked for would have next to no margin."""
+"""Minimum speed as a share of the target speed.
+
+A minimum only the tolerated tenth below the target would leave a walk at exactly the target speed
+almost no margin.
+"""
 HEADING_MEAN = 1.0
-"""s; within a stride the nose swings."""
+"""Averaging time in s: the nose swings within a stride."""
 
 
 def told_heading(wish: Wish, steps: int, time_step: float) -> np.ndarray | None:
-    """[T] rad, what the controller is told; None where no turn is asked for."""
+    """Commanded heading [T] in rad; None without a turn target."""
     if not {"turn", "steer"} & set(wish):
         return None
     return np.radians(wish.get("turn", 0.0)) * time_step * np.arange(steps)
@@ -46,10 +49,9 @@ def told_heading(wish: Wish, steps: int, time_step: float) -> np.ndarray | None:
 def draw_commands(
     fastest: float, count: int, steps: int, time_step: float, rng: np.random.Generator
 ) -> np.ndarray:
-    """[S, T] rad that are told: straight on for a while, then a turn to the left or to the right in
-    turn, at a rate of its own.
+    """Draw commanded headings [S, T] in rad: straight at first, then a turn at a constant rate.
 
-    fastest: deg/s; none is told to turn less than half as fast.
+    Sides alternate. Each rate is drawn between half of `fastest` and `fastest`, in deg/s.
     """
     rate = fastest * rng.uniform(0.5, 1.0, count) * np.where(np.arange(count) % 2, -1.0, 1.0)
     begin = rng.uniform(*COMMANDED, count)
@@ -59,7 +61,7 @@ def draw_commands(
 
 
 def steered(outcome: Outcome, told: np.ndarray, limits: WishesConfig) -> Criterion:
-    """11. It obeys: is up in the end and, from a while after each command, looks where it was told.
+    """11. The walk stays up and, some time after each command, keeps the commanded heading.
 
     told: [S, T] rad.
     """
@@ -68,19 +70,18 @@ def steered(outcome: Outcome, told: np.ndarray, limits: WishesConfig) -> Criteri
     sums = np.cumsum(np.pad(outcome.astray, ((0, 0), (1, 0))), axis=1)
     off = np.degrees(np.abs(sums[:, width:] - sums[:, :-width]) / width)
     due = np.arange(off.shape[1]) >= (begins + round(limits.delay / step))[:, None]
-    # NaN, from a fall on, obeys nobody.
+    # NaN, from a fall on, does not count as obeying.
     obeys = outcome.stayed_up & (~due | (off <= limits.heading)).all(1)
     share = at_least("share that obeys", obeys.mean(), limits.obey, 1.0)
     return Criterion(11, "steered", (share,))
 
 
 def following(config: CertificateConfig, wish: Wish, size: Dimensions) -> CertificateConfig:
-    """The thresholds with those that depend on the speed as the speed asked for has them. Whoever is
-    to carry its nose high or low may lean by so much more.
+    """Return the thresholds adapted to the target speed and pitch.
 
-    The least speed is no more than a share of the one asked for, which is held from both sides by a
-    criterion of its own, and the least stride no more than half of an animal's at that speed: a slow
-    walk has short strides.
+    The minimum speed is at most `FAST_ENOUGH` of the target, which has a two-sided criterion of its
+    own. The minimum stride is at most half of an animal's at that speed, because a slow walk has
+    short strides. A target pitch raises the tilt limit by the same angle.
     """
     if "pitch" in wish:
         tilt = config.upright.tilt + abs(wish["pitch"])
@@ -102,8 +103,9 @@ def following(config: CertificateConfig, wish: Wish, size: Dimensions) -> Certif
 
 
 def unrolled(recording: Recording, wish: Wish) -> Recording:
-    """The walk as if its told heading had been straight ahead: each step of its way is turned back
-    by the heading that it was told then.
+    """Return the recording as if the commanded heading had been straight ahead.
+
+    Each step of the path is turned back by the heading commanded at that time.
     """
     told = told_heading(wish, len(recording.trunk_pos), recording.time_step)
     if told is None:
@@ -117,7 +119,7 @@ def unrolled(recording: Recording, wish: Wish) -> Recording:
 
 
 def as_asked(window: Recording, wish: Wish, config: CertificateConfig) -> Criterion:
-    """10. It does what it was asked. window: unrolled, after the warm-up."""
+    """10. The walk meets its targets. window: unrolled, after the warm-up."""
     limits = config.wishes
     found = posture(window) | likeness(window, config.gait.clearance)
     measures: list[Measure] = []
@@ -145,8 +147,9 @@ def as_asked(window: Recording, wish: Wish, config: CertificateConfig) -> Criter
 
 
 def in_the_way(criteria: Sequence[Criterion]) -> str | None:
-    """A sentence on the first wish that was missed, and the number that stood in its way: of gait
-    and physics that which is nearest to its limit, or farthest beyond. None where none was missed.
+    """Sentence on the first missed target and the number in its way; None if none was missed.
+
+    The number is the measure of gait or physics nearest to its limit, or farthest beyond.
     """
     missed = [m for c in criteria if c.name == ASKED for m in c.measures if not m.passed]
     bounds = [m for c in criteria if c.name in BOUNDS for m in c.measures if m.room]
@@ -161,7 +164,7 @@ def in_the_way(criteria: Sequence[Criterion]) -> str | None:
 
 
 def heading_off(window: Recording) -> float:
-    """deg, farthest from the heading that it was told, mean over a second."""
+    """Largest deviation from the commanded heading in deg, mean over a second."""
     if window.heading is None:
         return np.nan
     width = max(round(HEADING_MEAN / window.time_step), 1)
@@ -170,7 +173,7 @@ def heading_off(window: Recording) -> float:
 
 
 def posture(window: Recording) -> dict[str, float]:
-    """How it carries its trunk: height in standing heights, bounce in hip heights, sway in deg."""
+    """Trunk posture: height in standing heights, bounce in hip heights, sway in deg."""
     height, size = window.trunk_pos[:, 2], window.dimensions
     return {
         "height": float(height.mean() / size.stand_height),

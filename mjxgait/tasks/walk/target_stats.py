@@ -1,4 +1,4 @@
-"""What an episode leaves behind of a walk of which more is asked, besides what every walk does."""
+"""Additional episode statistics of a walk with targets."""
 
 import dataclasses
 
@@ -17,10 +17,12 @@ from mjxgait.types import Sensed, pytree
 class WishTally(Tally):
     """See `Tally`.
 
-    falls: the footfalls. height, height_squared: [] m·steps, m²·steps of the trunk. roll_squared:
-    [] rad²·steps of its roll. pitch: [] rad·steps of its nose below the horizon. reach: [F] m·steps in
-    contact of how far ahead of where it stands at rest a foot is.
-    trunk: [2] m, where the trunk was, forward and left of the start.
+    falls: the footfalls.
+    height, height_squared: [] m·steps, m²·steps of the trunk.
+    roll_squared: [] rad²·steps of the trunk's roll.
+    pitch: [] rad·steps of the nose below the horizon.
+    reach: [F] m·steps in contact, distance of a foot ahead of where it stands at rest.
+    trunk: [2] m, position of the trunk forward and left of the start.
     """
 
     falls: Footfalls
@@ -33,7 +35,7 @@ class WishTally(Tally):
 
 
 def wish_tally(tally: Tally, feet: int) -> WishTally:
-    """The empty one over an empty tally."""
+    """Extend empty statistics by the empty ones of the targets."""
     none = jnp.zeros(())
     return WishTally(
         **vars(tally),
@@ -48,7 +50,7 @@ def wish_tally(tally: Tally, feet: int) -> WishTally:
 
 
 def wish_updated(creature: Body, before: WishTally, after: Tally, sensed: Sensed) -> WishTally:
-    """The tally after one step more, of which `after` has what every walk leaves behind."""
+    """Return the statistics after one more step; `after` holds those of every walk."""
     height = trunk_height(sensed)
     reads = ["roll", "pitch", "forward", "aside", "foot_place"]
     way = sense(creature, sensed, jnp.zeros(()), reads)
@@ -66,7 +68,7 @@ def wish_updated(creature: Body, before: WishTally, after: Tally, sensed: Sensed
 
 
 def along(before: WishTally, after: WishTally, told: jax.Array, half_time: int) -> WishTally:
-    """The tally after a step with its way along the heading [] in rad that was told then.
+    """Return `after` with distances along the commanded heading [] in rad.
 
     half_time: step.
     """
@@ -84,5 +86,5 @@ def along(before: WishTally, after: WishTally, told: jax.Array, half_time: int) 
 
 
 def wrapped(angle: jax.Array) -> jax.Array:
-    """The same direction [] from -pi to pi."""
+    """Angle [] wrapped to the range from -pi to pi."""
     return jnp.arctan2(jnp.sin(angle), jnp.cos(angle))

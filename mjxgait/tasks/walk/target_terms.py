@@ -1,8 +1,8 @@
-"""What a walk is worth of which more is asked than to be one: a speed, a gait, a turn, a posture.
+"""Fitness terms of a walk with targets: speed, gait, turn and posture.
 
-What is walked earns `WORTH` at most; all penalties share what it has earned. So standing still and
-falling at once earn nothing, a walk however bad more than nothing, and of two walks the one whose
-penalties sum up to less is the better, whatever the weights are.
+The distance earns at most `WORTH`, and all penalties together cost less than was earned. So
+standing still and falling at once earn nothing, and any walk earns more than nothing. Of two walks
+that earn the same, the one with the smaller sum of penalties is better, whatever the weights.
 """
 
 from typing import Any
@@ -28,33 +28,35 @@ from mjxgait.tasks.walk.gaits import (
 from mjxgait.tasks.walk.target_stats import WishTally
 
 SLOW = 0.01
-"""m/s; who goes no faster is compared with an animal that goes so fast."""
+"""Lowest speed in m/s at which a walk is compared with an animal's."""
 WORTH = 7.2
-"""What all of the wanted way earns: as many body lengths as without a wish, so that the weights of
-the penalties mean what they mean there."""
+"""Value of the whole wanted distance: as many body lengths as without targets.
+
+The weights of the penalties then mean the same.
+"""
 AT_MOST = 0.99
-"""Share of what was earned that all penalties together come near to; the rest is beyond rounding."""
+"""Limit of all penalties together, as a share of what was earned; the rest is beyond rounding."""
 STARTING = 0.9
-"""Share of the wanted speed's way that counts as all of it: a walk begins with standing."""
+"""Share of the distance at the wanted speed that earns everything: a walk begins with standing."""
 NEAR = 0.25
-"""Share of the wanted value that it may be missed by until the penalty is half of what it can be."""
+"""Relative error at which a penalty is half of its largest value."""
 ROUGH = {"height": 0.05, "bounce": 0.02, "sway": 2.0}
-"""Likewise, in standing heights, hip heights and deg."""
+"""Errors of half the largest penalty, in standing heights, hip heights and deg."""
 UNLIKE = {"stride": 0.15, "duty_factor": 0.15, "reach": 0.1, "pitch": 5.0}
-"""Likewise of what a walk is compared with an animal's by: over the animal's, in hip heights, deg."""
+"""The same for the animal measures: relative, relative, hip heights, deg."""
 
 
 def wished_terms(
     creature: Body, config: WalkConfig, step: float, horizon: int, tally: WishTally
 ) -> dict[str, jax.Array]:
-    """The terms [] of one episode; their weighted sum is as the module says."""
+    """Return the terms [] of one episode; the module docstring describes their weighted sum."""
     wish, seconds = config.wish, horizon * step
     length = creature.frame.body_length
     wanted = wanted_speed(creature, config) * seconds / length
     values, _ = plain_terms(creature, config, step, horizon, tally)
     values |= missed(creature, wish, step, horizon, tally)
     values["frequency"] = hasty(creature, config, step, tally)
-    # What is wrong per way, not per episode: a slow walk has less of a way.
+    # Errors count per distance, not per episode: a slow walk covers less.
     longer = WORTH / wanted
     aside = jnp.abs(tally.left) / length
     values["drift"] = values["drift"] - aside + longer * aside
@@ -71,7 +73,7 @@ def wished_terms(
 
 
 def wanted_speed(creature: Body, config: WalkConfig) -> jax.Array | float:
-    """m/s [] that are asked for, or up to which faster is better."""
+    """Target speed [] in m/s, or the speed up to which faster is better."""
     if config.wish.speed is not None:
         return config.wish.speed
     usual = WalkConfig().speed
@@ -80,8 +82,10 @@ def wanted_speed(creature: Body, config: WalkConfig) -> jax.Array | float:
 
 
 def hasty(creature: Body, config: WalkConfig, step: float, tally: WishTally) -> jax.Array:
-    """By how much [] the strides are more frequent than they should be, as without a wish; where a
-    speed is asked for, than those by which an animal goes twice as far at least.
+    """Relative excess [] of the stride frequency over its limit.
+
+    The limit is that of a walk without targets. A target speed also sets one: the frequency at half
+    of an animal's stride length.
     """
     rate = jnp.mean(tally.swings) / jnp.maximum(tally.steps, 1) / step
     most = jnp.asarray(stride_limit(creature.frame.mass))
@@ -93,7 +97,7 @@ def hasty(creature: Body, config: WalkConfig, step: float, tally: WishTally) -> 
 def missed(
     creature: Body, wish: WishConfig, step: float, horizon: int, tally: WishTally
 ) -> dict[str, jax.Array]:
-    """How far [] each wish that there is was missed, from 0 to 1; turns are in the way itself."""
+    """Error [] of each target that is set, from 0 to 1; turns already count in the distance."""
     lived, frame = jnp.maximum(tally.steps, 1), creature.frame
     found: dict[str, jax.Array] = {}
     if wish.speed is not None:
@@ -116,14 +120,15 @@ def missed(
         own = likeness(creature, step, horizon, tally)
         likes = [name for name in LIKENESS if name in wish.asked]
         off = {name: (own[name] - getattr(wish, name)) / UNLIKE[name] for name in likes}
-        # Animals differ too: what is a little off costs next to nothing.
+        # Animals differ too, so a small error costs next to nothing.
         found |= {name: _half_at(1.0, away**2) for name, away in off.items()}
     return found
 
 
 def likeness(creature: Body, step: float, horizon: int, tally: WishTally) -> dict[str, jax.Array]:
-    """What a walk is compared with an animal's by, each [] in the unit in which it is asked for; as
-    the examiner has it (`certify.likeness`).
+    """Compare a walk with an animal's: each measure [] in the unit of its target.
+
+    Certification measures the same (`certification.likeness`).
     """
     lived, hip = jnp.maximum(tally.steps, 1), creature.frame.hip_height
     speed = jnp.maximum(steady_speed(step, horizon, tally), SLOW)
@@ -139,7 +144,7 @@ def likeness(creature: Body, step: float, horizon: int, tally: WishTally) -> dic
 
 
 def steady_speed(step: float, horizon: int, tally: Any) -> jax.Array:
-    """m/s [] over the second half of the episode, or as far as there is one over all that was."""
+    """Speed [] in m/s over the second half of the episode, or over all of a shorter one."""
     half = horizon // 2
     late = tally.steps > half
     way = jnp.where(late, tally.forward - tally.forward_half, tally.forward)
@@ -147,7 +152,7 @@ def steady_speed(step: float, horizon: int, tally: Any) -> jax.Array:
 
 
 def wish_weights(wish: WishConfig) -> dict[str, Any]:
-    """Weight of each wish that there is and that has a term of its own."""
+    """Weights of the targets that are set and have a term of their own."""
     return {n: getattr(wish.weights, n) for n in wish.asked if hasattr(wish.weights, n)}
 
 
@@ -157,7 +162,7 @@ def _half_at(near: float, off: jax.Array) -> jax.Array:
 
 
 def _shared(values: dict[str, jax.Array], config: WalkConfig) -> dict[str, jax.Array]:
-    """The terms, penalties less by as much as it takes for them to cost no more than was earned."""
+    """Scale the penalties down so that they cost no more than was earned."""
     weights = {name: getattr(config.weights, name) for name in TERMS} | wish_weights(config.wish)
     costs = [weights[name] * value for name, value in values.items() if name not in REWARDS]
     cost = jnp.maximum(sum(costs, start=jnp.zeros(())), 0.0)

@@ -1,4 +1,4 @@
-"""What is asked of a walk in words: names for settings, as one layer of them (docs/wishes.md)."""
+"""Walk targets in words: names for settings, as one layer of them (docs/wishes.md)."""
 
 import dataclasses
 import re
@@ -34,17 +34,17 @@ SPEED = re.compile(r"(?:fr)?[0-9]*\.?[0-9]+(?:e-?[0-9]+)?(?:bl/s|m/s)?")
 
 @dataclasses.dataclass(frozen=True)
 class Wishes:
-    """What a user asks of a walk.
+    """Walk targets that a user requests.
 
     Attributes:
       speed: such as 0.4 (m/s), 0.4bl/s (body lengths per second), or fr0.2 (Froude number).
-      gait: walk, amble, trot, pace, canter, bound, gallop, tripod, wave, hop, waddle, natural
-        (an animal's at this speed, with its strides), or auto.
+      gait: walk, amble, trot, pace, canter, bound, gallop, tripod, wave, hop, waddle, natural (an
+        animal's at this speed, with its strides), or auto.
       turn: deg/s, to the left.
-      steer: deg/s, up to which it should obey turns to either side.
+      steer: deg/s; the walk must obey turns to either side up to this rate.
       style: calm, sneaky, heavy, proud, tired, hurried, or a TOML file of settings.
-      certificate: walks, or anywhere: then it learns on uneven ground and under more disturbances,
-        and goes on until it bears what `mjxgait stress` asks.
+      certificate: walks, or anywhere: trains on uneven ground under more disturbances, until the
+        walk passes `mjxgait stress`.
     """
 
     speed: str | None = None
@@ -56,7 +56,7 @@ class Wishes:
 
     @classmethod
     def of(cls, given: Mapping[str, Any]) -> "Wishes":
-        """Those that were given, as text or as what they are.
+        """Build the targets from the options that were given, as text or as values.
 
         Raises:
           UserError: a turn is no number.
@@ -74,7 +74,7 @@ class Wishes:
 
 
 NATURAL = "natural"
-"""The gait of an animal at this speed, whatever its name."""
+"""Gait of an animal at this speed, whatever its name."""
 TURNS = ("turn", "steer")
 LEVELS = ("walks", "anywhere")
 WISHES = tuple(field.name for field in dataclasses.fields(Wishes))
@@ -83,12 +83,13 @@ WISHES = tuple(field.name for field in dataclasses.fields(Wishes))
 def configured(
     creature: Creature, file: Path | None, use: Mapping[str, str], wishes: Wishes
 ) -> Config:
-    """The settings of a run: the layers below the options, and what is asked laid over them.
+    """Return the settings of a run: the layers below the options, and the targets on top.
 
-    Where nothing is, and no file says what is wanted, it is what this creature usually does.
+    Without targets and without a file, a walk has the creature's own default, `[usual]` in
+    creature.toml.
 
     Raises:
-      UserError: names the layer and the key, or the wish.
+      UserError: names the layer and the key, or the target.
     """
     config = resolve_config(creature.settings.train, creature.name, file, use)
     walks = config.use.task == "walk" and config.use.controller == "poses"
@@ -101,10 +102,10 @@ def configured(
 
 
 def wished(config: Config, creature: Creature, wishes: Wishes) -> Config:
-    """The settings with what these wishes are names for laid over them.
+    """Return the settings overlaid with those that these targets stand for.
 
     Raises:
-      UserError: names the wish that means nothing, or not for this body.
+      UserError: names the target that means nothing, or not for this body.
     """
     if wishes == Wishes():
         return config
@@ -129,8 +130,9 @@ def wished(config: Config, creature: Creature, wishes: Wishes) -> Config:
 
 
 def hint(config: Config) -> str | None:
-    """A sentence for whoever has set `fitness.speed` below what is called a walk, and so asks for
-    nothing that can be certified: it says up to where faster is better.
+    """Sentence on a `fitness.speed` too low for a walk to be certified; None if there is none.
+
+    Such a `fitness.speed` is no target speed: it only limits up to where faster is better.
     """
     if config.use.task != "walk" or config.fitness.wish.speed is not None:
         return None
@@ -145,10 +147,10 @@ def hint(config: Config) -> str | None:
 
 
 def speed_of(text: str, creature: Creature) -> float:
-    """m/s of a speed in words.
+    """Convert a speed in words to m/s.
 
     Raises:
-      UserError: it is none.
+      UserError: the text is no speed.
     """
     plain = text.strip().lower().replace(" ", "")
     if not SPEED.fullmatch(plain) or (plain.startswith("fr") and plain.endswith("/s")):
@@ -165,7 +167,7 @@ def speed_of(text: str, creature: Creature) -> float:
 
 
 def _pace(wishes: Wishes, creature: Creature, config: Config) -> dict[str, Any]:
-    """The speed and the gait, and a cycle drawn after both, near which evolution begins."""
+    """Settings for speed and gait, and for a textbook cycle near which evolution begins."""
     asked, name = wishes.speed, wishes.gait or AUTO
     if asked is None and name == AUTO:
         return {}
@@ -179,11 +181,10 @@ def _pace(wishes: Wishes, creature: Creature, config: Config) -> dict[str, Any]:
 
 
 def _speed(speed: float, creature: Creature) -> dict[str, Any]:
-    """A speed in m/s, and a cycle of at least as many steps as the shortest strides there may be at
-    that speed.
+    """Settings for a speed in m/s, with a cycle no shorter than the shortest stride at that speed.
 
-    Ten steps from pose to pose, a fifth of a second for all four, let whoever moves little run
-    through them far too often.
+    Ten steps from pose to pose, a fifth of a second for all four, let a gait of small movements
+    repeat far too often.
     """
     shortest = SHORTEST * animal_stride(speed, creature.frame.hip_height) / speed
     steps = unhurried(shortest, float(creature.model.opt.timestep))
@@ -191,7 +192,7 @@ def _speed(speed: float, creature: Creature) -> dict[str, Any]:
 
 
 def _natural(name: str) -> dict[str, Any]:
-    """Footfalls by name, an animal's strides and duty factor, feet below their hips, level."""
+    """Settings for an animal's footfalls, strides and duty factor, level, feet below the hips."""
     like = {"gait": name, "stride": 1.0, "duty_factor": 1.0, "reach": 0.0, "pitch": 0.0}
     return {"fitness": {"wish": like}}
 
@@ -216,7 +217,7 @@ def _turn(name: str, rate: float | None) -> dict[str, Any]:
 
 
 def _styled(config: Config, name: str) -> Config:
-    """The settings with a style's laid over them.
+    """Return the settings overlaid with those of a style.
 
     Raises:
       UserError: there is none of that name and no file, or it holds what is no setting.
@@ -230,7 +231,7 @@ def _styled(config: Config, name: str) -> Config:
 
 
 def _demanded(config: Config, level: str) -> Config:
-    """The settings with those laid over them by which a level of the certificate is reached.
+    """Return the settings overlaid with those for a level of the certificate.
 
     Raises:
       UserError: there is no such level.

@@ -1,4 +1,4 @@
-"""Walking as a task: forward, upright, in the manner that the settings ask for."""
+"""Walk task: forward, upright, in the manner given by the settings."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -29,11 +29,11 @@ from mjxgait.tasks.walk.target_terms import wish_weights, wished_terms
 from mjxgait.types import Sensed
 
 FALLEN = 0.2
-"""Share of its trials in which one may fall who is ready for harder ones."""
+"""Largest share of falls at which an individual is ready for harder trials."""
 
 
 class Walk(PlainTask):
-    """One creature's walk; see `PlainTask`."""
+    """Walk of one creature; see `PlainTask`."""
 
     Settings = WalkConfig
     outcomes = ("forward", "aside", "seconds")
@@ -58,7 +58,7 @@ class Walk(PlainTask):
     def told(
         cls, body: Body, step: float, horizon: int, ends: Termination | Ends, settings: WalkConfig
     ) -> "Walk":
-        """The task with these settings: with a wish more is looked at, without one nothing is."""
+        """Return the task with these settings; targets need additional statistics."""
         if settings.wish.asked and cls is Walk:
             return AskedWalk(body, step, horizon, ends, settings)
         return cls(body, step, horizon, ends, settings)
@@ -73,11 +73,11 @@ class Walk(PlainTask):
         return settings.hardening
 
     def harder(self, trials: Starts, settings: WalkConfig, level: jax.Array) -> Starts:
-        """See `Task`: disturbances grow, so that whoever stays up learns to bear them bit by bit."""
+        """See `Task`: disturbances grow, so that individuals learn to withstand them bit by bit."""
         return milder(trials, hardness(settings.hardening, level))
 
     def mastered(self, terms: Mapping[str, jax.Array]) -> jax.Array:
-        """See `Task`: who hardly ever falls."""
+        """See `Task`: hardly any falls."""
         return terms["fall"] <= FALLEN
 
     @property
@@ -85,7 +85,7 @@ class Walk(PlainTask):
         return Judge(self.creature, self.step, self.horizon // 2, self.settings.contact)
 
     def standards(self, settings: WalkConfig) -> jax.Array:
-        """See `Task`: the clearance [] in m that is wanted of each swing."""
+        """See `Task`: the wanted clearance [] of each swing in m."""
         return jnp.asarray(settings.clearance * self.creature.frame.hip_height, jnp.float32)
 
     def init(self) -> Any:
@@ -103,7 +103,7 @@ class Walk(PlainTask):
         return fitness_terms(self.creature, settings, self.step, self.horizon, tally)
 
     def outcome(self, tally: Tally) -> dict[str, jax.Array]:
-        """See `Task`: m forward and to the left until the end, and s until then."""
+        """See `Task`: m forward, m to the left and s until the end."""
         return {
             "forward": tally.forward,
             "aside": tally.left,
@@ -116,15 +116,15 @@ class Walk(PlainTask):
 
 
 class AskedWalk(Walk):
-    """A walk of which more is asked: see `settings.walk.WishConfig`.
+    """Walk with targets; see `WishConfig`.
 
-    Who is told to turn is told a heading that turns, and its way is measured along that: forward
-    and to the left of where it should be looking at each moment.
+    A turn is commanded as a heading that turns. Distances are measured along it: forward and to the
+    left of the heading commanded at each moment.
     """
 
     @property
     def wish(self) -> WishConfig:
-        """What is asked."""
+        """Targets of the walk."""
         return self.settings.wish
 
     @property
@@ -133,8 +133,10 @@ class AskedWalk(Walk):
         return (*super().terms, *wish_weights(self.wish))
 
     def trials(self, key: jax.Array, creature: Creature, settings: RolloutConfig) -> Starts:
-        """See `Task`: everybody's starts, and how they are told to turn: as asked, or the first
-        straight on and the others to the left and to the right in turn, half as fast at least.
+        """See `Task`: the usual initial conditions, and the rate of the commanded turn.
+
+        With `turn`, all have the target rate. With `steer`, the first goes straight; the others
+        turn left and right alternately, at half the target rate at least.
         """
         starts, count = draw_starts(key, creature, settings), settings.starts
         if self.wish.turn is not None:
@@ -148,7 +150,7 @@ class AskedWalk(Walk):
         return dataclasses.replace(starts, turn=jnp.radians(rate))
 
     def aim(self, trial: Starts) -> Any:
-        """See `Task`: the commanded heading [] in rad, and by what it grows in a step."""
+        """See `Task`: the commanded heading [] in rad, and its change per step."""
         if trial.turn is None:
             return ()
         return jnp.zeros(()), trial.turn * self.step
@@ -158,7 +160,7 @@ class AskedWalk(Walk):
         return (aim[0] + aim[1], aim[1]) if aim else aim
 
     def senses(self, aim: Any, sensed: Sensed) -> dict[str, jax.Array]:
-        """See `Task`: who is told where to go knows no line to come back to."""
+        """See `Task`: with a commanded heading there is no line to return to."""
         if not aim:
             return {}
         heading = sense(self.creature, sensed, jnp.zeros(()), ["heading"])["heading"]

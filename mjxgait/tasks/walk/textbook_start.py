@@ -1,4 +1,4 @@
-"""Settings by which evolution begins near a cycle that is drawn after an animal's, and not anywhere."""
+"""Settings that start evolution near a textbook cycle, drawn after an animal's."""
 
 from typing import Any
 
@@ -16,38 +16,44 @@ from mjxgait.tasks.walk.gaits import (
 )
 
 DRAWN = 8
-"""Poses of a cycle that is drawn."""
+"""Poses of a textbook cycle."""
 WITHIN, SLACK, BEGINS = 25.0, 0.15, 0.4
-"""How far evolution may depart from it: deg of each joint of each pose, share of its time; and the
-share of that in which it begins."""
+"""Search range around the cycle: deg for each joint of each pose, and share of its period.
+
+The third is the share of that range in which evolution begins.
+"""
 ORDERED = {
     "initial_choice": 1,
     "crossing": "align",
     "mutation": "gaussian",
     "forced": {"enabled": False},
 }
-"""Operators of a search that begins with a cycle: its poses have an order, which permutation and
-newcomers would destroy. Nearly all that is drawn around it stays up, so nothing is gained by a
-choice of the first."""
+"""Operators of a search that begins with a cycle.
+
+Its poses have an order, which permutation and immigrants would destroy. Nearly all individuals
+drawn around it stay up, so selecting the first ones gains nothing.
+"""
 INSIDE = 0.05
-"""Duty factor by which a drawn gait is away from the ends of what its name allows."""
+"""Margin in duty factor that a textbook cycle keeps from the ends of its gait's range."""
 
 
 def top_speed(creature: Creature, config: Config) -> float:
-    """m/s up to which faster is better where no speed is asked for."""
+    """Speed in m/s up to which faster is better, without a target speed."""
     return (config.fitness.speed or WalkConfig().speed) * creature.frame.body_length
 
 
 def natural_gait(creature: Creature, speed: float) -> str:
-    """The gait of an animal with so many feet at a speed in m/s; `auto` where it has no name."""
+    """Gait of an animal with as many feet at a speed in m/s; `auto` if it has no name."""
     froude = speed**2 / (creature.gravity * creature.frame.hip_height)
     names = {2: "walk", 4: "walk" if froude < WALKS_UP_TO else "trot", 6: "tripod"}
     return names.get(len(creature.feet.names), AUTO)
 
 
 def drawn(name: str, speed: float, creature: Creature, config: Config) -> dict[str, Any]:
-    """A gait at a speed in m/s with an animal's strides and duty factor; nothing where it has no name
-    or no second half that mirrors the first.
+    """Settings for a textbook cycle of a gait at a speed in m/s.
+
+    The cycle has an animal's strides and duty factor. Empty if the gait has no name, or no second
+    half that mirrors the first.
     """
     if name == AUTO or not (gait := gait_of(name, len(creature.feet.names))).twice:
         return {}
