@@ -20,8 +20,9 @@ STRENGTH, LEAST_STRENGTH, MOST_STRENGTH = 2.0, 0.5, 1.0
 DAMPING = 0.015
 """kd in units of kp, s. Stable PD needs 0.0075 at a step of 5 ms."""
 QUICKNESS = 5.0
-"""Least natural frequency of a joint, in units of that of a pendulum as long as the hip height. A
-slower joint cannot follow a stride.
+"""Least natural frequency of a joint, in units of that of a pendulum of the hip height.
+
+A slower joint cannot follow a stride.
 """
 SWING = 0.35
 """rad, amplitude at which the torque limit must swing a joint's own inertia at that frequency."""
@@ -50,8 +51,9 @@ flails. One-legged bodies use the full range.
 SWINGING = 2
 """Joints of a leg that swing it widely."""
 STEPPERS, APART = 2, 0.5
-"""Most feet of a body that must step to catch a fall. With more, or with feet this many hip heights
-apart along x, it stands.
+"""Most feet of a body that must step to catch a fall.
+
+A body with more feet, or with feet this many hip heights apart along x, stands.
 """
 WEAKEST = 0.3
 """Least foot motion of a stepping joint, m per rad and hip height."""

@@ -23,9 +23,7 @@ NO_LEGS = re.compile(
 """Name parts of limbs that no animal walks on, however low they hang."""
 
 DRAWS, STEPS, TINY = 300, (0.3, 0.1, 0.03, 0.01, 0.003, 0.001), 1e-5
-"""Random poses tried to lower a limb; rad by which each joint then moves on; m of descent that such
-a move must gain.
-"""
+"""Lowering of a limb: random poses tried; rad by which each joint then moves; m to gain by that."""
 
 
 class NoLegs(UserError):
@@ -133,8 +131,9 @@ def _below(model: mujoco.MjModel, anatomy: Anatomy, body: int) -> list[int]:
 
 
 def lowered_limbs(model: mujoco.MjModel, anatomy: Anatomy, movable: list[int]) -> np.ndarray:
-    """Pose [nq] with each limb as low as possible, for files whose zero pose has folded or
-    stretched legs.
+    """Pose [nq] with each limb as low as possible.
+
+    Used for files with folded or stretched legs in their zero pose.
     """
     data, rng = mujoco.MjData(model), np.random.default_rng(0)
     data.qpos[:] = anatomy.qpos

@@ -9,36 +9,35 @@ from mjxgait.tasks.walk.config import WalkConfig
 from mjxgait.tasks.walk.gaits import stride_limit
 
 STARTS, ALIVE = 6, 6.0
-"""For bodies that must step to catch a fall: evaluated trials, and weight of staying up to the end.
+"""Evaluated trials, and weight of staying up to the end, of bodies that must step to catch a fall.
 """
 LATE, HASTY = 1, 8.0
 """Largest torque delay in control steps, which is what first fells such a body in its examination.
 Weight of a hasty stride frequency, twice the default.
 """
 BRISK = 1.2
-"""Target speed of such a body in body lengths per second: slower walking needs standing on one
-foot.
-"""
+"""Target speed of such a body in body lengths per second: slower, it has to stand on one foot."""
 STRIDE = 0.7
 """Target stride length at that speed, in hip heights."""
 LEAST = 0.5
-"""Least stride length in hip heights that the certificate accepts: a cycle with shorter strides is
-a buzz.
-"""
+"""Least stride length of the certificate in hip heights: a cycle of shorter strides is a buzz."""
 
 LEAPING, RISES = 1.6, 8
-"""For one-legged bodies: target speed in body lengths per second, at a two-legged rhythm, and steps
-in which disturbances grow as the body learns to bear them. At the two-legged speed the hops are
-short, and with full disturbances at once it falls.
+"""Target hopping speed in body lengths per second of one-legged bodies, and hardening steps.
+
+The rhythm is that of two-legged bodies. The disturbances grow in these steps as the body learns to
+bear them. At the two-legged speed the hops are short, and with full disturbances at once it falls.
 """
 
 WHIPPED = 4.0
-"""Weight of swinging a foot too fast, in body lengths per √(g·h): most robots that fail a single
-criterion fail by the speed of their fastest part, a foot.
+"""Weight of swinging a foot too fast, in body lengths per √(g·h).
+
+Most robots that fail a single criterion fail by the speed of their fastest part, a foot.
 """
 MANY = 6
-"""Hinges per leg above which few random poses stand; for such robots falling forward would
-otherwise score better than standing.
+"""Hinges per leg above which few random poses stand.
+
+For such robots falling forward would otherwise score better than standing.
 """
 GENERATIONS = 150
 """Largest number of generations, twice the default."""

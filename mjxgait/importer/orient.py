@@ -17,8 +17,10 @@ FRONT_CORNERS, BACK_CORNERS = (
 )
 """Whole words of a name, as between underscores."""
 CLEARLY, MOSTLY = 1.1, 2.0
-"""Ratio of the swings along the two axes from which the axis of the larger swing is the walking
-direction: where symmetry does not separate the axes, and where it speaks for the other axis.
+"""Ratio of the foot swings along the two axes from which the larger one is the walking axis.
+
+The first holds where symmetry does not separate the axes, the second where it speaks for the other
+axis.
 """
 SHANK = 0.25
 """Share of a leg's length from which its last part is a shank, not a foot."""

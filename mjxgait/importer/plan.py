@@ -33,9 +33,7 @@ class Plan:
         spots = np.concatenate([rig.places, *rig.ends])
         self.span = float(np.ptp(spots, axis=0).max())
         self.height = float(np.ptp(np.concatenate([spots, *rig.skins])[:, up])) or self.span
-        level = [
-            axis for axis in range(3) if axis != up
-        ]  # a tie means that X is the side, as usual
+        level = [axis for axis in range(3) if axis != up]  # X is the side if both fit equally
         self.side = min(level, key=self._unlike)
         self.ahead = next(axis for axis in level if axis != self.side)
 
@@ -139,9 +137,7 @@ class Plan:
         return chain
 
     def has_toes(self, bone: int) -> bool:
-        """Return whether a limb splits at this bone into several of about equal reach, like
-        fingers.
-        """
+        """Return whether a limb splits at this bone into several of about equal reach (toes)."""
         reaches = sorted(map(self.reach, self.rig.children(bone)), reverse=True)
         return len(reaches) > 1 and reaches[1] > TOE * reaches[0]
 

@@ -25,15 +25,12 @@ from mjxgait.importer.plan import Plan
 
 RIGS: Mapping[str, Callable[[Path], Rig]] = {".bvh": rig_of_bvh, ".glb": rig_of_glb}
 UP, OTHER, SURER = "y", "z", 1.5
-"""Default up axis of a file that states none; the other candidate; and the ratio of the limbs'
-descent along the two from which the other one is up.
-"""
+"""Default up axis; the other candidate; and the least ratio of the limbs' descent to prefer it."""
 DENSITY = 1000.0
-"""kg/m³, density of water and, about, of animals."""
+"""kg/m³, the density of water and of animals."""
 MOST_BONES = 400
 METRES, CENTIMETRES = 4.0, 400.0
-"""Heights in file units: a skeleton below the first is in metres, below the second in centimetres,
-else in millimetres.
+"""Heights in file units below which a skeleton is in metres, or in centimetres; else millimetres.
 """
 THICK, THIN, TRUNK, SLIM = 0.12, 0.008, 0.7, 0.2
 """Radius of a limb's bone over its length; least radius over the creature's height; trunk radius
@@ -85,7 +82,7 @@ def _bare(rig: Rig) -> Rig:
                 needed.add(bone)
                 bone = rig.parents[bone]
         for bone in set(range(len(rig.names))) - needed:
-            parent = rig.parents[bone]  # the last bone marks the end of a chain
+            parent = rig.parents[bone]  # a removed leaf still marks its parent's end
             if parent in skinned and not rig.children(bone):
                 ends[parent] = np.concatenate([ends[parent], rig.places[[bone]]])
         rig = Rig(rig.names, rig.parents, rig.places, tuple(ends), rig.skins, rig.metres)

@@ -174,9 +174,7 @@ class Tip:
 
     @functools.cached_property
     def ends(self) -> tuple[np.ndarray, np.ndarray]:
-        """Points [n, 3] of the shank and of the foot's end, cached because a search reads them
-        often.
-        """
+        """Points [n, 3] of the shank and of the foot's end; cached for the search."""
         return self.shape.points[~self.far], self.shape.points[self.far]
 
 
