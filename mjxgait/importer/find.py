@@ -69,7 +69,7 @@ def find_anatomy(
 
 
 def _reference_pose(model: mujoco.MjModel) -> np.ndarray:
-    """The file's zero pose [nq]; a joint with a range that excludes zero is in its middle."""
+    """The file's zero pose [nq]; a joint outside its range there is set to the middle."""
     qpos = model.qpos0.copy()
     for j in range(model.njnt):
         a, (low, high) = int(model.jnt_qposadr[j]), model.jnt_range[j]

@@ -27,7 +27,7 @@ class Held:
 
     @property
     def stands(self) -> bool:
-        """Result of the test: the creature stayed up on its feet and came to rest."""
+        """True if the creature stayed up on its feet and came to rest."""
         return self.up > 0.85 and self.height > 0.75 and not self.touched and self.speed < 1.0
 
     @property
