@@ -1,4 +1,4 @@
-"""MJCF cleaning: includes put in place; only bodies, joints, geoms and meshes kept."""
+"""MJCF cleaning: includes put in place, meshes loaded, unneeded elements removed."""
 
 import xml.etree.ElementTree as ET
 from pathlib import Path

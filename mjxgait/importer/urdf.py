@@ -116,7 +116,7 @@ def _empty_shape(shape: ET.Element) -> bool:
 
 
 def _inertial(link: ET.Element, notes: Notes) -> bool:
-    """Mend an impossible inertia, keeping the mass; return whether a mass is stated (zero counts)."""
+    """Mend an impossible inertia, not the mass; return whether a mass is stated (zero counts)."""
     inertial = link.find("inertial")
     if inertial is None:
         return False
