@@ -1,4 +1,4 @@
-"""From somebody's model file (MJCF or URDF) to a creature folder."""
+"""Import of a model file (MJCF or URDF) as a creature folder."""
 
 from mjxgait.importer.convert import (
     TOML,

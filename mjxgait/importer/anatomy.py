@@ -1,4 +1,4 @@
-"""What a compiled model consists of, in one pose.
+"""Bodies, joints, feet and shapes of a compiled model in one pose.
 
 Letters: `B` bodies, `J` joints, as in MuJoCo's arrays.
 """
@@ -15,12 +15,12 @@ from mjxgait.importer.root import turn_up
 
 @dataclasses.dataclass(eq=False)
 class Anatomy:
-    """qpos: [nq] the pose that everything was measured in. xpos [B, 3], xrot [B, 3, 3]: bodies in
-    that pose, up is z, m.
+    """Anatomy of a creature in one pose, up is z.
 
-    root: body id. bodies: ids of the creature's bodies, parents first. active: ids of joints that
-    move. feet: ids of the last moving body of each leg. scale: m per unit of length. shapes: of
-    each body, scaled. lowered: whether qpos is not the file's zero pose, but its limbs let down.
+    qpos: [nq] that pose. xpos [B, 3] m, xrot [B, 3, 3]: bodies in it. root: body id. bodies: ids of
+    the creature's bodies, parents first. active: ids of joints that move. feet: ids of the last
+    moving body of each leg. scale: m per unit of length. shapes: of each body, scaled. lowered:
+    whether qpos has the limbs let down instead of the file's zero pose.
     """
 
     qpos: np.ndarray
@@ -35,9 +35,7 @@ class Anatomy:
     lowered: bool = False
 
     def low(self, model: mujoco.MjModel, bodies: Sequence[int]) -> float:
-        """Lowest point in m of some bodies; their frames and centres of mass where they have no
-        shapes.
-        """
+        """Lowest point in m of some bodies; the lowest body frame where they have no shapes."""
         heights = []
         for b in bodies:
             solid = [s for s in self.shapes[b] if s.solid] or self.shapes[b]
@@ -58,7 +56,7 @@ def measured(
     bodies: list[int],
     scale: float,
 ) -> Anatomy:
-    """The creature in one pose: nothing of its joints and feet yet. axis: [3], up in the file."""
+    """Measure the creature in one pose, without joints and feet. axis: [3], up in the file."""
     data = mujoco.MjData(model)
     data.qpos[:] = qpos
     mujoco.mj_kinematics(model, data)

@@ -1,5 +1,6 @@
-"""Makes the balance feedback so weak that the creature stands with it: a loop that is too strong
-for the body shakes it off its feet.
+"""Weakening of the balance feedback until the creature stands with it.
+
+A loop that is too strong for the body shakes it off its feet.
 """
 
 from collections.abc import Callable
@@ -16,10 +17,11 @@ from mjxgait.plugins import resolve_config
 MOST = 0.5
 """rad, where the controller clips the feedback (docs/controller.md)."""
 SHARES = (1.0, 0.5, 0.25, 0.12, 0.06, 0.0)
-"""Of the full weight, tried in this order."""
+"""Shares of the full weight, tried in this order."""
 NUDGE = 0.05
-"""rad by which the joints start beside the stance, as perturbed starts do: in perfect rest a
-loop would tremble late or never.
+"""rad, initial offset of the joints from the stance, as in perturbed trials.
+
+In perfect rest a loop would tremble late or never.
 """
 CALM = 0.3
 """rad/s, root mean square of the joints at the end; more is a tremor."""
@@ -33,7 +35,7 @@ def steady_balance(
     feet: set[str],
     notes: Notes,
 ) -> None:
-    """Scales the pitch and the roll weights of the drive.
+    """Scale the pitch and roll weights of the drive.
 
     Args:
       names: [J] of the joints. model, qpos: [nq] the creature facing +x in its standing pose. feet:
@@ -62,7 +64,7 @@ def steady_balance(
             )
             if tried[share].stands and tried[share].speed < CALM:
                 break
-        else:  # a body that falls in any case, for example one on two points: what holds it longest
+        else:  # a body that always falls, such as one on two points: the best score
             share = max(tried, key=lambda s: tried[s].score)
         weights = {name: round(share * weight, 3) for name, weight in table.items() if share}
         table.clear()
@@ -80,20 +82,17 @@ def steady_balance(
 def feedback(
     weights: np.ndarray, axis: int, stand: np.ndarray, gain: float, rate_gain: float
 ) -> Callable[[mujoco.MjData], np.ndarray]:
-    """The controller's correction [J] of the target.
+    """Return the controller's correction [J] of the target.
 
     Args:
-      weights: [J]. axis: 0 for roll, 1 for pitch. stand: [nq] the standing pose, in which the
-        creature faces +x.
+      weights: [J]. axis: 0 for roll, 1 for pitch. stand: [nq] the standing pose, facing +x.
       gain, rate_gain: of the trunk's angle, 1, and of its rate, s.
     """
     level = rotation(stand[3:7])
 
     def correct(data: mujoco.MjData) -> np.ndarray:
         turned = data.xmat[1].reshape(3, 3)
-        axes = (
-            turned @ level.T
-        )  # columns: forward, left and up of the stance in the world of this moment
+        axes = turned @ level.T  # columns: the stance's forward, left and up in the current world
         angle = np.arcsin(np.clip(axes[2, 1] if axis == 0 else -axes[2, 0], -1, 1))
         rate = (turned @ data.qvel[3:6]) @ axes[:, axis]
         return weights * np.clip(gain * angle + rate_gain * rate, -MOST, MOST)

@@ -1,5 +1,4 @@
-"""The creature as it will be written, with MuJoCo's kinematics: what poses and mirror images are
-computed with.
+"""Kinematic model of the creature as it will be written, for poses and mirror images.
 
 Letters: `J` active joints, `B` bodies in the list's order (MuJoCo's ids less one).
 """
@@ -16,14 +15,14 @@ FREE_POS, FREE_DOF = 7, 6
 
 
 class Puppet:
-    """Poses the bodies.
+    """Kinematic model of the bodies.
 
-    low, high: [J] limits in rad, infinite where there is none. feet: groups of places of the bodies
-    of each foot.
+    low, high: [J] limits in rad, infinite where there is none. feet: for each foot the places of
+    its bodies.
     """
 
     def __init__(self, bodies: list[Body], feet: list[int], in_plane: bool = False) -> None:
-        """in_plane: whether the file lets the trunk move in a plane only."""
+        """Compile the bodies. in_plane: whether the file lets the trunk move in a plane only."""
         self.bodies, self.in_plane = bodies, in_plane
         self.model = compile_own(creature_xml("puppet", bodies, None))
         self.data = mujoco.MjData(self.model)
@@ -37,7 +36,7 @@ class Puppet:
         self.mass = float(self.model.body_mass.sum())
 
     def welded(self, i: int) -> list[int]:
-        """A moving body and what is fixed to it."""
+        """Return a moving body and the bodies fixed to it."""
         group = [i]
         for k in range(i + 1, len(self.bodies)):
             if self.bodies[k].parent in group and not self.bodies[k].joints:
@@ -45,7 +44,7 @@ class Puppet:
         return group
 
     def segments(self) -> list[list[int]]:
-        """All moving bodies, the trunk first, each with what is fixed to it."""
+        """Return all moving bodies, the trunk first, each with the bodies fixed to it."""
         return [self.welded(i) for i, body in enumerate(self.bodies) if i == 0 or body.joints]
 
     def leg(self, foot: int) -> list[int]:
@@ -58,26 +57,24 @@ class Puppet:
         return [self.names.index(name) for name in order]
 
     def pose(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Positions [B, 3] m and rotations [B, 3, 3] at joint angles [J]; the trunk where it was
-        placed.
-        """
+        """Positions [B, 3] m and rotations [B, 3, 3] at joint angles [J], the trunk as placed."""
         self.data.qpos[:] = self.qpos(q)
         mujoco.mj_kinematics(self.model, self.data)
         return self.data.xpos[1:].copy(), self.data.xmat[1:].reshape(-1, 3, 3).copy()
 
     def qpos(self, q: np.ndarray) -> np.ndarray:
-        """[nq] with the trunk where it was placed."""
+        """Pose [nq] at joint angles [J], with the trunk as placed."""
         return np.concatenate(
             [self.bodies[0].pos, self.bodies[0].quat / np.linalg.norm(self.bodies[0].quat), q]
         )
 
     def centre_of_mass(self) -> np.ndarray:
-        """[3] m in the latest pose."""
+        """Centre of mass [3] m in the latest pose."""
         mujoco.mj_comPos(self.model, self.data)
         return self.data.subtree_com[1].copy()
 
     def sole_points(self, xpos: np.ndarray, xrot: np.ndarray) -> list[np.ndarray]:
-        """For each foot [n, 3] m; of a foot without shapes the place of its farthest part."""
+        """Sole points [n, 3] m of each foot; without shapes, the place of its farthest part."""
         soles = [tip_points(tips, xpos, xrot) for tips in self.tips]
         return [
             sole if len(sole) else xpos[group[-1:]]
@@ -85,16 +82,14 @@ class Puppet:
         ]
 
     def shank_height(self, xpos: np.ndarray, xrot: np.ndarray) -> float:
-        """m, the lowest point of all that belongs to the last parts of legs but not to their
-        ends.
-        """
+        """Lowest point in m of the last parts of the legs, without their ends."""
         return min(
             float(tip_points(tips, xpos, xrot, far=False)[:, 2].min(initial=np.inf))
             for tips in self.tips
         )
 
     def jacobian(self, foot: int, at: np.ndarray) -> np.ndarray:
-        """[J, 3] m/rad that a point [3] m of a foot moves per joint, in the latest pose."""
+        """Motion [J, 3] m/rad of a point [3] m of a foot per joint, in the latest pose."""
         moves = np.zeros((len(self.joints), 3))
         for j in self.leg(foot):
             moves[j] = np.cross(self.data.xaxis[j + 1], at - self.data.xanchor[j + 1])
@@ -103,8 +98,9 @@ class Puppet:
     def mirror(
         self, forward: np.ndarray, q: np.ndarray, slack: float = 1.0
     ) -> tuple[np.ndarray, np.ndarray] | None:
-        """Partner and sign [J] under reflection in the vertical plane along forward [3], or None
-        for an unsymmetric body. slack: see `images`.
+        """Partner and sign [J] under reflection in the vertical plane along `forward` [3].
+
+        None for an unsymmetric body. slack: see `images`.
         """
         partner, sign = self.images(forward, q, slack)
         return None if (partner < 0).any() else (partner, sign)
@@ -112,9 +108,9 @@ class Puppet:
     def images(
         self, forward: np.ndarray, q: np.ndarray, slack: float
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Partner [J] under that reflection, -1 for a joint that has none, and sign [J].
+        """Partner [J] under that reflection, -1 for a joint without one, and sign [J].
 
-        slack: how far images may be off, in units of what a creature's folder allows.
+        slack: tolerance of images, in units of the one for a creature's folder.
         """
         self.pose(q)
         mujoco.mj_comPos(self.model, self.data)
@@ -130,6 +126,6 @@ class Puppet:
         return geometry.mirror_images(anchors, axes, slides, carried, slack * near, slack)
 
     def turn(self, matrix: np.ndarray) -> None:
-        """Turns the trunk, and everything on it, about the world's origin. matrix: [3, 3]."""
+        """Turn the trunk and everything on it about the world's origin. matrix: [3, 3]."""
         root = self.bodies[0]
         root.pos, root.quat = matrix @ root.pos, quaternion(matrix @ rotation(root.quat))

@@ -1,4 +1,4 @@
-"""`import_model`: from a model file to the texts of a creature folder, step by step."""
+"""`import_model`: conversion of a model file to the texts of a creature folder."""
 
 import dataclasses
 import math
@@ -49,15 +49,15 @@ from mjxgait.importer.write_toml import creature_toml
 from mjxgait.importer.write_xml import creature_xml
 
 XML, TOML, README = WRITTEN = ("creature.xml", "creature.toml", "README.md")
-"""The files of a creature folder that an import makes."""
+"""Files of a creature folder that an import makes."""
 
 
 @dataclasses.dataclass(frozen=True)
 class ImportChoices:
-    """What the user says about a model.
+    """Import options set by the user.
 
-    keep, freeze: patterns of joint names. height: m, of a skeleton at rest. apart: whether to
-    compile in a process of its own, which may take so many seconds and gigabytes.
+    keep, freeze: patterns of joint names. height: m, of a skeleton at rest. apart: compile in a
+    separate process, limited to `seconds` of processor time and `gigabytes` of memory.
     """
 
     name: str | None = None
@@ -74,9 +74,10 @@ class ImportChoices:
 
 @dataclasses.dataclass(frozen=True)
 class Imported:
-    """files: name and text of each file of the creature folder.
+    """Imported creature.
 
-    stands: whether it stood for two seconds.
+    files: name and text of each file of the creature folder. stands: whether it stood for two
+    seconds.
     """
 
     name: str
@@ -86,11 +87,11 @@ class Imported:
 
 
 def import_model(path: Path, choices: ImportChoices | None = None) -> Imported:
-    """A creature from somebody's MJCF or URDF file, or from a skeleton (BVH, skinned GLB).
+    """Import a creature from an MJCF or URDF file, or from a skeleton (BVH, skinned GLB).
 
     Raises:
-      UserError: it cannot be read, or is nothing that could walk; names the element and the way
-        out.
+      UserError: the file cannot be read, or the model cannot walk; names the element and the
+        remedy.
     """
     choices, notes = choices or ImportChoices(), Notes()
     try:
@@ -152,7 +153,7 @@ def _import(path: Path, choices: ImportChoices, notes: Notes) -> Imported:
 
 
 def _read(path: Path, choices: ImportChoices, notes: Notes) -> Source:
-    """The tree of a model file, or the one that a skeleton is given."""
+    """Read a model file, or build the tree of a skeleton."""
     kind = path.suffix.lower()
     if kind in ELSEWHERE:
         raise UserError(f'{path}: cannot read "{kind}"; {ELSEWHERE[kind]}')
@@ -167,7 +168,7 @@ def _read(path: Path, choices: ImportChoices, notes: Notes) -> Source:
 
 
 def read_source(path: Path, search: Sequence[Path], notes: Notes) -> Source:
-    """The cleaned tree of a file.
+    """Read and clean the tree of a file.
 
     Raises:
       UserError: it cannot be read, or is neither MJCF nor URDF.
@@ -194,7 +195,7 @@ def _folder(
     planar: bool,
     rest: np.ndarray | None,
 ) -> Imported:
-    """rest: [nq] the pose in which a skeleton rests, None of other models."""
+    """Write the texts of the folder. rest: [nq] rest pose of a skeleton, None for other models."""
     puppet, notes = best.puppet, best.notes
     feet = [geom for foot in best.feet for geom in foot]
     trunk = puppet.bodies[0].name
@@ -244,10 +245,10 @@ def _folder(
 def _stated_pairs(
     puppet: Puppet, q: np.ndarray, mirror: tuple[np.ndarray, np.ndarray], planar: bool
 ) -> dict[str, tuple[str, int]]:
-    """Partner and sign by joint, of those that nobody could tell from the geometry alone.
+    """Partner and sign of each joint that the geometry alone does not determine.
 
-    Those are joints that are not quite each other's image, and all of a body in a plane, whose legs
-    are in one place.
+    These are joints with inexact mirror images, and all joints of a planar body, because its legs
+    coincide.
     """
     partner, sign = mirror
     found, turned = puppet.images(np.array([1.0, 0.0, 0.0]), q, slack=0.5)
@@ -260,7 +261,7 @@ def _stated_pairs(
 
 
 def _train(best: Candidate, symmetric: bool, stated_length: float | None) -> dict[str, Any]:
-    """The table `[train]`. stated_length: m, that of a body which is shorter than its legs."""
+    """Return the table `[train]`. stated_length: m, of a body shorter than its legs."""
     model, data = best.model, mujoco.MjData(best.model)
     data.qpos[:] = best.qpos
     mujoco.mj_kinematics(model, data)
@@ -274,10 +275,10 @@ def _train(best: Candidate, symmetric: bool, stated_length: float | None) -> dic
 
 
 def _stated_length(best: Candidate) -> float | None:
-    """m, of a body that is shorter than its legs, such as a biped's; None for all others.
+    """Body length in m of a body shorter than its legs, such as a biped; None for all others.
 
-    Speeds are wanted and judged in body lengths. A biped, measured from its back to its toes, would
-    be praised for shuffling.
+    Target and measured speeds are in body lengths. A biped measured from its back to its toes would
+    score well for shuffling.
     """
     model, data = best.model, mujoco.MjData(best.model)
     data.qpos[:] = best.qpos

@@ -1,4 +1,4 @@
-"""How strong the joints are and how far they swing, and which of them steer and balance.
+"""Joint gains, torque limits and ranges, and the joints that steer and balance.
 
 `J` active joints.
 """
@@ -14,25 +14,24 @@ from mjxgait.importer.soles import Stance
 
 GRAVITY = 9.81
 STIFFNESS, LEAST_STIFFNESS, MOST_STIFFNESS = 12.0, 2.5, 6.0
-"""kp in units of weight times hip height: the first shared among the feet, within the other two."""
+"""kp in units of weight times hip height: the first over the number of feet, within the others."""
 STRENGTH, LEAST_STRENGTH, MOST_STRENGTH = 2.0, 0.5, 1.0
-"""Torque limit, likewise."""
+"""Torque limit, in the same units."""
 DAMPING = 0.015
 """kd in units of kp, s. Stable PD needs 0.0075 at a step of 5 ms."""
 QUICKNESS = 5.0
-"""Least natural frequency of a joint, in units of a pendulum's of the hips' height: a slower
-joint cannot follow a stride.
+"""Least natural frequency of a joint, in units of that of a pendulum of the hip height.
+
+A slower joint cannot follow a stride.
 """
 SWING = 0.35
-"""rad, amplitude at which a joint's own inertia must be swung at that frequency within the
-torque limit.
-"""
+"""rad, amplitude at which the torque limit must swing a joint's own inertia at that frequency."""
 LEAST_DAMPING = 0.5
 """Damping ratio of a joint on its own."""
 LEAST_INERTIA = 2.0
-"""Of a joint, in units of time step times kd.
+"""Least inertia of a joint, in units of time step times kd.
 
-Stable PD does not know what the floor holds, and so gives way by I / (I + h kd).
+Stable PD ignores contact forces, and so gives way by I / (I + h kd).
 """
 RANGES = {
     "stride": 40.0,
@@ -44,31 +43,35 @@ RANGES = {
     "distal": 20.0,
     "other": 20.0,
 }
-"""deg to both sides of the standing angle, by what a joint does. Distal is what swings a foot below two
-joints that do, as hocks and pasterns: limbs flail that swing widely in all of them. Who has one leg hops with all
-of it."""
+"""deg to both sides of the standing angle, by role.
+
+`distal`: a third swing joint down the leg (hock, pastern). It gets a smaller range, or the limb
+flails. One-legged bodies use the full range.
+"""
 SWINGING = 2
 """Joints of a leg that swing it widely."""
 STEPPERS, APART = 2, 0.5
-"""Feet of a body that must step under its fall; with more, or so many hip heights one behind the
-other, it stands."""
+"""Most feet of a body that must step to catch a fall.
+
+A body with more feet, or with feet this many hip heights apart along x, stands.
+"""
 WEAKEST = 0.3
-"""m that a joint moves its foot per rad and hip height, to be one that takes the foot somewhere."""
+"""Least foot motion of a stepping joint, m per rad and hip height."""
 ENDLESS = 6.0
-"""rad, width of a range from which it is none."""
+"""rad, width from which a range counts as unlimited."""
 LEAST_BEND = 3.0
 """deg that a knee stays away from straight."""
 UPRIGHT = 0.7
-"""Cosine to the vertical from which a joint turns what hangs on it."""
+"""Cosine to the vertical from which a joint turns the parts below it."""
 ROLES = ("stride", "side", "lift")
 
 
 @dataclasses.dataclass(eq=False)
 class Drive:
-    """role: of each joint.
+    """Joint roles, gains, torque limits and ranges, and the weights of steering and balance.
 
-    kp, kd, torque: [J]. ranges: [J, 2] deg. The dicts map joint names to weights
-    (docs/controller.md).
+    role: of each joint. kp, kd, torque: [J]. ranges: [J, 2] deg. The dicts map joint names to
+    weights (docs/controller.md).
     """
 
     role: list[str]
@@ -86,7 +89,7 @@ class Drive:
 
 
 def plan_drive(puppet: Puppet, q: np.ndarray, stance: Stance, planar: bool, notes: Notes) -> Drive:
-    """The drive of a body that faces +x in its standing pose [J]."""
+    """Plan the drive of a body that faces +x in its standing pose [J]."""
     feet = len(puppet.feet)
     roles, moves = _roles(puppet, q, stance)
     weight, inertia = puppet.mass * GRAVITY * stance.hip, _own_inertia(puppet)
@@ -99,8 +102,8 @@ def plan_drive(puppet: Puppet, q: np.ndarray, stance: Stance, planar: bool, note
         weight * float(np.clip(STRENGTH / feet, LEAST_STRENGTH, MOST_STRENGTH)), SWING * quick
     )
     stated = np.array([joint.effort for joint in puppet.joints])
-    # The file's number is taken where it is one that a walk could need; 0 and 1000 N·m often only
-    # mean "not known".
+    # The file's torque is used where it is plausible for a walk: 0 and 1000 N·m often mean
+    # "unknown".
     torque = np.where(np.isfinite(stated) & (stated > 0.15 * own), np.minimum(stated, 3 * own), own)
     drive = Drive(roles, kp, kd, torque, _ranges(puppet, q, roles))
     _bend_one_way(puppet, q, drive, notes)
@@ -123,8 +126,9 @@ def plan_drive(puppet: Puppet, q: np.ndarray, stance: Stance, planar: bool, note
 
 
 def _own_inertia(puppet: Puppet) -> np.ndarray:
-    """[J] kg m², what each joint moves when the body floats free in the latest pose; with the
-    armature.
+    """Inertia [J] kg m² that each joint moves when the body floats free in the latest pose.
+
+    It includes the armature.
     """
     mujoco.mj_forward(puppet.model, puppet.data)
     mass = np.zeros((puppet.model.nv, puppet.model.nv))
@@ -133,8 +137,9 @@ def _own_inertia(puppet: Puppet) -> np.ndarray:
 
 
 def _add_armature(puppet: Puppet, drive: Drive, own: np.ndarray, notes: Notes) -> None:
-    """Gives light joints, of inertia `own` [J], the rotor of a motor of such strength, so that
-    stable PD can hold the weight with them.
+    """Raise the armature of light joints so that stable PD can hold the weight with them.
+
+    own: [J] inertia. The added armature is like the rotor of a motor of that strength.
     """
     least = LEAST_INERTIA * puppet.model.opt.timestep * drive.kd
     raised = []
@@ -150,7 +155,7 @@ def _add_armature(puppet: Puppet, drive: Drive, own: np.ndarray, notes: Notes) -
 
 
 def _roles(puppet: Puppet, q: np.ndarray, stance: Stance) -> tuple[list[str], np.ndarray]:
-    """What each joint does, and the mean way [J, 3] m/rad that it moves its feet."""
+    """Role of each joint, and the mean motion [J, 3] m/rad that it gives its feet."""
     soles = puppet.sole_points(*puppet.pose(q))
     middles = [sole[sole[:, 2] < sole[:, 2].min() + 0.03 * stance.hip].mean(0) for sole in soles]
     moves = np.array([puppet.jacobian(f, middle) for f, middle in enumerate(middles)])
@@ -179,7 +184,7 @@ def _roles(puppet: Puppet, q: np.ndarray, stance: Stance) -> tuple[list[str], np
 
 
 def _ranges(puppet: Puppet, q: np.ndarray, roles: list[str]) -> np.ndarray:
-    """[J, 2] deg about the standing angle, within the limits."""
+    """Ranges [J, 2] deg about the standing angle, within the limits."""
     half = np.array([RANGES[role] for role in roles])
     low = np.maximum(-half, np.degrees(np.where(np.isfinite(puppet.low), puppet.low, -1e3) - q))
     high = np.minimum(half, np.degrees(np.where(np.isfinite(puppet.high), puppet.high, 1e3) - q))
@@ -187,7 +192,7 @@ def _ranges(puppet: Puppet, q: np.ndarray, roles: list[str]) -> np.ndarray:
 
 
 def _bend_one_way(puppet: Puppet, q: np.ndarray, drive: Drive, notes: Notes) -> None:
-    """Keeps a knee whose file states no limits on the side to which it is bent in the stance."""
+    """Keep a knee without stated limits on the side to which it is bent in the stance."""
     sided = []
     soles = puppet.sole_points(*puppet.pose(q))
     for f, sole in enumerate(soles):
@@ -220,7 +225,7 @@ def _bend_one_way(puppet: Puppet, q: np.ndarray, drive: Drive, notes: Notes) -> 
 
 
 def _steering(puppet: Puppet, stance: Stance, drive: Drive, moves: np.ndarray) -> None:
-    """Left legs stride longer than right ones; a yaw joint between fore and hind legs bends."""
+    """Set the steering weights: left legs stride longer, and a spine joint bends about z."""
     for f in range(len(puppet.feet)):
         side = float(puppet.data.xpos[puppet.feet[f][0] + 1][1])
         own = [j for j in puppet.leg(f) if drive.role[j] == "stride"]
@@ -233,7 +238,7 @@ def _steering(puppet: Puppet, stance: Stance, drive: Drive, moves: np.ndarray) -
     ]
     behind = [j for j in spine if puppet.data.xanchor[j + 1][0] < puppet.data.xpos[1][0]]
     if behind:
-        # The hind part swings to the left with positive yaw about -z, which curves the body to the
+        # Positive yaw about -z swings the hind part to the left, which curves the body to the
         # right.
         drive.bend[puppet.names[behind[0]]] = 0.5 * float(
             np.sign(puppet.data.xaxis[behind[0] + 1][2])
@@ -241,7 +246,7 @@ def _steering(puppet: Puppet, stance: Stance, drive: Drive, moves: np.ndarray) -
 
 
 def _must_step(puppet: Puppet, stance: Stance) -> bool:
-    """Whether it stands on one foot in each step: two, and not one behind the other."""
+    """Return whether the body stands on one foot in each step: at most two feet, side by side."""
     ahead = [puppet.data.xpos[group[0] + 1][0] for group in puppet.feet]
     return len(puppet.feet) <= STEPPERS and bool(np.ptp(ahead) < APART * stance.hip)
 
@@ -249,8 +254,10 @@ def _must_step(puppet: Puppet, stance: Stance) -> bool:
 def _stepping(
     puppet: Puppet, stance: Stance, drive: Drive, moves: np.ndarray, planar: bool
 ) -> None:
-    """The highest joints that swing a foot forward, and to the side, take it under the fall; the
-    highest upright one turns it.
+    """Set the stepping weights.
+
+    The highest joints of a leg that swing the foot forward and sideways place it under the fall.
+    The highest upright joint turns it.
     """
     for f in range(len(puppet.feet)):
         for role, axis, table in (("stride", 0, drive.ahead), ("side", 1, drive.aside)):
@@ -267,8 +274,10 @@ def _stepping(
 
 
 def _balance(puppet: Puppet, stance: Stance, drive: Drive, moves: np.ndarray, planar: bool) -> None:
-    """Nose down: front feet push down, hind feet give way, toes press; right side down: the feet
-    go right, under the fall.
+    """Set the balance weights.
+
+    Nose down: front feet push down, hind feet give way, toes press. Right side down: the feet move
+    right, under the fall.
     """
     middle = np.mean([puppet.data.xpos[g[0] + 1][0] for g in puppet.feet])
     for f, group in enumerate(puppet.feet):

@@ -1,4 +1,4 @@
-"""Finds what a compiled model consists of, and refuses what cannot be a creature."""
+"""Anatomy of a compiled model; models that cannot be a creature are refused."""
 
 import fnmatch
 from collections.abc import Sequence
@@ -26,7 +26,7 @@ from mjxgait.importer.root import (
 
 MOST_BODIES, MOST_JOINTS = 400, 60
 ENOUGH = 6
-"""Joints that a leg keeps where all legs together have more than can move."""
+"""Joints kept per leg if all legs together have more than may move."""
 
 
 def find_anatomy(
@@ -37,14 +37,14 @@ def find_anatomy(
     up: str | None,
     notes: Notes,
 ) -> Anatomy:
-    """The anatomy of a compiled model.
+    """Find the anatomy of a compiled model.
 
     Args:
       coupled: names of joints that follow others. keep, freeze: patterns of joints that the user
         wants active or frozen.
 
     Raises:
-      UserError: no creature that can walk, and why.
+      UserError: the model is no creature that can walk; says why.
     """
     _check_size(model)
     root = find_root(model)
@@ -69,9 +69,7 @@ def find_anatomy(
 
 
 def _reference_pose(model: mujoco.MjModel) -> np.ndarray:
-    """[nq]: the file's zero pose, with each joint that may not be there in the middle of its
-    range.
-    """
+    """The file's zero pose [nq]; a joint outside its range there is set to the middle."""
     qpos = model.qpos0.copy()
     for j in range(model.njnt):
         a, (low, high) = int(model.jnt_qposadr[j]), model.jnt_range[j]
@@ -106,7 +104,7 @@ def _check_size(model: mujoco.MjModel) -> None:
 def _choose_joints(
     model: mujoco.MjModel, anatomy: Anatomy, movable: list[int], keep: Sequence[str], notes: Notes
 ) -> None:
-    """Active are the joints between the trunk and a foot, and those that the user keeps."""
+    """Activate the joints between the trunk and a foot, and those that the user keeps."""
     on_legs = {b for foot in anatomy.feet for b in ancestors(model, foot)}
     frozen = []
     for j in movable:
@@ -132,9 +130,7 @@ def _choose_joints(
 def _freeze_least(
     model: mujoco.MjModel, anatomy: Anatomy, keep: Sequence[str], notes: Notes
 ) -> None:
-    """Leaves each leg the joints that swing its end farthest, such as an insect's without those
-    of its toes.
-    """
+    """Keep in each leg the joints that swing its end farthest; an insect's toes freeze."""
     data = mujoco.MjData(model)
     data.qpos[:] = anatomy.qpos
     mujoco.mj_kinematics(model, data)
@@ -165,7 +161,7 @@ def _freeze_least(
 
 
 def _check_loops(model: mujoco.MjModel, anatomy: Anatomy) -> None:
-    """Refuses a loop that a moving joint is part of."""
+    """Refuse a loop that contains a moving joint."""
     moved = {
         b
         for b in anatomy.bodies

@@ -1,7 +1,7 @@
-"""Where a skeleton at rest can bend: a guess by where its bones lie.
+"""Hinges of a skeleton at rest, guessed from the places of its bones.
 
 A limb swings and spreads where it begins, and bends in one direction below; a spine bends in one
-place. Axes are those of the file; angles are deg from rest.
+place. Axes are the file's; angles are deg from rest.
 """
 
 import dataclasses
@@ -15,14 +15,14 @@ from mjxgait.importer.plan import SHORT, Plan, toes
 BENT = np.radians(8.0)
 SWING, SPREAD, SPINE, ANKLE, LOOSE = 60.0, 30.0, 25.0, 45.0, 45.0
 FOLD, STRETCH = 75.0, 3.0
-"""deg that a knee bends further from where it rests; that it stays from being straight."""
+"""deg that a knee folds from its rest pose; deg that it stays away from straight."""
 KNEE = (5.0, 110.0)
-"""deg that a knee which rests straight bends the wrong way, and the right one."""
+"""deg that a knee which rests straight bends the wrong way, and the right way."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Hinge:
-    """name: pitch, roll or yaw. axis: [3]. low, high: deg."""
+    """Hinge of a bone. name: pitch, roll or yaw. axis: [3]. low, high: deg."""
 
     name: str
     axis: np.ndarray
@@ -33,7 +33,7 @@ class Hinge:
 
 
 def hinges_of(plan: Plan) -> list[list[Hinge]]:
-    """Of each bone, the root's none."""
+    """Hinges of each bone; none for the root."""
     found: list[list[Hinge]] = [[] for _ in plan.rig.names]
     for bone in range(1, len(found)):
         if plan.is_limb(bone):
@@ -58,7 +58,7 @@ def _spine_below(plan: Plan, bone: int) -> list[int]:
 
 
 def _limb(plan: Plan, first: int, found: list[list[Hinge]]) -> None:
-    """Fills in the hinges of a limb, its side branches and toes rigid."""
+    """Fill in the hinges of a limb, its side branches and toes rigid."""
     chain = plan.limb(first)
     ends = (i for i, bone in enumerate(chain) if bone in plan.feet or plan.has_toes(bone))
     below = next(ends, len(chain))
@@ -78,7 +78,7 @@ def _limb(plan: Plan, first: int, found: list[list[Hinge]]) -> None:
 
 
 def _hip(plan: Plan, along: int) -> list[Hinge]:
-    """Two hinges about the axes along which the limb does not lie; the wider one is the stride."""
+    """Hinges about the two axes across the limb; the wider one is the stride."""
     swings = plan.up if along == plan.side else plan.side
     other = next(axis for axis in (plan.ahead, plan.up, plan.side) if axis not in (along, swings))
     reason = "a limb swings and spreads where it begins"
@@ -91,9 +91,7 @@ def _hip(plan: Plan, along: int) -> list[Hinge]:
 def _knee(
     plan: Plan, one: np.ndarray, other: np.ndarray, last: bool, vertical: bool, forward: float
 ) -> Hinge:
-    """The hinge between two bones of a limb that lie along two ways [3]: about the axis across the
-    plane in which they lie.
-    """
+    """Hinge between two bones of a limb with directions [3], across the plane that they span."""
     across = np.cross(one, other)
     size = float(np.linalg.norm(one) * np.linalg.norm(other))
     if float(np.linalg.norm(across)) > np.sin(BENT) * size:

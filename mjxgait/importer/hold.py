@@ -1,4 +1,4 @@
-"""Lets a creature stand in C MuJoCo with stable PD, and tells whether it does."""
+"""Stand test in C MuJoCo with stable PD."""
 
 import dataclasses
 from collections.abc import Callable
@@ -11,11 +11,11 @@ SECONDS = 2.0
 
 @dataclasses.dataclass(frozen=True)
 class Held:
-    """up: least product of the trunk's upright axis with the world's. height: least, in standing
-    heights. moved: m. sag: rad.
+    """Result of a stand test.
 
-    speed: rad/s, root mean square of the joints at the end. touched: a part that touched the floor
-    and may not, or "".
+    up: least product of the trunk's upright axis with the world's. height: least, in standing
+    heights. moved: m. sag: rad. speed: rad/s, root mean square of the joints at the end. touched: a
+    part that touched the floor and may not, or "".
     """
 
     up: float
@@ -27,12 +27,12 @@ class Held:
 
     @property
     def stands(self) -> bool:
-        """Whether it stayed up, on its feet, and came to rest."""
+        """True if the creature stayed up on its feet and came to rest."""
         return self.up > 0.85 and self.height > 0.75 and not self.touched and self.speed < 1.0
 
     @property
     def score(self) -> float:
-        """For the better of several that do not stand, or do: larger is better."""
+        """Score that ranks stand tests, standing or not: higher is better."""
         return (
             2 * self.stands
             + self.up
@@ -55,12 +55,13 @@ def hold(
     stand: np.ndarray | None = None,
     correct: Callable[[mujoco.MjData], np.ndarray] | None = None,
 ) -> Held:
-    """Stands for some seconds from qpos [nq]. kp, kd, limit: [J]. feet: names of geoms that may
-    touch.
+    """Simulate standing for some seconds from `qpos` [nq].
+
+    kp, kd, limit: [J]. feet: names of geoms that may touch.
 
     Args:
-      stand: [J] target angles, those of qpos where it is None. correct: the change [J] of the
-        target at a moment.
+      stand: [J] target angles, those of qpos if None. correct: the change [J] of the target at a
+        moment.
     """
     data = mujoco.MjData(model)
     data.qpos[:] = qpos
@@ -107,7 +108,7 @@ def hold(
 
 
 def _touching(model: mujoco.MjModel, data: mujoco.MjData, may_touch: np.ndarray) -> str:
-    """A part that touches something and may not, or "". may_touch: [G] of geoms."""
+    """Name of a part that touches something and may not, or "". may_touch: [G] of geoms."""
     touching = data.contact.geom.ravel()
     wrong = touching[~may_touch[touching]]
     return str(model.body(int(model.geom_bodyid[wrong[0]])).name) if len(wrong) else ""

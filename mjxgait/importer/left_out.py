@@ -1,4 +1,4 @@
-"""What an import leaves behind of a model file, told to the user."""
+"""Reports of the elements of a model file that an import drops."""
 
 import mujoco
 import numpy as np
@@ -10,7 +10,7 @@ from mjxgait.importer.parts import HINGE
 
 
 def tell_dropped(model: mujoco.MjModel, notes: Notes) -> None:
-    """Tells what of the file's machinery does not act on the creature."""
+    """Report the file's mechanisms that do not act on the creature."""
     for count, what, why in (
         (model.nu, "actuators", "joint torques are applied directly; their limits were read"),
         (model.ntendon, "tendons", "joint torques are applied directly"),
@@ -40,7 +40,7 @@ def tell_dropped(model: mujoco.MjModel, notes: Notes) -> None:
 
 
 def tell_left_out(model: mujoco.MjModel, anatomy: Anatomy, notes: Notes) -> None:
-    """Tells what else is in the file's world: other bodies, geoms that can be touched."""
+    """Report the other contents of the file's world: other bodies, geoms that can be touched."""
     own = {*anatomy.bodies, *geometry.ancestors(model, anatomy.root)}
     others = [b for b in range(1, model.nbody) if b not in own and model.body_parentid[b] == 0]
     touchable = (model.geom_contype | model.geom_conaffinity) != 0

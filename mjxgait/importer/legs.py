@@ -1,4 +1,4 @@
-"""Which joints of a compiled model could move, and which of its limbs are legs."""
+"""Joints of a compiled model that could move, and limbs that are legs."""
 
 import fnmatch
 import re
@@ -15,20 +15,19 @@ from mjxgait.importer.notes import Notes, listed
 from mjxgait.importer.parts import FREE, HINGE, SLIDE
 
 SAME_LEVEL = 0.2
-"""Share of the creature's height within which limbs that end near the lowest point are legs."""
+"""Share of the creature's height: limbs that end this close to the lowest point are legs."""
 
 NO_LEGS = re.compile(
     "(?<![a-z])(wing|haltere|antenna|mouth|jaw|mandible|proboscis|rostrum|haustellum|labrum|palp)"
 )
-"""In names of limbs that no animal walks on, however low they hang."""
+"""Name parts of limbs that no animal walks on, however low they hang."""
 
 DRAWS, STEPS, TINY = 300, (0.3, 0.1, 0.03, 0.01, 0.003, 0.001), 1e-5
-"""Random poses of a limb that is to hang down, rad by which each joint then goes on, and m by which it must
-hang lower for that."""
+"""Lowering of a limb: random poses tried; rad by which each joint then moves; m to gain by that."""
 
 
 class NoLegs(UserError):
-    """In this pose no limb reaches the floor."""
+    """No limb reaches the floor in this pose."""
 
 
 def movable_joints(
@@ -38,7 +37,7 @@ def movable_joints(
     freeze: Sequence[str],
     notes: Notes,
 ) -> list[int]:
-    """Joints that could be active."""
+    """Joints that could be active; frozen ones are reported."""
     joints, slides, told = [], [], []
     followers = _followers(model)
     for j in range(model.njnt):
@@ -75,7 +74,7 @@ def _followers(model: mujoco.MjModel) -> set[int]:
 
 
 def find_feet(model: mujoco.MjModel, anatomy: Anatomy, movable: list[int]) -> list[int]:
-    """The moving bodies at the ends of the limbs that reach the floor."""
+    """Return the last moving bodies of the limbs that reach the floor."""
     movers = {int(model.jnt_bodyid[j]) for j in movable}
     if not movers:
         raise UserError(
@@ -114,15 +113,13 @@ def find_feet(model: mujoco.MjModel, anatomy: Anatomy, movable: list[int]) -> li
 
 
 def _named_otherwise(model: mujoco.MjModel, end: int, movers: set[int]) -> bool:
-    """Whether a limb is called after something that is no leg."""
+    """Return whether a limb's name says that it is no leg."""
     names = [model.body(b).name.lower() for b in ancestors(model, end) if b in movers]
     return any(NO_LEGS.search(name) for name in names)
 
 
 def _segment(model: mujoco.MjModel, body: int, movers: set[int]) -> int:
-    """The nearest body up the tree, itself included, that has an active joint; the root where
-    there is none.
-    """
+    """Return the nearest body up the tree, itself included, with an active joint; else -1."""
     for b in ancestors(model, body):
         if b in movers:
             return b
@@ -134,7 +131,10 @@ def _below(model: mujoco.MjModel, anatomy: Anatomy, body: int) -> list[int]:
 
 
 def lowered_limbs(model: mujoco.MjModel, anatomy: Anatomy, movable: list[int]) -> np.ndarray:
-    """[nq]: each limb as low as it gets; for files whose zero pose has the legs folded or stretched out."""
+    """Pose [nq] with each limb as low as possible.
+
+    Used for files with folded or stretched legs in their zero pose.
+    """
     data, rng = mujoco.MjData(model), np.random.default_rng(0)
     data.qpos[:] = anatomy.qpos
     up = anatomy.xrot[anatomy.root] @ _world_rotation(model, anatomy.qpos, anatomy.root).T
@@ -168,7 +168,7 @@ def lowered_limbs(model: mujoco.MjModel, anatomy: Anatomy, movable: list[int]) -
 def _reach(
     model: mujoco.MjModel, joints: list[int], q: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """[2 x J] rad, between which joints are tried, from where they are."""
+    """Lower and upper bounds [J] in rad of the joint search around the current pose."""
     limits = np.array(
         [
             model.jnt_range[j] if model.jnt_range[j][0] < model.jnt_range[j][1] else (-1.6, 1.6)
@@ -182,7 +182,7 @@ def _reach(
 def _descended(
     height: Callable[[np.ndarray], float], q: np.ndarray, low: np.ndarray, high: np.ndarray
 ) -> np.ndarray:
-    """[J] from `q` downhill to where no joint alone leads lower, so that legs that are alike end alike."""
+    """Descend from `q` to a pose [J] that no single joint can lower: alike legs end alike."""
     lowest = height(q)
     for step in STEPS:
         moved = True
@@ -205,9 +205,7 @@ def _world_rotation(model: mujoco.MjModel, qpos: np.ndarray, body: int) -> np.nd
 def _without_toes(
     model: mujoco.MjModel, anatomy: Anatomy, ends: list[int], movers: set[int]
 ) -> list[int]:
-    """Several ends that branch off one moving body near each other are toes or fingers: that
-    body is the end.
-    """
+    """Replace ends that branch off one moving body near each other (toes, fingers) by that body."""
     span = max(float(np.ptp(anatomy.xpos[anatomy.bodies], axis=0).max()), 1e-6)
     result: list[int] = []
     for end in ends:
@@ -221,7 +219,7 @@ def _without_toes(
 
 
 def _is_wheel(model: mujoco.MjModel, anatomy: Anatomy, body: int) -> bool:
-    """A round part on an unlimited hinge through its middle."""
+    """Return whether the body is a round part on an unlimited hinge through its middle."""
     start = int(model.body_jntadr[body])
     if model.body_jntnum[body] != 1 or model.jnt_limited[start]:
         return False

@@ -1,4 +1,4 @@
-"""How a body of its class is to be evolved: settings that differ from those of a dog."""
+"""Training defaults of imported bodies, by class: settings that differ from a dog's."""
 
 from typing import Any
 
@@ -9,35 +9,45 @@ from mjxgait.tasks.walk.config import WalkConfig
 from mjxgait.tasks.walk.gaits import stride_limit
 
 STARTS, ALIVE = 6, 6.0
-"""Episodes by which a body is judged that steps under its fall, and what it counts to stay up to the end."""
+"""Evaluated trials, and weight of staying up to the end, of bodies that must step to catch a fall.
+"""
 LATE, HASTY = 1, 8.0
-"""Control steps by which torques may come late, which is what fells such a body first in its
-examination; and what it costs to be hasty, twice the usual."""
+"""Largest torque delay in control steps, which is what first fells such a body in its examination.
+Weight of a hasty stride frequency, twice the default.
+"""
 BRISK = 1.2
-"""Body lengths per second that such a body should walk: slower it has to stand on one foot."""
+"""Target speed of such a body in body lengths per second: slower, it has to stand on one foot."""
 STRIDE = 0.7
-"""Hip heights that its strides should be at that speed."""
+"""Target stride length at that speed, in hip heights."""
 LEAST = 0.5
-"""Those that the certificate asks for: a cycle that leads through shorter ones is a buzz."""
+"""Least stride length of the certificate in hip heights: a cycle of shorter strides is a buzz."""
 
 LEAPING, RISES = 1.6, 8
-"""Body lengths per second that who has one leg should hop, in the rhythm of who has two, and in how many steps
-disturbances grow as it learns to bear them: at two legs' speed its hops are short, and with all at once it falls."""
+"""Target hopping speed in body lengths per second of one-legged bodies, and hardening steps.
+
+The rhythm is that of two-legged bodies. The disturbances grow in these steps as the body learns to
+bear them. At the two-legged speed the hops are short, and with full disturbances at once it falls.
+"""
 
 WHIPPED = 4.0
-"""What it costs to swing a foot too fast, in body lengths per √(g·h): of robots that fail by one
-criterion alone most do by the speed of their fastest part, which is a foot."""
+"""Weight of swinging a foot too fast, in body lengths per √(g·h).
+
+Most robots that fail a single criterion fail by the speed of their fastest part, a foot.
+"""
 MANY = 6
-"""Hinges for each leg; of whom has more few random poses stand, and to fall ahead is worth more than to stay."""
+"""Hinges per leg above which few random poses stand.
+
+For such robots falling forward would otherwise score better than standing.
+"""
 GENERATIONS = 150
-"""Most of them, twice as many as usual."""
+"""Largest number of generations, twice the default."""
 SMALLER = 0.03
-"""Step of a mutation, as a share of a joint's range: half of that on four feet."""
+"""Mutation step as a share of a joint's range, half of that on four feet."""
 ENOUGH = 0.1
-"""Margin with which a run may end in its first half; hasty as they all are, few ever get to 0.2."""
+"""Margin with which a run may end in its first half: these bodies are hasty, so few reach 0.2."""
 
 Told = tuple[str, Confidence, str]
-"""What was chosen, how sure it is, and why."""
+"""The choice, its confidence and its reason."""
 
 
 def manner(
@@ -52,11 +62,12 @@ def manner(
     rotor: float,
     notes: Notes,
 ) -> dict[str, Any]:
-    """The table `[train]` of an imported creature, each reason told.
+    """Return the table `[train]` of an imported creature, and report its reason.
 
     Args:
-      steps: whether it must step under its fall. legs, hinges: how many. hip: m, its height. length: m, of the body.
-      mass: kg. time_step: s. rotor: kg m², the inertia of its usual motor.
+      steps: whether it must step to catch a fall. legs, hinges: their numbers. hip: m, height.
+        length: m, of the body. mass: kg. time_step: s. rotor: kg m², the inertia of its typical
+        motor.
     """
     bounces = rotor > mass * hip**2
     if steps:
@@ -73,8 +84,11 @@ def manner(
 
 
 def four_feet(bounces: bool) -> tuple[dict[str, Any], Told]:
-    """What is different for who stands on its feet; see `manner`. bounces: then what is near the
-    floor need not bear weight, which others learn more slowly by.
+    """Settings of a body that stands on its feet; see `manner`.
+
+    bounces: whether its motors are heavier to turn than all of it. A foot counts as down if it
+    bears weight, because a foot near the floor need not. Other bodies learn more slowly with that
+    rule.
     """
     fitness: dict[str, Any] = {"weights": {"foot_speed": WHIPPED}}
     what = "other starts in each generation; small mutations; feet that swing too fast cost"
@@ -89,7 +103,7 @@ def four_feet(bounces: bool) -> tuple[dict[str, Any], Told]:
 def many_hinges(
     bounces: bool, hip: float, length: float, time_step: float
 ) -> tuple[dict[str, Any], Told]:
-    """What is different for who stands on its feet, but in few poses of many; see `manner`."""
+    """Settings of a body that stands on its feet, but in few poses of many; see `manner`."""
     settings, (what, _, _) = four_feet(bounces)
     settings["fitness"]["weights"] |= {"alive": ALIVE, "frequency": HASTY}
     settings["controller"] = {
@@ -104,7 +118,7 @@ def many_hinges(
 def few_feet(
     legs: int, hip: float, length: float, mass: float, time_step: float
 ) -> tuple[dict[str, Any], Told]:
-    """What is different for who steps under its fall; see `manner`."""
+    """Settings of a body that must step to catch a fall; see `manner`."""
     hertz = BRISK * length / (STRIDE * hip)
     calm = min(WalkConfig().frequency, hertz / stride_limit(mass))
     weights = {"alive": ALIVE, "frequency": HASTY}
@@ -116,7 +130,7 @@ def few_feet(
         speed = f"{LEAPING:g} body lengths/s, in the air for free; disturbances that grow"
     settings = {
         "controller": {"interpolation": _unhurried(BRISK, hip, length, time_step)},
-        # Undisturbed it tells little about who bears something: all are tried in all starts.
+        # An undisturbed trial says little about robustness: evaluate all in all trials.
         "rollout": {"variety": GENERATIONS, "starts": STARTS, "promote": 1.0, "latency": LATE},
         "evolution": {"generations": GENERATIONS, "sigma": SMALLER},
         "fitness": fitness,
@@ -130,7 +144,5 @@ def few_feet(
 
 
 def _unhurried(speed: float, hip: float, length: float, time_step: float) -> int:
-    """Steps between poses with which no cycle leads through strides that are too short at this
-    speed, in body lengths per second.
-    """
+    """Steps between poses that avoid too short strides at this speed in body lengths/s."""
     return unhurried(LEAST * hip / (speed * length), time_step)

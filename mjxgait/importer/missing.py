@@ -1,4 +1,4 @@
-"""Meshes that cannot be had: their shapes are left out, but never a mass that only they tell."""
+"""Missing meshes: their shapes are dropped, but never a mass that only they state."""
 
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping
@@ -8,24 +8,24 @@ import mujoco
 from mjxgait.errors import UserError
 
 SMALL = "0 0 0 1e-3 0 0 0 1e-3 0 0 0 1e-3"
-"""m; corners of what stands in for a mesh until its shapes are taken out."""
+"""m; corners of the stand-in for a mesh until its shapes are removed."""
 
 
 def put_stand_in(mesh: ET.Element) -> None:
-    """Makes an MJCF mesh a small one without a file, so that the model can be read."""
+    """Replace an MJCF mesh by a small one without a file, so that the model can be read."""
     name = mesh.get("name", "")
     mesh.attrib.clear()
     mesh.attrib.update(name=name, vertex=SMALL)
 
 
 def leave_out(spec: mujoco.MjSpec, missing: Mapping[str, str]) -> None:
-    """Takes meshes and their shapes out of a model that has been read.
+    """Remove meshes and their shapes from a model that has been read.
 
     Args:
-      missing: by the mesh's name the file that it should have come from.
+      missing: mesh names, each with the file that it should have come from.
 
     Raises:
-      UserError: a shape's mass counts; names the mass, as far as the file tells it.
+      UserError: a shape's mass counts; names the mass, as far as the file states it.
     """
     for geom in list(spec.geoms):
         if geom.meshname in missing:
@@ -38,7 +38,7 @@ def leave_out(spec: mujoco.MjSpec, missing: Mapping[str, str]) -> None:
 
 
 def _counts(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> bool:
-    """Whether a body weighs less without this shape."""
+    """Return whether a body weighs less without this shape."""
     always = spec.compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
     low, high = spec.compiler.inertiagrouprange
     weighs = geom.mass > 0 if geom.mass == geom.mass else geom.density > 0
@@ -48,7 +48,7 @@ def _counts(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> bool:
 
 
 def lost(shape: str, body: str, file: str, mass: float = float("nan")) -> UserError:
-    """Of a mass that would be lost. mass: kg; NaN where only the mesh tells it."""
+    """Return the error for a mass that would be lost. mass: kg; NaN if only the mesh states it."""
     of = f'"{shape}" of body "{body}"' if shape else f'a shape of body "{body}"'
     weight = f"{mass:.3g} kg" if mass == mass else "a mass that only its mesh tells"
     return UserError(

@@ -1,6 +1,4 @@
-"""Cleans an MJCF tree: includes put in place, everything that is no body, joint, geom or mesh
-taken out.
-"""
+"""MJCF cleaning: includes put in place, meshes loaded, unneeded elements removed."""
 
 import xml.etree.ElementTree as ET
 from pathlib import Path
@@ -44,7 +42,7 @@ MOST_COPIES = 64
 
 
 def clean_mjcf(source: Source, path: Path, places: Places, notes: Notes) -> None:
-    """Cleans `source.tree` in place.
+    """Clean `source.tree` in place.
 
     Raises:
       UserError: an include that cannot be read.
@@ -84,7 +82,7 @@ def clean_mjcf(source: Source, path: Path, places: Places, notes: Notes) -> None
 
 
 def _include(tree: ET.Element, path: Path, places: Places, count: list[int]) -> None:
-    """Puts the content of included files in place, as MuJoCo does.
+    """Put the content of included files in place, as MuJoCo does.
 
     count: files and elements so far.
     """
@@ -111,7 +109,7 @@ def _include(tree: ET.Element, path: Path, places: Places, count: list[int]) -> 
 
 
 def _compiler(tree: ET.Element) -> list[str]:
-    """Takes folders and file handling out of <compiler>; returns where meshes lie."""
+    """Remove folders and file handling from <compiler>; return the mesh folders."""
     folders = [""]
     for compiler in tree.findall("compiler"):
         for key in COMPILER_FOLDERS:
@@ -124,7 +122,7 @@ def _compiler(tree: ET.Element) -> list[str]:
 
 
 def _empty(tree: ET.Element, name: str) -> None:
-    """Takes out <custom>; in <default> only what belongs to dropped elements."""
+    """Remove <custom>; <default> stays."""
     for element in tree.findall(name):
         if name == "custom":
             tree.remove(element)
@@ -154,7 +152,7 @@ def _drop_inner(tree: ET.Element, notes: Notes) -> None:
 
 
 def _drop_unreadable(source: Source, places: Places, folders: list[str], notes: Notes) -> None:
-    """Loads meshes, small ones in place of what cannot be loaded; geoms of height fields go."""
+    """Load meshes, with small ones in place of unreadable ones; remove geoms of height fields."""
     for asset in source.tree.findall("asset"):
         for mesh in list(asset.findall("mesh")):
             reference = mesh.attrib.pop("file", None)

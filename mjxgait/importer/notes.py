@@ -1,4 +1,4 @@
-"""What an import tells the user: each change with its reason, each guess with its confidence."""
+"""Import report: each change with its reason, each guess with its confidence."""
 
 import dataclasses
 from typing import Literal
@@ -8,7 +8,7 @@ Confidence = Literal["high", "medium", "low"]
 
 @dataclasses.dataclass(frozen=True)
 class Change:
-    """Something that is different from the file, and why."""
+    """A difference from the file, and its reason."""
 
     what: str
     why: str
@@ -16,7 +16,7 @@ class Change:
 
 @dataclasses.dataclass(frozen=True)
 class Guess:
-    """Something that the file does not say. reason: what it was guessed from."""
+    """A value that the file does not state. reason: the evidence for the guess."""
 
     what: str
     value: str
@@ -25,25 +25,25 @@ class Guess:
 
 
 class Notes:
-    """Collects the changes and guesses of one import; the same change is told once."""
+    """Changes and guesses of one import; each change is reported once."""
 
     def __init__(self) -> None:
         self.changes: list[Change] = []
         self.guesses: list[Guess] = []
 
     def change(self, what: str, why: str) -> None:
-        """Tells of a change."""
+        """Report a change."""
         change = Change(what, why)
         if change not in self.changes:
             self.changes.append(change)
 
     def guess(self, what: str, value: str, confidence: Confidence, reason: str) -> None:
-        """Tells of a guess; a later guess of the same thing replaces the earlier."""
+        """Report a guess; a later guess of the same thing replaces the earlier."""
         self.guesses = [g for g in self.guesses if g.what != what]
         self.guesses.append(Guess(what, value, confidence, reason))
 
     def text(self) -> str:
-        """The report in plain lines."""
+        """Return the report in plain lines."""
         lines = (
             ["Changes:"] + [f"  - {c.what}: {c.why}" for c in self.changes] if self.changes else []
         )

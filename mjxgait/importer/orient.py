@@ -1,6 +1,4 @@
-"""Finds where the front is, whether the body lives in a plane, and which joints mirror each
-other.
-"""
+"""Forward direction, planarity and mirrored joints of a body."""
 
 import re
 
@@ -19,16 +17,19 @@ FRONT_CORNERS, BACK_CORNERS = (
 )
 """Whole words of a name, as between underscores."""
 CLEARLY, MOSTLY = 1.1, 2.0
-"""How much farther hinges swing the feet along one axis than along the other for it to be the way
-that the body walks, where both axes are alike; and where symmetry speaks for the other."""
+"""Ratio of the foot swings along the two axes from which the larger one is the walking axis.
+
+The first holds where symmetry does not separate the axes, the second where it speaks for the other
+axis.
+"""
 SHANK = 0.25
 """Share of a leg's length from which its last part is a shank, not a foot."""
 ROUGHLY = 5.0
-"""How much less exact than usual the two sides of a body may be each other's image."""
+"""Factor on the usual tolerance for nearly mirrored bodies."""
 MOST_ALONE = 0.25
 """Share of the joints that may have no mirror image in a body that still counts as symmetric."""
 WIDEST = 1.4
-"""rad, of a hinge's range; a leg swings no farther in a stride."""
+"""rad, largest hinge range that counts: a leg swings no farther in a stride."""
 FORWARDS = {
     "x": np.array([1.0, 0, 0]),
     "-x": np.array([-1.0, 0, 0]),
@@ -38,13 +39,13 @@ FORWARDS = {
 
 
 def yaw_to(forward: np.ndarray) -> np.ndarray:
-    """[3, 3] rotation about z that takes a horizontal forward [3] to +x."""
+    """Rotation [3, 3] about z that turns a horizontal forward [3] to +x."""
     x, y = forward[:2] / np.linalg.norm(forward[:2])
     return np.array([[x, y, 0.0], [-y, x, 0.0], [0.0, 0.0, 1.0]])
 
 
 def find_forward(puppet: Puppet, q: np.ndarray, told: str | None, notes: Notes) -> np.ndarray:
-    """[3] unit vector in the world of the pose."""
+    """Forward unit vector [3] in the world of the pose."""
     xpos, _ = puppet.pose(q)
     if told:
         notes.guess("forward", told, "high", "as told")
@@ -63,7 +64,7 @@ def find_forward(puppet: Puppet, q: np.ndarray, told: str | None, notes: Notes) 
 
 
 def _axis(puppet: Puppet, q: np.ndarray) -> tuple[str, Confidence, str]:
-    """Whether it walks along x or y, how sure that is, and why."""
+    """Walking axis (x or y), its confidence and the reason."""
     axes = puppet.data.xaxis[1:]
     if is_planar(puppet, q) is not None:
         lateral = int(np.abs(axes[0][:2]).argmax())
@@ -87,15 +88,16 @@ def _axis(puppet: Puppet, q: np.ndarray) -> tuple[str, Confidence, str]:
 
 
 def _two_sided(puppet: Puppet, forward: np.ndarray, q: np.ndarray) -> bool:
-    """Whether the sides are each other's image. A biped is its own image from the side, too, but
-    there each of its legs is its own.
+    """Return whether the left and right sides mirror each other.
+
+    A biped seen from the side also equals its mirror image, but there each leg is its own partner.
     """
     found = puppet.mirror(forward, q)
     return found is not None and bool((found[0] != np.arange(len(found[0]))).any())
 
 
 def swings(puppet: Puppet, q: np.ndarray) -> tuple[float, float]:
-    """m that the hinges of the legs can swing the feet along x and along y, summed over them."""
+    """Foot swing in m along x and along y, summed over the hinges of the legs."""
     soles = puppet.sole_points(*puppet.pose(q))
     width = np.minimum(puppet.high - puppet.low, WIDEST)[:, None]
     ways = [
@@ -107,7 +109,7 @@ def swings(puppet: Puppet, q: np.ndarray) -> tuple[float, float]:
 
 
 def _front(puppet: Puppet, xpos: np.ndarray, axis: np.ndarray) -> tuple[int, str]:
-    """Which end is the front, and what says so."""
+    """Sign of the front along the axis, and its evidence in words."""
     score = 0.0
     for body, at in zip(puppet.bodies, xpos, strict=True):
         score += _named_front(body.name) * float((at - xpos[0]) @ axis)
@@ -115,7 +117,7 @@ def _front(puppet: Puppet, xpos: np.ndarray, axis: np.ndarray) -> tuple[int, str
         return int(np.sign(score)), "the names of front and rear parts"
     if len(puppet.feet) > 2:
         return 1, ""
-    # Toes reach forward from the ankle; where a leg ends in a shank, it hangs back from the knee.
+    # Toes reach forward from the ankle; a leg's last part that is a shank hangs back from the knee.
     toes = shanks = 0.0
     poses = puppet.pose(puppet.data.qpos[7:])
     for f, sole in enumerate(puppet.sole_points(*poses)):
@@ -134,7 +136,7 @@ def _front(puppet: Puppet, xpos: np.ndarray, axis: np.ndarray) -> tuple[int, str
 
 
 def _named_front(name: str) -> int:
-    """1 for the name of a front part, -1 for that of a rear one, else 0."""
+    """Return 1 for the name of a front part, -1 for a rear one, else 0."""
     name = name.lower()
     words = set(re.split(r"[^a-z]+", name))
     front = any(w in name for w in FRONT_WORDS) or bool(words & FRONT_CORNERS)
@@ -143,8 +145,9 @@ def _named_front(name: str) -> int:
 
 
 def is_planar(puppet: Puppet, q: np.ndarray) -> np.ndarray | None:
-    """The lateral axis [3] of a body whose hinges are all parallel and whose feet are, or are
-    kept, in one plane; else None.
+    """Lateral axis [3] of a planar body; else None.
+
+    Its hinges are all parallel and its feet lie, or are kept, in one plane.
     """
     poses = puppet.pose(q)
     axes = puppet.data.xaxis[1:]
@@ -158,9 +161,7 @@ def is_planar(puppet: Puppet, q: np.ndarray) -> np.ndarray | None:
 
 
 def planar_pairs(puppet: Puppet, q: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-    """Partner and sign [J] of a planar body with two alike legs from one hip; None when it has
-    none.
-    """
+    """Partner and sign [J] of a planar body with two alike legs on one hip; else None."""
     if len(puppet.feet) != 2:
         return None
     puppet.pose(q)
@@ -188,7 +189,7 @@ def planar_pairs(puppet: Puppet, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 def find_mirror(
     puppet: Puppet, q: np.ndarray, planar: bool, notes: Notes
 ) -> tuple[np.ndarray, np.ndarray] | None:
-    """Partner and sign [J] of a body that faces +x, or None for one that is not symmetric."""
+    """Partner and sign [J] of a body that faces +x; None if it is not symmetric."""
     if planar:
         found = planar_pairs(puppet, q)
         notes.guess(
@@ -217,11 +218,10 @@ def find_mirror(
 def _nearly_mirrored(
     puppet: Puppet, q: np.ndarray
 ) -> tuple[tuple[np.ndarray, np.ndarray] | None, str]:
-    """Partner and sign [J] of a body whose sides are not each other's exact image, and how they
-    differ in words; None where too many joints have no image at all.
+    """Partner and sign [J] of a nearly symmetric body, and its differences in words.
 
-    Those pair up by their names; who has no partner then keeps its own angle in the mirrored half
-    of a cycle.
+    Joints without a mirror image pair up by name. A joint without a partner keeps its own angle in
+    the mirrored half of a cycle. None if too many joints have no image.
     """
     partner, sign = puppet.images(np.array([1.0, 0, 0]), q, ROUGHLY)
     lone = np.flatnonzero(partner < 0)
@@ -248,9 +248,9 @@ def _nearly_mirrored(
 
 
 def _mirrors(puppet: Puppet, q: np.ndarray, partner: np.ndarray, sign: np.ndarray) -> bool:
-    """Whether mirrored angles give the mirrored pose, tried on a random pose.
+    """Return whether mirrored angles give the mirrored pose, tried on a random pose.
 
-    What is beside the plane of symmetry and has no partner is not looked at.
+    Joints beside the plane of symmetry without a partner are ignored.
     """
     trial = q + np.random.default_rng(1).uniform(-0.3, 0.3, len(q))
     puppet.pose(trial)
@@ -271,5 +271,5 @@ def _names_disagree(names: list[str], partner: np.ndarray) -> bool:
 
 
 def _other_side(name: str) -> str:
-    """The name with left and right exchanged."""
+    """Return the name with left and right exchanged."""
     return name.replace("left", "\0").replace("right", "left").replace("\0", "right")

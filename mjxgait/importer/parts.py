@@ -1,5 +1,6 @@
-"""A creature on its way from the compiled model to its folder: bodies in a tree, with their
-joints and shapes. All in SI units.
+"""Bodies, joints and shapes of a creature between the compiled model and its folder.
+
+All in SI units.
 """
 
 import contextlib
@@ -15,17 +16,18 @@ FREE, BALL, SLIDE, HINGE = (
     int(getattr(mujoco.mjtJoint, f"mjJNT_{name}")) for name in ("FREE", "BALL", "SLIDE", "HINGE")
 )
 MOST_POINTS = 48
-"""Of the hull that stands for a mesh."""
+"""Most points of a mesh's hull."""
 RINGS = 16
 
 
 @dataclasses.dataclass(eq=False)
 class Joint:
-    """A hinge. pos, axis: [3] in the body's frame. low, high: rad, infinite where unlimited. ref:
-    rad, the angle of the body as placed.
+    """A hinge.
 
-    effort: N·m, nan where the file states none. id: in the compiled model; a hinge made of a ball
-    joint has the ball's. stopped: whether its limits act as they do in the file.
+    pos, axis: [3] in the body's frame. low, high: rad, infinite where unlimited. ref: rad, the
+    angle of the body as placed. effort: N·m, nan where the file states none. id: in the compiled
+    model; a hinge made of a ball joint has the ball's. stopped: whether its limits act as in the
+    file.
     """
 
     name: str
@@ -42,13 +44,12 @@ class Joint:
 
 @dataclasses.dataclass(eq=False)
 class Shape:
-    """A geom. kind: MuJoCo's geom type. size: [3] m. pos [3], quat [4]: in the body's frame. rgba:
-    [4].
+    """A geom.
 
+    kind: MuJoCo's geom type. size: [3] m. pos [3], quat [4]: in the body's frame. rgba: [4].
     points: [n, 3] m in the body's frame, and radius m: the shape is the hull of balls of this
-    radius about the points.
-    solid: whether it touches things in the file. seen: whether it is drawn. name: for the written
-    file.
+    radius about the points. solid: whether it touches things in the file. seen: whether it is
+    drawn. name: for the written file.
     """
 
     kind: int
@@ -65,10 +66,11 @@ class Shape:
 
 @dataclasses.dataclass(eq=False)
 class Body:
-    """pos [3], quat [4]: in the parent's frame, with all joints at `ref`. mass: kg. ipos, iquat,
-    inertia: of the principal frame, kg·m².
+    """A body.
 
-    id: in the compiled model. parent: place in the list, -1 for the root.
+    pos [3], quat [4]: in the parent's frame, with all joints at `ref`. mass: kg. ipos, iquat,
+    inertia: of the principal frame, kg·m². id: in the compiled model. parent: place in the list, -1
+    for the root.
     """
 
     name: str
@@ -85,21 +87,21 @@ class Body:
 
 
 def rotation(quat: np.ndarray) -> np.ndarray:
-    """[3, 3] of a quaternion [4] (w, x, y, z)."""
+    """Rotation [3, 3] of a quaternion [4] (w, x, y, z)."""
     result = np.zeros(9)
     mujoco.mju_quat2Mat(result, np.asarray(quat, float))
     return result.reshape(3, 3)
 
 
 def quaternion(matrix: np.ndarray) -> np.ndarray:
-    """[4] (w, x, y, z) of a rotation [3, 3]."""
+    """Quaternion [4] (w, x, y, z) of a rotation [3, 3]."""
     result = np.zeros(4)
     mujoco.mju_mat2Quat(result, np.ascontiguousarray(matrix, float).ravel())
     return result
 
 
 def read_shapes(model: mujoco.MjModel, body: int) -> list[Shape]:
-    """The geoms of a body, planes and height fields left out."""
+    """Read the geoms of a body, without planes and height fields."""
     shapes = []
     for g in range(model.ngeom):
         kind = int(model.geom_type[g])
@@ -160,12 +162,12 @@ def _points(model: mujoco.MjModel, geom: int) -> tuple[np.ndarray, float]:
 
 
 def hull_points(points: np.ndarray) -> np.ndarray:
-    """At most `MOST_POINTS` corners of the convex hull of points [n, 3]."""
+    """Return at most `MOST_POINTS` corners of the convex hull of points [n, 3]."""
     with contextlib.suppress(QhullError, ValueError):  # flat: all points stay
         points = points[ConvexHull(points).vertices]
     if len(points) <= MOST_POINTS:
         return points
-    # Spread out: each next one is farthest from those that are chosen.
+    # Spread out: each next point is the farthest from the chosen ones.
     chosen = [int(np.argmin(points[:, 2]))]
     distance = np.linalg.norm(points - points[chosen[0]], axis=1)
     for _ in range(MOST_POINTS - 1):
@@ -175,17 +177,17 @@ def hull_points(points: np.ndarray) -> np.ndarray:
 
 
 def one_line(text: str) -> str:
-    """Text that can stand in a comment and in any file.
+    """Return a text that can stand in a comment and in any file.
 
-    Control characters become spaces, and what a file's name holds that is no Unicode a question
-    mark.
+    Control characters become spaces; bytes of a file name that are not Unicode become question
+    marks.
     """
     told = text.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
     return re.sub(r"[\x00-\x1f\x7f-\x9f]", " ", told)
 
 
 def plain_names(names: list[str], fallback: list[str]) -> list[str]:
-    """Names that can stand in a shell pattern, each once."""
+    """Return unique names that can stand in a shell pattern."""
     used: set[str] = set()
     result = []
     for name, other in zip(names, fallback, strict=True):

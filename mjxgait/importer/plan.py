@@ -1,4 +1,4 @@
-"""What the bones of a skeleton at rest are, by where they lie: trunk, limbs, ears, toes, feet.
+"""Roles of a skeleton's bones at rest by their places: trunk, limbs, ears, toes, feet.
 
 Letters: `B` bones.
 """
@@ -14,45 +14,47 @@ MIDDLE = 0.02
 SHORT = 0.04
 """Share of the height below which a bone does not bend on its own."""
 TOE = 0.5
-"""Share of the longest toe that another one reaches, or it is a spur."""
+"""Share of the longest toe's length from which another one is a toe, not a spur."""
 LIMB, LOW = 0.4, 0.1
-"""Share that a limb reaches of the longest one, or it is an ear; of the height within which it ends at the
-floor."""
+"""Share of the longest reach from which a branch is a limb, not an ear; share of the height within
+which a limb ends at the floor.
+"""
 FOOT, ANKLE_HIGH, HEEL = 0.3, 0.1, 0.25
-"""Share of its length that a foot points forward; of the height below which an ankle lies; of a foot's
-length that its heel is behind the ankle."""
+"""Share of its length by which a foot points forward; share of the height below which an ankle
+lies; distance of the heel behind the ankle, over foot length.
+"""
 
 
 class Plan:
-    """A skeleton in metres and what its limbs are. up: number of the axis that points up."""
+    """Skeleton in metres and the roles of its limbs. up: number of the axis that points up."""
 
     def __init__(self, up: int, rig: Rig) -> None:
         self.up, self.rig = up, rig
         spots = np.concatenate([rig.places, *rig.ends])
         self.span = float(np.ptp(spots, axis=0).max())
         self.height = float(np.ptp(np.concatenate([spots, *rig.skins])[:, up])) or self.span
-        level = [axis for axis in range(3) if axis != up]  # the side is X, as usual, if both are
+        level = [axis for axis in range(3) if axis != up]  # X is the side if both fit equally
         self.side = min(level, key=self._unlike)
         self.ahead = next(axis for axis in level if axis != self.side)
 
     def _unlike(self, axis: int) -> float:
-        """m, how far the joints are from their images across an axis, at most."""
+        """Largest distance in m of a joint from the nearest mirror image across an axis."""
         places = self.rig.places - self.rig.places[0]
         images = places * np.where(np.arange(3) == axis, -1.0, 1.0)
         return float(np.linalg.norm(places[:, None] - images, axis=2).min(1).max())
 
     def in_middle(self, bone: int) -> bool:
-        """Whether a bone begins between left and right."""
+        """Return whether a bone begins between left and right."""
         apart = self.rig.places[bone, self.side] - self.rig.places[0, self.side]
         return abs(float(apart)) < MIDDLE * self.span
 
     def carries(self, bone: int) -> bool:
-        """Whether it is the root, or in the middle with limbs of both sides below it."""
+        """Return whether a bone is the root, or in the middle with limbs of both sides below."""
         return bone == 0 or (self.in_middle(bone) and len(self.sides_below[bone]) > 1)
 
     @cached_property
     def sides_below(self) -> list[set[float]]:
-        """Of each bone the sides of limbs that it or one below it begins."""
+        """Sides of the limbs that begin at each bone or below it."""
         found: list[set[float]] = [set() for _ in self.rig.names]
         for bone in self.limbs:
             apart = self.rig.places[bone, self.side] - self.rig.places[0, self.side]
@@ -63,38 +65,38 @@ class Plan:
 
     @cached_property
     def half_width(self) -> float:
-        """m, mean distance from the middle at which limbs begin."""
+        """Mean distance in m from the middle at which limbs begin."""
         rig = self.rig
         apart = np.abs(rig.places[self.limbs, self.side] - rig.places[0, self.side])
         return float(apart.mean()) if self.limbs else 0.0
 
     def leaves_middle(self, bone: int) -> bool:
-        """Whether a limb, or an ear, leaves the trunk there."""
+        """Return whether a limb or an ear leaves the trunk at this bone."""
         parent = self.rig.parents[bone]
         return not self.in_middle(bone) and (parent < 0 or self.in_middle(parent))
 
     def is_limb(self, bone: int) -> bool:
-        """Whether a limb begins there: what is short is an ear, an eye, a handle."""
+        """Return whether a limb begins at this bone; shorter branches are ears, eyes or handles."""
         return self.leaves_middle(bone) and self.reach(bone) > LIMB * self.longest
 
     @cached_property
     def limbs(self) -> list[int]:
-        """The first bone of each."""
+        """First bone of each limb."""
         return [bone for bone in range(len(self.rig.names)) if self.is_limb(bone)]
 
     @cached_property
     def longest(self) -> float:
-        """m, that what leaves the middle reaches at most."""
+        """Longest reach in m of a branch that leaves the middle."""
         firsts = filter(self.leaves_middle, range(len(self.rig.names)))
         return max(map(self.reach, firsts), default=0.0)
 
     def reach(self, first: int) -> float:
-        """m, from where a limb, or what is left of it, begins to its end."""
+        """Distance in m from the beginning of a bone to the end of its limb."""
         return float(np.linalg.norm(self.tips[first] - self.rig.places[first]))
 
     @cached_property
     def tips(self) -> np.ndarray:
-        """[B, 3] where the limb ends that a bone belongs to."""
+        """End [B, 3] of the limb that each bone belongs to."""
         found = self.rig.places + [self.way(bone) for bone in range(len(self.rig.names))]
         for bone in reversed(range(len(found))):
             if below := self.rig.children(bone):
@@ -106,13 +108,13 @@ class Plan:
 
     @cached_property
     def stands(self) -> float:
-        """m, that limbs which end at the floor come down in all: much where up is up."""
+        """Total descent in m of the limbs that end at the floor; large if `up` is right."""
         tips = self.tips[self.limbs, self.up]
         drops = np.maximum(self.rig.places[self.limbs, self.up] - tips, 0.0)
         return float(drops[tips - self.floor < LOW * self.height].sum())
 
     def segments(self, bone: int) -> list[tuple[np.ndarray, np.ndarray]]:
-        """From where a bone begins to where it ends, [3] each, those within the trunk left out."""
+        """Start and ends [3] of a bone's segments, without those within the trunk."""
         rig, start = self.rig, self.rig.places[bone]
         below = rig.children(bone)
         if self.in_middle(bone):
@@ -123,25 +125,25 @@ class Plan:
         return [(start, end) for end in ends if np.linalg.norm(end - start) > 1e-4 * self.span]
 
     def way(self, bone: int) -> np.ndarray:
-        """[3] m from where a bone begins to its farthest end; zeros where it has none."""
+        """Vector [3] in m from a bone's start to its farthest end; zeros if it has none."""
         ways = [end - start for start, end in self.segments(bone)]
         return max(ways, key=lambda way: float(way @ way), default=np.zeros(3))
 
     def limb(self, first: int) -> list[int]:
-        """A limb's bones from its first one down, along the longest."""
+        """Bones of a limb from its first one down, along the longest."""
         chain = [first]
         while below := self.rig.children(chain[-1]):
             chain.append(max(below, key=self._length))
         return chain
 
     def has_toes(self, bone: int) -> bool:
-        """Whether a limb goes on from there as several of about one length, as fingers do."""
+        """Return whether a limb splits at this bone into several of about equal reach (toes)."""
         reaches = sorted(map(self.reach, self.rig.children(bone)), reverse=True)
         return len(reaches) > 1 and reaches[1] > TOE * reaches[0]
 
     @cached_property
     def feet(self) -> list[int]:
-        """Bones below the ankles of a body on two feet, which needs heels to stand; else none."""
+        """Bones below the ankles of a two-footed body, which needs heels to stand; else none."""
         rig, floor = self.rig, self.floor
         found = []
         for first in self.limbs:
@@ -154,18 +156,18 @@ class Plan:
 
     @cached_property
     def floor(self) -> float:
-        """m, of the lowest place."""
+        """Height in m of the lowest place."""
         return float(np.concatenate([self.rig.places, *self.rig.ends])[:, self.up].min())
 
     def capsules(self, bone: int, radius: float) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Ends [3], [3] of a bone's capsules; toes have none of their own where there is a sole."""
+        """Ends [3], [3] of a bone's capsules; toes above a sole have none of their own."""
         above = self.rig.parents[bone]
         while above >= 0 and above not in self.feet:
             above = self.rig.parents[above]
         return [] if above >= 0 else self.sole(bone, radius) or self.segments(bone)
 
     def sole(self, bone: int, radius: float) -> list[tuple[np.ndarray, np.ndarray]]:
-        """From heel to toe on the floor, of the bone below an ankle; nothing of any other."""
+        """Sole from heel to toe on the floor for a bone below an ankle; empty for other bones."""
         if bone not in self.feet:
             return []
         spots = self.spots_below(bone)
@@ -178,7 +180,7 @@ class Plan:
         return [(heel, toe)]
 
     def spots_below(self, bone: int) -> np.ndarray:
-        """[n, 3] where a bone, and all that hangs on it, begins and ends."""
+        """Starts and ends [n, 3] of a bone and all bones below it."""
         below = {bone}
         for other in range(bone + 1, len(self.rig.names)):
             if self.rig.parents[other] in below:
@@ -187,12 +189,12 @@ class Plan:
         return np.concatenate([self.rig.places[order], *[self.rig.ends[b] for b in order]])
 
     def moves(self, bone: int) -> bool:
-        """Whether it is long enough to bend on its own."""
+        """Return whether a bone is long enough to bend on its own."""
         return self._length(bone) > SHORT * self.height
 
 
 def toes(plan: Plan, foot: int) -> float:
-    """Where a foot points along the way: 1, -1, or 0 where it does not."""
+    """Direction of a foot along the forward axis: 1, -1, or 0 if it does not point along it."""
     way = plan.way(foot)
     share = float(way[plan.ahead]) / max(float(np.linalg.norm(way)), 1e-9)
     return float(np.sign(share)) if abs(share) > FOOT else 0.0

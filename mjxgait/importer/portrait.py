@@ -1,6 +1,4 @@
-"""Draws a creature in its standing pose with what creature.toml says about it, and tells its
-facts in words.
-"""
+"""Drawing of a creature in its standing pose with the contents of creature.toml, and its facts."""
 
 import mujoco
 import numpy as np
@@ -15,7 +13,7 @@ from mjxgait.rendering.shapes import Silhouettes
 
 WIDTH, HEIGHT = 1100, 760
 ROOM = 1.7
-"""Of the picture, in units of the creature."""
+"""Size of the picture, in units of the creature."""
 FOOT, FORWARD, LEFT, UP, GROUND = (
     (214, 84, 0),
     (200, 30, 30),
@@ -36,7 +34,7 @@ ALONE = (255, 255, 255)
 
 
 def standing(creature: Creature) -> Held:
-    """How it stands for two seconds."""
+    """Run the stand test for two seconds."""
     feet = {
         creature.model.geom(int(g)).name
         for g in [*creature.feet.watched[: len(creature.feet.foot_of)], *creature.feet.ground]
@@ -52,7 +50,7 @@ def standing(creature: Creature) -> Held:
 
 
 def facts(creature: Creature, held: Held) -> list[str]:
-    """Lines that tell what was loaded and how it stood."""
+    """Lines that report the loaded creature and how it stood."""
     state = "stands" if held.stands else "does not stand"
     touched = f', "{held.touched}" touches the floor' if held.touched else ""
     names = creature.joints.names
@@ -82,8 +80,9 @@ def facts(creature: Creature, held: Held) -> list[str]:
 
 
 def portrait(creature: Creature) -> Image.Image:
-    """The creature from its right side; feet ringed, axes drawn, joints with the same number
-    mirror each other.
+    """Draw the creature from its right side.
+
+    Feet are ringed and axes drawn; joints with the same number mirror each other.
     """
     data = mujoco.MjData(creature.model)
     data.qpos[:] = creature.stand_qpos
@@ -155,7 +154,7 @@ def _ring(
 def _mark_joints(
     draw: ImageDraw.ImageDraw, camera: Camera, creature: Creature, data: mujoco.MjData
 ) -> None:
-    """A dot with a number per joint; joints at one point stand side by side."""
+    """Draw a numbered dot per joint; joints at one point stand side by side."""
     firsts = dict.fromkeys(
         min(j, int(partner)) for j, partner in enumerate(creature.mirror.partner)
     )

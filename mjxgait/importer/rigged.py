@@ -1,6 +1,6 @@
-"""From a skeleton at rest to a model with hinges: a character without a body gets one.
+"""Model with hinges and capsules from a skeleton at rest.
 
-Nothing of it stands in the file, so all is told as a guess. The axes are the file's.
+The file states no body, so every choice is reported as a guess. The axes are the file's.
 """
 
 import xml.etree.ElementTree as ET
@@ -25,27 +25,29 @@ from mjxgait.importer.plan import Plan
 
 RIGS: Mapping[str, Callable[[Path], Rig]] = {".bvh": rig_of_bvh, ".glb": rig_of_glb}
 UP, OTHER, SURER = "y", "z", 1.5
-"""Which axis is taken for up if a file does not say; which other one if limbs come down along it that
-many times as far."""
+"""Default up axis; the other candidate; and the least ratio of the limbs' descent to prefer it."""
 DENSITY = 1000.0
-"""kg/m³, of water, as animals have it."""
+"""kg/m³, the density of water and of animals."""
 MOST_BONES = 400
 METRES, CENTIMETRES = 4.0, 400.0
-"""A skeleton that is lower is one in metres, in centimetres; else it is in millimetres."""
+"""Heights in file units below which a skeleton is in metres, or in centimetres; else millimetres.
+"""
 THICK, THIN, TRUNK, SLIM = 0.12, 0.008, 0.7, 0.2
-"""Radius of a limb's bone over its length, over the creature's height at least; of a trunk over half
-its width between the limbs; of necks and tails over their bones' length, at most half a trunk's."""
+"""Radius of a limb's bone over its length; least radius over the creature's height; trunk radius
+over half its width between the limbs; radius of a neck or tail over its bones' length, at most half
+a trunk's.
+"""
 SKINNED = 8
-"""Vertices from which on they tell how thick a bone's part is."""
+"""Least number of vertices that determine the thickness of a bone's part."""
 
 
 def model_of(
     path: Path, up: str | None, height: float | None, notes: Notes
 ) -> tuple[ET.Element, Guess]:
-    """An MJCF tree of a BVH or GLB file's skeleton, and which of its axes points up.
+    """Return an MJCF tree of a BVH or GLB file's skeleton, and its up axis.
 
     Args:
-      up: that axis, as told. height: m, that it is tall at rest.
+      up: that axis, if the user states it. height: m, at rest.
 
     Raises:
       UserError: the file is damaged, or has no skeleton.
@@ -70,7 +72,7 @@ def model_of(
 
 
 def _bare(rig: Rig) -> Rig:
-    """Without handles that move no skin, and without roots that only carry the others."""
+    """Remove handles that move no skin, and roots that only carry the others."""
     skinned = {b for b, skin in enumerate(rig.skins) if len(skin)}
     needed = set(range(len(rig.names)))
     if skinned:
@@ -80,7 +82,7 @@ def _bare(rig: Rig) -> Rig:
                 needed.add(bone)
                 bone = rig.parents[bone]
         for bone in set(range(len(rig.names))) - needed:
-            parent = rig.parents[bone]  # where a chain of bones ends, its last one says
+            parent = rig.parents[bone]  # a removed leaf still marks its parent's end
             if parent in skinned and not rig.children(bone):
                 ends[parent] = np.concatenate([ends[parent], rig.places[[bone]]])
         rig = Rig(rig.names, rig.parents, rig.places, tuple(ends), rig.skins, rig.metres)
@@ -112,7 +114,7 @@ def _check(path: Path, rig: Rig) -> None:
 
 
 def _upward(rig: Rig) -> Guess:
-    """The axis that points up: glTF's, or that along which the limbs come down to the floor."""
+    """Up axis: glTF's, or the one along which the limbs come down to the floor."""
     if rig.metres is not None:
         return Guess("up", UP, "high", "glTF has Y up")
     usual, other = (Plan("xyz".index(axis), rig).stands for axis in (UP, OTHER))
@@ -125,7 +127,7 @@ def _upward(rig: Rig) -> Guess:
 
 
 def _measured(path: Path, rig: Rig, up: int, height: float | None, notes: Notes) -> Rig:
-    """The skeleton in metres."""
+    """Return the skeleton in metres."""
     tall = float(np.ptp(np.concatenate([rig.places, *rig.ends, *rig.skins])[:, up]))
     if height is not None:
         if not (0.0 < height < 1e3 and tall > 1e-9):
@@ -152,7 +154,7 @@ def _measured(path: Path, rig: Rig, up: int, height: float | None, notes: Notes)
 
 
 def _radius(plan: Plan, bone: int) -> float:
-    """m, of the capsules of a bone: of its skin where there is one."""
+    """Radius in m of a bone's capsules, from its skin where there is one."""
     rig = plan.rig
     segments = plan.segments(bone)
     length = max((float(np.linalg.norm(b - a)) for a, b in segments), default=0.0)
@@ -160,7 +162,7 @@ def _radius(plan: Plan, bone: int) -> float:
         away = np.min([_distances(rig.skins[bone], a, b) for a, b in segments], axis=0)
         return float(np.clip(np.median(away), THIN * plan.height, 0.3 * plan.height))
     least = THIN * plan.height
-    sideways = int(np.abs(plan.way(bone)).argmax()) == plan.side  # as collar bones are
+    sideways = int(np.abs(plan.way(bone)).argmax()) == plan.side  # such as a collar bone
     if plan.carries(bone) and not sideways:
         return max(TRUNK * plan.half_width, least)
     share, most = (SLIM, 0.5) if plan.in_middle(bone) else (THICK, 1.0)
@@ -168,7 +170,7 @@ def _radius(plan: Plan, bone: int) -> float:
 
 
 def _distances(points: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """[V] m of points [V, 3] from the line between two ends."""
+    """Distances [V] in m of points [V, 3] from the segment between two ends."""
     along = b - a
     share = np.clip((points - a) @ along / max(float(along @ along), 1e-12), 0.0, 1.0)
     return np.linalg.norm(points - a - share[:, None] * along, axis=1)

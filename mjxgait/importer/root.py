@@ -1,4 +1,4 @@
-"""Which tree of a compiled model is the creature, how long its unit is and which way is up."""
+"""Root, unit of length and up axis of a compiled model."""
 
 import mujoco
 import numpy as np
@@ -12,8 +12,9 @@ UP_AXES = {"x": np.array([1.0, 0, 0]), "y": np.array([0, 1.0, 0]), "z": np.array
 
 
 def find_root(model: mujoco.MjModel) -> int:
-    """The body whose subtree has the most joints, then the most mass; a chain of bodies that
-    only carry root slides is passed over.
+    """Return the body with the most joints in its subtree, then the most mass.
+
+    A chain of bodies that only carry root slides is skipped.
     """
     tops = [b for b in range(1, model.nbody) if model.body_parentid[b] == 0]
 
@@ -48,13 +49,13 @@ def _types(model: mujoco.MjModel, body: int) -> list[int]:
 
 
 def in_plane(model: mujoco.MjModel, root: int) -> bool:
-    """Whether the file's root can slide and turn in one plane only, or less."""
+    """Return whether the file's root can slide and turn in at most one plane."""
     types = _types(model, root)
     return SLIDE in types and types.count(HINGE) <= 1
 
 
 def tell_root_joints(model: mujoco.MjModel, root: int, notes: Notes) -> None:
-    """Notes what becomes of the joints by which the file holds the root in the world."""
+    """Report the replacement of the joints that hold the root in the world."""
     types = _types(model, root)
     if types == [FREE]:
         return
@@ -72,7 +73,7 @@ def tell_root_joints(model: mujoco.MjModel, root: int, notes: Notes) -> None:
 
 
 def unit_length(model: mujoco.MjModel, bodies: list[int], notes: Notes) -> float:
-    """m per unit: a body of more than 40 m is one in millimetres."""
+    """Unit of length in m: a body of more than 40 m is in millimetres."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     span = float(np.ptp(data.xpos[bodies], axis=0).max(initial=0))
@@ -93,7 +94,7 @@ def up_axis(
     up: str | None,
     notes: Notes,
 ) -> np.ndarray:
-    """[3] unit vector of the file's world that points up."""
+    """Up unit vector [3] in the file's world."""
     gravity = model.opt.gravity
     if up:
         notes.guess("up", up, "high", "as told")
@@ -130,7 +131,7 @@ def up_axis(
 
 
 def turn_up(axis: np.ndarray) -> np.ndarray:
-    """[3, 3] rotation that takes an axis to z, without a turn where it is z already."""
+    """Rotation [3, 3] that takes an axis to z, the identity if it is z already."""
     if axis[2] > 0.99:
         return np.eye(3)
     side = np.roll(axis, 1) if axis[1] else np.array([0.0, 1.0, 0.0])

@@ -1,6 +1,4 @@
-"""Asserts that the written creature is the animal of the file: masses, inertias, joint positions
-and axes.
-"""
+"""Check that the written creature has the file's masses, inertias, joint positions and axes."""
 
 import mujoco
 import numpy as np
@@ -16,8 +14,9 @@ TOLERANCE = 1e-6
 def check_same(
     model: mujoco.MjModel, anatomy: Anatomy, puppet: Puppet, made: mujoco.MjModel
 ) -> None:
-    """Compares the compiled file with the written creature, body by body and joint by joint,
-    relative to their size.
+    """Compare the compiled file with the written creature, body by body and joint by joint.
+
+    Differences are relative to the size.
 
     Raises:
       UserError: something differs, which is a mistake of the import.
@@ -51,7 +50,7 @@ def _places(
     source: list[int],
     own: list[int],
 ) -> None:
-    """Where joints are and turn about, relative to the trunk, in the file's pose."""
+    """Compare joint places and axes relative to the trunk, in the file's pose."""
     before, after = mujoco.MjData(model), mujoco.MjData(made)
     before.qpos[:] = anatomy.qpos
     after.qpos[:] = made.qpos0
@@ -60,7 +59,7 @@ def _places(
     balls = [
         int(model.jnt_bodyid[j.id]) for j in puppet.joints if int(model.jnt_type[j.id]) == BALL
     ]
-    if balls:  # three hinges are zero where the ball is
+    if balls:  # the three hinges of a ball joint stay at zero here
         return
     for m, d in ((model, before), (made, after)):
         mujoco.mj_kinematics(m, d)

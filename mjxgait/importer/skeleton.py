@@ -1,4 +1,4 @@
-"""From the compiled model and its anatomy to the list of bodies that will be written."""
+"""Conversion of the compiled model and its anatomy to the list of bodies to write."""
 
 import dataclasses
 import functools
@@ -21,15 +21,15 @@ from mjxgait.importer.parts import (
 )
 
 MOST_RADIANS = 4 * np.pi
-"""A limit beyond it was meant in degrees."""
+"""Limit in rad beyond which the file's value was meant in degrees."""
 SHANK_END = 0.7
-"""From this share of its length on, a shank is the foot."""
+"""Share of a shank's length from which on it acts as the foot."""
 
 
 def build_bodies(
     model: mujoco.MjModel, anatomy: Anatomy, efforts: Mapping[str, float], notes: Notes
 ) -> list[Body]:
-    """The creature's bodies, parents first; frozen joints are baked into the bodies' places."""
+    """Return the creature's bodies, parents first, with frozen joints baked into their places."""
     ids = anatomy.bodies
     names = plain_names([model.body(b).name for b in ids], [f"body_{i}" for i in range(len(ids))])
     xpos, xrot = _placed(model, anatomy)
@@ -63,9 +63,7 @@ def build_bodies(
 
 
 def _placed(model: mujoco.MjModel, anatomy: Anatomy) -> tuple[np.ndarray, np.ndarray]:
-    """Places of all bodies with the active joints at their zero and the frozen ones where they
-    are kept.
-    """
+    """Places of all bodies, active joints at zero and frozen joints where they are kept."""
     data = mujoco.MjData(model)
     data.qpos[:] = anatomy.qpos
     shared = {int(model.jnt_bodyid[j]) for j in anatomy.active}
@@ -126,7 +124,7 @@ def _add_joints(
 
 
 def _stated_torque(model: mujoco.MjModel, joint: int) -> float:
-    """Largest torque in N·m by the file's actuators or joint, nan where it does not say."""
+    """Largest torque in N·m stated by the file's actuators or joint; nan if none is."""
     torques = []
     if model.jnt_actfrclimited[joint]:
         torques.append(float(np.abs(model.jnt_actfrcrange[joint]).max()))
@@ -151,8 +149,9 @@ def _stated_torque(model: mujoco.MjModel, joint: int) -> float:
 
 
 def height_of(bodies: list[Body], xpos: np.ndarray, xrot: np.ndarray, chosen: list[int]) -> float:
-    """Lowest point in m of the chosen bodies, at places [B, 3] and rotations [B, 3, 3] in the
-    list's order.
+    """Lowest point in m of the chosen bodies.
+
+    xpos: [B, 3] places. xrot: [B, 3, 3] rotations, in the list's order.
     """
     lows = [np.inf]
     for i in chosen:
@@ -165,8 +164,8 @@ def height_of(bodies: list[Body], xpos: np.ndarray, xrot: np.ndarray, chosen: li
 class Tip:
     """A shape of a foot.
 
-    far: [n] which of its points belong to the foot's end, the others belong to the shank. body: its
-    place.
+    far: [n] mask of the points at the foot's end; the others belong to the shank. body: its place
+    in the list.
     """
 
     body: int
@@ -175,14 +174,12 @@ class Tip:
 
     @functools.cached_property
     def ends(self) -> tuple[np.ndarray, np.ndarray]:
-        """Points of the shank, and of the foot's end, each [n, 3]; a search asks for them often."""
+        """Points [n, 3] of the shank and of the foot's end; cached for the search."""
         return self.shape.points[~self.far], self.shape.points[self.far]
 
 
 def foot_tips(bodies: list[Body], group: list[int]) -> list[Tip]:
-    """The shapes with which a limb can step: those at the far end of its last moving body and
-    what is welded to it.
-    """
+    """Shapes that a limb can step on, at the far end of its last moving body and welded bodies."""
     chain, i = [], group[0]
     while i > 0:
         chain.append(float(np.linalg.norm(bodies[i].pos)))
@@ -201,13 +198,13 @@ def foot_tips(bodies: list[Body], group: list[int]) -> list[Tip]:
     cloud = np.concatenate(clouds)
     far = cloud[np.linalg.norm(cloud, axis=1).argmax()]
     reach = float(np.linalg.norm(far))
-    # A short last part is a foot, and all of it may step; of a long one, a shank, only its far end.
+    # All of a short last part, a foot, may step; only the far end of a long one, a shank.
     share = SHANK_END if reach > 0.25 * (sum(chain) + reach) else -np.inf
     return [Tip(i, s, c @ far > share * reach**2) for (i, s), c in zip(shapes, clouds, strict=True)]
 
 
 def tip_points(tips: list[Tip], xpos: np.ndarray, xrot: np.ndarray, far: bool = True) -> np.ndarray:
-    """[n, 3] lowest points of the balls of a foot's end, or of its shank."""
+    """Lowest points [n, 3] of the balls of a foot's end, or of its shank."""
     found = []
     for t in tips:
         low = xpos[t.body] + t.ends[far] @ xrot[t.body].T

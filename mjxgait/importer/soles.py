@@ -1,6 +1,4 @@
-"""Gives feet and trunk shapes that the fast physics can hold against the floor: spheres and
-capsules in place of what the file has.
-"""
+"""Foot and trunk geoms for floor contact: spheres and capsules replace the file's shapes."""
 
 import dataclasses
 
@@ -22,9 +20,9 @@ BAND = 0.03
 STEEP = 0.5
 """Sine of the slope from which a capsule touches the floor with one end only."""
 SMALL_FOOT, NARROW_FOOT = 0.12, 0.07
-"""Shares of the hip height: up to the first a foot is a ball, up to the second it is a bar."""
+"""Shares of the hip height: a foot up to the first is a ball, up to the second a bar."""
 NEAR_FLOOR = 0.1
-"""Share of the hip height below which a part that is no foot may not collide."""
+"""Share of the hip height below which a part other than a foot may not collide."""
 MOST_TRUNK_SHAPES = 3
 
 
@@ -44,9 +42,9 @@ class Stance:
 def lay_soles(
     bodies: list[Body], groups: list[list[int]], stance: Stance, planar: bool, notes: Notes
 ) -> list[list[str]]:
-    """Names of the foot geoms of each foot; `bodies` change.
+    """Add foot geoms to `bodies`, and return their names for each foot.
 
-    groups: of each foot, the places of its last moving body and what is welded to it.
+    groups: places of each foot's last moving body and the bodies welded to it.
     """
     names = []
     for group in groups:
@@ -62,7 +60,7 @@ def lay_soles(
 def _sole(
     bodies: list[Body], group: list[int], stance: Stance, planar: bool, notes: Notes
 ) -> list[tuple[int, Shape]]:
-    """The shapes of one foot with the places of their bodies. Old shapes stay as pictures only."""
+    """Shapes of one foot and the places of their bodies; old shapes only stay visible."""
     name = bodies[group[0]].name
     owned = [(i, s) for i in group for s in bodies[i].shapes]
     solid = [tip for tip in foot_tips(bodies, group) if tip.far.any()]
@@ -121,7 +119,7 @@ def _ball(body: Body, pos: np.ndarray, radius: float, seen: bool = False) -> Sha
 
 
 def bar(body: Body, a: np.ndarray, b: np.ndarray, radius: float) -> Shape:
-    """A capsule between two points [3] of the body's frame."""
+    """Return a capsule between two points [3] of the body's frame."""
     along = b - a
     length = float(np.linalg.norm(along))
     if length < 1e-6:
@@ -153,8 +151,10 @@ def _colour(body: Body) -> np.ndarray:
 
 
 def _round_foot(bodies: list[Body], tip: Tip, stance: Stance, notes: Notes) -> tuple[int, Shape]:
-    """A sphere or a lying capsule as it is; of a steep capsule the lower end, with a ball at the
-    upper one that may not touch.
+    """Return the foot shape of a sphere or capsule.
+
+    A sphere or a lying capsule stays as it is. A steep capsule becomes a ball at its lower end; a
+    ball at its upper end may not touch the floor.
     """
     i, shape = tip.body, tip.shape
     world = stance.xpos[i] + shape.points @ stance.xrot[i].T
@@ -177,7 +177,7 @@ def _round_foot(bodies: list[Body], tip: Tip, stance: Stance, notes: Notes) -> t
 def _fitted(
     bodies: list[Body], low: list[Tip], home: int, stance: Stance, band: float
 ) -> list[tuple[int, Shape]]:
-    """Spheres or capsules whose lower side is the footprint of the low points."""
+    """Spheres or capsules with the footprint of the low points as their lower side."""
     world = tip_points(low, stance.xpos, stance.xrot)
     thick = float(np.ptp(world[:, 2]))
     bottom = float(world[:, 2].min())
@@ -233,8 +233,9 @@ def _fitted(
 def _across(
     bodies: list[Body], made: list[tuple[int, Shape]], stance: Stance
 ) -> list[tuple[int, Shape]]:
-    """Each ball and each end of a capsule as a long capsule across: in the creature's plane
-    nothing changes.
+    """Replace each ball and each end of a capsule by a long capsule across.
+
+    Nothing changes in the creature's plane.
     """
     wide = []
     for i, shape in made:
@@ -257,9 +258,7 @@ def guard_parts(
     stance: Stance,
     notes: Notes,
 ) -> None:
-    """Shapes of everything but the feet: a few spheres and capsules that end an episode when
-    they touch the floor.
-    """
+    """Give all parts but the feet a few spheres and capsules; if they touch, the episode ends."""
     on_feet = {i for group in feet for i in group}
     lowered = []
     for segment in segments:
@@ -294,7 +293,7 @@ def guard_parts(
                     "for touching the floor",
                 )
     for body in bodies:
-        for shape in body.shapes:  # the knee balls of feet, where they are too low to be knees
+        for shape in body.shapes:  # knee balls of feet collide only if they are high enough
             if "_upper_end" in shape.name:
                 i = bodies.index(body)
                 height = (
@@ -311,7 +310,7 @@ def guard_parts(
 
 
 def _inscribed(body: Body, shape: Shape) -> Shape:
-    """A capsule along the longest side of a box around the shape, a little thinner than it."""
+    """Return a capsule along the longest side of the shape's box, a little thinner than it."""
     turn = rotation(shape.quat)
     local = (shape.points - shape.pos) @ turn
     low, high = local.min(0), local.max(0)

@@ -1,6 +1,6 @@
-"""Reads a model file and what it refers to.
+"""Reading of a model file and its references.
 
-It is untrusted: only its folder and the search paths are read, and all is bounded.
+The file is untrusted: only its folder and the search paths are read, and everything is bounded.
 """
 
 import dataclasses
@@ -20,19 +20,21 @@ MOST_MESH = 30_000_000
 MOST_MESHES = 120_000_000
 """bytes of one XML file, of one mesh, of all meshes together."""
 MOST_ELEMENTS, MOST_ATTRIBUTES, MOST_DEPTH, MOST_INCLUDES = 20_000, 100, 200, 40
-"""Of all elements together, of each, and within each other; MuJoCo's own have up to 40 attributes."""
+"""Limits of elements, attributes per element, depth and includes.
+
+MuJoCo's own elements have up to 40 attributes.
+"""
 READABLE_MESHES = (".stl", ".obj", ".msh")
 
 
 @dataclasses.dataclass
 class Source:
-    """A model file on its way to MuJoCo: its cleaned tree refers to meshes by their keys in
-    `assets` and to no file.
+    """Cleaned model file for MuJoCo: its tree refers to meshes by keys in `assets`, to no file.
 
-    efforts: N·m, largest torque by joint name, where the file says so outside of MuJoCo's elements.
+    efforts: N·m, largest torque by joint name, if stated outside MuJoCo's elements.
     coupled: joints that follow others.
-    poses: standing poses that the file offers outside of keyframes.
-    missing: names of meshes that cannot be had, with the file that each should be in; MJCF only.
+    poses: standing poses that the file offers outside keyframes.
+    missing: names of unavailable meshes, each with its expected file; MJCF only.
     up: axis that points up, of a skeleton.
     """
 
@@ -46,21 +48,19 @@ class Source:
 
     @property
     def urdf(self) -> bool:
-        """Whether it is a URDF rather than an MJCF file."""
+        """True for a URDF, False for an MJCF file."""
         return self.tree.tag == "robot"
 
 
 class Places:
-    """The folders that may be read. `packages` are searched for `package://` paths."""
+    """Folders that may be read: the model's and the search paths, also for `package://` paths."""
 
     def __init__(self, model: Path, search: Sequence[Path]) -> None:
         self.home = model.resolve().parent
         self.roots = [self.home, *(folder.resolve() for folder in search)]
 
     def find(self, reference: str, folders: Sequence[str] = ("",)) -> Path | None:
-        """The file that a reference means, or None when it is missing or outside of the folders
-        that may be read.
-        """
+        """Return the referenced file; None if it is missing or outside the readable folders."""
         if "\0" in reference or len(reference) > 1000:
             return None
         uri = re.match(r"(?:package|model|file)://(.*)", reference)
@@ -85,7 +85,7 @@ class Places:
 
 
 def parse_xml(path: Path) -> ET.Element:
-    """The root element of a file.
+    """Parse the root element of a file.
 
     Raises:
       UserError: missing, too large, not XML, with a document type (entities can refer to files and
@@ -129,7 +129,7 @@ def _bounded(path: Path, events: Iterator[tuple[str, ET.Element]]) -> ET.Element
 def load_mesh(
     source: Source, places: Places, reference: str, folders: Sequence[str], notes: Notes
 ) -> str | None:
-    """Key of a mesh in `source.assets`, or None with a note when it cannot be used."""
+    """Load a mesh and return its key in `source.assets`; None with a note if it is unusable."""
     suffix = Path(reference).suffix.lower()
     if suffix not in READABLE_MESHES:
         notes.change(
@@ -161,9 +161,7 @@ def load_mesh(
 
 
 def numbers(text: str | None) -> list[float] | None:
-    """The numbers in an attribute; None when there is none, or something that is not a finite
-    number.
-    """
+    """Parse the numbers of an attribute; None if there is none or one is not finite."""
     try:
         values = [float(part) for part in (text or "").split()]
     except ValueError:

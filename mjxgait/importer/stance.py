@@ -1,5 +1,4 @@
-"""Finds a standing pose: the file's own where it stands, else leg bends that put the feet level
-under the weight.
+"""Search for a standing pose: leg bends that put level feet under the weight.
 
 Letters: `J` active joints, `F` feet.
 """
@@ -12,21 +11,21 @@ from mjxgait.importer.skeleton import height_of
 from mjxgait.importer.soles import Stance
 
 SPREADS = (0.4, 1.0, 1.6)
-"""rad, how far from the file's pose the search begins."""
+"""rad, initial widths of the search around the file's pose."""
 FIRST, SAMPLES, ROUNDS, ELITE = 400, 40, 25, 10
 MARGIN = 0.25
-"""rad that a joint should be from its limit."""
+"""rad that a joint should keep from its limit."""
 NEUTRAL = 0.9
 """Straightness of a leg that cannot bend."""
 
 
 def symmetric(q: np.ndarray, mirror: tuple[np.ndarray, np.ndarray] | None) -> np.ndarray:
-    """The mean [J] of a pose and its mirror image."""
+    """Mean [J] of a pose and its mirror image."""
     return q if mirror is None else (q + mirror[1] * q[mirror[0]]) / 2
 
 
 def level(puppet: Puppet, q: np.ndarray) -> None:
-    """Tilts the trunk so that the feet are level; where two feet leave a tilt open it stays."""
+    """Tilt the trunk until the feet are level; a tilt that two feet leave open stays."""
     lowest = np.array([sole[sole[:, 2].argmin()] for sole in puppet.sole_points(*puppet.pose(q))])
     if len(lowest) < 2:
         return
@@ -45,14 +44,14 @@ def level(puppet: Puppet, q: np.ndarray) -> None:
 
 
 def drop(puppet: Puppet, q: np.ndarray, sink: float = 0.0) -> None:
-    """Moves the trunk over the origin, with the lowest foot point on the floor, or sink m in it."""
+    """Move the trunk over the origin, the lowest foot point on the floor or `sink` m in it."""
     lowest = min(float(sole[:, 2].min()) for sole in puppet.sole_points(*puppet.pose(q)))
     root = puppet.bodies[0]
     root.pos = np.array([0.0, 0.0, root.pos[2] - lowest - sink])
 
 
 def stance_of(puppet: Puppet, q: np.ndarray) -> Stance:
-    """Where everything is; the hip height is the mean height of each leg's first joint."""
+    """Stance in a pose [J]; the hip height is the mean height of each leg's first joint."""
     xpos, xrot = puppet.pose(q)
     floor = min(float(sole[:, 2].min()) for sole in puppet.sole_points(xpos, xrot))
     shared = {
@@ -71,7 +70,7 @@ def stance_of(puppet: Puppet, q: np.ndarray) -> Stance:
 
 
 def _leg_length(puppet: Puppet, foot: int) -> float:
-    """m from joint to joint down to the sole, in the latest pose."""
+    """Leg length in m along the joints down to the sole, in the latest pose."""
     anchors = puppet.data.xanchor[[j + 1 for j in puppet.leg(foot)]]
     sole = puppet.sole_points(puppet.data.xpos[1:], puppet.data.xmat[1:].reshape(-1, 3, 3))[foot]
     path = np.concatenate([anchors, sole.mean(0)[None]])
@@ -79,15 +78,17 @@ def _leg_length(puppet: Puppet, foot: int) -> float:
 
 
 def across(sole: np.ndarray) -> np.ndarray:
-    """[3] the way up from a sole [n, 3] that lies nearly flat: at right angles to its longest side."""
+    """Up direction [3] of a nearly flat sole [n, 3]: perpendicular to its longest side."""
     along = np.linalg.svd(sole - sole.mean(0))[2][0]
     up = np.array([0.0, 0.0, 1.0]) - along[2] * along
     return np.asarray(up / np.linalg.norm(up))
 
 
 def straightness(path: np.ndarray) -> float:
-    """Of thigh and shank, the two longest parts in a row of a path [n, 3] from joint to joint to
-    the sole: 1 is a straight leg.
+    """Straightness of thigh and shank; 1 is a straight leg.
+
+    path: [n, 3] from joint to joint to the sole. Thigh and shank are its longest two consecutive
+    parts.
     """
     parts = np.linalg.norm(np.diff(path, axis=0), axis=1)
     if len(parts) < 2:
@@ -97,7 +98,7 @@ def straightness(path: np.ndarray) -> float:
 
 
 class Search:
-    """Looks for a pose by the cross-entropy method; poses are symmetric where the body is."""
+    """Cross-entropy search for a pose; symmetric bodies get symmetric poses."""
 
     def __init__(
         self,
@@ -115,7 +116,7 @@ class Search:
         ]
         lying = self._lying(stance, straight=False)
         if not lying and len(puppet.feet) == 1:
-            # Who has one foot to stand on needs all of it, though the shank reach down to the floor.
+            # A body on one foot needs its whole sole, even if the shank reaches the floor.
             lying = self._lying(stance_of(puppet, self._straightest()), straight=True)
             above = {puppet.bodies[puppet.feet[f][0]].parent for f in lying} - {0}
             self.segments = [s for s in self.segments if not set(s) & above]
@@ -123,13 +124,14 @@ class Search:
         self.legs = [puppet.leg(f) for f in range(len(puppet.feet))]
 
     def _straightest(self) -> np.ndarray:
-        """[J] the pose with all joints as near to 0 as they come."""
+        """Pose [J] with all joints as near to 0 as their limits allow."""
         nearest = np.clip(np.zeros_like(self.start), self.puppet.low, self.puppet.high)
         return symmetric(nearest, self.mirror)
 
     def _lying(self, stance: Stance, straight: bool) -> dict[int, np.ndarray]:
-        """Which feet lie on a broad sole, below an ankle, and the way up [3] in their own axes;
-        straight: across the sole, which may be a little tilted there.
+        """Feet that lie on a broad sole below an ankle, and the up direction [3] in their frames.
+
+        straight: take the direction across the sole, which may be slightly tilted there.
         """
         up = np.array([0.0, 0.0, 1.0])
         found = {}
@@ -141,7 +143,7 @@ class Search:
         return found
 
     def run(self, spread: float, seed: int) -> tuple[np.ndarray, float]:
-        """The best pose [J] found, and its cost."""
+        """Return the best pose [J] found, and its cost."""
         rng = np.random.default_rng(seed)
         mean, width = self.start.copy(), np.full(len(self.start), spread)
         best, least = mean, self.cost(mean)
@@ -173,10 +175,10 @@ class Search:
         return float(np.mean(ratios))
 
     def cost(self, q: np.ndarray) -> float:
-        """How bad a stance is.
+        """Cost of a stance [J].
 
-        Uneven feet, weight beside them, other parts low, stretched legs, feet within the hips,
-        limits near, far from the file's pose.
+        Terms: uneven feet, weight beside them, other parts low, stretched legs, feet within the
+        hips, closeness to limits, distance from the file's pose.
         """
         puppet, hip = self.puppet, self.hip
         xpos, xrot = puppet.pose(q)
@@ -213,10 +215,10 @@ class Search:
             + 40 * stretched
             + 0.3 * (near**2).mean()
             + 3 * beneath
-            # A leg steps as far forward as back from beneath its hip; but two feet must be beneath
-            # the weight.
+            # A leg steps equally far forward and back from beneath its hip; but two feet must be
+            # beneath the weight.
             + (10 * ahead if len(self.legs) > 2 else 0)
-            + (0 if self.planar else 20 * narrow)  # feet within the hips: what steps so tips over
+            + (0 if self.planar else 20 * narrow)  # a body that steps within its hips tips over
             + 200 * tilted
             + 5 * low_trunk
             + 0.2 * ((q - self.start) ** 2).mean()
@@ -224,7 +226,7 @@ class Search:
 
 
 def upright_quat(quat: np.ndarray) -> np.ndarray:
-    """[4] the same tilt without the turn about z."""
+    """Quaternion [4] with the same tilt and no turn about z."""
     matrix = rotation(quat)
     yaw = float(np.arctan2(matrix[1, 0], matrix[0, 0]))
     back = np.array([[np.cos(yaw), np.sin(yaw), 0], [-np.sin(yaw), np.cos(yaw), 0], [0, 0, 1.0]])

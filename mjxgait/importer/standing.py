@@ -1,4 +1,4 @@
-"""Which of the poses that a file offers, or a search finds, the creature stands in."""
+"""Choice of a standing pose, from the file's poses and those that a search finds."""
 
 import copy
 import dataclasses
@@ -24,7 +24,7 @@ from mjxgait.importer.stance import (
 from mjxgait.importer.write_xml import compile_own, creature_xml
 
 SINK = 0.0005
-"""m that feet begin in the floor, about as far as they rest in it."""
+"""m, initial depth of the feet in the floor, about as deep as they rest."""
 STRAIGHT = 0.97
 """Straightness from which legs count as straight."""
 AT_ITS_END = 0.05
@@ -33,9 +33,7 @@ AT_ITS_END = 0.05
 
 @dataclasses.dataclass(eq=False)
 class Candidate:
-    """A standing pose that was tried: the bodies with their soles, the keyframe, and how it
-    held.
-    """
+    """A tried standing pose: bodies with foot geoms, the keyframe, and the stand test."""
 
     puppet: Puppet
     q: np.ndarray
@@ -48,14 +46,14 @@ class Candidate:
 
 
 def first_pose(puppet: Puppet, model: mujoco.MjModel, anatomy: Anatomy) -> np.ndarray:
-    """[J] the pose in which the anatomy was found."""
+    """Pose [J] in which the anatomy was found."""
     return _angles(puppet, model, anatomy.qpos)
 
 
 def offered_poses(
     puppet: Puppet, model: mujoco.MjModel, anatomy: Anatomy, source: Source, start: np.ndarray
 ) -> list[tuple[str, np.ndarray]]:
-    """Poses that the file offers, with what they are."""
+    """Poses that the file offers, each with its description."""
     order = sorted(
         range(model.nkey),
         key=lambda k: (
@@ -93,9 +91,7 @@ def standing(
     planar: bool,
     notes: Notes,
 ) -> Candidate:
-    """The first pose that stands, of the file's own and those that a search finds; the best one
-    where none does.
-    """
+    """Return the first pose that stands, of the file's and the search's; else the best one."""
     tried: list[tuple[str, Candidate]] = []
     search = Search(puppet, offered[0][1], mirror, planar)
     for what, q in offered:
@@ -144,7 +140,7 @@ def _try(
     planar: bool,
     notes: Notes,
 ) -> Candidate:
-    """Puts the creature on soles in a pose, and lets it stand."""
+    """Add foot geoms in a pose, and run the stand test."""
     notes, bodies = copy.deepcopy(notes), copy.deepcopy(puppet.bodies)
     trial = Puppet(bodies, [group[0] for group in puppet.feet])
     level(trial, q)
@@ -166,16 +162,17 @@ def _try(
 
 
 def _keep_stops(puppet: Puppet, q: np.ndarray) -> None:
-    """Of joints that stand at an end of their range: their stop bears weight, as a straight knee's.
+    """Keep the stops of joints that stand at an end of their range.
 
-    Elsewhere limits are left to the controller, for each costs a row of the solver.
+    Such a stop bears weight, like a straight knee's. Other limits are left to the controller,
+    because each costs a row of the solver.
     """
     for joint, angle in zip(puppet.joints, q, strict=True):
         joint.stopped = bool(min(angle - joint.low, joint.high - angle) < AT_ITS_END)
 
 
 def _name_shapes(bodies: list[Body]) -> None:
-    """A name for each colliding shape that has none."""
+    """Name each colliding shape without a name."""
     for body in bodies:
         unnamed = [s for s in body.shapes if s.solid and not s.name]
         for i, shape in enumerate(unnamed):

@@ -1,5 +1,6 @@
-"""Cleans a URDF tree for MuJoCo's own reader: meshes loaded or dropped, broken inertias mended,
-degrees and efforts read.
+"""URDF cleaning for MuJoCo's reader.
+
+Meshes are loaded or dropped, broken inertias mended, degrees and efforts read.
 """
 
 import xml.etree.ElementTree as ET
@@ -28,11 +29,11 @@ TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 LEAST_MASS = 1e-6
 """kg, below which a link counts as massless."""
 LEAST_INERTIA = 1e-12
-"""kg·m², a principal moment below which MuJoCo takes an inertia for none."""
+"""kg·m², a principal moment below which MuJoCo ignores an inertia."""
 
 
 def clean_urdf(source: Source, path: Path, places: Places, notes: Notes) -> None:
-    """Cleans `source.tree` in place.
+    """Clean `source.tree` in place.
 
     Raises:
       UserError: it is a xacro template, or has no links.
@@ -75,10 +76,10 @@ def clean_urdf(source: Source, path: Path, places: Places, notes: Notes) -> None
 
 
 def _shapes(source: Source, link: ET.Element, stated: bool, places: Places, notes: Notes) -> None:
-    """Loads a link's meshes, and drops those that are missing.
+    """Load a link's meshes, and drop missing ones.
 
     Args:
-      stated: whether its mass is; if not, that of a mesh counts.
+      stated: whether its mass is; if not, a mesh's mass counts.
     """
     for kind in ("visual", "collision"):
         for shape in link.findall(kind):
@@ -101,7 +102,7 @@ def _shapes(source: Source, link: ET.Element, stated: bool, places: Places, note
 
 
 def _empty_shape(shape: ET.Element) -> bool:
-    """Whether its size is missing or has a part that is not positive."""
+    """Return whether a shape's size is missing or has a part that is not positive."""
     geometry = shape.find("geometry")
     if geometry is None or not len(geometry):
         return True
@@ -115,7 +116,7 @@ def _empty_shape(shape: ET.Element) -> bool:
 
 
 def _inertial(link: ET.Element, notes: Notes) -> bool:
-    """Mends an inertia that no body can have; the mass stays. Whether one is stated, if as none."""
+    """Mend an impossible inertia, not the mass; return whether a mass is stated (zero counts)."""
     inertial = link.find("inertial")
     if inertial is None:
         return False
@@ -154,16 +155,16 @@ def _inertial(link: ET.Element, notes: Notes) -> bool:
 
 
 def _ball_inertia(mass: float) -> float:
-    """kg·m², of a ball of water."""
+    """Inertia in kg·m² of a ball of water."""
     return 0.4 * mass * (3 * mass / (4 * np.pi * 1000.0)) ** (2 / 3)
 
 
 def _possible(moments: np.ndarray, mass: float) -> np.ndarray:
-    """The nearest principal moments [3] kg·m² that some body of this mass in kg can have."""
+    """Nearest principal moments [3] kg·m² that some body of this mass in kg can have."""
     least = max(float(np.abs(moments).max()) * 1e-2, mass * 1e-6)
     raised = np.maximum(moments, least)
     raised[2] = min(raised[2], raised[0] + raised[1])
-    if raised[2] < moments[2]:  # the largest is the one that is known best: raise the others
+    if raised[2] < moments[2]:  # the largest is the most reliable: raise the others
         raised[2] = moments[2]
         raised[:2] *= 1.0001 * moments[2] / (raised[0] + raised[1])
     return raised

@@ -1,6 +1,4 @@
-"""Compiles a cleaned model: in this process, or in one of its own that may use only so much time
-and memory.
-"""
+"""Compilation of a cleaned model, in this process or in one with limited time and memory."""
 
 import json
 import math
@@ -23,12 +21,12 @@ from mjxgait.importer.missing import leave_out, lost, put_stand_in
 from mjxgait.processes import python_command, safe_environment
 
 SECONDS, GIGABYTES = 10.0, 1.0
-"""Processor time and memory that a model may take to compile, by default."""
+"""Default limits of processor time in s and memory in GB for compiling a model."""
 PATIENCE = 6.0
-"""Seconds to wait for each second of processor time: other programs may have the cores too."""
+"""Seconds to wait per second of processor time, because other programs may use the cores."""
 MOST_REPAIRS = 40
 OPTIONAL = ("actuator", "sensor", "keyframe", "tendon", "contact")
-"""Sections that may be left out when the model does not compile with them."""
+"""Sections that are dropped if the model does not compile with them."""
 UNKNOWN_ATTRIBUTE = re.compile(r"unrecognized attribute: '([^']+)'.*?Element '([^']+)'", re.DOTALL)
 ASSET = re.compile(r"asset[0-9]+\.(?:stl|obj|msh)|(?<=')asset[0-9]+(?=')")
 
@@ -40,7 +38,7 @@ def compile_apart(
     seconds: float = SECONDS,
     gigabytes: float = GIGABYTES,
 ) -> tuple[mujoco.MjModel, list[tuple[str, str]]]:
-    """`compile_here` in a process of its own, which cannot take this one down.
+    """Run `compile_here` in a separate process, which cannot take this one down.
 
     Raises:
       UserError: it does not compile, or takes too long or too much memory.
@@ -80,7 +78,7 @@ def compile_apart(
 def compile_here(
     tree: ET.Element, assets: dict[str, bytes], missing: dict[str, str] | None = None
 ) -> tuple[mujoco.MjModel, list[tuple[str, str]]]:
-    """The compiled model, and what had to be left out for it to compile, with the reasons.
+    """Return the compiled model, and the changes needed to compile it with their reasons.
 
     Args:
       missing: meshes that small ones stand in for, see `leave_out`.
@@ -114,9 +112,7 @@ def _repair(
     left_out: list[str],
     gone: dict[str, str],
 ) -> bool:
-    """Changes the tree so that this message may not come again; False when nothing is left to
-    try.
-    """
+    """Change the tree to avoid this message; return False if nothing is left to try."""
     if found := UNKNOWN_ATTRIBUTE.search(message):
         name, tag = found.groups()
         hit = [e for e in tree.iter(tag) if name in e.attrib]
@@ -172,9 +168,9 @@ def _repair(
 
 
 def _drop_mesh(tree: ET.Element, key: str, gone: dict[str, str]) -> bool:
-    """Takes out the meshes of an asset and the shapes that use them; False when there are none.
+    """Remove the meshes of an asset and the shapes that use them; return False if there are none.
 
-    gone: meshes that small ones stand in for; those of MJCF become some of these.
+    gone: meshes replaced by small ones; those removed from MJCF are added.
     """
     stem = key.split(".")[0]
     hit = [m for m in tree.iter("mesh") if m.get("file", "").split(".")[0] == stem]
@@ -202,7 +198,7 @@ def _compiler(tree: ET.Element) -> ET.Element:
 
 
 def _bound(seconds: float, gigabytes: float) -> None:
-    """Limit this process to what it has taken so far and so much more, where the system can."""
+    """Limit further processor time and memory of this process, where the system can."""
     try:
         import resource
 
@@ -226,8 +222,7 @@ def _reason(error: Exception, gigabytes: float) -> str:
 
 
 def _serve() -> None:
-    """Reads an order from standard input and answers on standard output."""
-    # Written by compile_apart.
+    """Read an order, written by `compile_apart`, from standard input; answer on standard output."""
     text, assets, missing, seconds, gigabytes = pickle.loads(sys.stdin.buffer.read())
     _bound(seconds, gigabytes)
     try:

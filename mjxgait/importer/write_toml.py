@@ -1,4 +1,4 @@
-"""Writes creature.toml: the guesses, each with its confidence beside it."""
+"""Text of creature.toml: the guesses, each with its confidence beside it."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -27,14 +27,15 @@ def creature_toml(
     train: Mapping[str, Any],
     notes: Notes,
 ) -> str:
-    """The text of creature.toml.
+    """Return the text of creature.toml.
 
     Args:
       origin: the model file's name, in one line. forward: [3] in the trunk's frame. feet: names of
         geoms.
       mirror: whether it is symmetric, and stated pairs: joint to partner and sign.
-      planar: whether its legs are in one plane and pass each other. train: settings that are not the usual ones.
-      body_length: m, None where the loader shall measure it.
+      planar: whether its legs are in one plane and pass each other. train: settings that differ
+        from the defaults.
+      body_length: m, None if the loader measures it.
     """
     remark = {
         guess.what: f"  # {guess.confidence}: {one_line(guess.reason)}" for guess in notes.guesses
@@ -66,7 +67,7 @@ def creature_toml(
 
 
 def _joints(joints: list[str], drive: Drive, remark: Mapping[str, str]) -> list[str]:
-    """What most joints have, and what each has of its own."""
+    """Lines of the common joint values and of each joint's own."""
     kp, kd, torque, ranges = (
         np.round(v, 4) for v in (drive.kp, drive.kd, drive.torque, drive.ranges)
     )
@@ -105,7 +106,7 @@ def _mirror(
 
 
 def _corrections(drive: Drive) -> list[str]:
-    """How joints steer, keep it level and step under a fall."""
+    """Lines of the weights for steering, balance and stepping."""
     lines = [
         "[steering]  # low: from which way each joint moves its foot",
         f"bend = {_table(drive.bend)}",
@@ -128,13 +129,13 @@ def _corrections(drive: Drive) -> list[str]:
 
 
 def _usual(values: np.ndarray) -> float:
-    """The commonest value."""
+    """Most common value."""
     found, counts = np.unique(values, return_counts=True)
     return float(found[counts.argmax()])
 
 
 def _quoted(text: str) -> str:
-    """As TOML writes it, which is not as JSON does: it knows no halves of an emoji, no raw 0x7f."""
+    """Quote a text as TOML does; unlike JSON, it allows no lone surrogates and no raw 0x7f."""
     return tomli_w.dumps({"_": text}).removeprefix("_ = ").removesuffix("\n")
 
 

@@ -1,5 +1,6 @@
-"""Writes creature.xml: bodies, inertias, joints and shapes as they are, on a floor, with options
-that every physics here can simulate.
+"""Text of creature.xml: bodies, inertias, joints and shapes as they are, on a floor.
+
+Every physics backend can simulate its options.
 """
 
 import xml.etree.ElementTree as ET
@@ -43,7 +44,7 @@ FLOOR = """
 def creature_xml(
     name: str, bodies: list[Body], stand: np.ndarray | None, rest: np.ndarray | None = None
 ) -> str:
-    """The text of creature.xml. stand, rest: [nq] the keyframes of these names, None for none."""
+    """Return the text of creature.xml. stand, rest: [nq] keyframes of these names, or None."""
     root = ET.fromstring(f"<mujoco>{HEAD}<asset/><worldbody>{FLOOR}</worldbody></mujoco>")
     root.set("model", name)
     asset, world = root.find("asset"), root.find("worldbody")
@@ -67,7 +68,7 @@ def creature_xml(
 
 
 def compile_own(text: str) -> mujoco.MjModel:
-    """The compiled model of a text of ours.
+    """Compile a text that the import wrote.
 
     Raises:
       UserError: the file's numbers do not survive being written, such as an axis of no length.
