@@ -145,7 +145,7 @@ def _import(path: Path, choices: ImportChoices, notes: Notes) -> Imported:
         )
     feet = {name for foot in best.feet for name in foot}
     steady_balance(best.drive, best.puppet.names, best.model, best.qpos, feet, best.notes)
-    name = plain_names([choices.name or path.stem], ["creature"])[0]
+    name = plain_names([choices.name or path.stem], ["creature"])[0].strip(".-") or "creature"
     check_same(model, anatomy, best.puppet, best.model)
     if rest is not None:
         rest[:3] = best.qpos[:3]

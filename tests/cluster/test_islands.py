@@ -17,7 +17,7 @@ from mjxgait.distributed.local import Here
 from mjxgait.distributed.programs import Programs
 from mjxgait.distributed.scheduler import Crew
 from mjxgait.inspect.islands import island_facts
-from mjxgait.training.folder import create_run, read_metrics
+from mjxgait.training.folder import Numbered, create_run, read_metrics, read_records
 from mjxgait.training.screen import Screen
 from mjxgait.training.stored import stored_generations
 
@@ -57,9 +57,13 @@ def finished(tmp_path_factory: pytest.TempPathFactory, stool: Creature) -> Path:
     return folder
 
 
+def exchanges(folder: Path) -> list[dict]:
+    return read_records(folder / "migrations.jsonl", Numbered)
+
+
 def without_times(path: Path) -> list[dict]:
-    timed = ("wall_s", "steps_per_second")
-    return [{k: v for k, v in line.items() if k not in timed} for line in read_metrics(path)]
+    timed, lines = ("wall_s", "steps_per_second"), read_records(path, Numbered)
+    return [{k: v for k, v in line.items() if k not in timed} for line in lines]
 
 
 def test_the_folder_is_that_of_a_run_and_has_each_islands_own(finished: Path, stool: Creature):
@@ -86,11 +90,11 @@ def test_the_first_island_begins_as_the_run_without_islands(
     assert run(tmp_path / "one", stool, config(count=1))
     one = without_times(tmp_path / "one/islands/0/metrics.jsonl")
     assert without_times(finished / "islands/0/metrics.jsonl")[:3] == one[:3]
-    assert not read_metrics(tmp_path / "one/migrations.jsonl")
+    assert not exchanges(tmp_path / "one")
 
 
 def test_each_exchange_is_told(finished: Path):
-    told = read_metrics(finished / "migrations.jsonl")
+    told = exchanges(finished)
     assert [(line["generation"], line["from"], line["to"]) for line in told] == [
         (generation, (to - 1) % 3, to) for generation in (2, 4) for to in range(3)
     ]
@@ -99,7 +103,7 @@ def test_each_exchange_is_told(finished: Path):
 
 
 def test_what_arrives_is_there_in_the_next_generation(finished: Path):
-    sent = next(line for line in read_metrics(finished / "migrations.jsonl") if line["to"] == 1)
+    sent = next(line for line in exchanges(finished) if line["to"] == 1)
     after = read_metrics(finished / "islands/1/metrics.jsonl")[3]
     assert after["best"] >= sent["fitness"][0]
 
@@ -121,7 +125,7 @@ def test_without_exchanges_they_are_runs_of_their_own(
 ):
     folder = tmp_path / "apart"
     assert run(folder, stool, config(every=0))
-    assert not read_metrics(folder / "migrations.jsonl")
+    assert not exchanges(folder)
     together = without_times(finished / "islands/1/metrics.jsonl")
     apart = without_times(folder / "islands/1/metrics.jsonl")
     assert apart[:3] == together[:3]
@@ -137,7 +141,7 @@ def test_inspect_tells_each_island_and_what_came_to_it(
     assert [row["arrived"] for row in rows] == [2, 2, 2]
     assert [row["from"] for row in rows] == [[2], [0], [1]]
     told, own = (
-        read_metrics(finished / "migrations.jsonl"),
+        exchanges(finished),
         read_metrics(finished / "islands/1/metrics.jsonl"),
     )
     better = [

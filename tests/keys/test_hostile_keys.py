@@ -129,7 +129,7 @@ TEXT = {
     "nan in a column": ("csv", lambda t: t.replace(t.split(",")[-1], "nan"), "not a finite number"),
     "one frame": ("csv", lambda t: "\n".join(t.splitlines()[:2]), "at least two frames"),
     "a list": ("json", lambda t: "[1, 2]", "must hold"),
-    "cut": ("json", lambda t: t[:-5], "must hold"),
+    "cut": ("json", lambda t: t[:-5], "damaged"),
     "turns": ("json", lambda t: t.replace('"deg"', '"turn"'), 'must be "rad" or "deg"'),
     "too few": ("json", lambda t: t.replace('"time": [0.0, ', '"time": ['), "as many angles as"),
     "others": ("json", lambda t: t.replace("hip", "q").replace("_", "w"), "none of its columns"),
