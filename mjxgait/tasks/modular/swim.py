@@ -69,9 +69,8 @@ class Swim(GoingTask):
         )
 
     def judge(self, tally: Tally, settings: SwimConfig) -> Mapping[str, jax.Array]:
-        """See `Task`: the speed; the part lost by overlapping blocks; the part lost otherwise.
-
-        The latter is a part of the rest, lost by momentum from elsewhere.
+        """See `Task`: the speed; its loss by overlap; the loss of the rest by momentum from
+        elsewhere.
         """
         speed = self.speed(tally, settings)
         earned = jnp.maximum(speed, 0.0)
