@@ -1,4 +1,4 @@
-"""Fall detection: reasons for the early end of an episode on feet."""
+"""Fall detection: reasons for the early end of an episode."""
 
 from enum import IntEnum
 

@@ -232,9 +232,7 @@ def apart(window: Recording, config: BlocksConfig, on_land: bool) -> Criterion:
 
 
 def flight(middle: np.ndarray, time_step: float) -> np.ndarray:
-    """Straight-line speed [...] in m/s from the first to the last frame; middle: [..., T, 2 or 3]
-    m.
-    """
+    """Straight-line speed [...] in m/s over all frames; middle: [..., T, 2 or 3] m."""
     way = np.linalg.norm(middle[..., -1, :] - middle[..., 0, :], axis=-1)
     speed: np.ndarray = way / ((middle.shape[-2] - 1) * time_step)
     return speed

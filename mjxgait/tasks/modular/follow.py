@@ -107,8 +107,9 @@ def balanced(key: jax.Array, count: int, axes: int) -> jax.Array:
 
 
 def _ring(count: int, ahead: float, turn: jax.Array | float) -> jax.Array:
-    """Unit vectors [count, 3] evenly around the forward axis, `ahead` along it; turn: rad, first
-    one.
+    """Unit vectors [count, 3] evenly around the forward axis, `ahead` along it.
+
+    turn: rad, of the first.
     """
     about = turn + 2 * jnp.pi * jnp.arange(count) / max(count, 1)
     aside = float(np.sqrt(1 - ahead**2))

@@ -15,8 +15,8 @@ from mjxgait.types import Sensed, pytree
 SHARPNESS = 3
 """Exponent of the cost of depth: small depths cost less than in walking, large ones more.
 
-A fall presses the body into the ground for a moment, as deep as the square root of its height. At
-the cost of walking no jump above a tenth of a metre would be worth more.
+A fall presses the body into the ground for a moment, to a depth that grows as the square root of
+its height. At the cost of walking no jump above a tenth of a metre would be worth more.
 """
 
 
@@ -63,8 +63,7 @@ class Jump(BlocksTask):
         )
 
     def judge(self, tally: Tally, settings: JumpConfig) -> Mapping[str, jax.Array]:
-        """See `Task`: m; the part lost by overlapping blocks; the part of the rest lost by an early
-        end.
+        """See `Task`: m; its loss by overlap; the loss of the rest by an early end.
 
         Blocks overlap each other or the ground. An early end costs, because the wildest leap is the
         last.

@@ -56,10 +56,9 @@ class Roam(GoingTask):
         )
 
     def judge(self, tally: Tally, settings: RoamConfig) -> Mapping[str, jax.Array]:
-        """See `Task`: the speed; the part lost by overlaps; the part of the rest lost by tipping
-        over.
+        """See `Task`: the speed; its loss by overlap; the loss of the rest by tipping over.
 
-        Overlaps are those of blocks with each other or with the ground.
+        Blocks overlap each other or the ground.
         """
         speed = self.speed(tally, settings)
         earned = jnp.maximum(speed, 0.0)

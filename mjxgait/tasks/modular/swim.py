@@ -69,10 +69,7 @@ class Swim(GoingTask):
         )
 
     def judge(self, tally: Tally, settings: SwimConfig) -> Mapping[str, jax.Array]:
-        """See `Task`: the speed; the part lost by overlapping blocks; the part lost otherwise.
-
-        The latter is a part of the rest, lost by momentum from elsewhere.
-        """
+        """See `Task`: the speed; its loss by overlap; the loss of the rest by foreign momentum."""
         speed = self.speed(tally, settings)
         earned = jnp.maximum(speed, 0.0)
         inside = lost(tally.overlap / settings.overlap)

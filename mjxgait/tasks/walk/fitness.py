@@ -34,7 +34,7 @@ The share teaches balance, and must not make standing the best choice.
 WHIPPING = 2.25
 """Speed of a foot, in √(g·h), that is free.
 
-The certificate allows any body 3 and asks for a margin; the fastest body is nearly always a foot.
+The certificate allows any body 3 and needs a margin; the fastest body is nearly always a foot.
 """
 BEYOND = 0.02
 """Value of a body length beyond the distance at the wanted speed."""

@@ -43,7 +43,7 @@ NEAR = 0.25
 ROUGH = {"height": 0.05, "bounce": 0.02, "sway": 2.0}
 """Errors of half the largest penalty, in standing heights, hip heights and deg."""
 UNLIKE = {"stride": 0.15, "duty_factor": 0.15, "reach": 0.1, "pitch": 5.0}
-"""The same for the animal measures: relative, relative, hip heights, deg."""
+"""Likewise for the animal measures: relative, relative, hip heights, deg."""
 
 
 def wished_terms(
