@@ -2,7 +2,7 @@ import contextlib
 import ctypes
 import gc
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -45,6 +45,17 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
         "--matrix", type=Path, help="append a row of Markdown for each training that is tried"
     )
+
+
+@pytest.fixture
+def thorough(request: pytest.FixtureRequest) -> Callable[[str], None]:
+    """Return a function that skips the test with a reason, unless `--thorough` is given."""
+
+    def skip(reason: str) -> None:
+        if not request.config.getoption("--thorough"):
+            pytest.skip(f"{reason}; --thorough runs it")
+
+    return skip
 
 
 def pytest_collection_finish() -> None:

@@ -66,17 +66,6 @@ def examined_in_full(short: None, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(CertificateConfig, "__init__", CERTIFICATE)
 
 
-@pytest.fixture
-def thorough(request: pytest.FixtureRequest) -> Callable[[str], None]:
-    """Return a function that skips the test with a reason, unless `--thorough` is given."""
-
-    def skip(reason: str) -> None:
-        if not request.config.getoption("--thorough"):
-            pytest.skip(f"{reason}; --thorough runs it")
-
-    return skip
-
-
 def _default(monkeypatch: pytest.MonkeyPatch, cls: type, short: Any) -> None:
     """Give a class of settings other defaults."""
     plain = cls.__init__

@@ -125,24 +125,19 @@ def creatures_of(config: str) -> list[str]:
     return fit if table.get("creature") else [smallest(fit)]
 
 
-def marks(way: Way) -> set[tuple[str, ...]]:
-    """Return what a way of training simulates: its task, its file, and the file's table for the task."""
-    task = way.task or read_config(way.config or "default").get("use", {}).get("task")
-    task = task or use_of(way.creature).task
-    found = {("task", task), ("config", way.config or "")}
-    if way.config and task in read_config(way.config).get("task", {}):
-        found.add(("table", way.config, task))
-    return found
+def task_of(way: Way) -> str:
+    """Return the task of a way of training, by the name that a user gives it."""
+    asked = way.task or read_config(way.config or "default").get("use", {}).get("task")
+    return asked or use_of(way.creature).task
 
 
-def covering(ways: Iterable[Way]) -> list[Way]:
-    """Return the ways that bring something which no way before them has covered."""
-    chosen, known = [], set[tuple[str, ...]]()
+def first_of_each_task(ways: Iterable[Way]) -> list[Way]:
+    """Return the first way of training with each task."""
+    first: dict[tuple[str, bool], Way] = {}
     for way in ways:
-        if marks(way) - known:
-            chosen.append(way)
-            known |= marks(way)
-    return chosen
+        grows = creature_of(way.creature).settings.creature.grows
+        first.setdefault((task_of(way), grows), way)
+    return list(first.values())
 
 
 def trainings() -> Iterator[Way]:
