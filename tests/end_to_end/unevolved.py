@@ -56,7 +56,7 @@ def generation(
     later = dataclasses.replace(
         state,
         terms=jnp.zeros_like(state.terms),
-        outcome=jnp.ones_like(state.outcome),
+        outcome=jnp.full_like(state.outcome, 0.25),
         fitness=jnp.zeros_like(state.fitness),
         generation=state.generation + 1,
     )
