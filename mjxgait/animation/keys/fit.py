@@ -17,7 +17,7 @@ MOST_POSES = 12
 SEEN = 0.5
 """deg; a smaller loss at a pose range is not visible."""
 TURNS = 4
-"""Places tried for the first pose, within one step between poses."""
+"""Number of places tried for the first pose, within the first 1 / K of the cycle."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
