@@ -1,1 +1,1 @@
-"""Animation files: what is written for other programs, and what is read from them."""
+"""Animation files: export to other programs, and import from them."""

@@ -1,4 +1,4 @@
-"""From a creature folder to the static facts of a `Creature`."""
+"""Creature folders, and the static facts of a `Creature`."""
 
 from mjxgait.creature.creature import Creature
 from mjxgait.creature.load import load_creature

@@ -1,8 +1,8 @@
-"""The parts that a creature's facts fall into: what controllers, tasks and senses know of a body.
+"""Groups of a creature's facts, as controllers, tasks and observations use them.
 
 Letters: `J` actuated joints in the model's order, `F` geoms of feet, `G` watched geoms, the feet's
-first. Numbers are arrays that a compiled program has as constants or as inputs (`mjxgait/creature/body.py`);
-what shapes a program is a tuple.
+first. Arrays are constants or inputs of a compiled program (`mjxgait/creature/body.py`); tuples
+determine its shape.
 """
 
 import dataclasses
@@ -20,10 +20,10 @@ def _static() -> Any:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Frame:
-    """The trunk's axes, where it stands, and the creature's yardsticks.
+    """The trunk's axes and standing place, and the creature's characteristic sizes.
 
     forward, left, up: [3] unit vectors in the trunk's frame. stand_pos: [3] m, stand_rot: [3, 3],
-    of the standing trunk. start_axes: horizontal unit vectors [3] forward and left of it, in the
+    of the standing trunk. start_axes: its horizontal unit vectors [3] forward and left, in the
     world. hip_height: m, mean leg length. body_length: m. mass: kg.
     """
 
@@ -45,9 +45,10 @@ class Frame:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Joints:
-    """The actuated joints. stand: [J] rad, standing. pose_low, pose_high: [J] rad, of targets.
+    """The actuated joints.
 
-    low, high: [J] rad, of the joints themselves. qpos, dofs: [J] their places in `qpos` and `qvel`.
+    stand: [J] rad, standing. pose_low, pose_high: [J] rad, of targets. low, high: [J] rad, of the
+    joints themselves. qpos, dofs: [J] their places in `qpos` and `qvel`.
     """
 
     stand: np.ndarray
@@ -61,18 +62,18 @@ class Joints:
 
     @functools.cached_property
     def qpos_adr(self) -> np.ndarray:
-        """Places [J] in `qpos`, to index with."""
+        """Places [J] in `qpos` as an index array."""
         return np.array(self.qpos, dtype=int)
 
     @functools.cached_property
     def dof_adr(self) -> np.ndarray:
-        """Places [J] in `qvel`, to index with."""
+        """Places [J] in `qvel` as an index array."""
         return np.array(self.dofs, dtype=int)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Gains:
-    """What drives the joints. kp, kd, torque_limit: [J] N·m/rad, N·m·s/rad, N·m."""
+    """Gains of the joints. kp, kd, torque_limit: [J] N·m/rad, N·m·s/rad, N·m."""
 
     kp: np.ndarray
     kd: np.ndarray
@@ -81,9 +82,10 @@ class Gains:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Mirror:
-    """Which joint is whose mirror image. sign: [J] of the angle there. partners: [J].
+    """Mirror image of each joint.
 
-    symmetric: whether poses are mirrored.
+    partners: [J] the joint on the other side. sign: [J] of the angle there. symmetric: whether
+    poses are mirrored.
     """
 
     sign: np.ndarray
@@ -92,7 +94,7 @@ class Mirror:
 
     @functools.cached_property
     def partner(self) -> np.ndarray:
-        """Joint [J] on the other side, to index with."""
+        """Joint [J] on the other side as an index array."""
         return np.array(self.partners, dtype=int)
 
     def image(self, angles: np.ndarray) -> np.ndarray:
@@ -102,10 +104,11 @@ class Mirror:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Stepping:
-    """Weights [J], rad per hip height, with which joints take their foot ahead, and to the left.
+    """Weights of the joints for steps under a fall.
 
-    turn: [J] rad per rad by which they turn it to the left. legs: [J] the foot that each joint moves;
-    of joints without a weight any.
+    ahead, aside: [J] rad per hip height, to move the foot ahead and to the left. turn: [J] rad per
+    rad, to turn it to the left. legs: [J] the foot that each joint moves; arbitrary for joints
+    without a weight.
     """
 
     ahead: np.ndarray
@@ -118,7 +121,7 @@ class Stepping:
 class Corrections:
     """Weights [J] with which joints steer and balance (docs/controller.md).
 
-    stepping: with which they step under a fall; None where none does.
+    stepping: weights for steps under a fall; None where no joint steps.
     """
 
     steer_bend: np.ndarray
@@ -129,18 +132,18 @@ class Corrections:
 
     @property
     def steps(self) -> bool:
-        """Whether any joint steps under a fall."""
+        """True if any joint steps under a fall."""
         return self.stepping is not None
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Feet:
-    """What meets the ground.
+    """Feet, and other geoms that may touch the ground.
 
-    names: one per foot. foot_of: [F] which foot each geom of a foot belongs to. watched: [G] ids of
-    geoms whose height is sensed. ground: ids of the other geoms that may touch the floor.
-    stations: of each foot its rank from the front on its side, and whether that is the left.
-    places: [N, 2] m ahead of the trunk and left of it along its nose, where the N feet stand.
+    names: one per foot. foot_of: [F] foot of each geom of a foot. watched: [G] ids of geoms with an
+    observed height. ground: ids of the other geoms that may touch the floor. stations: each foot's
+    rank from the front on its side, and whether that side is the left. places: [N, 2] m ahead of
+    the trunk and left of it along its nose, where the N feet stand.
     """
 
     names: tuple[str, ...] = _static()
@@ -162,7 +165,7 @@ class Feet:
 
     @functools.cached_property
     def watched(self) -> np.ndarray:
-        """Ids [G] of the geoms whose height is sensed."""
+        """Ids [G] of the geoms with an observed height."""
         return np.array(self.seen, dtype=int)
 
     @functools.cached_property

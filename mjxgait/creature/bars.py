@@ -1,4 +1,4 @@
-"""Bars (capsules) inside a shape: spheres and capsules are their own, others are filled."""
+"""Bars (capsules) inside a shape: a sphere or capsule is one bar, other shapes are filled."""
 
 import dataclasses
 import itertools
@@ -8,20 +8,21 @@ import numpy as np
 
 GEOM = mujoco.mjtGeom
 MOST = 5
-"""Bars side by side in a flat shape."""
+"""Largest number of bars side by side in a flat shape."""
 STATIONS = 65
 REST = 0.1
-"""Share of a shape's length from which an end that no bar reaches gets one of its own."""
+"""Share of a shape's length above which an uncovered end gets a bar of its own."""
 RINGS = 24
 SHARP = 0.25
-"""Half thicknesses of a box, radius of the bars along its edges."""
+"""Radius of the bars along a box's edges, in half thicknesses of the box."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Bar:
     """A capsule in its body's frame.
 
-    centre: [3] m. half: [3] m, from there to one end of its axis; zero for a sphere. radius: m.
+    centre: [3] m. half: [3] m, from the centre to one end of the axis; zero for a sphere.
+    radius: m.
     """
 
     centre: np.ndarray
@@ -30,7 +31,7 @@ class Bar:
 
 
 def bars_of(model: mujoco.MjModel, geom: int) -> list[Bar]:
-    """The bars of a geom."""
+    """Bars of a geom, in its body's frame."""
     rot = np.zeros(9)
     mujoco.mju_quat2Mat(rot, model.geom_quat[geom])
     turn, pos = rot.reshape(3, 3), model.geom_pos[geom]
@@ -39,7 +40,7 @@ def bars_of(model: mujoco.MjModel, geom: int) -> list[Bar]:
 
 
 def _own_frame(model: mujoco.MjModel, geom: int) -> list[Bar]:
-    """In the geom's own frame."""
+    """Bars of a geom, in its own frame."""
     size = model.geom_size[geom]
     match int(model.geom_type[geom]):
         case GEOM.mjGEOM_SPHERE:
@@ -86,7 +87,7 @@ def _fill(points: np.ndarray) -> list[Bar]:
 
     The origin must lie inside. It does for primitive shapes; a mesh has its centre of mass there.
     """
-    # Slow to import, and inspecting a run needs no bars.
+    # Imported late: the import is slow, and inspecting a run needs no bars.
     from scipy.spatial import ConvexHull, QhullError
 
     low, high = points.min(0), points.max(0)
@@ -111,7 +112,7 @@ def _fill(points: np.ndarray) -> list[Bar]:
 
 
 def _edges(size: np.ndarray) -> list[Bar]:
-    """Thin bars along the four longest edges of a box, which the thick ones inside leave bare."""
+    """Thin bars along the four longest edges of a box, which the thick ones do not cover."""
     thin, broad, long = np.argsort(size)
     radius = SHARP * size[thin]
     half = np.zeros(3)
@@ -125,9 +126,9 @@ def _edges(size: np.ndarray) -> list[Bar]:
 
 
 def _along(line: np.ndarray, inside: np.ndarray) -> list[Bar]:
-    """The largest bar on a line of points [n, 3], and of what it leaves over at either end.
+    """The largest bar on a line of points [n, 3], and one at each end that it leaves uncovered.
 
-    inside: [n] m, how deep each point lies in the shape.
+    inside: [n] m, depth of each point in the shape.
     """
     bar = _largest(line, inside)
     covered = np.linalg.norm(line - bar.centre, axis=1) <= np.linalg.norm(bar.half) + bar.radius
@@ -138,7 +139,7 @@ def _along(line: np.ndarray, inside: np.ndarray) -> list[Bar]:
 
 
 def _largest(line: np.ndarray, inside: np.ndarray) -> Bar:
-    """The bar of the greatest volume."""
+    """The bar of the greatest volume on the line."""
     best, most = Bar(line[0], np.zeros(3), 0.0), -1.0
     for radius in np.linspace(0.4, 1.0, 25) * inside.max():
         span = np.flatnonzero(inside >= radius * (1 - 1e-9))

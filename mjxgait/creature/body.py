@@ -1,7 +1,7 @@
-"""A body as controllers, tasks and senses know it.
+"""A body as controllers, tasks and observations use it.
 
-Either the `Creature` itself, whose numbers are constants of the compiled program, or its numbers as
-inputs of the program, which then serves every body of the same make-up.
+Either the `Creature` itself, with its numbers as constants of the compiled program, or its numbers
+as inputs of the program, which then serves every body of the same structure.
 """
 
 import dataclasses
@@ -31,7 +31,7 @@ for part in (Frame, Joints, Gains, Mirror, Stepping, Corrections, Feet):
 
 @pytree
 class GivenBody:
-    """A body whose numbers are inputs of the program; see `Creature`."""
+    """A body with its numbers as inputs of the program; see `Creature`."""
 
     frame: Frame
     joints: Joints
@@ -47,9 +47,9 @@ Body = Creature | GivenBody
 
 @pytree
 class Ends:
-    """A `Termination` whose numbers are inputs of the program.
+    """A `Termination` with its numbers as inputs of the program.
 
-    min_up: [], height: ([], []). touch: whether one ends an episode.
+    min_up: [], height: ([], []). touch: whether a touch ends an episode.
     """
 
     min_up: Number
@@ -58,7 +58,10 @@ class Ends:
 
 
 def given_body(creature: Creature) -> GivenBody:
-    """A creature's numbers in single precision; names are numbered, for they shape no program."""
+    """A creature's numbers in single precision.
+
+    Names become numbers: they do not affect the program.
+    """
     given = GivenBody(
         frame=creature.frame,
         joints=dataclasses.replace(creature.joints, names=_numbered(creature.joints.names)),
@@ -74,7 +77,7 @@ def given_body(creature: Creature) -> GivenBody:
 
 
 def given_ends(ends: Termination) -> Ends:
-    """What ends an episode, in single precision."""
+    """The termination settings in single precision."""
     low, high = (jnp.float32(height) for height in ends.height)
     return Ends(jnp.float32(ends.min_up), (low, high), ends.touch)
 

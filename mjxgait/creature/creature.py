@@ -1,4 +1,4 @@
-"""The static facts of a body that the other rooms need."""
+"""The static facts of a body that the other packages need."""
 
 import dataclasses
 import hashlib
@@ -22,7 +22,7 @@ HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
 SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)
 FLOOR = "floor"
 REST = "rest"
-"""Name of the keyframe in which an animator's skeleton rests, where it is not the standing pose."""
+"""Keyframe of the rest pose of an animator's skeleton, where it is not the standing pose."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -30,8 +30,8 @@ class Creature:
     """The static facts of a body.
 
     files: name and text of each file, as read. model: the body as its file describes it.
-    trunk: id of its body. stand_qpos: [nq], the standing pose.
-    terrain: the ground it walks on, which is not in `model`: there the floor is a plane.
+    trunk: id of its body. stand_qpos: [nq], the standing pose. terrain: the ground; it is not in
+    `model`, where the floor is a plane.
     """
 
     settings: CreatureSettings
@@ -59,17 +59,17 @@ class Creature:
 
     @property
     def root_qpos(self) -> int:
-        """Where the trunk's joints begin in qpos: of a free trunk x, y, z and its quaternion."""
+        """First place of the trunk's joints in qpos; a free trunk has x, y, z and a quaternion."""
         return int(self.model.jnt_qposadr[self.model.body_jntadr[self.trunk]])
 
     @property
     def root_dof(self) -> int:
-        """Where they begin in qvel."""
+        """First place of the trunk's joints in qvel."""
         return int(self.model.jnt_dofadr[self.model.body_jntadr[self.trunk]])
 
     @property
     def gravity(self) -> float:
-        """m/s², downwards."""
+        """Gravity in m/s², downwards."""
         return float(-self.model.opt.gravity[2])
 
     @property
@@ -80,21 +80,21 @@ class Creature:
 
     @property
     def rest_qpos(self) -> np.ndarray:
-        """[nq], the pose in which the bones of files with its motion rest."""
+        """Rest pose [nq] of the bones in animation files."""
         return np.array(self.model.key(REST).qpos) if self.is_rig else self.stand_qpos
 
     @property
     def is_rig(self) -> bool:
-        """Whether it was made of a skeleton, whose bones rest in a pose of their own."""
+        """True if the creature was imported from a skeleton, which has its own rest pose."""
         return mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_KEY, REST) >= 0
 
     @property
     def evolution_model(self) -> mujoco.MjModel:
-        """The model in which evolution simulates, unless its settings say what ends an episode."""
+        """The model that evolution simulates if the run's settings do not set termination."""
         return self.model_where(self.settings.termination.touch)
 
     def on(self, ground: str) -> "Creature":
-        """The creature on other ground, by its text.
+        """Return the creature on other ground, given as text.
 
         Raises:
           ValueError: says what is allowed.
@@ -104,8 +104,8 @@ class Creature:
     def spanned(self, degrees: float) -> "Creature":
         """Return the creature with pose ranges of this width for every hinge; 0 returns it as it is.
 
-        Each range keeps the middle that creature.toml gives it. A range that would reach beyond the
-        joint's own range is moved inwards, and cut where it is wider.
+        Each range keeps its middle from creature.toml. A range that would reach beyond the joint's
+        own range is moved inwards, and cut where it is wider.
         """
         if not degrees:
             return self
@@ -123,9 +123,9 @@ class Creature:
         return dataclasses.replace(self, joints=spanned)
 
     def model_where(self, touch_ends: bool) -> mujoco.MjModel:
-        """The model in which evolution simulates, depending on whether a touch ends an episode.
+        """The model that evolution simulates, depending on whether a touch ends an episode.
 
-        If so it has contacts on feet and ground geoms only: the force of another never matters.
+        If so, only feet and ground geoms have contacts: the force on other geoms never matters.
         """
         if not touch_ends:
             return self.model

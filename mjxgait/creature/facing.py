@@ -1,5 +1,6 @@
-"""A body of which another side is ahead: who walks backwards is one who faces the other way and
-walks forward, for evolution and for the examiner.
+"""A body that faces another way.
+
+For evolution and certification, walking backwards is walking forward with the body turned around.
 """
 
 import dataclasses
@@ -26,11 +27,11 @@ Table = Mapping[str, float]
 
 
 def facing(creature: Creature, way: str) -> Creature:
-    """The creature whose forward axis points where `way` is now.
+    """Return the creature with its forward axis turned to `way`.
 
-    What its reflexes do to the body stays the same: a fall to its old front is answered as ever, by
-    another name. The mirror image of a sidestep goes the other way, so who goes aside has no mirror;
-    nor has it steering, for what turns a walk does not turn a sidestep.
+    Its reflexes act on the body as before, under other names. Sideways there is no mirror, because
+    the mirror image of a sidestep goes the other way, and no steering, because the correction that
+    turns a walk does not turn a sidestep.
 
     Raises:
       UserError: there is no such way.
@@ -46,7 +47,7 @@ def facing(creature: Creature, way: str) -> Creature:
 
 
 def _turned(settings: CreatureSettings, way: str, axis: np.ndarray) -> CreatureSettings:
-    # What is usual ahead is not known to be so the other way round.
+    # The defaults apply to walking forward; they may not fit another way.
     settings = dataclasses.replace(settings, usual=Usual())
     balance, stepping, steering = settings.balance, settings.stepping, settings.steering
     x, y, z = np.round(axis, 9) + 0.0
@@ -62,7 +63,8 @@ def _turned(settings: CreatureSettings, way: str, axis: np.ndarray) -> CreatureS
         return dataclasses.replace(
             settings, creature=identity, steering=steering, balance=balance, stepping=stepping
         )
-    # It is as long as it was wide, and what was roll to the right is a pitch towards the right side, and likewise all around.
+    # The body is now as long as it was wide, so the stated length is dropped. Roll to the right
+    # becomes pitch towards the right side, and likewise all around.
     sign = 1 if way == "right" else -1
     return dataclasses.replace(
         settings,

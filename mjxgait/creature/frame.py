@@ -1,4 +1,4 @@
-"""Where a creature starts: the directions and the place that its way is measured from."""
+"""Start place and directions, from which a creature's way is measured."""
 
 import mujoco
 import numpy as np
@@ -8,7 +8,7 @@ from mjxgait.creature.ground.spec import Place
 
 
 def start_place(creature: Creature) -> Place:
-    """Where the creature starts on its ground."""
+    """Start place of the creature on its ground."""
     return Place(
         creature.frame.stand_pos,
         creature.frame.start_axes[0],
@@ -18,8 +18,9 @@ def start_place(creature: Creature) -> Place:
 
 
 def horizontal_freedoms(creature: Creature) -> np.ndarray:
-    """[2, nv] generalised velocity of the trunk moving at 1 m/s along the world's x and y; zero
-    where the root cannot move so.
+    """Generalised velocities [2, nv] of the trunk moving at 1 m/s along the world's x and y.
+
+    Zero where the root cannot move so.
     """
     model = creature.model
     moves = np.zeros((2, model.nv))
@@ -35,7 +36,7 @@ def horizontal_freedoms(creature: Creature) -> np.ndarray:
 
 
 def vertical_freedom(model: mujoco.MjModel) -> np.ndarray:
-    """[nq] change of the positions that lifts by 1 m all whose root can rise; zero where it cannot."""
+    """Change of the positions [nq] that lifts every root by 1 m; zero for a root that cannot rise."""
     rises = np.zeros(model.nq)
     for joint in range(model.njnt):
         place = model.jnt_qposadr[joint]

@@ -1,4 +1,4 @@
-"""Measurements of a MuJoCo model in its standing pose: support points, leg length, mirror map."""
+"""Measurements of a MuJoCo model in its standing pose: support points, leg lengths, mirror map."""
 
 import mujoco
 import numpy as np
@@ -8,17 +8,17 @@ from mjxgait.errors import UserError
 GEOM = mujoco.mjtGeom
 DOWN = np.array([0.0, 0.0, -1.0])
 PARALLEL = 0.99999
-"""Cosine from which two axes count as parallel. Those of twenty joints that differ no more are of rank
-one to within 0.01, by which the examiner goes.
+"""Cosine from which two axes count as parallel. The axes of twenty joints within this limit are of
+rank one to within 0.01, the limit of certification.
 """
 
 
 def support_extents(geom_type: int, size: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
     """Parameters `(r, b, e)` of a geom's support function.
 
-    How far the geom reaches from its centre in the direction `u` of its own frame is
-    `r + sum(abs(u) * b) + sqrt(sum((u * e)**2))`: a sphere, a box and an ellipsoid summed
-    (Minkowski).
+    The geom's reach from its centre in the direction `u` of its own frame is
+    `r + sum(abs(u) * b) + sqrt(sum((u * e)**2))`: the Minkowski sum of a sphere, a box and an
+    ellipsoid.
 
     Args:
       size: [3] MuJoCo's sizes. A mesh is measured by the box in `size`.
@@ -44,7 +44,7 @@ def support_extents(geom_type: int, size: np.ndarray) -> tuple[float, np.ndarray
 def geom_reach(
     model: mujoco.MjModel, data: mujoco.MjData, geom: int, direction: np.ndarray
 ) -> float:
-    """How far a geom reaches along a world direction [3], measured from the world's origin; m."""
+    """Reach of a geom along a world direction [3], from the world's origin; m."""
     r, box, ellipsoid = support_extents(model.geom_type[geom], model.geom_size[geom])
     u = data.geom_xmat[geom].reshape(3, 3).T @ direction
     return float(
@@ -56,18 +56,18 @@ def geom_reach(
 
 
 def shapes(model: mujoco.MjModel) -> list[int]:
-    """The geoms of bodies that may touch something."""
+    """Geoms that may touch something, without the world's."""
     collides = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
     return [int(g) for g in np.flatnonzero(collides & (model.geom_bodyid != 0))]
 
 
 def lowest(model: mujoco.MjModel, data: mujoco.MjData) -> float:
-    """m, the lowest point of what may touch something."""
+    """Height of the lowest point that may touch something; m."""
     return min(-geom_reach(model, data, g, DOWN) for g in shapes(model))
 
 
 def body_length(model: mujoco.MjModel, data: mujoco.MjData, forward: np.ndarray) -> float:
-    """From the foremost to the hindmost point along a world direction [3]; m."""
+    """Distance from the foremost to the hindmost point along a world direction [3]; m."""
     parts = [g for g in range(model.ngeom) if model.geom_bodyid[g] != 0]
     front = max(geom_reach(model, data, g, forward) for g in parts)
     return front + max(geom_reach(model, data, g, -forward) for g in parts)
@@ -85,10 +85,10 @@ def ancestors(model: mujoco.MjModel, body: int) -> list[int]:
 def leg_lengths(
     model: mujoco.MjModel, data: mujoco.MjData, feet: list[int], joints: list[int]
 ) -> np.ndarray:
-    """[feet] height in m of each leg's first joint above the floor; a leg is the part of the
-    tree that leads to one foot body only.
+    """Height [feet] in m of each leg's first joint above the floor.
 
-    What stands on its trunk has no leg: all that hangs on it counts, up to the highest joint.
+    A leg is the part of the tree that leads to one foot body only. A body that stands on its trunk
+    has no leg: its highest joint counts.
     """
     if {model.jnt_bodyid[j] for j in joints}.isdisjoint(
         b for foot in feet for b in ancestors(model, foot)
@@ -110,7 +110,7 @@ def leg_lengths(
 
 
 def parallel(axes: np.ndarray) -> np.ndarray:
-    """[J] whether each axis is parallel to the first. axes: [J, 3] of length 1."""
+    """Flags [J] of the axes that are parallel to the first. axes: [J, 3] of length 1."""
     found: np.ndarray = np.abs(axes @ axes[0]) >= PARALLEL
     return found
 
@@ -123,8 +123,7 @@ def mirror_map(
     names: list[str],
     tolerance: float,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Partner joint and sign of every joint under reflection in the vertical plane through the
-    trunk.
+    """Partner and sign of every joint, reflected in the vertical plane through the trunk.
 
     A rotation axis is a pseudo-vector: reflected in y it becomes `(-x, y, -z)`; a slide's direction
     becomes `(x, -y, z)`.
@@ -132,9 +131,9 @@ def mirror_map(
     Args:
       anchors, axes: [J, 3] in the creature's frame (forward, left, up) in the standing pose, m.
       slides: [J] whether the joint is a slide.
-      carried: [J, 3] m, likewise, the centre of mass of all that hangs on the joint: it tells apart
-        a left joint and a right one that have the same anchor and axis.
-      tolerance: m, how far a mirrored anchor may be from its partner's.
+      carried: [J, 3] m, in the same frame: the centre of mass of all that hangs on the joint. It
+        distinguishes a left and a right joint with the same anchor and axis.
+      tolerance: m, largest distance of a mirrored anchor from its partner's.
 
     Returns:
       partner [J] and sign [J]: joint `j` of the mirror image moves as `sign[j] * partner[j]`.
@@ -160,9 +159,9 @@ def mirror_images(
     tolerance: float,
     slack: float = 1.0,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Partner [J] of every joint as `mirror_map` has it, -1 where there is none, and sign [J].
+    """Partner [J] of every joint as in `mirror_map`, -1 where there is none, and sign [J].
 
-    slack: how far axes may be off, in units of what they usually may.
+    slack: tolerance of the axes, in units of the usual one.
     """
     mirror = [1, -1, 1]
     turned = axes * np.where(slides[:, None], [1.0, -1.0, 1.0], [-1.0, 1.0, -1.0])

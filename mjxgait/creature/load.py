@@ -1,4 +1,4 @@
-"""Loads a creature folder: every fact that the other rooms need, checked, in one frozen value."""
+"""Load a creature folder: all facts that the other packages need, checked, in one frozen value."""
 
 import dataclasses
 import fnmatch
@@ -37,14 +37,14 @@ NOT_ALONE = re.compile(
     r"<\s*(!DOCTYPE|!ENTITY|include|plugin|extension|replicate|composite|flexcomp|attach|model|size)\b|[\s\"'](file\w*|\w+dir)\s*="
 )
 MOST_TEXT = 8_000_000
-"""Bytes of a file."""
+"""Largest size of a file in bytes."""
 
 
 def load_creature(folder: Path) -> Creature:
-    """The creature in a folder that holds `creature.xml` and `creature.toml`.
+    """Return the creature in a folder that holds `creature.xml` and `creature.toml`.
 
     Raises:
-      UserError: names the file and the element that is wrong, and the way out.
+      UserError: names the file, the wrong element and the remedy.
     """
     toml, xml = folder / "creature.toml", folder / "creature.xml"
     settings = build(CreatureSettings, read_toml(toml), str(toml))
@@ -63,9 +63,7 @@ def load_creature(folder: Path) -> Creature:
 
 
 def _check_alone(path: Path, text: str) -> None:
-    """A body may come from a stranger: it refers to no other file, runs no plugin, and does not
-    multiply itself.
-    """
+    """Refuse references to other files, plugins and replication: a body may come from a stranger."""
     if found := NOT_ALONE.search(text):
         what = found.group(1) or found.group(2)
         raise UserError(
@@ -118,7 +116,7 @@ def _assemble(
 
 
 def _actuated(model: mujoco.MjModel, trunk: int) -> list[int]:
-    """Ids of the joints that are driven: all hinges and slides but the trunk's."""
+    """Ids of the actuated joints: all hinges and slides but the trunk's."""
     joints = [
         j
         for j in range(model.njnt)
@@ -132,7 +130,7 @@ def _actuated(model: mujoco.MjModel, trunk: int) -> list[int]:
 def _joints(
     model: mujoco.MjModel, data: mujoco.MjData, joints: list[int], poses: np.ndarray
 ) -> Joints:
-    """poses: [J, 2] rad, how far targets reach about the standing pose."""
+    """The actuated joints. poses: [J, 2] rad, range of targets about the standing pose."""
     stand, given = data.qpos[model.jnt_qposadr[joints]], model.jnt_range[joints]
     endless = (given == 0).all(1, keepdims=True)
     low, high = np.where(endless, [-np.inf, np.inf], given).T
@@ -196,8 +194,9 @@ def _standing(model: mujoco.MjModel, keyframe: str) -> mujoco.MjData:
 
 
 def _trunk_axes(rotation: np.ndarray, forward: np.ndarray) -> np.ndarray:
-    """Rows forward, left, up in the trunk's frame: forward as given, up as near to the world's
-    as it can be in the standing pose.
+    """Rows forward, left, up in the trunk's frame.
+
+    Forward is as given; up is as near to the world's as it can be in the standing pose.
     """
     world_up = rotation.T @ [0.0, 0.0, 1.0]
     up = world_up - forward * (world_up @ forward) / max(forward @ forward, 1e-9)
@@ -267,7 +266,7 @@ def _feet(
 
 
 def _foot_bodies(model: mujoco.MjModel, names: tuple[str, ...]) -> tuple[list[int], list[int]]:
-    """Foot bodies, and foot geoms in the order of their feet; geoms on one body are one foot."""
+    """Foot bodies, and foot geoms in the order of their feet; geoms of one body form one foot."""
     if not names:
         raise UserError("creature.feet is empty; name the geoms that step on the floor")
     geoms = [_id(model, mujoco.mjtObj.mjOBJ_GEOM, name, "creature.feet") for name in names]
@@ -284,7 +283,7 @@ def _forbidden(model: mujoco.MjModel, feet: list[int], ground: list[int]) -> lis
 
 
 def _check_plane(creature: Creature, data: mujoco.MjData) -> None:
-    """Refuses a body in two dimensions that can leave its plane."""
+    """Refuse a planar body that can leave its plane."""
     names = creature.joints.names
     axes = data.xaxis[[creature.model.joint(name).id for name in names]]
     for name, alike in zip(names, geometry.parallel(axes), strict=True):
@@ -296,8 +295,9 @@ def _check_plane(creature: Creature, data: mujoco.MjData) -> None:
 
 
 def _check(creature: Creature, data: mujoco.MjData) -> None:
-    """Refuses an empty pose range and gains outside SPD's stable region `h² kp < (4 I + 2 h kd)
-    / 3` (docs/controller.md).
+    """Refuse an empty pose range, and gains outside SPD's stable region.
+
+    The region is `h² kp < (4 I + 2 h kd) / 3` (docs/controller.md).
     """
     model, h = creature.model, creature.model.opt.timestep
     mass = np.zeros((model.nv, model.nv))

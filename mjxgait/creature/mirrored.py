@@ -1,4 +1,4 @@
-"""Which joint is whose mirror image."""
+"""Mirror partners of joints."""
 
 import mujoco
 import numpy as np
@@ -16,10 +16,10 @@ def mirrored(
     joints: list[int],
     axes: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Partner [J] and sign [J]: those that the file states, the others from the geometry;
-    without symmetry everyone is their own.
+    """Partner [J] and sign [J] of each joint: as the file states, else from the geometry.
 
-    joints: [J] ids. axes: rows forward, left, up in the trunk's frame.
+    Without symmetry each joint is its own partner. joints: [J] ids. axes: rows forward, left, up in
+    the trunk's frame.
 
     Raises:
       UserError: names the joints that contradict each other.
@@ -64,7 +64,7 @@ def mirrored(
 
 
 def _check_names(names: list[str], partner: np.ndarray) -> None:
-    """The geometry and the names must not contradict each other."""
+    """Refuse names that contradict the geometry."""
     for name, other in zip(names, (names[p] for p in partner), strict=True):
         swapped = name.replace("left", "\0").replace("right", "left").replace("\0", "right")
         if swapped != name and swapped in names and swapped != other:

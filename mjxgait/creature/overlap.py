@@ -1,7 +1,7 @@
-"""Which parts of a creature can pass through each other, and how deep two bars are in one another.
+"""Overlap of a creature's parts: pairs that can pass through each other, and their depth.
 
-Parts do not collide in evolution: contacts there would cost too much. Their depth is measured
-instead, on bars (capsules, spheres) inside each shape, between parts that are not neighbours.
+Parts do not collide in evolution: such contacts would cost too much. Instead their depth is
+measured on bars (capsules, spheres) inside each shape, between parts that are not neighbours.
 Letters: `S` bars, `Q` pairs of bars.
 """
 
@@ -17,14 +17,14 @@ from mjxgait.creature.bars import Bar, bars_of
 from mjxgait.creature.creature import Creature
 
 NEAR = 0.1
-"""Hip heights; joints nearer to each other are at one place, like the three of an Euler hip."""
+"""Hip heights; joints nearer to each other count as one place, like the three of an Euler hip."""
 SAMPLES = 384
 BEYOND = 0.1
-"""Share of a pose range by which joints may leave it: balance corrections and lag do that."""
+"""Share of a pose range by which balance corrections and lag may take joints beyond it."""
 CLOSE = 0.05
 """Hip heights; pairs that stay farther apart in all sampled poses are left out."""
 MOST_PAIRS = 256
-"""Of bars that are watched."""
+"""Largest number of measured pairs of bars."""
 
 Numbers = Any
 """np.ndarray | jax.Array"""
@@ -33,11 +33,11 @@ Vector = tuple[Numbers, Numbers, Numbers]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Crossings:
-    """What to look at.
+    """The pairs of bars to measure.
 
-    body: [S] ids. centre, half: [S, 3] m in the body's frame, a bar's middle and from there to an
-    end. radius: [S] m. first, second: [Q] the bars of each pair. allowed: [Q] m, the depth at which
-    their shapes already stand.
+    body: [S] ids. centre, half: [S, 3] m in the body's frame, a bar's middle, and from there to an
+    end. radius: [S] m. first, second: [Q] the bars of each pair. allowed: [Q] m, the depth of their
+    shapes in the standing pose.
     """
 
     body: np.ndarray
@@ -50,7 +50,7 @@ class Crossings:
 
     @property
     def reach(self) -> np.ndarray:
-        """[Q] m; a pair's depth is this minus the distance of the two axes."""
+        """Reach [Q] in m; a pair's depth is this minus the distance of the two axes."""
         return self.radius[self.first] + self.radius[self.second] - self.allowed
 
     def only(self, pairs: np.ndarray | list[int]) -> "Crossings":
@@ -59,7 +59,7 @@ class Crossings:
         return dataclasses.replace(self, **chosen)
 
     def lengths(self) -> tuple[np.ndarray, np.ndarray]:
-        """[Q] squared half lengths of the first and the second bars; m²."""
+        """Squared half lengths [Q] of the first and the second bars; m²."""
         squared = (self.half**2).sum(1)
         return squared[self.first], squared[self.second]
 
@@ -79,7 +79,7 @@ def bar_distance(
     inverse = [(x > 0) / (x + (x == 0)) for x in lengths]
     along = _dot(first, second)
     lead, back = _dot(first, apart), _dot(second, apart)
-    # Of parallel segments any place will do to begin with: the two projections find the nearest.
+    # For parallel segments any start will do: the two projections find the nearest points.
     skew = (lengths[0] * lengths[1] - along * along).clip(1e-12, None)
     s = ((along * back - lead * lengths[1]) / skew).clip(-1.0, 1.0)
     t = ((along * s + back) * inverse[1]).clip(-1.0, 1.0)
@@ -89,7 +89,7 @@ def bar_distance(
 
 
 def find_crossings(creature: Creature) -> Crossings:
-    """The pairs of bars that come near each other in the pose ranges; always the same."""
+    """Pairs of bars that come near each other in the pose ranges; deterministic."""
     model, data = creature.model, mujoco.MjData(creature.model)
     data.qpos[:] = creature.stand_qpos
     mujoco.mj_kinematics(model, data)
@@ -107,7 +107,7 @@ def find_crossings(creature: Creature) -> Crossings:
 
 
 def all_bars(model: mujoco.MjModel) -> tuple[np.ndarray, list[Bar]]:
-    """The bars of everything that moves: geom id [S] and bar of each."""
+    """Bars of all moving geoms: geom id [S] and bar of each."""
     moving = np.flatnonzero(model.body_weldid[model.geom_bodyid] != 0)
     pairs = [(int(g), bar) for g in moving for bar in bars_of(model, int(g))]
     return np.array([g for g, _ in pairs], dtype=int), [bar for _, bar in pairs]
@@ -116,10 +116,11 @@ def all_bars(model: mujoco.MjModel) -> tuple[np.ndarray, list[Bar]]:
 def neighbours(
     model: mujoco.MjModel, data: mujoco.MjData, near: float, planar: bool = False
 ) -> np.ndarray:
-    """[nbody, nbody] whether two bodies are one, parent and child, have all joints at one place, or
-    are of two limbs of a body in a plane, which can only pass each other.
+    """Flags [nbody, nbody] of the pairs of bodies that count as neighbours.
 
-    near: m, how far apart joints at one place may be in the pose of `data`.
+    Neighbours are one body, are parent and child, have all joints between them at one place, or
+    belong to two limbs of a planar body, which can only pass each other. near: m, largest distance
+    of joints at one place in the pose of `data`.
     """
     weld = model.body_weldid
     joined = np.zeros((model.nbody, model.nbody), dtype=bool)
@@ -135,7 +136,7 @@ def neighbours(
 
 
 def _two_limbs(model: mujoco.MjModel, links: list[int]) -> bool:
-    """Whether the bodies between two others, as of `_links`, are of two limbs."""
+    """True if the bodies between two others, as of `_links`, belong to two limbs."""
     tops = [
         body for body in links if int(model.body_weldid[model.body_parentid[body]]) not in links
     ]
@@ -143,7 +144,7 @@ def _two_limbs(model: mujoco.MjModel, links: list[int]) -> bool:
 
 
 def _links(model: mujoco.MjModel, a: int, b: int) -> list[int]:
-    """The bodies whose joints lie between two others; all of them welded to nothing above."""
+    """The bodies with the joints between two others; none of them is welded to its parent."""
     links = []
     while a != b:
         links.append(max(a, b))  # a parent's id is smaller than its child's
@@ -165,7 +166,7 @@ def _joined(
     second: np.ndarray,
     allowed: np.ndarray | None = None,
 ) -> Crossings:
-    """Crossings of these pairs, with no bar that no pair needs."""
+    """Crossings of these pairs, without unused bars."""
     used, places = np.unique(np.concatenate([first, second]), return_inverse=True)
     chosen = [bars[i] for i in used]
     return Crossings(
@@ -180,7 +181,7 @@ def _joined(
 
 
 def _standing_and_deepest(creature: Creature, pairs: Crossings) -> tuple[np.ndarray, np.ndarray]:
-    """Depth [Q] in the standing pose, and the greatest over random poses too.
+    """Depth [Q] in the standing pose, and the greatest over this and random poses.
 
     Negative: a gap. -inf where the bars stay far apart.
     """
@@ -202,9 +203,9 @@ def _standing_and_deepest(creature: Creature, pairs: Crossings) -> tuple[np.ndar
 
 
 def _poses(creature: Creature) -> list[np.ndarray]:
-    """The standing pose [nq], then random ones in the pose ranges and somewhat beyond.
+    """The standing pose [nq], then random poses in the pose ranges and somewhat beyond.
 
-    They are uniform, and every other one is at the ends of all ranges.
+    They are uniform; in every other one each joint is at an end of its range.
     """
     rng = np.random.default_rng(0)
     wide = BEYOND * (creature.joints.pose_high - creature.joints.pose_low)
@@ -220,7 +221,7 @@ def _poses(creature: Creature) -> list[np.ndarray]:
 def bar_places(
     model: mujoco.MjModel, qpos: np.ndarray, pairs: Crossings
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Middle and half of every bar in a pose [nq], both [S, 3] m in the world."""
+    """Middle and half axis of every bar in a pose [nq], both [S, 3] m in the world."""
     data = mujoco.MjData(model)
     data.qpos[:] = qpos
     mujoco.mj_kinematics(model, data)
@@ -230,14 +231,14 @@ def bar_places(
 
 
 def pair_depths(pairs: Crossings, centre: np.ndarray, half: np.ndarray) -> np.ndarray:
-    """[Q] m; how much deeper than standing each two are in each other, negative where apart."""
+    """Depth [Q] of each pair in m beyond that of the standing pose; negative where apart."""
     apart = _parts((centre[pairs.first] - centre[pairs.second]).T)
     first, second = _parts(half[pairs.first].T), _parts(half[pairs.second].T)
     return np.asarray(pairs.reach - bar_distance(apart, first, second, pairs.lengths()))
 
 
 def _of_their_shapes(shapes: np.ndarray, stand: np.ndarray) -> np.ndarray:
-    """[Q] the standing depth of the two shapes that a pair of bars belongs to, at least 0."""
+    """Standing depth [Q] of the two shapes that a pair of bars belongs to, at least 0."""
     _, group = np.unique(shapes, return_inverse=True)
     depth = np.zeros(group.max(initial=-1) + 1)
     np.maximum.at(depth, group, stand)
@@ -245,7 +246,7 @@ def _of_their_shapes(shapes: np.ndarray, stand: np.ndarray) -> np.ndarray:
 
 
 def _deepest_of_each(shapes: np.ndarray, depth: np.ndarray, least: float) -> np.ndarray:
-    """The pairs to watch: every two shapes' deepest first, then their second, up to our limit."""
+    """Pairs to measure: the deepest of every two shapes, then the second, up to `MOST_PAIRS`."""
     order = [k for k in np.argsort(-depth, kind="stable") if depth[k] > least]
     turn = collections.Counter[int]()
     ranks = []

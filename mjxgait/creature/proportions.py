@@ -1,4 +1,4 @@
-"""Which parts of a creature may be of other sizes, and how high it then stands.
+"""Parts of a creature that may change size, and its standing height with other sizes.
 
 Letters: `B` bodies without the world, `Z` sizes: one for both parts of a mirrored pair.
 """
@@ -20,11 +20,11 @@ SLIDE = mujoco.mjtJoint.mjJNT_SLIDE
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Proportions:
-    """All that hangs on the trunk, in sizes of its own; the trunk stays as it is.
+    """Parts that can change size: all that hang on the trunk; the trunk keeps its size.
 
-    names: of the parts, per size. size_of: [B] whose size a body has, -1 for one that keeps its.
-    fixed: [S] m, reach: [S, B] m; when standing the lowest points of the S shapes are at
-    `fixed + reach @ factors`. upwards: [nq] what lifts the creature by 1 m.
+    names: of the parts, per size. size_of: [B] index of a body's size, -1 for a body that keeps
+    its own. fixed: [S] m, reach: [S, B] m; in the standing pose the lowest points of the S shapes
+    are at `fixed + reach @ factors`. upwards: [nq] change that lifts the creature by 1 m.
     """
 
     names: tuple[tuple[str, ...], ...]
@@ -34,13 +34,13 @@ class Proportions:
     upwards: np.ndarray
 
     def by_part(self, sizes: np.ndarray) -> dict[str, float]:
-        """Factors by part, of sizes [Z] as logarithms."""
+        """Factors by part. sizes: [Z] logarithms."""
         factors = np.exp(np.asarray(sizes, float))
         return {n: float(f) for f, names in zip(factors, self.names, strict=True) for n in names}
 
 
 def proportions(creature: Creature) -> Proportions:
-    """Those of a creature."""
+    """The proportions of a creature."""
     model = creature.model
     root = _jointed(model, creature.trunk)
     groups: dict[int, int] = {}
@@ -62,14 +62,14 @@ def proportions(creature: Creature) -> Proportions:
 
 
 def grown(creature: Creature, sizes: Mapping[str, float]) -> Creature:
-    """The creature with parts of these factors; its controller and certificate keep their yardstick.
+    """Return the creature with parts scaled by these factors; its stated body length stays.
 
     Raises:
-      UserError: such a body cannot be had.
+      UserError: such a body is not possible.
     """
     if not sizes:
         return creature
-    # Steering is in body lengths, as evolution had them.
+    # Steering is in body lengths, those of the creature that evolved.
     files = scaled_files(creature.files, sizes, body_length=creature.frame.body_length)
     return dataclasses.replace(load_files(files), terrain=creature.terrain)
 
@@ -78,7 +78,7 @@ def extreme_bodies(creature: Creature, most: float) -> list[Creature]:
     """Return the smallest and the largest body that evolution may try; none where `most` is 1.
 
     Raises:
-      UserError: one of them cannot be had; says why.
+      UserError: one of them is not possible; says why.
     """
     if most == 1.0:
         return []
@@ -95,12 +95,12 @@ def extreme_bodies(creature: Creature, most: float) -> list[Creature]:
 
 
 def _jointed(model: mujoco.MjModel, body: int) -> int:
-    """The body that it is welded to: one with a joint, or the world."""
+    """The body with a joint that a body is welded to, or the world."""
     return int(model.body_weldid[body])
 
 
 def _partner(creature: Creature, body: int) -> int:
-    """The mirror image of a body with joints, by its first that is actuated."""
+    """The mirror image of a body with joints, by its first actuated joint."""
     model = creature.model
     on = np.flatnonzero(model.dof_bodyid[creature.joints.dof_adr] == body)
     if not len(on):
@@ -109,10 +109,10 @@ def _partner(creature: Creature, body: int) -> int:
 
 
 def _heights(creature: Creature) -> tuple[np.ndarray, np.ndarray]:
-    """Of the lowest point of each shape that collides: what stays, and how it follows the factors.
+    """Height of each colliding shape's lowest point: constant part, and slope per factor.
 
     A body's own lengths (its shapes, joints and the places of its children) grow by its factor, and
-    attitudes stay as they are, so a height is a sum over the chain from the trunk.
+    orientations stay, so a height is a sum over the chain from the trunk.
     """
     model, data = creature.model, mujoco.MjData(creature.model)
     data.qpos[:] = creature.stand_qpos
@@ -139,7 +139,7 @@ def _heights(creature: Creature) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _slid(model: mujoco.MjModel, data: mujoco.MjData, body: int) -> float:
-    """m, how far the slides of a body have lifted it."""
+    """Height in m by which a body's slides have lifted it."""
     first = int(model.body_jntadr[body])
     joints = range(first, first + int(model.body_jntnum[body]))
     return sum(

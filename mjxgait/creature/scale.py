@@ -1,4 +1,4 @@
-"""Other proportions without touching the files: parts made longer, thicker and heavier together."""
+"""Other proportions without a change to the files: parts get longer, thicker and heavier."""
 
 import fnmatch
 import re
@@ -19,14 +19,14 @@ from mjxgait.errors import UserError, did_you_mean
 MODEL, SETTINGS = "creature.xml", "creature.toml"
 SMALLEST, LARGEST = 0.2, 5.0
 SIZE = re.compile(r"\n *<size\b[^>]*/>")
-"""How much memory MuJoCo wants, which it finds by itself."""
+"""MuJoCo's memory size, removed because MuJoCo finds it by itself."""
 
 
 def parse_scales(texts: Sequence[str]) -> dict[str, float]:
-    """Factors by pattern of body names, from `PATTERN=FACTOR` each.
+    """Factors by pattern of body names, from texts `PATTERN=FACTOR`.
 
     Raises:
-      UserError: names the text that is wrong.
+      UserError: names the wrong text.
     """
     scales = {}
     for text in texts:
@@ -45,12 +45,12 @@ def parse_scales(texts: Sequence[str]) -> dict[str, float]:
 
 
 def scaled(creature: Creature, scales: Mapping[str, float]) -> Creature:
-    """The creature with parts of another size, by pattern of their names; see `scaled_files`."""
+    """Return the creature with scaled parts, by pattern of their names; see `scaled_files`."""
     return load_files(scaled_files(creature.files, scales)) if scales else creature
 
 
 def load_files(files: Mapping[str, str]) -> Creature:
-    """The creature whose files these are, by name."""
+    """Return the creature made of these files, by name."""
     with tempfile.TemporaryDirectory() as folder:  # the run folder keeps the creature
         for name, text in files.items():
             (Path(folder) / name).write_text(text, encoding="utf-8")
@@ -60,15 +60,15 @@ def load_files(files: Mapping[str, str]) -> Creature:
 def scaled_files(
     files: Mapping[str, str], scales: Mapping[str, float], body_length: float | None = None
 ) -> dict[str, str]:
-    """The files of a creature whose parts are other lengths.
+    """Return the files of a creature with scaled parts.
 
-    A part is a body of creature.xml; those that match several patterns are scaled by each. Of a
-    part scaled by s the shapes and the places of joints and of the parts that hang on it are times
-    s, its mass s³ and its inertia s⁵. The creature stands on its lowest point as before. Gains and
-    torque limits stay.
+    A part is a body of creature.xml; a part that matches several patterns is scaled by each.
+    Scaling by s multiplies a part's shapes and the places of its joints and children by s, its mass
+    by s³ and its inertia by s⁵. The creature stands on its lowest point as before. Gains and torque
+    limits stay.
 
     Args:
-      body_length: m, for its settings to state; by default one that they state follows the trunk's.
+      body_length: m, written to the settings; by default a stated one follows the trunk's factor.
 
     Raises:
       UserError: a pattern matches nothing, or a part has a mesh.
@@ -102,9 +102,7 @@ def _factors(names: Sequence[str], scales: Mapping[str, float]) -> dict[str, flo
 
 
 def _measured(text: str, factors: Mapping[str, float], body_length: float | None) -> str:
-    """The settings with a body length: the one given, or where they state one, as the trunk's size
-    makes it.
-    """
+    """The settings with the given body length, or with the stated one times the trunk's factor."""
     table = tomllib.loads(text)
     creature = table["creature"]
     stated, factor = creature.get("body_length"), factors.get(creature["trunk"], 1.0)
@@ -122,7 +120,7 @@ def _scale(body: mujoco.MjsBody, s: float) -> None:
                 "scaled; scale other parts, or import the model with its collision shapes only"
             )
         geom.pos, geom.size, geom.fromto = s * geom.pos, s * geom.size, s * geom.fromto
-        # Not a number where a density is given instead, from which MuJoCo reckons itself.
+        # NaN where a density is given instead, from which MuJoCo computes the mass.
         geom.mass = s**3 * geom.mass
     for part in (*body.joints, *body.sites, *body.bodies):
         part.pos = s * part.pos
@@ -132,7 +130,7 @@ def _scale(body: mujoco.MjsBody, s: float) -> None:
 
 
 def _stand(spec: mujoco.MjSpec, height: float) -> None:
-    """Lifts the standing poses, and the pose of the file, until the lowest point is at `height`."""
+    """Lift the keyframes and the file's own pose until the lowest point is at `height`."""
     model = spec.compile()
     lift = height - _lowest(model)
     upwards = vertical_freedom(model)
@@ -144,7 +142,7 @@ def _stand(spec: mujoco.MjSpec, height: float) -> None:
 
 
 def _lowest(model: mujoco.MjModel) -> float:
-    """m, the lowest point in the first keyframe."""
+    """Height of the lowest point in the first keyframe; m."""
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, 0)
     mujoco.mj_kinematics(model, data)

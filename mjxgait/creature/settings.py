@@ -1,4 +1,4 @@
-"""`creature.toml`: what a body needs said that its model file cannot say (docs/creature.md)."""
+"""`creature.toml`: settings of a body that its model file cannot hold (docs/creature.md)."""
 
 import dataclasses
 import re
@@ -19,7 +19,7 @@ Degrees = tuple[Finite, Finite]
 
 MOST_NAME = 100
 NO_NAME = re.compile(r"""[\x00-\x1f\x7f/\\:*?"<>|]|^[.-]|^\s|[\s.]$""")
-"""In a name that is no file's on some system, or an option, or hidden."""
+"""Parts of a name that some systems forbid in file names, or that make an option or a hidden file."""
 
 
 def _file_name(name: str) -> str:
@@ -33,9 +33,10 @@ def _file_name(name: str) -> str:
 
 @dataclasses.dataclass(frozen=True)
 class Identity:
-    """The names of the parts. grows: whether it is a seed: what is simulated grows from genomes.
+    """The names of the parts.
 
-    planar: whether it is a body in two dimensions, whose limbs pass each other.
+    grows: whether it is only a seed, and the simulated bodies grow from genomes. planar: whether it
+    is a body in two dimensions; its limbs pass each other.
     """
 
     __pydantic_config__ = STRICT
@@ -53,8 +54,10 @@ class Identity:
 
 @dataclasses.dataclass(frozen=True)
 class JointSettings:
-    """Gains in N·m/rad and N·m·s/rad, torque limit in N·m, pose range in degrees about the
-    standing angle.
+    """Settings of all joints.
+
+    Gains in N·m/rad and N·m·s/rad, torque limit in N·m, pose range in degrees about the standing
+    angle.
     """
 
     __pydantic_config__ = STRICT
@@ -66,9 +69,7 @@ class JointSettings:
 
 @dataclasses.dataclass(frozen=True)
 class JointException:
-    """Settings of the joints whose name matches a shell pattern; what is None stays as it is for
-    all joints.
-    """
+    """Settings of the joints with names that match a shell pattern; None keeps the common value."""
 
     __pydantic_config__ = STRICT
     match: Pattern
@@ -90,7 +91,7 @@ class MirrorPair:
 
 @dataclasses.dataclass(frozen=True)
 class Mirror:
-    """Whether the body has a left and a right that mirror each other."""
+    """Mirror symmetry of the body's left and right."""
 
     __pydantic_config__ = STRICT
     symmetric: bool = True
@@ -117,8 +118,10 @@ class Balance:
 
 @dataclasses.dataclass(frozen=True)
 class Stepping:
-    """Weights per joint pattern, in rad per hip height, by which joints take their foot ahead, and
-    to the left, and in rad per rad turn it to the left; of the corrections that step under a fall.
+    """Weights per joint pattern of the corrections that step under a fall.
+
+    ahead, aside: rad per hip height, to move the foot ahead and to the left. turn: rad per rad, to
+    turn it to the left.
     """
 
     __pydantic_config__ = STRICT
@@ -129,8 +132,9 @@ class Stepping:
 
 @dataclasses.dataclass(frozen=True)
 class Termination:
-    """When an episode has failed: trunk's up axis against the world's, trunk height in standing
-    heights, a touch.
+    """Conditions that end an episode as failed.
+
+    The trunk's up axis against the world's, the trunk's height in standing heights, a touch.
     """
 
     __pydantic_config__ = STRICT
@@ -145,7 +149,7 @@ class Termination:
 
 @dataclasses.dataclass(frozen=True)
 class Usual:
-    """What is asked of its walk where nobody asks anything. gait: as after `--gait`."""
+    """Default walk targets of the creature. gait: as after `--gait`."""
 
     __pydantic_config__ = STRICT
     gait: str = "auto"

@@ -1,4 +1,4 @@
-"""A body of which time goes on by other steps."""
+"""A body with another simulation time step."""
 
 import mujoco
 
@@ -7,7 +7,7 @@ from mjxgait.creature.scale import MODEL, SIZE, load_files
 
 
 def at_step(creature: Creature, step: float) -> Creature:
-    """The creature simulated by steps of so many s; 0 are its own."""
+    """Return the creature with a time step in s; 0 keeps its own."""
     if step in (0.0, float(creature.model.opt.timestep)):
         return creature
     spec = mujoco.MjSpec.from_string(creature.files[MODEL])

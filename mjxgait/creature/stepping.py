@@ -1,4 +1,4 @@
-"""With what joints a body steps under a fall."""
+"""The joints with which a body steps under a fall."""
 
 import mujoco
 import numpy as np
@@ -16,7 +16,7 @@ def stepping_of(
     joints: list[int],
     feet: list[int],
 ) -> Stepping | None:
-    """What the weights [J] say of a body; None where all are zero.
+    """Stepping of a body with these weights [J]; None where all are zero.
 
     Args:
       joints: [J] ids. feet: bodies of the feet.

@@ -1,8 +1,8 @@
-"""A cycle as a textbook draws it, from a body's geometry and its footfalls alone.
+"""A textbook cycle, computed from a body's geometry and its footfalls alone.
 
-Feet that stand go back evenly beneath the trunk, feet that swing come forward in an arc; the joints
-follow by inverse kinematics. Nobody has simulated it: it is where evolution may begin. Letters: `N`
-feet, `C` poses of the cycle, `J` joints.
+In stance a foot moves back evenly beneath the trunk; in swing it comes forward in an arc. The
+joints follow by inverse kinematics. The cycle is not simulated: evolution may start from it.
+Letters: `N` feet, `C` poses of the cycle, `J` joints.
 """
 
 import dataclasses
@@ -15,17 +15,19 @@ from mjxgait.creature import geometry
 from mjxgait.creature.creature import Creature
 
 CROUCH = 0.05
-"""Hip heights by which the trunk is lower than it stands, so that legs reach ahead and back."""
+"""Hip heights by which the trunk is lower than standing, so that legs reach ahead and back."""
 TURN = 0.02
-"""Hip heights off its place that count as much as a radian by which a foot is turned: soles stay
-level where the leg has joints to spare."""
+"""Hip heights of a foot's position error that weigh as much as one radian of its rotation error:
+feet stay level where the leg has joints to spare."""
 ROUNDS, DAMPING = 20, 1e-3
 
 
 @dataclasses.dataclass(frozen=True)
 class Footfalls:
-    """phases: of each foot the middle of its stance, in cycles. duty: share of the cycle that a foot
-    stands. stride, lift: m, way of the body in a cycle, and height of a swing.
+    """Timing and size of the steps.
+
+    phases: middle of each foot's stance, in cycles. duty: duty factor, the stance's share of the
+    cycle. stride, lift: m, way of the body in a cycle, and height of a swing.
     """
 
     phases: Sequence[float]
@@ -35,11 +37,11 @@ class Footfalls:
 
 
 def textbook_cycle(creature: Creature, falls: Footfalls, poses: int) -> np.ndarray:
-    """Angles [C, J] rad, within the pose ranges, of so many moments of the cycle."""
+    """Angles [C, J] rad, within the pose ranges, at `poses` moments of the cycle."""
     legs = [_Leg(creature, foot) for foot in range(len(creature.feet.names))]
     cycle = np.tile(creature.joints.stand, (poses, 1))
     for leg, phase in zip(legs, falls.phases, strict=True):
-        # Twice around: the second time each moment begins where the one before it ended.
+        # Twice around: in the second round the first moment, too, starts from the one before it.
         for moment in [*range(poses), *range(poses)]:
             share = (moment / poses - phase + falls.duty / 2) % 1.0
             cycle[moment, leg.joints] = leg.reach(_path(share, falls), cycle[moment - 1])
@@ -47,7 +49,7 @@ def textbook_cycle(creature: Creature, falls: Footfalls, poses: int) -> np.ndarr
 
 
 def _path(share: float, falls: Footfalls) -> tuple[float, float]:
-    """m ahead of where it stands at rest and above it, at a share of the foot's own cycle."""
+    """Way of a foot in m ahead of and above its standing place, at a share of its own cycle."""
     half = 0.5 * falls.duty * falls.stride
     if share < falls.duty:
         return half * (1.0 - 2.0 * share / falls.duty), 0.0
@@ -56,7 +58,7 @@ def _path(share: float, falls: Footfalls) -> tuple[float, float]:
 
 
 class _Leg:
-    """The joints that move one foot and no other, and where they take it."""
+    """The joints that move one foot and no other, and their kinematics."""
 
     def __init__(self, creature: Creature, foot: int) -> None:
         model, feet = creature.model, creature.feet
@@ -77,8 +79,9 @@ class _Leg:
         self.ahead = nose / np.linalg.norm(nose)
 
     def reach(self, path: tuple[float, float], pose: np.ndarray) -> np.ndarray:
-        """Angles of the leg's joints [j] that take the foot there, by damped least squares from a
-        pose [J] on; as near as they come.
+        """Angles of the leg's joints [j] that bring the foot nearest to a place.
+
+        Damped least squares, starting from a pose [J].
         """
         hip, joints = self.creature.frame.hip_height, self.creature.joints
         ahead, above = path
@@ -93,7 +96,7 @@ class _Leg:
         return pose[self.joints]
 
     def _off(self, goal: np.ndarray, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """What is left to the goal, in hip heights, and its slopes [6, j]."""
+        """Error [6] to the goal, in hip heights, and its slopes [6, j]."""
         self._pose(pose)
         hip, turned = self.creature.frame.hip_height, self.data.xmat[self.body].reshape(3, 3)
         point = self.data.xpos[self.body] + turned @ self.arm

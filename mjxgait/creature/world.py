@@ -1,4 +1,4 @@
-"""What may be in the world beside the creature: a flat floor, and what nothing touches."""
+"""Check of the world around the creature: only a flat floor, and geoms that nothing touches."""
 
 import mujoco
 import numpy as np
@@ -9,13 +9,13 @@ WAY_OUT = "evolution knows one creature on a flat floor and nothing else"
 
 
 def check_world(model: mujoco.MjModel, trunk: int, floor: int) -> None:
-    """Refuses what evolution would ignore: what else moves, or can be touched and is not the floor.
+    """Refuse what evolution would ignore: other moving bodies, and touchable geoms but the floor.
 
     Args:
       trunk: body id. floor: geom id.
 
     Raises:
-      UserError: names the body or geom, and the way out.
+      UserError: names the body or geom, and the remedy.
     """
     own = int(model.body_treeid[trunk])
     for body in np.flatnonzero(model.body_treeid >= 0):
@@ -36,7 +36,7 @@ def check_world(model: mujoco.MjModel, trunk: int, floor: int) -> None:
 
 
 def _can_be_touched(model: mujoco.MjModel, geom: int, still: np.ndarray) -> bool:
-    """Whether MuJoCo would collide it with something that moves."""
+    """True if MuJoCo would collide the geom with something that moves."""
     masks = (model.geom_contype[geom] & model.geom_conaffinity) | (
         model.geom_contype & model.geom_conaffinity[geom]
     )

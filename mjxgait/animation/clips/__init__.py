@@ -1,4 +1,4 @@
-"""What is read of an animator's files: motions, and skeletons at rest."""
+"""Motions and skeletons at rest, read from an animator's files."""
 
 from mjxgait.animation.clips.clip import AngleTrack, Clip
 from mjxgait.animation.clips.rig import Rig

@@ -1,4 +1,4 @@
-"""What is read of a file with an animation, whatever its format.
+"""Content of an animation file in any format.
 
 Letters: `F` frames, `B` bones, `J` joints of the creature.
 """
@@ -12,27 +12,27 @@ from mjxgait import files
 from mjxgait.errors import UserError
 
 NOTE = "mjxgait"
-"""Name of the property of a node in which an exported walk says what made it."""
+"""Name of the node property that holds an exported walk's note on its origin."""
 ELSEWHERE = {
     ".gltf": "export as glTF binary (.glb), which is one file",
     ".fbx": "open it in Blender and export as glTF binary (.glb)",
     ".blend": "export as glTF binary (.glb)",
 }
-"""What is not read, and the way round."""
+"""Formats that are not read, and the workaround."""
 MOST_BYTES, MOST_TEXT = 200_000_000, 30_000_000
 MOST_BONES = 1000
 MOST_FRAMES = 100_000
 MOST_TURNS = 1_000_000
-"""Bones times frames."""
+"""Largest number of bones times frames."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Clip:
-    """Bones that turn.
+    """Bone rotations over time.
 
     names: [B]. parents: [B] place of the parent, -1 for none. times: [F] s, from 0 on.
-    turned: [F, B, 3, 3] how far each is turned from where it rests, in the file's world.
-    note: what an exported walk says of itself; else empty.
+    turned: [F, B, 3, 3] rotation from rest, in the file's world. note: an exported walk's note;
+    else empty.
     """
 
     names: tuple[str, ...]
@@ -44,7 +44,7 @@ class Clip:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class AngleTrack:
-    """Angles of joints that the file names. times: [F] s. angles: [F, J] rad."""
+    """Angles of the joints named in a file. times: [F] s. angles: [F, J] rad."""
 
     names: tuple[str, ...]
     times: np.ndarray
@@ -52,7 +52,7 @@ class AngleTrack:
 
 
 def read_bytes(path: Path, most: int = MOST_BYTES) -> bytes:
-    """The content of a file.
+    """Return the content of a file.
 
     Raises:
       UserError: it is missing, empty, too large or cannot be read.
@@ -64,7 +64,7 @@ def read_bytes(path: Path, most: int = MOST_BYTES) -> bytes:
 
 
 def read_text(path: Path) -> str:
-    """The content of a text file; see `read_bytes`."""
+    """Return the content of a text file; see `read_bytes`."""
     text = files.read_text(path, MOST_TEXT)
     if not text:
         raise UserError(f"{path}: the file is empty")
@@ -72,10 +72,10 @@ def read_text(path: Path) -> str:
 
 
 def check_size(path: Path, bones: int, frames: int) -> None:
-    """Refuses what no animator makes.
+    """Refuse sizes that no animator makes.
 
     Raises:
-      UserError: too many bones or frames, or less than two frames.
+      UserError: too many bones or frames, or fewer than two frames.
     """
     if bones > MOST_BONES:
         raise UserError(f"{path}: {bones} bones; more than {MOST_BONES} is not one creature")
@@ -88,10 +88,10 @@ def check_size(path: Path, bones: int, frames: int) -> None:
 
 
 def check_numbers(path: Path, what: str, values: np.ndarray) -> None:
-    """Refuses what is not finite.
+    """Refuse values that are not finite.
 
     Raises:
-      UserError: names the first frame.
+      UserError: names the first bad frame.
     """
     bad = ~np.isfinite(values.reshape(len(values), -1)).all(1)
     if bad.any():
@@ -99,7 +99,7 @@ def check_numbers(path: Path, what: str, values: np.ndarray) -> None:
 
 
 def check_times(path: Path, times: np.ndarray) -> np.ndarray:
-    """Times [F] from 0 on.
+    """Return the times [F] shifted to begin at 0.
 
     Raises:
       UserError: they do not grow.

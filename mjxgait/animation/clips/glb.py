@@ -1,6 +1,6 @@
-"""What a GLB file holds, through pygltflib: its description, its tree of nodes, its numbers.
+"""Content of a GLB file, through pygltflib: its description, its tree of nodes, its numbers.
 
-Such files come from strangers, so whatever the library stumbles over is a sentence.
+Such files come from strangers, so every failure of the library becomes a one-sentence error.
 """
 
 import json
@@ -17,9 +17,9 @@ from mjxgait.animation.clips.clip import check_size, read_bytes
 from mjxgait.errors import UserError
 
 MAGIC, HEAD = b"glTF", 20
-"""First bytes of a file; bytes before its description, which comes first."""
+"""First bytes of a file; number of bytes before its description, which comes first."""
 MOST_PARTS = 30_000
-"""Accessors, channels and the like, which the library reads one by one."""
+"""Largest number of accessors, channels and the like; the library reads them one by one."""
 TYPES = {
     gltf.BYTE: np.int8,
     gltf.UNSIGNED_BYTE: np.uint8,
@@ -37,14 +37,14 @@ DAMAGED = (
     ValueError,
     struct.error,
 )
-"""What reading raises where the content is not what its format says."""
+"""Errors raised while reading content that does not follow its format."""
 
 
 def open_glb(path: Path) -> gltf.GLTF2:
-    """A file's description, its binary part with it.
+    """Return a file's description with its binary part.
 
     Raises:
-      UserError: it is no GLB, is cut off, damaged, or of more bones than one creature has.
+      UserError: it is no GLB, is cut off, damaged, or has more bones than one creature.
     """
     data = read_bytes(path)
     if len(data) < HEAD or data[:4] != MAGIC:
@@ -64,7 +64,7 @@ def open_glb(path: Path) -> gltf.GLTF2:
 
 
 def _check_parts(path: Path, description: bytes) -> None:
-    """Refuses what the library would take minutes for."""
+    """Refuse files that would take the library minutes."""
     lists = json.loads(description)
     if not isinstance(lists.get("nodes", []), list):
         raise UserError(f"{path}: its list of nodes is damaged")
@@ -88,13 +88,13 @@ def tree(path: Path, nodes: Sequence[gltf.Node]) -> tuple[list[int], list[int]]:
 
 
 def name_of(nodes: Sequence[gltf.Node], node: int) -> str:
-    """A node's name, or one that says which it is."""
+    """A node's name, or one made of its number."""
     name = nodes[node].name
     return f"node {node}" if name is None else str(name)
 
 
 def placed(node: gltf.Node) -> np.ndarray:
-    """[4, 4] of a node at rest against its parent."""
+    """Transform [4, 4] of a node at rest against its parent."""
     if node.matrix:
         return np.array(node.matrix, float).reshape(4, 4).T
     whole = np.eye(4)
@@ -105,7 +105,7 @@ def placed(node: gltf.Node) -> np.ndarray:
 
 
 def values(document: gltf.GLTF2, number: int, every: int = 1) -> np.ndarray:
-    """The values [n, width] of an accessor as they are stored. every: take one of so many."""
+    """Stored values [n, width] of an accessor. every: take one in this many."""
     accessor = document.accessors[number]
     if accessor.bufferView is None or accessor.sparse:
         raise ValueError("an accessor without plain values")
@@ -120,7 +120,7 @@ def values(document: gltf.GLTF2, number: int, every: int = 1) -> np.ndarray:
 
 
 def shares(stored: np.ndarray) -> np.ndarray:
-    """As floats; whole numbers stand for -1 to 1, or 0 to 1."""
+    """Stored values as floats; whole numbers stand for -1 to 1, or 0 to 1."""
     if stored.dtype.kind == "f":
         return stored.astype(float)
     return stored.astype(float) / np.iinfo(stored.dtype).max

@@ -1,8 +1,8 @@
-"""Reads angles of joints over time from a CSV or JSON file.
+"""Read joint angles over time from a CSV or JSON file.
 
 CSV: a line of names, then numbers; `time` in s, each other column a joint in rad, or in degrees if
-its name ends with `_deg`. Columns of `mjxgait.walk` (`pos_NAME`) will do. JSON: `{"time": [...],
-"unit": "deg", "joints": {"NAME": [...]}}`.
+its name ends with `_deg`. Columns of `mjxgait.walk` (`pos_NAME`) are accepted. JSON: `{"time":
+[...], "unit": "deg", "joints": {"NAME": [...]}}`.
 """
 
 import csv
@@ -24,7 +24,7 @@ DEGREES, OURS = "_deg", "pos_"
 
 
 def read_csv(path: Path) -> AngleTrack:
-    """The angles in a CSV file.
+    """Return the angles in a CSV file.
 
     Raises:
       UserError: names the line that cannot be read.
@@ -54,7 +54,7 @@ def read_csv(path: Path) -> AngleTrack:
 
 
 def read_json(path: Path) -> AngleTrack:
-    """The angles in a JSON file.
+    """Return the angles in a JSON file.
 
     Raises:
       UserError: says what it must hold.

@@ -1,4 +1,4 @@
-"""Reads a BVH file: a skeleton and the angles of its joints, frame by frame."""
+"""Read a BVH file: a skeleton and the angles of its joints, frame by frame."""
 
 import dataclasses
 from pathlib import Path
@@ -27,8 +27,10 @@ CUT_OFF = "is cut off or damaged: a number or a word is missing"
 
 @dataclasses.dataclass
 class Skeleton:
-    """Of each bone in the order of the file its name, parent (-1 for none), channels, offset [3]
-    from its parent, and the offsets of its ends; in file units. above: bones that are still open.
+    """Bones in the order of the file, in its units.
+
+    For each bone its name, parent (-1 for none), channels, offset [3] from its parent, and the
+    offsets of its ends. above: bones that are still open.
     """
 
     names: list[str] = dataclasses.field(default_factory=list)
@@ -39,7 +41,7 @@ class Skeleton:
     above: list[int] = dataclasses.field(default_factory=list)
 
     def add(self, name: str) -> None:
-        """A bone that hangs on the one that is open."""
+        """Add a bone as a child of the open one."""
         self.names.append(name)
         self.parents.append(self.above[-1] if self.above else -1)
         self.channels.append([])
@@ -48,7 +50,7 @@ class Skeleton:
 
 
 def read_bvh(path: Path) -> Clip:
-    """The clip in a file; its bones rest with all angles at zero.
+    """Return the clip in a file; its bones rest with all angles at zero.
 
     Raises:
       UserError: it is no BVH file, or cut off; says where.
@@ -67,7 +69,7 @@ def read_bvh(path: Path) -> Clip:
 
 
 def rig_of_bvh(path: Path) -> Rig:
-    """The skeleton in a file, all angles at zero; a motion need not follow.
+    """Return the skeleton in a file, all angles at zero; the motion is optional.
 
     Raises:
       UserError: it is no BVH file, or cut off.
@@ -128,7 +130,7 @@ def _hierarchy(path: Path, words: list[str]) -> tuple[Skeleton, int]:
 
 
 def _channels(path: Path, words: list[str], at: int, bones: Skeleton) -> int:
-    """How many the open bone has."""
+    """Store the channels of the open bone, and return their number."""
     count = int(words[at + 1])
     named = words[at + 2 : at + 2 + count]
     if not 0 <= count <= MOST_CHANNELS or set(named) - {*POSITION, *ROTATION}:
@@ -156,7 +158,7 @@ def _motion(path: Path, words: list[str], at: int, width: int) -> tuple[float, n
 
 
 def _turned(parents: tuple[int, ...], channels: list[list[str]], values: np.ndarray) -> np.ndarray:
-    """[F, B, 3, 3] of angles in degrees, in the order in which a bone's channels are named."""
+    """Rotations [F, B, 3, 3] from angles in degrees, in the order of each bone's channels."""
     world = np.zeros((len(values), len(parents), 3, 3))
     first = 0
     for bone, (parent, named) in enumerate(zip(parents, channels, strict=True)):

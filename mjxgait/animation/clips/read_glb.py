@@ -1,4 +1,4 @@
-"""Reads the animation of a GLB file: nodes, their rest, and the keys of their rotations."""
+"""Read the animation of a GLB file: nodes, their rest, and the keys of their rotations."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -26,11 +26,11 @@ from mjxgait.animation.clips.glb import (
 from mjxgait.errors import UserError
 
 RATE = 60
-"""Frames/s of an animation whose bones have keys at different times."""
+"""Frames/s for an animation with keys at different times for different bones."""
 
 
 def read_glb(path: Path) -> Clip:
-    """The first animation of a file, of all its nodes.
+    """Return the first animation of a file, with all nodes.
 
     Raises:
       UserError: it is no GLB, is damaged, or has no animation that turns anything.
@@ -62,13 +62,13 @@ def read_glb(path: Path) -> Clip:
 
 
 def _turn(node: gltf.Node) -> np.ndarray:
-    """[3, 3] of a node as the file has it at rest."""
+    """Rotation [3, 3] of a node at rest."""
     columns = placed(node)[:3, :3]
     return Rotation.from_matrix(columns / np.linalg.norm(columns, axis=0)).as_matrix()
 
 
 def _note(nodes: Sequence[gltf.Node]) -> str:
-    """The text that an exported walk has on one of its nodes."""
+    """The note of an exported walk, found on one of its nodes; else empty."""
     notes = (node.extras.get(NOTE) for node in nodes if isinstance(node.extras, dict))
     return next((note for note in notes if isinstance(note, str)), "")
 
@@ -97,7 +97,7 @@ def _keys(path: Path, document: gltf.GLTF2) -> dict[int, tuple[np.ndarray, np.nd
 
 
 def _common_times(path: Path, keys: dict[int, tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
-    """The times [F] of the keys where all bones share them, else evenly over all."""
+    """Times [F] of the keys if all bones share them, else evenly spaced over all."""
     every = [times for times, _ in keys.values()]
     longest = max(every, key=len)
     if all(np.array_equal(times, longest) or len(times) == 1 for times in every):
@@ -109,7 +109,7 @@ def _common_times(path: Path, keys: dict[int, tuple[np.ndarray, np.ndarray]]) ->
 
 
 def _sampled(at: np.ndarray, quats: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Rotations [F, 3, 3] at other times, on the shortest way between keys."""
+    """Rotations [F, 3, 3] at other times, on the shortest path between keys."""
     turns = Rotation.from_quat(quats)
     if len(at) == 1:
         return np.tile(turns.as_matrix()[0], (len(times), 1, 1))

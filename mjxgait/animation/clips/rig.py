@@ -1,4 +1,4 @@
-"""A skeleton at rest, whatever its format. Letters: `B` bones, `V` vertices, `n` ends."""
+"""A skeleton at rest, from any format. Letters: `B` bones, `V` vertices, `n` ends."""
 
 import dataclasses
 
@@ -9,10 +9,9 @@ import numpy as np
 class Rig:
     """Bones, parents first, in the file's axes.
 
-    names: [B]. parents: [B] place of the parent, -1 for none. places: [B, 3] where each begins.
-    ends: of each [n, 3] where it ends without a bone that goes on. skins: of each [V, 3] the
-    vertices that follow it more than any other. metres: per unit of length, None where the format
-    does not say.
+    names: [B]. parents: [B] place of the parent, -1 for none. places: [B, 3] start of each bone.
+    ends: per bone [n, 3] its ends without a further bone. skins: per bone [V, 3] the vertices that
+    follow it most. metres: per unit of length, None where the format does not say.
     """
 
     names: tuple[str, ...]
@@ -23,11 +22,11 @@ class Rig:
     metres: float | None = None
 
     def children(self, bone: int) -> list[int]:
-        """The bones that hang on one."""
+        """Children of a bone."""
         return [i for i, parent in enumerate(self.parents) if parent == bone]
 
     def taken(self, bones: list[int]) -> "Rig":
-        """Some of the bones, in their order; each hangs on the next that was taken above it."""
+        """Return some of the bones, in this order; each gets its nearest taken ancestor as parent."""
 
         def above(bone: int) -> int:
             parent = self.parents[bone]
@@ -45,7 +44,7 @@ class Rig:
         )
 
     def scaled(self, factor: float) -> "Rig":
-        """The same in other units."""
+        """Return the skeleton in other units."""
         return dataclasses.replace(
             self,
             places=factor * self.places,

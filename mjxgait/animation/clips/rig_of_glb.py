@@ -1,4 +1,4 @@
-"""Reads the skeleton of a skinned GLB file: where its bones rest, and which vertices they move."""
+"""Read the skeleton of a skinned GLB file: rest places of its bones, and the vertices they move."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -19,11 +19,11 @@ from mjxgait.animation.clips.rig import Rig
 from mjxgait.errors import UserError
 
 ENOUGH = 50_000
-"""Vertices of one mesh that are looked at; of more every so many."""
+"""Approximate number of vertices read from one mesh; of a larger mesh only every n-th."""
 
 
 def rig_of_glb(path: Path) -> Rig:
-    """The bones of a file's largest skin.
+    """Return the bones of a file's largest skin.
 
     Raises:
       UserError: it is no GLB, is damaged, or has no skin.
@@ -62,7 +62,7 @@ def _rig(path: Path, document: gltf.GLTF2, number: int) -> Rig:
 
 
 def _skins(document: gltf.GLTF2, number: int, world: np.ndarray) -> Mapping[int, np.ndarray]:
-    """By joint the vertices [V, 3] that follow it most, where the skeleton at rest has them."""
+    """Vertices [V, 3] that follow each joint most, placed as in the skeleton at rest."""
     skin = document.skins[number]
     joints = np.array(skin.joints, int)
     bound = world[joints]

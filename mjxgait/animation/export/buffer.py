@@ -13,7 +13,7 @@ SHAPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
 
 
 class Buffer:
-    """Collects arrays for a document."""
+    """Buffer that collects arrays for a document."""
 
     def __init__(self, document: gltf.GLTF2) -> None:
         self.document = document
@@ -26,10 +26,9 @@ class Buffer:
         bounds: bool = False,
         normalized: bool = False,
     ) -> int:
-        """Stores an array [n] or [n, width] and returns the number of its accessor. bounds: state
-        least and greatest values.
+        """Store an array [n] or [n, width], and return the number of its accessor.
 
-        normalized: whole numbers stand for 0 to 1.
+        bounds: state the least and greatest values. normalized: whole numbers stand for 0 to 1.
         """
         values = np.ascontiguousarray(values)
         rows = values.reshape(len(values), -1)
@@ -52,7 +51,7 @@ class Buffer:
         return len(self.document.accessors) - 1
 
     def close(self) -> None:
-        """Puts the bytes into the document."""
+        """Put the bytes into the document."""
         self.blob += bytes(-len(self.blob) % 4)
         self.document.buffers = [gltf.Buffer(byteLength=len(self.blob))]
         self.document.set_binary_blob(bytes(self.blob))

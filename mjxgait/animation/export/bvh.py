@@ -1,4 +1,4 @@
-"""A walk as a BVH file: a skeleton that rests as the creature does, and each bone's angles.
+"""A walk as a BVH file: a skeleton in the creature's rest pose, and each bone's angles.
 
 BVH has Y up; here forward is +Z, left +X, lengths are m. Letters: `F` key frames.
 """
@@ -24,11 +24,11 @@ from mjxgait.errors import UserError
 from mjxgait.files import write_text
 
 ORDER = "ZXY"
-"""In which a bone's angles are told, as most programs write them."""
+"""Order of a bone's angles, as most programs write them."""
 
 
 def export_bvh(loop: WalkLoop, path: Path, travelling: bool = False) -> None:
-    """Writes the loop; see `build_bvh`.
+    """Write the loop; see `build_bvh`.
 
     Raises:
       UserError: the file cannot be written.
@@ -41,8 +41,10 @@ def export_bvh(loop: WalkLoop, path: Path, travelling: bool = False) -> None:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Bone:
-    """name, place of the parent (0 for none), and offset [3] m from it as the creature rests.
-    channels: names of the columns [F, n]. end: [3] m from where it begins to its farthest point.
+    """A bone of the file.
+
+    parent: its place, 0 for none. offset: [3] m from the parent in the rest pose. channels: names
+    of the columns [F, n]. end: [3] m from the bone's start to its farthest point.
     """
 
     name: str
@@ -56,7 +58,8 @@ class Bone:
 def build_bvh(loop: WalkLoop, travelling: bool = False) -> str:
     """The text of the file.
 
-    travelling: the trunk moves on at an even speed, in a circle where the walk turns; otherwise the creature walks in place.
+    travelling: the trunk moves on at an even speed, in a circle if the walk turns; otherwise the
+    creature walks in place.
     """
     bones = _bones(loop, travelling)
     order: list[int] = []
@@ -67,7 +70,7 @@ def build_bvh(loop: WalkLoop, travelling: bool = False) -> str:
 
 
 def _bones(loop: WalkLoop, travelling: bool) -> dict[int, Bone]:
-    """By place in the skeleton, the trunk's being 1."""
+    """Bones by place in the skeleton; the trunk's place is 1."""
     model, rest_qpos = loop.walk.creature.model, resting(loop)
     skeleton, axes = skeleton_of(model, loop.walk.creature.trunk), gltf_axes(loop.walk.forward)
     rest, rest_rot = (each[0] for each in world_poses(model, skeleton, rest_qpos[None], axes))
@@ -78,7 +81,7 @@ def _bones(loop: WalkLoop, travelling: bool) -> dict[int, Bone]:
         pos = (about @ pos[..., None])[..., 0] + gone[:, None]
         rot = about @ rot
     turned = rot @ rest_rot.transpose(0, 2, 1)
-    # The root, which stays on the floor, is no bone of the file.
+    # The file has no bone for the root, which stays on the floor.
     turned[:, 0], pos[:, 0], rest[0] = np.eye(3), 0.0, rest[1]
     bones = {}
     for i, parent in list(enumerate(skeleton.parent))[1:]:
@@ -93,7 +96,7 @@ def _bones(loop: WalkLoop, travelling: bool) -> dict[int, Bone]:
 
 
 def _branch(bones: Mapping[int, Bone], place: int, order: list[int]) -> list[str]:
-    """The lines of a bone and of those below it. order: gets their places."""
+    """The lines of a bone and of those below it. order: their places are appended to it."""
     bone = bones[place]
     order.append(place)
     below = [i for i, child in bones.items() if child.parent == place]
@@ -109,13 +112,13 @@ def _branch(bones: Mapping[int, Bone], place: int, order: list[int]) -> list[str
 
 
 def _angles(rotations: np.ndarray) -> np.ndarray:
-    """[F, 3] deg of rotations [F, 3, 3], without jumps by a turn between frames."""
+    """Angles [F, 3] in deg of rotations [F, 3, 3], without jumps by a full turn between frames."""
     angles = Rotation.from_matrix(rotations).as_euler(ORDER, degrees=True)
     return np.unwrap(angles, period=360.0, axis=0)
 
 
 def _word(name: str) -> str:
-    """A name as one word, which is all that BVH can hold."""
+    """A name as one word, as BVH requires."""
     return "_".join(name.split()) or "bone"
 
 

@@ -1,7 +1,6 @@
-"""What is on the floor below a creature that walks in place, so that one sees it move: rungs that
-pass with a walk, or tiles that a page moves.
+"""Marks on the floor below a creature that walks in place, to make its motion visible.
 
-glTF's axes: Y up, forward +Z.
+Rungs pass with a walk; tiles are moved by a page. glTF's axes: Y up, forward +Z.
 """
 
 import numpy as np
@@ -11,22 +10,23 @@ from mjxgait.animation.export.buffer import Buffer
 from mjxgait.animation.export.loop import WalkLoop
 
 APART, DEEP, WIDE = 0.35, 0.06, 0.9
-"""Body lengths between rungs, about; of a rung along the way, as a share of that; half across."""
+"""Distance of rungs in body lengths, approximate; half size of a rung along the way as a share of
+it; half size across in body lengths."""
 REACH = 1.6
-"""Body lengths before and behind the creature."""
+"""Reach of the rungs before and behind the creature in body lengths."""
 TILES_APART, TILES_REACH, TILE = 0.5, 6.0, 0.1
-"""Body lengths between tiles, and from the middle to the edge of all; half of one, as a share of the
-former."""
+"""Distance of tiles, and radius of the patch, in body lengths; half size of a tile as a share of the
+distance."""
 JUMP = 1e-4
-"""s in which the rungs go back by one place, where nobody sees it."""
+"""Time in s in which the rungs jump back by one place, too short to be seen."""
 COLOUR = (0.45, 0.46, 0.48, 1.0)
 
 
 def add_floor(document: gltf.GLTF2, buffer: Buffer, loop: WalkLoop) -> None:
-    """Adds the rungs to the scene and their motion to its animation.
+    """Add the rungs to the scene and their motion to its animation.
 
-    A loop leads over a whole number of rungs, each of which takes the place of the one before; the
-    foremost grows and the last vanishes, so that there is no seam. Who stays in place has none.
+    A loop passes a whole number of rungs; each takes the place of the one before. The foremost grows
+    and the last vanishes, so that there is no seam. A creature that stays in place gets no rungs.
     """
     length = loop.walk.creature.frame.body_length
     count = round(abs(loop.advance) / (APART * length))
@@ -56,9 +56,9 @@ def add_floor(document: gltf.GLTF2, buffer: Buffer, loop: WalkLoop) -> None:
 
 
 def add_tiles(document: gltf.GLTF2, buffer: Buffer, length: float) -> float:
-    """Adds a round patch of tiles as the node "floor", which nothing moves.
+    """Add a round patch of tiles as the node "floor", without motion.
 
-    length: m of the body. Returns the distance of neighbours in m: moved by that to any side the
+    length: m of the body. Returns the distance of neighbours in m: moved by it to any side, the
     patch looks the same.
     """
     apart, around = TILES_APART * length, round(TILES_REACH / TILES_APART)
@@ -74,7 +74,10 @@ def add_tiles(document: gltf.GLTF2, buffer: Buffer, length: float) -> float:
 def _flat(
     document: gltf.GLTF2, buffer: Buffer, name: str, centres: np.ndarray, half: tuple[float, float]
 ) -> int:
-    """The mesh of rectangles about centres [N, 2]: m to the left and ahead; half: of each size."""
+    """Number of a new mesh of rectangles about centres [N, 2]; m to the left and ahead.
+
+    half: half sizes in m.
+    """
     corners = np.array([[-1, -1], [-1, 1], [1, 1], [1, -1]]) * half
     flat = (centres[:, None] + corners).reshape(-1, 2)
     points = np.stack([flat[:, 0], np.zeros(len(flat)), flat[:, 1]], -1).astype(np.float32)

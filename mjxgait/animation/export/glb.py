@@ -1,6 +1,6 @@
-"""A walk as a GLB file: one skin whose joints are the creature's bodies, rigidly weighted, animated
-by key frames.
+"""A walk as a GLB file: one skin with the creature's bodies as joints, animated by key frames.
 
+Weights are rigid: each point follows one joint.
 glTF is Y-up with +Z forward and +X left, quaternions are (x, y, z, w), colours linear. Letters: `F`
 key frames, `B` joints of the skin (the root on the floor, then the bodies), `V` vertices.
 """
@@ -35,7 +35,7 @@ ROUGHNESS = 0.75
 
 
 def export_glb(loop: WalkLoop, path: Path, travelling: bool = False) -> None:
-    """Writes the loop; see `build_glb`.
+    """Write the loop; see `build_glb`.
 
     Raises:
       UserError: the file cannot be written.
@@ -61,16 +61,16 @@ def build_glb(loop: WalkLoop, travelling: bool = False, floor: bool = False) -> 
         "frames_per_s": loop.rate,
         "travelling": travelling,
     }
-    # Blender keeps what a node has and forgets what the file has.
+    # Blender keeps a node's extras and drops the file's.
     document.nodes[0].extras = document.extras | note_of(loop)
     buffer.close()
     return b"".join(document.save_to_bytes())
 
 
 def build_clips(loops: Mapping[str, WalkLoop], travelling: bool = False) -> bytes:
-    """The bytes of a file with an animation for each of several loops of one creature, by name.
+    """The bytes of a file with several loops of one creature as animations, by name.
 
-    All move the same joints, so that programs may blend them.
+    All move the same joints, so that programs can blend them.
     """
     document, buffer = _scene(loops, travelling)
     buffer.close()
@@ -78,7 +78,10 @@ def build_clips(loops: Mapping[str, WalkLoop], travelling: bool = False) -> byte
 
 
 def build_driven(loops: Mapping[str, WalkLoop]) -> tuple[bytes, float]:
-    """The same in place, on tiles that whoever plays it moves; and the m between two of these."""
+    """The bytes of a file with loops in place, on tiles for the player to move.
+
+    Also returns the distance of two tiles in m.
+    """
     document, buffer = _scene(loops, travelling=False)
     walk = next(iter(loops.values())).walk
     apart = add_tiles(document, buffer, walk.creature.frame.body_length)
@@ -193,7 +196,7 @@ def _add_animations(
     axes: np.ndarray,
     travelling: bool,
 ) -> None:
-    """One for each loop, all of the joints that move in any of them."""
+    """Add an animation for each loop; all have the joints that move in any of them."""
     rest = [(node.translation, node.rotation) for node in document.nodes]
     tracks = {name: _tracks(loop, skeleton, axes, travelling) for name, loop in loops.items()}
     moving = [
@@ -220,8 +223,10 @@ def _add_animations(
 def _tracks(
     loop: WalkLoop, skeleton: Skeleton, axes: np.ndarray, travelling: bool
 ) -> tuple[np.ndarray, np.ndarray]:
-    """See `local_poses`; travelling: the root moves on evenly, in a circle where the walk turns. One
-    that has a path of its own follows that.
+    """Positions and quaternions of the joints; see `local_poses`.
+
+    A loop with a path follows it. Otherwise, if travelling, the root moves on evenly, in a circle
+    if the walk turns.
     """
     pos, quat = local_poses(loop.walk.creature.model, skeleton, loop.qpos, axes)
     if loop.path is not None:

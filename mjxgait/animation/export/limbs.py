@@ -1,9 +1,9 @@
-"""Bones along the limbs, as a program draws them in which one animates: from a joint its Y axis leads
-to where the next one is, and about its X axis it turns as the part's hinge does.
+"""Bones along the limbs, as animation programs draw them.
 
-glTF's axes: Y up, forward +Z, left +X. A joint of glTF has no tail; a program takes the way to its
-child for that, so the last one of a limb gets a child at its tip, which is what inverse kinematics
-aims with. Letters: `B` joints.
+A joint's Y axis leads to the next joint, and its X axis is the axis of the part's hinge. glTF's
+axes: Y up, forward +Z, left +X. A glTF joint has no tail; programs use the way to its child
+instead, so the last joint of a limb gets a child at its tip, the end for inverse kinematics.
+Letters: `B` joints.
 """
 
 import dataclasses
@@ -16,13 +16,13 @@ from mjxgait.animation.export.skeleton import Skeleton, world_poses
 from mjxgait.animation.export.surface import far_end
 
 TIP = "_tip"
-"""Behind the name of a part: the joint at its end."""
+"""Suffix to a part's name for the joint at its end."""
 CLEAR = 0.25
-"""Of the way to the farthest child; where several lead together less far, they lead nowhere."""
+"""Share of the way to the farthest child; if the mean way is shorter, the bone keeps its axes."""
 ALONG = 0.8
-"""Cosine; a bone nearer than that to an axis turns about another one."""
+"""Cosine; an axis nearer than that to the bone is not used as its X axis."""
 LIKED = np.array([1.0, 0.01, 0.1])
-"""To which side a bone's X axis looks: to the left, else ahead, else up."""
+"""Side that a bone's X axis points to: left, else ahead, else up."""
 LEFT, AHEAD = np.eye(3)[0], np.eye(3)[2]
 
 
@@ -31,7 +31,7 @@ def along_limbs(
 ) -> Skeleton:
     """The skeleton with its bones along the limbs of a pose [nq], and with their tips.
 
-    The root keeps its axes, and so does a part whose children lie all around it.
+    The root keeps its axes, and so does a part with children all around it.
     """
     pos, rot = (each[0] for each in world_poses(model, skeleton, rest[None], axes))
     turn, hinges = skeleton.turn.copy(), _hinges(model, rest, axes)
@@ -53,7 +53,10 @@ def along_limbs(
 def _tipped(
     skeleton: Skeleton, tips: Mapping[int, np.ndarray], back: np.ndarray, axes: np.ndarray
 ) -> Skeleton:
-    """With joints at ends, which look ahead. tips: [3] m from the joints above, by their places."""
+    """The skeleton with joints at its tips, which look ahead.
+
+    tips: [3] m from the joint above, by its place.
+    """
     ahead = np.stack([LEFT, AHEAD, np.cross(LEFT, AHEAD)], 1)
     offset = [axes.T @ back[b] @ way for b, way in tips.items()]
     return Skeleton(
@@ -66,7 +69,7 @@ def _tipped(
 
 
 def _hinges(model: mujoco.MjModel, rest: np.ndarray, axes: np.ndarray) -> dict[int, np.ndarray]:
-    """The axis [3] of each body's last hinge: turned about that nothing but its angle changes."""
+    """Axis [3] of each body's last hinge: a turn about it changes only the hinge's angle."""
     data = mujoco.MjData(model)
     data.qpos[:] = rest
     mujoco.mj_kinematics(model, data)
@@ -75,8 +78,9 @@ def _hinges(model: mujoco.MjModel, rest: np.ndarray, axes: np.ndarray) -> dict[i
 
 
 def _frame(way: np.ndarray, hinge: np.ndarray | None) -> np.ndarray:
-    """[3, 3] with its Y axis along a way [3] and its X axis along the hinge, without one to the left
-    or, across that, ahead.
+    """Axes [3, 3] with Y along a way [3] and X along the hinge.
+
+    Without a usable hinge X points to the left, or ahead if the way leads to a side.
     """
     y = way / np.linalg.norm(way)
     sides = [LEFT, AHEAD] if hinge is None else [hinge, LEFT, AHEAD]

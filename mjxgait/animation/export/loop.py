@@ -1,4 +1,4 @@
-"""Whole strides of a walk, closed so that the end meets the beginning.
+"""Whole strides of a walk, closed to a loop.
 
 Letters: `F` key frames, `nq nv` as in MuJoCo.
 """
@@ -15,21 +15,18 @@ from mjxgait.rendering.walk import Walk
 RATES = (24, 30, 60)
 MOST_STRIDES = 4
 TOLERANCE = 0.01
-"""Change of speed that fitting the strides to whole frames may cost before another stride is
-taken in.
-"""
+"""Relative change of speed, from the fit to whole frames, above which another stride is added."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class WalkLoop:
     """Key frames in place: the creature stays above the origin of the world.
 
-    walk: they were taken from. qpos: [F, nq], in a loop the last equal to the first. rate:
-    frames/s. strides: in the loop; 0 if it is none.
-    advance: m that the creature moves forward in one loop; the travelling walk adds it evenly.
-    stretched: duration over the recorded one. frames: first and last recorded one. turned: rad to
-    the left in one loop, likewise; in place the creature looks ahead all the time.
-    path: [F, 2] m in the world, where the root moves otherwise than evenly, in place too.
+    walk: source of the frames. qpos: [F, nq], in a loop the last equal to the first. rate:
+    frames/s. strides: in the loop; 0 if it is none. advance: m forward in one loop; the travelling
+    walk adds it evenly. stretched: duration over the recorded one. frames: first and last recorded
+    frame. turned: rad to the left in one loop, added likewise; in place the creature always looks
+    ahead. path: [F, 2] m in the world, if the root moves unevenly; used in place, too.
     """
 
     walk: Walk
@@ -44,19 +41,19 @@ class WalkLoop:
 
     @property
     def times(self) -> np.ndarray:
-        """[F] s."""
+        """Times [F] in s."""
         return np.arange(len(self.qpos)) / self.rate
 
     @property
     def speed(self) -> float:
-        """m/s."""
+        """Mean speed in m/s."""
         return float(self.advance / self.times[-1])
 
 
 def walk_loop(walk: Walk, rate: int = 30, most: int = MOST_STRIDES) -> WalkLoop:
     """The steadiest strides of a walk as a loop of whole frames.
 
-    most: strides; with one the frames may be off the recorded times by half of one.
+    most: largest number of strides; with one, frames may be off the recorded times by half a frame.
 
     Raises:
       UserError: the walk has no steady stride.
@@ -88,11 +85,12 @@ def walk_loop(walk: Walk, rate: int = 30, most: int = MOST_STRIDES) -> WalkLoop:
     gap = _difference(model, qpos[-1], qpos[0])
     root = walk.creature.root_dof
     advance = float(-gap[root : root + 2] @ walk.forward)
-    # What the end lacks to be the beginning is added little by little.
+    # The gap between end and beginning is spread over the loop.
     qpos = np.array([_integrate(model, q, s * gap) for q, s in zip(qpos, share, strict=True)])
     qpos[-1] = qpos[0]
     place = walk.creature.root_qpos
-    # Shown where a viewer's own floor is, or none: on ground that is no plane at its mean height.
+    # The loop is shown on a viewer's own flat floor or on none, so uneven ground is replaced by its
+    # mean height.
     below = walk.ground_heights(walk.qpos[first:last, place : place + 2])
     qpos[:, place + 2] -= below.mean() - 0.5 * (below[-1] - below[0])
     qpos[:, place : place + 2] -= qpos[:-1, place : place + 2].mean(0)
@@ -101,7 +99,7 @@ def walk_loop(walk: Walk, rate: int = 30, most: int = MOST_STRIDES) -> WalkLoop:
 
 
 def walk_take(walk: Walk, rate: int = 30) -> WalkLoop:
-    """The whole walk as it was, also one that falls, in place and with a seam."""
+    """The whole walk as recorded, also one that falls, in place and with a seam."""
     model, place = walk.creature.model, walk.creature.root_qpos
     count = max(int(walk.seconds * rate), 2)
     qpos = resampled(model, walk.qpos, np.arange(count) / rate / walk.time_step)
@@ -115,15 +113,15 @@ def walk_take(walk: Walk, rate: int = 30) -> WalkLoop:
 
 
 def resampled(model: mujoco.MjModel, qpos: np.ndarray, frames: np.ndarray) -> np.ndarray:
-    """The poses [F, nq] at fractional frames [F] of poses [T, nq]."""
+    """Poses [F, nq] at fractional frames [F] of poses [T, nq]."""
     return np.array([_between(model, qpos, at) for at in frames])
 
 
 def _straightened(walk: Walk, qpos: np.ndarray, times: np.ndarray, rate: float) -> np.ndarray:
-    """The way [F, nq] of who turns evenly as if it led straight ahead.
+    """The poses [F, nq] of an even turn, straightened to lead ahead.
 
-    times: [F] s since the start. rate: rad/s to the left. Each step is turned back by the heading
-    of its moment, and the whole so that it leads forward.
+    times: [F] s since the start. rate: rad/s to the left. Each step is turned back by its own
+    heading, and the whole way is then turned to lead forward.
     """
     place, straight = walk.creature.root_qpos, qpos.copy()
     headings, steps = rate * times, np.diff(qpos[:, place : place + 2], axis=0)
@@ -146,8 +144,9 @@ def _turned(vector: np.ndarray, angle: float) -> np.ndarray:
 
 
 def _fitting_strides(walk: Walk, rate: int, most: int) -> tuple[int, int, int, int] | None:
-    """First and last recorded frame, number of strides, and of key frames; the fewest strides
-    that fit the frames well.
+    """First and last recorded frame, number of strides, and number of key frames less one.
+
+    The fewest strides that fit the frames well.
     """
     found = []
     for strides in range(1, most + 1):
@@ -169,7 +168,7 @@ def _between(model: mujoco.MjModel, qpos: np.ndarray, at: float) -> np.ndarray:
 
 
 def _difference(model: mujoco.MjModel, start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """[nv] that leads from one pose to another."""
+    """Change [nv] from one pose to another."""
     change = np.zeros(model.nv)
     mujoco.mj_differentiatePos(model, change, 1.0, start, end)
     return change

@@ -1,4 +1,4 @@
-"""What an exported walk says of itself, for `mjxgait refine`."""
+"""Note on an exported walk's origin, for `mjxgait refine`."""
 
 import json
 
@@ -9,11 +9,11 @@ from mjxgait.animation.export.loop import WalkLoop
 from mjxgait.champion.serializers import codec_of
 
 SAMPLES = 120
-"""Of a cycle's motion, as many as its reader takes."""
+"""Samples of a cycle's motion, as many as the reader uses."""
 
 
 def note_of(loop: WalkLoop) -> dict[str, str]:
-    """The key poses of a walk and the motion that they made, as one text that editors keep."""
+    """The key poses of a walk and the resulting motion, as one text that editors keep."""
     champion, creature = loop.walk.champion, loop.walk.creature
     if champion.controller != "poses" or not loop.strides:
         return {}
@@ -32,7 +32,7 @@ def note_of(loop: WalkLoop) -> dict[str, str]:
 
 
 def _stride(loop: WalkLoop, angles: np.ndarray) -> np.ndarray:
-    """The first stride of angles [F], closed: what its end lacks is spread over it."""
+    """The first stride of angles [F], closed: the gap at its end is spread over it."""
     share = np.linspace(0.0, 1.0, SAMPLES + 1)
     at = share * (len(angles) - 1) / loop.strides
     samples = np.interp(at, np.arange(len(angles)), angles)

@@ -1,4 +1,4 @@
-"""Loops that begin at the same moment of a stride, so that programs may blend them."""
+"""Loops that begin at the same phase of a stride, so that programs can blend them."""
 
 import dataclasses
 
@@ -11,9 +11,9 @@ from mjxgait.rendering.walk import Walk
 
 
 def stride_in_phase(walk: Walk, rate: int) -> WalkLoop:
-    """One stride of a walk as a loop that begins where the creature's first foot comes down.
+    """One stride of a walk as a loop that begins when the creature's first foot comes down.
 
-    Where that foot never leaves the floor the loop begins with the controller's cycle.
+    If that foot never leaves the floor, the loop begins with the controller's cycle.
 
     Raises:
       UserError: the walk has no steady stride.
@@ -35,7 +35,7 @@ def falls_of_first_foot(walk: Walk) -> np.ndarray:
 
 
 def standing_still(like: WalkLoop) -> WalkLoop:
-    """A second of the standing pose: a pose and no motion that anybody has simulated."""
+    """One second of the standing pose; it is not simulated."""
     creature: Creature = like.walk.creature
     stand = creature.stand_qpos.copy()
     place = creature.root_qpos

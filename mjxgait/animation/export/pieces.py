@@ -1,4 +1,4 @@
-"""The creature's surface in its rest pose, one piece per colour, each point held by one joint.
+"""The creature's surface in its rest pose, one piece per colour, each point bound to one joint.
 
 glTF's axes: Y up, forward +Z. Letters: `V` points, `F` triangles.
 """
@@ -15,7 +15,9 @@ from mjxgait.rendering.painter import geom_colours, seen_geoms
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Piece:
-    """name: of its material. colour: sRGB [4]. points: [V, 3] m. normals: [V, 3]. faces: [F, 3]
+    """A surface of one colour.
+
+    name: of its material. colour: sRGB [4]. points: [V, 3] m. normals: [V, 3]. faces: [F, 3]
     counterclockwise from outside. joints: [V] places in the skeleton.
     """
 
@@ -30,7 +32,7 @@ class Piece:
 def pieces_of(
     model: mujoco.MjModel, skeleton: Skeleton, axes: np.ndarray, rest: np.ndarray
 ) -> list[Piece]:
-    """All that is seen of the skeleton's bodies in a pose [nq]."""
+    """The visible surface of the skeleton's bodies in a pose [nq]."""
     data = mujoco.MjData(model)
     data.qpos[:] = rest
     mujoco.mj_kinematics(model, data)
@@ -43,7 +45,7 @@ def pieces_of(
 
 
 def linear(colour: np.ndarray) -> np.ndarray:
-    """From sRGB [3] to the linear colours of glTF and USD."""
+    """Convert sRGB [3] to the linear colours of glTF and USD."""
     return np.where(colour <= 0.04045, colour / 12.92, ((colour + 0.055) / 1.055) ** 2.4)
 
 
@@ -54,7 +56,7 @@ def _piece(
     axes: np.ndarray,
     geoms: list[int],
 ) -> Piece:
-    """Of geoms of one colour."""
+    """The piece made of geoms of one colour."""
     points, normals, faces, joints, count = [], [], [], [], 0
     for g in geoms:
         own, facing, triangles = geom_surface(model, g)
@@ -69,7 +71,7 @@ def _piece(
 
 
 def _name(model: mujoco.MjModel, geom: int) -> str:
-    """What the model calls a geom's material, else the part that has it first."""
+    """Name of a geom's material, else of its body."""
     material, body = int(model.geom_matid[geom]), int(model.geom_bodyid[geom])
     called = model.mat(material).name if material >= 0 else model.body(body).name
     return str(called) or f"body_{body}"

@@ -1,4 +1,4 @@
-"""The bones of a creature, and where they are in a pose, in glTF's axes, which are BVH's too.
+"""The bones of a creature, and their places in a pose, in the axes of glTF and BVH.
 
 glTF is Y-up with +Z forward and +X left, quaternions are (x, y, z, w). Letters: `F` key frames, `B`
 joints of the skin (the root on the floor, then the bodies).
@@ -12,7 +12,7 @@ import numpy as np
 from mjxgait.animation.export.loop import WalkLoop
 
 STILL = 1e-6
-"""m or unit quaternion; what moves less is not animated."""
+"""m or unit quaternion; smaller motions are not animated."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -32,9 +32,7 @@ class Skeleton:
 
 
 def skeleton_of(model: mujoco.MjModel, trunk: int) -> Skeleton:
-    """The bodies of the tree that begins at the trunk, below a root that stays on the floor, with
-    the bodies' own axes.
-    """
+    """The bodies of the trunk's tree with their own axes, below a root that stays on the floor."""
     bodies = [
         0,
         *(b for b in range(1, model.nbody) if model.body_rootid[b] == model.body_rootid[trunk]),
@@ -48,7 +46,7 @@ def skeleton_of(model: mujoco.MjModel, trunk: int) -> Skeleton:
 
 
 def gltf_axes(forward: np.ndarray) -> np.ndarray:
-    """[3, 3] that turns MuJoCo's world into glTF's: left to +X, up to +Y, forward [2] to +Z."""
+    """Rotation [3, 3] from MuJoCo's world to glTF's: left to +X, up to +Y, forward [2] to +Z."""
     way = np.append(forward, 0.0)
     return np.stack([np.cross([0.0, 0.0, 1.0], way), [0.0, 0.0, 1.0], way])
 
@@ -56,8 +54,9 @@ def gltf_axes(forward: np.ndarray) -> np.ndarray:
 def local_poses(
     model: mujoco.MjModel, skeleton: Skeleton, qpos: np.ndarray, axes: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Each joint against its parent: positions [F, B, 3] m and quaternions [F, B, 4] (x, y, z,
-    w), in glTF's axes.
+    """Positions [F, B, 3] m and quaternions [F, B, 4] of joints against their parents.
+
+    In glTF's axes; quaternions are (x, y, z, w).
     """
     pos, rot = world_poses(model, skeleton, qpos, axes)
     local_pos, quat = pos.copy(), np.zeros((*pos.shape[:2], 4))
@@ -74,7 +73,7 @@ def local_poses(
 def world_poses(
     model: mujoco.MjModel, skeleton: Skeleton, qpos: np.ndarray, axes: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Each joint in the world: positions [F, B, 3] m and rotations [F, B, 3, 3], in glTF's axes."""
+    """Positions [F, B, 3] m and rotations [F, B, 3, 3] of joints in the world, in glTF's axes."""
     data = mujoco.MjData(model)
     bodies, pos, rot = list(skeleton.bodies), [], []
     for row in qpos:
@@ -97,20 +96,19 @@ def resting(loop: WalkLoop) -> np.ndarray:
 
 
 def travel(loop: WalkLoop) -> tuple[np.ndarray, np.ndarray]:
-    """How the root moves on evenly: [F, 3] m, and [F] rad to the left, in a circle where the walk
-    turns.
-    """
+    """Even motion of the root: [F, 3] m, and [F] rad to the left; a circle if the walk turns."""
     share = np.linspace(0, 1, len(loop.qpos))
     turned = share * loop.turned
-    # Chords of the circle: sin(a / 2) / (a / 2) as long as the way along it.
+    # A chord is sin(a / 2) / (a / 2) times as long as the way along the circle.
     chord = share * loop.advance * np.sinc(turned / (2 * np.pi))
     ahead = np.stack([np.sin(turned / 2), np.zeros_like(turned), np.cos(turned / 2)], 1)
     return chord[:, None] * ahead, turned
 
 
 def _quaternions(rotations: np.ndarray) -> np.ndarray:
-    """[F, 4] (x, y, z, w) of rotations [F, 3, 3], neighbours on the same side of the sphere so
-    that they can be interpolated.
+    """Quaternions [F, 4] (x, y, z, w) of rotations [F, 3, 3].
+
+    Neighbours lie on the same side of the sphere, so that they can be interpolated.
     """
     quats = np.zeros((len(rotations), 4))
     for i, rotation in enumerate(rotations):

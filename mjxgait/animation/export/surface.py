@@ -7,9 +7,9 @@ from mjxgait.rendering.triangles import mesh_of
 
 GEOM = mujoco.mjtGeom
 AROUND, RINGS = 20, 10
-"""Parts of a round shape about its axis, and from pole to pole."""
+"""Number of parts of a round shape about its axis, and from pole to pole."""
 FAR = 0.98
-"""Of the greatest distance, from which on points are among the farthest."""
+"""Share of the greatest distance from which points count among the farthest."""
 
 Surface = tuple[np.ndarray, np.ndarray, np.ndarray]
 """Points [V, 3] m, unit normals [V, 3], triangles [F, 3] counterclockwise from outside."""
@@ -34,9 +34,7 @@ def geom_surface(model: mujoco.MjModel, geom: int) -> Surface:
 
 
 def far_end(model: mujoco.MjModel, body: int, qpos: np.ndarray) -> np.ndarray:
-    """[3] m in the world from a body's origin to where it reaches farthest in a pose: the middle of
-    its farthest points.
-    """
+    """Vector [3] in m, in the world, from a body's origin to the mean of its farthest points."""
     data = mujoco.MjData(model)
     data.qpos[:] = qpos
     mujoco.mj_kinematics(model, data)
@@ -63,8 +61,9 @@ def _globe() -> tuple[np.ndarray, np.ndarray]:
 
 
 def _rings(count: int) -> np.ndarray:
-    """Triangles between rings of `AROUND` vertices; those without area at the poles are left out
-    by the caller.
+    """Triangles between rings of `AROUND` vertices.
+
+    The caller removes those without area at the poles.
     """
     ring, step = np.meshgrid(np.arange(count - 1), np.arange(AROUND), indexing="ij")
     a, b = ring * AROUND + step, ring * AROUND + (step + 1) % AROUND
@@ -94,7 +93,7 @@ def _ellipsoid(radii: np.ndarray) -> Surface:
 
 def _capsule(radius: float, half: float) -> Surface:
     unit, _ = _globe()
-    # The ring at the equator twice: once for each end.
+    # The equator's ring occurs twice: once for each end.
     south, north = unit[: (RINGS // 2 + 1) * AROUND], unit[RINGS // 2 * AROUND :]
     normals = np.concatenate([south, north])
     points = np.concatenate([south * radius - [0, 0, half], north * radius + [0, 0, half]])
@@ -140,7 +139,7 @@ def _box(half: np.ndarray) -> Surface:
 
 
 def _mesh(points: np.ndarray, faces: np.ndarray) -> Surface:
-    """Flat shading: every triangle has vertices of its own."""
+    """The surface of a mesh with flat shading: every triangle has its own vertices."""
     corners = points[faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normals, axis=1)

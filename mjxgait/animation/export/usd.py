@@ -1,4 +1,4 @@
-"""A walk as a USD file: a skeleton with its skin and its motion, as UsdSkel has them.
+"""A walk as a USD file: a skeleton with its skin and its motion, in UsdSkel.
 
 Y is up, forward +Z, lengths are m. Needs the extra `[usd]`.
 """
@@ -26,7 +26,7 @@ from mjxgait.errors import UserError
 
 
 def export_usd(loop: WalkLoop, path: Path, travelling: bool = False) -> None:
-    """Writes the loop: a text file if the name ends with .usda, otherwise a binary one.
+    """Write the loop: a text file if the name ends with .usda, otherwise a binary one.
 
     travelling: as for a GLB.
 
@@ -60,7 +60,7 @@ def export_usd(loop: WalkLoop, path: Path, travelling: bool = False) -> None:
 def _add_skeleton(
     stage: Any, root: Any, loop: WalkLoop, skeleton: Skeleton, travelling: bool
 ) -> Any:
-    """The joints with their rest and their motion; returns the skeleton's path."""
+    """Add the joints with their rest and their motion; return the skeleton's path."""
     from pxr import UsdSkel, Vt
 
     model, axes = loop.walk.creature.model, gltf_axes(loop.walk.forward)
@@ -92,7 +92,7 @@ def _add_skeleton(
 
 
 def _add_piece(stage: Any, root: Any, piece: Piece, skeleton: Any) -> None:
-    """A mesh of one colour, held by the skeleton."""
+    """Add a mesh of one colour, bound to the skeleton."""
     from pxr import UsdGeom, UsdSkel, Vt
 
     mesh = UsdGeom.Mesh.Define(stage, root.AppendChild(_word(piece.name)))
@@ -110,13 +110,13 @@ def _add_piece(stage: Any, root: Any, piece: Piece, skeleton: Any) -> None:
 
 
 def _matrices(pos: np.ndarray, rot: np.ndarray) -> np.ndarray:
-    """[B, 4, 4] as USD has them, whose vectors are rows."""
+    """Transforms [B, 4, 4] in USD's convention of row vectors."""
     whole = np.tile(np.eye(4), (len(pos), 1, 1))
     whole[:, :3, :3], whole[:, 3, :3] = rot.transpose(0, 2, 1), pos
     return whole
 
 
 def _word(name: str) -> str:
-    """A name as USD allows it."""
+    """A name in a form that USD allows."""
     plain = re.sub(r"\W", "_", name, flags=re.ASCII)
     return plain if plain and not plain[0].isdigit() else f"_{plain}"

@@ -1,4 +1,4 @@
-"""A cycle that somebody has keyed or captured: read, matched, and turned into key poses."""
+"""Import of a keyed or captured cycle: read the file, match names, fit key poses."""
 
 from mjxgait.animation.keys.bring import Brought, bring
 

@@ -1,4 +1,4 @@
-"""Where up and forward of a creature lie in a file's axes.
+"""A creature's up and forward in a file's axes.
 
 Letters: `F` frames, `B` bones. Axes are [3, 3], from the creature's world to the file's.
 """
@@ -15,10 +15,10 @@ from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 
 WAYS = {"z": (0, 0, 1), "-z": (0, 0, -1), "x": (1, 0, 0), "-x": (-1, 0, 0)}
-"""Where a creature at rest in the file looks, in the file's axes with Y up."""
+"""Directions in which the file's creature looks at rest, in the file's axes with Y up."""
 USUAL = "z"
 TRIED = 12
-"""Frames on which two guesses are compared."""
+"""Number of frames on which two guesses are compared."""
 
 
 def axes_of(
@@ -26,11 +26,12 @@ def axes_of(
 ) -> np.ndarray:
     """The axes of a file.
 
-    Without a way they are the usual ones or, where its joints can do more of the motion so, those of
-    the file that the creature itself was made of.
+    Without a way these are the usual ones, or those of the file that the creature was imported
+    from, if its joints can then follow the motion better.
 
     Args:
-      bones: bone by the name of the part. way: where the file's creature looks, Y being up.
+      bones: bone by the name of the part. way: direction in which the file's creature looks, Y
+        being up.
     """
     usual, own = facing(creature, way or USUAL), rig_axes(creature)
     if way or own is None or np.allclose(own, usual, atol=1e-3):
@@ -46,7 +47,7 @@ def axes_of(
 
 
 def facing(creature: Creature, way: str) -> np.ndarray:
-    """The axes of a file with Y up in which the creature looks along a way.
+    """The axes of a file with Y up and the creature looking along a way.
 
     Raises:
       UserError: there is no such way.
@@ -60,7 +61,7 @@ def facing(creature: Creature, way: str) -> np.ndarray:
 
 
 def rig_axes(creature: Creature) -> np.ndarray | None:
-    """Those of the file of which an import made the creature; None if it was not a rig."""
+    """The axes of the file that the creature was imported from; None if it was not a rig."""
     if not creature.is_rig:
         return None
     data = mujoco.MjData(creature.model)

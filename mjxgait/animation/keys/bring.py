@@ -1,4 +1,4 @@
-"""From a file to key poses, each step told."""
+"""Import of key poses from a file, with a report of each step."""
 
 import dataclasses
 from collections.abc import Callable, Mapping
@@ -27,15 +27,15 @@ READERS: Mapping[str, Callable[[Path], Clip | AngleTrack]] = {
 }
 Read = Clip | AngleTrack
 MOST_FRAMES = 1500
-"""That a cycle is looked for in."""
+"""Largest number of frames in which a cycle is searched."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Brought:
     """A file's cycle on a creature.
 
-    names: in the file, by the creature's part or joint. track: angles over all the file. own: what
-    the file says of the key poses that made it, where it is an exported walk.
+    names: in the file, by the creature's part or joint. track: angles over the whole file. own: the
+    key poses noted in the file, if it is an exported walk.
     """
 
     names: Mapping[str, str]
@@ -55,15 +55,15 @@ def bring(
     way: str | None = None,
     tell: Callable[[str], object] = lambda said: None,
 ) -> Brought:
-    """Reads a file and fits key poses to its cycle.
+    """Read a file and fit key poses to its cycle.
 
     Args:
-      table: names in the file by the creature's part (of a CSV or JSON: joint). ends: s, of one
-        cycle. tolerance: rad, of the key poses. way: where the file's creature looks, see `axes_of`.
-        tell: called with each line of the report.
+      table: names in the file by the creature's part (for CSV and JSON: joint). ends: s, of one
+        cycle. tolerance: rad, of the key poses. way: direction in which the file's creature looks,
+        see `axes_of`. tell: called with each line of the report.
 
     Raises:
-      UserError: one sentence that says what is wrong with the file.
+      UserError: says in one sentence what is wrong with the file.
     """
     try:
         return _bring(creature, path, table, ends, tolerance, way, tell)
@@ -108,10 +108,10 @@ def _bring(
 
 
 def _cut(read: Read, ends: tuple[float | None, float | None]) -> Read:
-    """What lies between the ends, and a frame on each side.
+    """The part between the ends, and one frame more on each side.
 
     Raises:
-      UserError: it is too long to look for a cycle in.
+      UserError: it is too long to search for a cycle.
     """
     first, last = (
         int(np.searchsorted(read.times, end)) if end is not None else other
@@ -129,7 +129,7 @@ def _cut(read: Read, ends: tuple[float | None, float | None]) -> Read:
 
 
 def _angles(creature: Creature, read: AngleTrack, names: Mapping[str, str]) -> Retargeted:
-    """Angles of joints that a file names, within their ranges; others stay as they stand."""
+    """Angles of the joints that a file names, within their ranges; others keep the standing angle."""
     if not names:
         known = ", ".join(creature.joints.names)
         raise UserError(f"none of its columns is like a joint of {creature.name}: {known}")
@@ -145,7 +145,7 @@ def _angles(creature: Creature, read: AngleTrack, names: Mapping[str, str]) -> R
 
 
 def told_names(names: Mapping[str, str], wanted: list[str], found: tuple[str, ...]) -> list[str]:
-    """Lines that say what was taken for what."""
+    """Report lines: the matched names."""
     lines = [f"names: {len(names)} of {len(wanted)} parts have a bone or a column"]
     lines += [f"  {own} <- {other}" for own, other in names.items()]
     if left := [name for name in wanted if name not in names]:
@@ -156,7 +156,7 @@ def told_names(names: Mapping[str, str], wanted: list[str], found: tuple[str, ..
 
 
 def told_errors(track: Retargeted) -> list[str]:
-    """Lines that say how well the joints can do what the file wants."""
+    """Report lines: how well the joints can follow the file."""
     lines = ["what the joints cannot do, in degrees (root mean square, most):"]
     for name, missed in track.errors.items():
         mean, most = np.degrees(np.sqrt(np.mean(missed**2))), np.degrees(missed.max())
@@ -165,7 +165,7 @@ def told_errors(track: Retargeted) -> list[str]:
 
 
 def told_cycle(cycle: Cycle) -> list[str]:
-    """A line that says which cycle was found."""
+    """Report line: the cycle that was found."""
     mirrored = "its second half mirrors the first" if cycle.mirrored else "not mirrored"
     return [
         f"cycle: {cycle.period:.3f} s from {cycle.begins:.3f} s on, {mirrored}; its ends differ by "
@@ -174,13 +174,13 @@ def told_cycle(cycle: Cycle) -> list[str]:
 
 
 def told_fit(fit: Fit) -> list[str]:
-    """A line that says how the cycle was fitted."""
+    """Report line: the fit of the cycle."""
     error = np.degrees(fit.error)
     return [f"key poses: {len(fit.key_poses)}, {error:.1f} degrees from it (root mean square)"]
 
 
 def told_own(own: Own) -> list[str]:
-    """A line that says what was changed in an exported walk."""
+    """Report line: the changes to an exported walk."""
     count, changed = len(own.fit.key_poses), np.degrees(own.changed)
     return [
         f"key poses: {count}, those of the walk that was exported, and what was changed since then: "
@@ -189,7 +189,7 @@ def told_own(own: Own) -> list[str]:
 
 
 def told_clipped(fit: Fit) -> list[str]:
-    """A line for each joint that cannot go as far as it should."""
+    """Report lines: one for each joint with angles cut off at its pose range."""
     return [
         f"  {name}: up to {lost:.0f} degrees beyond its pose range are cut off"
         for name, lost in fit.clipped.items()

@@ -1,4 +1,4 @@
-"""Finds the cycle in angles over time, and whether its second half mirrors the first.
+"""Search for the cycle in angles over time, and for the mirror symmetry of its halves.
 
 Letters: `F` frames, `J` joints, `N` evenly spaced samples of one cycle.
 """
@@ -12,20 +12,20 @@ from mjxgait.errors import UserError
 
 SAMPLES = 120
 CLOSED = np.radians(5.0)
-"""rad, root mean square; poses that differ by less are the same of a cycle."""
+"""rad, root mean square; poses that differ by less count as the same pose of a cycle."""
 MIRRORED = np.radians(6.0)
 SHORTEST = 0.1
-"""s of a cycle."""
+"""Shortest cycle in s."""
 STILL = np.radians(1.0)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Cycle:
-    """angles: [N, J] rad over one cycle, the first not repeated. period: s. begins: s in the file.
+    """One cycle of a file's motion.
 
-    gap: rad, root mean square, between the end and the beginning before they were joined.
-    mirrored: whether the second half is the mirror image of the first; then it is made so exactly.
-    drawn: [N, J] rad before that.
+    angles: [N, J] rad, the first not repeated. period: s. begins: s in the file. gap: rad, root
+    mean square, between the end and the beginning before they were joined. mirrored: whether the
+    second half mirrors the first; `angles` are then made exactly so. drawn: [N, J] rad before that.
     """
 
     angles: np.ndarray
@@ -46,11 +46,10 @@ def find_cycle(
     """One cycle of angles [F, J] at times [F] s.
 
     Args:
-      begin, end: s; what the user says of its ends. Without an end it is where the motion first
-        comes back to itself.
+      begin, end: s, as requested. Without an end the cycle ends where the motion first repeats.
 
     Raises:
-      UserError: nothing moves, or the ends are none.
+      UserError: nothing moves, or the ends are not usable.
     """
     first = times[0] if begin is None else begin
     last = times[-1] if end is None else end
@@ -75,22 +74,22 @@ def find_cycle(
 
 
 def interpolated(at: np.ndarray, times: np.ndarray, angles: np.ndarray) -> np.ndarray:
-    """[n, J] at other times [n] than those [F] of the angles [F, J]."""
+    """Angles [n, J] at times `at` [n], from the angles [F, J] at times [F]."""
     return np.stack([np.interp(at, times, column) for column in angles.T], 1)
 
 
 def _sampled(
     times: np.ndarray, angles: np.ndarray, first: float, period: float, count: int
 ) -> np.ndarray:
-    """[count, J] evenly over a period, both ends included."""
+    """Angles [count, J] evenly over a period, both ends included."""
     return interpolated(first + np.linspace(0.0, period, count), times, angles)
 
 
 def _period(times: np.ndarray, angles: np.ndarray, first: float, last: float) -> float:
-    """s after which the motion is what it was; all there is where it never is.
+    """Period in s after which the motion repeats; the whole length if it never does.
 
-    A clip that closes holds a whole number of cycles; in any other the shortest lag is looked for
-    at which the poses come back over the rest of the clip.
+    A closed clip holds a whole number of cycles. In any other clip the period is the shortest lag
+    at which the poses repeat over the rest of the clip.
     """
     length = last - first
     count = max(round(length / np.median(np.diff(times))), 2)

@@ -1,4 +1,4 @@
-"""How far a walk departs from the cycle that it was made of, in numbers and in words.
+"""Departure of a walk from its original cycle, in numbers and in words.
 
 Letters: `N` samples of a cycle, `J` joints, `F` feet.
 """
@@ -17,17 +17,19 @@ from mjxgait.rendering.walk import Walk
 from mjxgait.training.folder import open_run
 
 WORTH_TELLING = 0.01
-"""m; a foot that moves less far elsewhere is where it was."""
+"""m; smaller changes of a foot are not reported."""
 MOST_LINES = 5
 TILTED, OUT_OF_TIME = np.radians(1.0), 0.015
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Departure:
-    """poses: deg, root mean square of what the key poses differ from those that they lie near.
-    moved: the same of the joints as they moved against the cycle that was drawn, without the delay
-    with which they follow; period: share of the drawn one. None where there is no steady stride.
-    by_joint: deg, of the key poses. words: what changed, a sentence each.
+    """Departure of a champion's walk from the original cycle.
+
+    poses: deg, root mean square difference of the key poses from the original ones. moved: the
+    same for the joints as they moved against the drawn cycle, without their delay; period: share of
+    the drawn one; both None where there is no steady stride. by_joint: deg, of the key poses.
+    words: one sentence for each change.
     """
 
     poses: float
@@ -38,17 +40,17 @@ class Departure:
 
 
 def departure_of(folder: Path) -> Departure:
-    """Of the champion of a run that `mjxgait refine` has made.
+    """Departure of the champion of a run made by `mjxgait refine`.
 
     Raises:
-      UserError: it was not made by it, or has no champion.
+      UserError: the run was made otherwise, or has no champion.
     """
     original = read_original(folder, open_run(folder)[0])
     return departure(original, champion_of(folder, LOOP_SECONDS).walk)
 
 
 def departure(original: Original, walk: Walk) -> Departure:
-    """Of a champion's walk from the cycle of its run."""
+    """Departure of a champion's walk from the cycle of its run."""
     creature, champion, count = walk.creature, walk.champion, len(original.angles)
     poses = np.asarray(champion.genome["key_poses"], float)
     apart = np.degrees(poses - np.reshape(champion.settings.around, poses.shape))
@@ -68,7 +70,7 @@ def departure(original: Original, walk: Walk) -> Departure:
 
 
 def _in_words(pitch: float, period: float) -> list[str]:
-    """Of the trunk's mean pitch in rad, nose down, and the share of the drawn period."""
+    """Sentences on the trunk's mean pitch in rad, nose down, and the share of the drawn period."""
     told = []
     if abs(pitch) > TILTED:
         way = "down" if pitch > 0 else "up"
@@ -80,14 +82,14 @@ def _in_words(pitch: float, period: float) -> list[str]:
 
 
 def _over_stride(walk: Walk, first: int, last: int, count: int) -> np.ndarray:
-    """[N, J] of the joints as they moved over one stride."""
+    """Recorded joint angles [N, J] over one stride."""
     angles = walk.qpos[:, walk.creature.joints.qpos_adr]
     at, frames = np.linspace(first, last, count, endpoint=False), np.arange(len(angles))
     return interpolated(at, frames, angles)
 
 
 def _feet_in_words(creature: Creature, drawn: np.ndarray, done: np.ndarray) -> list[str]:
-    """What the feet do otherwise, seen from the trunk; the largest changes first."""
+    """Sentences on the feet's changes, seen from the trunk; the largest first."""
     before, after = _feet(creature, drawn), _feet(creature, done)
     told = []
     for foot, name in enumerate(creature.feet.names):
@@ -107,7 +109,7 @@ def _feet_in_words(creature: Creature, drawn: np.ndarray, done: np.ndarray) -> l
 
 
 def _feet(creature: Creature, angles: np.ndarray) -> np.ndarray:
-    """[N, F, 3] m of the feet forward, left and up of the trunk."""
+    """Places [N, F, 3] in m of the feet forward, left and up of the trunk."""
     data, frame = mujoco.MjData(creature.model), creature.frame
     axes = np.stack([frame.forward, frame.left, frame.up])
     geoms, foot_of = np.array(creature.feet.stepping), creature.feet.foot_of

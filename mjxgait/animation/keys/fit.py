@@ -1,8 +1,8 @@
-"""As few key poses as reproduce a cycle.
+"""The fewest key poses that reproduce a cycle.
 
-The controller leads evenly from pose to pose (docs/controller.md), so a cycle of poses is a sum of
-hat functions: the best poses for a number of them are linear least squares. Letters: `N` samples of
-a cycle, `K` key poses, `C` poses of the whole cycle, `J` joints.
+The controller interpolates linearly from pose to pose (docs/controller.md), so a cycle of poses is
+a sum of hat functions, and linear least squares gives the best poses of a given number. Letters:
+`N` samples of a cycle, `K` key poses, `C` poses of the whole cycle, `J` joints.
 """
 
 import dataclasses
@@ -15,15 +15,17 @@ from mjxgait.errors import UserError
 
 MOST_POSES = 12
 SEEN = 0.5
-"""deg."""
+"""deg; a smaller loss at a pose range is not visible."""
 TURNS = 4
-"""Places between two samples of poses that are tried for the first pose."""
+"""Number of places tried for the first pose, within the first 1 / K of the cycle."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Fit:
-    """key_poses: [K, J] rad. error: rad, root mean square over the cycle. starts: part of the cycle
-    at which the first pose lies. clipped: deg by joint, what its pose range takes away at most.
+    """Key poses fitted to a cycle.
+
+    key_poses: [K, J] rad. error: rad, root mean square over the cycle. starts: the first pose's
+    place as a share of the cycle. clipped: deg by joint, the most that its pose range cuts off.
     """
 
     key_poses: np.ndarray
@@ -33,10 +35,10 @@ class Fit:
 
 
 def fit_poses(creature: Creature, cycle: Cycle, tolerance: float) -> Fit:
-    """The fewest key poses that come within a tolerance in rad, root mean square.
+    """The fewest key poses within a tolerance in rad, root mean square.
 
     Raises:
-      UserError: not even the most poses do.
+      UserError: even `MOST_POSES` are not within it.
     """
     for count in range(2, MOST_POSES + 1):
         best = min((_fitted(creature, cycle, count, turn) for turn in _turns(count)), key=_error)
@@ -71,9 +73,7 @@ def _fitted(creature: Creature, cycle: Cycle, count: int, starts: float) -> Fit:
 
 
 def within_range(creature: Creature, poses: np.ndarray) -> tuple[np.ndarray, dict[str, float]]:
-    """Key poses [K, J] within the joints' pose ranges, and by joint the deg that it takes away at
-    most, where one would see it.
-    """
+    """Key poses [K, J] within the joints' pose ranges, and the largest visible loss in deg by joint."""
     joints = creature.joints
     kept = np.clip(poses, joints.pose_low, joints.pose_high)
     lost = np.degrees(np.abs(poses - kept).max(0))

@@ -1,4 +1,4 @@
-"""Several runs near one cycle, from as it was drawn to whatever walks, side by side in a folder."""
+"""Several runs near one cycle in one folder, from the cycle as drawn to a free walk."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -17,16 +17,16 @@ from mjxgait.training.folder import CERTIFICATE, is_taken, open_run
 
 PICTURE = "front"
 STARTS = 4
-"""Number of the criterion that says how many disturbed starts stay up."""
+"""Number of the criterion on disturbed starts that stay up."""
 
 
 def folder_of(out: Path, keep: float) -> Path:
-    """Of the run that keeps so much."""
+    """Folder of the run that keeps this share."""
     return out / f"keep-{keep:g}"
 
 
 def runs_in(out: Path) -> list[Path]:
-    """The runs of a front, the most faithful first; none where it is no front."""
+    """The runs of a front, the most faithful first; empty if the folder is no front."""
     found = [run for run in out.glob("keep-*") if (run / KEYS).is_file()]
     return sorted(found, key=kept_by, reverse=True)
 
@@ -37,7 +37,7 @@ def kept_by(run: Path) -> float:
 
 
 def check_front(out: Path, keeps: Sequence[float]) -> None:
-    """Refuse to begin where something lies.
+    """Refuse to begin in a folder that is in use.
 
     Raises:
       UserError: the folder is not empty, or a share is there twice.
@@ -52,12 +52,12 @@ def check_front(out: Path, keeps: Sequence[float]) -> None:
 
 
 def finished(run: Path) -> bool:
-    """Whether its champion has been examined."""
+    """True if the run's champion has a certificate."""
     return (run / CERTIFICATE).is_file()
 
 
 def look(run: Path) -> Kept:
-    """At a run that has ended."""
+    """The result of a finished run."""
     document = read_certificate(run / CERTIFICATE)
     if document is None:
         raise UserError(f"{run}: has no certificate yet; mjxgait refine --resume {run}")
@@ -75,7 +75,7 @@ def look(run: Path) -> Kept:
 
 
 def draw(out: Path) -> Path:
-    """Writes the picture of a front whose runs have ended, and says where.
+    """Draw a front of finished runs, and return the path of the picture.
 
     Raises:
       UserError: a run has no certificate yet, or the picture cannot be written.

@@ -1,4 +1,4 @@
-"""Which bone moves which part of the creature, by a table or by the likeness of names."""
+"""Bones matched to the creature's parts, by a table or by similar names."""
 
 import difflib
 import re
@@ -8,7 +8,7 @@ from typing import Any
 from mjxgait.errors import UserError, did_you_mean
 
 LIKE = 0.6
-"""Of two names, from which on they are taken for the same."""
+"""Likeness from which two names count as the same."""
 SIDES = {"l": "left", "left": "left", "r": "right", "right": "right"}
 SAME = {
     "upleg": "thigh",
@@ -32,20 +32,20 @@ SAME = {
     "toes": "foot",
     "ankle": "foot",
 }
-"""What rigs call the parts of a leg, and one word for each."""
+"""Names of body parts in rigs, and one common word for each."""
 
 
 def matched(
     wanted: Iterable[str], found: Iterable[str], table: Mapping[str, Any] | None, where: str
 ) -> dict[str, str]:
-    """For each wanted name the name in the file that means it, as far as there is one.
+    """Name in the file by wanted name, for those with a match.
 
     Args:
-      table: wanted name to name in the file, as the user says; it goes before all likeness.
+      table: the user's names in the file by wanted name; it takes precedence over likeness.
       where: the table's file, for errors.
 
     Raises:
-      UserError: the table names what is not there.
+      UserError: the table has an unknown name.
     """
     wanted, found = list(wanted), list(found)
     pairs = {}
@@ -66,7 +66,7 @@ def matched(
 
 
 def _words(name: str) -> tuple[frozenset[str], str]:
-    """The side that a name says, and its other words in one order."""
+    """Side in a name, and its other words in sorted order."""
     plain = re.sub(r"^.*:", "", name)
     plain = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", plain)
     words = [word for word in re.split(r"[^a-z]+", plain.lower()) if word]
@@ -76,7 +76,7 @@ def _words(name: str) -> tuple[frozenset[str], str]:
 
 
 def _likeness(one: tuple[frozenset[str], str], other: tuple[frozenset[str], str]) -> float:
-    """From 0 to 1; of different sides 0."""
+    """Likeness of two names from 0 to 1; 0 for different sides."""
     if one[0] != other[0]:
         return 0.0
     return difflib.SequenceMatcher(None, one[1], other[1]).ratio()

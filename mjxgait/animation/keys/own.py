@@ -1,7 +1,7 @@
-"""What an exported walk says of the key poses that made it, so that it can come back edited.
+"""Key poses noted in an exported walk, for import after an edit.
 
-A body never is where its targets are: it follows late, and bends under its weight. Of a cycle that
-`mjxgait export` wrote both are known; what was changed in the file since then is added to the
+A body never reaches its targets exactly: it lags, and bends under its weight. A cycle written by
+`mjxgait export` states both targets and motion; changes to the motion since then are added to the
 targets. Letters: `N` samples of a cycle, `K` key poses, `J` joints.
 """
 
@@ -16,16 +16,17 @@ from mjxgait.animation.keys.fit import Fit, within_range
 from mjxgait.creature import Creature
 
 UNCHANGED = np.radians(0.5)
-"""rad, root mean square of a joint; what differs by less was not edited, or is the same on both
+"""rad, root mean square of a joint; below it a joint counts as unedited, or as the same on both
 sides.
 """
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Own:
-    """fit: key poses with what was changed. changed: rad, root mean square. advance: how the
-    target moves on. tuning: genes by name. cycle: as it was drawn, mirrored if the walk was and what
-    was changed is.
+    """An exported walk with its edits.
+
+    fit: key poses with the changes. cycle: as drawn; mirrored if the walk and the changes are.
+    changed: rad, root mean square. advance: how the target moves on. tuning: genes by name.
     """
 
     fit: Fit
@@ -36,7 +37,7 @@ class Own:
 
 
 def own_poses(creature: Creature, note: str, cycle: Cycle) -> Own | None:
-    """Of a file that the creature's own walk was exported to; None of every other."""
+    """Read the note of an exported walk of this creature; return None for any other file."""
     names = creature.joints.names
     try:
         document = json.loads(note)
@@ -68,12 +69,12 @@ def own_poses(creature: Creature, note: str, cycle: Cycle) -> Own | None:
 
 
 def _most(change: np.ndarray) -> float:
-    """rad, root mean square over a cycle [N, J], of the joint that changes most."""
+    """Change of the joint that changes most over a cycle [N, J]; rad, root mean square."""
     return float(np.sqrt(np.mean(change**2, 0)).max())
 
 
 def _resampled(motion: np.ndarray, count: int) -> np.ndarray:
-    """[N, J] of samples of a cycle, as many as asked for."""
+    """A cycle resampled to `count` samples [N, J]."""
     closed = np.concatenate([motion, motion[:1]])
     at = np.arange(count) / count * len(motion)
     return interpolated(at, np.arange(len(closed)), closed)

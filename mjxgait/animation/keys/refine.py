@@ -1,4 +1,4 @@
-"""A run that stays near a cycle that somebody has keyed: a run like any other, by its settings."""
+"""A run that stays near a keyed cycle: a normal run with special settings."""
 
 import dataclasses
 import json
@@ -20,25 +20,27 @@ from mjxgait.training.disk import disk_errors
 from mjxgait.training.folder import create_run
 
 KEYS = "keys.json"
-"""In the run folder: the cycle that the run stays near."""
+"""File in the run folder with the cycle that the run stays near."""
 FARTHEST = 30.0
-"""deg; how far each joint of each key pose may depart where nothing is to be kept."""
+"""deg; largest departure of each joint of each key pose when nothing is kept."""
 SLOWER = 0.3
-"""Share by which the period may change where nothing is to be kept."""
+"""Share by which the period may change when nothing is kept."""
 OWN_SPREAD = 0.2
-"""Share of its range in which each gene begins where the file says which genes made the walk."""
+"""Share of its range over which each gene is drawn at first, if the file states the walk's genes."""
 
 
 def _near(value: float, ends: Sequence[float], share: float) -> list[float]:
-    """The part of a range about a value that lies within a share of its width."""
+    """The part of a range that lies within a share of its width about a value."""
     low, high = min(ends[0], value), max(ends[1], value)
     return [max(low, value - share * (high - low)), min(high, value + share * (high - low))]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Original:
-    """What a run remembers of the cycle. angles: [N, J] rad over one cycle; the key poses begin at
-    the share `starts` of it. period: s. source: name of the file.
+    """The cycle that a run stays near.
+
+    source: name of the file. angles: [N, J] rad over one cycle; the key poses begin at the share
+    `starts` of it. period: s.
     """
 
     source: str
@@ -57,7 +59,7 @@ def base_settings(
 ) -> Config:
     """The settings of a training with key poses, before the cycle is known.
 
-    config, seed, population, generations: what the user says. others: tables as in a config file.
+    config, seed, population, generations: as requested. others: tables as in a config file.
 
     Raises:
       UserError: they are wrong, or for another controller.
@@ -74,9 +76,9 @@ def base_settings(
 
 
 def refining(config: Config, brought: Brought, keep: float) -> Config:
-    """The settings of a run near a cycle, the clock leading it in the cycle's own time.
+    """The settings of a run near a cycle; a clock leads it in the cycle's own time.
 
-    keep: 1 lets only the reflexes (steering, balance) evolve, 0 every joint by `FARTHEST`.
+    keep: with 1 only the reflexes (steering, balance) evolve; with 0 every joint, by `FARTHEST`.
 
     Raises:
       UserError: `keep` is no share.
@@ -106,7 +108,7 @@ def refining(config: Config, brought: Brought, keep: float) -> Config:
 def begin(
     out: Path | None, creature: Creature, config: Config, source: Path, brought: Brought
 ) -> Path:
-    """A new run folder that keeps the cycle which it stays near; see `create_run`."""
+    """Create a run folder, and store the cycle in it; see `create_run`."""
     folder = create_run(out, creature, config)
     joints = dict(zip(creature.joints.names, brought.cycle.angles.T.tolist(), strict=True))
     document = {

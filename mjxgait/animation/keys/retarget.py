@@ -1,7 +1,7 @@
-"""From turned bones to the angles of a creature's hinges: least squares within their ranges.
+"""Retargeting of bone rotations to a creature's hinges: least squares within their ranges.
 
-Letters: `F` frames, `J` actuated joints. A bone at rest stands for a part in the creature's rest pose;
-what both are turned from there is the same, each seen from the next matched part above it.
+A bone at rest corresponds to a part in the creature's rest pose. From there both turn equally, each
+relative to the next matched part above it. Letters: `F` frames, `J` actuated joints.
 """
 
 import dataclasses
@@ -18,12 +18,15 @@ from mjxgait.creature.geometry import ancestors
 from mjxgait.errors import UserError
 
 ENDLESS = 4 * np.pi
-"""rad; range of a hinge that has none."""
+"""rad; limit of a hinge without a range."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Retargeted:
-    """angles: [F, J] rad. errors: by joint, rad [F] of rotation that its segment cannot do."""
+    """Retargeted motion.
+
+    angles: [F, J] rad. errors: by joint, rad [F] of rotation that its segment cannot do.
+    """
 
     angles: np.ndarray
     errors: Mapping[str, np.ndarray]
@@ -31,9 +34,10 @@ class Retargeted:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Segment:
-    """Parts between a matched one and the next matched one above it.
+    """Parts between a matched part and the next matched part above it.
 
-    bodies: from the top down, without the upper end. joints: places [n] in the creature's joints.
+    top: the upper end. bodies: from the top down, without it. joints: places [n] in the creature's
+    joints.
     """
 
     top: int
@@ -42,7 +46,7 @@ class Segment:
 
 
 def movers(creature: Creature) -> list[str]:
-    """Names of the parts that a bone can be meant for: the trunk and all that a hinge moves."""
+    """Names of the parts that a bone can match: the trunk and all parts with actuated joints."""
     model = creature.model
     bodies = dict.fromkeys([creature.trunk, *_bodies_of_joints(creature)])
     return [str(model.body(b).name) for b in bodies]
@@ -51,9 +55,9 @@ def movers(creature: Creature) -> list[str]:
 def retarget(
     creature: Creature, clip: Clip, bones: Mapping[str, str], axes: np.ndarray
 ) -> Retargeted:
-    """The angles that turn the creature's parts as the bones are turned.
+    """The angles that turn the creature's parts like the bones.
 
-    Joints of parts without a bone stay as they stand.
+    Joints of parts without a bone keep their standing angles.
 
     Args:
       bones: bone by the name of the part. axes: [3, 3] from the creature's world to the file's.
@@ -90,7 +94,7 @@ def _bodies_of_joints(creature: Creature) -> list[int]:
 
 
 def _segments(creature: Creature, parts: Mapping[int, int]) -> list[Segment]:
-    """One for each part with a bone below the trunk; those without a joint are none."""
+    """One segment for each part with a bone below the trunk, if it has a joint."""
     of_joints = _bodies_of_joints(creature)
     found = []
     for end in sorted(parts):
@@ -108,7 +112,7 @@ def _segments(creature: Creature, parts: Mapping[int, int]) -> list[Segment]:
 
 
 def _trunk_bone(clip: Clip, parts: Mapping[int, int], creature: Creature) -> int:
-    """The bone of the trunk; where none is matched the lowest one that all matched hang on."""
+    """The bone of the trunk; if none is matched, the lowest bone above all matched ones."""
     if creature.trunk in parts:
         return parts[creature.trunk]
 
@@ -134,12 +138,12 @@ def _world(creature: Creature) -> dict[int, np.ndarray]:
 def _solved(
     creature: Creature, segment: Segment, wanted: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Angles [F, n] rad for rotations [F, 3, 3], and what each frame lacks [F] rad."""
+    """Angles [F, n] rad for rotations [F, 3, 3], and the remaining error [F] rad."""
     joints = creature.joints
     places = list(segment.joints)
     low, high = (np.clip(edge[places], -ENDLESS, ENDLESS) for edge in (joints.low, joints.high))
     turn = _forward(creature, segment)
-    # SciPy's first step is as long as the first guess, so angles are counted from where none is 0.
+    # SciPy's first step is as long as the first guess, so angles are shifted to be never 0.
     zero, width = low - 1.0, high - low
     guess = np.clip(joints.stand[places], low, high) - zero
     found, missed = [], []
@@ -157,7 +161,7 @@ def _solved(
 
 
 def _forward(creature: Creature, segment: Segment) -> Callable[[np.ndarray], np.ndarray]:
-    """From angles [n] to the rotation [3, 3] of the segment's end against its top."""
+    """Function from angles [n] to the rotation [3, 3] of the segment's end against its top."""
     model = creature.model
     of_joints = _bodies_of_joints(creature)
     steps: list[tuple[np.ndarray, list[tuple[int, np.ndarray, float]]]] = []
@@ -180,7 +184,7 @@ def _forward(creature: Creature, segment: Segment) -> Callable[[np.ndarray], np.
 
 
 def _axis(creature: Creature, joint: int) -> tuple[np.ndarray, float]:
-    """Axis [3] of a hinge, zero for a slide, and the angle at which it does not turn, rad."""
+    """Axis [3] of a hinge, zero for a slide, and the angle of its unturned pose in rad."""
     model, at = creature.model, creature.model.joint(creature.joints.names[joint])
     hinge = int(at.type[0]) == int(mujoco.mjtJoint.mjJNT_HINGE)
     zero = float(model.qpos0[creature.joints.qpos[joint]])

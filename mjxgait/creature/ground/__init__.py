@@ -1,3 +1,4 @@
-"""The ground as height and normal at (x, y): what it may be (`spec`), and the same for the compiled
-program (`surface`). Docs: docs/ground.md.
+"""The ground as height and normal at (x, y).
+
+`spec` describes it; `surface` computes it in the compiled program. Docs: docs/ground.md.
 """

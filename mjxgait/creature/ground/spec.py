@@ -1,6 +1,6 @@
-"""What the ground is, as text: `flat`, `slope:0.1:down`, `steps:0.05`, `bumps:0.05`, `rough:0.05@3`.
+"""The ground as text: `flat`, `slope:0.1:down`, `steps:0.05`, `bumps:0.05`, `rough:0.05@3`.
 
-No JAX here: settings, examiner and pictures read it too.
+No JAX here: settings, certification and rendering read it too.
 """
 
 import dataclasses
@@ -17,7 +17,7 @@ DIRECTIONS = {
     "bumps": (),
     "rough": (),
 }
-"""Of each kind but `flat`; the first is meant where none is given."""
+"""Directions of each kind but `flat`; the first is the default."""
 MOST = {"slope": 1.0, "steps": 0.5, "bumps": 0.5, "rough": 0.5}
 """The largest size of each kind."""
 ALLOWED = (
@@ -31,7 +31,7 @@ TEXT = re.compile(
 
 
 class Place(NamedTuple):
-    """Where a creature starts on it: the trunk, the way forward there, and its sizes in m."""
+    """A creature's start on the ground: place of the trunk, way forward, and sizes in m."""
 
     start: np.ndarray
     forward: np.ndarray
@@ -41,11 +41,11 @@ class Place(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class GroundSpec:
-    """What the ground is.
+    """Description of the ground.
 
-    size: rise per metre of a slope; hip heights otherwise: of a step, or the most that bumps and
-      rough ground may rise or fall. direction: see `DIRECTIONS`. seed: which of the grounds of its
-      kind; 0 for a slope, of which there is one.
+    size: rise per metre of a slope; otherwise hip heights: of a step, or the most that bumps and
+      rough ground may rise or fall. direction: see `DIRECTIONS`. seed: selects one ground of its
+      kind; 0 for a slope, which has no variants.
     """
 
     kind: str = FLAT
@@ -55,7 +55,7 @@ class GroundSpec:
 
     @property
     def flat(self) -> bool:
-        """Whether it is the plane z = 0."""
+        """True if it is the plane z = 0."""
         return self.kind == FLAT
 
     def __str__(self) -> str:
@@ -71,7 +71,7 @@ LEVEL = GroundSpec()
 
 
 def parse_ground(text: str) -> GroundSpec:
-    """From its text.
+    """Parse the text of a ground.
 
     Raises:
       ValueError: says what is allowed.
@@ -93,7 +93,7 @@ def parse_ground(text: str) -> GroundSpec:
 
 
 def check_ground(text: str) -> str:
-    """The text itself, if it is of a ground.
+    """Return the text itself if it describes a ground.
 
     Raises:
       ValueError: says what is allowed.

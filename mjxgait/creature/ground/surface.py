@@ -1,8 +1,8 @@
 """The ground in the compiled program: height, slope and contact as pure functions of its numbers.
 
-All is analytic and without a table: a wave is made of parabolas, which cost five operations where a
-sine costs twenty-five. Numbers and places broadcast against each other, so the same code serves one
-creature ([] and [n]) and lanes innermost ([L] and [n, L]). What each kind is: docs/ground.md.
+All is analytic and without a table: a wave consists of parabolas, which cost five operations where
+a sine costs twenty-five. Numbers and places broadcast against each other, so the same code serves
+one creature ([] and [n]) and lanes innermost ([L] and [n, L]). Kinds of ground: docs/ground.md.
 """
 
 from typing import Any, NamedTuple, Protocol
@@ -14,29 +14,29 @@ from mjxgait.creature.ground.spec import GroundSpec, Place
 from mjxgait.types import Number, pytree
 
 TREAD = 1.0
-"""Hip heights; the length of a step."""
+"""Length of a step in hip heights."""
 RISER = 0.2
 """Share of the tread over which a step rises."""
 LENGTHS = {"bumps": (2.0, 2.0), "rough": (1.5, 2.0, 2.7, 3.6, 4.8)}
-"""Hip heights; of each wave."""
+"""Length of each wave in hip heights."""
 DRAWS = max(len(lengths) for lengths in LENGTHS.values())
-"""Pairs of random numbers that a ground takes, whatever its kind."""
+"""Pairs of random numbers that a ground of any kind takes."""
 
 
 class Relief(Protocol):
-    """Heights seen from the start: ahead and to the left of it, in m."""
+    """Heights by the place ahead and to the left of the start, in m."""
 
     def rise(self, ahead: Any, left: Any, level: Any) -> tuple[Any, Any, Any]:
         """Height in m, and its change per metre ahead and to the left.
 
-        level: m around the start that are level.
+        level: m, radius around the start that is level.
         """
         ...
 
 
 @pytree
 class Ground:
-    """One trial's ground. start: [2] m. forward: [2]. level: [] m around the start."""
+    """One trial's ground. start: [2] m. forward: [2]. level: [] m, see `Relief`."""
 
     start: Number
     forward: Number
@@ -46,7 +46,7 @@ class Ground:
 
 @pytree
 class Slope:
-    """along, across: [] rise per metre ahead and to the left."""
+    """A slope. along, across: [] rise per metre ahead and to the left."""
 
     along: Number
     across: Number
@@ -67,7 +67,7 @@ class Slope:
 
 @pytree
 class Steps:
-    """Stairs: height, tread: [] m of a step. offset: [] share of a tread before the first."""
+    """Stairs. height, tread: [] m of a step. offset: [] share of a tread before the first."""
 
     height: Number
     tread: Number
@@ -113,7 +113,7 @@ class Waves:
 
 @pytree
 class Together:
-    """One on another: the sum of their heights."""
+    """Waves on a slope: the sum of their heights."""
 
     slope: Slope
     waves: Waves
@@ -126,7 +126,10 @@ class Together:
 
 
 def _full(ahead: Any, left: Any, level: Any) -> tuple[Any, Any, Any]:
-    """0 within `level` of the start, 1 from twice as far on; and its changes per metre."""
+    """Share of the full height, and its changes per metre.
+
+    0 within `level` of the start, 1 from twice as far on.
+    """
     width = 3 * level * level
     share = jnp.clip((ahead * ahead + left * left) / width - 1 / 3, 0.0, 1.0)
     change = 12 * share * (1 - share) / width
@@ -157,8 +160,8 @@ def lay_ground(spec: GroundSpec, place: Place, draws: Any) -> Ground | None:
 def lay_uneven(place: Place, slope: Any, rough: float, draws: Any) -> Ground:
     """Rough ground on a slope to any side.
 
-    slope: [2] rise per metre ahead and to the left. rough: hip heights, the most that it rises and
-    falls besides. draws: see `lay_ground`.
+    slope: [2] rise per metre ahead and to the left. rough: hip heights, the most that the waves
+    rise or fall. draws: see `lay_ground`.
     """
     waves = _waves(GroundSpec("rough", rough), place.hip_height, jnp.asarray(draws))
     return _laid(place, Together(Slope(*jnp.float32(slope)), waves))
@@ -174,7 +177,7 @@ def _laid(place: Place, relief: Relief) -> Ground:
 
 
 def _waves(spec: GroundSpec, hip: float, draws: Any) -> Waves:
-    """Of equal steepness. Rough ground's directions are drawn, bumps lie crosswise."""
+    """Waves of equal steepness. Rough ground draws their directions, bumps lie crosswise."""
     lengths = np.array(LENGTHS[spec.kind]) * hip
     count = len(lengths)
     drawn = draws[:count, 0] if spec.kind == "rough" else 0.5
@@ -188,12 +191,12 @@ def _waves(spec: GroundSpec, hip: float, draws: Any) -> Waves:
 
 
 def named_draws(seed: int) -> np.ndarray:
-    """[DRAWS, 2] of the ground of a seed, from NumPy's frozen Mersenne twister."""
+    """Random numbers [DRAWS, 2] of a seed's ground, from NumPy's frozen Mersenne twister."""
     return np.random.RandomState(seed).random_sample((DRAWS, 2))
 
 
 def height(ground: Ground, x: Any, y: Any) -> Any:
-    """m at places in m."""
+    """Height in m at places in m."""
     return _surface(ground, x, y)[0]
 
 
@@ -203,13 +206,13 @@ def normal(ground: Ground, x: Any, y: Any) -> tuple[Any, Any, Any]:
 
 
 def clearance(ground: Ground, x: Any, y: Any, z: Any, radius: Any) -> Any:
-    """m from spheres at these centres to the ground, as to the plane under the centre."""
+    """Distance in m of spheres at these centres to the ground's tangent plane below the centre."""
     below, by_x, by_y = _surface(ground, x, y)
     return (z - below) * _normal(by_x, by_y)[2] - radius
 
 
 class Contact(NamedTuple):
-    """Of spheres with the ground: distance in m (negative inside), and the contact's three axes."""
+    """Contact of spheres with the ground: distance in m (negative inside), and its three axes."""
 
     distance: Any
     normal: tuple[Any, Any, Any]
@@ -218,9 +221,9 @@ class Contact(NamedTuple):
 
 
 def contact(ground: Ground, x: Any, y: Any, z: Any, radius: Any) -> Contact:
-    """Of spheres at these centres with the ground, as with a plane where it is nearest to them.
+    """Contact of spheres at these centres with the ground's tangent plane nearest to them.
 
-    That plane is found in two looks: under the centre, and at the foot of the perpendicular on the
+    Two evaluations find that plane: below the centre, and at the foot of the perpendicular on the
     plane there. Tangents are those that MuJoCo makes of a normal alone (`mju_makeFrame`).
     """
     below, by_x, by_y = _surface(ground, x, y)
@@ -230,7 +233,7 @@ def contact(ground: Ground, x: Any, y: Any, z: Any, radius: Any) -> Contact:
     below, by_x, by_y = _surface(ground, foot_x, foot_y)
     nx, ny, nz = _normal(by_x, by_y)
     distance = (x - foot_x) * nx + (y - foot_y) * ny + (z - below) * nz - radius
-    # The world's y less its part along the normal; no ground is so steep that y would be it.
+    # The world's y less its part along the normal; no ground is steep enough to make y the normal.
     flat = 1 / jnp.sqrt(1 - ny * ny)
     first = -nx * ny * flat, (1 - ny * ny) * flat, -nz * ny * flat
     second = -nz * flat, jnp.zeros_like(nx), nx * flat
