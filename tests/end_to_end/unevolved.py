@@ -53,10 +53,12 @@ def generation(
     state: EvolutionState, follows: bool = False
 ) -> tuple[EvolutionState, GenerationMetrics]:
     """Return the same population, one generation later, and metrics of ones."""
+    # None is zero and no two are equal: some are divided by each other's difference.
+    outcomes = 0.25 + 0.01 * jnp.arange(state.outcome.shape[-1])
     later = dataclasses.replace(
         state,
         terms=jnp.zeros_like(state.terms),
-        outcome=jnp.full_like(state.outcome, 0.25),
+        outcome=jnp.broadcast_to(outcomes, state.outcome.shape),
         fitness=jnp.zeros_like(state.fitness),
         generation=state.generation + 1,
     )
