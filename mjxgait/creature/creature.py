@@ -102,7 +102,7 @@ class Creature:
         return dataclasses.replace(self, terrain=parse_ground(ground))
 
     def spanned(self, degrees: float) -> "Creature":
-        """Return the creature with pose ranges of this width for every hinge; 0 returns it as it is.
+        """Return the creature with pose ranges of this width for every hinge; 0 changes nothing.
 
         Each range keeps its middle from creature.toml. A range that would reach beyond the joint's
         own range is moved inwards, and cut where it is wider.

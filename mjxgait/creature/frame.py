@@ -36,7 +36,7 @@ def horizontal_freedoms(creature: Creature) -> np.ndarray:
 
 
 def vertical_freedom(model: mujoco.MjModel) -> np.ndarray:
-    """Change of the positions [nq] that lifts every root by 1 m; zero for a root that cannot rise."""
+    """Change of the positions [nq] that lifts every root by 1 m; zero if a root cannot rise."""
     rises = np.zeros(model.nq)
     for joint in range(model.njnt):
         place = model.jnt_qposadr[joint]

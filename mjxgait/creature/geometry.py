@@ -8,8 +8,9 @@ from mjxgait.errors import UserError
 GEOM = mujoco.mjtGeom
 DOWN = np.array([0.0, 0.0, -1.0])
 PARALLEL = 0.99999
-"""Cosine from which two axes count as parallel. The axes of twenty joints within this limit are of
-rank one to within 0.01, the limit of certification.
+"""Cosine from which two axes count as parallel.
+
+The axes of twenty joints within it are of rank one to within 0.01, the limit of certification.
 """
 
 

@@ -63,7 +63,7 @@ def load_creature(folder: Path) -> Creature:
 
 
 def _check_alone(path: Path, text: str) -> None:
-    """Refuse references to other files, plugins and replication: a body may come from a stranger."""
+    """Refuse other files, plugins and replication, because a body may come from a stranger."""
     if found := NOT_ALONE.search(text):
         what = found.group(1) or found.group(2)
         raise UserError(

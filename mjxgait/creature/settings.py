@@ -19,7 +19,7 @@ Degrees = tuple[Finite, Finite]
 
 MOST_NAME = 100
 NO_NAME = re.compile(r"""[\x00-\x1f\x7f/\\:*?"<>|]|^[.-]|^\s|[\s.]$""")
-"""Parts of a name that some systems forbid in file names, or that make an option or a hidden file."""
+"""Forbidden parts of a name: some system allows no such file, or it is an option, or hidden."""
 
 
 def _file_name(name: str) -> str:

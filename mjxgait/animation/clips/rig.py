@@ -26,7 +26,7 @@ class Rig:
         return [i for i, parent in enumerate(self.parents) if parent == bone]
 
     def taken(self, bones: list[int]) -> "Rig":
-        """Return some of the bones, in this order; each gets its nearest taken ancestor as parent."""
+        """Return some of the bones, in this order; the nearest ancestor taken becomes parent."""
 
         def above(bone: int) -> int:
             parent = self.parents[bone]

@@ -10,13 +10,17 @@ from mjxgait.animation.export.buffer import Buffer
 from mjxgait.animation.export.loop import WalkLoop
 
 APART, DEEP, WIDE = 0.35, 0.06, 0.9
-"""Distance of rungs in body lengths, approximate; half size of a rung along the way as a share of
-it; half size across in body lengths."""
+"""Approximate distance of rungs in body lengths.
+
+Half size of a rung along the way as a share of it, and across in body lengths.
+"""
 REACH = 1.6
 """Reach of the rungs before and behind the creature in body lengths."""
 TILES_APART, TILES_REACH, TILE = 0.5, 6.0, 0.1
-"""Distance of tiles, and radius of the patch, in body lengths; half size of a tile as a share of the
-distance."""
+"""Distance of tiles and radius of the patch in body lengths.
+
+Half size of a tile as a share of the distance.
+"""
 JUMP = 1e-4
 """Time in s in which the rungs jump back by one place, too short to be seen."""
 COLOUR = (0.45, 0.46, 0.48, 1.0)
@@ -25,8 +29,9 @@ COLOUR = (0.45, 0.46, 0.48, 1.0)
 def add_floor(document: gltf.GLTF2, buffer: Buffer, loop: WalkLoop) -> None:
     """Add the rungs to the scene and their motion to its animation.
 
-    A loop passes a whole number of rungs; each takes the place of the one before. The foremost grows
-    and the last vanishes, so that there is no seam. A creature that stays in place gets no rungs.
+    A loop passes a whole number of rungs; each takes the place of the one before. The foremost
+    grows and the last vanishes, so that there is no seam. A creature that stays in place gets no
+    rungs.
     """
     length = loop.walk.creature.frame.body_length
     count = round(abs(loop.advance) / (APART * length))

@@ -1,8 +1,8 @@
 """A walk as a GLB file: one skin with the creature's bodies as joints, animated by key frames.
 
-Weights are rigid: each point follows one joint.
-glTF is Y-up with +Z forward and +X left, quaternions are (x, y, z, w), colours linear. Letters: `F`
-key frames, `B` joints of the skin (the root on the floor, then the bodies), `V` vertices.
+Weights are rigid. glTF is Y-up with +Z forward and +X left, quaternions are (x, y, z, w), colours
+linear. Letters: `F` key frames, `B` joints of the skin (the root on the floor, then the bodies),
+`V` vertices.
 """
 
 from collections.abc import Mapping, Sequence

@@ -129,7 +129,7 @@ def _cut(read: Read, ends: tuple[float | None, float | None]) -> Read:
 
 
 def _angles(creature: Creature, read: AngleTrack, names: Mapping[str, str]) -> Retargeted:
-    """Angles of the joints that a file names, within their ranges; others keep the standing angle."""
+    """Angles of the joints that a file names, within their ranges; others keep standing angles."""
     if not names:
         known = ", ".join(creature.joints.names)
         raise UserError(f"none of its columns is like a joint of {creature.name}: {known}")

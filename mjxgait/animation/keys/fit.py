@@ -73,7 +73,7 @@ def _fitted(creature: Creature, cycle: Cycle, count: int, starts: float) -> Fit:
 
 
 def within_range(creature: Creature, poses: np.ndarray) -> tuple[np.ndarray, dict[str, float]]:
-    """Key poses [K, J] within the joints' pose ranges, and the largest visible loss in deg by joint."""
+    """Key poses [K, J] within the pose ranges, and the largest visible loss in deg by joint."""
     joints = creature.joints
     kept = np.clip(poses, joints.pose_low, joints.pose_high)
     lost = np.degrees(np.abs(poses - kept).max(0))

@@ -16,9 +16,7 @@ from mjxgait.animation.keys.fit import Fit, within_range
 from mjxgait.creature import Creature
 
 UNCHANGED = np.radians(0.5)
-"""rad, root mean square of a joint; below it a joint counts as unedited, or as the same on both
-sides.
-"""
+"""rad, root mean square of a joint; smaller differences are no edit and no asymmetry."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -26,7 +26,7 @@ FARTHEST = 30.0
 SLOWER = 0.3
 """Share by which the period may change when nothing is kept."""
 OWN_SPREAD = 0.2
-"""Share of its range over which each gene is drawn at first, if the file states the walk's genes."""
+"""Share of its range in which each gene begins, if the file states the walk's genes."""
 
 
 def _near(value: float, ends: Sequence[float], share: float) -> list[float]:
