@@ -1,1 +1,1 @@
-"""Pictures for people."""
+"""Pictures, plots and videos of walks and runs."""

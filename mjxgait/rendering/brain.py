@@ -1,4 +1,4 @@
-"""A brain of blocks as a picture: a band for each part, from what is sensed on the left to the hinges."""
+"""Drawing of a modular body's brain: a band per part, from sensors on the left to hinges."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -17,12 +17,13 @@ from mjxgait.rendering.style import (
 )
 
 COLUMN, ROW = 2.5, 0.42
-"""Inches from one cell to the next."""
+"""Distance between cells in inches."""
 MARGIN = 1.1
-"""Inches for the bands' names."""
+"""Space for the bands' names in inches."""
 HEADING = 0.6
 NEAR = 0.62
-"""Of a wire's way, where its weight stands, so that those from one cell do not meet."""
+"""Position of the weight along its wire, as a fraction: weights of wires from one cell must not
+overlap."""
 LOOKS = {
     "hinge": {"facecolor": DARK, "edgecolor": DARK, "boxstyle": "round,pad=0.3"},
     "neuron": {"facecolor": PALE, "edgecolor": DARK, "boxstyle": "round,pad=0.3"},
@@ -32,13 +33,13 @@ Place = tuple[float, float]
 
 
 def shape(network: Network) -> tuple[float, float]:
-    """Inches of the figure."""
+    """Return the figure's size in inches."""
     rows = sum(_rows(network).values())
     return MARGIN + COLUMN * (_deepest(network) + 1), HEADING + ROW * (rows + 1)
 
 
 def draw_brain(drawing: Figure, network: Network) -> None:
-    """Cells in columns by how many wires they are from a hinge, wires with their weights."""
+    """Draw cells in columns by their distance to a hinge in wires, and wires with their weights."""
     axes = drawing.subplots()
     below = 0
     for band, (owner, count) in enumerate(_rows(network).items()):
@@ -59,14 +60,14 @@ def _deepest(network: Network) -> int:
 
 
 def _rows(network: Network) -> Mapping[int, int]:
-    """By owner, the centre first, how many cells stand above each other."""
+    """Number of rows per owner, the centre first."""
     counts = Counter((cell.owner, cell.depth) for cell in network.cells.values())
     owners = sorted({owner for owner, _ in counts})
     return {o: max(count for (owner, _), count in counts.items() if owner == o) for o in owners}
 
 
 def _places(network: Network) -> Mapping[int, Place]:
-    """Of each cell: columns from the hinges, rows from above."""
+    """Place of each cell: columns from the hinges, rows from the top."""
     places: dict[int, Place] = {}
     top = 0.0
     for owner, rows in _rows(network).items():
@@ -95,7 +96,7 @@ def _boxed(axes: Axes, cell: Cell, at: Place) -> Text:
 
 
 def _draw_wire(axes: Axes, weight: float, source: Text, target: Text) -> None:
-    """From box to box, to the right; backwards, or to itself, in a bow."""
+    """Draw a straight arrow to the right; a bow backwards or to the cell itself."""
     (x, y), (to_x, to_y) = start, end = source.get_position(), target.get_position()
     arrow: dict[str, Any] = {
         "arrowstyle": "->",

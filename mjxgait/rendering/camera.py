@@ -1,5 +1,5 @@
-"""A camera with parallel rays: lengths along the floor stay true, so the scale in the picture
-can be measured with.
+"""A camera with parallel rays: lengths along the floor stay true, so the picture's scale can be
+used to measure.
 """
 
 import dataclasses
@@ -14,22 +14,22 @@ VIEWS = {
     "three-quarter": (45.0, 24.0),
     "follow": (-68.0, 24.0),
 }
-"""By name: azimuth and elevation in deg. Straight from ahead or from above a floor has no depth to
-measure with."""
+"""Azimuth and elevation in deg by name. None is exactly from ahead or above, where a floor has no
+depth to measure with."""
 
 
 def view_of(name: str) -> dict[str, float]:
-    """Azimuth and elevation in rad of a view."""
+    """Return azimuth and elevation of a view in rad."""
     azimuth, elevation = VIEWS[name]
     return {"azimuth": float(np.radians(azimuth)), "elevation": float(np.radians(elevation))}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Camera:
-    """Looks at a creature from its right side, a little from the front and from above, so that it
-    walks to the right.
+    """View from a creature's right side, slightly from the front and from above: it walks to the
+    right.
 
-    centre: [3] m, in the middle of the picture. forward: [2] unit, the creature's way. scale:
+    centre: [3] m, in the middle of the picture. forward: [2] unit, the creature's direction. scale:
     pixels/m. width, height: pixels.
     azimuth: rad, from the side towards the front. elevation: rad.
     """
@@ -44,7 +44,7 @@ class Camera:
 
     @property
     def axes(self) -> np.ndarray:
-        """[3, 3] unit rows: right in the picture, up in the picture, into the scene."""
+        """Unit rows [3, 3]: right in the picture, up in the picture, into the scene."""
         forward = np.append(self.forward, 0.0)
         left = np.cross(UP, forward)
         right = np.cos(self.azimuth) * forward + np.sin(self.azimuth) * left
@@ -53,25 +53,23 @@ class Camera:
         return np.stack([right, np.cross(right, into), into])
 
     def pixels(self, points: np.ndarray) -> np.ndarray:
-        """[..., 2] pixels (right, down) of world points [..., 3] m."""
+        """Return the pixels [..., 2] (right, down) of world points [..., 3] m."""
         across = (points - self.centre) @ self.axes[:2].T * [self.scale, -self.scale]
         return across + np.array([self.width, self.height]) / 2
 
     def depth(self, points: np.ndarray) -> np.ndarray:
-        """[...] m into the scene, of world points [..., 3]."""
+        """Return the depth [...] in m of world points [..., 3]."""
         return (points - self.centre) @ self.axes[2]
 
     def rays(self, columns: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        """[rows, columns, 3] world points in the plane of the picture, through the middles of
-        pixels.
-        """
+        """Return world points [rows, columns, 3] in the picture's plane, at pixel middles."""
         right, up, _ = self.axes
         a = (columns + 0.5 - self.width / 2) / self.scale
         b = -(rows + 0.5 - self.height / 2) / self.scale
         return self.centre + a[None, :, None] * right + b[:, None, None] * up
 
     def enlarged(self, factor: int) -> "Camera":
-        """The same view in a picture that has more pixels."""
+        """Return the same view with more pixels."""
         return dataclasses.replace(
             self, scale=self.scale * factor, width=self.width * factor, height=self.height * factor
         )

@@ -1,5 +1,5 @@
-"""Who is shown: the champions of one or several runs, the best of a population, or the best of
-several generations.
+"""Individuals to show: champions of runs, the best of a population, or the best of several
+generations.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -10,16 +10,16 @@ from mjxgait.rendering.walk import Walk, record_walk
 from mjxgait.training.folder import open_champion
 
 LOOP_SECONDS = 12.0
-"""Simulated to find a steady stride: whoever shows one shows the same."""
+"""Simulated time to find a steady stride; shared, so that all outputs show the same stride."""
 
 
 def champion_of(run: Path, seconds: float) -> Runner:
-    """The run's champion."""
+    """Return the run's champion."""
     return Runner(record_walk(*open_champion(run), seconds))
 
 
 def champions_of(runs: Sequence[Path], seconds: float) -> list[Runner]:
-    """The champion of each run, named by its creature; by its folder where a creature comes twice."""
+    """Return each run's champion, labelled by creature, or by folder if creatures repeat."""
     walks = [champion_of(run, seconds).walk for run in runs]
     names = [spoken(walk) for walk in walks]
     for others in ([run.resolve().name for run in runs], [str(run) for run in runs]):
@@ -28,10 +28,10 @@ def champions_of(runs: Sequence[Path], seconds: float) -> list[Runner]:
 
 
 def top_of(run: Path, count: int, seconds: float) -> list[Runner]:
-    """The best of the latest population, best first.
+    """Return the best of the latest population, best first.
 
     Raises:
-      UserError: there are not so many.
+      UserError: the population is smaller.
     """
     return [
         Runner(walk, f"rank {rank}")
@@ -40,7 +40,7 @@ def top_of(run: Path, count: int, seconds: float) -> list[Runner]:
 
 
 def through_generations(run: Path, generations: Sequence[int], seconds: float) -> list[Runner]:
-    """The best of each of these generations.
+    """Return the best of each of these generations.
 
     Raises:
       UserError: there is no checkpoint of one of them.
@@ -49,7 +49,7 @@ def through_generations(run: Path, generations: Sequence[int], seconds: float) -
 
 
 def in_generations(run: Path, places: Mapping[int, int], seconds: float) -> list[Runner]:
-    """Those who had these places in these generations; 0 is the best's.
+    """Return one individual per generation, given by its place; 0 is the best.
 
     Raises:
       UserError: there is no checkpoint of one of them.

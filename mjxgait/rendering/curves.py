@@ -1,4 +1,4 @@
-"""Plots of a run over its generations: fitness, what the terms give, diversity.
+"""Plots of a run over its generations: fitness, contributions of the terms, diversity, size.
 
 lines: of `metrics.jsonl`.
 """
@@ -24,13 +24,13 @@ from mjxgait.rendering.style import (
 
 Lines = Sequence[Mapping[str, Any]]
 MAIN_TERMS = 7
-"""Drawn one by one; the others are drawn together."""
+"""Terms drawn one by one; the others are summed."""
 GREYS = ("0.25", "0.62", "0.82", "0.45", "0.92", "0.72", "0.35", "0.98")
 HATCHES = ("", "///", "", "...", "\\\\\\", "xxx", "---", "")
 
 
 def plot_fitness(lines: Lines, path: Path) -> None:
-    """The fitness curve as one PNG, which every run has in its folder."""
+    """Write the fitness curve of a run folder as one PNG."""
     with figure((8, 4.5)) as drawing:
         draw_fitness(drawing.subplots(), lines)
         with replaced(path) as beside:
@@ -38,7 +38,7 @@ def plot_fitness(lines: Lines, path: Path) -> None:
 
 
 def draw_fitness(axes: Axes, lines: Lines) -> None:
-    """Best, mean, and quartiles where the log tells of them; spells of forced evolution shaded."""
+    """Draw best, mean and any logged quartiles; forced phases are shaded."""
     column = columns(lines)
     generation = column["generation"]
     lower, upper = column["lower_quartile"], column["upper_quartile"]
@@ -53,7 +53,7 @@ def draw_fitness(axes: Axes, lines: Lines) -> None:
 
 
 def draw_terms(axes: Axes, lines: Lines, weights: Mapping[str, np.ndarray]) -> None:
-    """What each term gives to (above zero) and takes from (below) the best individual's fitness.
+    """Draw each term's contribution to the best individual's fitness, losses below zero.
 
     weights: signed, one array [generations] per term.
     """
@@ -101,7 +101,7 @@ def draw_terms(axes: Axes, lines: Lines, weights: Mapping[str, np.ndarray]) -> N
 
 
 def draw_diversity(axes: Axes, lines: Lines) -> None:
-    """Share of different genomes, and the mean spread of a gene."""
+    """Draw the share of different genomes and the mean spread of a gene."""
     column = columns(lines)
     generation = column["generation"]
     population = max(float(np.nanmax(column["unique"])), 1.0)
@@ -135,7 +135,7 @@ def draw_diversity(axes: Axes, lines: Lines) -> None:
 
 
 def draw_size(axes: Axes, lines: Lines) -> None:
-    """Nodes of all expressions of an individual: of the best, and in the mean."""
+    """Draw the number of nodes in all expressions of an individual: best and mean."""
     column = columns(lines)
     generation = column["generation"]
     axes.plot(generation, column["nodes_best"], "-", color=DARK, linewidth=2, label="best")
@@ -148,7 +148,7 @@ def draw_size(axes: Axes, lines: Lines) -> None:
 
 
 def progress_figures(lines: Lines, weights: Mapping[str, np.ndarray]) -> Figures:
-    """The plots of this file by file name."""
+    """Return the plots of this file by file name."""
     size: Figures = {"size": ((8, 3.5), lambda drawing: draw_size(drawing.subplots(), lines))}
     return {
         "fitness": ((8, 4.5), lambda drawing: draw_fitness(drawing.subplots(), lines)),
@@ -159,7 +159,7 @@ def progress_figures(lines: Lines, weights: Mapping[str, np.ndarray]) -> Figures
 
 
 def columns(lines: Lines) -> dict[str, np.ndarray]:
-    """Each metric over the generations; what is missing or not finite is NaN."""
+    """Return each metric over the generations; missing values are NaN."""
     return {
         key: np.array(
             [np.nan if (value := line.get(key)) is None else value for line in lines], float
@@ -169,7 +169,7 @@ def columns(lines: Lines) -> dict[str, np.ndarray]:
 
 
 def shade_forced(axes: Axes, column: Mapping[str, np.ndarray]) -> None:
-    """Shades the generations that were forced."""
+    """Shade the forced generations."""
     for i, at in enumerate(column["generation"][column["forced"] == 1]):
         label = "_" if i else "forced evolution"
         axes.axvspan(

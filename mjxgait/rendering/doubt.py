@@ -1,4 +1,4 @@
-"""What has to be said of a motion that is shown or exported: that nothing certifies it."""
+"""Notice for a shown or exported motion without a valid certificate."""
 
 from pathlib import Path
 
@@ -12,9 +12,9 @@ from mjxgait.training.own import command
 
 
 def doubt(run: Path, walk: Walk) -> str:
-    """Return in one line that the champion of a run is not certified, and why; empty if it is.
+    """Return one line that gives the reasons why a run's champion is not certified; empty if it is.
 
-    walk: of this champion, as simulated just now.
+    walk: of this champion, freshly simulated.
     """
     reasons = [f"it falls after {walk.fell:.1f} s"] if np.isfinite(walk.fell) else []
     try:

@@ -1,4 +1,4 @@
-"""A walk as it is seen on a stage: turned into the stage's way, and painted in its own colours.
+"""A walk in a scene: turned into the scene's direction, and painted in its own colours.
 
 Letters: `G` geoms.
 """
@@ -13,14 +13,15 @@ UP = np.array([0.0, 0.0, 1.0])
 
 
 class Entrant:
-    """One of those in a picture, before it is put into a lane.
+    """A participant of a scene, before its shift into a lane.
 
-    outline: [points, 3] m, the outermost of the creature as it starts. across, along: m, its width
-    and length. top: m. back: m, its hindmost along the way, from where it starts.
+    outline: [points, 3] m, outermost points of the creature at the start. across, along: m, its
+    width and length. top: m, its highest point. back: m, its hindmost point along the direction of
+    travel, from the start.
     """
 
     def __init__(self, walk: Walk, origin: np.ndarray, forward: np.ndarray) -> None:
-        """origin: [2] m, forward: [2] unit: where the stage has its starts, and the way from there."""
+        """Scene's start, origin [2] m, and direction of travel, forward [2] unit."""
         self.walk, self.origin = walk, origin
         self.start, self.step = walk.trunk_pos[0, :2], walk.time_step
         ahead, left = walk.forward @ forward, _left(walk.forward) @ forward
@@ -29,24 +30,24 @@ class Entrant:
         self._measure(np.append(forward, 0.0))
 
     def frame(self, time: float) -> int:
-        """The walk's own at s since the start; one that is over stays as it ended."""
+        """Return the walk's frame at s since the start; its last once it is over."""
         return min(round(time / self.step), len(self.walk.qpos) - 1)
 
     def placed(self, points: np.ndarray) -> np.ndarray:
-        """Points [..., 3] m of the walk's own world, on the stage."""
+        """Return points [..., 3] m of the walk's own world in the scene."""
         return (points - np.append(self.start, 0.0)) @ self.turn.T + np.append(self.origin, 0.0)
 
     def trunk(self, time: float) -> np.ndarray:
-        """[3] m on the stage."""
+        """Return the trunk's position [3] m in the scene."""
         return self.placed(self.walk.trunk_pos[self.frame(time)])
 
     def poses(self, time: float) -> tuple[np.ndarray, np.ndarray]:
-        """Positions [G, 3] m and rotations [G, 3, 3] on the stage of all that is shown."""
+        """Return positions [G, 3] m and rotations [G, 3, 3] in the scene of all geoms shown."""
         pos, rot = self.walk.geom_poses(np.array([self.frame(time)]))
         return self.placed(pos[0]), self.turn @ rot[0]
 
     def ground_heights(self, places: np.ndarray) -> np.ndarray:
-        """[n] m at places [n, 2] m of the stage."""
+        """Return the ground heights [n] m at places [n, 2] m of the scene."""
         own = (places - self.origin) @ self.turn[:2, :2] + self.start
         return self.walk.ground_heights(own)
 

@@ -21,8 +21,7 @@ def filmstrip(
     view: str | None = None,
     rows: int = 2,
 ) -> Image.Image:
-    """One stride in rows of pictures, each with its part of the stride, its time and the feet that
-    carry weight.
+    """Return one stride in rows of pictures, each with its part of the stride and its time.
 
     size: pixels of each picture. view: see `Stage`.
     """
@@ -49,7 +48,7 @@ def filmstrip(
 
 
 def draw_filmstrip(drawing: Figure, walk: Walk) -> None:
-    """The filmstrip as a figure, so that it can be saved like the plots."""
+    """Draw the filmstrip as a figure, to be saved like the plots."""
     _, what = gait_window(walk, 1)
     axes = drawing.subplots()
     axes.imshow(filmstrip(walk), interpolation="lanczos")

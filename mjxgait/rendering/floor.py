@@ -1,4 +1,4 @@
-"""The floor with its scale: bands across the way and a ruler along it."""
+"""The floor with its scale: bands across the direction of travel and a ruler along it."""
 
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
@@ -10,17 +10,18 @@ BANDS = ((236, 237, 238), (225, 227, 229))
 INK = (70, 74, 80)
 DARK_INK = (38, 41, 46)
 STEPS = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0)
-"""m; what the bands may be wide."""
+"""Allowed widths of the bands in m."""
 BAND_PIXELS = 70
 FAR = 100.0
-"""m; how far a band reaches to both sides."""
+"""Reach of a band to either side in m."""
 
 
 def draw_floor(camera: Camera, origin: np.ndarray, relief: Relief | None = None) -> Image.Image:
-    """Bands of a round width in m, counted from the origin [2] m along the creature's way, and
-    their numbers at the lower edge.
+    """Draw bands of a round width in m with their numbers at the lower edge.
 
-    relief: of ground that is no plane.
+    origin: [2] m, where bands are counted from, along the creature's direction.
+
+    relief: heights of uneven ground.
     """
     if relief is not None:
         picture = draw_relief(camera, origin, band_width(camera.scale), BANDS, relief)
@@ -38,9 +39,7 @@ def draw_floor(camera: Camera, origin: np.ndarray, relief: Relief | None = None)
 
 
 def band_lines(camera: Camera, origin: np.ndarray) -> tuple[np.ndarray, float]:
-    """Numbers of the lines between bands that may be in the picture, and the width of a band in
-    m.
-    """
+    """Return the numbers of possibly visible lines between bands, and a band's width in m."""
     step = band_width(camera.scale)
     middle = int((camera.centre[:2] - origin) @ camera.forward // step)
     reach = (
@@ -50,21 +49,21 @@ def band_lines(camera: Camera, origin: np.ndarray) -> tuple[np.ndarray, float]:
 
 
 def band_width(scale: float) -> float:
-    """m; the narrowest that leaves room for its number. scale: pixels/m."""
+    """Return the narrowest width in m with room for a number. scale: pixels/m."""
     return next((s for s in STEPS if s * scale >= BAND_PIXELS), STEPS[-1])
 
 
 def font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
-    """Pillow's own, so that no font has to be installed."""
+    """Return Pillow's own font, so that none has to be installed."""
     return ImageFont.load_default(size)
 
 
 def number_bands(
     draw: ImageDraw.ImageDraw, camera: Camera, origin: np.ndarray, relief: Relief | None = None
 ) -> None:
-    """A tick and a number where each line meets the lower edge.
+    """Draw a tick and a number where each line meets the lower edge.
 
-    On ground that is no plane the lines are those at the height of the ground in mid-picture.
+    On uneven ground the lines lie at the ground's height in mid-picture.
     """
     numbers, step = band_lines(camera, origin)
     level = 0.0 if relief is None else float(relief(*camera.centre[:2]))
@@ -87,7 +86,7 @@ def number_bands(
 def _line_ends(
     camera: Camera, origin: np.ndarray, numbers: np.ndarray, step: float, level: float = 0.0
 ) -> np.ndarray:
-    """[n, 2, 2] pixels of both ends of the lines between bands, at a height in m."""
+    """Pixels [n, 2, 2] of both ends of the lines between bands, at a height in m."""
     forward, start = np.append(camera.forward, 0.0), np.append(origin, level)
     left = np.cross([0.0, 0.0, 1.0], forward)
     along = start + numbers[:, None] * step * forward

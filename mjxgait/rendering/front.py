@@ -1,5 +1,5 @@
-"""What it costs to keep a cycle as it was drawn, as one picture: a filmstrip of each walk, and how
-steady it is over how far it departs.
+"""Trade-off plot of keeping a drawn cycle: steadiness over distance from the original, and a
+filmstrip of each walk.
 """
 
 import dataclasses
@@ -13,14 +13,15 @@ from mjxgait.rendering.walk import Walk
 
 PICTURES, SIZE = 6, (300, 230)
 WIDE, HIGH, PLOT = 12.0, 1.9, 3.4
-"""Inches: of the picture, of one filmstrip, of the plot."""
+"""Width of the picture, and heights of a filmstrip and of the plot, in inches."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Kept:
-    """A walk near a cycle. keep: share of the original that was asked for. departs: deg, root mean
-    square, of its key poses. stays: share of the disturbed starts that stay up. certified: whether
-    it passes all criteria.
+    """A walk near a cycle.
+
+    keep: requested share of the original. departs: deg, root mean square distance of its key poses.
+    stays: share of the disturbed starts that stay up. certified: whether it passes all criteria.
     """
 
     keep: float
@@ -31,12 +32,12 @@ class Kept:
 
 
 def shape(kept: Sequence[Kept]) -> tuple[float, float]:
-    """Inches of the picture."""
+    """Return the picture's size in inches."""
     return WIDE, PLOT + HIGH * len(kept)
 
 
 def draw_front(drawing: Figure, kept: Sequence[Kept]) -> None:
-    """The plot above, then a filmstrip for each walk, the most faithful first."""
+    """Draw the plot, and below it a filmstrip for each walk in the order given."""
     above, *strips = drawing.subplots(1 + len(kept), 1, height_ratios=[PLOT, *[HIGH] * len(kept)])
     order = sorted(kept, key=lambda one: one.departs)
     above.plot([k.departs for k in order], [k.stays for k in order], color=DARK, linestyle=":")

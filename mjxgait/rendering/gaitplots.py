@@ -1,4 +1,4 @@
-"""Plots of one walk: footfalls, joint angles against their targets, trunk height and speed."""
+"""Plots of one walk: footfalls, joint angles with their targets, trunk height and speed."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,16 +14,16 @@ from mjxgait.rendering.style import (
 from mjxgait.rendering.walk import Walk
 
 STRIDES = 2
-"""Shown of the gait."""
+"""Strides shown."""
 FALLBACK = 2.0
-"""s shown of a walk that has no steady strides."""
+"""Time shown of a walk without steady strides, s."""
 ROW = 0.28
 """Half the height of a footfall bar."""
 
 
 def gait_window(walk: Walk, strides: int = STRIDES) -> tuple[slice, str]:
-    """The frames to show and what to call them: steady strides, or the beginning of a walk that
-    has none.
+    """Return the frames to show and their description: steady strides, or the beginning of the walk
+    if it has none.
     """
     found = walk.steady_strides(strides)
     if found:
@@ -36,7 +36,7 @@ def gait_window(walk: Walk, strides: int = STRIDES) -> tuple[slice, str]:
 
 
 def draw_footfalls(axes: Axes, walk: Walk) -> None:
-    """A bar while a foot carries weight (Hildebrand's diagram)."""
+    """Draw a bar while a foot carries weight (Hildebrand's diagram)."""
     window, what = gait_window(walk)
     contact, step = walk.recording.contact[window], walk.time_step
     names = walk.creature.feet.names
@@ -71,7 +71,7 @@ def draw_footfalls(axes: Axes, walk: Walk) -> None:
 
 
 def draw_joints(drawing: Figure, walk: Walk) -> None:
-    """Angle and target of every joint, mirror partners on one row."""
+    """Draw angle and target of every joint, mirror partners in one row."""
     window, what = gait_window(walk)
     order = _partner_order(walk)
     columns = 2 if len(order) <= 20 else 4
@@ -99,7 +99,7 @@ def draw_joints(drawing: Figure, walk: Walk) -> None:
 
 
 def draw_trunk(drawing: Figure, walk: Walk) -> None:
-    """Height and forward speed of the trunk over the whole walk."""
+    """Draw height and forward speed of the trunk over the whole walk."""
     recording, step = walk.recording, walk.time_step
     time = np.arange(len(recording.trunk_pos)) * step
     above, below = drawing.subplots(2, 1, sharex=True)
@@ -134,7 +134,7 @@ def draw_trunk(drawing: Figure, walk: Walk) -> None:
 
 
 def gait_figures(walk: Walk) -> Figures:
-    """The plots of this file by file name."""
+    """Return the plots of this file by file name."""
     rows = -(-len(_partner_order(walk)) // 2)
     return {
         "footfalls": (
@@ -147,7 +147,7 @@ def gait_figures(walk: Walk) -> Figures:
 
 
 def _mark_strides(axes: Axes, walk: Walk, window: slice) -> None:
-    """A line where a new stride begins."""
+    """Draw a line where a new stride begins."""
     for frame in walk.stride_frames():
         if window.start < frame < window.stop:
             axes.axvline(
@@ -160,7 +160,7 @@ def _mark_strides(axes: Axes, walk: Walk, window: slice) -> None:
 
 
 def _partner_order(walk: Walk) -> list[int]:
-    """Joints left and right beside each other, then those of the middle."""
+    """Joints in pairs of left and right, then those of the middle."""
     partner = walk.creature.mirror.partner
     pairs = [(j, int(p)) for j, p in enumerate(partner) if j < p]
     paired = [j for pair in pairs for j in pair]

@@ -1,4 +1,4 @@
-"""Pictures by MuJoCo's own renderer where GL works, which a process of its own finds out."""
+"""Pictures by MuJoCo's own renderer if GL works; a separate process tests that."""
 
 import subprocess
 import sys
@@ -18,18 +18,18 @@ from mjxgait.rendering.stage import Stage
 
 WORKER = "mjxgait.rendering.gl_worker"
 OFF = ("disable", "disabled", "off", "false", "0")
-"""Values of MUJOCO_GL that ask for no GL."""
+"""Values of MUJOCO_GL for no GL."""
 GROUND_CELL = 0.08
-"""Hip heights; of the field that stands for ground that is no plane."""
+"""Cell of the height field for uneven ground, in hip heights."""
 PATIENCE = 60.0
-"""s that a first picture may take."""
+"""Longest time for a first picture, s."""
 
 
 def working_backend(stage: Stage, wanted: str | None = None) -> tuple[str | None, str]:
-    """The GL backend that can draw this stage, or None; and a sentence that says what was tried.
+    """Return the GL backend that can draw this scene, or None; and a sentence on the attempts.
 
     Args:
-      wanted: the value of MUJOCO_GL: the only backend to try, or that there is to be none.
+      wanted: the value of MUJOCO_GL: the only backend to try, or one of `OFF`.
     """
     if wanted and wanted.lower() in OFF:
         return None, f"drawn without GL, as MUJOCO_GL={wanted} says"
@@ -65,7 +65,7 @@ def working_backend(stage: Stage, wanted: str | None = None) -> tuple[str | None
 
 
 def gl_pictures(stage: Stage, frames: Sequence[int], backend: str) -> Iterator[Image.Image]:
-    """The moments of these frames.
+    """Draw these frames.
 
     Raises:
       UserError: the renderer stopped half way.
@@ -94,8 +94,8 @@ def gl_pictures(stage: Stage, frames: Sequence[int], backend: str) -> Iterator[I
 
 
 def scene_file(stage: Stage, frames: Sequence[int], path: Path) -> None:
-    """Writes all that the worker needs: poses [F, N, nq] with each creature in its lane, and the
-    camera of every frame.
+    """Write the worker's input: poses [F, N, nq] with each creature in its lane, and the camera of
+    every frame.
     """
     walk = stage.entrants[0].walk
     spec, creature = walk.marked, walk.creature
@@ -134,9 +134,10 @@ def scene_file(stage: Stage, frames: Sequence[int], path: Path) -> None:
 
 
 def _ground(stage: Stage) -> dict[str, Any]:
-    """Ground that is no plane as a height field around all that is seen; nothing for a plane.
+    """Uneven ground as a height field around the visible area; empty for the plane.
 
-    heights: [rows, columns] m, rows to the left. ground_at: [2] m, its middle; ground_half: [2] m.
+    heights: [rows, columns] m, rows to the left. ground_at: [2] m, its middle. ground_half: [2] m,
+    half its size.
     """
     if stage.relief is None:
         return {}

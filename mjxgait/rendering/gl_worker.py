@@ -1,5 +1,5 @@
-"""Draws with MuJoCo's own renderer in a process of its own: a GL library that is missing or crashes
-takes nothing else with it.
+"""Rendering with MuJoCo's own renderer in a separate process, so that a missing or crashing GL
+library harms nothing else.
 
 `python -m mjxgait.rendering.gl_worker SCENE.npz` writes raw RGB frames to its standard output.
 Letters: `F` frames, `N` creatures.
@@ -16,14 +16,14 @@ BAND_GREY = 0.81
 BAND_HEIGHT = 1e-3
 """m above the floor, so that the two do not flicker."""
 SMOOTH = 2
-"""Rendered pixels per pixel and direction: smoother than GL's own samples, and faster where a
-CPU does the work.
+"""Rendered pixels per pixel and direction: smoother than GL's own multisampling, and faster on a
+CPU.
 """
 SHADOW = 2048
 
 
 def main(path: str) -> None:
-    """Draws every frame of a scene file; see `gl.scene_file`."""
+    """Draw every frame of a scene file; see `gl.scene_file`."""
     with np.load(path) as scene:
         parts = {name: scene[name] for name in scene.files}
     model = _prepared(_compiled(parts), parts)
@@ -50,7 +50,7 @@ def main(path: str) -> None:
 
 
 def _compiled(parts: dict[str, np.ndarray]) -> mujoco.MjModel:
-    """The model, its floor a height field where the ground is no plane."""
+    """Model whose floor is a height field if the ground is uneven."""
     if "heights" not in parts:
         return mujoco.MjModel.from_xml_string(str(parts["xml"]))
     heights, spec = parts["heights"], mujoco.MjSpec.from_string(str(parts["xml"]))
@@ -72,8 +72,8 @@ def _compiled(parts: dict[str, np.ndarray]) -> mujoco.MjModel:
 
 
 def _prepared(model: mujoco.MjModel, parts: dict[str, np.ndarray]) -> mujoco.MjModel:
-    """Parallel rays, a plain floor for the bands to lie on, and none of the model's own lamps:
-    all creatures are lit alike.
+    """Set parallel rays and a plain floor for the bands, and turn the model's own lamps off: all
+    creatures are lit alike.
     """
     width, height = (SMOOTH * int(n) for n in parts["size"])
     model.vis.global_.offwidth, model.vis.global_.offheight = width, height
@@ -93,7 +93,7 @@ def _prepared(model: mujoco.MjModel, parts: dict[str, np.ndarray]) -> mujoco.MjM
 def _add_lamp(
     scene: mujoco.MjvScene, centre: np.ndarray, towards: np.ndarray, distance: float
 ) -> None:
-    """A lamp far away that throws shadows. towards: [3] unit."""
+    """Add a distant lamp that casts shadows. towards: [3] unit."""
     lamp = scene.lights[scene.nlight]
     lamp.type = int(mujoco.mjtLightType.mjLIGHT_DIRECTIONAL)
     lamp.headlight, lamp.castshadow = 0, 1
@@ -103,7 +103,7 @@ def _add_lamp(
 
 
 def _keep_floor_out_of_shadows(scene: mujoco.MjvScene, floor: int) -> None:
-    """Decoration throws no shadow; else the floor would speckle itself with its own."""
+    """Make the floor decoration, which casts no shadow; else its own would speckle it."""
     for geom in scene.geoms[: scene.ngeom]:
         if geom.objtype == mujoco.mjtObj.mjOBJ_GEOM and geom.objid == floor:
             geom.category = int(mujoco.mjtCatBit.mjCAT_DECOR)
@@ -112,7 +112,7 @@ def _keep_floor_out_of_shadows(scene: mujoco.MjvScene, floor: int) -> None:
 def _add_bands(
     scene: mujoco.MjvScene, middles: np.ndarray, width: float, forward: np.ndarray
 ) -> None:
-    """Bands across the way at points [n, 2] m."""
+    """Add bands across the direction of travel at points [n, 2] m."""
     turn = np.array([[forward[0], -forward[1], 0], [forward[1], forward[0], 0], [0, 0, 1]])
     for middle in middles:
         geom = scene.geoms[scene.ngeom]

@@ -1,4 +1,4 @@
-"""Bodies that grew: the graph beside what grows from it, and its ancestors."""
+"""Plots of grown bodies: the graph beside the body that grows from it, and its ancestors."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -20,18 +20,18 @@ from mjxgait.rendering.walk import Walk
 from mjxgait.training.lineage import mothers_line
 
 STANDING = 0.1
-"""Simulated seconds, of which the first moment is shown."""
+"""Simulated seconds; only the first moment is shown."""
 SIZE = (480, 360)
-"""Pixels of a body."""
+"""Pixels of a body's picture."""
 MOST = 8
-"""Bodies in a row."""
+"""Largest number of bodies in a row."""
 COPIES = ("", "\nmirrored", "\na pair")
 ALONG = (0.6, 0.45, 0.3)
-"""Of an arrow's way, where its words stand, so that those of a node's own do not meet."""
+"""Positions of labels along arrows, as fractions: labels of one node's arrows must not overlap."""
 
 
 def draw_graph(drawing: Figure, walk: Walk) -> None:
-    """The nodes and connections that grow, and the body."""
+    """Draw the nodes and connections that grow, and the body."""
     graph, body = drawing.subplots(1, 2)
     settings: Any = walk.champion.settings
     genome = walk.champion.genome
@@ -43,15 +43,15 @@ def draw_graph(drawing: Figure, walk: Walk) -> None:
 
 @dataclasses.dataclass(frozen=True)
 class Row:
-    """Bodies of several generations. descend: whether each descends from the one before."""
+    """Bodies of several generations. descend: whether each descends from the previous one."""
 
     bodies: Sequence[Runner]
     descend: bool
 
 
 def bodies_of(run: Path, champion: Champion) -> Row:
-    """The champion and its first ancestors in some of the generations that are kept; where a log does
-    not tell of mothers, the best of these.
+    """Return the champion and its maternal ancestors in some of the stored generations; the best
+    individuals if the log has no mothers.
     """
     latest = read_snapshot(run)
     line = mothers_line(latest.lines, latest.generation, _place(latest, champion))
@@ -64,7 +64,7 @@ def bodies_of(run: Path, champion: Champion) -> Row:
 
 
 def draw_bodies(drawing: Figure, row: Row) -> None:
-    """In a row, each with a scale of its own."""
+    """Draw the bodies in a row, each at its own scale."""
     fields = drawing.subplots(1, len(row.bodies), squeeze=False)[0]
     for axes, body in zip(fields, row.bodies, strict=True):
         axes.imshow(Stage([body.walk], *SIZE).picture(0), interpolation="lanczos")
@@ -77,7 +77,7 @@ def draw_bodies(drawing: Figure, row: Row) -> None:
 
 
 def _place(population: Snapshot, champion: Champion) -> int:
-    """The champion's; the best's if it is not there."""
+    """Champion's place in the population; 0, the best, if it is absent."""
     genes = [
         (found == champion.genome[name]).reshape(len(found), -1).all(1)
         for name, found in population.genomes.items()
@@ -123,7 +123,7 @@ def _of_node(genome: Mapping[str, np.ndarray], node: int, grown: Sequence[Part])
 
 
 def _connect(axes: Axes, start: np.ndarray, end: np.ndarray, text: str, number: int) -> None:
-    """An arrow, each of a node's own bent in its own way; who follows itself has a loop outwards."""
+    """Draw an arrow; those of one node bend differently, and one to its own node loops outwards."""
     if np.allclose(start, end):
         aside = 0.14 * np.array([-start[1], start[0]])
         start, end, bend, shrink, along = start - aside, end + aside, 2.4 + number, 0, 0.5
@@ -137,7 +137,7 @@ def _connect(axes: Axes, start: np.ndarray, end: np.ndarray, text: str, number: 
         "connectionstyle": f"arc3,rad={bend}",
     }
     axes.annotate("", tuple(end.tolist()), tuple(start.tolist()), arrowprops=arrow)
-    # What Matplotlib bends an arrow by: a parabola towards this point.
+    # Matplotlib bends an arrow as a parabola towards this point.
     way = end - start
     towards = (start + end) / 2 + bend * np.array([way[1], -way[0]])
     rest = 1 - along

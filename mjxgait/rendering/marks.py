@@ -1,6 +1,6 @@
-"""What a way leads to, to be seen: goals on the floor, and a bar on two posts.
+"""Overlays of a scene: goals on the floor, and a bar on two posts.
 
-Nothing touches them, and no simulation knows them.
+They collide with nothing and are in no simulation.
 """
 
 import mujoco
@@ -17,18 +17,18 @@ GOAL_COLOUR, BAR_COLOUR, POST_COLOUR = (
     [0.55, 0.57, 0.60, 1.0],
 )
 DISC = 0.25, 0.004
-"""Radius in body lengths and height in m of a goal."""
+"""Radius in body lengths and half the height in m of a goal."""
 BODY = "marks"
 
 
 def marked(
     creature: Creature, goals: np.ndarray, floor: np.ndarray, bar: np.ndarray | None
 ) -> mujoco.MjSpec:
-    """The creature and, as its last body, what stands on its way.
+    """Return the creature's model with the goals and the bar as its last body.
 
     Args:
-      goals: [goals] m ahead of the start. floor: [goals] m, height of the floor there. bar: [2] m ahead of the start and above
-        the floor, of its lower edge.
+      goals: [goals] m ahead of the start. floor: [goals] m, height of the floor there. bar: [2] m
+        ahead of the start and above the floor, of its lower edge.
     """
     spec, start = mujoco.MjSpec.from_string(creature.files["creature.xml"]), start_frame(creature)
     body = spec.worldbody.add_body(name=BODY)
@@ -44,7 +44,7 @@ def marked(
 def _add_bar(
     body: mujoco.MjsBody, start: StartFrame, ahead: float, height: float, half: float
 ) -> None:
-    """half: m that it is wide to either side, on posts that stand up above it."""
+    """Add a bar on posts that rise above it. half: m, half its width."""
     middle, up = _ahead(start, ahead), np.array([0.0, 0.0, height + RADIUS])
     ends = [middle + side * half * start.left for side in (1, -1)]
     across = np.concatenate([end + up for end in ends])
@@ -55,7 +55,7 @@ def _add_bar(
 
 
 def _ahead(start: StartFrame, distance: float) -> np.ndarray:
-    """[3] m, a place on the floor."""
+    """Place [3] m on the floor, ahead of the start."""
     place: np.ndarray = start.place * [1, 1, 0] + distance * start.forward
     return place
 

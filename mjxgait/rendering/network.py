@@ -1,4 +1,4 @@
-"""What of a brain of blocks reaches a hinge: neurons, the sensors they have, and the wires between."""
+"""Parts of a modular body's brain that reach a hinge: neurons, their sensors, and the wires."""
 
 import dataclasses
 from collections.abc import Iterator, Mapping
@@ -10,15 +10,15 @@ READS: Mapping[str, int] = {
     **dict.fromkeys(("divide", "greater-than", "min", "max", "expt", "memory"), 2),
     **dict.fromkeys(("oscillate-wave", "oscillate-saw"), 2),
 }
-"""How many of its three inputs a neuron makes use of; all others one."""
+"""Number of its three inputs that a neuron uses; 1 for functions not listed."""
 NOTHING, ONE = 0, 1
-"""Columns of what is known that are no cell; see `BrainTwin`."""
+"""Input columns of constants, which are no cells; see `BrainTwin`."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Cell:
-    """A hinge, a neuron or a sensor. owner: number of its part, or `CENTRE`. depth: wires from here
-    to the nearest hinge, on the shortest way.
+    """A hinge, a neuron or a sensor. owner: number of its part, or `CENTRE`. depth: fewest wires to
+    a hinge.
     """
 
     owner: int
@@ -29,7 +29,7 @@ class Cell:
 
 @dataclasses.dataclass(frozen=True)
 class Wire:
-    """From one cell to another, known by their numbers."""
+    """Connection between two cells, given by their numbers."""
 
     source: int
     target: int
@@ -38,16 +38,18 @@ class Wire:
 
 @dataclasses.dataclass(frozen=True)
 class Network:
-    """cells: by number, which is the twin's column, and for hinge h it is -1 - h."""
+    """Graph of a brain. cells: by number: the reference controller's column, or -1 - h for hinge
+    h.
+    """
 
     cells: Mapping[int, Cell]
     wires: tuple[Wire, ...]
 
 
 def network_of(twin: BrainTwin, lit: bool) -> Network:
-    """Breadth first from all hinges against the wires' direction; what it does not meet is silent.
+    """Search breadth first from all hinges against the wires; cells not reached have no effect.
 
-    lit: whether there is a light; else nothing comes from those who would see it.
+    lit: whether there is a light; else the light sensors are left out.
     """
     depth = {-1 - h: 0 for h in range(len(twin.hinges))}
     waiting, wires = list(depth), []
@@ -64,13 +66,13 @@ def network_of(twin: BrainTwin, lit: bool) -> Network:
 
 
 def kind_of(twin: BrainTwin, column: int) -> str:
-    """The function of the neuron that has a column."""
+    """Return the function of the neuron in a column."""
     place = column - min(twin.place.values())
     return next(kind for kind, these in twin.alike.items() if place in these)
 
 
 def _inputs(twin: BrainTwin, number: int, lit: bool) -> Iterator[tuple[int, float]]:
-    """Column and weight of all that a cell makes use of."""
+    """Column and weight of every input that a cell uses."""
     first = min(twin.place.values())
     if number < 0:
         wires = [(int(twin.driver[-1 - number]), float(twin.gain[-1 - number]))]
@@ -105,12 +107,12 @@ def _cell(twin: BrainTwin, number: int, depth: int, lit: bool) -> Cell:
 
 
 def _written(column: int, weight: float) -> str:
-    """An input as its neuron's label has it: a number, or a dot where a wire comes in."""
+    """An input in its neuron's label: a number, or a dot for a wire."""
     if column == NOTHING:
         return "0"
     return f"{weight:.2f}" if column == ONE else "·"
 
 
 def owner_name(owner: int) -> str:
-    """What a band is called."""
+    """Return a band's name."""
     return "centre" if owner == CENTRE else f"part {owner}"

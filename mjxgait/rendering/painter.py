@@ -1,6 +1,6 @@
-"""Draws creatures on a floor with NumPy and Pillow alone: no GPU, no GL library, on any machine.
+"""Drawing of creatures on a floor with NumPy and Pillow alone: no GPU, no GL library, any machine.
 
-Every primitive is hit by its own rays and kept by depth; meshes are filled triangle by triangle.
+Primitives are ray-cast and tested against a depth buffer; meshes are filled triangle by triangle.
 Letters: `G` geoms.
 """
 
@@ -21,11 +21,11 @@ from mjxgait.rendering.triangles import fill_mesh
 SMOOTH = 2
 """Rays per pixel and direction."""
 LIGHT = TOWARDS_LAMP / np.linalg.norm(TOWARDS_LAMP)
-"""Towards the lamp, as (forward, left, up) of the creature's way."""
+"""Unit vector towards the lamp, as (forward, left, up) of the creature."""
 SHADOW_GREY = 0.30
 OUTLINE = 0.45
 HAZE = np.array([224, 226, 228], dtype=np.float32)
-"""What parts on the far side fade into, so that left and right limbs can be told apart."""
+"""Colour that parts on the far side fade into, to distinguish left and right limbs."""
 MOST_HAZE = 0.42
 COMPASS = np.stack(
     [
@@ -35,15 +35,16 @@ COMPASS = np.stack(
     1,
 )
 SEEN_GROUPS = 3
-"""MuJoCo shows geom groups 0 to 2 unless told otherwise."""
+"""Number of visible geom groups: MuJoCo shows 0 to 2 by default."""
 
 
 class Painter:
-    """What is needed to draw one kind of creature, anywhere."""
+    """Data to draw one kind of creature, in any pose and place."""
 
     def __init__(self, model: mujoco.MjModel) -> None:
-        """`far` [G] may be set: 1 for parts on the creature's far side, which are drawn paler; 0
-        for those on its near side.
+        """Read geoms, colours and outlines from the model.
+
+        `far` [G] may be set: 1 for parts on the creature's far side, drawn paler; 0 for near ones.
         """
         self.model = model
         self.geoms = seen_geoms(model)
@@ -52,7 +53,7 @@ class Painter:
         self.far = np.zeros(len(self.geoms))
 
     def shadows(self, pos: np.ndarray, rot: np.ndarray) -> np.ndarray:
-        """[geoms, points, 3] m: what hides the floor from light that falls straight down.
+        """Return the outlines [geoms, points, 3] m that block light from straight above.
 
         pos, rot: world positions [ngeom, 3] m and rotations [ngeom, 3, 3] of its geoms.
         """
@@ -60,7 +61,7 @@ class Painter:
         return self.outlines.outermost(pos[self.geoms], rot[self.geoms], directions)
 
     def draw(self, canvas: "_Canvas", pos: np.ndarray, rot: np.ndarray, first: int = 0) -> None:
-        """Onto a canvas whose bodies are numbered from `first` on."""
+        """Draw onto a canvas, with bodies numbered from `first` on."""
         pos, rot = pos[self.geoms], rot[self.geoms]
         right, up, _ = canvas.camera.axes
         rims = canvas.camera.pixels(
@@ -82,13 +83,13 @@ def paint(
     origin: np.ndarray,
     relief: Relief | None = None,
 ) -> Image.Image:
-    """One frame.
+    """Return one frame.
 
     Args:
       creatures: the painter of each, and world positions [ngeom, 3] m and rotations [ngeom, 3, 3]
         of its geoms.
       origin: [2] m, where the scale on the floor is zero.
-      relief: of ground that is no plane.
+      relief: heights of uneven ground.
     """
     fine = camera.enlarged(SMOOTH)
     picture = draw_floor(camera, origin, relief).resize(
@@ -106,7 +107,7 @@ def paint(
 def _shade_floor(
     picture: Image.Image, camera: Camera, rims: Sequence[np.ndarray], relief: Relief | None
 ) -> None:
-    """Darkens the floor where the light from above does not reach it."""
+    """Darken the floor below the creatures, where the light from above does not reach it."""
     mask = Image.new("L", picture.size)
     draw = ImageDraw.Draw(mask)
     for points in rims:
@@ -119,7 +120,7 @@ def _shade_floor(
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class _Paint:
-    """colour: [3] 0 to 1. far: 0 to 1, see `Painter`. body: for the outline between parts."""
+    """Look of a geom. colour: [3] 0 to 1. far: 0 to 1, see `Painter`. body: id, for outlines."""
 
     colour: np.ndarray
     far: float
@@ -127,7 +128,7 @@ class _Paint:
 
 
 class _Canvas:
-    """A picture [height, width, 3] that knows how far away each of its pixels is."""
+    """A picture [height, width, 3] with a depth buffer."""
 
     def __init__(self, pixels: np.ndarray, camera: Camera) -> None:
         self.pixels, self.camera = pixels, camera
@@ -144,7 +145,7 @@ class _Canvas:
         rim: np.ndarray,
         paint: _Paint,
     ) -> None:
-        """Draws a geom whose outline lies between the pixels in rim [4, 2]."""
+        """Draw a geom; its outline lies between the pixels in rim [4, 2]."""
         x0, y0 = np.maximum(np.floor(rim.min(0)).astype(int) - 1, 0)
         x1, y1 = np.minimum(
             np.ceil(rim.max(0)).astype(int) + 2, [self.camera.width, self.camera.height]
@@ -164,7 +165,7 @@ class _Canvas:
     def cover(
         self, place: tuple[slice, slice], distance: np.ndarray, normal: np.ndarray, paint: _Paint
     ) -> None:
-        """Paints a rectangle where it is nearer than what is there.
+        """Paint a rectangle's pixels that are nearer than the present ones.
 
         distance: [h, w] m; normal: [h, w, 3] in the world.
         """
@@ -178,7 +179,7 @@ class _Canvas:
         self.pixels[place][nearer] = colour + MOST_HAZE * paint.far * (HAZE - colour)
 
     def image(self) -> Image.Image:
-        """The picture, with dark lines where one part ends before another."""
+        """Return the picture, with dark lines between bodies."""
         edge = np.zeros(self.depth.shape, dtype=bool)
         for axis in (0, 1):
             here, there = (
@@ -192,12 +193,12 @@ class _Canvas:
 
 
 def lamp_direction(forward: np.ndarray) -> np.ndarray:
-    """[3] unit vector in the world towards the lamp. forward: [2] the creature's way."""
+    """Return the world's unit vector [3] towards the lamp. forward: [2] creature's direction."""
     return LIGHT @ np.array([[*forward, 0.0], [-forward[1], forward[0], 0.0], [0.0, 0.0, 1.0]])
 
 
 def seen_geoms(model: mujoco.MjModel) -> np.ndarray:
-    """Ids of the geoms that belong to a creature and can be seen."""
+    """Return the ids of a creature's visible geoms."""
     alpha = geom_colours(model)[:, 3] if model.ngeom else np.zeros(0)
     flat = np.isin(model.geom_type, [mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD])
     return np.flatnonzero(
@@ -206,7 +207,7 @@ def seen_geoms(model: mujoco.MjModel) -> np.ndarray:
 
 
 def geom_colours(model: mujoco.MjModel) -> np.ndarray:
-    """[ngeom, 4] red, green, blue, opacity, each 0 to 1: of the material where a geom has one."""
+    """Return red, green, blue and opacity [ngeom, 4], 0 to 1, of the material if a geom has one."""
     material = model.geom_matid
     return np.where(
         (material >= 0)[:, None],

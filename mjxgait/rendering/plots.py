@@ -1,6 +1,4 @@
-"""All plots of a run, as PNG and SVG: the one function that the end of training and `mjxgait
-plot` call.
-"""
+"""All plots of a run, as PNG and SVG; called by the end of training and by `mjxgait plot`."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -47,9 +45,7 @@ from mjxgait.training.own import command
 
 
 def plot_run(run: Path, out: Path | None = None, formats: Sequence[str] = FORMATS) -> list[Path]:
-    """Writes every plot there is something to draw for into RUN/plots (or `out`); returns the
-    files.
-
+    """Write every plot that the run has data for into RUN/plots (or `out`); return the files.
     Raises:
       UserError: not a run folder, nothing to plot yet, or the folder cannot be written.
     """
@@ -79,7 +75,7 @@ def plot_run(run: Path, out: Path | None = None, formats: Sequence[str] = FORMAT
 
 
 def _of_goals(walk: Walk) -> Figures:
-    """The way to a goal; nothing where there is none."""
+    """Onion-skin picture of the way to a goal or under a bar; empty without one."""
     if walk.marked is None:
         return {}
     picture = strobe.strobe(walk)
@@ -88,7 +84,7 @@ def _of_goals(walk: Walk) -> Figures:
 
 
 def _of_programs(walk: Walk) -> Figures:
-    """The champion's expressions; nothing where it has none."""
+    """Trees of the champion's expressions; empty if it has none."""
     if walk.champion.controller != "program":
         return {}
     found = trees.expressions_of(walk.creature, walk.champion)
@@ -96,7 +92,7 @@ def _of_programs(walk: Walk) -> Figures:
 
 
 def _of_grown(run: Path, walk: Walk) -> Figures:
-    """Graph and body, brain, and ancestors; nothing where the body did not grow."""
+    """Graph and body, brain, and ancestors; empty unless the body grew from a graph."""
     if "graph.half" not in walk.champion.genome:
         return {}
     row = grown.bodies_of(run, walk.champion)
@@ -114,7 +110,7 @@ def _of_grown(run: Path, walk: Walk) -> Figures:
 
 
 def _weights(creature: Creature, config: Config, lines: Lines) -> dict[str, np.ndarray]:
-    """Signed weight of each term of the run's task, [generations]."""
+    """Signed weight [generations] of each term of the run's task."""
     step, ends = float(creature.model.opt.timestep), what_ends(creature, config.rollout)
     task = make_task(creature, step, ends, config)
     rows = [task.weights(config.fitness, jnp.int32(line["generation"])) for line in lines]

@@ -1,4 +1,4 @@
-"""Ground that is no plane, drawn in facets from far to near, with the same bands as the floor."""
+"""Uneven ground, drawn in facets from far to near, with the same bands as the floor."""
 
 from collections.abc import Callable
 
@@ -8,13 +8,13 @@ from PIL import Image, ImageDraw
 from mjxgait.rendering.camera import Camera
 
 Relief = Callable[[np.ndarray, np.ndarray], np.ndarray]
-"""Height in m at places x, y in m in the world, of any shape."""
+"""Height in m at places x, y in m in the world; arrays of any shape."""
 FACET_PIXELS = 14
-"""How wide a facet is in the picture."""
+"""Width of a facet in the picture."""
 LIGHT = np.array([-0.25, -0.45, 0.85])
-"""Towards the lamp, as (forward, left, up) of the creature's way."""
+"""Direction towards the lamp, as (forward, left, up) of the creature."""
 CONTRAST = 2.0
-"""Change of brightness per metre of rise towards the lamp: more than a lamp does, to be seen."""
+"""Change of brightness per unit of slope towards the lamp: more than physical, for visibility."""
 DARKEST, BRIGHTEST = 0.7, 1.07
 
 
@@ -25,7 +25,7 @@ def draw_relief(
     colours: tuple[tuple[int, int, int], tuple[int, int, int]],
     relief: Relief,
 ) -> Image.Image:
-    """The ground in the camera's view; every other band of `step` m has the second colour.
+    """Return the ground in the camera's view; every other band of `step` m has the second colour.
 
     origin: [2] m, where bands are counted from, along the camera's forward.
     """
@@ -50,13 +50,12 @@ def draw_relief(
 def facet_lines(
     camera: Camera, origin: np.ndarray, step: float, level: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """m ahead and to the left of the origin, of lines that cover the picture; bands end on some.
-
+    """Return lines that cover the picture, in m ahead of and left of the origin; bands end on some.
     level: m, height of the ground in mid-picture.
     """
     sideways = np.array([-camera.forward[1], camera.forward[0]])
     into = camera.axes[2]
-    # Where the middle ray meets the ground.
+    # Point at which the middle ray meets the ground.
     middle = camera.centre[:2] - (camera.centre[2] - level) / into[2] * into[:2] - origin
     deep = camera.height / camera.scale / np.sin(camera.elevation)
     wide = camera.width / camera.scale / np.cos(camera.azimuth) + deep * np.tan(camera.azimuth)
@@ -66,12 +65,12 @@ def facet_lines(
     ahead = (first + np.arange(int(1.4 * wide / along) + 2)) * along
     across = facet / np.sin(camera.elevation)
     rows = np.arange(int(1.6 * deep / across) + 2) - int(0.8 * deep / across)
-    # Lines that stay where they are on the ground, so that nothing flickers in a video.
+    # Lines stay fixed on the ground, so that nothing flickers in a video.
     return ahead, (np.round(middle @ sideways / across) + rows) * across
 
 
 def _brightness(z: np.ndarray, ahead: np.ndarray, left: np.ndarray) -> np.ndarray:
-    """[rows, columns] of each facet, 1 where it is level."""
+    """Brightness [rows, columns] of each facet, 1 if level."""
     by_left, by_ahead = np.gradient(z, left, ahead)
     steep = -(by_ahead * LIGHT[0] + by_left * LIGHT[1])
     middle = (steep[1:, 1:] + steep[1:, :-1] + steep[:-1, 1:] + steep[:-1, :-1]) / 4

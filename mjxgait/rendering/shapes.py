@@ -1,4 +1,4 @@
-"""How rays and silhouettes meet MuJoCo's shapes, seen by a camera whose rays are parallel.
+"""Ray intersections and silhouettes of MuJoCo's shapes for a camera with parallel rays.
 
 Letters: `N` rays, `G` geoms, `K` directions.
 """
@@ -13,9 +13,7 @@ MISS = np.inf
 
 
 class Silhouettes:
-    """Outlines of geoms, from their support functions: of a sphere, a box and an ellipsoid
-    summed.
-    """
+    """Outlines of geoms from their support functions: sums of a sphere, a box and an ellipsoid."""
 
     def __init__(self, model: mujoco.MjModel, geoms: np.ndarray) -> None:
         parts = [support_extents(model.geom_type[g], model.geom_size[g]) for g in geoms]
@@ -24,8 +22,8 @@ class Silhouettes:
         self.ellipsoid = np.array([p[2] for p in parts])[:, None]
 
     def outermost(self, pos: np.ndarray, rot: np.ndarray, directions: np.ndarray) -> np.ndarray:
-        """Outermost points [G, K, 3] of geoms at pos [G, 3] and rot [G, 3, 3] along unit
-        directions [K, 3]; m.
+        """Return the outermost points [G, K, 3] m of geoms at pos [G, 3] and rot [G, 3, 3] along
+        unit directions [K, 3].
         """
         local = directions @ rot
         stretched = local * self.ellipsoid
@@ -37,7 +35,7 @@ class Silhouettes:
 def hit(
     kind: int, size: np.ndarray, origins: np.ndarray, direction: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Where parallel rays enter a primitive, in the primitive's own frame.
+    """Return the points at which parallel rays enter a primitive, in its own frame.
 
     Args:
       origins: [N, 3] m. direction: [3] unit.
@@ -69,7 +67,7 @@ def _ellipsoid(
 def _capsule(
     radius: float, half: float, origins: np.ndarray, direction: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The nearest of the side and the two round ends."""
+    """Nearest hit of the side and the two round ends."""
     side = _side(radius, origins, direction)
     along = origins[:, 2] + _reach(side) * direction[2]
     side = np.where(np.abs(along) <= half, side, MISS)
@@ -101,7 +99,7 @@ def _cylinder(
 def _box(
     half: np.ndarray, origins: np.ndarray, direction: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """By slabs."""
+    """Hit by the slab method."""
     slope = np.where(np.abs(direction) < 1e-9, 1e-9, direction)
     near = (-np.sign(slope) * half - origins) / slope
     far = (np.sign(slope) * half - origins) / slope
@@ -113,7 +111,7 @@ def _box(
 
 
 def _side(radius: float, origins: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """Distance to the endless cylinder about z."""
+    """Distance to the infinite cylinder about z."""
     o, d = origins[:, :2], direction[:2]
     steep = float(d @ d)
     if steep < 1e-12:
@@ -122,7 +120,7 @@ def _side(radius: float, origins: np.ndarray, direction: np.ndarray) -> np.ndarr
 
 
 def _first_root(a: float, b: np.ndarray, c: np.ndarray) -> np.ndarray:
-    """Smaller root of `a t² + 2 b t + c`; infinite where there is none."""
+    """Smaller root of `a t² + 2 b t + c`; infinite if there is none."""
     inside = b * b - a * c
     return np.where(inside >= 0, (-b - np.sqrt(np.maximum(inside, 0))) / a, MISS)
 

@@ -1,4 +1,4 @@
-"""One or several walks on one floor, and the camera that goes along with them."""
+"""Scene of one or several walks on one floor, and the camera that follows them."""
 
 from collections.abc import Iterator, Sequence
 
@@ -12,21 +12,21 @@ from mjxgait.rendering.relief import Relief
 from mjxgait.rendering.walk import Walk
 
 ROOM = 1.35
-"""Of the picture, in units of the creature."""
+"""Size of the picture in units of the creature's."""
 LANE, LONG_LANE = 1.25, 0.6
-"""Least width of a lane in units of the creature's width and length."""
+"""Least width of a lane, in units of the creature's width and length."""
 RACE_ELEVATION = np.radians(33.0)
 LAG = 0.15
-"""Of the picture's width that the first in a race is ahead of its middle."""
+"""Distance of a race's leader from the middle, as a share of the picture's width."""
 SMOOTH_SECONDS = 0.6
-"""Over which the camera's way is averaged, so that it does not shake with each step."""
+"""Averaging window of the camera's path, so that it does not shake with each step."""
 
 
 class Stage:
-    """Walks in lanes side by side, the first one nearest, seen from the side.
+    """A scene: walks in lanes side by side, the first one nearest, seen from the side.
 
-    Frames are control steps of the first. view: a name in `camera.VIEWS`; by default a little from
-    the front and from above.
+    Frames are control steps of the first walk. view: a name in `camera.VIEWS`; by default slightly
+    from the front and from above.
     """
 
     def __init__(
@@ -44,12 +44,12 @@ class Stage:
 
     @property
     def alike(self) -> bool:
-        """Whether all are one creature, with the same things on its way."""
+        """True if all walks have the same creature, goals and bar."""
         first = self.entrants[0].walk
         return all(_same_scene(first, entrant.walk) for entrant in self.entrants[1:])
 
     def picture(self, frame: int) -> Image.Image:
-        """The moment of a frame; a walk that is over stays as it ended."""
+        """Draw a frame; a finished walk stays in its last pose."""
         shown = []
         for entrant, lane in zip(self.entrants, self.lanes, strict=True):
             pos, rot = entrant.poses(frame * self.time_step)
@@ -57,11 +57,11 @@ class Stage:
         return paint(self.camera(frame), shown, self.origin, self.relief)
 
     def pictures(self, frames: Sequence[int]) -> Iterator[Image.Image]:
-        """The moments of several frames."""
+        """Draw several frames."""
         return map(self.picture, frames)
 
     def camera(self, frame: int) -> Camera:
-        """Goes along with the one in front."""
+        """Return the camera of a frame; it follows the leader."""
         way = self.way[min(frame, len(self.way) - 1)]
         centre = np.append(
             self.origin + way[0] * self.forward + way[1] * self.left[:2], self.middle + way[2]
@@ -71,7 +71,7 @@ class Stage:
         )
 
     def behind(self, frame: int, place: int) -> np.ndarray:
-        """[2] pixels, right behind the creature in a lane and half as high as it stands."""
+        """Return the pixel [2] right behind a lane's creature, at half its standing height."""
         entrant = self.entrants[place]
         trunk = entrant.trunk(frame * self.time_step) + self.lanes[place]
         point = trunk[:2] + entrant.back * self.forward
@@ -81,13 +81,13 @@ class Stage:
 
     @property
     def relief(self) -> Relief | None:
-        """The ground, if it is no plane; each lane has that of its own walk."""
+        """Heights of uneven ground, each lane with its own walk's; None for the plane."""
         if all(entrant.walk.ground is None for entrant in self.entrants):
             return None
         return self._height
 
     def _height(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """m at places of the world, seen from the nearest lane."""
+        """Height in m at places of the world, from the nearest lane's ground."""
         places = np.stack(np.broadcast_arrays(x, y), -1).reshape(-1, 2)
         aside = (places - self.origin) @ self.left[:2]
         nearest = np.abs(aside[:, None] - self.lanes @ self.left).argmin(-1)
@@ -98,26 +98,26 @@ class Stage:
         return heights.reshape(np.shape(x))
 
     def _lanes(self) -> np.ndarray:
-        """[lanes, 3] m from the middle of all."""
+        """Offsets of the lanes [lanes, 3] m from their common middle."""
         widths = np.array([max(LANE * one.across, LONG_LANE * one.along) for one in self.entrants])
         places = np.cumsum(widths) - widths / 2
         return (places - places[[0, -1]].mean())[:, None] * self.left
 
     def _choose_view(self) -> None:
-        """Scale and height at which all lanes fill the picture well."""
+        """Set scale, height and path of the camera such that all lanes fill the picture."""
         flat = Camera(np.append(self.origin, 0.0), self.forward, 1.0, 0, 0, **self.view)
         outlines = [one.outline + lane for one, lane in zip(self.entrants, self.lanes, strict=True)]
         seen = flat.pixels(np.concatenate(outlines))
         size = np.ptp(seen, axis=0)
         self.scale = float(min(self.width / (ROOM * size[0]), self.height / (ROOM * size[1])))
         self.shift = float(seen[:, 0].max() + seen[:, 0].min()) / 2 * flat.axes[0]
-        # The middle of what is seen, a little lower for the numbers on the floor.
+        # Slightly below the middle, to leave room for the numbers on the floor.
         self.middle = (
             float(-seen[:, 1].min() - 0.5 * size[1]) / np.cos(flat.elevation)
             - 0.03 * self.height / self.scale
         )
         everyone = np.array([self._path(entrant) for entrant in self.entrants])
-        # In a race there is room behind the one in front.
+        # A race needs room behind the leader.
         behind = 0.0 if len(everyone) == 1 else LAG * self.width / self.scale
         front = np.column_stack(
             [everyone[..., 0].max(0) - behind, everyone[..., 1].mean(0), everyone[..., 2].mean(0)]
@@ -125,8 +125,8 @@ class Stage:
         self.way = smooth(front, round(SMOOTH_SECONDS / self.time_step))
 
     def _path(self, entrant: Entrant) -> np.ndarray:
-        """[frames, 3] m: ahead of the start, to its left, and the ground's height there; of who is
-        afloat how far it has risen.
+        """Path [frames, 3] m: ahead of the start, to its left, and the ground's height there; for a
+        swimmer its rise instead.
         """
         steps = [entrant.frame(frame * self.time_step) for frame in range(self.frames)]
         trunk = entrant.walk.trunk_pos[steps]
@@ -138,7 +138,7 @@ class Stage:
 
 
 def _same_scene(first: Walk, other: Walk) -> bool:
-    """Whether one model shows both."""
+    """Return whether one model shows both walks."""
     if first.creature.files["creature.xml"] != other.creature.files["creature.xml"]:
         return False
     specs = [walk.marked for walk in (first, other)]
@@ -146,7 +146,7 @@ def _same_scene(first: Walk, other: Walk) -> bool:
 
 
 def smooth(path: np.ndarray, frames: int) -> np.ndarray:
-    """A path [T, D] averaged over so many frames."""
+    """Return a path [T, D] averaged over this many frames."""
     frames = max(min(frames, len(path)), 1)
     padded = np.concatenate(
         [

@@ -1,4 +1,4 @@
-"""What a walk bears, as one picture: a bar per trial."""
+"""Plot of a walk's stress tests: a bar per trial."""
 
 from matplotlib.figure import Figure
 
@@ -7,7 +7,7 @@ from mjxgait.rendering.style import DARK, PALE
 
 
 def draw_stress(drawing: Figure, found: Stress) -> None:
-    """Share of the starts that did it, trial by trial; dark where that is enough."""
+    """Draw the share of starts that passed each trial; dark if sufficient."""
     axes = drawing.add_subplot()
     names = [trial.name for trial in found.trials]
     shares = [trial.share for trial in found.trials]

@@ -1,4 +1,4 @@
-"""A way in one picture: the creature at many moments, as under a strobe."""
+"""Onion-skin picture: the creature at many moments along its way."""
 
 import dataclasses
 
@@ -12,25 +12,25 @@ from mjxgait.rendering.stage import Stage
 from mjxgait.rendering.walk import Walk
 
 SPACING = 0.45
-"""Body lengths between two moments, about."""
+"""Approximate distance between moments in body lengths."""
 MOST = 30
-"""Moments in a picture; a longer way has them farther apart."""
+"""Largest number of moments in a picture; a longer way spaces them farther apart."""
 ROOM = 1.35
-"""Of the picture's height, in units of the highest."""
+"""Height of the picture, in units of the highest point."""
 HEIGHT, WIDEST = 420, 3000
 """Pixels."""
 ELEVATION = np.radians(8.0)
 
 
 def moments(walk: Walk) -> np.ndarray:
-    """Frames at even distances along the way, from the first to the one that got farthest."""
+    """Return frames at even distances along the way, from the first to the farthest."""
     way = np.maximum.accumulate((walk.trunk_pos[:, :2] - walk.trunk_pos[0, :2]) @ walk.forward)
     count = min(round(way[-1] / (SPACING * walk.creature.frame.body_length)) + 1, MOST)
     return np.unique(np.searchsorted(way, np.linspace(0.0, way[-1], count)))
 
 
 def strobe(walk: Walk) -> Image.Image:
-    """All moments, seen square from the side; the way is as wide as it must be."""
+    """Draw all moments from the side; the way sets the picture's width."""
     stage, frames = Stage([walk], 2 * HEIGHT, HEIGHT), moments(walk)
     (entrant,) = stage.entrants
     shown = [(entrant.painter, *entrant.poses(frame * walk.time_step)) for frame in frames]
@@ -38,7 +38,7 @@ def strobe(walk: Walk) -> Image.Image:
 
 
 def draw_strobe(drawing: Figure, walk: Walk, picture: Image.Image) -> None:
-    """The picture as a figure, so that it can be saved like the plots."""
+    """Draw the picture as a figure, to be saved like the plots."""
     frames = moments(walk)
     axes = drawing.subplots()
     axes.imshow(picture, interpolation="lanczos")
@@ -48,13 +48,13 @@ def draw_strobe(drawing: Figure, walk: Walk, picture: Image.Image) -> None:
 
 
 def shape(picture: Image.Image) -> tuple[float, float]:
-    """Inches of the figure."""
+    """Return the figure's size in inches."""
     width = min(14.0, 4.0 * picture.width / picture.height)
     return width, width * picture.height / picture.width + 0.4
 
 
 def _camera(stage: Stage, walk: Walk, frames: np.ndarray) -> Camera:
-    """Holds the way, half a body at both ends, and the highest that it gets."""
+    """Camera with room for the way, the body at both ends, and the highest point reached."""
     moved = walk.trunk_pos[frames] - walk.trunk_pos[0]
     way = moved[:, :2] @ walk.forward
     length = float(np.ptp(way)) + 2.4 * walk.creature.frame.body_length

@@ -1,6 +1,4 @@
-"""How all plots look: line styles and hatches carry the meaning, so that they can be read in
-grey.
-"""
+"""Style of all plots: line styles and hatches carry the meaning, so grey prints are legible."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -15,7 +13,7 @@ from matplotlib.figure import Figure
 from mjxgait.files import replaced
 
 Figures = Mapping[str, tuple[tuple[float, float], Callable[[Figure], None]]]
-"""By file name: size in inches, and what draws on the figure."""
+"""Size in inches and drawing function by file name."""
 FORMATS = ("png", "svg")
 SETTINGS = {
     "font.size": 10,
@@ -38,7 +36,7 @@ ACCENT = "tab:orange"
 
 @contextmanager
 def figure(size: tuple[float, float]) -> Iterator[Figure]:
-    """An empty figure of this size in inches, closed at the end."""
+    """Yield an empty figure of this size in inches, and close it at the end."""
     with plt.rc_context(SETTINGS):
         drawing = plt.figure(figsize=size, layout="constrained")
         try:
@@ -48,10 +46,10 @@ def figure(size: tuple[float, float]) -> Iterator[Figure]:
 
 
 def save(drawing: Figure, path: Path, formats: Sequence[str] = FORMATS) -> list[Path]:
-    """Writes the figure once per format beside each other; path: without a suffix."""
+    """Write the figure once per format. path: without a suffix."""
     files = [path.with_name(f"{path.name}.{kind}") for kind in formats]
     for file in files:
-        # Without the date, the same plot is the same file.
+        # Without a date, equal plots are equal files.
         with replaced(file) as beside:
             drawing.savefig(beside, metadata={"Date": None} if file.suffix == ".svg" else None)
     return files

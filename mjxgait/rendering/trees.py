@@ -1,6 +1,6 @@
 """Expressions drawn as trees: one figure, a tree for each joint.
 
-Numbers are what it takes to draw a node: leaves side by side, what is above in their middle.
+Leaves stand side by side, each parent in the middle of its children.
 """
 
 import dataclasses
@@ -25,14 +25,14 @@ from mjxgait.rendering.style import (
 )
 
 LEAF, LEVEL = 0.52, 0.5
-"""Inches that a leaf is wide and a level is high."""
+"""Width of a leaf and height of a level in inches."""
 NARROWEST, WIDEST = 6.0, 40.0
-"""Inches of a figure."""
+"""Limits of a figure's width in inches."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Node:
-    """place: in leaves from the left. depth: levels below the root. above: place of its parent."""
+    """A tree node. place: leaves from the left. depth: below the root. above: parent's place."""
 
     label: str
     kind: str
@@ -42,14 +42,14 @@ class Node:
 
 
 def laid_out(expression: Expression) -> tuple[list[Node], int]:
-    """Its nodes, and how many leaves it has."""
+    """Return an expression's nodes and its number of leaves."""
     nodes: list[Node] = []
     leaves = _lay(expression, 0, 0, nodes)[1]
     return nodes, leaves
 
 
 def _lay(expression: Expression, first: int, depth: int, nodes: list[Node]) -> tuple[float, int]:
-    """Adds the nodes of a part whose leaves begin at `first`; its place, and how many leaves."""
+    """Add the nodes of a subtree whose leaves begin at `first`; return its place and leaf count."""
     if not isinstance(expression, tuple):
         kind = "number" if isinstance(expression, float) else "sense"
         label = f"{expression:.3g}" if isinstance(expression, float) else expression
@@ -64,7 +64,7 @@ def _lay(expression: Expression, first: int, depth: int, nodes: list[Node]) -> t
         leaves += count
     place = (places[0] + places[-1]) / 2
     for below in mine:
-        # The part's own root is the last that was added.
+        # A subtree's root was added last.
         below[-1] = dataclasses.replace(below[-1], above=place)
         nodes += below
     nodes.append(Node(str(expression[0]), "function", place, depth, None))
@@ -72,14 +72,14 @@ def _lay(expression: Expression, first: int, depth: int, nodes: list[Node]) -> t
 
 
 def expressions_of(creature: Creature, champion: Champion) -> Mapping[str, Expression]:
-    """By joint."""
+    """Return a champion's expressions by joint."""
     known, genome = terminals(creature, tuple(ADDED.values())), champion.genome
     rows = zip(creature.joints.names, genome["code"], genome["value"], strict=True)
     return {joint: nested(code, value, known) for joint, code, value in rows}
 
 
 def shape(trees: Mapping[str, Expression]) -> tuple[float, float]:
-    """Inches of the figure."""
+    """Return the figure's size in inches."""
     layouts = [laid_out(tree) for tree in trees.values()]
     width = max(leaves for _, leaves in layouts) * LEAF
     heights = [_levels(nodes) * LEVEL for nodes, _ in layouts]
@@ -87,7 +87,7 @@ def shape(trees: Mapping[str, Expression]) -> tuple[float, float]:
 
 
 def draw_trees(drawing: Figure, trees: Mapping[str, Expression]) -> None:
-    """One below the other: functions in circles, senses in colour, numbers plain."""
+    """Draw the trees in a column: functions in circles, observations in colour, numbers plain."""
     layouts = {joint: laid_out(tree) for joint, tree in trees.items()}
     heights = [_levels(nodes) for nodes, _ in layouts.values()]
     rows = drawing.subplots(len(layouts), 1, squeeze=False, height_ratios=heights)[:, 0]
@@ -98,7 +98,7 @@ def draw_trees(drawing: Figure, trees: Mapping[str, Expression]) -> None:
 
 
 def _levels(nodes: list[Node]) -> float:
-    """Levels that a tree takes, with its title."""
+    """Height of a tree and its title in levels."""
     return max(node.depth for node in nodes) + 2.2
 
 

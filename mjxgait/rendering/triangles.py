@@ -1,4 +1,4 @@
-"""Meshes for the painter: each triangle that faces the camera is filled by depth."""
+"""Meshes for the painter: triangles that face the camera are filled, tested by depth."""
 
 from typing import Any
 
@@ -9,7 +9,7 @@ import numpy as np
 def fill_mesh(
     canvas: Any, model: mujoco.MjModel, geom: int, pos: np.ndarray, rot: np.ndarray, paint: Any
 ) -> None:
-    """Draws a mesh geom at pos [3] m and rot [3, 3] on a painter's canvas."""
+    """Draw a mesh geom at pos [3] m and rot [3, 3] on a painter's canvas."""
     points, faces = mesh_of(model, geom)
     world = points @ rot.T + pos
     corners = world[faces]
@@ -21,7 +21,7 @@ def fill_mesh(
 
 
 def mesh_of(model: mujoco.MjModel, geom: int) -> tuple[np.ndarray, np.ndarray]:
-    """Points [V, 3] m in the geom's frame and triangles [F, 3] of a mesh geom."""
+    """Return a mesh geom's points [V, 3] m in its own frame and triangles [F, 3]."""
     mesh = int(model.geom_dataid[geom])
     first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
     face, faces = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])
@@ -31,7 +31,7 @@ def mesh_of(model: mujoco.MjModel, geom: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _fill(canvas: Any, flat: np.ndarray, depth: np.ndarray, normal: np.ndarray, paint: Any) -> None:
-    """One triangle: pixels flat [3, 2], depth [3]."""
+    """Fill one triangle. flat: [3, 2] pixels. depth: [3] m."""
     x0, y0 = np.maximum(np.floor(flat.min(0)).astype(int), 0)
     x1, y1 = np.minimum(
         np.ceil(flat.max(0)).astype(int) + 1, [canvas.camera.width, canvas.camera.height]

@@ -1,4 +1,4 @@
-"""Moving pictures: one champion, or several walks as a race, written as WebP, GIF, MP4 or PNG."""
+"""Videos of one champion, or several walks as a race, as WebP, GIF, MP4 or PNG."""
 
 import dataclasses
 import itertools
@@ -25,12 +25,12 @@ LABEL_GAP = 8
 EDGE = 8
 """Pixels between a label and the picture's edge."""
 GIF_HUNDREDTHS = 100
-"""A GIF counts the time of a frame in hundredths of a second."""
+"""Time units per second in a GIF."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Runner:
-    """A walk and what is written above it; empty for a walk that is shown alone."""
+    """A walk and its label, which is empty for a single walk."""
 
     walk: Walk
     label: str = ""
@@ -39,9 +39,9 @@ class Runner:
 def moving_pictures(
     runners: Sequence[Runner], stage: Stage, fps: int, slow: float = 1.0, backend: str | None = None
 ) -> Iterator[Image.Image]:
-    """The frames of a video.
+    """Draw the frames of a video.
 
-    slow: how many times slower than life. backend: of GL; None draws without.
+    slow: factor by which time is stretched. backend: of GL; None draws without.
     """
     step = stage.time_step
     count = max(int(stage.frames * step * slow * fps), 1)
@@ -55,7 +55,7 @@ def moving_pictures(
 def write_captions(
     picture: Image.Image, stage: Stage, runners: Sequence[Runner], frame: int, slow: float = 1.0
 ) -> None:
-    """Name, speed and time; in a race also who is who."""
+    """Write name, speed and time; in a race label every walk."""
     draw = ImageDraw.Draw(picture, "RGBA")
     size, now = max(stage.height // 20, 13), frame * stage.time_step
     lead = runners[0].walk
@@ -73,7 +73,7 @@ def write_captions(
         text = f"{runner.label}: {condition(runner.walk, now)}"
         letters = font(round(0.7 * size))
         box = draw.textbbox((x, y), text, font=letters, anchor="rm")
-        # Whoever has been left behind keeps a label at the edge.
+        # A walk that was left behind keeps its label at the edge.
         x += max(EDGE - box[0], 0) + min(stage.width - EDGE - box[2], 0)
         y += max(EDGE - box[1], 0) + min(stage.height - EDGE - box[3], 0)
         left, top, right, bottom = draw.textbbox((x, y), text, font=letters, anchor="rm")
@@ -82,12 +82,12 @@ def write_captions(
 
 
 def spoken(walk: Walk) -> str:
-    """The creature's name as it is written in pictures."""
+    """Return the creature's name as written in pictures."""
     return walk.creature.name.replace("_", " ")
 
 
 def condition(walk: Walk, time: float) -> str:
-    """The mean forward speed of the last second at s since the start, or that it fell."""
+    """Return the mean forward speed of the last second, or the time of a fall. time: s."""
     if time >= walk.fell:
         return f"fell at {walk.fell:.1f} s"
     frame = min(round(time / walk.time_step), len(walk.qpos) - 1)
@@ -99,7 +99,7 @@ def condition(walk: Walk, time: float) -> str:
 
 
 def write_video(pictures: Iterable[Image.Image], path: Path, fps: int) -> None:
-    """Writes the frames in the format that the name of the file asks for.
+    """Write the frames in the format given by the file's suffix.
 
     Raises:
       UserError: another format, MP4 without the extra, or a file that cannot be written.
@@ -117,7 +117,7 @@ def write_video(pictures: Iterable[Image.Image], path: Path, fps: int) -> None:
 
 
 def require_writer(path: Path) -> None:
-    """Says before the long work whether the file can be written.
+    """Check before the long work that the file can be written.
 
     Raises:
       UserError: see `write_video`.
@@ -146,7 +146,7 @@ def _write_webp(pictures: Iterable[Image.Image], path: Path, fps: int) -> None:
 
 def _write_gif(given: Iterable[Image.Image], path: Path, fps: int) -> None:
     pictures = list(given)
-    # One palette for all, so that still parts do not flicker.
+    # One palette for all frames, so that still parts do not flicker.
     samples = pictures[:: max(len(pictures) // 6, 1)]
     joined = Image.fromarray(np.concatenate([np.asarray(sample) for sample in samples]))
     palette = joined.quantize(128, method=Image.Quantize.MEDIANCUT)
@@ -161,7 +161,7 @@ def _write_mp4(pictures: Iterable[Image.Image], path: Path, fps: int) -> None:
     av = _import_av(path)
     frames = iter(pictures)
     first = next(frames)
-    # H.264 wants even sizes.
+    # H.264 requires even sizes.
     width, height = first.width // 2 * 2, first.height // 2 * 2
     with av.open(str(path), "w") as container:
         stream = container.add_stream("libx264", rate=fps)

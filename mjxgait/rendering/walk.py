@@ -1,5 +1,5 @@
-"""A champion's undisturbed walk, simulated once in C MuJoCo: what every picture, video and
-animation is made of.
+"""A champion's undisturbed walk, simulated once in C MuJoCo: the source of every picture, video and
+animation.
 
 Letters: `T` frames (control steps), `J` joints, `G` geoms, `nq` as in MuJoCo.
 """
@@ -24,17 +24,16 @@ from mjxgait.reference.terrain import terrain_of
 from mjxgait.rendering.marks import marked
 
 WARMUP = 2.0
-"""s until a gait has settled; strides are taken from after it where there are enough."""
+"""Time for a gait to settle, s; strides are taken from later if there are enough."""
 AFTERMATH = 0.7
-"""s that are still shown after a fall."""
+"""Time shown after a fall, s."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Walk:
-    """One walk.
+    """One walk, which ends at the requested time or soon after a fall.
 
-    qpos: [T, nq]. fell: s, infinite when it stayed up. It ends with the time asked for, or soon
-    after the fall. start: how it began, with its goal and its bar where the task has them.
+    fell: s, infinite if it stayed up. start: initial conditions, with any goal and bar of the task.
     """
 
     creature: Creature
@@ -45,33 +44,33 @@ class Walk:
 
     @property
     def time_step(self) -> float:
-        """Between frames, s."""
+        """Time between frames, s."""
         return self.trajectory.time_step
 
     @property
     def qpos(self) -> np.ndarray:
-        """[T, nq] m, quaternions, rad."""
+        """Poses [T, nq]: m, quaternions, rad."""
         return self.trajectory.qpos[0]
 
     @property
     def seconds(self) -> float:
-        """Length of the walk."""
+        """Duration of the walk."""
         return len(self.qpos) * self.time_step
 
     @cached_property
     def recording(self) -> Recording:
-        """What a look at every frame measured."""
+        """Measurements of every frame."""
         return measure(self.creature, self.trajectory)
 
     @cached_property
     def shown(self) -> mujoco.MjModel:
-        """The creature's model, and after its own bodies and geoms what stands on its way."""
+        """The creature's model; goals and bar follow its own bodies and geoms."""
         spec = self.marked
         return self.creature.model if spec is None else spec.compile()
 
     @cached_property
     def marked(self) -> mujoco.MjSpec | None:
-        """What `shown` is made of; None where nothing stands on its way."""
+        """Source of `shown`; None without goals and bar."""
         if self.start is None:
             return None
         goals, bar = self._goals(self.start.goal[:1]), self.start.bar[0]
@@ -82,7 +81,7 @@ class Walk:
         return marked(self.creature, goals, self.ground_heights(places), over)
 
     def _goals(self, first: np.ndarray) -> np.ndarray:
-        """[goals] m ahead of the start, all that it ever had."""
+        """All goals [goals] of the walk, m ahead of the start."""
         goals, onward = list(first[first > 0]), how_simulated(self.champion.task).onward
         farthest = ((self.trunk_pos[:, :2] - self.trunk_pos[0, :2]) @ self.forward).max()
         while len(goals) and (after := onward(goals[-1], goals[0], farthest)) > goals[-1]:
@@ -91,32 +90,33 @@ class Walk:
 
     @cached_property
     def forward(self) -> np.ndarray:
-        """[2] horizontal unit vector, in the world, in which the creature starts out."""
+        """Horizontal unit vector [2] in the world, the creature's initial direction."""
         axis = (self.creature.frame.stand_rot @ self.creature.frame.forward)[:2]
         return axis / np.linalg.norm(axis)
 
     @cached_property
     def trunk_pos(self) -> np.ndarray:
-        """[T, 3] m in the world."""
+        """Trunk positions [T, 3] m in the world."""
         return self.body_poses()[0][:, self.creature.trunk]
 
     @property
     def afloat(self) -> bool:
-        """Whether it is in water, where nothing holds it at a height."""
+        """True if the creature is in water, where its height is free."""
         return how_simulated(self.champion.task, self.champion.wish).drag > 0
 
     @cached_property
     def ground(self) -> Ground | None:
-        """What it walks on; None for the plane z = 0."""
+        """Ground of the walk; None for the plane z = 0."""
         return terrain_of(self.creature)
 
     def ground_heights(self, places: np.ndarray) -> np.ndarray:
-        """[T] m of the ground at places [T, 2] m in the world."""
+        """Return the ground's heights [T] m at places [T, 2] m in the world."""
         return self.ground.height(*places.T) if self.ground else np.zeros(len(places))
 
     def stride_frames(self) -> np.ndarray:
-        """Frames at which the controller's cycle begins anew, while the creature is up: a loop of
-        whole cycles has no seam, which one of footfalls would have. Footfalls where it has none.
+        """Return the frames at which a stride begins, before any fall.
+
+        Strides are cycles of the controller, which loop without a seam; without a cycle, footfalls.
         """
         phase = self.trajectory.phase[0]
         cyclic = np.isfinite(phase).all()
@@ -124,8 +124,8 @@ class Walk:
         return starts[starts * self.time_step < self.fell]
 
     def steady_strides(self, count: int) -> tuple[int, int] | None:
-        """First and last frame of `count` strides in a row whose durations are nearest to the
-        usual; None when there are not so many.
+        """Return first and last frame of `count` successive strides with a duration nearest to the
+        median; None if there are too few.
         """
         starts = self.stride_frames()
         settled = starts[starts * self.time_step >= WARMUP]
@@ -137,7 +137,7 @@ class Walk:
         return int(starts[chosen]), int(starts[chosen + count])
 
     def body_poses(self, frames: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """World positions [T, nbody, 3] m and rotations [T, nbody, 3, 3] of the bodies."""
+        """Return world positions [T, nbody, 3] m and rotations [T, nbody, 3, 3] of the bodies."""
         return _poses(
             self.creature.model,
             self.qpos if frames is None else self.qpos[frames],
@@ -145,12 +145,12 @@ class Walk:
         )
 
     def geom_poses(self, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """World positions [T, G, 3] m and rotations [T, G, 3, 3] of all that is shown."""
+        """Return world positions [T, G, 3] m and rotations [T, G, 3, 3] of all geoms in `shown`."""
         return _poses(self.shown, self.qpos[frames], ("geom_xpos", "geom_xmat"))
 
 
 def record_walk(creature: Creature, champion: Champion, seconds: float) -> Walk:
-    """Simulates the champion on the creature's ground, without noise or pushes."""
+    """Simulate the champion on the creature's ground, without noise or pushes."""
     task = how_simulated(champion.task, champion.wish)
     start = task.aimed(nominal_starts(creature, 1), CertificateConfig())
     outcome = simulate(creature, champion, start, seconds, record=1, threads=1)
@@ -158,7 +158,7 @@ def record_walk(creature: Creature, champion: Champion, seconds: float) -> Walk:
     finite = np.isfinite(film.qpos[0]).all(1) & np.isfinite(film.qvel[0]).all(1)
     last = len(finite) if finite.all() else int(np.argmin(finite))
     last = min(last, round((fell + AFTERMATH) / film.time_step)) if np.isfinite(fell) else last
-    # One that blew up at once is shown standing.
+    # A walk that diverges at once is shown standing.
     frames = np.minimum(np.arange(max(last, 2)), max(last, 1) - 1)
     kept = {
         name: getattr(film, name)[:, frames]
