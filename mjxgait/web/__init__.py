@@ -1,1 +1,1 @@
-"""Pages in the browser: one to give away, and one to watch an evolution with."""
+"""Browser pages: one to share a walk, one to drive it, and one to watch a running evolution."""

@@ -1,4 +1,4 @@
-"""One HTML file in which walks are driven by keys or a stick: their clips, blended."""
+"""One HTML file that drives a creature by keys or a stick, with the clips of its walks blended."""
 
 import base64
 import html
@@ -12,20 +12,20 @@ from mjxgait.animation.export import WalkLoop, build_driven
 from mjxgait.web.page import viewer_script
 
 FAR = 3.2
-"""Of the camera, in units of the creature's size."""
+"""Camera distance in units of the creature's size."""
 KEPT = ("name", "speed", "turn", "duration")
 
 
 def driven_page(
     loops: Mapping[str, WalkLoop], clips: Sequence[Mapping[str, Any]], of: int, blends: str
 ) -> str:
-    """The text of the page.
+    """Return the text of the page.
 
     Args:
       loops: of one creature, by name; the first stands.
       clips: for each its name, `speed` in m/s, `turn` in deg/s and `duration` in s.
-      of: how many walks were asked for.
-      blends: what is known of blends as physics, in words.
+      of: number of walks requested.
+      blends: physical validity of the blends, in words.
     """
     creature = next(iter(loops.values())).walk.creature
     glb, apart = build_driven(loops)

@@ -1,9 +1,8 @@
-"""A page on this machine that shows a run as it learns: the best so far walking, and the curve
-growing.
+"""Local page that shows a run as it learns: the current best walk and the fitness curve.
 
-It only reads the run folder, in a process of its own, so it cannot disturb a training and works on
-a finished run as well. The browser plays the animation; all that costs time here is one short
-simulation when the champion has changed.
+A separate process only reads the run folder, so it cannot disturb a training and works on a
+finished run as well. The browser plays the animation; the only cost here is one short simulation
+when the champion has changed.
 """
 
 import contextlib
@@ -36,18 +35,18 @@ from mjxgait.training.folder import (
 HERE = "127.0.0.1"
 PORTS = range(8765, 8785)
 SECONDS = 5.0
-"""Of the walk that is shown."""
+"""Duration of the walk that is shown."""
 SHARE = 0.04
-"""Of one core that looking at new champions may take on average."""
+"""Largest average share of one core for simulating new champions."""
 PATIENCE = 1.0
-"""s between looks at the folder."""
+"""Time between checks of the folder, s."""
 CONNECTIONS, IDLE = 32, 10.0
-"""Connections at once, and s after which one that neither asks nor takes an answer is closed."""
+"""Largest number of connections, and s after which an idle one is closed."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Shown:
-    """What the page shows. version: grows with each new animation; 0 while there is none."""
+    """Content of the page. version: grows with each new animation; 0 while there is none."""
 
     version: int
     what: str
@@ -55,17 +54,17 @@ class Shown:
 
 
 class Watcher:
-    """Follows a run folder."""
+    """Observer of a run folder."""
 
     def __init__(self, run: Path) -> None:
-        """Raises UserError when it is not a run folder."""
+        """Open the run; raise UserError if it is not a run folder."""
         self.run = run
         self.creature, _ = open_run(run)
         self.shown = Shown(0, "waiting for the first generation", b"")
         self._seen = 0
 
     def look(self) -> float:
-        """Takes a new champion in, if there is one; returns s to wait before the next look."""
+        """Load any new champion; return the time in s to wait before the next check."""
         began = time.process_time()
         try:
             changed = (self.run / CHAMPION).stat().st_mtime_ns
@@ -73,19 +72,19 @@ class Watcher:
             return PATIENCE
         if changed != self._seen:
             self._seen = changed
-            # Half a file cannot be met with: it is replaced in one go. A foreign one is left to the
-            # other commands to report.
+            # A partial file cannot occur: files are replaced atomically. Other commands report a
+            # foreign one.
             with contextlib.suppress(UserError):
                 self.shown = self._shown()
         return max(PATIENCE, (time.process_time() - began) * (1 / SHARE - 1))
 
     def follow(self, ended: Callable[[], bool]) -> None:
-        """Looks again and again."""
+        """Check repeatedly until `ended` returns true."""
         while not ended():
             time.sleep(self.look())
 
     def state(self) -> dict[str, Any]:
-        """What the page asks for every second."""
+        """Return the state that the page requests every second."""
         what = self.shown.what
         try:
             lines = read_metrics(self.run / METRICS)
@@ -121,11 +120,11 @@ def serve(
     ready: Callable[[str], None] = print,
     wait: Callable[[], object] | None = None,
 ) -> None:
-    """Shows a run until interrupted, or until `wait` returns.
+    """Show a run until interrupted, or until `wait` returns.
 
     Args:
       port: on this machine; by default the first free one.
-      ready: is told the address.
+      ready: called with the address.
 
     Raises:
       UserError: not a run folder, or the port is taken.
@@ -152,7 +151,7 @@ def _shut_after(server: ThreadingHTTPServer, wait: Callable[[], object]) -> None
 
 
 class _Server(ThreadingHTTPServer):
-    """A server that has so many connections at once; a further one is closed at once."""
+    """A server with at most `CONNECTIONS` connections; it closes any further one at once."""
 
     daemon_threads = True
 
@@ -161,27 +160,27 @@ class _Server(ThreadingHTTPServer):
         super().__init__(*given)
 
     def process_request(self, request: Any, client_address: Any) -> None:
-        """Answer in a thread of its own where there is one free."""
+        """Answer in a new thread if one is free."""
         if self._free.acquire(blocking=False):
             super().process_request(request, client_address)
         else:
             self.shutdown_request(request)
 
     def process_request_thread(self, request: Any, client_address: Any) -> None:
-        """Answer, and give the thread back."""
+        """Answer, and release the thread."""
         try:
             super().process_request_thread(request, client_address)
         finally:
             self._free.release()
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """Say nothing of a browser that has gone or has waited too long."""
+        """Ignore a browser that disconnected or timed out."""
         if not isinstance(sys.exception(), OSError):
             super().handle_error(request, client_address)
 
 
 def open_server(watcher: Watcher, port: int | None = None) -> ThreadingHTTPServer:
-    """The server, bound to this machine alone.
+    """Return a server, bound to this machine alone.
 
     Raises:
       UserError: the port is taken.
@@ -206,7 +205,7 @@ class _Handler(BaseHTTPRequestHandler):
     timeout = IDLE
 
     def do_GET(self) -> None:
-        # A page from elsewhere whose name has been made to point here must get nothing.
+        # DNS rebinding: a foreign page whose host name resolves to this machine must get nothing.
         if self.headers.get("Host", "").rsplit(":", 1)[0] not in (HERE, "localhost"):
             self.send_error(HTTPStatus.FORBIDDEN)
             return
@@ -215,7 +214,7 @@ class _Handler(BaseHTTPRequestHandler):
             case "/":
                 self._send((web / "live.html").read_bytes(), "text/html; charset=utf-8")
             case "/viewer.js":
-                # Without the reference to a source map, which is not here.
+                # The source map is not served.
                 self._send(
                     (web / "model-viewer.min.js")
                     .read_bytes()
@@ -235,9 +234,9 @@ class _Handler(BaseHTTPRequestHandler):
         self.send_header("Content-Length", str(len(content)))
         self.send_header("Cache-Control", "no-store")
         self.end_headers()
-        # The browser may have gone on to the next one.
+        # The browser may have dropped this request for the next one.
         with contextlib.suppress(ConnectionError, TimeoutError):
             self.wfile.write(content)
 
     def log_message(self, format: str, *args: Any) -> None:
-        """Says nothing."""
+        """Log nothing."""

@@ -1,6 +1,4 @@
-"""One HTML file that plays a walk in 3D by double click: nothing in it asks the network for
-anything.
-"""
+"""One HTML file that plays a walk in 3D on a double click, without any network request."""
 
 import base64
 import html
@@ -45,11 +43,11 @@ CHECK = (
     "and ends with exit code 0 only if all are equal."
 )
 FAR = 1.7
-"""Of the camera, in units of the creature's size."""
+"""Camera distance in units of the creature's size."""
 
 
 def write_page(run: Path, out: Path) -> str:
-    """Write the page of a run's champion; return what is to be said of it, see `doubt`.
+    """Write the page of a run's champion; return the notice of `doubt`.
 
     Raises:
       UserError: no run, no champion, no steady stride, or the file cannot be written.
@@ -62,7 +60,7 @@ def write_page(run: Path, out: Path) -> str:
 
 
 def write_text(out: Path, page: str) -> None:
-    """Writes a page.
+    """Write a page.
 
     Raises:
       UserError: the file cannot be written.
@@ -74,15 +72,15 @@ def write_text(out: Path, page: str) -> None:
 
 
 def viewer_script() -> str:
-    """The viewer, to stand in a page."""
+    """Return the viewer's script, ready to be embedded in a page."""
     script = resources.files("mjxgait.web") / "assets" / "model-viewer.min.js"
-    # Without the reference to a source map, which a browser's tools would ask for.
+    # Browser tools would request the source map.
     text = script.read_text(encoding="utf-8").rsplit("//# sourceMappingURL", 1)[0]
     return text.replace("</script", "<\\/script")
 
 
 def build_page(walk: Walk, loop: WalkLoop, sections: str) -> str:
-    """The text of the page; sections: HTML below the walk."""
+    """Return the text of the page. sections: HTML below the walk."""
     web = resources.files("mjxgait.web") / "assets"
     stride = loop.times[-1] / loop.strides
     lead = (
@@ -129,7 +127,7 @@ def _images(figures: Figures, creature: Creature) -> Iterable[str]:
 
 
 def certificate_table(run: Path, creature: Creature, champion: Champion) -> str:
-    """The criteria as a table, or why there is none."""
+    """Return the criteria as a table, or the reason why there is none."""
     document = read_certificate(run / CERTIFICATE)
     if document is None:
         return "<p>Not examined: <code>mjxgait certify</code> does it.</p>"
@@ -152,7 +150,7 @@ def certificate_table(run: Path, creature: Creature, champion: Champion) -> str:
 
 
 def _said(verdict: Verdict) -> str:
-    """The verdict in a sentence or two."""
+    """Verdict in one or two sentences."""
     said = "All criteria pass" if verdict.passed else "Not all criteria pass"
     if verdict.reservation:
         return f"Not certified. {said}, but {verdict.reservation}."
@@ -160,7 +158,7 @@ def _said(verdict: Verdict) -> str:
 
 
 def _anywhere(run: Path, champion: Champion) -> str:
-    """The trials of the second level as a table; nothing where nobody has asked for it."""
+    """Table of the stress tests; empty if the champion has not taken them."""
     document = read_stress(run / STRESS, champion)
     if document is None:
         return ""
@@ -194,7 +192,7 @@ def _origin(creature: Creature, champion: Champion) -> str:
 
 def _table(heading: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     def cell(text: str) -> str:
-        # In a table with a heading numbers stand under each other.
+        # Numbers align only in a table with a heading.
         kind = (
             ' class="fails"'
             if text == "fails"
