@@ -1,4 +1,4 @@
-"""What a checkpoint holds, read without compiling or simulating anything (docs/seeing.md)."""
+"""Content of a checkpoint, read without compiling or simulating anything (docs/seeing.md)."""
 
 from mjxgait.inspect.difference import differences, print_differences
 from mjxgait.inspect.facts import facts, individual_facts

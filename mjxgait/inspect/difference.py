@@ -1,4 +1,4 @@
-"""What differs between two checkpoints."""
+"""Differences between two checkpoints."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -14,8 +14,9 @@ from mjxgait.inspect.tables import print_columns, print_pairs, show
 
 
 def differences(a: Snapshot, b: Snapshot) -> dict[str, Any]:
-    """Settings, fitness, population and champion of two checkpoints against each other; poses
-    only where the joints are the same.
+    """Compare settings, fitness, populations and champions of two checkpoints.
+
+    Genomes are compared only for the same controller, poses only for the same joints.
     """
     mine, other = (flat(dataclasses.asdict(s.config)) for s in (a, b))
     kinds = [s.config.use.controller for s in (a, b)]
@@ -40,7 +41,7 @@ def differences(a: Snapshot, b: Snapshot) -> dict[str, Any]:
 
 
 def print_differences(found: Mapping[str, Any], console: Console) -> None:
-    """As tables."""
+    """Print the differences as tables."""
     a, b = found["a"], found["b"]
     heading = {
         s: f"{side['creature']}, generation {side['generation']} of {side['run']}"

@@ -1,4 +1,4 @@
-"""From a snapshot to plain values: what `--json` prints and what the tables are made of.
+"""Plain values of a snapshot, printed by `--json` and shown in the tables.
 
 Angles in degrees.
 """
@@ -40,7 +40,7 @@ KINDS = {
 
 
 def facts(snapshot: Snapshot) -> dict[str, Any]:
-    """Everything there is to tell of a checkpoint."""
+    """Return all facts about a checkpoint."""
     return {
         "run": str(snapshot.run),
         "creature": snapshot.creature.name,
@@ -79,9 +79,7 @@ def facts(snapshot: Snapshot) -> dict[str, Any]:
 
 
 def certificate(snapshot: Snapshot) -> str:
-    """One sentence about the certificate of the run's champion, whatever checkpoint the snapshot
-    is of.
-    """
+    """Return a sentence on the certificate of the run's champion, for any of its checkpoints."""
     document = _certificate(snapshot)
     if isinstance(document, str):
         return document
@@ -98,7 +96,7 @@ def certificate(snapshot: Snapshot) -> str:
 
 
 def _anywhere(snapshot: Snapshot) -> str:
-    """A sentence about the second level, where somebody has asked for it."""
+    """Sentence on the champion's stress tests; empty without any."""
     document = _stress(snapshot)
     if document is None:
         return ""
@@ -109,10 +107,10 @@ def _anywhere(snapshot: Snapshot) -> str:
 
 
 def verdict(snapshot: Snapshot) -> dict[str, Any] | None:
-    """The certificate of the run's champion in a few values; None where it has none that counts.
+    """Return the main values of the champion's certificate; None if it has no valid one.
 
-    speed: m/s. gait: its name. Both are None for what is no walk. anywhere: whether it walks there
-    too; None where nobody has tried. reservation: see `certify.Verdict`.
+    speed: m/s. gait: its name. Both are None for other tasks than walking. anywhere: whether it
+    passed the stress tests; None without any. reservation: see `certification.Verdict`.
     """
     document = _certificate(snapshot)
     if isinstance(document, str):
@@ -130,7 +128,7 @@ def verdict(snapshot: Snapshot) -> dict[str, Any] | None:
 
 
 def _certificate(snapshot: Snapshot) -> dict[str, Any] | str:
-    """Return what the examiner wrote of the run's champion, or why there is nothing that counts."""
+    """Return the certificate of the run's champion, or the reason why it has no valid one."""
     if snapshot.trouble:
         return snapshot.trouble
     try:
@@ -144,7 +142,7 @@ def _certificate(snapshot: Snapshot) -> dict[str, Any] | str:
 
 
 def _stress(snapshot: Snapshot) -> dict[str, Any] | None:
-    """What is known of the champion's second level; None where that is nothing."""
+    """Results of the champion's stress tests; None without any."""
     try:
         champion = kept_champion(snapshot.run, snapshot.creature)
         return read_stress(snapshot.run / STRESS, champion)
@@ -153,8 +151,8 @@ def _stress(snapshot: Snapshot) -> dict[str, Any] | None:
 
 
 def settings_changed(snapshot: Snapshot) -> dict[str, dict[str, Any]]:
-    """The settings that differ from configs/default.toml, by dotted key: the default and this
-    run's.
+    """Return the settings that differ from configs/default.toml, by dotted key: default and this
+    run's value.
     """
     use = dataclasses.asdict(snapshot.config.use)
     default = flat(dataclasses.asdict(resolve_config({}, snapshot.creature.name, use=use)))
@@ -167,8 +165,8 @@ def settings_changed(snapshot: Snapshot) -> dict[str, dict[str, Any]]:
 
 
 def fitness_summary(fitness: np.ndarray) -> dict[str, Any]:
-    """Best, quartiles, mean and worst of those that have a finite fitness [P], and how many have
-    none.
+    """Return best, quartiles, mean and worst of the finite fitness values [P], and the number of
+    others.
     """
     finite = fitness[np.isfinite(fitness)]
     if not len(finite):
@@ -196,9 +194,7 @@ def fitness_summary(fitness: np.ndarray) -> dict[str, Any]:
 
 
 def forced_spells(lines: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Each unbroken row of forced generations: first and last, and best fitness before and
-    after.
-    """
+    """Return each forced phase: first and last generation, fitness before and after."""
     spells = []
     for forced, group in itertools.groupby(
         range(len(lines)), key=lambda i: bool(lines[i]["forced"])
@@ -220,21 +216,21 @@ def forced_spells(lines: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
 
 
 def task_of(snapshot: Snapshot) -> Task:
-    """What the run's creature is to do."""
+    """Return the run's task."""
     creature, config = snapshot.creature, snapshot.config
     step, ends = float(creature.model.opt.timestep), what_ends(creature, config.rollout)
     return make_task(creature, step, ends, config)
 
 
 def terms_of(snapshot: Snapshot) -> tuple[str, ...]:
-    """Names of the fitness terms; none where the task has others now than when it was evolved."""
+    """Return the names of the fitness terms; none if the task now has another number of them."""
     names = task_of(snapshot).terms
     return names if snapshot.arrays["terms"].shape[-1] == len(names) else ()
 
 
 def contributions(snapshot: Snapshot) -> np.ndarray:
-    """[P, F] what each term gives to or takes from the fitness of each individual; a row's sum
-    is its fitness. [P, 0] where nobody knows the terms.
+    """Return each term's signed contribution [P, F] to each individual's fitness; a row sums to the
+    fitness. [P, 0] if the terms are unknown.
     """
     terms = np.asarray(snapshot.arrays["terms"], float)
     if not terms_of(snapshot):
@@ -249,7 +245,7 @@ def contributions(snapshot: Snapshot) -> np.ndarray:
 
 
 def population(snapshot: Snapshot) -> list[dict[str, Any]]:
-    """One row per individual, best first."""
+    """Return one row per individual, best first."""
     parts, arrays, names = contributions(snapshot), snapshot.arrays, terms_of(snapshot)
     return [
         {
@@ -267,14 +263,14 @@ def population(snapshot: Snapshot) -> list[dict[str, Any]]:
 
 
 def diversity(snapshot: Snapshot) -> dict[str, Any]:
-    """How many genomes differ, and by how much."""
+    """Return the number of different genomes, and their spread."""
     rows = snapshot.rows
     found = {"individuals": len(rows), "unique": len(np.unique(rows, axis=0))}
     return found | view_of(snapshot.config.use.controller).spread(snapshot)
 
 
 def individual_facts(snapshot: Snapshot, rank: int) -> dict[str, Any]:
-    """One member of the population; rank 1 is the best.
+    """Return the facts about one individual; rank 1 is the best.
 
     Raises:
       UserError: the population is smaller.
@@ -297,5 +293,5 @@ def individual_facts(snapshot: Snapshot, rank: int) -> dict[str, Any]:
 
 
 def number(value: Any) -> float | None:
-    """A number that JSON can hold; None for what is not finite."""
+    """Return a number for JSON; None if it is not finite."""
     return float(value) if np.isfinite(value) else None

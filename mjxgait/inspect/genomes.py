@@ -1,4 +1,4 @@
-"""How each kind of genome is told of."""
+"""Report of a genome, for each kind of controller."""
 
 from collections.abc import Mapping
 from typing import Any, Protocol
@@ -15,30 +15,30 @@ class GenomeView(Protocol):
     """One kind of genome, as values for `--json` and as tables for the screen."""
 
     def facts(self, snapshot: Snapshot, i: int) -> dict[str, Any]:
-        """The genome of the individual in place `i`."""
+        """Return the genome of the individual in place `i`."""
         ...
 
     def spread(self, snapshot: Snapshot) -> dict[str, Any]:
-        """Standard deviation over the population of what the genomes hold."""
+        """Return the standard deviation of the genomes' values over the population."""
         ...
 
     def difference(self, a: Snapshot, b: Snapshot) -> dict[str, Any]:
-        """Of two populations and their champions; has `same_individuals`."""
+        """Return the difference of two populations and their champions; has `same_individuals`."""
         ...
 
     def show(
         self, individual: Mapping[str, Any], spread: Mapping[str, Any] | None, console: Console
     ) -> None:
-        """Prints the genome of an individual, and how far the population is spread."""
+        """Print an individual's genome, and the spread of the population."""
         ...
 
     def show_difference(self, found: Mapping[str, Any], console: Console) -> None:
-        """Prints a difference."""
+        """Print a difference."""
         ...
 
 
 class PlainView:
-    """Arrays of numbers under their names: for every kind that has no view of its own."""
+    """Report of named arrays, for every kind without its own report."""
 
     def facts(self, snapshot: Snapshot, i: int) -> dict[str, Any]:
         """See `GenomeView`."""
@@ -76,7 +76,7 @@ class PlainView:
 
 
 def view_of(controller: str) -> GenomeView:
-    """Return the report of a kind of controller's genomes; of one without, its arrays as they are."""
+    """Return the report for a controller's genomes; plain arrays if its kind has none."""
     kind = known_controller(controller)
     view: GenomeView = kind.part("report")() if kind and kind.report else PlainView()
     return view

@@ -1,4 +1,4 @@
-"""What a run on islands holds: how each stands, and what they have exchanged."""
+"""State of each island of a run, and their exchanges."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -22,7 +22,7 @@ from mjxgait.training.stored import is_number
 
 @dataclasses.dataclass(frozen=True)
 class _Exchange:
-    """Schema of a line of `migrations.jsonl`: who came to an island, best first."""
+    """Schema of a line of `migrations.jsonl`: migrants to an island, best first."""
 
     __pydantic_config__ = STORED
     generation: int
@@ -32,9 +32,9 @@ class _Exchange:
 
 
 def island_facts(run: Path, last: int) -> list[dict[str, Any]]:
-    """A row per island up to a generation; none where the run has one population.
+    """Return a row per island up to a generation; none if the run has one population.
 
-    arrived: migrants that came to it; ahead: how often they were better than all that it had.
+    arrived: number of migrants. ahead: number of exchanges with a migrant above the island's best.
     """
     told = [line for line in read_records(run / MIGRATIONS, _Exchange) if line["generation"] < last]
     known = [folder for folder in (run / ISLANDS).glob("*/") if is_number(folder.name)]
@@ -43,7 +43,7 @@ def island_facts(run: Path, last: int) -> list[dict[str, Any]]:
 
 
 def print_islands(rows: Sequence[Mapping[str, Any]], console: Console) -> None:
-    """As a table."""
+    """Print the islands as a table."""
     if not rows:
         return
     table = titled_table("islands; how many migrants came to each, and from where", console)

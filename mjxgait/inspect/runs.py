@@ -1,4 +1,4 @@
-"""A folder full of runs: one line each."""
+"""Summary of a folder of runs: one line each."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -17,16 +17,14 @@ from mjxgait.training.stored import stored_generations
 
 
 def runs_in(folder: Path) -> list[Path]:
-    """The run folders directly inside a folder, by name; empty when it is itself a run, or holds
-    none.
-    """
+    """Return the run folders directly inside a folder, by name; empty if it is itself a run."""
     if not folder.is_dir() or (folder / CONFIG).is_file():
         return []
     return sorted(entry for entry in folder.iterdir() if (entry / CONFIG).is_file())
 
 
 def just_begun(path: Path) -> dict[str, Any] | None:
-    """Return what there is to say of a run that runs now and has no checkpoint yet; None of others."""
+    """Return the summary of a running run without a checkpoint; None for others."""
     who = None if stored_generations(path) else running(path)
     return {"run": str(path), "problem": None, "running": who} if who else None
 
@@ -37,10 +35,9 @@ def print_just_begun(line: Mapping[str, Any], console: Console) -> None:
 
 
 def list_runs(runs: Sequence[Path]) -> list[dict[str, Any]]:
-    """Return what there is to say of each run.
+    """Return a summary of each run.
 
-    One that cannot be read has the reason under `problem`; `running` names the process that writes
-    it now.
+    `problem` is the reason why a run cannot be read; `running` names the process that writes it.
     """
     kept = (
         "running",
@@ -68,7 +65,7 @@ def list_runs(runs: Sequence[Path]) -> list[dict[str, Any]]:
 
 
 def print_runs(lines: Sequence[Mapping[str, Any]], console: Console) -> None:
-    """As a table, the problems below it."""
+    """Print the runs as a table, with the problems below."""
     table = Table(box=None, pad_edge=False)
     numbers = ("generation", "best", "seed", "margin", "m/s")
     for heading in ("run", "creature", *numbers, "gait", "written", "state"):
@@ -105,7 +102,7 @@ def _rounded(value: float | None) -> str:
 
 
 def _state(line: Mapping[str, Any]) -> str:
-    """Return what became of a run, in two words or three; by other rules, with what differs."""
+    """Return the state of a run in a few words, or the reservation of its verdict."""
     if line["running"]:
         return "running"
     if line["trouble"]:

@@ -1,5 +1,4 @@
-"""One checkpoint read back as NumPy arrays, whatever devices wrote it, together with the run it
-belongs to.
+"""One checkpoint and its run, read back as NumPy arrays independently of the devices that wrote it.
 
 Letters: `P` individuals, `R` starts, `F` fitness terms.
 """
@@ -38,12 +37,11 @@ from mjxgait.training.stored import (
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Snapshot:
-    """A checkpoint that is whole, and its run.
+    """An intact checkpoint and its run.
 
     arrays: of the state, by dotted name. lines: of the metrics, up to this generation. generations:
-    there are checkpoints of.
-    versions: of the packages that wrote the run's champion. written: s since the epoch. size: bytes
-    on disk.
+    those with a checkpoint. versions: of the packages that wrote the run's champion. written: s
+    since the epoch. size: bytes on disk.
     """
 
     run: Path
@@ -59,7 +57,7 @@ class Snapshot:
 
     @property
     def generation(self) -> int:
-        """That the checkpoint was written after."""
+        """Generation after which the checkpoint was written."""
         return self.manifest.generation
 
     @property
@@ -69,18 +67,18 @@ class Snapshot:
 
     @property
     def _every_gene(self) -> dict[str, np.ndarray]:
-        """The arrays of `genomes` and, where bodies evolve, their sizes."""
+        """The arrays of `genomes` and, if bodies evolve, their sizes."""
         named = ((name.partition("."), array) for name, array in self.arrays.items())
         return {rest: array for (room, _, rest), array in named if room == "genomes"}
 
     @property
     def rows(self) -> np.ndarray:
-        """[P, genes] every gene of every genome, in its own unit."""
+        """Genes [P, genes] of all genomes, each in its own unit."""
         flat = [array.reshape(len(array), -1) for array in self._every_gene.values()]
         return np.concatenate(flat, axis=1)
 
     def champion(self, rank: int) -> Champion:
-        """An individual; rank 1 is the best.
+        """Return an individual; rank 1 is the best.
 
         Raises:
           UserError: the population is smaller.
@@ -101,17 +99,17 @@ class Snapshot:
 
     @property
     def fitness(self) -> np.ndarray:
-        """[P], best first."""
+        """Fitness [P], best first."""
         return self.arrays["fitness"]
 
     @property
     def ended(self) -> str | None:
-        """Why the run is over at this checkpoint; None when it was to go on."""
+        """Reason why the run ends at this checkpoint; None if it continues."""
         return end_of(self.run, self.creature, self.config, Stored(self.manifest, self.arrays))
 
     @cached_property
     def trouble(self) -> str | None:
-        """Why the run's champion cannot be read; None where it can, or there is none yet."""
+        """Reason why the run's champion cannot be read; None if it can, or does not exist yet."""
         if not (self.run / CHAMPION).exists():
             return None
         try:
@@ -122,11 +120,12 @@ class Snapshot:
 
 
 def read_snapshot(path: Path, generation: int | None = None) -> Snapshot:
-    """The checkpoint of a run folder (the latest, or that of `generation`), or the one at a path.
+    """Return the checkpoint of a run folder (the latest, or that of `generation`), or the one at a
+    path.
 
     Raises:
       UserError: not a run or checkpoint, or a damaged or foreign one; says which and names the
-        newest that is intact.
+        newest intact one.
     """
     run, generation = _locate(path, generation)
     creature, config = open_run(run)
@@ -149,8 +148,8 @@ def read_snapshot(path: Path, generation: int | None = None) -> Snapshot:
 
 
 def _lines(path: Path, last: int) -> list[dict[str, Any]]:
-    """The metrics up to a generation; none where the file is not one of ours: the checkpoint is
-    still worth telling of.
+    """Metrics up to a generation; none if the file is foreign, since the checkpoint alone is still
+    useful.
     """
     try:
         return [line for line in read_metrics(path) if line["generation"] <= last]
@@ -159,7 +158,7 @@ def _lines(path: Path, last: int) -> list[dict[str, Any]]:
 
 
 def _locate(path: Path, generation: int | None) -> tuple[Path, int | None]:
-    """The run folder, and the generation that the path itself names."""
+    """Run folder, and the generation that the path itself names."""
     if not path.exists():
         raise UserError(f"{path}: no such folder")
     if (path / CONFIG).is_file():
@@ -209,6 +208,6 @@ def _versions(run: Path) -> dict[str, str]:
 
 
 def shared(a: Snapshot, b: Snapshot) -> int:
-    """How many genomes are in both populations."""
+    """Return the number of genomes in both populations."""
     mine, other = ({row.tobytes() for row in s.rows} for s in (a, b))
     return len(mine & other)

@@ -1,4 +1,4 @@
-"""Tables on the screen, and the numbers in them."""
+"""Tables on the screen, and their numbers."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -8,7 +8,7 @@ from rich.table import Table
 
 
 def show(value: float | None, sign: bool = False) -> str:
-    """A number in a table."""
+    """Return a number as text for a table."""
     if value is None:
         return "none"
     text = f"{value:+.2f}" if sign else f"{value:.3f}"
@@ -16,13 +16,13 @@ def show(value: float | None, sign: bool = False) -> str:
 
 
 def titled_table(title: str, console: Console) -> Table:
-    """Prints a heading and returns the empty table to print below it."""
+    """Print a heading and return the empty table to print below it."""
     console.print(f"\n{title}", style="bold")
     return Table(box=None, pad_edge=False)
 
 
 def print_pairs(rows: Mapping[str, str], console: Console) -> None:
-    """Names and values in two columns."""
+    """Print names and values in two columns."""
     table = Table(box=None, show_header=False, pad_edge=False)
     table.add_column(no_wrap=True)
     table.add_column(overflow="fold")
@@ -32,7 +32,7 @@ def print_pairs(rows: Mapping[str, str], console: Console) -> None:
 
 
 def print_columns(title: str, rows: Mapping[str, list[Any]], console: Console) -> None:
-    """What A has and what B has."""
+    """Print the values of A and B side by side."""
     if not rows:
         console.print(f"\n{title}: no difference")
         return
@@ -45,5 +45,5 @@ def print_columns(title: str, rows: Mapping[str, list[Any]], console: Console) -
 
 
 def title(individual: Mapping[str, Any]) -> str:
-    """What to call an individual."""
+    """Return an individual's title."""
     return "champion" if individual["rank"] == 1 else f"individual {individual['rank']}"

@@ -11,14 +11,14 @@ from mjxgait.inspect.islands import print_islands
 from mjxgait.inspect.tables import print_pairs, show, titled_table
 
 FEW = 10
-"""Individuals that are shown where not all are asked for."""
+"""Individuals shown by default."""
 BLOCKS = "▁▂▃▄▅▆▇█"
 WIDEST = 60
 """Characters of a sparkline; longer histories are thinned."""
 
 
 def print_facts(facts: Mapping[str, Any], console: Console, few: bool = False) -> None:
-    """All about one checkpoint; see `facts`. few: of the population only the best."""
+    """Print all facts about a checkpoint; see `facts`. few: only the best of the population."""
     _print_identity(facts, console)
     _print_settings(facts["settings_changed"], console)
     _print_history(facts, console)
@@ -32,7 +32,7 @@ def print_facts(facts: Mapping[str, Any], console: Console, few: bool = False) -
 
 
 def print_individual(individual: Mapping[str, Any], console: Console) -> None:
-    """All about one member of a population; see `individual_facts`."""
+    """Print all facts about one individual; see `individual_facts`."""
     console.print(
         f"individual {individual['rank']}: fitness {show(individual['fitness'])}, "
         f"{individual['kind']}, born in generation {individual['born']}",
@@ -50,13 +50,13 @@ def print_individual(individual: Mapping[str, Any], console: Console) -> None:
 
 
 def _print_sizes(individual: Mapping[str, Any], console: Console) -> None:
-    """Of an individual whose body has evolved."""
+    """Print the sizes of an evolved body."""
     if sizes := individual.get("sizes"):
         console.print("sizes: " + ", ".join(f"{name} {f:.2f}" for name, f in sizes.items()))
 
 
 def sparkline(values: Sequence[float | None], low: float, high: float) -> str:
-    """One character per value, by its height between low and high; a space where there is none."""
+    """Return one character per value, by its height between low and high; a space for None."""
     room = max(high - low, 1e-9)
 
     def block(value: float | None) -> str:
@@ -70,7 +70,7 @@ def sparkline(values: Sequence[float | None], low: float, high: float) -> str:
 
 
 def ago(written: str) -> str:
-    """How long before now, of an ISO time, in the largest unit that fits."""
+    """Return the time elapsed since an ISO time, in the largest unit that fits."""
     seconds = (
         datetime.datetime.now(datetime.UTC) - datetime.datetime.fromisoformat(written)
     ).total_seconds()
@@ -82,7 +82,7 @@ def ago(written: str) -> str:
 
 def _print_identity(facts: Mapping[str, Any], console: Console) -> None:
     going = "not finished: `mjxgait train --resume` goes on from the latest checkpoint"
-    # A certificate ends a run too, if it is the champion's.
+    # The champion's certificate ends a run, too.
     alive = facts["running"] and f"runs now: {facts['running']}"
     state = (
         alive or facts["ended"] or ("not known without the champion" if facts["trouble"] else going)
@@ -167,7 +167,7 @@ def _print_population(rows: Sequence[Mapping[str, Any]], console: Console) -> No
         name: sum(abs(row["contributions"][name] or 0.0) for row in rows)
         for name in rows[0]["contributions"]
     }
-    # As many terms as the line has room for, those that matter most first.
+    # Only as many terms as the line has room for.
     main = sorted((name for name in weight if weight[name]), key=lambda name: -weight[name])[
         : max((console.width - 42) // 10, 1)
     ]
