@@ -50,7 +50,7 @@ def main(path: str) -> None:
 
 
 def _compiled(parts: dict[str, np.ndarray]) -> mujoco.MjModel:
-    """Model whose floor is a height field if the ground is uneven."""
+    """Model with a height field as floor if the ground is uneven."""
     if "heights" not in parts:
         return mujoco.MjModel.from_xml_string(str(parts["xml"]))
     heights, spec = parts["heights"], mujoco.MjSpec.from_string(str(parts["xml"]))

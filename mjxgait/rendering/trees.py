@@ -49,7 +49,7 @@ def laid_out(expression: Expression) -> tuple[list[Node], int]:
 
 
 def _lay(expression: Expression, first: int, depth: int, nodes: list[Node]) -> tuple[float, int]:
-    """Add the nodes of a subtree whose leaves begin at `first`; return its place and leaf count."""
+    """Add the nodes of a subtree with leaves from `first` on; return its place and leaf count."""
     if not isinstance(expression, tuple):
         kind = "number" if isinstance(expression, float) else "sense"
         label = f"{expression:.3g}" if isinstance(expression, float) else expression

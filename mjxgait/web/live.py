@@ -205,7 +205,7 @@ class _Handler(BaseHTTPRequestHandler):
     timeout = IDLE
 
     def do_GET(self) -> None:
-        # DNS rebinding: a foreign page whose host name resolves to this machine must get nothing.
+        # DNS rebinding: a foreign host name that resolves to this machine must get nothing.
         if self.headers.get("Host", "").rsplit(":", 1)[0] not in (HERE, "localhost"):
             self.send_error(HTTPStatus.FORBIDDEN)
             return
