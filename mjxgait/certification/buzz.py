@@ -1,4 +1,4 @@
-"""Vibration of the joints: motion too fast to belong to a stride.
+"""Vibration of the joints: motion too fast for a stride.
 
 Letters: `F` frequencies, `J` actuated joints.
 """
@@ -9,18 +9,24 @@ from mjxgait.reference.measure import Recording
 from mjxgait.tasks.walk.gaits import transition
 
 SLOWEST = 20.0
-"""Hz; what is slower may belong to a stride."""
+"""Hz; slower motion may belong to a stride."""
 MULTIPLE = 7
-"""Of the frequency at which an animal changes from trot to gallop; small animals stride fast."""
+"""Multiple of the stride frequency at which an animal changes from trot to gallop.
+
+Small animals stride fast.
+"""
 BAND = 2.0
-"""Hz, width of the band that is looked for. A footfall shakes a joint at all frequencies, a
-vibration at one."""
+"""Hz, width of the search band.
+
+A footfall shakes a joint at all frequencies, a vibration at one.
+"""
 
 
 def buzz(window: Recording) -> float:
-    """The strongest vibration of a joint, over the speed of all joints (root mean squares).
+    """Return the strongest vibration of a joint over the speed of all joints (root mean squares).
 
-    It is the speed within a band of 2 Hz, of whatever joint and wherever from 20 Hz on it is largest.
+    The vibration is the largest speed of any joint within any band of 2 Hz, from 20 Hz on, or
+    from `MULTIPLE` times the transition frequency if that is higher.
     """
     speed, step = window.joint_vel, window.time_step
     if not np.isfinite(speed).all() or not speed.any():
@@ -34,7 +40,7 @@ def buzz(window: Recording) -> float:
 
 
 def _power(speed: np.ndarray, step: float) -> np.ndarray:
-    """[F, J] (rad/s)² at each frequency from 0 on; their sum is a joint's mean square."""
+    """Power [F, J] in (rad/s)² at each frequency from 0 on; its sum is a joint's mean square."""
     taper = np.hanning(len(speed))[:, None]
     waves: np.ndarray = np.abs(np.fft.rfft(speed * taper, axis=0)) ** 2
     total = waves.sum(0)

@@ -1,4 +1,4 @@
-"""The stable-walk certificate: examines a champion in C MuJoCo, free of JAX."""
+"""Examination of a champion in C MuJoCo for the stable-walk certificate, free of JAX."""
 
 import dataclasses
 import itertools
@@ -28,15 +28,18 @@ from mjxgait.reference.starts import (
 )
 
 SCHEMA = 2
-"""Version of the file and of the criteria: 1 had eight criteria, and chose on what it examined."""
+"""Version of the file and of the criteria.
+
+Schema 1 had eight criteria, and chose the champion on the draw that it was examined on.
+"""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Certificate:
-    """The verdict.
+    """Result of an examination.
 
-    champion: fingerprint of the one examined. report: the numbers without a threshold.
-    seconds: that it took. attempts: examinations that its run has taken, this one included.
+    champion: fingerprint of the examined champion. report: numbers without a threshold.
+    seconds: duration of the examination. attempts: examinations of its run, this one included.
     """
 
     creature: str
@@ -51,21 +54,21 @@ class Certificate:
 
     @property
     def passed(self) -> bool:
-        """Whether there are criteria and all of them pass."""
+        """True if there are criteria and all of them pass."""
         return judge(self.criteria).passed
 
     @property
     def margin(self) -> float:
-        """That of the worst criterion, by which candidates are ranked; positive when all pass."""
+        """Margin of the worst criterion, which ranks candidates; positive when all pass."""
         return judge(self.criteria).margin
 
     @property
     def verdict(self) -> Verdict:
-        """As a reader of the file comes to it."""
+        """Result that a reader derives from the stored file."""
         return judged(self.document())
 
     def rows(self) -> list[tuple[str, str, str, str, str]]:
-        """A table: criterion, measure, value, threshold, verdict."""
+        """Return a table: criterion, measure, value, threshold, result."""
         return [
             (
                 f"{c.number} {c.name}",
@@ -79,11 +82,11 @@ class Certificate:
         ]
 
     def to_json(self) -> str:
-        """The text of `certificate.json`."""
+        """Return the text of `certificate.json`."""
         return json.dumps(self.document(), indent=2, allow_nan=False) + "\n"
 
     def document(self) -> dict[str, Any]:
-        """What `certificate.json` holds; numbers that are not finite become null."""
+        """Return the content of `certificate.json`; non-finite numbers become null."""
         document = {
             "schema": schema_of(self.task),
             "creature": self.creature,
@@ -113,14 +116,14 @@ class Certificate:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Glance:
-    """The undisturbed walk, and the criteria that it alone decides: all but 4 and 5."""
+    """Nominal check: the undisturbed walk, and the criteria that it alone decides, all but 4, 5."""
 
     whole: Recording
     criteria: tuple[Criterion, ...]
 
     @property
     def margin(self) -> float:
-        """That of the worst of its criteria."""
+        """Margin of the worst of its criteria."""
         return judge(self.criteria).margin
 
 
@@ -129,10 +132,10 @@ def glance(
     champion: Champion,
     config: CertificateConfig | None = None,
 ) -> Glance:
-    """The part of the examination that nobody disturbs: a fifth of its time.
+    """Check the undisturbed walk, which takes a fifth of the examination's time.
 
-    The walk with half the time step is taken at the side of the other: most of what one walk costs
-    is Python's, which is no more for two.
+    The walk with half the time step runs beside the other: most of the cost of one walk is Python
+    overhead, which two walks share.
 
     Raises:
       UserError: the creature's facts contradict its own files, or the champion is not finite.
@@ -155,11 +158,11 @@ def certify(
     seen: Glance | None = None,
     attempts: int = 1,
 ) -> Certificate:
-    """Examines a champion against all nine criteria, on starts and pushes drawn for it alone.
+    """Examine a champion by all nine criteria, on starts and pushes drawn for it alone.
 
     Args:
-      seen: what a glance with the same config has found, to save looking again.
-      attempts: examinations that its run has taken, this one included.
+      seen: result of `glance` with the same config, to save the repetition.
+      attempts: examinations of its run, this one included.
 
     Raises:
       UserError: the creature's facts contradict its own files, or the champion is not finite.
@@ -209,9 +212,9 @@ def record(
     seconds: float,
     start: Starts | None = None,
 ) -> Recording:
-    """The undisturbed walk, measured.
+    """Record and measure the undisturbed walk.
 
-    start: how it begins; by default nominal, with the usual goal where the task has one.
+    start: initial conditions; nominal by default, with the usual goal if the task has one.
     """
     start = nominal_starts(creature, 1) if start is None else start
     return recordings(creature, champion, seconds, start)[0]
@@ -220,7 +223,7 @@ def record(
 def recordings(
     creature: Creature, champion: Champion, seconds: float, starts: Starts
 ) -> list[Recording]:
-    """Walks from some starts, measured; parts in each other only at the usual time step."""
+    """Record and measure walks from some starts; overlap of parts only at the usual time step."""
     task = how_simulated(champion.task, champion.wish)
     starts = task.aimed(starts, CertificateConfig())
     count, drag = len(starts), task.drag if task.grown else None
@@ -239,23 +242,23 @@ def survival(
     seed: int = 0,
     threads: int = 0,
 ) -> float:
-    """Share of perturbed starts that are up to the end and have moved forward."""
+    """Return the share of perturbed starts that stay up to the end and move forward."""
     disturbed = perturbed_starts(creature, starts, np.random.default_rng(seed))
     outcome = simulate(creature, champion, disturbed, seconds, threads=threads)
     return float((outcome.stayed_up & (outcome.travel[:, 0] > 0)).mean())
 
 
 def distance(creature: Creature, champion: Champion, seconds: float) -> float:
-    """Forward way in m of the undisturbed walk, up to its end or its fall."""
+    """Return the forward distance in m of the undisturbed walk, up to its end or fall."""
     return float(simulate(creature, champion, nominal_starts(creature, 1), seconds).travel[0, 0])
 
 
 def push_ladder(
     creature: Creature, champion: Champion, config: CertificateConfig, threads: int = 0
 ) -> dict[float, float]:
-    """Share that stays up after each of the larger pushes, the same for all champions.
+    """Return the share that stays up after each larger push, on the draw shared by all champions.
 
-    Their speeds are in units of sqrt(g * hip height).
+    Push speeds are in units of sqrt(g * hip height).
     """
     groups = draws.ladder(creature, config, draws.common(config))
     starts = demands_of(champion.task, champion.wish).aimed(join(*groups), config)
@@ -271,8 +274,9 @@ def push_ladder(
 
 
 def half_point(shares: dict[float, float]) -> float | None:
-    """Where the share of survivors first comes down to a half, between the pushes tried; None
-    when it never does.
+    """Push speed at which the share of survivors first drops to a half; None if it never does.
+
+    Interpolated between the pushes tried.
     """
     steps = sorted(shares.items())
     for (s0, share0), (s1, share1) in itertools.pairwise(steps):
@@ -282,7 +286,7 @@ def half_point(shares: dict[float, float]) -> float | None:
 
 
 def _bears(shares: dict[float, float]) -> dict[str, Any]:
-    """What the report has of pushes; shares of survivors by speed."""
+    """Return the report's entries on pushes, from shares of survivors by push speed."""
     return {
         "push_survival": {f"{speed:g}": share for speed, share in sorted(shares.items())},
         "push_that_fells_half": half_point(shares),
@@ -290,7 +294,7 @@ def _bears(shares: dict[float, float]) -> dict[str, Any]:
 
 
 def schema_of(task: str) -> int:
-    """Version of `certificate.json` for a task: a certificate with another one is outdated."""
+    """Version of `certificate.json` for a task; a certificate of another version is outdated."""
     return SCHEMA + how_simulated(task).revision
 
 

@@ -1,8 +1,8 @@
-"""Derives a second time what the examiner takes from the shared loader, from the creature's files.
+"""Second derivation of the loader's facts, from the creature's files, for the examiner.
 
 Hip height, axes and mirror map decide what counts as forward, fast and symmetric: an error in them
-would pass evolution and examination alike. Nothing here uses `mjxgait.creature` but the value that
-is checked; geometry comes from C MuJoCo, settings from the text of creature.toml.
+would pass evolution and examination alike. Only the checked value comes from `mjxgait.creature`;
+geometry comes from C MuJoCo, settings from the text of creature.toml.
 Letters: `J` actuated joints.
 """
 
@@ -19,13 +19,16 @@ from mjxgait.errors import UserError
 
 EXACT = 1e-9
 LIKENESS = 0.15
-"""Of a body and its mirror image: rad, and hip heights. Drawn bodies are not quite symmetric."""
+"""Tolerance between a body and its mirror image: rad, and hip heights.
+
+Drawn bodies are not quite symmetric.
+"""
 SWING = 0.6
-"""rad, of the random poses that are mirrored."""
+"""rad, half width of the random poses that are mirrored."""
 
 
 def check_body(creature: Creature, pose_span: float = 0.0) -> None:
-    """Compare every fact that decides about a certificate with a second derivation of it.
+    """Compare every fact that decides a certificate with a second derivation of it.
 
     Args:
       pose_span: degrees, `evolution.pose_span` of the run; with 0 the pose ranges are those of
@@ -50,7 +53,7 @@ def check_body(creature: Creature, pose_span: float = 0.0) -> None:
 
 
 class _Body:
-    """What the files say, standing in C MuJoCo."""
+    """Body built from the files alone, standing in C MuJoCo."""
 
     def __init__(self, files: Mapping[str, str], pose_span: float) -> None:
         self.pose_span = np.radians(pose_span)
@@ -76,7 +79,7 @@ class _Body:
         mujoco.mj_kinematics(self.model, self.data)
 
     def facts(self, creature: Creature) -> Iterator[tuple[str, Any, Any]]:
-        """Names, values of the creature, and values by its files."""
+        """Yield each fact: name, value of the creature, value by its files."""
         forward, left, up = self.axes()
         stand = np.array([self.stand[j.qposadr[0]] for j in self.joints])
         yield "trunk", creature.trunk, self.trunk.id
@@ -100,7 +103,7 @@ class _Body:
     def drives(
         self, creature: Creature, stand: np.ndarray
     ) -> Iterator[tuple[str, tuple[np.ndarray, np.ndarray]]]:
-        """Gains, limits and weights [J] of the creature, and by its files."""
+        """Yield gains, limits and weights [J]: name, the creature's, and those by its files."""
         low, high = np.array([self._range(j) for j in self.joints]).T
         lowest, highest = self.pose_ranges(stand, low, high)
         yield "lower limit", (creature.joints.low, low)
@@ -127,7 +130,7 @@ class _Body:
     def pose_ranges(
         self, stand: np.ndarray, low: np.ndarray, high: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Lowest and highest pose [J] in rad, of creature.toml or of the pose span.
+        """Lowest and highest pose [J] in rad, from creature.toml or the pose span.
 
         low, high: [J] rad, the joints' own ranges. A pose span replaces the width of each hinge's
         range; the range is then shifted until it lies within the joint's own.
@@ -156,7 +159,7 @@ class _Body:
         """Mean height in m of the legs' first joints, found from the trunk downwards.
 
         A leg begins with the first body below the trunk that carries a single foot. If no joint
-        lies between the trunk and any foot, it is the height of the highest joint.
+        lies between the trunk and any foot, the highest joint counts.
         """
         self.pose(self.stand)
         carried = np.zeros(self.model.nbody, int)
@@ -176,7 +179,7 @@ class _Body:
         return float(np.mean(heights))
 
     def check_length(self, creature: Creature) -> None:
-        """The length lies between that of the geoms' centres and of the spheres about them."""
+        """Check the body length: between the extents of the geoms' centres and bounding spheres."""
         if stated := self.identity.get("body_length"):
             low = high = float(stated)
         else:
@@ -193,10 +196,10 @@ class _Body:
             )
 
     def check_mirror(self, creature: Creature) -> None:
-        """Random poses and their mirror images, part by part: where each is and how it has turned.
+        """Compare place and rotation of each part in random poses and in their mirror images.
 
-        Joints whose partner the file states are only compared with it, and stand still; what moves
-        with one that is said to be its own partner has no image.
+        A joint with a partner stated in the file is only compared with that statement, and stands
+        still. If it is stated as its own partner, the part that it moves has no image.
         """
         rng, stated = np.random.default_rng(0), self.table.get("mirror", {}).get("pairs", [])
         for pair in stated:
@@ -230,8 +233,9 @@ class _Body:
                     )
 
     def _parts(self, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Of each joint its place [J, 3], from the trunk's, in m, and the rotation [J, 3, 3] of the body
-        that it moves. Masses may lie otherwise on one side than on the other.
+        """Place of each joint [J, 3], m from the trunk; rotation [J, 3, 3] of the body it moves.
+
+        Joints are compared, not centres of mass, which may differ between the sides.
         """
         qpos = self.stand.copy()
         qpos[[j.qposadr[0] for j in self.joints]] = pose
@@ -241,7 +245,7 @@ class _Body:
         return place, self.data.xmat[moved].reshape(-1, 3, 3).copy()
 
     def setting(self, joint: str, key: str, default: Any = None) -> Any:
-        """A joint's setting: that of all joints, and over it the exceptions in their order."""
+        """Setting of a joint: that of all joints, overridden by matching exceptions in order."""
         value = self.table["joints"].get(key, default)
         for exception in self.table.get("joint", []):
             if key in exception and fnmatch.fnmatchcase(joint, exception["match"]):
@@ -249,7 +253,7 @@ class _Body:
         return value
 
     def weight(self, joint: str, group: str, key: str) -> float:
-        """A joint's weight in a correction; 0 where no pattern names it."""
+        """Weight of a joint in a correction; 0 if no pattern names it."""
         weight = 0.0
         for pattern, value in self.table.get(group, {}).get(key, {}).items():
             if fnmatch.fnmatchcase(joint, pattern):

@@ -1,6 +1,6 @@
-"""What the certificate demands: the nine criteria and the tasks, one table each, with the defaults.
+"""Thresholds of the certificate with their defaults: a table for each criterion and task.
 
-The first table is `outcome.Fall`; those of the tasks are in `thresholds`.
+The table of criterion 1 is `outcome.Fall`; those of tasks are in each task's `thresholds`.
 """
 
 import dataclasses
@@ -25,10 +25,12 @@ from mjxgait.tasks.modular.thresholds import (
 
 @dataclasses.dataclass(frozen=True)
 class ProgressConfig:
-    """2. strides: least number.
+    """Criterion 2: progress.
 
-    speed: body lengths/s. drift: over distance. heading: deg off straight ahead, mean over a second.
-    second_half: its speed over the first half's.
+    Attributes:
+      strides: least number. speed: body lengths/s, least. drift: largest, over the distance.
+      heading: deg off straight ahead, largest, mean over a second.
+      second_half: least speed of the second half over that of the first.
     """
 
     __pydantic_config__ = STRICT
@@ -41,9 +43,11 @@ class ProgressConfig:
 
 @dataclasses.dataclass(frozen=True)
 class PeriodConfig:
-    """3. autocorrelation: least, at the stride period.
+    """Criterion 3: periodic strides.
 
-    variation: largest coefficient of variation of the stride period.
+    Attributes:
+      autocorrelation: least, at the stride period.
+      variation: largest coefficient of variation of the stride period.
     """
 
     __pydantic_config__ = STRICT
@@ -53,12 +57,13 @@ class PeriodConfig:
 
 @dataclasses.dataclass(frozen=True)
 class StartsConfig:
-    """4. Perturbed starts.
+    """Criterion 4: perturbed starts.
 
     Attributes:
+      count: starts.
       joints, velocities, masses, gains: half widths in rad, rad/s, and as a share of each body's
         mass and of each joint's kp and kd.
-      friction: range of the factor. latency: most control steps by which torques come late.
+      friction: range of the factor. latency: largest delay of torques in control steps.
       slope: steepest, in degrees. floor: range of the factor on the softness of the floor.
       upright: share that must stay up.
     """
@@ -78,13 +83,13 @@ class StartsConfig:
 
 @dataclasses.dataclass(frozen=True)
 class PushesConfig:
-    """5. Speeds in units of sqrt(g * hip height).
+    """Criterion 5: pushes. Speeds are in units of sqrt(g * hip height).
 
     Attributes:
       count, speed: pushes and their size. window: s, when a push may come. upright: share that must
         stay up to the end.
-      ladder: larger pushes, tried to find the one that fells half. ladder_count: at each.
-        ladder_seconds: s to fall after a push.
+      ladder: speeds of larger pushes, to find the one that fells half. ladder_count: pushes at
+        each speed. ladder_seconds: s to fall after a push.
     """
 
     __pydantic_config__ = STRICT
@@ -99,7 +104,11 @@ class PushesConfig:
 
 @dataclasses.dataclass(frozen=True)
 class HalfStepConfig:
-    """6. distance: largest relative change of the distance when the time step is halved."""
+    """Criterion 6: half the time step.
+
+    Attributes:
+      distance: largest relative change of the distance.
+    """
 
     __pydantic_config__ = STRICT
     distance: Positive = 0.2
@@ -107,15 +116,16 @@ class HalfStepConfig:
 
 @dataclasses.dataclass(frozen=True)
 class GaitConfig:
-    """7. What makes a gait.
+    """Criterion 7: gait.
 
     Attributes:
       frequency: largest stride frequency, in units of 4.48 m^-0.14 Hz. stride_length: least, in hip
         heights.
       clearance: least, in hip heights. slip: largest, over the distance. duty_factor: range.
-      flicker: most touchdowns per stride that end no swing, mean of the feet.
+      flicker: largest number of touchdowns per stride that end no swing, mean of the feet.
       buzz: strongest vibration of a joint over the speed of all joints.
-      amplitudes: largest difference of a joint's amplitude from its mirror image's, over the larger.
+      amplitudes: largest difference between amplitudes of a joint and its mirror image, over the
+        larger.
       duties: largest difference between the duty factors of a left foot and of the right one.
     """
 
@@ -133,10 +143,11 @@ class GaitConfig:
 
 @dataclasses.dataclass(frozen=True)
 class PhysicsConfig:
-    """8. joint_speed: rad/s. joint_overrun: rad past the end of a joint's range. body_speed:
-    sqrt(g * hip height).
+    """Criterion 8: physics. All values are the largest allowed.
 
-    penetration: hip heights. torque: torque limits.
+    Attributes:
+      joint_speed: rad/s. joint_overrun: rad past the end of a joint's range.
+      body_speed: sqrt(g * hip height). penetration: hip heights. torque: torque limits.
     """
 
     __pydantic_config__ = STRICT
@@ -149,7 +160,11 @@ class PhysicsConfig:
 
 @dataclasses.dataclass(frozen=True)
 class PartsConfig:
-    """9. overlap: hip heights, how deep parts may stand in each other but neighbours."""
+    """Criterion 9: parts.
+
+    Attributes:
+      overlap: hip heights, largest depth of parts in others that are not their neighbours.
+    """
 
     __pydantic_config__ = STRICT
     overlap: Positive = 0.02
@@ -157,15 +172,15 @@ class PartsConfig:
 
 @dataclasses.dataclass(frozen=True)
 class WishesConfig:
-    """10. How far what was asked of a walk may be missed (docs/wishes.md).
+    """Criteria 10 and 11: tolerances of the walk targets (docs/wishes.md).
 
     Attributes:
-      speed: over the speed asked for. heading: deg off the heading it was told, mean over a second.
+      speed: over the target speed. heading: deg off the commanded heading, mean over a second.
       height: standing heights. bounce: hip heights. sway: deg.
       stride, duty_factor: over an animal's. reach: hip heights. pitch: deg.
-      commands: turns that who is to be steered is told, in so many simulations of their own; each
-        from straight on, at a rate that no one knew, to either side.
-      delay: s from a command on until the heading must be the one told. obey: share that must.
+      commands: steering simulations, each with a commanded turn: from straight ahead, to either
+        side, at a rate not known in advance.
+      delay: s from a command until the heading must follow it. obey: share that must follow.
     """
 
     __pydantic_config__ = STRICT
@@ -185,7 +200,7 @@ class WishesConfig:
 
 @dataclasses.dataclass(frozen=True)
 class CertificateConfig:
-    """The examination.
+    """Settings of the examination.
 
     Attributes:
       seconds: of each simulation. warmup: s at its start that do not count.

@@ -1,5 +1,4 @@
-"""The criteria that every task shares: pure functions from what was measured to values, thresholds
-and verdicts.
+"""Criteria shared by the tasks: pure functions from measurements to values, thresholds and results.
 
 Letters: `T` frames, `J` actuated joints.
 """
@@ -18,8 +17,8 @@ from mjxgait.reference.outcome import Fall
 class Measure:
     """One number against its threshold.
 
-    sense: whether the value must be at least or at most the threshold.
-    room: distance from the threshold at which nothing is left to gain.
+    sense: `>=` if the value must be at least the threshold, `<=` if at most.
+    room: distance from the threshold beyond which the margin no longer grows.
     """
 
     name: str
@@ -30,14 +29,14 @@ class Measure:
 
     @property
     def passed(self) -> bool:
-        """NaN never passes."""
+        """True if the value meets the threshold; NaN never does."""
         return bool(
             self.value >= self.threshold if self.sense == ">=" else self.value <= self.threshold
         )
 
     @property
     def margin(self) -> float:
-        """Distance to the threshold in units of `room`: 1 at best, negative when failed."""
+        """Distance to the threshold in units of `room`: at most 1, negative if failed."""
         if np.isnan(self.value):
             return -np.inf
         distance = (
@@ -50,7 +49,7 @@ class Measure:
 
 @dataclasses.dataclass(frozen=True)
 class Criterion:
-    """A group of measures that must all pass."""
+    """Group of measures that must all pass."""
 
     number: int
     name: str
@@ -58,18 +57,19 @@ class Criterion:
 
     @property
     def passed(self) -> bool:
-        """Whether there are measures and all of them pass."""
+        """True if there are measures and all of them pass."""
         return bool(self.measures) and all(m.passed for m in self.measures)
 
     @property
     def margin(self) -> float:
-        """That of the worst measure."""
+        """Margin of the worst measure."""
         return min((m.margin for m in self.measures), default=-np.inf)
 
 
 def at_least(name: str, value: float, threshold: float, best: float | None = None) -> Measure:
-    """A measure that should be large; `best` is the value beyond which more is no better (twice
-    the threshold if not given).
+    """Measure that should be large.
+
+    best: value beyond which more is no better; twice the threshold by default.
     """
     return Measure(
         name, float(value), ">=", threshold, (2 * threshold if best is None else best) - threshold
@@ -77,18 +77,18 @@ def at_least(name: str, value: float, threshold: float, best: float | None = Non
 
 
 def steady(first: float, second: float, least: float) -> Measure:
-    """What is done in the second half of a motion, over what is done in the first."""
+    """Measure of the second half of a motion over the first."""
     share = second / first if first > 0 else np.nan
     return at_least("second half / first half", share, least, 1.0)
 
 
 def at_most(name: str, value: float, threshold: float) -> Measure:
-    """A measure that should be small, at best zero."""
+    """Measure that should be small, at best zero."""
     return Measure(name, float(value), "<=", threshold, threshold)
 
 
 def upright(whole: Recording, window: Recording, config: Fall) -> Criterion:
-    """1. Never falls, and in the window nothing but feet and ground contacts touches the floor."""
+    """Criterion 1: no fall; in the window only feet and ground contacts touch the floor."""
     height = whole.trunk_pos[:, 2] / whole.dimensions.stand_height
     low, high = config.height
     return Criterion(
@@ -104,22 +104,23 @@ def upright(whole: Recording, window: Recording, config: Fall) -> Criterion:
 
 
 def starts(share: float, config: CertificateConfig) -> Criterion:
-    """4. Share of the perturbed starts that stayed up."""
+    """Criterion 4: share of the perturbed starts that stayed up."""
     return Criterion(
         4, "perturbed starts", (at_least("share that stays up", share, config.starts.upright, 1.0),)
     )
 
 
 def pushes(share: float, config: CertificateConfig) -> Criterion:
-    """5. Share of the pushed simulations that stayed up."""
+    """Criterion 5: share of the pushed simulations that stayed up."""
     return Criterion(
         5, "pushes", (at_least("share that stays up", share, config.pushes.upright, 1.0),)
     )
 
 
 def physics(window: Recording, config: PhysicsConfig) -> Criterion:
-    """8. No physics exploit: speeds, joint angles, penetration and torques of a machine that
-    could exist.
+    """Criterion 8: no physics exploit.
+
+    Speeds, joint angles, penetration and torques must be those of a machine that could exist.
     """
     size = window.dimensions
     return Criterion(
@@ -152,15 +153,15 @@ def physics(window: Recording, config: PhysicsConfig) -> Criterion:
 
 
 def parts(window: Recording, config: PartsConfig) -> Criterion:
-    """9. No part stands in another but its neighbours, more than in the standing pose."""
+    """Criterion 9: no more overlap than in the standing pose, except between neighbours."""
     deepest = window.overlap.max(initial=0.0) / window.dimensions.hip_height
     return Criterion(9, "parts", (at_most("overlap / hip height", deepest, config.overlap),))
 
 
 def joint_overrun(window: Recording) -> np.ndarray:
-    """[T, J] rad past the end of each joint's range; 0 within it.
+    """Angle [T, J] in rad past the end of each joint's range; 0 within it.
 
-    The shipped bodies have no stop there, only targets end there.
+    The shipped bodies have no stop there; only targets end there.
     """
     low, high = np.array(window.dimensions.joint_range).T
     return np.maximum(np.maximum(low - window.joint_pos, window.joint_pos - high), 0.0)
@@ -172,12 +173,10 @@ def speed(window: Recording) -> float:
 
 
 def distance(window: Recording) -> float:
-    """m forward."""
+    """Forward distance in m."""
     return float(window.trunk_pos[-1, 0] - window.trunk_pos[0, 0])
 
 
 def ratio(part: float, distance: float) -> float:
-    """Of a nuisance to the distance; not a number where there is no way forward to compare it
-    with.
-    """
+    """Ratio of a nuisance to the forward distance; NaN without one."""
     return part / distance if distance > 0 else np.nan

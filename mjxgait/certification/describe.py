@@ -1,4 +1,4 @@
-"""What a gait is like, without a threshold: speed, effort, rhythm, footfalls, and its name.
+"""Description of a gait without thresholds: speed, effort, rhythm, footfalls and name.
 
 `N` feet.
 """
@@ -15,7 +15,7 @@ from mjxgait.reference.strides import stride_frequency, stride_starts
 
 
 def describe(window: Recording, clearance: float) -> dict[str, Any]:
-    """The report's numbers; clearance in hip heights makes a swing."""
+    """Return the report's numbers. clearance: rise of a foot in a swing, in hip heights."""
     size = window.dimensions
     v, frequency = speed(window), stride_frequency(window, clearance)
     duty, phases = window.contact.mean(0), footfall_phases(window)
@@ -37,12 +37,12 @@ def describe(window: Recording, clearance: float) -> dict[str, Any]:
 
 
 def slip_distance(window: Recording) -> np.ndarray:
-    """[N] m, path that each foot slides on the floor while it carries weight."""
+    """Path [N] in m that each foot slides on the floor while it carries weight."""
     return (window.foot_slip * window.contact).sum(0) * window.time_step
 
 
 def worst_overlap(window: Recording) -> dict[str, Any] | None:
-    """The two parts deepest in each other: how deep in m, and in which share of frames."""
+    """Two parts with the deepest overlap: depth in m, and share of frames; None without overlap."""
     depth = np.nan_to_num(window.overlap)
     if not depth.any():
         return None
@@ -65,9 +65,7 @@ def cost_of_transport(window: Recording) -> float:
 
 
 def mean_stance(window: Recording, parts: int) -> np.ndarray:
-    """[parts, N] how often each foot carries weight in each part of the stride, over all
-    strides.
-    """
+    """Share of time [parts, N] that each foot carries weight in each part of all strides."""
     starts = stride_starts(window)
     share, seen = np.zeros((parts, window.contact.shape[1])), np.zeros((parts, 1))
     for a, b in itertools.pairwise(starts):
@@ -78,17 +76,18 @@ def mean_stance(window: Recording, parts: int) -> np.ndarray:
 
 
 def footfall_diagram(window: Recording, parts: int = 20) -> list[str]:
-    """Per foot one character for each twentieth of the stride: `#` where it mostly stands, `.`
-    where it mostly swings.
+    """Return a string per foot, with a character for each part of the stride.
+
+    `#`: mostly standing. `.`: mostly swinging.
     """
     return ["".join("#" if s > 0.5 else "." for s in foot) for foot in mean_stance(window, parts).T]
 
 
 def footfall_phases(window: Recording) -> np.ndarray:
-    """[N] middle of each foot's stance in cycles, [0, 1), against the first foot.
+    """Middle of each foot's stance [N] in cycles, [0, 1), relative to the first foot.
 
-    The middle of the stance, as a circular mean, does not hang on a single early or late touch as a
-    touchdown does. Where the duty factors are alike both agree.
+    This circular mean does not depend on a single early or late contact, as a touchdown does. If
+    the duty factors are alike, both agree.
     """
     stance = mean_stance(window, 100)
     angle = np.exp(2j * np.pi * (np.arange(len(stance)) + 0.5) / len(stance))
@@ -97,8 +96,9 @@ def footfall_phases(window: Recording) -> np.ndarray:
 
 
 def gait_name(size: Dimensions, duty: np.ndarray, phases: np.ndarray) -> str:
-    """The nearest of the named gaits (Hildebrand 1965 for four feet) from duty factors and
-    phases [N].
+    """Return the nearest named gait from duty factors and phases [N].
+
+    Hildebrand 1965 for four feet.
     """
     if not np.isfinite(phases).all() or duty.min() > 0.98 or duty.max() < 0.02:
         return "none"
@@ -118,7 +118,7 @@ def gait_name(size: Dimensions, duty: np.ndarray, phases: np.ndarray) -> str:
 
 
 def _apart(a: float, b: float) -> float:
-    """Distance of two phases, 0 to 0.5."""
+    """Distance between two phases, 0 to 0.5."""
     return abs((a - b + 0.5) % 1.0 - 0.5)
 
 
@@ -142,7 +142,7 @@ def _quadruped(places: np.ndarray, duty: np.ndarray, phases: np.ndarray) -> str:
         return "canter"
     if min(front_pair, hind_pair) < 0.35:
         return "gallop" if duty.mean() < 0.5 else "walk"
-    # Symmetrical gaits: how far a fore foot follows the hind foot of its side.
+    # Symmetrical gaits: lag of a fore foot behind the hind foot of its side.
     lag = (
         float(
             np.angle(np.exp(2j * np.pi * (fl - hl)) + np.exp(2j * np.pi * (fr - hr))) / (2 * np.pi)
@@ -159,9 +159,7 @@ def _quadruped(places: np.ndarray, duty: np.ndarray, phases: np.ndarray) -> str:
 
 
 def _three_beats(fl: float, fr: float, hl: float, hr: float) -> bool:
-    """Whether the feet of one diagonal fall together, the two others apart from them and from
-    each other.
-    """
+    """Return True if one diagonal's feet fall together, and the others apart from all the rest."""
     for together, others in (((fl, hr), (fr, hl)), ((fr, hl), (fl, hr))):
         beats = (together[0], *others)
         gaps = [_apart(a, b) for a, b in itertools.combinations(beats, 2)]

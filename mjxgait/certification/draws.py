@@ -1,7 +1,7 @@
-"""Which starts and pushes: one draw to choose on, and each champion's own to be examined on.
+"""Draws of starts and pushes: a common one to choose by, and each champion's own to examine it.
 
-A champion's draw follows from his fingerprint, which nobody knows before he is complete: evolution
-cannot tune for it, and the same champion is examined on the same draw, whenever and by whomever.
+A champion's draw follows from its fingerprint, which exists only once the champion is complete.
+Evolution therefore cannot tune for it, and every examination of a champion uses the same draw.
 """
 
 import dataclasses
@@ -19,38 +19,39 @@ from mjxgait.reference.starts import (
 )
 
 AIMS = 3
-"""The purpose of what a task draws: goals."""
+"""Purpose of the draw of a task's goals."""
 COMMANDS = 4
-"""Of turns that are told."""
+"""Purpose of the draw of commanded turns."""
 STEERED_FOR = 12.0
-"""s, length of a simulation that is steered."""
+"""s, length of a steered simulation."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Draw:
-    """Where all draws of an examination come from; words: of the seed."""
+    """Source of all draws of an examination. words: of the seed."""
 
     words: tuple[int, ...]
 
     def generator(self, purpose: int) -> np.random.Generator:
-        """A source for each purpose: 0 starts, 1 pushes, 2 the ladder of larger pushes, `AIMS`,
-        `COMMANDS`.
+        """Return the generator for a purpose.
+
+        0: starts. 1: pushes. 2: the ladder of larger pushes. Also `AIMS` and `COMMANDS`.
         """
         return np.random.default_rng([*self.words, purpose])
 
 
 def common(config: CertificateConfig) -> Draw:
-    """The one that is the same for all champions."""
+    """Return the draw shared by all champions."""
     return Draw((config.seed,))
 
 
 def own(champion: Champion, config: CertificateConfig) -> Draw:
-    """The champion's."""
+    """Return the champion's own draw."""
     return Draw((config.seed, int(champion.fingerprint, 16)))
 
 
 def starts(creature: Creature, config: CertificateConfig, draw: Draw, count: int) -> Starts:
-    """Those of criterion 4."""
+    """Draw the starts of criterion 4."""
     noise, rng = config.starts, draw.generator(0)
     familiar = perturbed_starts(
         creature, count, rng, noise.joints, noise.velocities, noise.friction, noise.masses
@@ -66,15 +67,15 @@ def starts(creature: Creature, config: CertificateConfig, draw: Draw, count: int
 
 
 def pushes(creature: Creature, config: CertificateConfig, draw: Draw, count: int) -> Starts:
-    """Those of criterion 5."""
+    """Draw the pushes of criterion 5."""
     speed = config.pushes.speed * _unit_speed(creature)
     return pushed_starts(creature, count, draw.generator(1), speed, config.pushes.window)
 
 
 def ladder(creature: Creature, config: CertificateConfig, draw: Draw) -> list[Starts]:
-    """The larger pushes, a group for each size, all within two seconds.
+    """Draw the larger pushes, a group for each size, all within two seconds.
 
-    None is watched for longer than it takes to fall.
+    Each is watched only for as long as a fall takes.
     """
     settings, rng = config.pushes, draw.generator(2)
     begin, end = settings.window[0], min(settings.window[0] + 2.0, settings.window[1])

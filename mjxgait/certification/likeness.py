@@ -1,4 +1,4 @@
-"""How much a walk is like an animal's: dynamic similarity (Alexander & Jayes 1983), and its bearing."""
+"""Likeness of a walk to an animal's: dynamic similarity (Alexander & Jayes 1983), and posture."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -12,11 +12,11 @@ from mjxgait.tasks.walk.gaits import animal_duty, animal_stride
 
 
 def likeness(window: Recording, clearance: float) -> dict[str, float]:
-    """Stride length and duty factor over those of an animal with such legs at this speed; where feet
-    stand, in hip heights (`standing`); deg of the nose above the horizon, mean; how often a
-    foot loses the floor for a moment in each stride (`patter`), which an animal's does not.
+    """Compare a walk with that of an animal with such legs at this speed.
 
-    clearance: height in hip heights that makes a swing.
+    stride, duty_factor: over the animal's. reach: see `standing`. pitch: mean deg of the nose above
+    the horizon. patter: see `patter`; an animal has none.
+    clearance: rise of a foot in a swing, in hip heights.
     """
     hip, v = window.dimensions.hip_height, speed(window)
     stride = v / stride_frequency(window, clearance)
@@ -30,7 +30,7 @@ def likeness(window: Recording, clearance: float) -> dict[str, float]:
 
 
 def in_words(report: Mapping[str, Any]) -> str | None:
-    """A sentence from a report; None where it is of no walk, or of one that gets nowhere."""
+    """Return a sentence on a report; None if it is of no walk, or of one without progress."""
     found = report.get("likeness", {})
     stride, duty = found.get("stride"), found.get("duty_factor")
     if stride is None or duty is None or not np.isfinite([stride, duty]).all():
@@ -42,9 +42,7 @@ def in_words(report: Mapping[str, Any]) -> str | None:
 
 
 def patter(window: Recording) -> float:
-    """How often a foot loses the floor for a moment in each stride, mean of the feet: touchdowns that
-    end no swing.
-    """
+    """Contact flicker: touchdowns per stride that end no swing, mean of the feet."""
     carries = window.contact
     touchdowns = (carries[1:] & ~carries[:-1]).sum(0)
     swung = np.array(list(map(len, falls_of_feet(window))))
@@ -53,8 +51,9 @@ def patter(window: Recording) -> float:
 
 
 def standing(window: Recording) -> float:
-    """Hip heights by which feet are ahead of or behind where they stand at rest, in the mean of all
-    moments in which they carry weight; mean of the feet.
+    """Mean offset of stance from its place at rest, forward or back, in hip heights.
+
+    Each foot's offset is its mean over all frames in which it carries weight.
     """
     if window.foot_ahead is None:
         return np.nan

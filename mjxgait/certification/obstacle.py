@@ -1,6 +1,4 @@
-"""What keeps a motion from being a walk, in words: where it is so far from one that most measures
-have no value.
-"""
+"""Reason in words for a motion so far from a walk that most measures have no value."""
 
 import numpy as np
 
@@ -9,11 +7,11 @@ from mjxgait.reference.measure import Recording
 from mjxgait.reference.strides import stride_starts
 
 LEFT = 0.05
-"""Share of the certificate's least speed below which a creature has not left its place."""
+"""Share of the certificate's minimum speed below which a creature has not left its place."""
 
 
 def obstacle(whole: Recording, config: CertificateConfig) -> str | None:
-    """The first thing that is in the way of a recorded motion, None where it strides ahead."""
+    """Return the first reason that a recorded motion is no walk; None if it strides ahead."""
     fell = _fell(whole, config)
     if fell is not None:
         when = "in the first second, " if fell < 1 else ""
@@ -31,7 +29,7 @@ def obstacle(whole: Recording, config: CertificateConfig) -> str | None:
 
 
 def _fell(whole: Recording, config: CertificateConfig) -> float | None:
-    """s until it had tipped over, or was too low or too high; None where it stayed up."""
+    """Time in s until the trunk tips over or is too low or too high; None if it stays up."""
     low, high = config.upright.height
     height = whole.trunk_pos[:, 2] / whole.dimensions.stand_height
     up = (whole.trunk_up >= config.upright.min_up) & (height >= low) & (height <= high)

@@ -1,4 +1,4 @@
-"""Runs many simulations of one champion on C MuJoCo under the NumPy controller.
+"""Simulations of one champion in C MuJoCo with the reference controller in NumPy.
 
 Letters: `S` simulations, `R` recorded ones (the first of the `S`), `T` control steps.
 """
@@ -33,22 +33,22 @@ def simulate(
     watch: Watch | None = None,
     twin: Twin | None = None,
 ) -> Outcome:
-    """Simulates the champion from every start, to the task's nominal goal where that has none.
+    """Simulate the champion from every start; a start without a goal gets the task's nominal one.
 
     Args:
-      record: R, how many of the first simulations to record; these run to the end even after a
-        fall, the others stop there.
-      fall: when one is down; by default as its task has it.
-      heading: [T] or [S, T] rad, commanded heading at each control step; None is as its task has
-        it, mostly straight ahead.
+      record: R, number of simulations to record, from the first on. These run to the end even
+        after a fall; the others stop there.
+      fall: conditions of a fall; the task's by default.
+      heading: [T] or [S, T] rad, commanded heading at each control step; None takes the task's,
+        mostly straight ahead.
       threads: 0 takes the machine's cores. The result does not depend on it.
-      watch: is told who is lost, and ends all as soon as that decides; how far they have come then
-        does depend on threads.
-      twin: moves it in the place of the champion's own controller; one that tells simulations apart
-        wants a single thread.
+      watch: receives the simulations that can no longer succeed, and ends all once that decides
+        the result. The distances until then do depend on threads.
+      twin: replaces the champion's own reference controller. One that treats simulations
+        differently needs a single thread.
     """
     threads = threads or cores()
-    # Dealt out like cards, so that each thread gets its share of every kind of start.
+    # Interleaved, so that each thread gets its share of every kind of start.
     shares = [np.arange(i, len(starts), threads) for i in range(min(threads, len(starts)))]
     steps = round(seconds / creature.model.opt.timestep)
     task = how_simulated(champion.task, champion.wish)

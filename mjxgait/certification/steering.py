@@ -1,4 +1,4 @@
-"""Tells a champion that is to be steered where to go, and looks whether it goes there."""
+"""Steering test: commands headings and checks that the champion follows them."""
 
 from mjxgait.certification import draws
 from mjxgait.certification.config import CertificateConfig
@@ -13,7 +13,7 @@ from mjxgait.creature import Creature
 def told_to_turn(
     creature: Creature, champion: Champion, config: CertificateConfig, draw: Draw, threads: int
 ) -> tuple[Criterion, ...]:
-    """Whether one that is to be steered follows headings of a draw, from perturbed starts."""
+    """Evaluate steering by drawn headings from perturbed starts; empty if none are commanded."""
     demands, step = demands_of(champion.task, champion.wish), creature.model.opt.timestep
     steps = round(STEERED_FOR / step)
     told = demands.commands(config, steps, step, draw.generator(COMMANDS))

@@ -1,5 +1,4 @@
-"""The second level: whether a walk goes anywhere, off the level floor and under more than the
-certificate asks (docs/certificate.md).
+"""Stress tests, the second level: uneven ground and larger disturbances (docs/certificate.md).
 
 Letters: `S` simulations.
 """
@@ -22,16 +21,16 @@ from mjxgait.reference.outcome import Fall, Outcome
 from mjxgait.reference.starts import Starts, perturbed_starts, pushed_starts
 
 FLOORS = 4
-"""Rough floors, on each of which some of the starts walk."""
+"""Number of rough floors among which the starts are divided."""
 
 
 @dataclasses.dataclass(frozen=True)
 class StressConfig:
-    """What is asked.
+    """Settings of the stress tests.
 
-    starts: S of each trial. share: that must do it. seconds: each but the longest, `long`. bumps:
-    hip heights. slope: deg. friction: coefficient. push: sqrt(g * hip height). trunk: factor on its
-    mass and inertia.
+    starts: S of each trial. share: of the starts that must succeed. seconds: of each trial but the
+    longest, `long`. bumps: hip heights. slope: deg. friction: coefficient.
+    push: sqrt(g * hip height). trunk: factor on its mass and inertia.
     """
 
     starts: int = 32
@@ -47,7 +46,7 @@ class StressConfig:
 
 @dataclasses.dataclass(frozen=True)
 class Trial:
-    """One way of asking more. share: of its starts that stayed up and got a body length ahead."""
+    """One stress test. share: of its starts that stayed up and got a body length ahead."""
 
     name: str
     share: float
@@ -56,7 +55,7 @@ class Trial:
 
 @dataclasses.dataclass(frozen=True)
 class Stress:
-    """All trials of one champion, named by its fingerprint."""
+    """All trials of one champion, identified by its fingerprint."""
 
     champion: str
     trials: tuple[Trial, ...]
@@ -64,11 +63,11 @@ class Stress:
 
     @property
     def passed(self) -> bool:
-        """Whether it walks anywhere."""
+        """True if all trials pass."""
         return all(trial.passed for trial in self.trials)
 
     def rows(self) -> list[str]:
-        """A line for each trial, and one for the whole."""
+        """Return a line for each trial, and one for the whole."""
         lines = [
             f"{t.name:24} {t.share:>4.0%}  {'pass' if t.passed else 'FAIL'}" for t in self.trials
         ]
@@ -76,7 +75,7 @@ class Stress:
         return [*lines, verdict]
 
     def document(self) -> dict[str, Any]:
-        """What `stress.json` holds."""
+        """Return the content of `stress.json`."""
         return {"schema": 1, "passed": self.passed} | dataclasses.asdict(self)
 
 
@@ -88,14 +87,14 @@ def stress(
     threads: int = 0,
     hasty: bool = False,
 ) -> Stress:
-    """Asks a champion that walks for more than the certificate does, one thing at a time.
+    """Test a walking champion beyond the certificate, one disturbance at a time.
 
     Args:
-      tell: called with the name of each trial before it is tried.
-      hasty: nothing more is tried after the first that it fails; the longest is the last.
+      tell: called with the name of each trial before it runs.
+      hasty: stops after the first failed trial; the longest is the last.
 
     Raises:
-      UserError: its task is another one than walking.
+      UserError: the task is not `walk`.
     """
     if champion.task != "walk":
         raise UserError(f"this champion's task is {champion.task}: only a walk is stressed")
@@ -113,7 +112,7 @@ def stress(
 def _trials(
     creature: Creature, champion: Champion, config: StressConfig, threads: int
 ) -> Iterator[tuple[str, Callable[[], list[Outcome]]]]:
-    """Names, and what simulates them."""
+    """Yield the name of each trial and the function that simulates it."""
     rng = common(CertificateConfig()).generator
     plain = perturbed_starts(creature, config.starts, rng(0))
 
@@ -123,7 +122,7 @@ def _trials(
     def bumps() -> list[Outcome]:
         floors = [creature.on(f"rough:{config.bumps:g}@{i}") for i in range(FLOORS)]
         shares = [plain.rows(np.arange(i, len(plain), FLOORS)) for i in range(FLOORS)]
-        # What hangs low may brush a bump.
+        # Low-hanging parts may brush a bump.
         return [
             simulate(floor, champion, some, config.seconds, fall=Fall(touch=False), threads=threads)
             for floor, some in zip(floors, shares, strict=True)
@@ -149,6 +148,6 @@ def _trials(
 
 
 def _done(creature: Creature, outcome: Outcome) -> np.ndarray:
-    """Which [S] stayed up and got somewhere."""
+    """Mask [S] of simulations that stayed up and got more than a body length ahead."""
     done: np.ndarray = outcome.stayed_up & (outcome.travel[:, 0] > creature.frame.body_length)
     return done

@@ -1,4 +1,4 @@
-"""The rehearsal: one draw that is the same for all champions, on which one of them is chosen."""
+"""Trial run on a draw shared by all champions, by which one of them is chosen."""
 
 import math
 from collections.abc import Sequence
@@ -28,18 +28,18 @@ def rehearse(
     wanted: float = -np.inf,
     caution: float = 0.0,
 ) -> float:
-    """The worst margin of criteria 4 and 5 on the draw that is the same for all champions.
+    """Return the worst margin of criteria 4, 5 and steering on the draw shared by all champions.
 
-    Champions are chosen by it, and examined on another draw. Where pushes decide it ends when those
-    pushed last have had time to fall. Else it is as long as the examination: who gets to a goal late
-    is late for that only.
+    This margin chooses champions; the examination uses another draw. If pushes decide, a trial run
+    ends once the last pushed have had time to fall. Otherwise it lasts as long as the examination:
+    a late arrival at a goal must count here too.
 
     Args:
-      count: perturbed starts, and as many pushes where those decide.
-      wanted: as soon as this margin is out of reach nobody is simulated any further; returned is
-        then what it would be at most.
-      caution: standard errors by which the measured shares count less. A champion that was chosen
-        by a share has been lucky more often than not.
+      count: perturbed starts, and as many pushes if pushes decide.
+      wanted: once this margin is out of reach, the simulations stop and the largest margin that
+        is still possible is returned.
+      caution: standard errors that are subtracted from the measured shares. A champion chosen by
+        a share has been lucky more often than not.
     """
     config = config or CertificateConfig()
     draw, demands = draws.common(config), demands_of(champion.task, champion.wish)
@@ -70,11 +70,11 @@ def rehearse(
 
 
 def _cautious(well: np.ndarray, caution: float) -> float:
-    """Share of successes [S], less so many of its standard errors."""
+    """Share of successes [S] minus `caution` standard errors."""
     share = float(well.mean())
     return share - caution * math.sqrt(share * (1 - share) / len(well))
 
 
 def _worst(criteria: Sequence[Criterion]) -> float:
-    """Their margin; nothing that is not asked is in the way."""
+    """Margin of the worst criterion; infinite without criteria, so that it limits nothing."""
     return judge(criteria).margin if criteria else np.inf

@@ -1,6 +1,4 @@
-"""Reads a `certificate.json` and a `stress.json` back and tells whether they are of the champion that
-lies beside them.
-"""
+"""Readers of `certificate.json` and `stress.json`, and the check that they are of this champion."""
 
 import dataclasses
 from pathlib import Path
@@ -23,7 +21,7 @@ from mjxgait.creature.ground.spec import FLAT
 from mjxgait.files import DamagedFile, read_json
 
 _NAMES = {"certify": "a certificate", "stress": "what `mjxgait stress` writes"}
-"""By the command that writes it."""
+"""Names of the files in messages, by the command that writes each."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -49,7 +47,7 @@ class _Criterion:
 
 @dataclasses.dataclass(frozen=True)
 class _Report:
-    """What is read of a report; each task has further keys."""
+    """Part of a report that is read; each task has further keys."""
 
     __pydantic_config__ = STORED
     speed: Number | None = None
@@ -94,7 +92,7 @@ class _Stress:
 
 
 def read_certificate(path: Path) -> dict[str, Any] | None:
-    """What `Certificate.to_json` wrote; None when there is no file.
+    """Read what `Certificate.to_json` wrote; None if there is no file.
 
     Raises:
       UserError: it is not a certificate.
@@ -103,8 +101,7 @@ def read_certificate(path: Path) -> dict[str, Any] | None:
 
 
 def read_stress(path: Path, champion: Champion) -> dict[str, Any] | None:
-    """What `Stress.document` says of this champion; None when there is no file, or it is of another
-    one.
+    """Read what `Stress.document` says of this champion; None without a file on this champion.
 
     Raises:
       UserError: it is no such file.
@@ -114,7 +111,7 @@ def read_stress(path: Path, champion: Champion) -> dict[str, Any] | None:
 
 
 def _read(path: Path, schema: type, command: str) -> dict[str, Any] | None:
-    """A document as its schema says. command: that writes it."""
+    """Read and check a document. command: `mjxgait` command that writes it."""
     if not path.exists():
         return None
     cure = f"`mjxgait {command} {path.parent}` writes it anew"
@@ -128,11 +125,10 @@ def _read(path: Path, schema: type, command: str) -> dict[str, Any] | None:
 
 
 def outdated(document: dict[str, Any], champion: Champion, creature: Creature) -> str | None:
-    """A sentence that says why a certificate does not count for this champion; None when it is of
-    this one, of its task, and of the ground of this creature.
+    """Return a sentence on why a certificate does not count for this champion; None if it counts.
 
-    Times of files tell nothing: copying a run, or writing the same champion once more, changes
-    them.
+    A certificate counts for its own champion, task, ground and schema. File times prove nothing:
+    copying a run, or writing the same champion again, changes them.
     """
     if "champion" not in document:
         return "The certificate is outdated: it does not say which champion was examined, as those of earlier versions."

@@ -1,6 +1,6 @@
-"""The verdict of an examination, derived from measures and thresholds and from nothing else.
+"""Result of an examination, derived only from measures and thresholds.
 
-A stored certificate is judged as a new one is: what it says of its own verdict is only compared.
+A stored certificate is evaluated like a new one: the result that it states is only compared.
 """
 
 import dataclasses
@@ -17,11 +17,11 @@ from mjxgait.kinds import known_task, tasks
 
 @dataclasses.dataclass(frozen=True)
 class Verdict:
-    """What the criteria say.
+    """Result of all criteria.
 
-    passed: whether there are criteria and all of them pass. margin: that of the worst measure.
+    passed: True if there are criteria and all of them pass. margin: of the worst measure.
     failed: the criteria that do not pass. other_rules: thresholds that differ from the shipped
-    ones, a phrase each. contradiction: a sentence where the stored verdict is another one.
+    ones, a phrase each. contradiction: a sentence if the stored result is another one.
     """
 
     passed: bool
@@ -32,23 +32,23 @@ class Verdict:
 
     @property
     def certified(self) -> bool:
-        """Whether all criteria pass, by the shipped rules, and the file says nothing else."""
+        """True if all criteria pass by the shipped rules and the file has no contradiction."""
         return self.passed and not self.other_rules and not self.contradiction
 
     @property
     def numbers(self) -> list[int]:
-        """Of the criteria that do not pass."""
+        """Numbers of the criteria that do not pass."""
         return [criterion.number for criterion in self.failed]
 
     @property
     def reservation(self) -> str:
-        """Why it is no certificate though all criteria pass; empty where nothing is in the way."""
+        """Reason against a certificate although all criteria pass; empty if there is none."""
         if self.contradiction:
             return self.contradiction
         return f"by other rules: {', '.join(self.other_rules)}" if self.other_rules else ""
 
     def in_words(self) -> str:
-        """A few words; of the criteria that fail two by name."""
+        """Return the result in a few words, with at most two failed criteria by name."""
         if self.passed:
             return self.reservation or "certified"
         if not self.failed:
@@ -58,14 +58,14 @@ class Verdict:
 
 
 def judge(criteria: Sequence[Criterion]) -> Verdict:
-    """The verdict of these criteria; without any, nothing has passed."""
+    """Evaluate these criteria; without any, the result is not passed."""
     failed = tuple(criterion for criterion in criteria if not criterion.passed)
     margin = min((criterion.margin for criterion in criteria), default=-np.inf)
     return Verdict(bool(criteria) and not failed, margin, failed)
 
 
 def judged(document: Mapping[str, Any]) -> Verdict:
-    """The verdict of a stored certificate; see `standing.read_certificate`."""
+    """Evaluate a stored certificate; see `validity.read_certificate`."""
     verdict = judge(criteria_of(document))
     return dataclasses.replace(
         verdict,
@@ -75,7 +75,7 @@ def judged(document: Mapping[str, Any]) -> Verdict:
 
 
 def criteria_of(document: Mapping[str, Any]) -> tuple[Criterion, ...]:
-    """The criteria of a stored certificate, whatever it says of their verdicts."""
+    """Return the criteria of a stored certificate, without the results that it states."""
     return tuple(
         Criterion(c["number"], c.get("name", ""), tuple(map(_measure, c["measures"])))
         for c in document["criteria"]
@@ -83,9 +83,9 @@ def criteria_of(document: Mapping[str, Any]) -> tuple[Criterion, ...]:
 
 
 def other_rules(document: Mapping[str, Any]) -> Iterator[str]:
-    """Each threshold of a stored certificate that is not the shipped one.
+    """Yield each threshold of a stored certificate that is not the shipped one.
 
-    Thresholds of other tasks do not count, nor those that an earlier version did not have.
+    Thresholds of other tasks do not count, nor those that an older certificate lacks.
     """
     if not isinstance(document.get("config"), Mapping):
         yield "thresholds that it does not state"
@@ -99,7 +99,7 @@ def other_rules(document: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _contradiction(document: Mapping[str, Any], verdict: Verdict) -> str:
-    """A sentence where a stored verdict is not that of its measures; else empty."""
+    """Return a sentence if a stored result is not that of its measures; else empty."""
     said = {c["number"]: c["passed"] for c in document["criteria"]}
     wrong = [c.number for c in criteria_of(document) if said[c.number] != c.passed]
     if document["passed"] == verdict.passed and not wrong:
@@ -124,7 +124,7 @@ def _measure(entry: Mapping[str, Any]) -> Measure:
 
 
 def _room(entry: Mapping[str, Any], distance: float) -> float:
-    """Of a stored measure; of an earlier version's, which has none, by its margin."""
+    """Room of a stored measure; derived from the margin in files of earlier versions."""
     if "room" in entry:
         return max(_number(entry["room"]), 0.0)
     margin = abs(_number(entry.get("margin")))
@@ -132,7 +132,7 @@ def _room(entry: Mapping[str, Any], distance: float) -> float:
 
 
 def _number(value: Any) -> float:
-    """A number as JSON has it; NaN for all else."""
+    """Number from a JSON value; NaN for all else."""
     return (
         float(value) if isinstance(value, int | float) and not isinstance(value, bool) else np.nan
     )

@@ -1,4 +1,4 @@
-"""Whether a stored certificate is what an examination of the same champion finds."""
+"""Comparison of a stored certificate with a new examination of the same champion."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -9,14 +9,16 @@ from mjxgait.certification.criteria import Criterion, Measure
 from mjxgait.certification.verdict import criteria_of, judged
 
 TOLERANCE = 1e-6
-"""By which a measure may differ, of its size, or absolutely below 1. On one machine with the same
-versions of MuJoCo and NumPy nothing differs."""
+"""Allowed difference of a measure, relative to its size, or absolute below 1.
+
+On one machine with the same versions of MuJoCo and NumPy nothing differs.
+"""
 
 
 def differences(stored: Mapping[str, Any], again: Mapping[str, Any]) -> list[str]:
-    """What differs between a stored certificate and a new one, a phrase each; none if they are equal.
+    """Return the differences between a stored certificate and a new one, a phrase each.
 
-    Seconds and attempts do not count, nor do numbers that no criterion has.
+    Seconds, attempts and numbers without a criterion do not count.
     """
     named = {key: (stored.get(key), again[key]) for key in ("champion", "creature_digest", "task")}
     named["ground"] = (stored.get("report", {}).get("ground"), again["report"]["ground"])

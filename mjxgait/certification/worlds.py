@@ -1,8 +1,8 @@
-"""Other floors to walk on than that of evolution: sloping or slippery.
+"""Sloping or slippery floors in place of that of evolution.
 
-Each function gives back the creature with another model. Its parts, their masses and all indices
-stay the same, so `simulate` takes it with every champion of the creature. Uneven ground is a matter
-of the creature's `terrain`: `creature.on("rough:0.05")`.
+Each function returns the creature with another model. Its parts, their masses and all indices stay
+the same, so `simulate` accepts it with every champion of the creature. Uneven ground is set by the
+creature's `terrain`: `creature.on("rough:0.05")`.
 """
 
 import copy
@@ -14,10 +14,10 @@ from mjxgait.creature import Creature
 
 
 def sloping(creature: Creature, angle: float) -> Creature:
-    """Ground that rises forward by `angle` rad; negative falls.
+    """Return the creature on ground that rises forward by `angle` rad; a negative angle descends.
 
-    Gravity is tilted and not the floor: heights are square to the slope, and the balance correction
-    takes the slope for level.
+    Gravity is tilted, not the floor: heights are perpendicular to the slope, and the balance
+    correction takes the slope for level.
     """
     model = copy.copy(creature.model)
     forward = (creature.frame.stand_rot @ creature.frame.forward) * [1.0, 1.0, 0.0]
@@ -29,7 +29,7 @@ def sloping(creature: Creature, angle: float) -> Creature:
 
 
 def slippery(creature: Creature, friction: float) -> Creature:
-    """Every contact with this coefficient of sliding friction."""
+    """Return the creature with this coefficient of sliding friction at every contact."""
     model = copy.copy(creature.model)
     model.geom_friction[:, 0] = friction
     return dataclasses.replace(creature, model=model)

@@ -1,4 +1,4 @@
-"""What each task demands of its champion."""
+"""Acceptance criteria of each task."""
 
 from mjxgait.certification.tasks.protocol import Demands, promising
 from mjxgait.certification.tasks.registry import demands_of, how_simulated

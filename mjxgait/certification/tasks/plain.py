@@ -1,4 +1,4 @@
-"""What is demanded of a task of the user's own: no fall, no exploit, and what its class says."""
+"""Acceptance criteria of a user-defined task: no fall, no exploit, and those of its class."""
 
 from collections.abc import Mapping
 from typing import Any, Protocol
@@ -21,11 +21,11 @@ from mjxgait.reference.measure import Recording
 
 
 class HasCriteria(Protocol):
-    """A task's class, as `tasks.plain.PlainTask` has it."""
+    """Task class with criteria of its own, such as `tasks.plain.PlainTask`."""
 
     @classmethod
     def criteria(cls, window: Recording) -> tuple[Criterion, ...]:
-        """Of its own, numbered from 10."""
+        """Return the task's own criteria, numbered from 10."""
         ...
 
 

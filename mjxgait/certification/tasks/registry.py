@@ -1,4 +1,4 @@
-"""The acceptance criteria of a task by its name."""
+"""Acceptance criteria of a task by its name."""
 
 import functools
 from collections.abc import Mapping
@@ -10,16 +10,16 @@ from mjxgait.kinds import TaskKind, known_task, task_kind
 
 
 def demands_of(task: str, wish: Mapping[str, Any] | None = None) -> Demands:
-    """Return the criteria of a task with those of the targets that were requested besides.
+    """Return the criteria of a task, with those of the requested targets.
 
     Raises:
-      UserError: it is code of the user's own that was not named.
+      UserError: the task is user-defined code that was not named.
     """
     return _made(task_kind(task)).asked(wish or {})
 
 
 def how_simulated(task: str, wish: Mapping[str, Any] | None = None) -> Demands | StaysUp:
-    """Return what a simulation of a task must know: goals, falls, turns; the usual if it is unknown."""
+    """Return a task's goals, falls and turns for a simulation; the usual ones if it is unknown."""
     kind = known_task(task)
     return (_made(kind) if kind else StaysUp()).asked(wish or {})
 

@@ -1,4 +1,4 @@
-"""What most tasks have in common in the examination: who is disturbed must stay up."""
+"""Common part of most tasks in the examination: disturbed bodies must stay up."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -16,7 +16,7 @@ from mjxgait.reference.starts import Starts
 
 
 class Unasked:
-    """See `Demands`: those of a task of which nothing more can be asked.
+    """See `Demands`: for a task without targets.
 
     revision: see `Demands`.
     """
@@ -40,16 +40,16 @@ class Unasked:
     def obeyed(
         self, outcome: Outcome, told: np.ndarray, config: CertificateConfig
     ) -> tuple[Criterion, ...]:
-        """See `Demands`: nothing was told."""
+        """See `Demands`: nothing was commanded."""
         return ()
 
     def lost(self, outcome: Outcome, starts: Starts, steps: int) -> np.ndarray:
-        """See `Demands`: who is down."""
+        """See `Demands`: those that are down."""
         return ~outcome.stayed_up
 
 
 class StaysUp(Unasked):
-    """See `Demands`: criteria 4 and 5 of those that have no goal but to be up in the end.
+    """See `Demands`: criteria 4 and 5 for tasks with no goal but to be up at the end.
 
     drag, pushed, by_pushes, grown, leaps, worth: see `Demands`.
     """
@@ -93,7 +93,7 @@ class StaysUp(Unasked):
 
 
 def to_the_end(outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature) -> np.ndarray:
-    """Which [R] of an individual's trials in evolution lasted as long as an episode does."""
-    # Half a step, for an episode lasts a whole number of them.
+    """Return a mask [R] of an individual's trials in evolution that lasted a whole episode."""
+    # Half a step of tolerance: an episode lasts a whole number of steps.
     lasted: np.ndarray = outcome["seconds"] > seconds - 0.5 * creature.model.opt.timestep
     return lasted
