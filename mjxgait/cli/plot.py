@@ -26,7 +26,7 @@ class PlotOptions:
 
 
 def plot_command(arguments: Sequence[str]) -> int:
-    """Returns the exit code."""
+    """Return the exit code."""
     options = tyro.cli(PlotOptions, args=list(arguments), prog="mjxgait plot")
     os.environ.setdefault("JAX_PLATFORMS", "cpu")
     from mjxgait.rendering.plots import plot_run
