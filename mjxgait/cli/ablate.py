@@ -45,8 +45,8 @@ class AblateOptions:
       env: Creature, instead of the study's.
       seeds: Number of seeds, instead of the study's.
       first_seed: First seed, instead of the study's.
-      generations: Number of generations, instead of the study's; variants with their own number keep
-        their share of evaluations.
+      generations: Number of generations, instead of the study's; variants with their own number
+        keep their share of evaluations.
       config: Base config, instead of the study's: a TOML file, or the name of a shipped one.
       rows: Runs side by side in one program; by default all, on a cluster 4.
       physics: mjx simulates all runs with MJX itself instead of this program's faster step.
@@ -228,7 +228,7 @@ def _open(folder: Path) -> tuple[Any, Creature]:
 def _repeatable(options: AblateOptions) -> list[str]:
     """Return the options that decide the results, without folders.
 
-    So the report does not depend on where it is made.
+    The report must not depend on where it is made.
     """
     if options.resume:
         return ["study.toml"]

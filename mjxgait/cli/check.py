@@ -17,8 +17,9 @@ from mjxgait.training.disk import require_writable
 
 @dataclasses.dataclass(frozen=True)
 class CheckOptions:
-    """Validate a creature folder, run a stand test of two seconds, and draw the creature with its
-    feet, axes and mirror pairs marked.
+    """Validate a creature folder, run a stand test of two seconds, and draw the creature.
+
+    The picture marks its feet, axes and mirror pairs.
 
     Attributes:
       env: Creature folder, or the name of a shipped creature.

@@ -12,8 +12,9 @@ from mjxgait.errors import UserError
 
 @dataclasses.dataclass(frozen=True)
 class ExportOptions:
-    """Write the champion's walk as a seamless loop: a skinned GLB or USD, or a BVH skeleton. Units m,
-    Y up, forward +Z.
+    """Write the champion's walk as a seamless loop: a skinned GLB or USD, or a BVH skeleton.
+
+    Units m, Y up, forward +Z.
 
     Attributes:
       run: Run folder.

@@ -25,8 +25,9 @@ Words = Annotated[tuple[str, ...], tyro.conf.UseAppendAction]
 
 @dataclasses.dataclass(frozen=True)
 class ImportOptions:
-    """Make a creature folder from a model file (MJCF or URDF) or a character's skeleton (BVH, or a
-    skinned GLB), and report every change and guess.
+    """Make a creature folder from a model file, and report every change and guess.
+
+    Reads MJCF, URDF, and a character's skeleton (BVH, or a skinned GLB).
 
     Attributes:
       model: The file.
@@ -116,7 +117,7 @@ def check_folder(folder: Path, read: Sequence[Path], model: Path, force: bool) -
 
 
 def write_folder(folder: Path, imported: Imported) -> None:
-    """Write the creature folder, after a test that its texts load.
+    """Write the creature folder, after checking that its texts load.
 
     Raises:
       UserError: the texts are not a creature, or the folder cannot be written.

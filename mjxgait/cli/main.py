@@ -52,7 +52,7 @@ Evolve a stable walk for any creature.
 def _with_own_parts(given: Sequence[str]) -> list[str]:
     """Load the code that `--controller` and `--task` name; return the options of the subcommand.
 
-    Only the command line does so: no run folder, model or settings file can load code.
+    No run folder, model or settings file can load code.
     """
     command, *rest = given
     if not any(argument.partition("=")[0] in OWN_PARTS for argument in rest):

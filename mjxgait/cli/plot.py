@@ -11,8 +11,10 @@ import tyro
 
 @dataclasses.dataclass(frozen=True)
 class PlotOptions:
-    """Draw a run: fitness, terms and diversity over generations; footfalls, joints, trunk and a
-    filmstrip of its champion.
+    """Draw all plots of a run.
+
+    Fitness, terms and diversity over generations; footfalls, joints, trunk and a filmstrip of its
+    champion.
 
     Attributes:
       run: Run folder.

@@ -11,8 +11,10 @@ from mjxgait.errors import UserError
 
 @dataclasses.dataclass(frozen=True)
 class ShareOptions:
-    """Write one HTML file with the 3D walk, the curves and the certificate; it opens by double
-    click, without a network. The page of a repertoire is steered with arrow keys or a stick.
+    """Write one HTML file with the 3D walk, the curves and the certificate.
+
+    It plays by double click, without a network. The page of a repertoire is steered with arrow keys
+    or a stick.
 
     Attributes:
       run: Run folder, or the folder of a repertoire.

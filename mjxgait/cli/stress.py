@@ -11,8 +11,9 @@ import tyro
 
 @dataclasses.dataclass(frozen=True)
 class StressOptions:
-    """Test a champion harder than the certificate does: bumps, slopes to all sides, a slippery
-    floor, larger pushes, a heavier trunk, ten minutes (docs/certificate.md).
+    """Test a champion harder than the certificate does (docs/certificate.md).
+
+    Bumps, slopes to all sides, a slippery floor, larger pushes, a heavier trunk, ten minutes.
 
     Writes RUN/stress.json and a picture beside it. The exit code is 0 even if the champion fails.
 

@@ -85,10 +85,11 @@ class TrainOptions:
         walk, waddle, hop (two), natural (an animal's at this speed), or auto (whatever evolves). By
         default the usual gait in creature.toml: natural for both dogs.
       turn: Turn rate while walking, degrees per second to the left.
-      steer: Largest turn rate that the walk must obey on command, degrees per second to either side.
+      steer: Largest commanded turn rate that the walk must follow, degrees per second to either
+        side.
       style: calm, sneaky, heavy, proud, tired, hurried, or a FILE.toml of settings.
-      certificate: walks, or anywhere: trains on uneven ground until the walk passes `mjxgait stress`
-        (docs/certificate.md).
+      certificate: walks, or anywhere: trains on uneven ground until the walk passes `mjxgait
+        stress` (docs/certificate.md).
       cluster: Evolve on a Ray cluster: HOST:PORT, or auto for the cluster that this machine belongs
         to (docs/cluster.md).
       ground: Short for --rollout.ground: flat, slope:0.1, steps:0.05, bumps:0.05, rough:0.05.

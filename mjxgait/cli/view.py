@@ -35,8 +35,8 @@ def view_command(arguments: Sequence[str]) -> int:
     options = tyro.cli(ViewOptions, args=list(arguments), prog="mjxgait view")
     from mjxgait.web.live import serve
 
-    # Background processes of a script ignore interrupts, and Python leaves it so: without this only
-    # a kill would end the page.
+    # Background processes of a script ignore interrupts, and Python leaves it so: without this
+    # handler only a kill would end the page.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     serve(
         options.run,
