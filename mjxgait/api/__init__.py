@@ -1,4 +1,4 @@
-"""The program as a library: the same runs as the command line makes, from a script or a notebook.
+"""Library interface: the same runs as on the command line, from a script or a notebook.
 
 import mjxgait
 

@@ -1,4 +1,4 @@
-"""Looking at runs: their examination, and their motion as numbers."""
+"""Examine runs, and return their motion as arrays."""
 
 from pathlib import Path
 
@@ -17,13 +17,13 @@ from mjxgait.training.own import command
 
 
 def examine(run: Run | Place, config: Place | None = None) -> Certificate:
-    """Examines the champion of a run in C MuJoCo, criterion by criterion; writes nothing.
+    """Examine the champion of a run in C MuJoCo, criterion by criterion; write nothing.
 
     Args:
-      config: TOML file with other thresholds (configs/certificate/default.toml shows all).
+      config: TOML file with other thresholds (configs/certificate/default.toml lists all).
 
     Raises:
-      UserError: no run, no champion, or a bad file.
+      UserError: no run, no champion, or an invalid file.
     """
     known = run if isinstance(run, Run) else open(run)
     table = read_toml(Path(config)) if config else {}
@@ -37,10 +37,10 @@ def examine(run: Run | Place, config: Place | None = None) -> Certificate:
 
 
 def verify(run: Run | Place) -> list[str]:
-    """Examines the champion of a run again, by the thresholds of its certificate; writes nothing.
+    """Return the differences between a second examination of a champion and its certificate.
 
-    Returns what differs from the certificate, a phrase each: none where all measures are equal
-    (`certify.verify.TOLERANCE`).
+    One phrase each; empty if all measures are equal (`certification.verify.TOLERANCE`). The second
+    examination uses the thresholds of the certificate. Writes nothing.
 
     Raises:
       UserError: no run, no champion, no certificate, or thresholds of another version.
@@ -58,15 +58,15 @@ def verify(run: Run | Place) -> list[str]:
 def examine_expressions(
     env: Place, file: Place, task: str | None = None, config: Place | None = None
 ) -> Certificate:
-    """Examines a program that was written by hand (docs/programs.md); writes nothing.
+    """Examine a program that was written by hand (docs/programs.md); write nothing.
 
     Args:
-      env: shipped creature, creature folder, or model file; its own settings decide how often the
-        expressions are evaluated and how the drive follows. file: holds one program. task: by
-        default what the creature usually does. config: as for `examine`.
+      env: shipped creature, creature folder, or model file; its own settings set how often the
+        expressions are evaluated and how the drive follows. file: contains one program. task: by
+        default the creature's usual task. config: as for `examine`.
 
     Raises:
-      UserError: names the file and the line of a mistake.
+      UserError: a mistake, with its file and line.
     """
     from mjxgait.controllers.expressions.written import written_champion
     from mjxgait.plugins.fit import check_fit
@@ -83,11 +83,11 @@ def examine_expressions(
 
 
 def walk(run: Run | Place, seconds: float = 12.0) -> dict[str, np.ndarray]:
-    """The champion's undisturbed motion in C MuJoCo, as columns [T] for pandas or a plot.
+    """Return the champion's undisturbed motion in C MuJoCo as columns [T], for pandas or a plot.
 
     `time` s; `trunk_x`, `trunk_y`, `trunk_z` m, forward, left and up from the start; `pitch`,
     `roll` rad; per joint `pos_NAME` rad, `vel_NAME` rad/s, `torque_NAME` N·m; per foot
-    `height_NAME` m, `force_NAME` N. It ends soon after a fall.
+    `height_NAME` m, `force_NAME` N. The motion ends soon after a fall.
 
     Raises:
       UserError: no run or no champion.

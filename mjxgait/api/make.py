@@ -1,4 +1,4 @@
-"""Making runs: a body, who moves it and what is asked of it, evolved and examined."""
+"""Create runs: evolve a controller for a creature and a task, and examine the champion."""
 
 import dataclasses
 from collections.abc import Callable, Mapping
@@ -26,15 +26,15 @@ def load_creature(
     tell: Callable[[str], object] = lambda said: None,
     way: str = "forward",
 ) -> Creature:
-    """A shipped creature by name, a creature folder, or a model file (MJCF, URDF) as it is.
+    """Load a shipped creature by name, a creature folder, or a model file (MJCF, URDF).
 
     Args:
-      scale: factors of the parts' size by pattern of their names (docs/creature.md).
-      tell: called with what was found in a model file.
-      way: forward, back, left or right: which side of it is to be ahead (docs/wishes.md).
+      scale: size factors of parts, by name pattern (docs/creature.md).
+      tell: called with the notes of the import of a model file.
+      way: forward, back, left or right: the side that becomes the front (docs/wishes.md).
 
     Raises:
-      UserError: there is none, or it cannot be used; says why.
+      UserError: not found or not usable, with the reason.
     """
     path = Path(env)
     if not path.is_file():
@@ -70,28 +70,27 @@ def train(
     settings: Mapping[str, Any] | None = None,
     quiet: bool = False,
 ) -> Run:
-    """Evolves a creature, has its champion examined, and returns the run.
+    """Evolve a creature, examine its champion, and return the run.
 
-    It is what `mjxgait train` does, without plots: the same settings give the same champion.
+    Does the same as `mjxgait train`, without plots: the same settings give the same champion.
 
     Args:
-      env: shipped creature, creature folder, or model file. out: the run folder, which must not
-        hold anything; by default a new one under runs/.
+      env: shipped creature, creature folder, or model file. out: the run folder, which must be
+        empty or new; by default a new one under runs/.
       config: file with settings, or the name of a shipped config such as wilson.
-      controller, task: who moves the creature and what it is to do: a shipped name, or
-        FILE.py:CLASS of your own (docs/extending.md).
-      scale: factors of the parts' size, such as {"*_shin": 1.2} (docs/creature.md).
-      way: forward, back, left or right: where it goes, seen from itself (docs/wishes.md).
-      speed, gait, turn, steer, style: what is asked of a walk (docs/wishes.md): m/s or text such as
+      controller, task: a shipped name, or FILE.py:CLASS of your own (docs/extending.md).
+      scale: size factors of parts, such as {"*_shin": 1.2} (docs/creature.md).
+      way: forward, back, left or right: direction in the creature's own frame (docs/wishes.md).
+      speed, gait, turn, steer, style: walk targets (docs/wishes.md): m/s or text such as
         "0.4bl/s", a name, deg/s to the left, deg/s to either side, a name or a file.
       certificate: walks, or anywhere (docs/certificate.md).
-      expressions: file of programs to begin with, for the controller program (docs/programs.md).
+      expressions: file of initial programs, for the controller program (docs/programs.md).
       seed, population, generations: the settings that are changed most often.
       settings: any others, in tables as in a config file: {"rollout": {"seconds": 5.0}}.
-      quiet: says nothing on the screen.
+      quiet: prints nothing.
 
     Raises:
-      UserError: one sentence that says what is wrong with what was given.
+      UserError: an invalid argument, explained in one sentence.
     """
     from mjxgait.controllers.expressions.written import with_expressions
     from mjxgait.tasks.walk.targets import Wishes, configured
@@ -138,23 +137,22 @@ def refine(
     settings: Mapping[str, Any] | None = None,
     quiet: bool = False,
 ) -> Run:
-    """Makes a hand-made or captured cycle walk, and returns the run (docs/refine.md).
+    """Evolve a walk near a hand-made or captured cycle, and return the run (docs/refine.md).
 
-    It is what `mjxgait refine` does; `Run.departure` says what physics changed.
+    Does the same as `mjxgait refine`; `Run.departure` reports what physics changed.
 
     Args:
       env: as for `train`. keys: file with the cycle: GLB, BVH, CSV or JSON. out: as for `train`.
-      keep: 1 leaves the poses as they are, 0 lets each joint depart by 30 degrees and the period by
-        30 %.
-      names: name in the file by part (of a CSV or JSON: joint), or a TOML file of these, where the
+      keep: 1 fixes the poses, 0 lets each joint depart by 30 degrees and the period by 30 %.
+      names: name in the file by part (CSV or JSON: joint), or a TOML file of these, where the
         guess is wrong.
-      begin, end: s, of the cycle in the file. tolerance: degrees, root mean square, within which key
-        poses reproduce it. forward: z, -z, x or -x, where the file's creature looks, Y being up; by
-        default z, or as in the rig that the creature was imported from.
+      begin, end: s, of the cycle in the file. tolerance: degrees, largest root mean square error of
+        the key poses. forward: z, -z, x or -x, the facing direction in the file, Y up; by default
+        z, or as in the rig that the creature was imported from.
       config, seed, population, generations, settings, quiet: as for `train`.
 
     Raises:
-      UserError: one sentence that says what is wrong with what was given, or with the file.
+      UserError: an invalid argument or file, explained in one sentence.
     """
     from mjxgait.animation.keys import bring
     from mjxgait.animation.keys import refine as near
@@ -175,7 +173,7 @@ def refine(
 def _evolved(
     folder: Path, creature: Creature, config: Config, quiet: bool, begin: Callable[[], object]
 ) -> Run:
-    """Return the run in a new folder, evolved and examined. begin: makes the folder."""
+    """Evolve and examine a run in a new folder; return it. begin: makes the folder."""
     from rich.console import Console
 
     from mjxgait.distributed.evolve import evolve
@@ -189,7 +187,7 @@ def _evolved(
 
 
 def _use(**named: str | None) -> dict[str, str]:
-    """Who takes part, the user's own code loaded."""
+    """Return the names of the given controller and task; load user-defined code."""
     given = {kind: text for kind, text in named.items() if text is not None}
     if not given:
         return {}

@@ -19,7 +19,7 @@ from mjxgait.training.folder import (
     read_metrics,
 )
 
-if TYPE_CHECKING:  # it leads to all that draws
+if TYPE_CHECKING:  # it imports all drawing code
     from mjxgait.animation.keys.departure import Departure
 
 Place = str | Path
@@ -27,23 +27,20 @@ Place = str | Path
 
 @dataclasses.dataclass(frozen=True)
 class Run:
-    """A run folder.
-
-    folder: where everything of it lies (the README says what).
-    """
+    """A run folder. folder: its path (contents: see the README)."""
 
     folder: Path
 
     @property
     def creature(self) -> Creature:
-        """The champion's body: where bodies evolve its own, else that which the run was given."""
+        """The champion's body: its own if bodies evolve, else the one given to the run."""
         if (self.folder / CHAMPION).exists():
             return open_champion(self.folder)[0]
         return open_run(self.folder)[0]
 
     @property
     def config(self) -> Config:
-        """The settings, every key."""
+        """The settings, with every key."""
         return open_run(self.folder)[1]
 
     @property
@@ -51,18 +48,18 @@ class Run:
         """The best individual: its genome by name, its settings, its fitness.
 
         Raises:
-          UserError: there is none yet.
+          UserError: no champion yet.
         """
         return open_champion(self.folder)[1]
 
     @property
     def certificate(self) -> dict[str, Any] | None:
-        """What the examiner said, as `certificate.json` has it; None before an examination."""
+        """Contents of `certificate.json`; None before an examination."""
         return read_certificate(self.folder / CERTIFICATE)
 
     @property
     def certified(self) -> bool:
-        """Whether its champion has passed every criterion, by the shipped rules, on its ground."""
+        """True if the champion passed every criterion of the shipped rules on its ground."""
         document = self.certificate
         if document is None or not judged(document).certified:
             return False
@@ -70,7 +67,7 @@ class Run:
 
     @property
     def departure(self) -> "Departure":
-        """How far the champion is from the cycle that the run stays near, in numbers and in words.
+        """Difference between the champion and the cycle given to `refine`, in numbers and words.
 
         Raises:
           UserError: the run was not made by `refine`, or has no champion.
@@ -80,8 +77,9 @@ class Run:
         return departure_of(self.folder)
 
     def metrics(self) -> dict[str, np.ndarray]:
-        """Each number of `metrics.jsonl` over generations [G], NaN where there was none; `mothers` [G, P]
-        where it tells of them.
+        """Return each metric of `metrics.jsonl` over generations [G], NaN where it is missing.
+
+        `mothers`, if logged, is [G, P].
         """
         lines = read_metrics(self.folder / METRICS)
         names = dict.fromkeys(name for line in lines for name in line)
@@ -92,10 +90,10 @@ class Run:
 
 
 def open(folder: Place) -> Run:
-    """A run that is there already.
+    """Open an existing run.
 
     Raises:
-      UserError: it is not a run folder.
+      UserError: not a run folder.
     """
     run = Run(Path(folder))
     open_run(run.folder)

@@ -26,35 +26,35 @@ from mjxgait.training.lock import locked
 
 STUDY = "study.toml"
 OVER = ("env", "seeds", "first_seed", "generations", "config", "rows", "physics")
-"""Options that lie over keys of the study of the same name."""
+"""Options that override the keys of the same name in the study."""
 ROWS, STRIDE = 4, 5
-"""Of a piece of work on a cluster: runs, and generations."""
+"""Runs and generations of a job on a cluster."""
 EXPECTED_SPEED = 0.8e6
-"""Creature-steps per second of two cores; only for the estimate."""
+"""Creature-steps per second on two cores; only for the estimate."""
 
 
 @dataclasses.dataclass(frozen=True)
 class AblateOptions:
-    """Run a study: variants times seeds, side by side, with a report (docs/ablations.md).
+    """Run a study, variants times seeds side by side, with a report (docs/ablations.md).
 
-    Writes report.md, report.html, results.csv and generations.parquet into the folder of the study.
+    Writes report.md, report.html, results.csv and generations.parquet into the study folder.
 
     Attributes:
-      study: File of a study, or the name of a shipped one; with --resume it is not needed.
+      study: File of a study, or the name of a shipped one; not needed with --resume.
       out: Folder for the study; by default one under runs/.
-      env: Another creature than the study names.
-      seeds: Another number of seeds.
-      first_seed: Another first seed.
-      generations: Another number of generations; variants that have a number of their own keep
-        their share of evaluations.
-      config: Another base config: a TOML file, or the name of a shipped one.
-      rows: So many runs side by side in one program, instead of all; on a cluster 4.
+      env: Creature, instead of the study's.
+      seeds: Number of seeds, instead of the study's.
+      first_seed: First seed, instead of the study's.
+      generations: Number of generations, instead of the study's; variants with their own number
+        keep their share of evaluations.
+      config: Base config, instead of the study's: a TOML file, or the name of a shipped one.
+      rows: Runs side by side in one program; by default all, on a cluster 4.
       physics: mjx simulates all runs with MJX itself instead of this program's faster step.
-      cluster: Have the runs done by a Ray cluster: HOST:PORT, or auto for the one that this machine is a
-        part of (docs/cluster.md).
-      resume: Folder of a study to go on with, as it was.
-      hours: Refuse a study that would take longer than this.
-      dry_run: Only say what would be run, and how long it would take.
+      cluster: Evolve on a Ray cluster: HOST:PORT, or auto for the cluster that this machine belongs
+        to (docs/cluster.md).
+      resume: Folder of a study to continue unchanged.
+      hours: Refuse a study that may take longer.
+      dry_run: Only print the planned runs and the estimated time.
     """
 
     study: tyro.conf.Positional[Path | None] = None
@@ -73,7 +73,7 @@ class AblateOptions:
 
 
 def ablate_command(arguments: Sequence[str]) -> int:
-    """Returns the exit code."""
+    """Return the exit code."""
     options = tyro.cli(AblateOptions, args=list(arguments), prog="mjxgait ablate")
     from mjxgait.experiments.ablation.measures import measure, read_logs
     from mjxgait.experiments.ablation.plan import check_variants, make_plan, read_study
@@ -102,7 +102,7 @@ def ablate_command(arguments: Sequence[str]) -> int:
     creature = at_step(creature, plan.runs[0].config.rollout.step)
     if not options.resume:
         check_variants(plan, creature, where)
-    # JAX takes a second to import: only once the study is known to be good.
+    # JAX takes a second to import, so the study is checked first.
     from mjxgait.experiments.ablation.rows import groups
     from mjxgait.training.blueprint import check_plan
     from mjxgait.training.devices import prepare_devices
@@ -147,7 +147,7 @@ def _run(
     cluster: str | None,
     begin: Callable[[], object] | None,
 ) -> bool:
-    """Run a study here or on a cluster; return whether it came to its end.
+    """Run a study on this machine or on a cluster; return False if interrupted.
 
     begin: makes the folder of a new study; called after the last check.
     """
@@ -163,10 +163,10 @@ def _run(
 
 
 class _Progress:
-    """Plain lines; time left from the generations so far."""
+    """Progress as plain lines; the time left is estimated from the generations so far."""
 
     def part(self, group: int, count: int, news: dict[str, Any]) -> None:
-        """Of a study whose programs run at many places at once."""
+        """Report on one program of a study on a cluster, where several run at once."""
         if "compiling" in news:
             return
         print(
@@ -195,7 +195,7 @@ class _Progress:
 
 
 def _check_new(folder: Path) -> None:
-    """Refuse a folder that holds something."""
+    """Refuse a folder that is not empty."""
     if is_taken(folder):
         raise UserError(
             f"{folder}: holds something already; name another folder with --out, or go on with "
@@ -204,7 +204,7 @@ def _check_new(folder: Path) -> None:
 
 
 def _create(folder: Path, study: Any, creature: Creature) -> None:
-    """Make the folder of a study with its exact file and creature."""
+    """Make the folder of a study, with its exact settings and creature."""
     try:
         (folder / CREATURE).mkdir(parents=True, exist_ok=True)
         for name, text in creature.files.items():
@@ -226,8 +226,9 @@ def _open(folder: Path) -> tuple[Any, Creature]:
 
 
 def _repeatable(options: AblateOptions) -> list[str]:
-    """The options that decide the results, without folders: the report is the same wherever it
-    is made.
+    """Return the options that decide the results, without folders.
+
+    The report must not depend on where it is made.
     """
     if options.resume:
         return ["study.toml"]

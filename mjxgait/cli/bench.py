@@ -1,4 +1,4 @@
-"""`mjxgait bench`: how fast the simulation is, beside C MuJoCo, DART, and the machine."""
+"""`mjxgait bench`: speed of the simulation against C MuJoCo, DART, and the machine's peak."""
 
 import dataclasses
 import json
@@ -16,23 +16,23 @@ from mjxgait.files import write_text
 
 @dataclasses.dataclass(frozen=True)
 class BenchOptions:
-    """Measure useful creature-steps per second beside C MuJoCo and DART, turn by turn in one run.
+    """Measure useful creature-steps per second against C MuJoCo and DART, by turns in one run.
 
     The contestants are a program in C around MuJoCo's functions, NumPy between batched steps of C
-    MuJoCo, and DART (docs/performance.md). C is left out where there is no compiler, DART unless
-    dartpy is installed (the extra peers). Leave the machine alone meanwhile: the ratios stand some
-    load, the rates do not.
+    MuJoCo, and DART (docs/performance.md). C needs a compiler, DART needs dartpy (the extra peers);
+    without them they are left out. Leave the machine idle meanwhile: the ratios tolerate some load,
+    the rates do not.
 
     Attributes:
-      json: File to write everything to; of several creatures `ratios` by name, and `creatures`.
+      json: File to write everything to; for several creatures `ratios` by name, and `creatures`.
       env: Names of shipped creatures or paths of creature folders; `all`: every shipped one.
       rounds: Turns of each contestant.
-      population: Genomes in the workload, each on all starts of the default settings.
-      generations: How long the better half of them has evolved.
+      population: Genomes in the workload, each from all initial conditions of the default settings.
+      generations: Generations for which the better half of them has evolved.
       scaling: Also measure the curves over population and lanes of a single creature, and the
         overhead of a generation; takes minutes. The picture is written beside the JSON file.
-      history: File to append a line per creature to, such as benchmarks/history.jsonl, so that a
-        regression shows.
+      history: File to append a line per creature to, such as benchmarks/history.jsonl, to show
+        regressions.
     """
 
     json: Path
@@ -45,7 +45,7 @@ class BenchOptions:
 
 
 def bench_command(arguments: Sequence[str]) -> int:
-    """Returns the exit code."""
+    """Return the exit code."""
     options = tyro.cli(BenchOptions, args=list(arguments), prog="mjxgait bench")
     folders = _folders(options.env)
     if options.scaling and len(folders) > 1:
@@ -94,7 +94,7 @@ def _measured(folder: Path, options: BenchOptions) -> dict[str, Any]:
     settings = load_creature(folder).settings
     config = walking(settings)
     evolution = dataclasses.replace(config.evolution, population=options.population)
-    # The rivals' joints all have the creature's own gains.
+    # In the other simulators all joints have the creature's own gains.
     rollout = dataclasses.replace(config.rollout, gains=0.0)
     config = dataclasses.replace(config, evolution=evolution, rollout=rollout)
     _say(settings.creature.name)
@@ -102,7 +102,7 @@ def _measured(folder: Path, options: BenchOptions) -> dict[str, Any]:
 
 
 def _together(results: list[dict[str, Any]]) -> dict[str, Any]:
-    """Results of several creatures as one: the ratios of each in front."""
+    """Merge the results of several creatures, ratios first."""
     ratios = {
         result["creature"]: {k: v for k, v in result.items() if k.startswith("ratio_over_")}
         for result in results

@@ -1,4 +1,4 @@
-"""`mjxgait certify`: examine the champion of a run, or a program written by hand, in C MuJoCo."""
+"""`mjxgait certify`: examine the champion of a run, or a handwritten program, in C MuJoCo."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -15,27 +15,24 @@ from mjxgait.training.folder import CERTIFICATE
 
 @dataclasses.dataclass(frozen=True)
 class CertifyOptions:
-    """Examine the champion of a run: whether it truly walks, criterion by criterion
-    (docs/certificate.md).
+    """Test criterion by criterion that the champion of a run truly walks (docs/certificate.md).
 
-    Writes RUN/certificate.json. The exit code is 0 whether or not the champion passes, as long as
-    it could be examined.
+    Writes RUN/certificate.json. The exit code is 0 if the examination ran, even if the champion
+    fails.
 
-    With --env and --expressions it examines a program that was written by hand instead
-    (docs/programs.md). Then nothing is written without --out, and the exit code is 0 if the program
-    passes and 1 if it does not.
+    With --env and --expressions a handwritten program is examined instead (docs/programs.md). Then
+    nothing is written without --out, and the exit code is 0 if the program passes, else 1.
 
-    By other thresholds than the shipped ones (--config) nothing is certified: every command shows
-    such a certificate as "by other rules", with what differs.
+    Other thresholds than the shipped ones (--config) certify nothing: every command shows such a
+    certificate as "by other rules", with the differences.
 
     Attributes:
       run: Run folder.
       env: With --expressions: name of a shipped creature, path of a creature folder, or a model
         file.
       expressions: File with the program: (list EXPRESSION ...), or lines JOINT = EXPRESSION.
-      task: With --expressions: what the creature is to do; by default what it usually does (hop
-        for luxo).
-      config: TOML file with other thresholds; configs/certificate/default.toml shows all.
+      task: With --expressions: the task; by default the creature's usual one (hop for luxo).
+      config: TOML file with other thresholds; configs/certificate/default.toml lists all.
       out: With --expressions: file for the certificate, which must not exist.
     """
 
@@ -48,7 +45,7 @@ class CertifyOptions:
 
 
 def certify_command(arguments: Sequence[str]) -> int:
-    """Returns the exit code."""
+    """Return the exit code."""
     options = tyro.cli(CertifyOptions, args=list(arguments), prog="mjxgait certify")
     if options.expressions is not None:
         return _certify_expressions(options, options.expressions)
@@ -68,7 +65,7 @@ def certify_command(arguments: Sequence[str]) -> int:
 
 
 def _certify_expressions(options: CertifyOptions, file: Path) -> int:
-    """Returns 0 if the program in the file is certified, else 1."""
+    """Return 0 if the program in the file passes, else 1."""
     if options.run is not None or options.env is None:
         raise UserError(
             f"--expressions {file}: name the creature and no run: mjxgait certify --env luxo "

@@ -17,12 +17,13 @@ from mjxgait.training.disk import require_writable
 
 @dataclasses.dataclass(frozen=True)
 class CheckOptions:
-    """Validate a creature folder, let it stand for two seconds, and draw it with its feet, axes and
-    mirror pairs marked.
+    """Validate a creature folder, run a stand test of two seconds, and draw the creature.
+
+    The picture marks its feet, axes and mirror pairs.
 
     Attributes:
       env: Creature folder, or the name of a shipped creature.
-      out: The picture; by default <name>-check.png in the folder where you are.
+      out: The picture; by default <name>-check.png in the current folder.
     """
 
     env: tyro.conf.Positional[str]
@@ -30,7 +31,7 @@ class CheckOptions:
 
 
 def check_command(arguments: Sequence[str]) -> int:
-    """Returns the exit code: 1 for a creature that is valid but does not stand."""
+    """Return the exit code: 1 for a creature that is valid but does not stand."""
     options = tyro.cli(CheckOptions, args=list(arguments), prog="mjxgait check")
     folder = Path(options.env)
     creature = load_creature(folder if folder.is_dir() else find_creature(options.env))

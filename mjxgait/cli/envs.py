@@ -1,4 +1,4 @@
-"""`mjxgait envs`: what is shipped."""
+"""`mjxgait envs`: the shipped creatures and configs."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ class EnvsOptions:
 
 
 def envs_command(arguments: Sequence[str]) -> int:
-    """Returns the exit code."""
+    """Return the exit code."""
     tyro.cli(EnvsOptions, args=list(arguments), prog="mjxgait envs")
     for name in shipped_creatures():
         creature = load_creature(find_creature(name))

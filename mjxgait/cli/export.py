@@ -12,14 +12,15 @@ from mjxgait.errors import UserError
 
 @dataclasses.dataclass(frozen=True)
 class ExportOptions:
-    """Write the champion's walk as a loop without a seam: as a GLB or USD with a skin, or as a BVH
-    skeleton. Units m, Y up, forward +Z.
+    """Write the champion's walk as a seamless loop: a skinned GLB or USD, or a BVH skeleton.
+
+    Units m, Y up, forward +Z.
 
     Attributes:
       run: Run folder.
       out: File to write, ending with .glb, .bvh, .usda or .usdc.
       rate: Key frames per second.
-      travelling: The root moves forward; otherwise the creature walks in place.
+      travelling: Move the root forward; otherwise the creature walks in place.
     """
 
     run: tyro.conf.Positional[Path]
@@ -29,7 +30,7 @@ class ExportOptions:
 
 
 def export_command(arguments: Sequence[str]) -> int:
-    """Returns the exit code."""
+    """Return the exit code."""
     options = tyro.cli(ExportOptions, args=list(arguments), prog="mjxgait export")
     from mjxgait.animation.export import (
         export_bvh,

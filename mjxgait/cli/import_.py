@@ -25,24 +25,25 @@ Words = Annotated[tuple[str, ...], tyro.conf.UseAppendAction]
 
 @dataclasses.dataclass(frozen=True)
 class ImportOptions:
-    """Make a creature folder from a model file (MJCF or URDF) or from a character's skeleton (BVH, or a
-    skinned GLB), and tell every change and guess.
+    """Make a creature folder from a model file, and report every change and guess.
+
+    Reads MJCF, URDF, and a character's skeleton (BVH, or a skinned GLB).
 
     Attributes:
       model: The file.
       out: Folder to make.
-      name: Name of the creature; the file's name by default.
-      search: Further folders that may be read for meshes, package:// paths and includes; may be
-        given several times.
-      keep: Pattern of joints that stay movable though no leg hangs on them; may be given several
+      name: Name of the creature; by default the file's name.
+      search: Further folder to search for meshes, package:// paths and includes; may be given
+        several times.
+      keep: Pattern of joints that stay movable although they carry no leg; may be given several
         times.
       freeze: Pattern of joints to freeze; may be given several times.
-      up: Axis of the file that points up, where the guess is wrong.
-      forward: Axis along which it should walk, where the guess is wrong.
-      height: Metres that a skeleton is tall at rest, where the guess of its unit is wrong.
-      seconds: Processor time that MuJoCo may take to compile the model.
-      gigabytes: Memory that it may take for that.
-      force: Write over a creature folder that is there already.
+      up: Axis of the file that points up, if the guess is wrong.
+      forward: Walking direction, if the guess is wrong.
+      height: Height of a skeleton at rest in metres, if its unit is guessed wrong.
+      seconds: Processor time that MuJoCo may use to compile the model.
+      gigabytes: Memory that it may use for that.
+      force: Overwrite an existing creature folder.
     """
 
     model: tyro.conf.Positional[Path]
@@ -60,7 +61,7 @@ class ImportOptions:
 
 
 def import_command(arguments: Sequence[str]) -> int:
-    """Returns the exit code."""
+    """Return the exit code."""
     options = tyro.cli(ImportOptions, args=list(arguments), prog="mjxgait import")
     choices = ImportChoices(
         options.name,
@@ -89,14 +90,14 @@ def import_command(arguments: Sequence[str]) -> int:
 
 
 def check_folder(folder: Path, read: Sequence[Path], model: Path, force: bool) -> None:
-    """Whether a creature may be written there, before the import takes its time.
+    """Check, before the slow import, that a creature may be written to the folder.
 
     Args:
-      read: folders that the import reads besides the model's own. force: a creature may be lost.
+      read: folders that the import reads besides the model's own. force: overwrite a creature.
 
     Raises:
-      UserError: the model or what it needs lies there, or anything that is no creature, or a
-        creature without `force`.
+      UserError: the import reads from the folder, or it contains other things than a creature, or
+        a creature without `force`.
     """
     if folder.resolve() in {place.resolve() for place in (model.parent, *read)}:
         raise UserError(
@@ -116,10 +117,10 @@ def check_folder(folder: Path, read: Sequence[Path], model: Path, force: bool) -
 
 
 def write_folder(folder: Path, imported: Imported) -> None:
-    """Write the creature folder, once its texts have been loaded.
+    """Write the creature folder, after checking that its texts load.
 
     Raises:
-      UserError: the texts are no creature, or the folder cannot be written.
+      UserError: the texts are not a creature, or the folder cannot be written.
     """
     load_files(imported.files)
     try:

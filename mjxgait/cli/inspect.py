@@ -1,4 +1,4 @@
-"""`mjxgait inspect`: what a checkpoint, a run or a folder of runs holds."""
+"""`mjxgait inspect`: contents of a checkpoint, a run or a folder of runs."""
 
 import dataclasses
 import json
@@ -19,12 +19,12 @@ PIPED_WIDTH = 160
 
 @dataclasses.dataclass(frozen=True)
 class InspectOptions:
-    """Tell what a checkpoint holds, without compiling; only --verify simulates.
+    """Show the contents of a checkpoint, without compiling; only --verify simulates.
 
     Attributes:
-      path: Run folder, one of its checkpoints, or a folder full of runs.
-      generation: The checkpoint of this generation instead of the latest.
-      individual: Everything about one member of the population; 1 is the best.
+      path: Run folder, one of its checkpoints, or a folder of runs.
+      generation: Generation of the checkpoint, instead of the latest.
+      individual: Rank of one individual to show in full; 1 is the best.
       all: Show the whole population instead of its best ten.
       diff: Two runs or checkpoints to compare.
       verify: Examine the champion of a run again, and compare every measure with its certificate.
@@ -42,14 +42,14 @@ class InspectOptions:
 
 
 def inspect_command(arguments: Sequence[str]) -> int:
-    """Returns the exit code."""
+    """Return the exit code."""
     options = tyro.cli(InspectOptions, args=list(arguments), prog="mjxgait inspect")
-    # Reading needs no accelerator, and a broken one must not be in the way. Before anything imports
+    # Reading needs no accelerator, and a broken one must not prevent it. Must precede the import of
     # JAX.
     os.environ.setdefault("JAX_PLATFORMS", "cpu")
     from mjxgait import inspect
 
-    # Names of runs are no markup.
+    # Names of runs are not markup.
     width = None if sys.stdout.isatty() else PIPED_WIDTH
     console = Console(highlight=False, markup=False, width=width)
 
@@ -96,7 +96,7 @@ def inspect_command(arguments: Sequence[str]) -> int:
 
 
 def _verified(options: InspectOptions) -> dict[str, Any]:
-    """What a second examination of a run's champion says of its certificate."""
+    """Compare a second examination of a run's champion with its certificate."""
     others = options.generation, options.individual, options.diff
     if options.path is None or any(option is not None for option in others) or options.all:
         raise UserError("--verify takes one run folder and nothing else but --json")

@@ -1,4 +1,4 @@
-"""The command line: `mjxgait SUBCOMMAND`; `scripts/*.py` are thin over it."""
+"""The command line: `mjxgait SUBCOMMAND`; `scripts/*.py` are thin wrappers around it."""
 
 import importlib
 import keyword
@@ -33,12 +33,12 @@ COMMANDS = {
     "DIR",
     "envs": "list the shipped creatures and configs",
 }
-"""Each lives in mjxgait/commands/<name>.py (`import` in import_.py) as `<name>_command` and is
-imported only when it is called.
+"""Each is `<name>_command` in mjxgait/cli/<name>.py (`import` in import_.py), imported only when it
+is called.
 """
 
 OWN_PARTS = ("--controller", "--task")
-"""Options of every subcommand that name code of the user's own."""
+"""Options of every subcommand that name user-defined code."""
 
 USAGE = """usage: mjxgait SUBCOMMAND [options]
 
@@ -50,9 +50,9 @@ Evolve a stable walk for any creature.
 
 
 def _with_own_parts(given: Sequence[str]) -> list[str]:
-    """The options of a subcommand, after the code that `--controller` and `--task` name is loaded.
+    """Load the code that `--controller` and `--task` name; return the options of the subcommand.
 
-    Only here: no run folder, model or settings file can have code loaded.
+    No run folder, model or settings file can load code.
     """
     command, *rest = given
     if not any(argument.partition("=")[0] in OWN_PARTS for argument in rest):
@@ -68,7 +68,7 @@ def _with_own_parts(given: Sequence[str]) -> list[str]:
 
 
 def _without_own_parts(given: Sequence[str]) -> list[str]:
-    """Return the words of a command less what names the user's own code."""
+    """Return the words of a command without those that name user-defined code."""
     rest, waiting = [], list(given)
     while waiting:
         word = waiting.pop(0)
@@ -80,7 +80,7 @@ def _without_own_parts(given: Sequence[str]) -> list[str]:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """The console command. Exit codes: 0 done, 2 a mistake in what was given, 130 interrupted."""
+    """Run the console command. Exit codes: 0 done, 2 invalid arguments, 130 interrupted."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     if not given or given[0] in ("-h", "--help"):
         print(
@@ -106,8 +106,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         print(f"mjxgait: {error}", file=sys.stderr)
         sys.exit(2)
     except BrokenPipeError:
-        # Whoever read the output has closed it, as `head` does; Python must not complain about the
-        # rest when it ends.
+        # The reader of the output has closed it, as `head` does; Python must not complain at exit
+        # about the rest.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
     except KeyboardInterrupt:

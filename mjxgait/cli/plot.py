@@ -11,8 +11,10 @@ import tyro
 
 @dataclasses.dataclass(frozen=True)
 class PlotOptions:
-    """Draw a run: fitness, terms and diversity over generations; footfalls, joints, trunk and a
-    filmstrip of its champion.
+    """Draw all plots of a run.
+
+    Fitness, terms and diversity over generations; footfalls, joints, trunk and a filmstrip of its
+    champion.
 
     Attributes:
       run: Run folder.
@@ -26,7 +28,7 @@ class PlotOptions:
 
 
 def plot_command(arguments: Sequence[str]) -> int:
-    """Returns the exit code."""
+    """Return the exit code."""
     options = tyro.cli(PlotOptions, args=list(arguments), prog="mjxgait plot")
     os.environ.setdefault("JAX_PLATFORMS", "cpu")
     from mjxgait.rendering.plots import plot_run

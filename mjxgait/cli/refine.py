@@ -1,4 +1,4 @@
-"""`mjxgait refine`: a hand-made cycle in, the nearest one that physics lets walk out."""
+"""`mjxgait refine`: evolve a walk near a hand-made cycle."""
 
 import dataclasses
 from collections.abc import Callable, Sequence
@@ -25,28 +25,28 @@ from mjxgait.training.folder import (
 
 @dataclasses.dataclass(frozen=True)
 class RefineOptions:
-    """Make a hand-made or captured cycle walk: its key poses change only as far as physics asks.
+    """Make a hand-made or captured cycle walk: its key poses change only within --keep.
 
     Attributes:
       env: Name of a shipped creature, path of a creature folder, or a model file.
       keys: The cycle: .glb, .bvh, or .csv or .json of joint angles (docs/refine.md).
       out: Folder for the run; by default a new one under runs/.
-      keep: How much to keep: 1 leaves the poses as they are, 0 lets every joint depart by 30 degrees
-        and the period by 30 %. Several make a run each, below --out, and a picture of all.
-      names: TOML file with the name in the file of each part (of a CSV or JSON: joint), where the
-        guess is wrong.
+      keep: Share to keep: 1 fixes the poses, 0 lets every joint depart by 30 degrees and the period
+        by 30 %. Several values make a run each, below --out, and a picture of all.
+      names: TOML file with the name in the file of each part (CSV or JSON: joint), where the guess
+        is wrong.
       begin: Second at which the cycle begins.
       end: Second at which it ends.
-      tolerance: Degrees, root mean square, within which the key poses reproduce the cycle.
-      forward: Where the creature in the file looks, Y being up; by default z, or as in the rig that
-        the creature was imported from.
+      tolerance: Largest root mean square error of the key poses against the cycle, in degrees.
+      forward: Direction that the creature in the file faces, Y up; by default z, or as in the rig
+        that the creature was imported from.
       only_show: Show names, errors, cycle and key poses, and evolve nothing.
       config: TOML file with settings, or the name of a shipped config.
-      seed: Of all randomness.
-      population: Individuals of a generation.
-      generations: At most.
+      seed: Random seed.
+      population: Population size.
+      generations: Maximum number of generations.
       physics: mjx simulates with MJX itself instead of this program's faster step.
-      resume: Run folder of a refine to go on with, or the folder of several.
+      resume: Run folder of a refine to continue, or the folder of several.
     """
 
     env: str = "tall_quadruped"
@@ -68,7 +68,7 @@ class RefineOptions:
 
 
 def refine_command(arguments: Sequence[str]) -> int:
-    """Returns the exit code."""
+    """Return the exit code."""
     options = tyro.cli(RefineOptions, args=list(arguments), prog="mjxgait refine")
     from mjxgait.animation.keys import bring, front
     from mjxgait.animation.keys.refine import base_settings, begin, refining
@@ -107,7 +107,7 @@ def refine_command(arguments: Sequence[str]) -> int:
 
 
 def _check(creature: Creature, config: Config) -> None:
-    """Refuse what no run can be made of, before anything is written."""
+    """Refuse an invalid creature or config before anything is written."""
     from mjxgait.training.blueprint import check_plan
     from mjxgait.training.devices import prepare_devices
 
@@ -117,7 +117,7 @@ def _check(creature: Creature, config: Config) -> None:
 
 
 def _front(out: Path, runs: Sequence[Path]) -> int:
-    """Ends all runs of a front, the most faithful first, and draws them."""
+    """Finish all runs of a trade-off plot, the most faithful first, and draw it."""
     from mjxgait.animation.keys import front
 
     for run in runs:
@@ -130,12 +130,12 @@ def _front(out: Path, runs: Sequence[Path]) -> int:
 
 
 def _resumed(folder: Path) -> int:
-    """Go on with a run; see `_run`."""
+    """Continue a run; see `_run`."""
     from mjxgait.animation.keys.refine import read_original
     from mjxgait.training.ended import nothing_left
 
     creature, config = open_run(folder)
-    read_original(folder, creature)  # a run of another kind is refused before the work
+    read_original(folder, creature)  # refuses other kinds of run before the work
     if over := nothing_left(folder, creature, config, config):
         print(over)
         _tell(folder, creature)
@@ -149,7 +149,7 @@ def _run(
     config: Config,
     write: Callable[[], object] | None = None,
 ) -> int:
-    """Evolve near the cycle, examine the champion, and print how far it departs.
+    """Evolve near the cycle, examine the champion, and print its departure.
 
     write: makes the folder of a new run.
     """
@@ -171,7 +171,7 @@ def _run(
 
 
 def _tell(folder: Path, creature: Creature) -> None:
-    """Print how far the champion of a run departs from the cycle that it stays near."""
+    """Print the departure of a run's champion from the original cycle."""
     from mjxgait.animation.keys.departure import departure_of
     from mjxgait.animation.keys.refine import read_original
 

@@ -15,26 +15,25 @@ MOST_RUNNERS = 12
 SIZE = (640, 360)
 """Pixels of a video."""
 SECONDS = 5.0
-"""Of a video."""
+"""Length of a video."""
 
 
 @dataclasses.dataclass(frozen=True)
 class RenderOptions:
-    """Make a video of a run's champion walking; several walks, or runs, side by side as a race.
+    """Make a video of a run's champion walking, or a race of several walks or runs.
 
     Attributes:
-      runs: Run folder; the champions of several race, whatever their creatures.
+      runs: Run folder; several champions race, of any creatures.
       out: File to write: .webp, .gif, .mp4 (extra [video]), or .png for a filmstrip of one stride.
-      top: The best N of the latest population as a race.
-      generations: The best of each of these generations as a race, such as 0,5,20.
-      seconds: Length of the walk; 5 by default, and for a filmstrip as long as its stride takes to
-        be steady.
-      fps: Pictures per second.
-      size: Width and height in pixels, of each picture of a filmstrip; by default 640 360, of a
-        filmstrip 420 300.
-      camera: From where it is seen; by default from the side, a little from the front and above.
-      slow: How many times slower than life.
-      renderer: painter needs no GPU and no GL library; gl is MuJoCo's own; auto takes gl where it
+      top: Race of the best N of the latest population.
+      generations: Race of the best of each of these generations, such as 0,5,20.
+      seconds: Length of the walk; by default 5, for a filmstrip until its stride is steady.
+      fps: Frames per second.
+      size: Width and height in pixels, by default 640 360; for a filmstrip of each picture, by
+        default 420 300.
+      camera: Camera position; by default at the side, a little to the front and above.
+      slow: Slow-motion factor.
+      renderer: painter needs no GPU and no GL library; gl is MuJoCo's own; auto uses gl where it
         works.
     """
 
@@ -51,11 +50,11 @@ class RenderOptions:
 
 
 def render_command(arguments: Sequence[str]) -> int:
-    """Returns the exit code."""
+    """Return the exit code."""
     options = tyro.cli(RenderOptions, args=list(arguments), prog="mjxgait render")
     os.environ.setdefault("JAX_PLATFORMS", "cpu")
-    # With a GL library that is missing, importing MuJoCo itself fails: only the process that draws
-    # may see the variable.
+    # If the variable names a missing GL library, the import of MuJoCo fails: only the drawing
+    # process may see it.
     wanted = os.environ.pop("MUJOCO_GL", None)
     from mjxgait.rendering import cast, video
     from mjxgait.rendering.doubt import doubt
@@ -93,10 +92,10 @@ def render_command(arguments: Sequence[str]) -> int:
 
 
 def _check(options: RenderOptions) -> list[int]:
-    """The generations asked for.
+    """Check the options, and return the requested generations.
 
     Raises:
-      UserError: names the option that cannot be.
+      UserError: an invalid option, by name.
     """
     for name, value, low, high in (
         ("fps", options.fps, 1, 60),
@@ -129,10 +128,10 @@ def _check(options: RenderOptions) -> list[int]:
 
 
 def _backend(stage: Any, options: RenderOptions, wanted: str | None) -> str | None:
-    """The GL backend to draw with, said in one line.
+    """Return the GL backend to draw with, None for the painter; print the choice.
 
     Raises:
-      UserError: GL was asked for and does not work.
+      UserError: GL was requested and does not work.
     """
     if options.renderer == "painter":
         return None
@@ -146,7 +145,7 @@ def _backend(stage: Any, options: RenderOptions, wanted: str | None) -> str | No
 
 
 def _still(runners: list[Any], stage: Any, options: RenderOptions) -> None:
-    """A filmstrip of one walk, or the end of a race."""
+    """Write a filmstrip of one walk, or a picture of the end of a race."""
     from mjxgait.rendering import video
     from mjxgait.rendering.filmstrip import SIZE as EACH
     from mjxgait.rendering.filmstrip import filmstrip

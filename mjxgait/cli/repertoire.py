@@ -31,35 +31,37 @@ from mjxgait.training.lock import locked
 
 MAP = "map.png"
 OF_FILES = ("rate", "travelling", "blends", "cluster")
-"""Options that decide nothing about the walks."""
+"""Options that do not affect the walks."""
 
 
 @dataclasses.dataclass(frozen=True)
 class RepertoireOptions:
-    """Evolve a grid of walks, speeds by turns, side by side and each seeded from its neighbours;
-    examine each; write all that are certified as clips of one GLB, in phase, with a table of where
-    they belong in a blend space (docs/repertoire.md).
+    """Evolve a grid of walks, speeds by turns, side by side, each seeded from its neighbours.
+
+    Examines each walk. Writes the certified ones as clips of one GLB, in phase, with a table of
+    their places in a blend space (docs/repertoire.md).
 
     Attributes:
       env: Name of a shipped creature, path of a creature folder, or a model file (MJCF or URDF).
-      speeds: How fast: 0.4 (m/s), 0.4bl/s (body lengths per second), or fr0.2 (Froude number).
-      turns: Degrees per second, each to either side; straight on is always among them.
-      gait: Of all walks; see `mjxgait train --help`.
-      style: Of all walks: calm, sneaky, heavy, proud, tired, hurried, or a FILE.toml of settings.
-      config: TOML file with settings, or the name of a shipped config; one of your own takes the
-        place of configs/repertoire.toml.
+      speeds: Speeds: 0.4 (m/s), 0.4bl/s (body lengths per second), or fr0.2 (Froude number).
+      turns: Turn rates in degrees per second, each to both sides; straight on is always included.
+      gait: Gait of all walks; see `mjxgait train --help`.
+      style: Style of all walks: calm, sneaky, heavy, proud, tired, hurried, or a FILE.toml of
+        settings.
+      config: TOML file with settings, or the name of a shipped config; replaces
+        configs/repertoire.toml.
       out: Folder for the repertoire; by default runs/repertoire-CREATURE. Each walk in it is a run
         folder.
-      resume: Folder of a repertoire to go on with, as it was.
-      population: Of each walk.
-      generations: Of each walk, straight on and turning.
-      seed: Of all randomness.
+      resume: Folder of a repertoire to continue unchanged.
+      population: Population size of each walk.
+      generations: Generations of each walk, straight or turning.
+      seed: Random seed.
       physics: mjx simulates with MJX itself instead of this program's faster step.
       rate: Key frames per second of the clips.
-      travelling: The clips move their root; otherwise the creature walks in place.
-      blends: Try what lies half way between neighbours in C MuJoCo too, and whether it can go over
-        from one to the other while it walks.
-      cluster: Have it evolved by a Ray cluster: HOST:PORT, or auto (docs/cluster.md).
+      travelling: Move the root in the clips; otherwise the creature walks in place.
+      blends: Test in C MuJoCo also the blends half way between neighbours, and changes from one to
+        the other while walking.
+      cluster: Evolve on a Ray cluster: HOST:PORT, or auto (docs/cluster.md).
     """
 
     env: str = "tall_quadruped"
@@ -81,11 +83,11 @@ class RepertoireOptions:
 
 
 def repertoire_command(arguments: Sequence[str]) -> int:
-    """Returns the exit code."""
+    """Return the exit code."""
     options = tyro.cli(RepertoireOptions, args=list(arguments), prog="mjxgait repertoire")
     plan = None if options.resume else planned(options)
     folder, grid = _resumed(options) if plan is None else (plan.folder, plan.grid)
-    # JAX takes a second to import: only once the options are known to be good.
+    # JAX takes a second to import, so the options are checked first.
     from mjxgait.distributed.dashboard import crew_at
     from mjxgait.experiments.repertoire.evolve import evolve
     from mjxgait.training.devices import prepare_devices
@@ -116,7 +118,7 @@ def repertoire_command(arguments: Sequence[str]) -> int:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Planned:
-    """A repertoire of which nothing is written yet. configs: of each cell's run."""
+    """A repertoire before anything is written. configs: settings of each cell's run."""
 
     folder: Path
     creature: Creature
@@ -125,10 +127,10 @@ class Planned:
 
 
 def planned(options: RepertoireOptions) -> Planned:
-    """Read the options and check them. Writes nothing.
+    """Check the options and return the plan. Writes nothing.
 
     Raises:
-      UserError: the options mean nothing, or the folder holds something already.
+      UserError: invalid options, or the folder is not empty.
     """
     from mjxgait.experiments.repertoire.cells import check, settings_of
 
@@ -148,7 +150,7 @@ def planned(options: RepertoireOptions) -> Planned:
 
 
 def begin(plan: Planned) -> None:
-    """Make the folder, with a run folder for each cell.
+    """Make the folder, with a run folder per cell.
 
     Raises:
       UserError: see `check_plan`; or the folder cannot be written.
@@ -179,7 +181,7 @@ def _resumed(options: RepertoireOptions) -> tuple[Path, Grid]:
 
 
 def _settings(options: RepertoireOptions, creature: Creature) -> Config:
-    """What all walks share."""
+    """Return the settings that all walks share."""
     config = resolve_config(creature.settings.train, creature.name, Path(options.config))
     config = wished(config, creature, Wishes(gait=options.gait, style=options.style))
     short = {"population": options.population, "generations": options.generations}
@@ -192,7 +194,7 @@ def _settings(options: RepertoireOptions, creature: Creature) -> Config:
 def _leave(
     folder: Path, creature: Creature, grid: Grid, options: RepertoireOptions, screen: "_Screen"
 ) -> None:
-    """The map, and the clips where there are any."""
+    """Write the map, and the clips if there are any."""
     from mjxgait.experiments.repertoire.blends import blends
     from mjxgait.experiments.repertoire.changes import changes
     from mjxgait.experiments.repertoire.clips import (
@@ -235,7 +237,7 @@ def _leave(
 
 
 class _Screen:
-    """Plain lines."""
+    """Progress as plain lines."""
 
     def __init__(self, console: Console) -> None:
         self.console = console

@@ -1,4 +1,4 @@
-"""`mjxgait share`: one offline page of a run's champion, or of a repertoire to drive."""
+"""`mjxgait share`: one offline page with a run's champion, or a steerable repertoire."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -11,8 +11,10 @@ from mjxgait.errors import UserError
 
 @dataclasses.dataclass(frozen=True)
 class ShareOptions:
-    """Write one HTML file with the 3D walk, the curves and the certificate; it plays by double
-    click, without a network. Of a repertoire one that is driven by arrow keys or a stick.
+    """Write one HTML file with the 3D walk, the curves and the certificate.
+
+    It plays by double click, without a network. The page of a repertoire is steered with arrow keys
+    or a stick.
 
     Attributes:
       run: Run folder, or the folder of a repertoire.
@@ -24,7 +26,7 @@ class ShareOptions:
 
 
 def share_command(arguments: Sequence[str]) -> int:
-    """Returns the exit code."""
+    """Return the exit code."""
     options = tyro.cli(ShareOptions, args=list(arguments), prog="mjxgait share")
     if options.out.suffix.lower() not in (".html", ".htm"):
         raise UserError(

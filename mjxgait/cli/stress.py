@@ -1,4 +1,4 @@
-"""`mjxgait stress`: whether a walk goes anywhere."""
+"""`mjxgait stress`: stress tests of a walk."""
 
 import dataclasses
 import json
@@ -11,14 +11,15 @@ import tyro
 
 @dataclasses.dataclass(frozen=True)
 class StressOptions:
-    """Ask more of a champion than the certificate does: bumps, slopes to all sides, a slippery
-    floor, larger pushes, a heavier trunk, ten minutes (docs/certificate.md).
+    """Test a champion harder than the certificate does (docs/certificate.md).
 
-    Writes RUN/stress.json and a picture beside it. The exit code is 0 whether or not it passes.
+    Bumps, slopes to all sides, a slippery floor, larger pushes, a heavier trunk, ten minutes.
+
+    Writes RUN/stress.json and a picture beside it. The exit code is 0 even if the champion fails.
 
     Attributes:
       run: Run folder.
-      starts: Disturbed starts of each trial.
+      starts: Disturbed initial conditions of each trial.
     """
 
     run: tyro.conf.Positional[Path]
@@ -26,7 +27,7 @@ class StressOptions:
 
 
 def stress_command(arguments: Sequence[str]) -> int:
-    """Returns the exit code."""
+    """Return the exit code."""
     options = tyro.cli(StressOptions, args=list(arguments), prog="mjxgait stress")
     from mjxgait.certification.stress import StressConfig, stress
     from mjxgait.errors import UserError

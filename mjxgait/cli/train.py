@@ -54,47 +54,49 @@ if TYPE_CHECKING:  # JAX takes a second to import
 class TrainOptions:
     """Evolve a walk for a creature.
 
-    Settings come in layers, each over the one before: configs/default.toml, the creature's own
-    [train] table, the file of --config, and the options given here. Every key of the config is an
-    option. --controller and --task name who moves the creature and what it is to do: poses and
-    walk, or FILE.py:CLASS of your own (docs/extending.md).
+    Settings come in layers, each overriding the one before: configs/default.toml, the creature's
+    own [train] table, the file of --config, and the options given here. Every key of the config is
+    an option. --controller and --task select the controller and the task, such as poses and walk,
+    or FILE.py:CLASS of your own (docs/extending.md).
 
     Attributes:
       env: Name of a shipped creature, path of a creature folder, or a model file (MJCF or URDF) to
         import on the fly.
       config: TOML file with settings, or the name of a shipped config such as wilson.
-      scale: Parts of another size, as PATTERN=FACTOR: '*_shin=1.2' for longer shins, 'trunk=0.9'
+      scale: Size factors of parts, as PATTERN=FACTOR: '*_shin=1.2' for longer shins, 'trunk=0.9'
         (docs/creature.md). Lengths, masses and inertias follow, gains do not.
-      way: back, left or right: where it goes, seen from itself; forward by default (docs/wishes.md).
-      expressions: File of programs written by hand that evolution begins with, for --controller
-        program (docs/programs.md).
+      way: back, left or right: direction in the creature's own frame; forward by default
+        (docs/wishes.md).
+      expressions: File of handwritten programs as the start of evolution, for --controller program
+        (docs/programs.md).
       out: Folder for the run; by default a new one under runs/.
-      runs: So many separate runs side by side, with seeds from --seed on, each a run folder in the
-        folder, and a picture of all champions (docs/zoo.md).
-      resume: Run folder to go on with; its own creature and settings are used, only what ends a run
-        may differ: --generations, --evolution.target, --examination.
-      generation: With --resume: the checkpoint to go on from instead of the latest.
+      runs: Number of separate runs side by side, with seeds from --seed on: a folder with a run
+        folder each, and a picture of all champions (docs/zoo.md).
+      resume: Run folder to continue, with its own creature and settings. Only the settings that end
+        a run may differ: --generations, --evolution.target, --examination.
+      generation: With --resume: the checkpoint to continue from, instead of the latest.
       population: Short for --evolution.population.
       generations: Short for --evolution.generations.
       evolve_body: Short for --evolution.body: 1.25 lets the parts below the trunk become up to a
-        quarter larger or a fifth smaller; the run keeps the body that won in body/.
-      speed: How fast it should walk: 0.4 (m/s), 0.4bl/s (body lengths per second), or fr0.2 (Froude
-        number). This and the next four are for walking (docs/wishes.md).
+        quarter larger or a fifth smaller; the run stores the winning body in body/.
+      speed: Target speed: 0.4 (m/s), 0.4bl/s (body lengths per second), or fr0.2 (Froude number).
+        This and the next four are for walking (docs/wishes.md).
       gait: walk, amble, trot, pace, canter, bound, gallop, hop (four feet), walk, tripod, wave (six),
-        walk, waddle, hop (two), natural (an animal's at this speed), or auto (what comes). Where
-        nothing is asked it is what creature.toml has as usual: natural for both dogs.
-      turn: Degrees per second to the left that it should turn while it walks.
-      steer: Degrees per second up to which it should obey when it is told to turn, to either side.
+        walk, waddle, hop (two), natural (an animal's at this speed), or auto (whatever evolves). By
+        default the usual gait in creature.toml: natural for both dogs.
+      turn: Turn rate while walking, degrees per second to the left.
+      steer: Largest commanded turn rate that the walk must follow, degrees per second to either
+        side.
       style: calm, sneaky, heavy, proud, tired, hurried, or a FILE.toml of settings.
-      certificate: walks, or anywhere: then it learns on uneven ground, and goes on until it bears what
-        `mjxgait stress` asks (docs/certificate.md).
-      cluster: Have it done by a Ray cluster: HOST:PORT, or auto for the one that this machine is a part
-        of (docs/cluster.md).
+      certificate: walks, or anywhere: trains on uneven ground until the walk passes `mjxgait
+        stress` (docs/certificate.md).
+      cluster: Evolve on a Ray cluster: HOST:PORT, or auto for the cluster that this machine belongs
+        to (docs/cluster.md).
       ground: Short for --rollout.ground: flat, slope:0.1, steps:0.05, bumps:0.05, rough:0.05.
-      physics: Short for --rollout.physics: mjx simulates with MJX itself, auto with the faster step of
-        this program where it knows the model (docs/performance.md).
+      physics: Short for --rollout.physics: mjx simulates with MJX itself, auto with this program's
+        faster step where it supports the model (docs/performance.md).
       view: Show the best of each generation walking on a page that only this machine can reach.
-      plots: Draw all plots of the run when it has ended (`mjxgait plot`).
+      plots: Draw all plots at the end of the run (`mjxgait plot`).
       settings: The config, key by key.
     """
 
@@ -125,7 +127,7 @@ class TrainOptions:
 
 
 def train_command(arguments: Sequence[str]) -> int:
-    """Returns the exit code."""
+    """Return the exit code."""
     creature, default = _layers(arguments)
     shape = _options_of(type(default))
     options = tyro.cli(
@@ -160,7 +162,7 @@ def train_command(arguments: Sequence[str]) -> int:
 
 
 def _check_resumed(options: TrainOptions, config: Config, default: Config) -> None:
-    """Refuse what a resumed run cannot change. default: the settings of its folder."""
+    """Reject changes that a resumed run cannot make. default: the settings of its folder."""
     if options.scale or options.way != "forward":
         raise UserError(
             f"{options.resume}: a resumed run keeps its body; --scale and --way need a new run"
@@ -173,8 +175,8 @@ def _check_resumed(options: TrainOptions, config: Config, default: Config) -> No
 
 
 def _evolve(options: TrainOptions, folder: Path, creature: Creature, config: Config) -> int:
-    """Evolve a new run, or go on with one, and draw it; return the exit code."""
-    # JAX takes a second to import: only once the options are known to be good.
+    """Evolve a new or resumed run and draw it; return the exit code."""
+    # JAX takes a second to import, so the options are checked first.
     from mjxgait.cli.view import following
     from mjxgait.distributed.evolve import evolve
     from mjxgait.training.devices import prepare_devices
@@ -199,12 +201,12 @@ def _evolve(options: TrainOptions, folder: Path, creature: Creature, config: Con
 
 
 def _several(options: TrainOptions, creature: Creature, config: Config, default: Config) -> int:
-    """Runs side by side; returns the exit code."""
+    """Evolve several runs side by side; return the exit code."""
     if options.view or options.generation is not None:
         raise UserError("--runs: several runs have no --view and no --generation")
     if options.resume is None:
         assert options.runs is not None
-        # On a cluster each run is a piece of work, so all machines have some.
+        # On a cluster each run is a job of its own, so that every machine gets work.
         together = 1 if options.cluster else 0
         zoo = check_zoo(options.out, creature, config, options.runs)
         begin = partial(create_zoo, zoo, creature, config, options.runs, together)
@@ -223,7 +225,7 @@ def _is_zoo(folder: Path | None) -> bool:
 
 
 def _options_of(config: type[Config]) -> type[TrainOptions]:
-    """The options with every key of this config."""
+    """Return the options class with every key of this config."""
     settings = Annotated[config, tyro.conf.arg(name="")]  # type: ignore[valid-type]
     field = ("settings", settings, dataclasses.field(default_factory=config))
     return dataclasses.make_dataclass(
@@ -236,9 +238,7 @@ def _options_of(config: type[Config]) -> type[TrainOptions]:
 
 
 def _draw(folder: Path, screen: "Screen", all_plots: bool) -> bool:
-    """Draws the run after all that it has to say is on the screen; returns whether nobody
-    interrupted it.
-    """
+    """Draw the run, once its results are on the screen; return False if interrupted."""
     try:
         _plot_fitness(folder)
         if all_plots:
@@ -253,7 +253,7 @@ def _draw(folder: Path, screen: "Screen", all_plots: bool) -> bool:
 
 
 def _plot_fitness(folder: Path) -> None:
-    """The curve that every run has; matplotlib is slow to import."""
+    """Draw the fitness curve; matplotlib is slow to import, so only if there are data."""
     if lines := read_metrics(folder / METRICS):
         from mjxgait.rendering.curves import plot_fitness
 
@@ -266,9 +266,7 @@ def _plot_fitness(folder: Path) -> None:
 
 
 def _layers(arguments: Sequence[str]) -> tuple[Creature, Config]:
-    """The creature and the settings below the options: they decide what the options' defaults
-    are.
-    """
+    """Return the creature and the settings below the options; they are the options' defaults."""
     early = argparse.ArgumentParser(add_help=False, allow_abbrev=False, exit_on_error=False)
     for name in ("--env", "--config", "--resume", "--use.controller", "--use.task"):
         early.add_argument(name, nargs="?")
@@ -299,8 +297,9 @@ def _layers(arguments: Sequence[str]) -> tuple[Creature, Config]:
 
 
 def _settings(options: TrainOptions) -> Config:
-    """The config with the short options laid over it, checked again: the options are typed but
-    their ranges are not.
+    """Return the config with the short options applied, checked again.
+
+    The parser checks the types of options, not their ranges.
     """
     short = {
         "population": options.population,
@@ -322,6 +321,6 @@ def _settings(options: TrainOptions) -> Config:
 
 
 def _without_ends(config: Config) -> Config:
-    """The settings that decide what a generation computes."""
+    """Return the settings that decide what a generation computes."""
     endless = dataclasses.replace(config.evolution, generations=0, target=None)
     return dataclasses.replace(config, evolution=endless, examination=ExaminationConfig())

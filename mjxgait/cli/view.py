@@ -1,4 +1,4 @@
-"""`mjxgait view`: a local page that shows a run as it learns."""
+"""`mjxgait view`: a local page that shows a run during training."""
 
 import contextlib
 import dataclasses
@@ -16,13 +16,13 @@ from mjxgait.processes import python_command, safe_environment
 
 @dataclasses.dataclass(frozen=True)
 class ViewOptions:
-    """Show a run, finished or still learning, on a page that only this machine can reach.
+    """Show a run, finished or in training, on a page that only this machine can reach.
 
     Attributes:
       run: Run folder.
       port: Port on 127.0.0.1; by default the first free one from 8765 on.
-      until_input_ends: End when the standard input does; `train --view` asks for it, so that the
-        page ends with the training however that ends.
+      until_input_ends: End when the standard input does; `train --view` uses it so that the page
+        ends with the training, however that ends.
     """
 
     run: tyro.conf.Positional[Path]
@@ -31,12 +31,12 @@ class ViewOptions:
 
 
 def view_command(arguments: Sequence[str]) -> int:
-    """Returns the exit code; runs until interrupted."""
+    """Serve the page until interrupted; return the exit code."""
     options = tyro.cli(ViewOptions, args=list(arguments), prog="mjxgait view")
     from mjxgait.web.live import serve
 
-    # What a script starts in the background ignores interrupts, and Python leaves it so: without
-    # this nothing but a kill would end it.
+    # Background processes of a script ignore interrupts, and Python leaves it so: without this
+    # handler only a kill would end the page.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     serve(
         options.run,
@@ -51,12 +51,12 @@ def view_command(arguments: Sequence[str]) -> int:
 
 @contextlib.contextmanager
 def following(run: Path) -> Iterator[None]:
-    """Show a run as long as the block lasts, in a process of its own that prints its address.
+    """Show a run during the block, in a process of its own that prints its address.
 
-    If it fails, the block goes on. It ends with this process too where that is killed: then the
-    system closes the pipe that it reads.
+    The block goes on if that process fails. That process also ends if this one is killed, because
+    the system then closes the pipe that it reads.
     """
-    # What was named on this command line, not what the run folder says.
+    # Code named on this command line, never code named by the run folder.
     own = [word for kind, place in loaded() for word in (f"--{kind}", place)]
     command = python_command("mjxgait", "view", str(run), "--until-input-ends", *own)
     viewer = subprocess.Popen(command, stdin=subprocess.PIPE, env=safe_environment())

@@ -21,11 +21,10 @@ PICTURE = "zoo.png"
 def evolve_zoo(
     zoo: Path, cluster: str | None = None, begin: Callable[[], object] = lambda: None
 ) -> int:
-    """Evolve the runs of a folder, or go on with them, and show what came of it; returns the exit
-    code.
+    """Evolve or continue the runs of a folder, and show the results; return the exit code.
 
-    cluster: address of the cluster that computes it, if not this machine. begin: makes the folder of
-    new runs; called after the last check.
+    cluster: address of the cluster to use instead of this machine. begin: makes the folder of new
+    runs; called after the last check.
     """
     from mjxgait.distributed.dashboard import crew_at
     from mjxgait.distributed.rows import Rows
@@ -77,7 +76,7 @@ def _leave(zoo: Path, name: str, folders: list[Path], console: Console) -> None:
 
 
 class _Screen:
-    """Plain lines."""
+    """Progress as plain lines."""
 
     def __init__(self, console: Console) -> None:
         self.console = console
