@@ -19,8 +19,8 @@ MEANS = ("mean", "median", "lower_quartile", "upper_quartile", "spread")
 def exchanged(states: Sequence[Packed], config: IslandsConfig) -> list[Packed]:
     """Return the states after each island's best have replaced the worst of others.
 
-    All states are of the same generation. Individuals evaluated on easier trials than an island's do
-    not migrate to it.
+    All states are of the same generation. Individuals evaluated on easier trials than an island's
+    do not migrate to it.
     """
     found = [_individuals(state.arrays) for state in states]
 
