@@ -1,1 +1,1 @@
-"""Measures the simulation against C MuJoCo, DART and the machine itself (docs/performance.md)."""
+"""Benchmark of the simulation: C MuJoCo, DART and the machine's limits (docs/performance.md)."""

@@ -1,4 +1,4 @@
-"""A model reduced to what its steps need; the physics stays the same."""
+"""Model reduced to what its steps need; the physics stays the same."""
 
 from typing import Any
 
@@ -10,10 +10,10 @@ from mjxgait.creature.creature import FLOOR
 
 
 def bare_model(creature: Creature) -> tuple[mujoco.MjModel, np.ndarray]:
-    """The evolution model without shapes that are only drawn, its contacts as explicit pairs.
+    """Return the evolution model without purely visual shapes, its contacts as explicit pairs.
 
-    Pairs spare MuJoCo the search for what might touch. A model that this cannot be done to is
-    returned as it is. Beside it, the ids [G] of the watched geoms in it.
+    Pairs save MuJoCo the search for possible contacts. A model that cannot be reduced is returned
+    unchanged. Also returns the ids [G] of the watched geoms in the model.
     """
     full = creature.evolution_model
     names = [full.geom(g).name for g in range(full.ngeom)]
@@ -43,7 +43,7 @@ def _only_the_floor_is_touched(full: mujoco.MjModel) -> bool:
 
 
 def _keep_inertia(body: mujoco.MjsBody, full: mujoco.MjModel) -> None:
-    """States the inertia that the body's shapes gave it, those about to be dropped included."""
+    """Set a body's inertia explicitly, since some of the shapes that define it are deleted."""
     i = full.body(body.name).id
     body.explicitinertial, body.fullinertia = True, [np.nan] * 6
     body.mass, body.inertia = full.body_mass[i], full.body_inertia[i]
@@ -51,7 +51,10 @@ def _keep_inertia(body: mujoco.MjsBody, full: mujoco.MjModel) -> None:
 
 
 def _contacts(full: mujoco.MjModel) -> dict[int, dict[str, Any]]:
-    """By geom, its contact with the floor as MuJoCo mixes it; found by sinking the body."""
+    """Return each geom's contact with the floor, as MuJoCo mixes it.
+
+    The contacts are found by sinking the body into the floor.
+    """
     data = mujoco.MjData(full)
     data.qpos[int(full.jnt_qposadr[full.jnt_type == mujoco.mjtJoint.mjJNT_FREE][0]) + 2] -= 100.0
     mujoco.mj_forward(full, data)

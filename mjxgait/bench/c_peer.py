@@ -1,4 +1,4 @@
-"""C by hand around MuJoCo's functions: `c_peer.c`, compiled when the contest begins.
+"""Hand-written C around MuJoCo's functions: `c_peer.c`, compiled at the start of the contest.
 
 The shared object of the installed mujoco package does the physics, in double precision as shipped.
 """
@@ -21,7 +21,7 @@ SOURCE = Path(__file__).with_suffix(".c")
 COMPILERS = ("cc", "gcc", "clang")
 FLAGS = ("-O3", "-march=native", "-shared", "-fPIC")
 TUNING = ("threshold", "period", "steer", "pitch", "pitch_rate", "roll", "roll_rate")
-"""The order of docs/controller.md, written here so that a peer's process need not import JAX."""
+"""In the order of docs/controller.md; repeated here so that a peer's process imports no JAX."""
 
 
 class NoCompiler(Exception):
@@ -29,10 +29,10 @@ class NoCompiler(Exception):
 
 
 def build(folder: Path) -> Path:
-    """The shared object, compiled into `folder`.
+    """Compile the shared object into `folder` and return its path.
 
     Raises:
-      NoCompiler: no C compiler is there, or it fails.
+      NoCompiler: there is no C compiler, or it fails.
     """
     package = Path(mujoco.__file__).parent
     compiler = next((found for name in COMPILERS if (found := shutil.which(name))), None)
@@ -64,7 +64,7 @@ class CPeer:
         self.library = ctypes.CDLL(str(library))
 
     def lap(self) -> tuple[int, float]:
-        """Useful steps, and the sum over episodes of the distance forward in m."""
+        """Return the useful steps, and the sum over episodes of the distance forward in m."""
         steps, forward = ctypes.c_longlong(), ctypes.c_double()
         self.library.lap(
             ctypes.byref(self.work),
@@ -80,7 +80,10 @@ class CPeer:
 def _work(
     workload: Workload, creature: Creature, model: mujoco.MjModel, watched: np.ndarray
 ) -> tuple[ctypes.Structure, list[np.ndarray]]:
-    """`Work` of c_peer.c, whose fields are these in this order, and the arrays it points to."""
+    """Fill the `Work` of c_peer.c; return it and the arrays that it points to.
+
+    The C struct has the same fields in the same order.
+    """
     law, limits = Law(creature, workload), creature.settings.termination
     forbidden = watched[len(creature.feet.foot_of) :] if limits.touch else watched[:0]
     integers = {

@@ -1,6 +1,6 @@
-"""The contest: every contestant on the same work, turn by turn in one run.
+"""Contest: all contestants do the same work, in turns within one run.
 
-What else the machine does falls on all alike.
+Other load on the machine affects all alike.
 """
 
 import dataclasses
@@ -29,7 +29,7 @@ from mjxgait.config.shipped import install_command
 from mjxgait.cores import cores
 
 DART_STRIDE = 4
-"""DART is so much slower that it is given every fourth genome only."""
+"""DART is so slow that it gets only every fourth genome."""
 LABELS = {
     "ours": "ours",
     "c": "C",
@@ -37,26 +37,26 @@ LABELS = {
     "dart": "DART",
     "dart_one_core": "DART, one core",
 }
-"""What the names of the contestants in a result stand for."""
+"""Display names of the contestants."""
 PACKAGES = ("mjxgait", "jax", "jaxlib", "mujoco", "mujoco-mjx", "numpy", "dartpy")
 
 
 class Contestant(Protocol):
-    """Whoever can pass over a workload."""
+    """Anything that can run a workload once."""
 
     def lap(self) -> Lap:
-        """One pass."""
+        """Run the workload once."""
         ...
 
 
 def contest(
     folder: Path, config: Config, rounds: int, generations: int, say: Callable[[str], None]
 ) -> dict[str, Any]:
-    """Everything that the benchmark finds out, ready for JSON.
+    """Return all results of the benchmark, ready for JSON.
 
     Args:
       rounds: passes of each contestant.
-      generations: how long the walkers of the workload have evolved.
+      generations: of evolution before the workload is taken.
     """
     facts = machine_facts()
     say("compiling")
@@ -76,8 +76,8 @@ def contest(
     say("timing what a generation does besides simulating")
     besides = overhead(ours)
     say("counting operations, measuring the cores")
-    # By processor time, as if no other work had taken turns: the peaks are the best of short tries
-    # and hardly see it either.
+    # Processor time excludes other work on the machine. The peaks, the best of short tries, hardly
+    # include it either.
     computed = 1e6 * cores() / (median(lap.cost for lap in laps["ours"]) * share)
     cost, peak = step_cost(ours.experiment), measured_peak()
     return {
@@ -104,7 +104,7 @@ def contest(
 
 
 def append_history(result: dict[str, Any], file: Path) -> None:
-    """One line with the figures that a regression would show in."""
+    """Append a line with the figures that would show a regression."""
     kept = (
         "date",
         "creature",
@@ -124,7 +124,7 @@ def append_history(result: dict[str, Any], file: Path) -> None:
 
 
 def _peers(work: Workload) -> tuple[dict[str, Workers], dict[str, str]]:
-    """Contestants by name (`LABELS` says what they are), and why one was left out."""
+    """Return the contestants by name (see `LABELS`), and for each one left out the reason."""
     from mjxgait.bench.mujoco_peer import MujocoPeer
 
     peers: dict[str, Workers] = {}
@@ -155,7 +155,7 @@ def _peers(work: Workload) -> tuple[dict[str, Workers], dict[str, str]]:
 def _interleave(
     contestants: dict[str, Contestant], rounds: int, say: Callable[[str], None]
 ) -> dict[str, list[Lap]]:
-    """Turn by turn; the first turn of each only warms up."""
+    """Let the contestants run in turns; the first turn of each is a warm-up."""
     laps: dict[str, list[Lap]] = {name: [] for name in contestants}
     for turn in range(rounds + 1):
         for name, contestant in contestants.items():
@@ -168,7 +168,7 @@ def _interleave(
 
 
 def ratio_table(results: list[dict[str, Any]]) -> str:
-    """A line per creature: us of processor time per useful step, over ours in brackets."""
+    """Make a line per creature: us of processor time per useful step, and its ratio to ours."""
     names = [name for name in LABELS if any(name in r["laps"] for r in results)]
     lines = [f"{'us per useful step':18}" + "".join(f"{LABELS[name]:>18}" for name in names)]
     for result in results:
@@ -183,7 +183,7 @@ def ratio_table(results: list[dict[str, Any]]) -> str:
 
 
 def _ratios(laps: dict[str, list[Lap]]) -> dict[str, Any]:
-    """How many times ours is faster within a round: medians, None for who was left out.
+    """Return our speed over each contestant's within a round: medians, None if left out.
 
     ratio_over_NAME: by wall time, ratio_spread: its quartiles. processor_ratio: by processor time,
     which other work on the machine changes less.

@@ -1,8 +1,8 @@
-"""DART through dartpy, stable PD as in its tutorial.
+"""DART through dartpy, with stable PD as in its tutorial.
 
-The body is rebuilt from the MuJoCo model: same masses, joints and feet, contacts of the feet only.
-DART knows no armature, and solves its contacts as a linear complementarity problem to the end. It
-steps one world at a time; what the controller computes is vectorised over `LANES` worlds, as far as
+The body is rebuilt from the MuJoCo model: same masses, joints and feet; only the feet have
+contacts. DART has no armature, and solves its contacts as a linear complementarity problem to the
+end. It steps one world at a time; the controller is vectorised over `LANES` worlds, as far as
 dartpy's accessors allow.
 """
 
@@ -19,7 +19,7 @@ from mjxgait.creature import Creature
 FREE_DOFS = 6
 LANES = 32
 TOUCH_EVERY = 4
-"""Steps between two looks at whether a forbidden part touches: each look costs a call per part."""
+"""Steps between two checks for contact of forbidden parts: each costs a call per part."""
 
 
 class Unsupported(ValueError):
@@ -27,7 +27,7 @@ class Unsupported(ValueError):
 
 
 def check_supported(creature: Creature) -> None:
-    """Whether DART can simulate this creature.
+    """Check that DART can simulate this creature.
 
     Raises:
       Unsupported: it cannot; the message says why.
@@ -43,14 +43,14 @@ class DartPeer:
         self.jobs = np.arange(first, workload.episodes, stride)
         self.law = Law(self.creature, workload)
         self.lanes = [_Lane(self.creature) for _ in range(min(LANES, len(self.jobs)))]
-        # DART's degrees of freedom: the root's six, then the joints in the order of the bodies,
-        # which is the model's.
+        # DART's degrees of freedom: the root's six, then the joints in the order of the model's
+        # bodies.
         self.kd = np.concatenate([np.zeros(FREE_DOFS), self.law.kd])
         self.damping = np.diag(self.kd * self.law.step)
         self.limit = np.concatenate([np.zeros(FREE_DOFS), self.creature.gains.torque_limit])
 
     def lap(self) -> tuple[int, float]:
-        """Useful steps, and the sum over episodes of the distance forward in m."""
+        """Return the useful steps, and the sum over episodes of the distance forward in m."""
         waiting, total, forward = list(self.jobs[::-1]), 0, 0.0
         for lane in self.lanes:
             lane.begin(int(waiting.pop()), self.work)
@@ -85,7 +85,7 @@ class DartPeer:
                 lane.push(turned.T @ self.work.push[lane.job % starts][:3])
         q = np.array([lane.skeleton.getPositions() for lane in running])
         v = np.array([lane.skeleton.getVelocities() for lane in running])
-        # MuJoCo's order, in which the law reads the root's angular velocity; both have it in the
+        # `Law` reads the root's angular velocity in MuJoCo's order. Both simulators have it in the
         # body's frame.
         target = self.law.target(
             genome, position, pos, rot, np.concatenate([v[:, 3:6], v[:, :3], v[:, FREE_DOFS:]], 1)
@@ -102,8 +102,9 @@ class DartPeer:
     def _stable_pd(
         self, running: list["_Lane"], q: np.ndarray, v: np.ndarray, target: np.ndarray
     ) -> np.ndarray:
-        """The tutorial's formula, constraint forces of the previous step included; clamped like
-        ours.
+        """Compute the tutorial's formula, clamped like ours.
+
+        It includes the constraint forces of the previous step.
         """
         p, d = np.zeros_like(q), -self.kd * v
         p[:, FREE_DOFS:] = -self.law.kp * (
@@ -131,7 +132,7 @@ class DartPeer:
 
 
 class _Lane:
-    """A world of its own with one creature in it, and where its episode is."""
+    """A separate world with one creature, and the progress of its episode."""
 
     def __init__(self, creature: Creature) -> None:
         self.model = creature.evolution_model
@@ -147,7 +148,7 @@ class _Lane:
         self.job, self.step, self.position, self.moved = -1, 0, 0, 0.0
 
     def begin(self, job: int, work: Workload) -> None:
-        """Puts the creature at the start of an episode."""
+        """Put the creature at the start of an episode."""
         start = job % len(work.qpos)
         qpos, qvel = work.qpos[start], work.qvel[start]
         root = dartpy.math.Isometry3()
@@ -167,13 +168,13 @@ class _Lane:
         self.job, self.step, self.position, self.moved = job, 0, 0, 0.0
 
     def push(self, velocity: np.ndarray) -> None:
-        """Adds to the root's velocity, in the body's frame."""
+        """Add to the root's velocity, in the body's frame."""
         now = self.skeleton.getVelocities()
         now[3:6] += velocity
         self.skeleton.setVelocities(now)
 
     def touches(self) -> bool:
-        """Whether a part that must not touch the floor does."""
+        """Return whether a forbidden part touches the floor."""
         for body, centres, radius in self.balls:
             transform = self.bodies[body].getWorldTransform()
             if transform.translation()[2] + min(centres @ transform.rotation()[2]) < radius:
@@ -182,7 +183,7 @@ class _Lane:
 
 
 def _skeleton(creature: Creature, model: mujoco.MjModel) -> tuple[Any, dict[int, Any]]:
-    """The body, and its DART nodes by MuJoCo's body ids."""
+    """Build the body; also return its DART nodes by MuJoCo's body ids."""
     skeleton = dartpy.dynamics.Skeleton("creature")
     nodes: dict[int, Any] = {}
     for body in range(1, model.nbody):
@@ -199,7 +200,7 @@ def _skeleton(creature: Creature, model: mujoco.MjModel) -> tuple[Any, dict[int,
 
 
 def _node(skeleton: Any, model: mujoco.MjModel, body: int, parent: Any) -> Any:
-    """A body with its joint: free, one hinge, or two crossing ones as a universal joint."""
+    """Add a body and its joint: free, one hinge, or two crossing hinges as a universal joint."""
     dynamics = dartpy.dynamics
     joints = range(model.body_jntadr[body], model.body_jntadr[body] + model.body_jntnum[body])
     if [model.jnt_type[j] for j in joints] == [mujoco.mjtJoint.mjJNT_FREE]:
@@ -237,12 +238,12 @@ def _sphere(node: Any, model: mujoco.MjModel, geom: int) -> None:
     shape = node.createShapeNode(dartpy.dynamics.SphereShape(float(model.geom_size[geom, 0])))
     shape.setRelativeTranslation(model.geom_pos[geom])
     shape.createCollisionAspect()
-    # DART takes the lesser of two frictions: the floor's shall count.
+    # DART takes the lower of two frictions: this makes it the floor's.
     shape.createDynamicsAspect().setFrictionCoeff(10.0)
 
 
 def _floor() -> Any:
-    """A box whose top is the floor."""
+    """Return a box whose top is the floor."""
     floor = dartpy.dynamics.Skeleton("floor")
     _, node = floor.createWeldJointAndBodyNodePair()
     shape = node.createShapeNode(dartpy.dynamics.BoxShape([200.0, 200.0, 1.0]))
@@ -255,8 +256,9 @@ def _floor() -> Any:
 def _forbidden_spheres(
     creature: Creature, model: mujoco.MjModel
 ) -> list[tuple[int, np.ndarray, float]]:
-    """Body, centres and radius of spheres that reach as low as the parts that must not touch: of
-    a capsule its two ends.
+    """Return body, centres and radius of spheres that reach as low as the forbidden parts.
+
+    A capsule becomes its two end spheres.
     """
     balls = []
     for geom in creature.feet.watched[len(creature.feet.foot_of) :]:

@@ -1,5 +1,6 @@
-"""Counts the floating-point operations of a program as it is written, before a compiler repeats
-or saves any.
+"""Count of a program's floating-point operations as written.
+
+A compiler may repeat or save some.
 """
 
 import math
@@ -15,15 +16,16 @@ ONE_EACH = frozenset((
     "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "floor", "sign", "clamp", "select_n", "lt", "le", "gt", "ge", "eq", "ne",
 ))
 # fmt: on
-"""Primitives that do one operation per element of their result."""
+"""Primitives with one operation per element of their result."""
 REDUCTIONS = frozenset(
     ["reduce_sum", "reduce_max", "reduce_min", "reduce_prod", "cumsum", "reduce_and", "reduce_or"]
 )
 
 
 def count_flops(function: Callable[..., Any], *args: Any) -> float:
-    """Operations on floating-point numbers, comparisons and choices included; a loop counts as
-    often as it runs if that is known.
+    """Count the floating-point operations of a function, comparisons and choices included.
+
+    A loop counts as often as it runs, if that is known.
     """
     return _count(jax.make_jaxpr(function)(*args).jaxpr)
 
@@ -51,7 +53,7 @@ def _equation(equation: Any) -> float:
 
 
 def _inner(params: dict[str, Any]) -> Any:
-    """The programs within an operation: bodies of loops, branches, calls."""
+    """Yield the programs within an operation: loop bodies, branches, calls."""
     for value in params.values():
         for item in value if isinstance(value, (tuple, list)) else (value,):
             jaxpr = getattr(item, "jaxpr", item)

@@ -1,5 +1,6 @@
-"""How far the step is from what the cores can do: operations and bytes counted in the compiled
-step, against a measured peak.
+"""Distance of the step from the limits of the cores.
+
+Operations and bytes are counted in the compiled step and compared with a measured peak.
 """
 
 from functools import partial
@@ -14,17 +15,15 @@ from mjxgait.training.experiment import Experiment
 
 
 def step_cost(experiment: Experiment) -> dict[str, float]:
-    """Per creature and step, controller and tally included.
+    """Return the cost per creature and step, controller and tally included.
 
     flops_asked: floating-point operations of the program as written. flops: of the compiled one as
-    XLA counts them, which computes some values twice rather than storing them. bytes: read and
-    written by the compiled kernels, mostly in the cache. state_bytes: what a simulation carries
-    from step to step.
+    XLA counts them; it computes some values twice rather than store them. bytes: read and written
+    by the compiled kernels, mostly in the cache. state_bytes: carried from step to step.
     """
     simulator, lanes = experiment.simulator, experiment.simulator.lanes
     lane = jax.eval_shape(partial(_lanes, experiment, lanes), experiment.abstract().genomes)
-    # The one look under the rollout's bonnet: its loop around the step would hide the step's own
-    # cost.
+    # Private access, only here: the rollout's loop around the step would hide the step's own cost.
     step = partial(simulator._step, jnp.int32(0))
     compiled = jax.jit(step).lower(lane).compile().cost_analysis() or {}
     state = sum(leaf.size * leaf.dtype.itemsize for leaf in jax.tree.leaves(lane))
@@ -41,8 +40,9 @@ def step_cost(experiment: Experiment) -> dict[str, float]:
 def distance_to_limit(
     cost: dict[str, float], peak: dict[str, float], computed_rate: float
 ) -> dict[str, Any]:
-    """Shares of the measured peaks that `computed_rate` creature-steps per second use; 1 would
-    be the machine's limit.
+    """Return the shares of the measured peaks that `computed_rate` creature-steps per second use.
+
+    A share of 1 is the machine's limit.
     """
     bound = {
         "flops": peak["flops"] / cost["flops_asked"],
@@ -57,7 +57,7 @@ def distance_to_limit(
 
 
 def _lanes(experiment: Experiment, lanes: int, genomes: Any) -> Lane:
-    """Simulations at the start, as many as a device holds, of the first of genomes [N, ...]."""
+    """Start as many simulations as a device holds, of the first of genomes [N, ...]."""
     simulator = experiment.simulator
     genomes = jax.tree.map(lambda leaf: leaf[None, :1], genomes)
     starts, settings = jax.tree.map(

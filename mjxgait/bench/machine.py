@@ -1,4 +1,4 @@
-"""What the measuring machine is, and the most that its cores were seen to do."""
+"""Facts about the measuring machine, and the measured peak of its cores."""
 
 import os
 import platform
@@ -15,7 +15,7 @@ TRIES = 20
 
 
 def machine_facts() -> dict[str, Any]:
-    """Processor, cores, system, and how busy the machine was before the measurement."""
+    """Return processor, cores, system, and the load before the measurement."""
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else None
     return {
         "processor": _processor(),
@@ -27,10 +27,10 @@ def machine_facts() -> dict[str, Any]:
 
 
 def measured_peak() -> dict[str, float]:
-    """flops: per s, single precision, in a matrix product. memory_bytes, cache_bytes: per s in an
-    addition beyond and within the cache.
+    """Measure the peak of all cores, with one process per core at once.
 
-    One process per core, all at once; the best of a few tries of each, summed.
+    flops: per s, single precision, in a matrix product. memory_bytes, cache_bytes: per s in an
+    addition beyond and within the cache. Each is the best of a few tries, summed over the cores.
     """
     count = cores()
     with process_per_core() as pool:
@@ -48,8 +48,9 @@ def _matrix_product(size: int) -> float:
 
 
 def _addition(size: int, repeats: int) -> float:
-    """Bytes per second of `c = a + b` on single-precision arrays of a size; two read, one
-    written.
+    """Return the bytes per second of `c = a + b` on single-precision arrays.
+
+    Two are read, one is written.
     """
     a, b, c = (np.ones(size, np.float32) for _ in range(3))
 
@@ -61,7 +62,7 @@ def _addition(size: int, repeats: int) -> float:
 
 
 def _best(work: Callable[[], object]) -> float:
-    """Seconds of the fastest of a few tries."""
+    """Return the seconds of the fastest of a few tries."""
     times = []
     for _ in range(TRIES):
         began = time.perf_counter()

@@ -1,9 +1,9 @@
-"""NumPy between batched steps of C MuJoCo: `mujoco.batch`, with docs/controller.md in NumPy.
+"""NumPy between batched steps of C MuJoCo (`mujoco.batch`): docs/controller.md in NumPy.
 
-What is fast without leaving Python: each simulation keeps its MjData, so that the step ends with
-the velocity stage of the new state and nothing is computed twice; an ended simulation takes the
-next episode at once, and none is stepped when no episode is left; arrays are indexed only then.
-It keeps no tally but the distance, so it does less than what it is compared with.
+It is as fast as Python allows. Each simulation keeps its MjData, so the step ends with the
+velocity stage of the new state and computes nothing twice. An ended simulation takes the next
+episode at once, and is no longer stepped when no episode is left; only then are arrays indexed.
+It records no statistics but the distance, so it does less than its rivals.
 """
 
 from typing import Any
@@ -19,7 +19,7 @@ from mjxgait.reference.layout import Layout, LowestPoint
 
 VELOCITY_STAGE = int(mujoco.mjtStage.mjSTAGE_VEL)
 LANES = 128
-"""Simulations per core: fewer pay more for NumPy's calls, more leave the cache."""
+"""Simulations per core: with fewer NumPy's calls cost more, more do not fit the cache."""
 
 
 class MujocoPeer:
@@ -56,7 +56,7 @@ class MujocoPeer:
         self.damped = DampedSolve(self.model, self.creature)
 
     def lap(self) -> tuple[int, float]:
-        """Useful steps, and the sum over episodes of the distance forward in m."""
+        """Return the useful steps, and the sum over episodes of the distance forward in m."""
         self.job = np.zeros(self.lanes, int)
         self.position = np.zeros(self.lanes, int)
         self.steps = np.zeros(self.lanes, int)
@@ -82,7 +82,7 @@ class MujocoPeer:
             self._step(rows)
 
     def _step(self, rows: Any) -> None:
-        """One control step of the simulations in `rows`."""
+        """Run one control step of the simulations in `rows`."""
         creature, law, genome = self.creature, self.law, self.job[rows] // len(self.work.qpos)
         pos, rot = (
             self.xpos[rows, creature.trunk],
@@ -106,7 +106,7 @@ class MujocoPeer:
         self.batch.step(None if isinstance(rows, slice) else rows, stage=VELOCITY_STAGE)
 
     def _refill(self, rows: np.ndarray) -> int:
-        """Starts waiting episodes in the first of `rows`; how many there were."""
+        """Start waiting episodes in the first of `rows`; return their number."""
         rows = rows[: len(self.jobs) - self.taken]
         if not len(rows):
             return 0
@@ -129,9 +129,9 @@ class MujocoPeer:
             self.batch.forward(lanes, stage=VELOCITY_STAGE)
 
     def _down(self, rows: Any) -> np.ndarray:
-        """The rules of `mjxgait.tasks.walk.stats`.
+        """Apply the rules of `mjxgait.tasks.walk.stats`.
 
-        Negated comparisons: what is not a number is down.
+        The comparisons are negated, so that NaN counts as down.
         """
         creature, limits = self.creature, self.creature.settings.termination
         up = self.xmat[rows, creature.trunk, 6:] @ creature.frame.up
@@ -143,7 +143,7 @@ class MujocoPeer:
 
 
 class Law:
-    """The pose tracker's side of the controller for many simulations; looks constants up once."""
+    """Pose tracker of the controller for many simulations; looks constants up once."""
 
     def __init__(self, creature: Creature, workload: Workload) -> None:
         self.creature, settings = creature, workload.config.controller
@@ -176,7 +176,7 @@ class Law:
         rot: np.ndarray,
         v: np.ndarray,
     ) -> np.ndarray:
-        """Corrected target [S, J] in rad."""
+        """Return the corrected target [S, J] in rad."""
         creature, gain = self.creature, self.tuning
         a, step = np.divmod(position, self.interpolation)
         here = self.cycle[genome, a]
@@ -220,7 +220,7 @@ class Law:
         q: np.ndarray,
         steps: np.ndarray,
     ) -> np.ndarray:
-        """Positions in the cycle [S] at the next step."""
+        """Return the positions in the cycle [S] at the next step."""
         if self.by_clock:
             return (self.length * steps * self.step / self.tuning["period"][genome] + 1e-6).astype(
                 int
@@ -234,7 +234,7 @@ class Law:
 
 
 class DampedSolve:
-    """`(M + h diag(kd))^-1 force` through LAPACK, from MuJoCo's stored entries in one look-up."""
+    """Solve `(M + h diag(kd))^-1 force` by LAPACK, from MuJoCo's stored entries in one look-up."""
 
     def __init__(self, model: mujoco.MjModel, creature: Creature) -> None:
         layout = Layout(model)
@@ -249,7 +249,7 @@ class DampedSolve:
         )
 
     def solve(self, mass: np.ndarray, force: np.ndarray) -> np.ndarray:
-        """Accelerations [S, nv] of stored entries [S, nC] and forces [S, nv]."""
+        """Return accelerations [S, nv] for stored entries [S, nC] and forces [S, nv]."""
         stored = np.zeros((len(mass), mass.shape[1] + 1))
         np.add(mass, self.damping, out=stored[:, :-1])
         dense = stored.take(self.entry, axis=1).reshape(-1, self.size, self.size)
@@ -257,7 +257,7 @@ class DampedSolve:
 
 
 def check_controller(config: Config) -> None:
-    """Refuses what the peers do not know, lest they do less work without a word."""
+    """Refuse settings that the peers do not support, lest they silently do less work."""
     drive = config.drive
     if (
         drive.law != "spd"
@@ -270,7 +270,7 @@ def check_controller(config: Config) -> None:
 
 
 def quiet(model: mujoco.MjModel) -> mujoco.MjModel:
-    """A simulation that blows up must end, not begin anew; what costs more than it saves is off."""
+    """Make a simulation that blows up end, not reset; switch off what costs more than it saves."""
     flag = mujoco.mjtDisableBit
     off = [flag.mjDSBL_AUTORESET, flag.mjDSBL_ISLAND]
     if not _has_passive(model):
@@ -291,7 +291,7 @@ def _has_passive(model: mujoco.MjModel) -> bool:
 
 
 def _span(adr: np.ndarray) -> Any:
-    """Addresses as a slice where they are neighbours: a view instead of a copy."""
+    """Return consecutive addresses as a slice, which gives a view instead of a copy."""
     return (
         slice(int(adr[0]), int(adr[-1]) + 1)
         if np.array_equal(adr, np.arange(adr[0], adr[0] + len(adr)))

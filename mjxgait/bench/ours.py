@@ -1,6 +1,4 @@
-"""This project as a contestant: the compiled generation that a run calls, genetic algorithm,
-fitness and all.
-"""
+"""This project as a contestant: a run's compiled generation, with genetic algorithm and fitness."""
 
 import dataclasses
 import time
@@ -23,7 +21,7 @@ from mjxgait.training.generation import next_starts
 class Ours:
     """One creature's run.
 
-    startup, trace and compile: s. laps judge the genomes that `take` was given.
+    startup, compile: s. Laps evaluate the genomes given to `take`.
     """
 
     def __init__(self, folder: Path, config: Config) -> None:
@@ -38,14 +36,14 @@ class Ours:
         self.first = self.experiment.place(self.first)
 
     def evolved(self, generations: int) -> EvolutionState:
-        """The state after some generations."""
+        """Return the state after some generations."""
         state = self.first
         for _ in range(generations + 1):
             state, _ = self.step(state)
         return state
 
     def take(self, genomes: Genome) -> None:
-        """Makes these [P] the population that laps judge: a state that nobody has judged yet."""
+        """Make these genomes [P] the population that laps evaluate; none is evaluated yet."""
         if (
             self.experiment.config.evolution.offspring
             != self.experiment.config.evolution.population
@@ -57,26 +55,27 @@ class Ours:
         self.first = self.experiment.place(dataclasses.replace(self.first, genomes=genomes))
 
     def lap(self) -> Lap:
-        """One generation, in which everyone is judged on all starts."""
+        """Run one generation, which evaluates every individual on all starts."""
         began, worked = time.perf_counter(), time.process_time()
         state, metrics = jax.block_until_ready(self.step(self.first))
         seconds, processor = time.perf_counter() - began, time.process_time() - worked
         return Lap(seconds, int(metrics.sim_steps), self._mean_forward(state), processor)
 
     def _mean_forward(self, state: EvolutionState) -> float:
-        """m, over all episodes."""
+        """Return the mean distance forward over all episodes, in m."""
         place = self.experiment.simulator.task.outcomes.index("forward")
         return float(np.nanmean(np.asarray(state.outcome[..., place])))
 
     def useful_share(self) -> float:
-        """Of all computed steps, how many were lived, in the generation that a lap computes."""
+        """Return the share of useful steps in the computed steps of a lap's generation."""
         _, metrics = self.step(self.first)
         return float(metrics.sim_steps) / float(metrics.computed_steps)
 
 
 def half_and_half(ours: Ours, generations: int) -> Genome:
-    """The better half of an evolved population and half of the initial one: good walkers and
-    early deaths alike.
+    """Join the better half of an evolved population with half of the initial one.
+
+    So the workload has good walkers and early deaths.
     """
     half = ours.experiment.config.evolution.population // 2
     evolved, initial = ours.evolved(generations).genomes, ours.first.genomes
@@ -86,7 +85,7 @@ def half_and_half(ours: Ours, generations: int) -> Genome:
 
 
 def as_workload(folder: Path, experiment: Experiment, state: EvolutionState) -> Workload:
-    """Return in NumPy what the next generation of this state judges: its genomes on its starts.
+    """Return in NumPy what the next generation of this state evaluates: its genomes on its starts.
 
     Where starts vary (`rollout.variety`) a run has many more; each generation takes some of them.
     """

@@ -1,6 +1,4 @@
-"""What a generation costs besides the simulations: the genetic algorithm's operators, and the
-host's bookkeeping.
-"""
+"""Cost of a generation besides the simulations: genetic operators and the host's bookkeeping."""
 
 import dataclasses
 import io
@@ -31,8 +29,10 @@ REPEATS = 30
 
 
 def overhead(ours: Ours, generations: int = 8) -> dict[str, float]:
-    """Seconds per generation and shares of it: the operators, which are part of the compiled
-    program, then what the host does: the checkpoint, and all else (metrics, champion, screen).
+    """Return the seconds per generation and the shares of its parts.
+
+    Parts: the operators, within the compiled program; on the host, the checkpoint, and all else
+    (metrics, champion, screen).
     """
     operators = _operators(ours.experiment)
     whole, compiled, checkpoint = _host_loop(ours, generations)
@@ -46,7 +46,7 @@ def overhead(ours: Ours, generations: int = 8) -> dict[str, float]:
 
 
 def _operators(experiment: Experiment) -> float:
-    """Of a generation whose judge answers at once."""
+    """Time a generation with an evaluator that returns at once."""
     task, count = experiment.simulator.task, experiment.config.evolution.offspring
     trials = experiment.config.rollout.starts
 
@@ -75,9 +75,7 @@ def _operators(experiment: Experiment) -> float:
 
 
 class _TimedCheckpoints(Checkpoints):
-    """Knows how long its saves have held up the run; what it writes in the background does not
-    count.
-    """
+    """Checkpoints that time how long saving holds up the run, background writing excluded."""
 
     seconds = 0.0
 
@@ -88,9 +86,7 @@ class _TimedCheckpoints(Checkpoints):
 
 
 def _host_loop(ours: Ours, generations: int) -> tuple[float, float, float]:
-    """Seconds altogether, within the compiled generation, and in saving checkpoints, per
-    generation of a run's own loop.
-    """
+    """Return seconds per generation of a run's own loop: in all, compiled part, checkpoints."""
     inside: list[float] = []
 
     def step(state: EvolutionState) -> Any:

@@ -1,5 +1,6 @@
-"""How time and memory grow with the population and with the lanes: each point in a process of
-its own, so that its memory is its own.
+"""Growth of time and memory with the population and with the lanes.
+
+Each point runs in its own process, so that its memory can be measured.
 """
 
 import dataclasses
@@ -37,7 +38,7 @@ class Point:
 
 
 def scaling_points(creature: str, say: Callable[[str], None]) -> dict[str, list[dict[str, Any]]]:
-    """Measures all curves: over the population, over the lanes, and the default settings."""
+    """Measure all curves: over the population, over the lanes, and the default settings."""
     curves = {
         "population": [Point(population=p) for p in POPULATIONS],
         "lanes": [Point(population=512, lanes=n) for n in LANES],
@@ -63,7 +64,7 @@ def _line(point: dict[str, Any]) -> str:
 
 
 def measure(creature: str, point: Point) -> dict[str, Any]:
-    """One point, in a new process."""
+    """Measure one point, in a new process."""
     arguments = [creature, json.dumps(dataclasses.asdict(point))]
     result = subprocess.run(
         python_command("mjxgait.bench.scaling", *arguments),
@@ -76,9 +77,9 @@ def measure(creature: str, point: Point) -> dict[str, Any]:
 
 
 def measure_here(creature: str, point: Point) -> dict[str, Any]:
-    """One point, in this process: an initial population is judged again and again.
+    """Measure one point in this process, by evaluating an initial population repeatedly.
 
-    Memory in MiB, at most.
+    Memory is the peak in MiB.
     """
     from mjxgait.bench.ours import Ours
     from mjxgait.bench.workload import walking
@@ -110,7 +111,7 @@ def measure_here(creature: str, point: Point) -> dict[str, Any]:
 
 
 def draw(points: dict[str, list[dict[str, Any]]], path: Path) -> None:
-    """The picture of the two curves, with the memory beside the first."""
+    """Draw the two curves and the memory."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11, 3.6), layout="constrained")
@@ -140,7 +141,7 @@ def draw(points: dict[str, list[dict[str, Any]]], path: Path) -> None:
 
 
 def _peak_memory() -> float:
-    """Of this process so far, in MiB."""
+    """Return the peak memory of this process so far, in MiB."""
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return peak / (1 << 20 if sys.platform == "darwin" else 1 << 10)
 

@@ -1,6 +1,4 @@
-"""A contestant on all cores: one process per core, each with its share of the episodes, started
-together and waited for together.
-"""
+"""A contestant on all cores: one process per core with a share of the episodes, run together."""
 
 import multiprocessing
 import time
@@ -16,12 +14,12 @@ class Peer(Protocol):
     """A contestant's share of the work."""
 
     def lap(self) -> tuple[int, float]:
-        """Simulates all its episodes; useful steps, and the sum of the distances forward in m."""
+        """Simulate all its episodes; return useful steps, and the sum of distances forward in m."""
         ...
 
 
 class Workers:
-    """Processes that wait between laps, so that they take nothing from the other contestants.
+    """Processes that wait between laps, so that they take no time from other contestants.
 
     startup: s until all were ready.
     """
@@ -52,7 +50,7 @@ class Workers:
         self.startup = time.perf_counter() - began
 
     def lap(self) -> Lap:
-        """One pass over the workload."""
+        """Run the workload once."""
         began = time.perf_counter()
         for pipe in self.pipes:
             pipe.send("go")
@@ -62,7 +60,7 @@ class Workers:
         return Lap(seconds, steps, forward / self.episodes, processor)
 
     def close(self) -> None:
-        """Ends the processes."""
+        """End the processes."""
         for pipe in self.pipes:
             pipe.close()
         for process in self.processes:

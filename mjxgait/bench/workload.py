@@ -1,4 +1,4 @@
-"""The work that every contestant is given: the same genomes on the same starts, in plain NumPy.
+"""Work of every contestant: the same genomes on the same starts, in plain NumPy.
 
 Letters: `N` genomes, `R` starts, `K` key poses, `C` poses in a cycle, `J` actuated joints, `nq nv`
 as in MuJoCo.
@@ -17,10 +17,10 @@ from mjxgait.plugins import resolve_config
 
 
 def walking(settings: CreatureSettings) -> Config:
-    """The settings in a contest: the rivals walk by key poses, whatever else the creature does."""
+    """Return the settings of a contest: walking by key poses, whatever else the creature does."""
     use = dataclasses.asdict(UseConfig())
     config = resolve_config(settings.train, settings.creature.name, use=use)
-    # The rivals simulate every genome on all starts of a generation, and so does our side.
+    # The other contestants simulate every genome on all starts of a generation; so do we.
     return dataclasses.replace(config, rollout=dataclasses.replace(config.rollout, promote=1.0))
 
 
@@ -49,15 +49,15 @@ class Workload:
         return len(self.key_poses) * len(self.qpos)
 
     def creature(self) -> Creature:
-        """Loaded anew: a creature does not travel to another process."""
+        """Load the creature anew: it cannot be sent to another process."""
         return load_creature(self.folder)
 
     def cycles(self, creature: Creature) -> np.ndarray:
-        """[N, C, J] rad, the whole pose cycle of each genome."""
+        """Return the pose cycle [N, C, J] of each genome, in rad."""
         return np.stack([pose_cycle(poses, creature) for poses in self.key_poses])
 
     def every(self, stride: int) -> "Workload":
-        """Every `stride`-th genome, for a contestant that would take too long over all."""
+        """Keep every `stride`-th genome, for a contestant that is too slow for all."""
         tuning = {name: values[::stride] for name, values in self.tuning.items()}
         return dataclasses.replace(self, key_poses=self.key_poses[::stride], tuning=tuning)
 
@@ -82,5 +82,5 @@ class Lap:
 
     @property
     def cost(self) -> float:
-        """us of processor time per useful creature-step."""
+        """Processor time per useful creature-step, in us."""
         return 1e6 * self.processor / self.steps

@@ -1,4 +1,4 @@
-"""Work for other hands: what a run hands out, who does it, here or on the machines of a cluster.
+"""Distributed evolution: jobs and their workers, here or on the machines of a cluster.
 
-Ray is imported only where `--cluster` names an address (docs/cluster.md).
+Ray is imported only if `--cluster` names an address (docs/cluster.md).
 """

@@ -1,4 +1,4 @@
-"""One large population: the offspring of a generation, judged in blocks by everybody who is there."""
+"""One large population: each generation's offspring, evaluated in chunks by all workers."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -17,12 +17,12 @@ from mjxgait.types import Asked, Judged
 
 
 class Blocks:
-    """See `Evaluator`: a run's genomes, judged by a crew in blocks of equal size.
+    """Chunked `Evaluator`: a crew evaluates a run's genomes in chunks of equal size.
 
-    With its size a block's bits are the same, however many machines there are.
+    The size fixes a chunk's bits: they do not depend on the number of machines.
 
     Raises:
-      UserError: the offspring of a generation cannot be cut into equal blocks of about that size.
+      UserError: the offspring of a generation cannot be cut into equal chunks of about that size.
     """
 
     def __init__(self, crew: Crew, creature: Creature, config: Config) -> None:
@@ -32,7 +32,7 @@ class Blocks:
     def judge(
         self, genomes: Any, trials: Starts, settings: Config, asked: Asked | None = None
     ) -> Judged:
-        """See `Evaluator`. One row; its settings are in the recipe."""
+        """See `Evaluator`. Takes one row; its settings are in the recipe."""
         genomes, trials, asked = jax.device_get((genomes, trials, asked))
         return together(self._crew.all(self._work(genomes, trials, asked)) or ())
 
@@ -43,7 +43,7 @@ class Blocks:
         for first in range(0, count, self.size):
 
             def cut(leaf: np.ndarray, first: int = first) -> np.ndarray:
-                # What has been spent is the whole generation's: the first block counts it.
+                # The steps spent are the whole generation's: only the first chunk counts them.
                 part = slice(first, first + self.size)
                 return leaf[:, part] if leaf.ndim > 1 else leaf * (first == 0)
 
@@ -52,10 +52,10 @@ class Blocks:
 
 
 def block_size(offspring: int, most: int) -> int:
-    """The largest size of equal blocks that is not above `most`.
+    """Return the largest size of equal chunks that is at most `most`.
 
     Raises:
-      UserError: it would be less than half of that.
+      UserError: that size is less than half of `most`.
     """
     size = next(n for n in range(min(most, offspring), 0, -1) if offspring % n == 0)
     if 2 * size < min(most, offspring):
@@ -67,7 +67,7 @@ def block_size(offspring: int, most: int) -> int:
 
 
 def together(blocks: Sequence[Judged]) -> Judged:
-    """The verdict on all individuals, from those on blocks of them; leaves [B, n, ...], steps [B]."""
+    """Join the results of chunks: leaves [B, n, ...] are concatenated, steps [B] are summed."""
 
     def joined(*leaves: np.ndarray) -> np.ndarray:
         if leaves[0].ndim > 1:

@@ -1,4 +1,4 @@
-"""To the cluster that the user names, and nowhere else."""
+"""Connection to the cluster that the user names, and to no other."""
 
 import contextlib
 import logging
@@ -15,10 +15,11 @@ from mjxgait.errors import UserError
 LOOPBACK = ("127.0.0.1", "localhost")
 AUTO = "auto"
 NEVER_LEAVE_LOOPBACK = {"RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0"}
-"""Read as Ray is imported. Without it Ray takes this machine's outer address for 127.0.0.1."""
+"""Read when Ray is imported. Without it Ray replaces 127.0.0.1 by this machine's outer address."""
 QUIET = {"RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0", "RAY_DEDUP_LOGS_SKIP_REGEX": "."}
-"""Read as Ray is imported. Else it announces what it will do in a later version, and explains every
-lost worker in a paragraph."""
+"""Read when Ray is imported. Without it Ray announces changes of a later version and prints a
+paragraph for every lost worker.
+"""
 PATIENCE = 5.0
 """Seconds for the head to answer."""
 
@@ -27,14 +28,14 @@ PATIENCE = 5.0
 def connected(
     address: str, tell: Callable[[str], object], watch: Callable[[Crew], object] = lambda crew: None
 ) -> Iterator[Crew]:
-    """The crew of a cluster of Ray; whatever it runs for us ends with the block.
+    """Connect to a Ray cluster and yield its crew; all that it runs for us ends with the block.
 
     Args:
-      address: HOST:PORT, or auto for the cluster that this machine is a part of.
+      address: HOST:PORT, or auto for the cluster that this machine belongs to.
       tell, watch: see `Crew`.
 
     Raises:
-      UserError: Ray is not installed, nobody answers, or a machine has other versions than this one.
+      UserError: Ray is not installed, no head answers, or a machine has other versions than this.
     """
     place = _place(address)
     host, _, port = place.rpartition(":")
@@ -66,13 +67,13 @@ def _ray() -> Any:
         raise UserError(
             f"--cluster needs Ray: {install_command('cluster')}, on every machine of the cluster"
         ) from None
-    # What its threads say of lost machines is said in a sentence of ours.
+    # `Machines` reports lost machines; Ray's threads need not.
     logging.getLogger("ray").setLevel(logging.CRITICAL)
     return ray
 
 
 def _place(address: str) -> str:
-    """HOST:PORT of the cluster that is meant."""
+    """Return HOST:PORT of the cluster; look it up if the address is auto."""
     if address == AUTO:
         running = Path(os.environ.get("RAY_TMPDIR", "/tmp")) / "ray" / "ray_current_cluster"
         address = os.environ.get("RAY_ADDRESS") or (
@@ -90,7 +91,7 @@ def _place(address: str) -> str:
 
 
 def _must_answer(address: str, host: str, port: str) -> None:
-    """Ray itself would try for minutes."""
+    """Fail early if the head does not answer; Ray itself would try for minutes."""
     try:
         socket.create_connection((host, int(port)), PATIENCE).close()
     except (OSError, OverflowError) as error:

@@ -1,4 +1,4 @@
-"""All machines on one screen: a live table in a terminal, one line per arrival and loss elsewhere."""
+"""Dashboard of all machines: a live table in a terminal, else a line per arrival and loss."""
 
 import contextlib
 import time
@@ -16,12 +16,12 @@ from mjxgait.distributed.local import Here
 from mjxgait.distributed.scheduler import Crew
 
 A_SECOND = 4
-"""Looks at the crew; with thousands of workers one takes as long as handing out work."""
+"""Table updates per second; with thousands of workers one takes as long as handing out work."""
 
 
 @contextlib.contextmanager
 def crew_at(address: str | None, console: Console | None = None) -> Iterator[Crew]:
-    """Those of the cluster at an address, all on the screen; without one this process alone.
+    """Yield the crew of the cluster at an address, shown live; without one this process alone.
 
     Raises:
       UserError: see `connected`.
@@ -34,7 +34,7 @@ def crew_at(address: str | None, console: Console | None = None) -> Iterator[Cre
 
 
 class Board:
-    """What each machine is doing."""
+    """Live table of what each machine does."""
 
     def __init__(self, console: Console | None = None) -> None:
         self.console = console or Console(highlight=False, soft_wrap=True, markup=False)
@@ -55,18 +55,18 @@ class Board:
         self._live.stop()
 
     def tell(self, said: str) -> None:
-        """A line of its own."""
+        """Print a message on its own line."""
         self.console.print(f"cluster: {said}")
 
     def watch(self, crew: Crew) -> None:
-        """Shows how things stand."""
+        """Update the table."""
         if self.console.is_terminal and time.monotonic() - self._shown > 1 / A_SECOND:
             self._shown = time.monotonic()
             self._live.update(table(crew))
 
 
 def table(crew: Crew) -> Table:
-    """A row per machine: workers, how many of them work, and what has come back from it."""
+    """Make a row per machine: its workers, how many of them work, and the jobs it has done."""
     busy = Counter(worker.node for worker in crew.busy)
     there = busy + Counter(worker.node for worker in crew.idle)
     shown = Table("machine", box=None, pad_edge=False)

@@ -1,4 +1,4 @@
-"""A run of one population or of several, by this machine or by a cluster."""
+"""Run of one population or of several, on this machine or on a cluster."""
 
 import contextlib
 from collections.abc import Callable
@@ -25,10 +25,10 @@ def evolve(
     cluster: str | None = None,
     begin: Callable[[], object] = lambda: None,
 ) -> bool:
-    """Run, or go on with, the evolution in a run folder; returns whether it came to its end.
+    """Start or resume the evolution in a run folder; return whether it reached its end.
 
     Args:
-      resume: go on from a checkpoint, the latest or that of `generation`.
+      resume: continue from a checkpoint, the latest or that of `generation`.
       cluster: address of the cluster that computes it, if not this machine.
       begin: makes the folder of a new run; called after the last check that can refuse the run.
 

@@ -1,7 +1,7 @@
-"""A run of several populations that exchange their best, each advanced by whoever is there.
+"""Run of several populations that exchange their best, each advanced by any worker.
 
-All are at the same generation when they exchange, so the result depends on nothing but the settings
-and the seed. What each has come to is on this machine's disk before it goes on: whoever computed it
+All exchange at the same generation, so the result depends only on the settings and the seed. Each
+island's state is on this machine's disk before the island continues: the machine that computed it
 may be lost.
 """
 
@@ -55,7 +55,7 @@ def train(
     resume: bool,
     begin: Callable[[], object] = lambda: None,
 ) -> bool:
-    """Run, or go on with, the islands in a run folder; returns whether they came to their end.
+    """Start or resume the islands in a run folder; return whether they reached their end.
 
     begin: makes the folder of new islands; called after the last check.
     """
@@ -92,7 +92,7 @@ def train(
 
 
 def _over(islands: "_Islands", examiner: Examiner) -> tuple[str | None, Examined | None]:
-    """Why the run is over, if it is, and who ended it; leaves the best of now as champion."""
+    """Write the best as champion; return why the run is over, and what ended it, or None."""
     experiment = examiner.experiment
     state = islands.together(experiment)
     if np.isfinite(state.fitness[0]):
@@ -108,11 +108,11 @@ def _over(islands: "_Islands", examiner: Examiner) -> tuple[str | None, Examined
 
 
 class _Islands:
-    """Their states, on disk and at hand."""
+    """States of the islands, on disk and in memory."""
 
     def __init__(self, folder: Path, creature: Creature, config: Config, resume: bool) -> None:
         self.folder, self.creature = folder, creature
-        # Where one island is stuck others may not be.
+        # A stuck island does not stop the run: others may still improve.
         forced = dataclasses.replace(config.evolution.forced, patience=0)
         evolution = dataclasses.replace(config.evolution, forced=forced)
         self.config = dataclasses.replace(config, evolution=evolution)
@@ -128,7 +128,7 @@ class _Islands:
         self._return_to(self.generation)
 
     def advance(self, crew: Crew, stopped: Callable[[], bool]) -> list[Advanced] | None:
-        """All islands to the next exchange, or the end; None when told to stop."""
+        """Advance all islands to the next exchange or to the end; None when stopped."""
         stride = self.settings.every or self.config.checkpoint_every
         until = (max(self.generation, 0) // stride + 1) * stride
         until = min(until, self.config.evolution.generations)
@@ -137,8 +137,11 @@ class _Islands:
         return crew.all(work, stopped)
 
     def keep(self, found: list[Advanced], seconds: float) -> list[dict[str, Any]]:
-        """Puts all on disk; returns the lines of all islands together. seconds: they took so long."""
-        # One that has reached the target has fewer generations than the others.
+        """Write all states to disk; return the metrics lines of all islands together.
+
+        seconds: that the islands took.
+        """
+        # An island that has reached the target has fewer generations than the others.
         rows = list(zip(*([lines[0] for lines in each.lines] for each in found), strict=False))
         lines = [together(row, seconds / len(rows)) for row in rows]
         for place, advanced in zip(self.places, found, strict=True):
@@ -156,17 +159,17 @@ class _Islands:
         return lines
 
     def together(self, experiment: Experiment) -> Any:
-        """The best of all as one state."""
+        """Return the best of all islands as one state."""
         known = [state for state in self.states if state is not None]
         return gathered(known).state(experiment.abstract(), str(self.folder))
 
     def close(self) -> None:
-        """Waits until everything is on disk."""
+        """Wait until everything is on disk."""
         for store in (*self.stores, self.store):
             store.close()
 
     def _sent(self) -> list[Packed | None]:
-        """The states that the islands go on from: after an exchange, if it is time."""
+        """Return the states to continue from, after an exchange if one is due."""
         known = [state for state in self.states if state is not None]
         every = self.settings.every
         if not known or not every or self.generation % every or len(known) == 1:
@@ -183,7 +186,7 @@ class _Islands:
         ]
 
     def _common(self) -> int:
-        """The latest generation that all islands have a checkpoint of; -1 if there is none."""
+        """Return the latest generation that all islands have a checkpoint of, -1 if none."""
         return max(
             set.intersection(*(set(store.generations()) for store in self.stores)), default=-1
         )
@@ -196,7 +199,7 @@ class _Islands:
         with disk_errors(self.folder):
             for place in (*self.places, self.folder):
                 truncate_metrics(place / METRICS, generation)
-            # What was exchanged after it is exchanged again.
+            # The exchange that follows this generation is repeated.
             truncate_metrics(self.folder / MIGRATIONS, generation - 1)
 
 

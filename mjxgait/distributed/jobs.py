@@ -1,4 +1,4 @@
-"""What can be handed out: pure work on one recipe, the same bits whoever of a kind of machine does it."""
+"""Jobs for workers: pure work on one recipe, with the same bits on all machines of a kind."""
 
 import dataclasses
 import time
@@ -25,17 +25,17 @@ class Job(Protocol):
     """Work on a recipe."""
 
     def do(self, programs: Programs, recipe: Recipe) -> Any:
-        """Its result, in NumPy."""
+        """Return the result, in NumPy."""
         ...
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Advanced:
-    """Where evolution has come to.
+    """Result of advancing evolution.
 
-    lines: of the metrics, a list [B] per generation. champions: of rows that have come to their
-    end. note: see `Experiment.plant_note`. reason: why it is over, if it is. seconds: that the
-    generations took, without compilation. steps: creature-steps lived in them.
+    lines: of the metrics, a list [B] per generation. champions: of rows that have reached their
+    last generation. note: see `Experiment.plant_note`. reason: why the run is over, if it is.
+    seconds: of the generations, without compilation. steps: useful creature-steps in them.
     """
 
     packed: Packed
@@ -49,9 +49,9 @@ class Advanced:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class AdvanceRows:
-    """Runs side by side, from a state or from the beginning, until a generation.
+    """Advance runs side by side to a generation, from a state or from the beginning.
 
-    planted: arrays [B, P, ...] of the genomes by name, to begin with instead of random ones.
+    planted: arrays [B, P, ...] of the initial genomes by name, in place of random ones.
     """
 
     state: Packed | None
@@ -78,14 +78,14 @@ class AdvanceRows:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class AdvanceIsland:
-    """One population of a run, from a state or from the beginning, until a generation or its end."""
+    """Advance one population of a run to a generation or its end, from a state or anew."""
 
     state: Packed | None
     until: int
     island: int
 
     def do(self, programs: Programs, recipe: Recipe) -> Advanced:
-        """See `Job`. The state is packed without a row's axis, as a run's checkpoint has it."""
+        """See `Job`. The state is packed without the row axis, as in a run's checkpoint."""
         batch = programs.batch(recipe)
         one = batch.experiments[0]
         begun = self.state and self.state.state(one.abstract(), "an island's state")
@@ -102,7 +102,10 @@ class AdvanceIsland:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Judge:
-    """Genomes [1, N, ...] on starts [1, R], with leaves in NumPy. asked: see `Evaluator`."""
+    """Evaluate genomes [1, N, ...] on starts [1, R], with leaves in NumPy.
+
+    asked: see `Evaluator`.
+    """
 
     genomes: Any
     starts: Starts
@@ -115,9 +118,9 @@ class Judge:
 
 
 class _Way:
-    """The generations of one job, one after the other, and what there is to tell of them.
+    """Successive generations of one job and their metrics.
 
-    states: of the latest.
+    states: of the latest generation.
     """
 
     def __init__(self, step: Step, batch: Batch, states: EvolutionState, until: int) -> None:
@@ -128,7 +131,7 @@ class _Way:
         self.lines: list[Lines] = []
 
     def __iter__(self) -> Iterator[Lines]:
-        """The lines [B] of each generation."""
+        """Yield the metrics lines [B] of each generation."""
         task = self.batch.experiments[0].simulator.task
         while self.generation < self.until:
             began = time.perf_counter()
@@ -145,12 +148,15 @@ class _Way:
             yield self.lines[-1]
 
     def advanced(self, packed: Packed, **also: Any) -> Advanced:
-        """All of it."""
+        """Return the result of all generations."""
         note = self.batch.experiments[0].plant_note
         return Advanced(packed, self.lines, note, self.seconds, self.steps, **also)
 
 
 def _row(states: EvolutionState, row: int) -> EvolutionState:
-    """One row's state; its key, which cannot be taken out like the rest, is not asked for."""
+    """Return one row's state.
+
+    A key cannot be indexed like other leaves; it is not needed, so a placeholder replaces it.
+    """
     plain = dataclasses.replace(states, key=states.generation)
     return jax.tree.map(lambda leaf: leaf[row], plain)

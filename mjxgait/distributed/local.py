@@ -1,4 +1,4 @@
-"""The hands of this process: one worker, which works while it is waited for."""
+"""Backend of this process: one worker, which works during `wait`."""
 
 from mjxgait.distributed.jobs import Job
 from mjxgait.distributed.programs import Programs
@@ -7,7 +7,7 @@ from mjxgait.distributed.scheduler import Report, Worker
 
 
 class Here:
-    """See `Hands`. programs: that this process has compiled already."""
+    """See `Hands`. programs: those that this process has already compiled."""
 
     def __init__(self, programs: Programs | None = None) -> None:
         self._programs = programs or Programs()
@@ -24,7 +24,7 @@ class Here:
         self._work = worker, recipe, job
 
     def wait(self, seconds: float) -> list[Report]:
-        """See `Hands`. An error of the work goes through as it is."""
+        """See `Hands`. An error of the job is raised unchanged."""
         if self._work is None:
             return []
         (worker, recipe, job), self._work = self._work, None

@@ -1,4 +1,4 @@
-"""What islands exchange, and what they are together, on packed states: no program is needed for it."""
+"""Exchange between islands, and their union, on packed states; no program is needed for it."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -10,16 +10,17 @@ from mjxgait.training.folder import MOTHERS
 from mjxgait.training.packed import Packed
 
 OF_EACH = ("terms", "outcome", "fitness", "born", "origin", "rounds")
-"""Arrays [P, ...] of a state, beside those of the genomes."""
+"""Arrays [P, ...] of a state, besides those of the genomes."""
 SUMS = ("failures", "episodes", "evaluations", "sim_steps", "computed_steps", "unique")
 MEANS = ("mean", "median", "lower_quartile", "upper_quartile", "spread")
-"""Of a line of the metrics, what islands have together; the rest is that of the best one."""
+"""Metrics summed or averaged over the islands; the other metrics are those of the best one."""
 
 
 def exchanged(states: Sequence[Packed], config: IslandsConfig) -> list[Packed]:
-    """The states after the best of each have been copied over the worst of others; all have come as far.
+    """Return the states after each island's best have replaced the worst of others.
 
-    Who was judged on milder trials than those of an island does not come to it.
+    All states are of the same generation. Individuals evaluated on easier trials than an island's
+    do not migrate to it.
     """
     found = [_individuals(state.arrays) for state in states]
 
@@ -32,9 +33,10 @@ def exchanged(states: Sequence[Packed], config: IslandsConfig) -> list[Packed]:
 
 
 def gathered(states: Sequence[Packed]) -> Packed:
-    """The best of all islands as one population of the same size; all else is of the best island.
+    """Return the best of all islands as one population of the same size.
 
-    Of islands whose trials differ in how hard they are, those with the hardest.
+    All else is the best island's. Of islands whose trials differ in difficulty, only those with the
+    hardest count.
     """
     hardest = max(map(_level, states))
     states = [state for state in states if _level(state) == hardest]
@@ -45,15 +47,15 @@ def gathered(states: Sequence[Packed]) -> Packed:
 
 
 def together(lines: Sequence[Mapping[str, Any]], seconds: float) -> dict[str, Any]:
-    """One line of the metrics for all islands; island: whose best it has.
+    """Return one metrics line for all islands; `island` is the index of the best one.
 
-    seconds: that all of them took for a generation, with compiling where there was any. Islands that
-    took turns took the sum of theirs, which has none.
+    seconds: of all islands for a generation, compilation included. Islands that took turns took
+    the sum of their own times, which exclude it.
     """
     bests = [-np.inf if line["best"] is None else line["best"] for line in lines]
     leader = int(np.argmax(bests))
     line = dict(lines[leader]) | {"island": leader}
-    # Who comes from another island has no mother on this one.
+    # A migrant has no mother on this island.
     line.pop(MOTHERS, None)
     line |= {name: sum(each[name] for each in lines) for name in SUMS}
     for name in MEANS:
@@ -68,7 +70,7 @@ def together(lines: Sequence[Mapping[str, Any]], seconds: float) -> dict[str, An
 
 
 def _taken_in(state: Packed, migrants: Sequence[Mapping[str, np.ndarray]]) -> Packed:
-    """A population, sorted best first, with migrants in the place of its worst, half of it at most."""
+    """Replace the worst of a population by migrants, at most half of it; sort best first."""
     if not migrants:
         return state
     size = len(state.arrays["fitness"])
@@ -78,7 +80,7 @@ def _taken_in(state: Packed, migrants: Sequence[Mapping[str, np.ndarray]]) -> Pa
 
 
 def _level(state: Packed) -> int:
-    """How often its trials have become harder."""
+    """Number of times that the trials have become harder."""
     return int(state.arrays.get("level", 0))
 
 
@@ -99,7 +101,7 @@ def _joined(parts: Sequence[Mapping[str, np.ndarray]]) -> dict[str, np.ndarray]:
 
 
 def _sorted(arrays: Mapping[str, np.ndarray], count: int) -> dict[str, np.ndarray]:
-    """The best so many, best first; of equals the earlier."""
+    """Return the best `count`, best first; ties keep their order."""
     order = np.argsort(-_comparable(arrays["fitness"]), kind="stable")[:count]
     return {name: array[order] for name, array in arrays.items()}
 

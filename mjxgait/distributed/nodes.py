@@ -1,4 +1,4 @@
-"""What a machine is and what is installed on it, and whether it may work with this one."""
+"""Machines: processor, installed versions, and whether they may work with this one."""
 
 import dataclasses
 import functools
@@ -10,7 +10,10 @@ from mjxgait.errors import UserError
 
 @dataclasses.dataclass(frozen=True)
 class Machine:
-    """versions: of all that decides what a program computes. kind: of processor; `tag` is its hash."""
+    """A machine of the cluster.
+
+    versions: of all that determines what a program computes. kind: of processor; `tag` is its hash.
+    """
 
     versions: Mapping[str, str]
     kind: str
@@ -18,10 +21,9 @@ class Machine:
 
 
 def look() -> dict[str, Any]:
-    """The fields of a `Machine`, of the one that this runs on.
+    """Return the fields of `Machine` for the machine that runs this.
 
-    It travels as it is, to machines where mjxgait is missing too: it needs nothing but Python's own
-    library.
+    It uses only Python's own library: it is sent by value, to machines that may lack mjxgait.
     """
     import hashlib
     import importlib.metadata
@@ -47,7 +49,7 @@ def look() -> dict[str, Any]:
             model, flags = (value, flags) if key == "model name" else (model, flags)
             flags = value if key in ("flags", "Features") else flags
     except OSError:
-        pass  # no Linux
+        pass  # not Linux
     kind = f"{platform.machine()} {model}"
     tag = hashlib.sha256(f"{kind} {' '.join(sorted(flags.split()))}".encode()).hexdigest()[:8]
     return {"versions": versions, "kind": kind, "tag": tag}
@@ -55,12 +57,12 @@ def look() -> dict[str, Any]:
 
 @functools.cache
 def this() -> Machine:
-    """This machine."""
+    """Return this machine."""
     return Machine(**look())
 
 
 def mismatch(where: str, there: Machine) -> str | None:
-    """One sentence on what another machine has of another version than this one; None if nothing."""
+    """Name the first difference between another machine's versions and this one's, or None."""
     here = this().versions
     for name, version in here.items():
         if there.versions[name] != version:
@@ -72,10 +74,10 @@ def mismatch(where: str, there: Machine) -> str | None:
 
 
 def require_same(where: str, there: Machine) -> None:
-    """Refuses a machine of other versions.
+    """Refuse a machine with other versions.
 
     Raises:
-      UserError: names the first difference, and both.
+      UserError: names the first difference, and both versions.
     """
     if said := mismatch(where, there):
         raise UserError(said)

@@ -1,4 +1,4 @@
-"""Programs that a process has compiled, so that work of the same shape finds them again."""
+"""Compiled programs of a process; work of the same shape reuses them."""
 
 import dataclasses
 from collections.abc import Hashable
@@ -17,12 +17,12 @@ from mjxgait.training.stages import Stages, Turn, at_once
 from mjxgait.types import Asked, Judged
 
 KEPT = 8
-"""Of each sort, those that were used last; a program takes some hundred MB."""
+"""Of each sort, the most recently used; a program takes some hundred MB."""
 
 
 @dataclasses.dataclass(frozen=True)
 class BatchShape:
-    """That of runs side by side. rows: how many. sources: the most that one of them has."""
+    """Shape of runs side by side. rows: their number. sources: the most that one of them has."""
 
     run: Shape
     rows: int
@@ -34,7 +34,7 @@ class BatchShape:
 
 
 class Programs:
-    """Of one process. turn: held while a program is compiled."""
+    """Compiled programs of one process. turn: held while a program is compiled."""
 
     def __init__(self, turn: Turn = at_once) -> None:
         self._turn = turn
@@ -44,11 +44,11 @@ class Programs:
         self._judges: Latest[jax.stages.Compiled] = Latest(KEPT)
 
     def batch(self, recipe: Recipe) -> Batch:
-        """The runs of a recipe."""
+        """Return the runs of a recipe."""
         return self._known(recipe)[1]
 
     def step(self, recipe: Recipe) -> Step:
-        """A generation of all runs of a recipe."""
+        """Return the compiled generation of all runs of a recipe."""
         shape, batch = self._known(recipe)
 
         def turn(part: str) -> AbstractContextManager[object]:
@@ -59,7 +59,7 @@ class Programs:
     def judge(
         self, recipe: Recipe, genomes: Any, starts: Any, asked: Asked | None = None
     ) -> Judged:
-        """The verdict on genomes [1, N, ...], in NumPy."""
+        """Evaluate genomes [1, N, ...], in NumPy."""
         shape, batch = self._known(recipe)
         count = jax.tree.leaves(genomes)[0].shape[1]
 
@@ -75,7 +75,7 @@ class Programs:
         return judged
 
     def _known(self, recipe: Recipe) -> tuple[BatchShape, Batch]:
-        """The runs of a recipe, and what decides the shape of their program."""
+        """Return the runs of a recipe, and the shape of their program."""
         return self._batches.find(recipe.digest, lambda: self._built(recipe))
 
     def _built(self, recipe: Recipe) -> tuple[BatchShape, Batch]:

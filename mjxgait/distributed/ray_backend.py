@@ -1,7 +1,7 @@
-"""The workers on the machines of a Ray cluster: one per core of every machine that has our versions.
+"""Ray backend: one worker per core of every machine with the same versions as this one.
 
-Each is an actor that stays on its machine. Ray is not asked to repeat anything: what is lost is said
-to the crew, and a new worker is started where the machine still lives.
+Each worker is an actor that stays on its machine. Ray repeats nothing: losses are reported to the
+crew, and a new worker starts if the machine still lives.
 """
 
 import dataclasses
@@ -24,14 +24,17 @@ from mjxgait.distributed.scheduler import Report, Worker
 from mjxgait.distributed.worker import RemoteWorker
 
 EVERY = 1.0
-"""Seconds between two looks at who has joined."""
+"""Seconds between two checks for new machines."""
 HOPELESS = 5
-"""Workers in a row that a machine may lose before they can begin."""
+"""Workers lost in a row before they begin, after which a machine gets no new ones."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Node:
-    """A machine of the cluster. name: its address, with a number if one of that address was there before."""
+    """A machine of the cluster.
+
+    name: its address, with a number if the address occurred before.
+    """
 
     id: str
     name: str
@@ -39,7 +42,7 @@ class Node:
 
 
 class Machines:
-    """See `Hands`. tell: called with what a user should know.
+    """See `Hands`. tell: called with messages for the user.
 
     Raises:
       UserError: a machine that is there from the beginning has other versions than this one.
@@ -61,7 +64,7 @@ class Machines:
         self._recipes: dict[str, Any] = {}
         self._count, self._looked = 0, 0.0
         self.seconds: dict[str, float] = {}
-        """That the workers of each machine have worked."""
+        """Seconds that the workers of each machine have worked."""
         self._look_for_nodes()
         for ref in list(self._looking):
             self._meet(ref, refuse=True)
@@ -75,7 +78,7 @@ class Machines:
         return [worker for ref in _ready(self._coming) if (worker := self._begun(ref))]
 
     def start(self, worker: Worker, recipe: Recipe, job: Job) -> None:
-        """See `Hands`. A recipe goes to each machine once."""
+        """See `Hands`. A recipe is sent to each machine once."""
         if recipe.digest not in self._recipes:
             self._recipes[recipe.digest] = ray.put(recipe)
         actor, _ = self._actors[worker]
@@ -99,7 +102,7 @@ class Machines:
             return Report(worker, lost=_why(error))
         except RayTaskError as error:
             cause = error.cause
-            if isinstance(cause, OSError):  # its machine's trouble: a full disk, too many files
+            if isinstance(cause, OSError):  # the machine's fault: full disk, too many files
                 ray.kill(self._actors.pop(worker)[0])
                 return Report(worker, lost=str(cause))
             return Report(worker, error=cause if isinstance(cause, Exception) else error)
@@ -128,11 +131,11 @@ class Machines:
         self._looking[ask.remote()] = node
 
     def _meet(self, ref: Any, refuse: bool = False) -> None:
-        """A machine says what it has; one of other versions is left alone, or refused."""
+        """Receive a machine's description; ignore it, or refuse it, if versions differ."""
         node = self._looking.pop(ref)
         try:
             found = Machine(**ray.get(ref))
-        except RayError as error:  # it may have gone already
+        except RayError as error:  # it may have left already
             self._tell(f"{node.name} does not say what it has ({_why(error)}); it is left alone")
             return
         if refuse:
@@ -165,7 +168,10 @@ class Machines:
         self._coming[actor.ready.remote()] = worker
 
     def _begun(self, ref: Any) -> Worker | None:
-        """The worker, once it can work; who cannot is left alone, and who was killed meanwhile is replaced."""
+        """Return the worker once it can work.
+
+        A worker that cannot is dropped; one that was killed meanwhile is replaced.
+        """
         worker = self._coming.pop(ref)
         try:
             ray.get(ref)
@@ -186,7 +192,7 @@ class Machines:
 
     def _replace(self, worker: Worker) -> None:
         actor, node = self._actors.pop(worker)
-        ray.kill(actor)  # it may only be out of reach
+        ray.kill(actor)  # it may be alive, but out of reach
         self._hire(node)
 
 

@@ -1,4 +1,4 @@
-"""What a machine needs to build the program of some runs: it travels with the work, no folder is shared."""
+"""All that a machine needs to build the program of some runs; sent along, no folder is shared."""
 
 import dataclasses
 import hashlib
@@ -18,7 +18,7 @@ from mjxgait.plugins.user_code import is_loaded, load, loaded
 
 @dataclasses.dataclass(frozen=True)
 class OwnPart:
-    """A controller or a task of the user's: its class, and the file that it is in."""
+    """A user-defined controller or task: its class, and the file that it is in."""
 
     kind: str
     cls: str
@@ -26,7 +26,7 @@ class OwnPart:
     source: str
 
     def load(self) -> None:
-        """Makes it known to this process."""
+        """Load the class into this process."""
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / self.file
             path.write_text(self.source, encoding="utf-8")
@@ -35,7 +35,7 @@ class OwnPart:
 
 @dataclasses.dataclass(frozen=True)
 class Recipe:
-    """The creature's files by name, the runs' settings as tables, and the user's own code.
+    """A creature's files by name, the runs' settings as tables, and the user's own code.
 
     sources: see `build_batch`.
     """
@@ -49,19 +49,19 @@ class Recipe:
     def of(
         cls, creature: Creature, configs: Sequence[Config], sources: Sequence[Sequence[int]] = ()
     ) -> "Recipe":
-        """Of runs of one program."""
+        """Make the recipe of runs of one program."""
         tables = tuple(dataclasses.asdict(config) for config in configs)
         known = tuple(map(tuple, sources))
         return cls(dict(creature.files), tables, tuple(_own_parts(configs)), known)
 
     @cached_property
     def digest(self) -> str:
-        """Hash of all of it."""
+        """Hash of the whole recipe."""
         text = json.dumps(dataclasses.asdict(self), sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
 
     def read(self) -> tuple[Creature, list[Config]]:
-        """What it was made of; the user's own code is loaded."""
+        """Return the creature and the configs; load the user's own code."""
         for part in self.own:
             if not is_loaded(part.kind, f"{part.file}:{part.cls}"):
                 part.load()
@@ -70,7 +70,7 @@ class Recipe:
 
 
 def _own_parts(configs: Sequence[Config]) -> Iterator[OwnPart]:
-    """Of what has been loaded, who takes part."""
+    """Yield the loaded plugins that the configs use."""
     used = {name for config in configs for name in (config.use.controller, config.use.task)}
     for kind, text in loaded():
         place, _, cls = text.rpartition(":")

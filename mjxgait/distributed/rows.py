@@ -1,4 +1,4 @@
-"""Whole runs as rows of one program, each with a run folder of its own."""
+"""Whole runs as rows of one program, each with its own run folder."""
 
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -19,17 +19,17 @@ from mjxgait.training.folder import METRICS, open_run, truncate_metrics
 from mjxgait.training.packed import Packed, side_by_side
 
 Tell = Callable[[int, int, Advanced | None], object]
-"""Called with the generation, the last one, and what has come back, if something has."""
+"""Called with the generation, the last generation, and the latest result, if there is one."""
 
 
 class Rows:
-    """Runs that go on together, from the folders that they were made in.
+    """Runs that advance together, from the folders that they were made in.
 
     Attributes:
-      sources: see `build_batch`. images: a row's second folder, where there is one, with what is
-        written there in place of its state.
-      keep_every: see `Checkpoints`; by default no generation stays but the latest.
-      together: so many rows are one piece of work; 0: all, as those with sources must be.
+      sources: see `build_batch`. images: a row's second folder, if it has one, and the function
+        that makes what is written there from its state.
+      keep_every: see `Checkpoints`; by default only the latest generation stays.
+      together: rows per job; 0: all, as those with sources must be.
     """
 
     def __init__(
@@ -56,7 +56,10 @@ class Rows:
         tell: Tell,
         stopped: Callable[[], bool],
     ) -> Packed | None:
-        """The states [B] of the last generation; None when told to stop. begin: see `AdvanceRows`."""
+        """Return the states [B] of the last generation; None when stopped.
+
+        begin: `AdvanceRows.planted` of all rows.
+        """
         seconds = [folder for folder, _ in self.images.values()]
         stores = {path: Checkpoints(path, self.keep_every) for path in [*self.folders, *seconds]}
         try:
@@ -89,7 +92,7 @@ class Rows:
                 yield recipe, AdvanceRows(None, until, planted)
 
     def _stored(self, stores: Mapping[Path, Checkpoints]) -> Packed | None:
-        """What was left by the latest generation that all have a checkpoint of."""
+        """Restore the latest generation that all folders have a checkpoint of; None if none."""
         known = set.intersection(*(set(store.generations()) for store in stores.values()))
         common = max(known, default=-1)
         for folder, store in stores.items():
@@ -117,7 +120,7 @@ class Rows:
         state: Packed,
         lines: Iterable[Mapping[str, Any]],
     ) -> None:
-        """First the log, for a resumed run takes lines out, last the state."""
+        """Write the log first, since a resumed run can remove its lines, and the state last."""
         path = folder / METRICS
         with disk_errors(folder), path.open("a", encoding="utf-8") as log:
             log.writelines(json.dumps(line) + "\n" for line in lines)
@@ -125,7 +128,7 @@ class Rows:
 
 
 def _joined(pieces: Sequence[Advanced]) -> Advanced:
-    """Pieces that were worked on at the same time, as one."""
+    """Join the results of jobs that ran at the same time."""
     rows = [piece.packed.row(row) for piece in pieces for row in range(piece.packed.count)]
     return Advanced(
         side_by_side(rows),

@@ -1,6 +1,6 @@
-"""Hands work out to whoever is idle and collects it: lost work is given to somebody else, late work to somebody as well.
+"""Scheduler: dispatches jobs to idle workers, retries lost jobs, and duplicates late ones.
 
-Nothing here knows what the work is or where the hands are.
+It depends neither on what the jobs do nor on where the workers are.
 """
 
 import dataclasses
@@ -16,26 +16,26 @@ from mjxgait.distributed.recipe import Recipe
 from mjxgait.errors import UserError
 
 LATE = 2.0
-"""Work that takes so many times as long as the median is given to somebody else too, once nothing
-else waits: whoever is first counts. So nobody waits for one that stands still for longer than this
-and the time that the other takes.
+"""Times the median duration after which a job is given to a second worker too, once no other job
+waits; the first result counts. A stalled worker thus delays a run by no more than this and the
+second worker's time.
 """
 FEW, MANY = 3, 64
-"""How much must have been done before anything is called late, and what is remembered of it."""
+"""Jobs done before any can be late, and durations remembered."""
 FATAL = 5
-"""Workers that one piece of work may cost."""
+"""Workers that one job may cost."""
 TICK = 0.2
-"""Seconds between two looks at who is late and whether to stop."""
+"""Seconds between two checks for late jobs and for a stop request."""
 ALONE = 60.0
-"""Seconds without anybody after which it is said."""
+"""Seconds without workers after which a message says so."""
 
 Make = Callable[[], tuple[Recipe, Job]]
-"""Work, made when somebody is there to do it."""
+"""Makes a job when a worker is there to do it."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Worker:
-    """Somebody who does one thing at a time. node: name of the machine."""
+    """A worker that does one job at a time. node: name of its machine."""
 
     number: int
     node: str
@@ -43,7 +43,7 @@ class Worker:
 
 @dataclasses.dataclass(frozen=True)
 class Report:
-    """What became of a worker's work: its value, or why the worker is lost, or an error of the work itself."""
+    """Result of a worker's job: its value, why the worker is lost, or the job's own error."""
 
     worker: Worker
     value: Any = None
@@ -52,18 +52,18 @@ class Report:
 
 
 class Hands(Protocol):
-    """Workers, wherever they are."""
+    """Backend: provides workers and runs jobs on them."""
 
     def arrivals(self) -> list[Worker]:
-        """Who has come since the last call."""
+        """Return the workers that joined since the last call."""
         ...
 
     def start(self, worker: Worker, recipe: Recipe, job: Job) -> None:
-        """Has an idle worker begin."""
+        """Start a job on an idle worker."""
         ...
 
     def wait(self, seconds: float) -> list[Report]:
-        """What has happened, as soon as there is something, or nothing after so long."""
+        """Return the reports as soon as there are any, or none after `seconds`."""
         ...
 
 
@@ -74,7 +74,7 @@ class _Task:
     work: tuple[Recipe, Job] | None = None
     losses: int = 0
     workers: int = 0
-    """That are at it."""
+    """Workers now at the job."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -92,7 +92,10 @@ def _never() -> bool:
 
 
 class Crew:
-    """Those at hand. tell: called with what a user should know. watch: called with the crew now and then."""
+    """Available workers and their jobs.
+
+    tell: called with messages for the user. watch: called with the crew now and then.
+    """
 
     def __init__(
         self,
@@ -110,22 +113,22 @@ class Crew:
         self.idle: list[Worker] = []
         self.busy: dict[Worker, _Turn] = {}
         self.done: dict[str, int] = {}
-        """Pieces of work that have come back, by node."""
+        """Jobs done, by node."""
 
     @property
     def open(self) -> int:
-        """Pieces of work that nobody has done yet."""
+        """Number of jobs not yet done."""
         return len(self._open)
 
     def submit(self, key: Hashable, make: Make, first: bool = False) -> None:
-        """Has work done under a key that is not in use. first: before all that waits."""
+        """Queue a job under a key that is not in use. first: ahead of all waiting jobs."""
         task = self._open[key] = _Task(key, make)
         (self._waiting.appendleft if first else self._waiting.append)(task)
 
     def all(
         self, work: Iterable[tuple[Recipe, Job]], stopped: Callable[[], bool] = _never
     ) -> list[Any] | None:
-        """The results of all of it, in order; None when told to stop."""
+        """Return the results of all jobs, in order; None when stopped."""
         keys: list[Hashable] = []
         found: dict[Hashable, Any] = {}
         for piece in work:
@@ -138,10 +141,10 @@ class Crew:
         return [found[key] for key in keys]
 
     def next(self, stopped: Callable[[], bool]) -> tuple[Hashable, Any] | None:
-        """The next result with its key, in no order; None when told to stop.
+        """Return the next result with its key, in no order; None when stopped.
 
         Raises:
-          UserError: a piece of work has cost too many workers.
+          UserError: a job has cost too many workers.
         """
         while not stopped():
             if self._ready:
@@ -166,7 +169,7 @@ class Crew:
             self.hands.start(worker, *task.work)
 
     def _late(self) -> _Task | None:
-        """The oldest work that one worker alone is late with."""
+        """Return the oldest late job that has one worker only."""
         if len(self._took) < FEW:
             return None
         limit = self._clock() - LATE * median(self._took)
@@ -184,7 +187,7 @@ class Crew:
         if report.lost is None:
             self.idle.append(worker)
         if self._open.get(task.key) is not task:
-            return  # somebody else was first
+            return  # another worker was first
         if report.error is not None:
             raise report.error
         if report.lost is not None:
@@ -207,7 +210,7 @@ class Crew:
             self._waiting.appendleft(task)
 
     def _look_around(self) -> None:
-        """Says once when nobody has been there for a while."""
+        """Report once that there has been no worker for a while."""
         if self.idle or self.busy:
             self._alone_since = self._clock()
         elif self._alone_since is not None and self._clock() - self._alone_since > ALONE:

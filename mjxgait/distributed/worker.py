@@ -1,7 +1,7 @@
-"""What runs on the machines of a cluster: one process per core, with one device of JAX each.
+"""Worker processes on the machines of a cluster: one per core, with one JAX device each.
 
-So the bits of a result depend on no machine's number of cores. Nothing here imports JAX before the
-process has been told of its core.
+A result's bits thus do not depend on a machine's number of cores. Nothing here imports JAX before
+`ENVIRONMENT` is set.
 """
 
 import contextlib
@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 ENVIRONMENT = {
-    "NPROC": "1",  # the threads of XLA
+    "NPROC": "1",  # XLA's threads
     "OMP_NUM_THREADS": "1",
     "OPENBLAS_NUM_THREADS": "1",
     "JAX_NUM_CPU_DEVICES": "1",
@@ -25,7 +25,7 @@ ROOM = 2**20
 
 
 class RemoteWorker:
-    """An actor. tag: of its kind of machine, see `Machine`."""
+    """An actor that runs jobs. tag: of its kind of machine, see `Machine`."""
 
     def __init__(self, tag: str) -> None:
         os.environ.update(ENVIRONMENT)
@@ -36,7 +36,7 @@ class RemoteWorker:
         self._programs = Programs(_turn)
 
     def ready(self) -> int:
-        """Its process, once it can work.
+        """Return the process id, once the worker can work.
 
         Raises:
           OSError: there is no room for a creature's files.
@@ -47,7 +47,7 @@ class RemoteWorker:
         return os.getpid()
 
     def do(self, recipe: Any, job: Any) -> tuple[Any, float]:
-        """The job's result, and how many seconds it took."""
+        """Return the job's result and its duration in s."""
         began = time.perf_counter()
         result = job.do(self._programs, recipe)
         return result, time.perf_counter() - began
@@ -55,9 +55,9 @@ class RemoteWorker:
 
 @contextlib.contextmanager
 def _turn(name: str, patience: float = -1.0) -> Iterator[None]:
-    """Of all workers of a machine one compiles a program; the others then find it in the cache.
+    """Let one worker of a machine compile a program; the others then find it in the cache.
 
-    Where nothing can be kept each compiles its own at once. patience: s; waits for ever by default.
+    Without a writable cache each compiles at once. patience: s; waits forever by default.
     """
     import filelock
     import jax
