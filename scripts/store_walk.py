@@ -62,7 +62,7 @@ def main() -> None:
 
 
 def arrays(window: Recording) -> dict[str, np.ndarray]:
-    """Return the file's contents: sizes unchanged, and per frame [T, ...] integers in millionths."""
+    """Return the contents: sizes unchanged, and per frame [T, ...] integers in millionths."""
     size = window.dimensions
     return {
         "time_step": np.array(window.time_step),

@@ -28,7 +28,7 @@ from mjxgait.errors import UserError
 from mjxgait.files import DamagedFile, read_json, write_text
 
 SCHEMA = 2
-"""Version of the file. Version 1 implied key poses and kept the drive in the controller settings."""
+"""File version. Version 1 implied key poses and kept the drive in the controller settings."""
 
 SOUGHT = ("around", "within", "expressions")
 """Settings of where the search starts; they do not affect how a champion moves."""
