@@ -1,25 +1,25 @@
-"""What an accelerator makes of the compiled step: creature-steps per second, and joules per million.
+"""Benchmark of the compiled step on an accelerator: creature-steps per second, joules per million.
 
     python benchmarks/accelerator.py --out FOLDER
     JAX_PLATFORMS=cpu python benchmarks/accelerator.py --out FOLDER --engines ours --lanes 64
 
-A pass is the program by which a run judges its individuals: controller, drive, physics and statistics.
-Every lane simulates one episode of an individual that treads on the spot, so all lanes work until
-the end and all engines have the same episodes. The engines differ in the physics alone: `ours` is
-the lane-major step, `mjx` is MuJoCo's own MJX in JAX. MuJoCo Warp (`impl="warp"` of MJX) is not
-among them: it steps as a whole and does not let stable PD in between.
+A pass is the program by which a run evaluates its individuals: controller, drive, physics and
+statistics. Every lane simulates one episode of an individual that treads on the spot, so all lanes
+work until the end and all engines have the same episodes. The engines differ only in the physics:
+`ours` is the lane-major step, `mjx` is MuJoCo's own MJX in JAX. MuJoCo Warp (`impl="warp"` of MJX)
+is excluded: it steps as a whole and leaves no place for stable PD.
 
-Each row is a process of its own. All compile at once, beside each other; then one after the other
-is measured, alone. A row that fails or takes too long has the reason in its place. Prints a Markdown
-table and writes it, with everything as JSON, after each row:
+Each row is a process of its own. All compile at the same time; then each is measured alone, one
+after the other. A row that fails or takes too long shows the reason. Prints a Markdown table, and
+writes it after each row, with everything as JSON:
 
 - lanes: simulations at once, on all devices together.
-- compile: s, tracing included, beside the other rows' compilers.
+- compile: s, tracing included, while the other rows compile, too.
 - steps/s: creature-steps per second, the best pass; us: of one control step of all lanes.
 - W, J/M: mean of the card's power during the passes, and joules per million creature-steps; empty
-  where nvidia-smi does not know it.
-- alive, forward: share of the episodes that lasted, and m that the bodies moved, which tell whether
-  the engines did the same.
+  where nvidia-smi reports none.
+- alive, forward: share of the episodes that lasted, and m that the bodies moved: a check that the
+  engines did the same.
 """
 
 import argparse
@@ -35,11 +35,11 @@ from statistics import mean
 from typing import Any
 
 ENGINES = {"ours": "auto", "mjx": "mjx"}
-"""By name, what `rollout.physics` calls it."""
+"""Engines, and their names in `rollout.physics`."""
 INDIVIDUALS = 64
-"""That differ from each other; more lanes have them again."""
+"""Different individuals; further lanes repeat them."""
 SWING = 4.0
-"""deg about the standing pose within which the individuals tread."""
+"""Range of the treading about the standing pose, in degrees."""
 COLUMNS = "engine", "lanes", "compile", "steps/s", "us", "W", "J/M", "alive", "forward"
 POWER = (
     "nvidia-smi --query-gpu=power.draw.instant --format=csv,noheader,nounits --id=0 --loop-ms=100"
@@ -68,11 +68,11 @@ def main() -> None:
 
 
 def report(options: argparse.Namespace) -> None:
-    """All rows: compiled beside each other, measured one after the other, written after each."""
+    """Compile all rows in parallel, measure them one after the other, write after each."""
     end = time.monotonic() + options.budget
     names = [(engine, lanes) for lanes in options.lanes for engine in options.engines]
     started = {name: start(*name) for name in names}
-    # Half of the time for compilers: a row that is not ready by then must not cost the others.
+    # Compilation gets half of the time: a slow row must not cost the others.
     ready = {name: answer(child, end - options.budget / 2) for name, child in started.items()}
     rows: list[dict[str, Any]] = []
     for (engine, lanes), child in started.items():
@@ -88,7 +88,7 @@ def report(options: argparse.Namespace) -> None:
 
 
 def start(engine: str, lanes: int) -> Any:
-    """The process of a row. It takes the card's memory as it needs it, for it is not alone there."""
+    """Start the process of a row. It allocates memory as needed: it shares the card."""
     return subprocess.Popen(
         [sys.executable, *sys.argv, "--row", f"{engine}:{lanes}"],
         stdin=subprocess.PIPE,
@@ -100,7 +100,7 @@ def start(engine: str, lanes: int) -> Any:
 
 
 def answer(child: Any, end: float) -> dict[str, Any]:
-    """The next line that a process says, which is JSON; an error when it ends or the time does."""
+    """Return the next JSON line of a process; an error when it ends or the time is up."""
     if not select.select([child.stdout], [], [], max(end - time.monotonic(), 0.0))[0]:
         child.kill()
         return {"error": "took too long"}
@@ -109,11 +109,11 @@ def answer(child: Any, end: float) -> dict[str, Any]:
 
 
 def measure(options: argparse.Namespace, engine: str, lanes: str) -> None:
-    """Compiles and says so; measures when it is bidden to, and says what came of it."""
-    # What libraries print goes to standard error, so that only answers are read.
+    """Compile and report it; measure after a line on standard input, and report the result."""
+    # Libraries print to standard error, so that only answers are read.
     said = os.fdopen(os.dup(1), "w", buffering=1)
     os.dup2(2, 1)
-    # Only here: the process that waits for the others does without JAX, and without the card.
+    # Imported here: the parent process needs neither JAX nor the card.
     import jax
 
     from mjxgait.training.devices import compiled, everywhere, prepare_devices
@@ -152,7 +152,7 @@ def measure(options: argparse.Namespace, engine: str, lanes: str) -> None:
 
 
 def workload(options: argparse.Namespace, engine: str, lanes: int) -> tuple[Any, Any]:
-    """The run whose judge is measured, and its individuals [1, N, ...], one for each lane."""
+    """Return the run to be measured and its individuals [1, N, ...], one per lane."""
     import jax
     import jax.numpy as jnp
 
@@ -183,7 +183,7 @@ def workload(options: argparse.Namespace, engine: str, lanes: int) -> tuple[Any,
 
 
 def passes(work: Any, at_least: float) -> tuple[list[float], list[float]]:
-    """Seconds of each pass, for so many s; W of the card meanwhile, ten times a second."""
+    """Return seconds of each pass, for so many s in all; W of the card, ten times a second."""
     try:
         watch = subprocess.Popen(POWER.split(), stdout=subprocess.PIPE, text=True)
     except OSError:
@@ -196,7 +196,7 @@ def passes(work: Any, at_least: float) -> tuple[list[float], list[float]]:
     if watch is None:
         return seconds, []
     watch.terminate()
-    # The first readings are of the moment before the passes.
+    # The first readings are from before the passes.
     said = watch.communicate()[0].split()[2:]
     return seconds, [float(word) for word in said if word.replace(".", "", 1).isdigit()]
 

@@ -1,9 +1,9 @@
-"""What an animator's round trip through Blender keeps: `python benchmarks/blender.py RUN PYTHON`.
+"""Errors of a round trip through Blender: `python benchmarks/blender.py RUN PYTHON`.
 
-RUN's walk is exported, opened in Blender, exported again as it is and with one joint bent, and read
-back as `mjxgait refine` reads it. PYTHON is an interpreter with `pip install bpy`, of Python 3.11;
-it wants another numpy than this program, so it stands alone. Prints a line of JSON: errors in
-degrees, over all joints and frames. `--picture FILE` draws the bones.
+RUN's walk is exported, opened in Blender, exported again unchanged and with one joint bent, and
+read back as `mjxgait refine` reads it. PYTHON is an interpreter with `pip install bpy`, of Python
+3.11; bpy needs another numpy than this program, so it has its own environment. Prints a line of
+JSON: errors in degrees, over all joints and frames. `--picture FILE` draws the bones.
 """
 
 import argparse
@@ -58,13 +58,13 @@ def main() -> None:
 
 
 def alone(creature: Creature) -> str:
-    """The first joint that moves a part without another's help."""
+    """Return the first joint that is the only one of its part."""
     parts = [int(creature.model.joint(name).bodyid[0]) for name in creature.joints.names]
     return next(n for n, p in zip(creature.joints.names, parts, strict=True) if parts.count(p) == 1)
 
 
 def blender(python: Path, folder: Path, name: str, *options: str) -> dict[str, Any]:
-    """Opens the walk, writes NAME.glb, and returns what was said of it."""
+    """Open the walk in Blender, write NAME.glb, and return its report."""
     files = [str(folder / "walk.glb"), str(folder / f"{name}.glb")]
     done = subprocess.run(
         [str(python), str(SCRIPT), *files, *options], capture_output=True, text=True
@@ -77,15 +77,17 @@ def blender(python: Path, folder: Path, name: str, *options: str) -> dict[str, A
 
 
 def off(brought: Brought, expected: np.ndarray) -> float:
-    """The greatest difference of angles [F, J] in degrees."""
+    """Return the greatest difference of angles [F, J] in degrees."""
     return float(np.degrees(np.abs(brought.track.angles - expected).max()))
 
 
 def bending(
     creature: Creature, joint: str, brought: Brought, was: np.ndarray, degrees: float
 ) -> dict[str, Any]:
-    """How far the angles are from those that were bent as said, either way about the hinge; frames
-    in which the joint would go beyond its range are left out."""
+    """Compare the angles with those bent by so many degrees, either way about the hinge.
+
+    Frames that would take the joint beyond its range are left out.
+    """
     place = creature.joints.names.index(joint)
     low, high = creature.joints.low[place], creature.joints.high[place]
     errors = []

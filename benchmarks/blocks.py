@@ -1,9 +1,9 @@
-"""What a step of a mixed population costs, against the tall quadruped's, by turns on one core.
+"""Cost of a step of a mixed population relative to the tall quadruped's, in turns on one core.
 
     python benchmarks/blocks.py
 
-64 lanes; the blocks' are 64 random bodies, each lane another, driven by sines on land and in water,
-the quadruped treads. Processor time, best of the rounds; without controllers and tasks.
+64 lanes. Modular bodies: 64 random ones, another in each lane, driven by sines on land and in
+water. The quadruped treads. Processor time, best of the rounds; no controllers or tasks.
 """
 
 import argparse
@@ -45,7 +45,7 @@ def blocks(capacity: Capacity, around: Surroundings) -> Run:
 
 
 def quadruped() -> Run:
-    """The tall one with whole-body contacts, as `train` simulates it."""
+    """The tall quadruped with whole-body contacts, as `train` simulates it."""
     creature = load_creature("tall_quadruped")
     plant, _ = make_plant(creature, "auto", False)
     qpos = jnp.tile(jnp.asarray(creature.stand_qpos, jnp.float32)[:, None], (1, LANES))
@@ -55,7 +55,7 @@ def quadruped() -> Run:
 
 
 def stepped(plant, body: BodyState, torque: jax.Array) -> Run:
-    """Compiled, and run once."""
+    """Compile a pass, run it once and return it."""
 
     @jax.jit
     def go(body: BodyState, torque: jax.Array) -> BodyState:

@@ -1,13 +1,14 @@
-"""What a step costs where the body's numbers are constants, inputs, or one set per lane.
+"""Cost of a step with the body's numbers as constants, as inputs, or as one set per lane.
 
     python benchmarks/bodies.py --env tall_quadruped duck --json bodies.json
 
-A step is the plant's with stable PD towards the standing pose, 64 lanes on one core, no controller,
-tally or genetic algorithm. Every way steps the same bodies (per lane they are all the same) through
-the same motion, turn by turn in one process; a ratio is taken within a round.
+A step is the plant's with stable PD towards the standing pose: 64 lanes on one core, no controller,
+episode statistics or genetic algorithm. All variants step the same bodies (equal in all lanes)
+through the same motion, in turns in one process; a ratio is taken within a round.
 
 - constants: the numbers are part of the program, as in `mjxgait train`.
-- inputs: one body for all lanes, its numbers arguments of the program: any body of this topology.
+- inputs: one body for all lanes; its numbers are arguments of the program, which fits any body of
+  this topology.
 - lanes: a body per lane, in the state.
 """
 
@@ -56,7 +57,7 @@ def main() -> None:
 
 
 def measure(env: str, rounds: int) -> list[dict[str, Any]]:
-    """us of processor time per creature-step in each round, and s to compile, of each way."""
+    """us of processor time per creature-step in each round, and s to compile, per variant."""
     creature = load_creature(find_creature(env))
     plant, _ = make_plant(creature, "auto", True)
     if plant.lane_axis != -1:
@@ -91,7 +92,7 @@ def measure(env: str, rounds: int) -> list[dict[str, Any]]:
 def build(
     creature: Creature, plant: Plant, numbers: Any, every: Any
 ) -> tuple[Callable[[], jax.Array], float]:
-    """A pass of so many steps, and s to compile it.
+    """Return a pass of so many steps, and s to compile it.
 
     numbers: of one body for all lanes; every: of one per lane; None for constants.
     """
@@ -109,7 +110,7 @@ def build(
 
 
 def start(creature: Creature, every: Any) -> BodyState:
-    """Standing, the joints a little off, differently in each lane."""
+    """Return the standing pose [lanes last], the joints a little off, differently in each lane."""
     qpos = np.tile(creature.stand_qpos[:, None], LANES)
     noise = np.random.default_rng(0).uniform(-0.1, 0.1, (len(creature.joints.qpos_adr), LANES))
     qpos[creature.joints.qpos_adr] += noise
@@ -118,7 +119,7 @@ def start(creature: Creature, every: Any) -> BodyState:
 
 
 def follow(creature: Creature, plant: Plant, state: BodyState) -> tuple[BodyState, Sensed]:
-    """One step of stable PD towards the standing pose, and what was sensed before it."""
+    """Return the state after a step of stable PD towards standing, and what was sensed before."""
     step = float(creature.model.opt.timestep)
     kp, kd, limit, goal = (
         np.float32(x)[:, None]
@@ -140,7 +141,7 @@ def follow(creature: Creature, plant: Plant, state: BodyState) -> tuple[BodyStat
 
 
 def lifted(creature: Creature, joints: jax.Array) -> jax.Array:
-    """Joint values [J, L] at their places among the degrees of freedom, which are the last."""
+    """Pad joint values [J, L] to all degrees of freedom; the joints are the last ones."""
     first = int(creature.joints.dof_adr[0])
     assert list(creature.joints.dof_adr) == list(range(first, creature.model.nv))
     return jnp.pad(joints, ((first, 0), (0, 0)))

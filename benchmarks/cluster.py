@@ -1,17 +1,17 @@
-"""What a cluster of Ray costs, on simulated machines of one core each on this one.
+"""Costs of a Ray cluster, measured on simulated machines of one core each on this machine.
 
     python benchmarks/cluster.py rows blocks overhead calls --json FILE
 
 - rows: efficiency of a study's rows, two machines against one
-- blocks: the same of one population
-- overhead: ms per generation beside the simulation, over the size of blocks
-- calls: what handing out, taking in and putting on disk cost
+- blocks: the same of one population, evaluated in chunks
+- overhead: ms per generation besides the simulation, by chunk size
+- calls: costs of dispatching, collecting and storing
 
 Needs mjxgait[cluster] and two idle cores: each machine is bound to a core. One machine and two take
 turns; efficiency is the median over laps of the wall time with one over twice that with two,
-compilation not counted. On a machine that is busy otherwise it says nothing; there the workers'
-processor time with one over that with two tells how much they hinder each other. The file keeps
-everything, and what it has of an earlier call; `cluster_paper.py` reckons with it.
+compilation not counted. On a busy machine it means nothing; there the workers' processor time with
+one over that with two shows how much they slow each other down. The file keeps everything,
+including results of earlier calls; `cluster_paper.py` uses it.
 """
 
 import argparse
@@ -48,13 +48,13 @@ from mjxgait.training.experiment import build_experiment
 from mjxgait.training.packed import pack
 
 SIZES = (64, 256, 1024, 4096)
-"""Of blocks, of one population of the largest."""
+"""Individuals per chunk; the population has the largest size."""
 RUNS = 8
 
 
 @dataclasses.dataclass(frozen=True)
 class Nothing:
-    """Work that brings back what it was given, after so long."""
+    """Job that returns its data after so many seconds."""
 
     data: bytes = b""
     seconds: float = 0.0
@@ -66,7 +66,7 @@ class Nothing:
 
 @dataclasses.dataclass(frozen=True)
 class Clocked:
-    """Other work, and the processor time that it took."""
+    """Another job, with the processor time that it took."""
 
     job: Job
 
@@ -76,7 +76,7 @@ class Clocked:
 
 
 class Clock:
-    """A crew that has clocked work done; processor: s of it in all."""
+    """Scheduler that measures its jobs; processor: s of processor time in all."""
 
     def __init__(self, crew: Crew) -> None:
         self.crew, self.processor = crew, 0.0
@@ -126,7 +126,7 @@ def subject(
 
 
 def rows(crew: Crew, options: argparse.Namespace) -> dict[str, Any]:
-    """Eight runs as pieces of work of one row each."""
+    """Eight runs as jobs of one row each."""
     creature, config = subject(options, 128)
     recipes = [
         Recipe.of(creature, [dataclasses.replace(config, seed=seed)]) for seed in range(RUNS)
@@ -139,13 +139,13 @@ def rows(crew: Crew, options: argparse.Namespace) -> dict[str, Any]:
 
     for machine in (0, 1):
         with one_of(crew, machine):
-            work(0)  # each compiles and builds all of it
+            work(0)  # each machine builds and compiles everything
     found = in_turns(clock, work, options.laps)
     return found | {"runs": RUNS, "generations": options.generations}
 
 
 def blocks(crew: Crew, options: argparse.Namespace) -> dict[str, Any]:
-    """Generations of one population, in eight blocks."""
+    """Generations of one population, in eight chunks."""
     creature, config = subject(options, 512)
     experiment = build_experiment(creature, config)
     clock = Clock(crew)
@@ -172,7 +172,7 @@ def blocks(crew: Crew, options: argparse.Namespace) -> dict[str, Any]:
 
 
 def overhead(crew: Crew, options: argparse.Namespace) -> dict[str, Any]:
-    """With one machine and the shortest of episodes: the wall time in which it does not work."""
+    """Wall time that the only machine spends idle, with the shortest episodes."""
     found: dict[str, Any] = {"population": SIZES[-1]}
     for size in SIZES:
         creature, config = subject(options, SIZES[-1], seconds=0.05, block=size)
@@ -197,7 +197,7 @@ def overhead(crew: Crew, options: argparse.Namespace) -> dict[str, Any]:
 
 
 def calls(crew: Crew, options: argparse.Namespace) -> dict[str, Any]:
-    """With work that does nothing, hundreds of pieces at once; and what this process spends on it."""
+    """Costs of jobs that do nothing, hundreds at once, and this process's time for them."""
     recipe, found = Recipe({}, ()), dict[str, Any]()
     for size in (100, 10_000, 1_000_000):
         count = 400
@@ -218,12 +218,12 @@ def calls(crew: Crew, options: argparse.Namespace) -> dict[str, Any]:
     )
     found["bytes per verdict"] = (state.terms.nbytes + state.outcome.nbytes) // people
     found["ms to put a row's state on disk"] = storing(creature, state)
-    return found | {"µs per piece under way and look": looking(crew)}  # leaves a worker busy
+    return found | {"µs per piece under way and look": looking(crew)}  # last: leaves a worker busy
 
 
 def looking(crew: Crew) -> float:
-    """Of one `ray.wait` over a thousand results that are not there yet."""
-    import ray  # `simulated` has things to say to it before
+    """us of `ray.wait` per result that is not there yet."""
+    import ray  # only after `simulated` has set its environment
 
     actor, _ = next(iter(crew.hands._actors.values()))
     recipe = ray.put(Recipe({}, ()))
@@ -249,7 +249,7 @@ def storing(creature: Creature, state: Any) -> float:
 
 
 class Timed:
-    """See `Evaluator`: another one, and how long it took."""
+    """See `Evaluator`: another one, with the time that it took."""
 
     def __init__(self, evaluator: Any) -> None:
         self._evaluator, self.seconds = evaluator, 0.0
@@ -264,7 +264,7 @@ class Timed:
 
 @contextlib.contextmanager
 def bound(count: int) -> Iterator[Machines]:
-    """Machines of one core each, the n-th bound to core n; this process has what they leave."""
+    """Machines of one core each, the n-th bound to core n; this process is not bound."""
     before = os.sched_getaffinity(0)
     cores = sorted(before)
     os.sched_setaffinity(0, {cores[0]})
@@ -281,7 +281,7 @@ def bound(count: int) -> Iterator[Machines]:
 
 @contextlib.contextmanager
 def one_of(crew: Crew, machine: int) -> Iterator[None]:
-    """One of two machines does everything."""
+    """Let one of two machines do everything."""
     gather(crew, 2)
     crew.idle.sort(key=lambda worker: worker.number)
     resting = crew.idle.pop(1 - machine)
@@ -318,12 +318,12 @@ def in_turns(clock: Clock, work: Callable[[], None], laps: int) -> dict[str, Any
 
 
 def work_of(crew: Crew) -> float:
-    """Seconds that all workers have worked."""
+    """Seconds of work of all workers."""
     return float(sum(crew.hands.seconds.values()))
 
 
 def gather(crew: Crew, count: int) -> None:
-    """Waits until all are there."""
+    """Wait until all workers are idle."""
     crew.next(lambda: len(crew.idle) >= count)
 
 

@@ -1,12 +1,12 @@
-"""What a cluster of Ray bears, on simulated machines of one core each on this one.
+"""Fault tolerance of a Ray cluster, on simulated machines of one core each on this machine.
 
     python benchmarks/cluster_faults.py study    # random kills of workers, machines and the command
     python benchmarks/cluster_faults.py islands  # the same in a run on four islands
     python benchmarks/cluster_faults.py blocks   # the same in one population, judged in blocks
     python benchmarks/cluster_faults.py disk     # machines whose disk is full (mounts one: needs root)
 
-One run that nobody touches, then others until there were `--kills` kills; a killed command is called
-again with `--resume`. All must end the same, and no champion that was written may be written again.
+One undisturbed run, then others until there were `--kills` kills; a killed command is called again
+with `--resume`. All must give the same results, and no finished champion may be written again.
 """
 
 import argparse
@@ -61,7 +61,7 @@ def main() -> None:
     parser.add_argument("--kills", type=int, default=20)
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
-    # Who dies does not depend on how fast the programs are.
+    # The faults do not depend on how fast the programs run.
     os.environ.setdefault("JAX_DISABLE_MOST_OPTIMIZATIONS", "1")
     with tempfile.TemporaryDirectory() as scratch:
         found = (
@@ -108,7 +108,7 @@ def kills(scratch: Path, what: str, count: int, chance: random.Random) -> dict[s
 
 
 class Command:
-    """`mjxgait` as a process; what it says goes into a file beside the folder."""
+    """`mjxgait` as a process; its output goes into a file beside the folder."""
 
     def __init__(self, what: str, folder: Path, address: str, resume: bool = False) -> None:
         self.what, self.folder, self.address = what, folder, address
@@ -128,7 +128,7 @@ class Command:
             )
 
     def runs_for(self, seconds: float) -> bool:
-        """Whether it does so."""
+        """Return True if the process is still running after so many seconds."""
         try:
             self.process.wait(seconds)
         except subprocess.TimeoutExpired:
@@ -147,7 +147,7 @@ class Command:
 
 
 def results(folder: Path) -> dict[str, Any]:
-    """All that a study or a run on islands leaves, but the time that it took."""
+    """All results of a study or a run on islands, except times."""
     champions = [*folder.glob("champions/*.json"), *folder.glob("champion.json")]
     logs = [*folder.glob("groups/*/metrics.jsonl"), *folder.glob("islands/*/metrics.jsonl")]
     found: dict[str, Any] = {str(path.relative_to(folder)): path.read_text() for path in champions}
@@ -160,13 +160,16 @@ def results(folder: Path) -> dict[str, Any]:
 
 
 def stamps(folder: Path) -> dict[str, int]:
-    """When each champion of a study that has ended was written."""
+    """Modification time in ns of each champion file of a study."""
     return {path.name: path.stat().st_mtime_ns for path in folder.glob("champions/*.json")}
 
 
 def disk(scratch: Path) -> dict[str, Any]:
-    """The same study with a machine that can keep no program, and one without room for a creature's files."""
-    os.environ.pop("JAX_COMPILATION_CACHE_DIR", None)  # it would come before the user's own
+    """The study with two machines that lack disk space.
+
+    One cannot store programs, the other a creature's files.
+    """
+    os.environ.pop("JAX_COMPILATION_CACHE_DIR", None)  # it would override the cache folder
     full = scratch / "full"
     full.mkdir()
     mounted = ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(full)]

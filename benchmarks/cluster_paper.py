@@ -1,12 +1,11 @@
-"""A large cluster on paper: the crew as it is, hands and a clock that are made up from measured costs.
+"""Model of a large cluster: the real scheduler, with a backend and clock of measured costs.
 
     python benchmarks/cluster_paper.py FILE          # that `cluster.py rows blocks calls` wrote
     python benchmarks/cluster_paper.py FILE --check  # the same reckoning against Ray, tiny fake work
 
-What is counted: the seconds of a piece of work; what handing out and taking in cost this machine, one
-after the other, by their number and their bytes; a look at all that is under way at every turn; and
-putting on disk what has come back. Not counted: Ray's own limits in numbers of machines and actors,
-the networks of real buildings, compilation.
+Counted: the seconds of a job; this machine's costs of dispatching and collecting, serially, by
+number and bytes; a check of all running jobs at every turn; storing the results on disk. Not
+counted: Ray's own limits in numbers of machines and actors, real networks, compilation.
 """
 
 import argparse
@@ -32,7 +31,10 @@ MB = 1e6
 
 @dataclasses.dataclass(frozen=True)
 class Costs:
-    """Seconds of this machine per piece of work, per byte, per look at a piece under way; latency: of one piece."""
+    """Costs on this machine in seconds.
+
+    Per job, per byte, and per check of a running job; latency: of one job.
+    """
 
     piece: float
     byte: float
@@ -41,9 +43,9 @@ class Costs:
 
     @classmethod
     def of(cls, calls: dict[str, Any]) -> "Costs":
-        """As `cluster.py calls` found them."""
+        """Return the costs that `cluster.py calls` found."""
         spent = [calls[f"ms of this process per piece, {n} bytes"] / 1e3 for n in (100, 1_000_000)]
-        # What is sent comes back.
+        # The bytes travel both ways.
         return cls(
             piece=spent[0],
             byte=max(spent[1] - spent[0], 0.0) / 2e6,
@@ -54,7 +56,7 @@ class Costs:
 
 @dataclasses.dataclass(frozen=True)
 class Piece:
-    """Work on paper: how long it takes and what travels, there and back; disk: s to keep the result."""
+    """Modelled job: its duration, the bytes sent there and back; disk: s to store the result."""
 
     seconds: float
     size: int
@@ -62,7 +64,7 @@ class Piece:
 
 
 class Paper:
-    """See `Hands`. Its clock is the crew's; whatever this machine does itself moves it on."""
+    """See `Hands`. Its clock is the scheduler's; this machine's own work advances it."""
 
     def __init__(self, workers: int, costs: Costs) -> None:
         self.now, self.costs = 0.0, costs
@@ -95,7 +97,10 @@ class Paper:
 def on_paper(
     workers: int, costs: Costs, piece: Piece, count: int, in_a_row: int = 1
 ) -> tuple[float, float]:
-    """Seconds for so many times so many pieces of which each follows on the one before; share of the workers' time that they work."""
+    """Seconds for `count` chains of `in_a_row` jobs each, and the share of time that workers work.
+
+    Each job of a chain follows on the one before.
+    """
     hands = Paper(workers, costs)
     crew = Crew(hands, clock=lambda: hands.now)
     left = dict.fromkeys(range(count), in_a_row)
@@ -155,7 +160,7 @@ def told(wall: float, used: float) -> str:
 
 
 def checked(costs: Costs) -> dict[str, Any]:
-    """Sixteen workers that sleep: they share two cores, so the pieces must be tiny only in what they compute."""
+    """Compare with 16 real workers that sleep: on two cores, jobs must compute little."""
     workers, count, found = 16, 400, {}
     with machines(1) as made:
         made.add(cores=workers - 1)

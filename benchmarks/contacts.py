@@ -1,14 +1,14 @@
-"""What a step costs over the number of contact points: the plant's, and C MuJoCo's beside it.
+"""Cost of a step by number of contact points: the plant's, and C MuJoCo's beside it.
 
     python benchmarks/contacts.py --points 4 8 12 20 --json contacts.json
 
-A shipped body is given more spheres that reach down to the floor, spread over its feet (`feet`),
-over all its moving bodies (`all`), or over all but 20 cm above the floor (`high`: points that could
-touch and do not). In C MuJoCo it treads on the spot for a second under stable PD, 64 times; those
-states are then stepped again, by the plant (single precision, 64 lanes) and by C (double precision,
-one after the other) in turns, each on one core. A step is `forward` and `advance` of the plant and
-`mj_step` of C, without any controller. Prints a table and writes everything as JSON. Most of its
-time goes into compiling the plant, minutes for 32 points and more.
+A shipped body gets additional spheres that reach down to the floor, spread over its feet (`feet`),
+over all its moving bodies (`all`), or over all at 20 cm above the floor (`high`: points that could
+touch and do not). In C MuJoCo it treads on the spot for a second under stable PD, 64 times. The
+plant (single precision, 64 lanes) and C (double precision, one after the other) then step those
+states again, in turns, each on one core. A step is `forward` and `advance` of the plant and
+`mj_step` of C, without any controller. Prints a table and writes everything as JSON. Compiling the
+plant takes most of the time: minutes for 32 points and more.
 """
 
 import argparse
@@ -41,7 +41,7 @@ LANES = 64
 STEPS = 200
 RADIUS = 0.015
 ABOVE = {"feet": 0.0, "all": 0.0, "high": 0.2}
-"""m above the floor at which a placement puts the lowest points of its spheres."""
+"""Height of a placement's lowest points above the floor in m."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -123,7 +123,7 @@ def timed(replay: Callable[[], object]) -> float:
 
 
 def with_points(env: str, placement: str, count: int) -> Creature:
-    """The shipped body, given massless spheres until it has so many contact points."""
+    """Return the shipped body with massless spheres, up to so many contact points."""
     folder = data_folder("envs") / env
     plain = load_creature(folder)
     bodies = host_bodies(plain, placement)
@@ -172,7 +172,7 @@ def placed(creature: Creature, body: int, turn: int, above: float) -> np.ndarray
 
 
 def tread(creature: Creature) -> Trace:
-    """Stable PD in C MuJoCo, its targets swaying: the first lane stands, the last one treads."""
+    """Run stable PD with swaying targets in C MuJoCo, from standing (lane 0) to treading (last)."""
     rng, model = np.random.default_rng(0), quiet(creature)
     data, mass, joints = (
         mujoco.MjData(model),
@@ -207,7 +207,7 @@ def tread(creature: Creature) -> Trace:
 
 
 def our_replay(plant: Plant, trace: Trace) -> tuple[Callable[[], object], float]:
-    """One pass over the states, every result summed up so that none is left out; s to compile."""
+    """Return a pass over the states that sums up all results, to omit none; s to compile."""
     qpos, qvel, warmstart, torque = (side_by_side(x) for x in dataclasses.astuple(trace))
     states = BodyState(qpos, qvel, warmstart, warmstart, jnp.ones((STEPS, LANES)))
 
@@ -226,12 +226,12 @@ def our_replay(plant: Plant, trace: Trace) -> tuple[Callable[[], object], float]
 
 
 def side_by_side(values: np.ndarray) -> jax.Array:
-    """[T, n, L] of [L * T, n]."""
+    """Rearrange [L * T, n] to [T, n, L]."""
     return jnp.asarray(values.reshape(LANES, STEPS, -1).transpose(1, 2, 0), jnp.float32)
 
 
 def c_replay(creature: Creature, trace: Trace) -> Callable[[], object]:
-    """One pass of `mj_step` over the same states in one thread of C."""
+    """Return a pass of `mj_step` over the same states in one thread of C."""
     model = quiet(creature)
     data = mujoco.MjData(model)
     state = np.concatenate([np.zeros((STEPS * LANES, 1)), trace.qpos, trace.qvel], axis=1)
@@ -264,7 +264,7 @@ def near(creature: Creature, trace: Trace) -> float:
 
 
 def quiet(creature: Creature) -> mujoco.MjModel:
-    """Islands cost more than they save on one creature."""
+    """Return the model without islands, which cost more than they save on one creature."""
     model = creature.evolution_model
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ISLAND)
     model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE

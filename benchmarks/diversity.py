@@ -1,12 +1,12 @@
-"""How different the animals are that separate runs find, and how soon each run is one family.
+"""Diversity of the animals that separate runs find, and of the lineages within each run.
 
     python benchmarks/diversity.py runs/zoo/seed* --picture diversity.png
 
-Prints a row per run: what its champion is, how many families its population has in the end, and from
-which generation on it is one. A family is whoever is descended, mother by mother, from one that had
-no mother: of the first generation, or drawn anew. The picture has the families by generation, and
-the champions by blocks, hinges and speed. For bodies of blocks that go somewhere (swim, walk,
-follow), whose runs tell of mothers (`evolution.lineage`).
+Prints a row per run: its champion, the number of families in the last population, and the first
+generation with only one. A family (lineage) is all individuals descended, mother by mother, from
+one without a mother: of the first generation, or drawn anew. The picture shows the families by
+generation, and the champions by blocks, hinges and speed. For modular bodies that travel (swim,
+walk, follow), in runs that record mothers (`evolution.lineage`).
 """
 
 import argparse
@@ -28,7 +28,7 @@ HEADER = ("run", "certified", "speed", "blocks", "hinges", "mass", "families", "
 
 
 class Animal(NamedTuple):
-    """A run's champion, and how many families its population had by generation."""
+    """A run's champion, and the number of families of its population by generation."""
 
     name: str
     certified: bool
@@ -40,7 +40,7 @@ class Animal(NamedTuple):
 
     @property
     def alone(self) -> int | None:
-        """The generation from which on all were one family."""
+        """First generation with only one family."""
         return self.families.index(1) if 1 in self.families else None
 
 
@@ -69,7 +69,7 @@ def main() -> None:
 
 
 def animal(folder: Path) -> Animal:
-    """What a run folder tells of its champion."""
+    """Read a run folder's champion."""
     told = json.loads((folder / CERTIFICATE).read_text(encoding="utf-8"))
     model = mujoco.MjModel.from_xml_path(str(folder / "body" / "creature.xml"))
     return Animal(
@@ -84,11 +84,11 @@ def animal(folder: Path) -> Animal:
 
 
 def families(mothers: np.ndarray) -> list[int]:
-    """How many there are in each generation. mothers: [G, P] places in the one before."""
+    """Count the families of each generation. mothers: [G, P] indices into the one before."""
     ancestors = np.arange(mothers.shape[1])
     counts = [len(ancestors)]
     for of_generation in mothers[1:].astype(int):
-        # Who has no mother is the first of a family.
+        # An individual without a mother founds a family.
         first = ancestors.max() + 1 + np.arange(len(ancestors))
         ancestors = np.where(of_generation == NOBODY, first, ancestors[of_generation])
         counts.append(len(set(ancestors.tolist())))

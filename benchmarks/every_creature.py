@@ -1,17 +1,15 @@
-"""Trains creatures over seeds, each in a process of its own, and prints a table of what C MuJoCo
-says of the champions.
+"""Train creatures over seeds, each in its own process, and print a table of results in C MuJoCo.
 
     python benchmarks/every_creature.py --env tall_quadruped short_quadruped --seeds 0 1 2 3 4 \\
         --config default --out runs/every
 
-A run that is there already is not repeated. Options after `--` go to `train`, such as
-`-- --cluster HOST:PORT`. Columns: whether the champion is certified ("outdated"
-when the certificate is another champion's, or does not say whose) and the margin of its worst
-criterion; which criteria fail; speed over the certificate's 20 s; body lengths per second from the
-nominal start over evolution's own episode, in the simulation that evolved it and in C MuJoCo; share
-of 64 perturbed starts, which evolution never saw, that are up and forward after an episode and
-after 22 s; generations; wall time of the whole command, start-up, compilation and examination
-included.
+An existing run is not repeated. Options after `--` go to `train`, such as
+`-- --cluster HOST:PORT`. Columns: whether the champion is certified ("outdated" when the
+certificate belongs to another champion, or names none) and the margin of its worst criterion; the
+criteria that fail; speed over the certificate's 20 s; body lengths per second from the nominal
+start over evolution's own episode, in the simulation that evolved it and in C MuJoCo; share of 64
+perturbed starts, unused in evolution, that are up and forward after an episode and after 22 s;
+generations; wall time of the whole command, with start-up, compilation and examination.
 """
 
 import argparse
@@ -80,7 +78,7 @@ def main() -> None:
 
 
 def train(folder: Path, name: str, seed: int, more: list[str]) -> float:
-    """Wall time of the run in s; the one noted beside it when it is there already. more: options."""
+    """Wall time of the run in s; for an existing one, the time noted beside it. more: options."""
     note = folder.with_suffix(".wall")
     if not note.exists():
         given = ["--env", name, "--seed", str(seed), "--out", str(folder), "--no-plots"]
@@ -92,7 +90,7 @@ def train(folder: Path, name: str, seed: int, more: list[str]) -> float:
 
 
 def row(folder: Path, seed: int, wall: float) -> list[str]:
-    """What the run folder and two more looks in C MuJoCo say."""
+    """Return a row from the run folder and two more simulations in C MuJoCo."""
     (creature, champion), (_, config) = open_champion(folder), open_run(folder)
     certificate = read_certificate(folder / CERTIFICATE) or sys.exit(
         f"{folder}: no certificate; delete it, and it is made again"

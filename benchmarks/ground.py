@@ -1,11 +1,11 @@
-"""What a step costs on each kind of ground, against the plane z = 0.
+"""Cost of a step on each kind of ground, relative to the plane z = 0.
 
     python benchmarks/ground.py --env tall_quadruped duck --json ground.json
 
 As in benchmarks/bodies.py: the plant's step with stable PD towards the standing pose, 64 lanes on
-one core, no controller, tally or genetic algorithm; heights above the ground are used. All stand
-where the ground is level, so every way steps through the same motion, turn by turn in one process;
-a ratio is taken within a round.
+one core, no controller, episode statistics or genetic algorithm; heights above the ground are used.
+All stand where the ground is level, so every variant steps through the same motion, in turns in one
+process; a ratio is taken within a round.
 """
 
 import argparse
@@ -54,7 +54,7 @@ def main() -> None:
 
 
 def measure(env: str, rounds: int) -> list[dict[str, Any]]:
-    """us of processor time per creature-step in each round, and s to compile, on each ground."""
+    """us of processor time per creature-step in each round, and s to compile, per ground."""
     creature = load_creature(find_creature(env))
     plant, _ = make_plant(creature, "auto", True)
     if plant.lane_axis != -1:
@@ -77,7 +77,7 @@ def measure(env: str, rounds: int) -> list[dict[str, Any]]:
 
 
 def build(creature: Creature, plant: Plant, text: str) -> tuple[Callable[[], jax.Array], float]:
-    """A pass of so many steps, and s to compile it."""
+    """Return a pass of so many steps, and s to compile it."""
     spec = parse_ground(text)
     ground = lay_ground(spec, start_place(creature), named_draws(spec.seed))
     every = jax.tree.map(lambda leaf: jnp.tile(leaf[..., None], LANES), ground)
@@ -98,7 +98,7 @@ def build(creature: Creature, plant: Plant, text: str) -> tuple[Callable[[], jax
 
 
 def least(low: jax.Array, sensed: Sensed) -> jax.Array:
-    """The lowest [L] m that anything was above the ground: so heights cannot be left out."""
+    """Lowest height [L] of anything above the ground in m, so that heights cannot be omitted."""
     low = jnp.minimum(low, sensed.geom_low.min(0))
     return low if sensed.floor is None else jnp.minimum(low, sensed.trunk_pos[2] - sensed.floor)
 

@@ -1,13 +1,12 @@
-"""From model files that nobody here wrote to certified walks: imports and trains each in processes
-of its own, and prints a table.
+"""Import and train third-party models, each in its own processes, and print a table of their walks.
 
     python benchmarks/imported.py --models "laikago" "gym ant" --out runs/imported
 
-Names are those of `tests/importing/packages.py`, whose files come from the package index; `--files`
-takes others, such as the rigs that `benchmarks/rig_of_blender.py` writes. Options after `--` go to
-`train`. Columns: wall time of both commands together and of the import alone;
-whether the champion is certified, and the margin of its worst criterion; speed over the
-certificate's 20 s; generations; what fails, each measure with its value.
+Names are those of `tests/importing/packages.py`, with files from the package index; `--files` takes
+others, such as the rigs that `benchmarks/rig_of_blender.py` writes. Options after `--` go to
+`train`. Columns: wall time of both commands together and of the import alone; whether the champion
+is certified, and the margin of its worst criterion; speed over the certificate's 20 s; generations;
+failed measures with their values.
 """
 
 import argparse
@@ -59,7 +58,7 @@ def main() -> None:
 
 
 def walk(name: str, path: Path, search: Sequence[Path], out: Path, more: list[str]) -> list[str]:
-    """A row of the table; a refusal of the import or of the training is its last column."""
+    """Return a row of the table; if import or training is refused, its last column says why."""
     env, run = (out / kind / name.replace(" ", "_") for kind in ("envs", "runs"))
     for folder in (env, run):
         shutil.rmtree(folder, ignore_errors=True)
@@ -78,7 +77,7 @@ def walk(name: str, path: Path, search: Sequence[Path], out: Path, more: list[st
 
 
 def _mjxgait(log: Path, *command: str) -> str:
-    """Runs a command, its output into a file; what it says last if it fails, else nothing."""
+    """Run a command, log its output; return its last line of errors if it fails, else nothing."""
     log.parent.mkdir(parents=True, exist_ok=True)
     done = subprocess.run(
         python_command("mjxgait", *command), capture_output=True, text=True, check=False

@@ -1,9 +1,9 @@
-"""Run by a Python that has Blender as a module (`pip install bpy`): opens an exported walk as Blender
-does, says what is there, turns bones at every frame as an animator would, and exports it again.
+"""Open an exported walk in Blender, report its contents, turn bones and export it again.
 
 PYTHON benchmarks/in_blender.py IN.glb OUT.glb --turn hind_left_upper=-12 --picture bones.png
 
-Prints one line of JSON. Lengths are m; Blender has Z up.
+Needs a Python that has Blender as a module (`pip install bpy`). Turns bones at every frame, as an
+animator would. Prints one line of JSON. Lengths are m; Blender has Z up.
 """
 
 import argparse
@@ -15,7 +15,7 @@ from mathutils import Quaternion, Vector  # type: ignore[import-not-found]
 
 SIZE, SAMPLES = (560, 400), 64
 THICK = 0.06
-"""Of a bone's length, the half width of its picture."""
+"""Half width of a drawn bone over its length."""
 
 
 def main() -> None:
@@ -42,7 +42,7 @@ def main() -> None:
 
 
 def opened(file: Path) -> bpy.types.Object:
-    """The skeleton of a file in a scene that has its frame rate, so that keys lie on frames."""
+    """Return a file's skeleton in a scene with its frame rate, so that keys lie on frames."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.import_scene.gltf(filepath=str(file))
     rate = next(b["frames_per_s"] for b in armature().data.bones if "frames_per_s" in b)
@@ -61,7 +61,7 @@ def armature() -> bpy.types.Object:
 
 
 def said(skeleton: bpy.types.Object) -> dict[str, object]:
-    """What a user sees of the file."""
+    """Describe what a user sees of the file."""
     action = skeleton.animation_data.action
     ends = action.frame_range
     return {
@@ -79,7 +79,7 @@ def said(skeleton: bpy.types.Object) -> dict[str, object]:
 
 
 def turn(skeleton: bpy.types.Object, name: str, degrees: float) -> None:
-    """A bone about its own X axis, at every frame."""
+    """Turn a bone about its own X axis, at every frame."""
     bone, scene = skeleton.pose.bones[name], bpy.context.scene
     bent = Quaternion((1.0, 0.0, 0.0), degrees / 57.29577951308232)
     keys = []
@@ -92,8 +92,10 @@ def turn(skeleton: bpy.types.Object, name: str, degrees: float) -> None:
 
 
 def draw(skeleton: bpy.types.Object, file: Path) -> None:
-    """The creature at rest, seen through, with its bones as Blender draws them; by the processor,
-    for which no display is needed."""
+    """Draw the creature at rest, transparent, with its bones as Blender draws them.
+
+    Renders on the processor, which needs no display.
+    """
     scene = bpy.context.scene
     skeleton.data.pose_position = "REST"
     for material in bpy.data.materials:
@@ -126,7 +128,7 @@ def draw(skeleton: bpy.types.Object, file: Path) -> None:
 
 
 def add_bone(head: Vector, tail: Vector, material: bpy.types.Material) -> None:
-    """An octahedron from a bone's head to its tail."""
+    """Add an octahedron from a bone's head to its tail."""
     way = tail - head
     turned = way.to_track_quat("Y", "Z")
     thick, waist = THICK * way.length, head + 0.1 * way

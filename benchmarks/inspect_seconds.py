@@ -1,4 +1,4 @@
-"""Processor seconds that `mjxgait inspect RUN` takes, the median of some: it should stay below 3.
+"""Median processor seconds of `mjxgait inspect RUN`; should stay below 3.
 
 python benchmarks/inspect_seconds.py runs/every/duck-0 --times 5
 """
@@ -12,7 +12,7 @@ from mjxgait.processes import python_command
 
 
 def seconds(run: str) -> float:
-    """Of one call, of all its processes; a busy machine changes it little."""
+    """Seconds of one call, of all its processes; other load on the machine changes it little."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     command = python_command("mjxgait", "inspect", run, "--json")
     subprocess.run(command, capture_output=True, check=True)

@@ -2,8 +2,8 @@
 
     python benchmarks/islands.py runs/islands.json
 
-All seeds and islands of a way are rows of one program, so it takes minutes and no cluster. Each way
-is kept in the file as it ends; what is there already is not run again.
+All seeds and islands of a variant are rows of one program, so it takes minutes and no cluster. Each
+variant is stored in the file when it ends; stored ones are not run again.
 """
 
 import argparse
@@ -63,7 +63,7 @@ def main() -> None:
 
 
 def best(options: argparse.Namespace, islands: IslandsConfig) -> dict[str, Any]:
-    """The best fitness [seed] of each generation."""
+    """Return the best fitness [seed] of each generation."""
     creature = load_creature(options.env)
     config = resolve_config(creature.settings.train, creature.name)
     table = {
@@ -93,7 +93,7 @@ def rows(config: Config, seeds: int, count: int) -> list[Config]:
 
 
 def exchange(states: EvolutionState, abstract: Any, islands: IslandsConfig) -> EvolutionState:
-    """Seed by seed."""
+    """Exchange individuals between the islands of each seed."""
     packed = pack(states)
     each = [
         Packed({name: array[row] for name, array in packed.arrays.items()}, packed.key_impl)

@@ -1,9 +1,9 @@
-"""Ten cycles as a textbook draws them, refined until they walk: `python benchmarks/keyed.py FOLDER`.
+"""Ten textbook cycles, refined until they walk: `python benchmarks/keyed.py FOLDER`.
 
-A chart says when each leg carries, how far its hip swings and how far its knee bends on the way
-forward; nobody has simulated it. Each is written as a CSV file of angles and given to `mjxgait
-refine`; a line of JSON per cycle tells what became of it. `--only NAME ...` takes some of them;
-other options are handed on: `--config near.toml`.
+A chart gives the stance time of each leg, the swing of its hip and the bend of its knee on the way
+forward; it was never simulated. Each is written as a CSV file of angles and passed to `mjxgait
+refine`; a line of JSON per cycle gives the result. `--only NAME ...` selects some of them; other
+options are passed on: `--config near.toml`.
 """
 
 import argparse
@@ -22,7 +22,7 @@ from mjxgait.processes import python_command
 from mjxgait.training.folder import CERTIFICATE
 
 RATE = 24
-"""Frames/s, as films are drawn."""
+"""Frames/s, the usual rate of films."""
 LEGS = ("front_left", "front_right", "hind_left", "hind_right")
 GAITS = {
     "walk": (0.25, 0.75, 0.0, 0.5),
@@ -30,7 +30,7 @@ GAITS = {
     "pace": (0.0, 0.5, 0.0, 0.5),
     "amble": (0.2, 0.7, 0.0, 0.5),
 }
-"""At which share of the cycle each leg comes down."""
+"""Share of the cycle at which each leg touches down."""
 CHARTS = {
     "short trot": ("short_quadruped", "trot", 0.5, 0.5, 20.0, 35.0),
     "short walk": ("short_quadruped", "walk", 0.65, 0.6, 22.0, 35.0),
@@ -43,11 +43,11 @@ CHARTS = {
     "duck waddle": ("duck", "", 0.55, 0.55, 20.0, 35.0),
     "duck stroll": ("duck", "", 0.7, 0.6, 22.0, 35.0),
 }
-"""Creature, gait, seconds of a cycle, share of it that a leg carries, degrees of hip and knee."""
+"""Creature, gait, seconds of a cycle, duty factor, degrees of hip and knee."""
 
 
 def leg(share: np.ndarray, carries: float, hip: float, knee: float) -> tuple[np.ndarray, ...]:
-    """How far forward a leg is and how much it is bent, deg, at shares [F] of its own cycle."""
+    """Return the hip and knee angles of a leg, deg, at shares [F] of its own cycle."""
     on_floor = share < carries
     swing = np.clip((share - carries) / (1.0 - carries), 0.0, 1.0)
     forward = np.where(on_floor, 1.0 - 2.0 * share / carries, -np.cos(np.pi * swing))
@@ -55,7 +55,7 @@ def leg(share: np.ndarray, carries: float, hip: float, knee: float) -> tuple[np.
 
 
 def drawn(creature: Creature, name: str) -> dict[str, np.ndarray]:
-    """Angles [F] in degrees by joint, the last frame equal to the first."""
+    """Return angles [F] in degrees by joint, the last frame equal to the first."""
     kind, gait, seconds, carries, hip, knee = CHARTS[name]
     time = np.linspace(0.0, 1.0, round(seconds * RATE) + 1)
     angles = {}
@@ -82,7 +82,7 @@ def drawn(creature: Creature, name: str) -> dict[str, np.ndarray]:
 
 
 def write_cycle(folder: Path, name: str) -> Path:
-    """The CSV file of a chart."""
+    """Write the CSV file of a chart."""
     creature = load_creature(find_creature(CHARTS[name][0]))
     angles = drawn(creature, name)
     seconds = CHARTS[name][2]
@@ -95,7 +95,7 @@ def write_cycle(folder: Path, name: str) -> Path:
 
 
 def refined(folder: Path, name: str, keep: float, others: list[str]) -> dict[str, object]:
-    """What became of a chart; others: options of the command."""
+    """Refine a chart and return the result; others: options of the command."""
     file, run = write_cycle(folder, name), folder / name.replace(" ", "-")
     kind, began = CHARTS[name][0], time.perf_counter()
     command = python_command("mjxgait", "refine", "--env", kind, "--keys", str(file))

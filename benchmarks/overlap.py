@@ -1,4 +1,4 @@
-"""How deep parts of champions stand in each other: `python benchmarks/overlap.py RUN...`.
+"""Depth of overlap between parts of champions: `python benchmarks/overlap.py RUN...`.
 
 Measured by C MuJoCo on the true shapes (`mj_geomDistance`), in every other frame of the undisturbed
 walk of 20 s, between parts that are not neighbours, beyond their depth in the standing pose.
@@ -21,9 +21,9 @@ from mjxgait.training.folder import CERTIFICATE, open_champion
 
 SECONDS = 20.0
 EVERY = 2
-"""Frames: one in so many is looked at."""
+"""Frames per measured frame."""
 WORTH = 0.01
-"""Hip heights; what counts as a frame with parts in each other."""
+"""Depth in hip heights above which a frame counts as overlapping."""
 
 
 class Depths:
@@ -41,7 +41,7 @@ class Depths:
         self.usual = np.array([max(self._depth(a, b), 0.0) for a, b in self.pairs])
 
     def of(self, qpos: np.ndarray) -> tuple[float, tuple[str, str]]:
-        """The deepest in a pose [nq], m, and whose it is; 0 if none is deeper than standing."""
+        """Return the greatest depth in a pose [nq], m, and its parts; 0 if standing is as deep."""
         self._place(qpos)
         bound = self.model.geom_rbound[self.pairs].sum(1)
         centre = self.data.geom_xpos[self.pairs]
@@ -64,14 +64,14 @@ class Depths:
 
 
 def walk_of(folder: Path) -> tuple[Creature, np.ndarray]:
-    """The creature of a run, and its champion's undisturbed walk [T, nq]."""
+    """Return the creature of a run, and its champion's undisturbed walk [T, nq]."""
     creature, champion = open_champion(folder)
     walk = simulate(creature, champion, nominal_starts(creature, 1), SECONDS, record=1).trajectory
     return creature, walk.qpos[0]
 
 
 def describe(folder: Path) -> str:
-    """One line of the table."""
+    """Return one line of the table."""
     creature, walk = walk_of(folder)
     depths = Depths(creature)
     found = [depths.of(qpos) for qpos in walk[::EVERY]]
@@ -89,7 +89,7 @@ def describe(folder: Path) -> str:
 
 
 def main(folders: Iterable[str]) -> None:
-    """Prints a table."""
+    """Print a table."""
     print(
         "| run | deepest | whose | frames beyond 1 % | certified | m/s |\n|---|---|---|---|---|---|"
     )

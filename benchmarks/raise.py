@@ -1,25 +1,24 @@
-"""How much more than the certificate asks a champion can bear, as a table for docs/results.md; all
-in C MuJoCo by the examiner.
+"""Limits of champions beyond the certificate, in C MuJoCo, as a table for docs/results.md.
 
     python benchmarks/raise.py runs/every/tall_quadruped-0 runs/every/duck-0 --json raise.json
 
-The starts are those of the certificate's criterion 4 with another seed; the same ones for every
-column. `A%, B%`: share that stays up for 22 s, and the mean way forward over that of the same
-starts on the plain floor, what falls counting up to its fall. Columns:
+The starts are those of the certificate's criterion 4 with another seed, the same for every column.
+`A%, B%`: share that stays up for 22 s, and the mean forward distance over that of the same starts
+on the plain floor, up to the fall if there is one. Columns:
 
 - push: sudden change of the trunk's horizontal velocity, in sqrt(g h), that fells half; from any
   side, between 2 and 4 s, 5 s to fall.
-- plain: the floor of evolution; the share that stays up and the speed in body lengths/s.
+- plain: the floor of evolution; share that stays up and speed in body lengths/s.
 - bumps: rough ground (docs/ground.md) that rises and falls by at most this share of the hip height;
   four of them, a quarter of the starts on each. Other parts than feet may touch it.
 - uphill, downhill: steepest slope in degrees on which 90 % stay up and get more than a body length
   forward, all gentler ones included.
 - friction, trunk: coefficient of sliding friction 0.4 instead of 0.9; mass and inertia of the trunk
   body 1.3 times as large.
-- 10 min: how many of one undisturbed and three perturbed walks of ten minutes stay up.
-- turn at once, turn gently: one undisturbed walk, left / right; s from the command to turn by 90
-  degrees, at once or growing by 15 a second, until the heading, mean over a second, comes within 15
-  degrees and stays there for the rest of the 40 s; else what it was at the end.
+- 10 min: number of ten-minute walks that stay up, of one undisturbed and three perturbed.
+- turn at once, turn gently: one undisturbed walk, left / right. The command turns by 90 degrees, at
+  once or at 15 degrees a second. s from the command until the heading, mean over a second, comes
+  within 15 degrees and stays there for the rest of the 40 s; else the heading at the end.
 """
 
 import argparse
@@ -58,7 +57,7 @@ PUSHES = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 1.0, 1.2, 1.6)
 LONG = 600.0
 BEFORE_TURN, TURN_SECONDS, WITHIN = 5.0, 40.0, 15.0
 TURNS = {"turn_at_once": np.inf, "turn_gently": 15.0}
-"""Degrees per second by which the commanded heading grows."""
+"""Rate of the commanded heading in degrees per second."""
 HEADER = (
     "run",
     "push",
@@ -99,14 +98,14 @@ def main() -> None:
 
 
 def note(run: str) -> Callable[[str], None]:
-    """Tells what is being tried, where it is not in the table's way."""
+    """Return a function that prints the current trial to standard error, outside the table."""
     return lambda trial: print(f"{run}: {trial}", file=sys.stderr, flush=True)
 
 
 def examine(
     creature: Creature, champion: Champion, count: int, tell: Callable[[str], None]
 ) -> dict[str, Any]:
-    """All trials of one champion."""
+    """Run all trials of one champion."""
     starts = perturbed_starts(creature, count, np.random.default_rng(SEED))
     tell("plain")
     plain = simulate(creature, champion, starts, SECONDS)
@@ -149,7 +148,7 @@ def share_up(*outcomes: Outcome) -> float:
 
 
 def bearing(outcomes: Sequence[Outcome], way: float) -> dict[str, float]:
-    """Share that stays up, and forward way over that on the plain floor, `way` in m."""
+    """Share that stays up, and forward distance over that on the plain floor, `way` in m."""
     travel = np.concatenate([outcome.travel[:, 0] for outcome in outcomes])
     return {"up": share_up(*outcomes), "distance": float(travel.mean() / way)}
 
@@ -157,7 +156,7 @@ def bearing(outcomes: Sequence[Outcome], way: float) -> dict[str, float]:
 def bumps(
     creature: Creature, champion: Champion, starts: Starts, amplitude: float
 ) -> list[Outcome]:
-    """On each of the floors its share of the starts; amplitude: hip heights."""
+    """Simulate an equal share of the starts on each floor; amplitude: hip heights."""
     floors = [creature.on(f"rough:{amplitude:g}@{SEED + i}") for i in range(FLOORS)]
     shares = [starts.rows(np.arange(i, len(starts), FLOORS)) for i in range(FLOORS)]
     return [
@@ -167,7 +166,7 @@ def bumps(
 
 
 def slopes(creature: Creature, champion: Champion, starts: Starts, sign: int) -> dict[str, Any]:
-    """Ever steeper ones, up to the first that too many do not manage."""
+    """Try ever steeper slopes, up to the first that too few manage."""
     managed, steepest = {}, 0.0
     for degrees in SLOPES:
         outcome = simulate(sloping(creature, sign * np.radians(degrees)), champion, starts, SECONDS)
@@ -192,9 +191,7 @@ def heavier_trunk(creature: Creature, starts: Starts, factor: float) -> Starts:
 
 
 def turn(creature: Creature, champion: Champion, degrees: float, rate: float) -> dict[str, Any]:
-    """Straight on for a while, then with another heading commanded, which is approached by
-    `rate` degrees/s.
-    """
+    """Walk straight, then command another heading, approached at `rate` degrees/s."""
     time_step = creature.model.opt.timestep
     before, steps = round(BEFORE_TURN / time_step), round((BEFORE_TURN + TURN_SECONDS) / time_step)
     since = np.maximum(np.arange(steps) - before + 1, 0) * time_step
@@ -218,13 +215,13 @@ def turn(creature: Creature, champion: Champion, degrees: float, rate: float) ->
         np.full(width, 1 / width),
         "valid",
     )[before:]
-    # NaN, after a simulation blew up, counts as off.
+    # NaN, from a diverged simulation, counts as off.
     off = np.flatnonzero(~(np.abs(mean - degrees) <= WITHIN))
     arrived = int(off[-1]) + 1 if len(off) else 0
     reached = bool(outcome.stayed_up[0]) and arrived < len(mean)
     return {
         "reached": reached,
-        # A mean over a second is known at its end.
+        # A mean over a second is complete at its end.
         "seconds": arrived * time_step + 1.0 if reached else None,
         "fell": float(outcome.fell[0] - BEFORE_TURN) if not outcome.stayed_up[0] else None,
         "heading_at_end": float(mean[-1]) if np.isfinite(mean[-1]) else None,
@@ -269,7 +266,7 @@ def long_walk(creature: Creature, champion: Champion, starts: Starts) -> dict[st
 
 
 def cells(found: dict[str, Any]) -> list[str]:
-    """One row of the table."""
+    """Return one row of the table."""
 
     def borne(name: str) -> str:
         return f"{found[name]['up']:.0%}, {found[name]['distance']:.0%}"

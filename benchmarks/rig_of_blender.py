@@ -1,10 +1,10 @@
-"""Run by a Python that has Blender as a module (`pip install bpy`): writes a rig that its makers drew
-as a BVH skeleton and as a skinned GLB, at rest.
+"""Write a Blender rig as a BVH skeleton and as a skinned GLB, at rest.
 
 PYTHON benchmarks/rig_of_blender.py Animals.wolf FOLDER
 
-Kinds are those of Blender's add-on Rigify: Animals.horse, Basic.basic_quadruped, human, ... A rig has
-no skin, so tubes along its bones are one, each of which follows its bone.
+Needs a Python that has Blender as a module (`pip install bpy`). Kinds are those of Blender's add-on
+Rigify: Animals.horse, Basic.basic_quadruped, human, ... These rigs have no skin, so each bone gets
+a tube that follows it.
 """
 
 import argparse
@@ -39,7 +39,7 @@ def main() -> None:
 
 
 def drawn(kind: str) -> bpy.types.Object:
-    """The skeleton of a kind, alone in its scene."""
+    """Return the skeleton of a kind, alone in its scene."""
     rig = bpy.data.objects.new("rig", bpy.data.armatures.new("rig"))
     bpy.context.scene.collection.objects.link(rig)
     bpy.context.view_layer.objects.active = rig
@@ -50,7 +50,7 @@ def drawn(kind: str) -> bpy.types.Object:
 
 
 def wrapped(rig: bpy.types.Object) -> None:
-    """Adds a mesh of tubes that follows the bones."""
+    """Add a mesh of tubes that follows the bones."""
     corners, faces, groups = [], [], {}
     for bone in rig.data.bones:
         first = len(corners)

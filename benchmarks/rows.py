@@ -1,11 +1,10 @@
-"""Useful creature-steps per second of a study's rows against those of a single run, generation by
-generation in turns.
+"""Useful creature-steps per second of a study's rows relative to a single run's, in turns.
 
     python benchmarks/rows.py --variants 4 --seeds 16 --generations 4
 
-Both are the shipped tall_quadruped, or another creature, with its own settings and the same lanes; the
-study's variants differ in their mutation rate. Prints both rates for each generation, the median ratio, and
-the largest memory of the process before and after.
+Both alternate by generation, with the shipped tall_quadruped or another creature, its own settings
+and the same lanes; the study's variants differ in their mutation rate. Prints both rates for each
+generation, the median ratio, and the peak memory of the process before and after.
 """
 
 import argparse
@@ -78,14 +77,14 @@ def variant(config: Config, number: int, seed: int) -> Config:
 
 
 def timed(step, state):
-    """The next state, and useful steps per second."""
+    """Return the next state, and useful steps per second."""
     began = time.perf_counter()
     state, metrics = jax.block_until_ready(step(state))
     return state, int(metrics.sim_steps.sum()) / (time.perf_counter() - began)
 
 
 def memory() -> float:
-    """Peak of this process in MiB."""
+    """Peak memory of this process in MiB."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 

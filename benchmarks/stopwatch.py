@@ -1,9 +1,9 @@
-"""`mjxgait train` in this process, and how long each of its parts has held it up.
+"""`mjxgait train` in this process, with the time that each of its parts delayed it.
 
     python benchmarks/stopwatch.py parts.json --env tall_quadruped --seed 0
 
-All after the first argument is handed on to `train`. What is timed are the functions that the run's
-own loop calls, one after the other in the main thread; what is left goes to `rest`.
+Arguments after the first go to `train`. Timed are the functions that the run's own loop calls, one
+after the other in the main thread; the remainder is `rest`.
 """
 
 import functools
@@ -27,7 +27,7 @@ class Stopwatch:
         self.seconds[part] = self.seconds.get(part, 0.0) + seconds
 
     def timed(self, part: str, function: Callable[..., Any]) -> Callable[..., Any]:
-        """The same function, whose calls count for a part."""
+        """Return the same function, with its calls timed for a part."""
 
         @functools.wraps(function)
         def run(*args: Any, **kwargs: Any) -> Any:
@@ -40,7 +40,7 @@ class Stopwatch:
         return run
 
     def watch(self, owner: object, name: str, part: str) -> None:
-        """Times the calls of what an object or a module knows by a name."""
+        """Time the calls of a function, given by its name in an object or a module."""
         setattr(owner, name, self.timed(part, getattr(owner, name)))
 
 
@@ -64,7 +64,7 @@ def main() -> None:
     watch.watch(stages, "lowered", "tracing")
     watch.watch(experiment, "compile_stages", "compiling")
     watch.watch(loop, "_generation", "evolution")
-    # What goes on beside evolution holds it up only where it is waited for.
+    # Validation runs in parallel: it delays evolution only where the loop waits.
     watch.watch(looks.Looks, "found", "waiting for looks")
     watch.watch(examination.Examiner, "best", "examination at the end")
     watch.watch(checkpoint.Checkpoints, "save", "checkpoints")
@@ -75,7 +75,7 @@ def main() -> None:
     except SystemExit as end:
         code = int(end.code or 0)
     whole = time.perf_counter() - BEGAN
-    # What is traced meanwhile holds up nobody twice.
+    # Tracing happens during compiling: count it once.
     watch.add("compiling", -watch.seconds.get("tracing", 0.0))
     watch.add("rest", whole - sum(watch.seconds.values()))
     Path(path).write_text(json.dumps(watch.seconds, indent=2) + "\n", encoding="utf-8")

@@ -1,10 +1,10 @@
-"""Seconds from the command to a certified walk, and where they go: `mjxgait train` in new processes,
-first with an empty cache, then with a warm one.
+"""Seconds from the command to a certified walk, by part, with an empty and then a warm cache.
 
     python benchmarks/time_to_walk.py --json walk.json --picture walk.png
 
-Each seed is run twice in a cache folder of its own: the first run finds nothing compiled, the
-second finds everything. `benchmarks/stopwatch.py` times the parts from within.
+Each `mjxgait train` is a new process. Each seed is run twice in a cache folder of its own: the
+first run finds nothing compiled, the second everything. `benchmarks/stopwatch.py` times the parts
+from within.
 """
 
 import argparse
@@ -34,7 +34,7 @@ PARTS = (
 
 
 def run(env: str, seed: int, cache: Path, folder: Path, more: list[str]) -> dict:
-    """One run of the command: its wall time, and what came of it."""
+    """Run the command once and return its wall time and results."""
     parts = folder.with_suffix(".parts.json")
     command = [
         sys.executable,
@@ -62,7 +62,7 @@ def run(env: str, seed: int, cache: Path, folder: Path, more: list[str]) -> dict
         for line in (folder / "metrics.jsonl").read_text(encoding="utf-8").splitlines()
     ]
     held_up = json.loads(parts.read_text(encoding="utf-8"))
-    # Of the interpreter's own start and end the stopwatch knows nothing.
+    # The stopwatch misses the interpreter's own start and end.
     held_up["rest"] += seconds - sum(held_up.values())
     certificate = json.loads((folder / "certificate.json").read_text(encoding="utf-8"))
     shares = [line["sim_steps"] / line["computed_steps"] for line in lines]
@@ -105,7 +105,7 @@ def main() -> None:
 
 
 def report(runs: dict[str, list[dict]]) -> dict:
-    """Medians of the runs so far, means of their parts, and how busy the machine is."""
+    """Medians of the runs so far, means of their parts, and the machine's load."""
     medians = {
         f"{kind}_median_s": median(entry["seconds"] for entry in entries)
         for kind, entries in runs.items()
@@ -122,7 +122,7 @@ def report(runs: dict[str, list[dict]]) -> dict:
 
 
 def draw(reports: dict[str, dict], path: Path) -> None:
-    """A bar for each creature, cold and warm: the mean seconds of each part."""
+    """Draw a bar for each creature, cold and warm: the mean seconds of each part."""
     bars = {
         f"{env}, {kind}": of[f"{kind}_parts_s"] for env, of in reports.items() for kind in KINDS
     }

@@ -1,11 +1,10 @@
-"""What comes of what is asked of a walk: `mjxgait train` with speeds and gaits asked for, in new
-processes, one after the other.
+"""Results of `mjxgait train` with target speeds and gaits, in new processes, one after the other.
 
     python benchmarks/wishes.py --json wishes.json
     python benchmarks/wishes.py --env crab --speeds 0.25 1 --gaits --seeds 0 1 --json crab.json
 
-For each creature every speed, then every gait that a body with so many feet has; one row each, with
-the speed in C MuJoCo, the gait's name there, how like an animal's it is, whether the champion is
+For each creature every speed, then every gait for its number of feet; one row each, with the speed
+in C MuJoCo, the gait's name there, stride and duty factor over an animal's, whether the champion is
 certified, and the wall time. Options after `--` go to `train`, such as `-- --cluster HOST:PORT`.
 """
 
@@ -68,7 +67,7 @@ def main() -> None:
 
 
 def run(env: str, wish: list[str], seed: int, more: list[str]) -> dict:
-    """One run of the command, and what came of it."""
+    """Run the command once and return its results."""
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch) / "run"
         command = python_command("mjxgait", "train", "--env", env, "--seed", str(seed))

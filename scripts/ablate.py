@@ -1,6 +1,6 @@
-"""Compares variants of the settings: `python scripts/ablate.py forced_evolution --out runs/forced`.
+"""Compare variants of the settings: `python scripts/ablate.py forced_evolution --out runs/forced`.
 
-The same as `mjxgait ablate`.
+Same as `mjxgait ablate`.
 """
 
 import sys

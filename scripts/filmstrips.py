@@ -1,5 +1,6 @@
-"""Makes docs/filmstrips.md, one stride of each champion: `python scripts/filmstrips.py
-runs/every/*-[0-4]`.
+"""Draw one stride of each champion and write docs/filmstrips.md.
+
+python scripts/filmstrips.py runs/every/*-[0-4]
 """
 
 import sys
@@ -18,7 +19,7 @@ WIDTH = 1100
 
 
 def strip(run: Path, name: str) -> Path:
-    """The filmstrip of a run as a small picture in the docs."""
+    """Draw the filmstrip of a run, write it as a small picture to the docs, return its path."""
     picture = DOCS / "images" / "strips" / f"{name}.webp"
     picture.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as scratch:

@@ -1,6 +1,6 @@
-"""Tells what a checkpoint holds: `python scripts/inspect_checkpoint.py RUN`.
+"""Show the contents of a checkpoint: `python scripts/inspect_checkpoint.py RUN`.
 
-The same as `mjxgait inspect`.
+Same as `mjxgait inspect`.
 """
 
 import sys

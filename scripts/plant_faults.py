@@ -1,9 +1,9 @@
-"""Plants the faults of tests/faults.toml, one at a time, and says which test catches each.
+"""Plant the faults of tests/faults.toml, one at a time, and report which test catches each.
 
 `python scripts/plant_faults.py [NAME ...]`: every fault, or those named. Each is planted in a copy
-of the tree, never in the checkout. The tests named for it run first, then, if none of these fails,
-the rest of the quick ones. Needs no network. Exits with 1 when a fault is not caught, or when its
-old text is not there exactly once. docs/testing.md says what it is for.
+of the tree, never in the checkout. The tests named for it run first; if they pass, the other quick
+tests run. Needs no network. Exits with 1 when a fault is not caught, or when its old text does not
+occur exactly once. docs/testing.md describes its purpose.
 """
 
 import argparse
@@ -25,18 +25,18 @@ ROOT = Path(__file__).resolve().parents[1]
 LIST = ROOT / "tests" / "faults.toml"
 LEFT_OUT = (".*", "__pycache__", "*.egg-info")
 AT_THE_TOP = ("build", "dist", "runs")
-"""What a copy of the tree does without, everywhere and at its top."""
+"""Names that a copy of the tree omits: everywhere, and at its top."""
 LONGEST = 900
-"""Seconds for one run of tests; a fault that makes them hang counts as not caught."""
+"""Time limit of a test run in seconds; a fault that makes tests hang counts as not caught."""
 FAILURE = re.compile(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", re.MULTILINE)
 
 
 @dataclasses.dataclass(frozen=True)
 class Fault:
-    """A mistake that somebody could make.
+    """A plausible mistake.
 
-    file: where, from the root. old, new: the text and what takes its place. tests: arguments of
-    pytest that are likely to catch it. why: what goes wrong, in a line.
+    file: path from the root. old, new: the text and its replacement. tests: arguments of pytest
+    that are likely to catch it. why: what goes wrong, in a line.
     """
 
     name: str
@@ -49,7 +49,7 @@ class Fault:
 
 @dataclasses.dataclass(frozen=True)
 class Finding:
-    """What became of a fault. caught_by: the first test that failed, None where all passed."""
+    """Result of a fault. caught_by: the first test that failed, None where all passed."""
 
     fault: Fault
     caught_by: str | None
@@ -58,16 +58,16 @@ class Finding:
 
 
 def read_faults(path: Path = LIST) -> list[Fault]:
-    """The faults of a list, in its order."""
+    """Return the faults of a list, in its order."""
     rows = tomllib.loads(path.read_text(encoding="utf-8"))["fault"]
     return [Fault(**{**row, "tests": tuple(row["tests"])}) for row in rows]
 
 
 def planted(fault: Fault, root: Path = ROOT) -> str:
-    """The text of the fault's file with the fault in it.
+    """Return the text of the fault's file with the fault in it.
 
     Raises:
-      ValueError: the old text is not there exactly once.
+      ValueError: the old text does not occur exactly once.
     """
     text = (root / fault.file).read_text(encoding="utf-8")
     if (count := text.count(fault.old)) != 1:
@@ -80,7 +80,7 @@ def planted(fault: Fault, root: Path = ROOT) -> str:
 def run_tests(
     tree: Path, arguments: tuple[str, ...], cache: Path, longest: float | None = LONGEST
 ) -> tuple[int, str]:
-    """Exit status and output of pytest in a tree, up to the first failure."""
+    """Return exit status and output of pytest in a tree, up to the first failure."""
     command = [sys.executable, "-m", "pytest", "-x", "-q", "-n", "0", "--tb=short", *arguments]
     environment = os.environ | {
         "PYTHONPATH": str(tree),
@@ -98,7 +98,7 @@ def run_tests(
 
 @contextlib.contextmanager
 def copied(root: Path) -> Iterator[Path]:
-    """A copy of a tree, for as long as it is needed."""
+    """Yield a temporary copy of a tree."""
     everywhere = shutil.ignore_patterns(*LEFT_OUT)
 
     def left_out(folder: str, names: list[str]) -> set[str]:
@@ -112,7 +112,7 @@ def copied(root: Path) -> Iterator[Path]:
 
 
 def examine(fault: Fault, root: Path, cache: Path) -> Finding:
-    """Plants one fault in a copy of a tree and runs tests until one fails."""
+    """Plant one fault in a copy of a tree and run tests until one fails."""
     begin, text = time.monotonic(), planted(fault, root)
     with copied(root) as tree:
         (tree / fault.file).write_text(text, encoding="utf-8")
@@ -128,16 +128,16 @@ def examine(fault: Fault, root: Path, cache: Path) -> Finding:
 
 
 def check_sound(faults: list[Fault], root: Path, cache: Path) -> None:
-    """Ends the program where the tests fail without any fault: then they would catch everything."""
+    """Exit if the tests fail without a fault: then they would catch everything."""
     named = dict.fromkeys(test for fault in faults for test in fault.tests)
-    with copied(root) as tree:  # which must hold all that the tests need
+    with copied(root) as tree:  # also checks that the copy is complete
         status, output = run_tests(tree, tuple(named), cache, longest=None)
     if status != 0:
         sys.exit(f"the tests fail without a fault, with status {status}:\n{output[-3000:]}")
 
 
 def table(findings: list[Finding]) -> str:
-    """Markdown: every fault, what it does, and what caught it."""
+    """Return a Markdown table: every fault, its effect, and the test that caught it."""
     lines = ["| fault | where | what goes wrong | caught by |", "|---|---|---|---|"]
     for finding in findings:
         fault, caught = finding.fault, f"`{finding.caught_by}`" if finding.caught_by else "nothing"
@@ -147,7 +147,7 @@ def table(findings: list[Finding]) -> str:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Exit status: 0 when all are caught."""
+    """Return the exit status: 0 when all are caught."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("names", nargs="*", help="of faults; all if none is given")
     parser.add_argument("--list", type=Path, default=LIST, help="the file of faults")

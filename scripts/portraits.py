@@ -1,5 +1,6 @@
-"""Makes the small moving pictures of the README from finished runs: `python scripts/portraits.py
-runs/every/*-0`.
+"""Render the small moving pictures of the README from finished runs.
+
+python scripts/portraits.py runs/every/*-0
 """
 
 import sys

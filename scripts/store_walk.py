@@ -1,10 +1,11 @@
-"""Stores a champion's undisturbed walk as the certificate sees it, and writes docs/worked-example.md anew.
+"""Store a champion's undisturbed walk and rewrite docs/worked-example.md from it.
 
     python scripts/store_walk.py RUN
 
-Into docs/data/walk go the run's creature, settings and champion, a certificate made anew, and
-`walk.npz`: integers, millionths of m, rad, N and m/s. Then the code on the page runs on them, and
-everything on the page between the marks "numbers" is written from what it finds.
+docs/data/walk receives the run's creature, settings and champion, a new certificate, and
+`walk.npz`: the walk as the certificate measures it, in integers, millionths of m, rad, N and m/s.
+Then the code on the page runs on these files, and its results replace everything on the page
+between the marks "numbers".
 """
 
 import argparse
@@ -35,11 +36,11 @@ PAGE, FOLDER = ROOT / "docs" / "worked-example.md", ROOT / "docs" / "data" / "wa
 CODE = re.compile(r"```python\n(.*?)```", re.DOTALL)
 NUMBERS = re.compile(r"(<!-- numbers: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 BY_HAND = (2, 3, 7)
-"""The criteria whose numbers the page works out."""
+"""Criteria with numbers that the page works out."""
 
 
 def main() -> None:
-    """Examines, records and writes."""
+    """Certify, record and write."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -61,7 +62,7 @@ def main() -> None:
 
 
 def arrays(window: Recording) -> dict[str, np.ndarray]:
-    """Contents of the file: sizes as they are, and per frame [T, ...] integers in millionths."""
+    """Return the contents: sizes unchanged, and per frame [T, ...] integers in millionths."""
     size = window.dimensions
     return {
         "time_step": np.array(window.time_step),
@@ -81,12 +82,12 @@ def arrays(window: Recording) -> dict[str, np.ndarray]:
 
 
 def millionths(values: np.ndarray) -> np.ndarray:
-    """As integers, which take a third of the room of float64 when compressed."""
+    """Return integers, which take a third of the room of float64 when compressed."""
     return np.round(values * 1e6).astype(np.int32)
 
 
 def page_of(page: str, folder: Path) -> str:
-    """The page with all numbers from a stored walk."""
+    """Return the page with all numbers from a stored walk."""
     found = worked_out(page)
     certificate = json.loads((folder / CERTIFICATE).read_text(encoding="utf-8"))
     champion = json.loads((folder / CHAMPION).read_text(encoding="utf-8"))
@@ -99,7 +100,7 @@ def page_of(page: str, folder: Path) -> str:
 
 
 def worked_out(page: str) -> dict[str, Any]:
-    """The names that the code on the page defines; it reads the walk from the root of the checkout."""
+    """Return the names that the page's code defines; it reads the walk from the checkout's root."""
     match, names = CODE.search(page), dict[str, Any]()
     assert match
     with contextlib.chdir(ROOT), contextlib.redirect_stdout(io.StringIO()):
@@ -108,7 +109,7 @@ def worked_out(page: str) -> dict[str, Any]:
 
 
 def certified(certificate: Mapping[str, Any]) -> dict[str, float]:
-    """The same measures by name, as the certificate has them."""
+    """Return the same measures by name, as the certificate has them."""
     chosen = (c for c in certificate["criteria"] if c["number"] in BY_HAND)
     return {m["name"]: m["value"] for c in chosen for m in c["measures"]}
 

@@ -1,4 +1,4 @@
-"""Evolves a walk: `python scripts/train.py --env tall_quadruped`. The same as `mjxgait train`."""
+"""Evolve a walk: `python scripts/train.py --env tall_quadruped`. Same as `mjxgait train`."""
 
 import sys
 

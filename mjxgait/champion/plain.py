@@ -1,4 +1,4 @@
-"""Genomes as their arrays: how those are written of which nothing else is known."""
+"""Default serializer: genomes as named arrays."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -12,7 +12,7 @@ Genome = Mapping[str, np.ndarray]
 
 
 class PlainCodec:
-    """See `Codec`: arrays as nested lists under their names. Codecs of their own inherit from it."""
+    """See `Codec`: arrays as nested lists under their names. Other serializers inherit from it."""
 
     def settled(self, genome: Genome, creature: Creature) -> dict[str, np.ndarray]:
         """See `Codec`."""
@@ -27,7 +27,7 @@ class PlainCodec:
         return {name: np.array(values, float) for name, values in document.items()}
 
     def settings(self, table: Mapping[str, Any], where: str) -> Any:
-        """See `Codec`: as it is; whoever knows the controller reads it."""
+        """See `Codec`: the table unparsed; it is parsed where the controller is available."""
         return dict(table)
 
     def check(self, genome: Genome, creature: Creature) -> None:

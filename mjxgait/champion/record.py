@@ -1,4 +1,4 @@
-"""`champion.json`: one individual and all that decides how it moves."""
+"""`champion.json`: one individual and everything that decides how it moves."""
 
 import dataclasses
 import hashlib
@@ -28,22 +28,22 @@ from mjxgait.errors import UserError
 from mjxgait.files import DamagedFile, read_json, write_text
 
 SCHEMA = 2
-"""Champions of 1 had key poses without saying so, and the drive among the controller's settings."""
+"""File version. Version 1 implied key poses and kept the drive in the controller settings."""
 
 SOUGHT = ("around", "within", "expressions")
-"""Settings that say where evolution began to look, and nothing of how a champion moves."""
+"""Settings of where the search starts; they do not affect how a champion moves."""
 USUAL = {"steering": 1.0}
-"""Settings that came later, and what they were before: champions of then keep their fingerprint."""
+"""Settings added later, with the value implied before: older champions keep their fingerprint."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Champion:
-    """An individual that was evolved.
+    """An evolved individual.
 
     controller: name of its kind, as in `[use]`. genome: its arrays by name. settings: the
-    controller's. task: that it was evolved for. fitness and terms: as evolution scored it.
-    origin: where it comes from (generation, seed, versions). sizes: factors of the parts that are
-    not as the creature has them, where bodies evolve. wish: what was asked of its walk, by name.
+    controller's. task: the one it was evolved for. fitness and terms: as evolution scored it.
+    origin: where it comes from (generation, seed, versions). sizes: factors of the parts that
+    differ from the creature's, where bodies evolve. wish: targets of its walk, by name.
     pose_span: degrees, `evolution.pose_span` of its run; 0 leaves the pose ranges of creature.toml.
     """
 
@@ -63,7 +63,7 @@ class Champion:
 
     @classmethod
     def of(cls, creature: Creature, config: Config, genome: Genome, **scored: Any) -> "Champion":
-        """Who has this genome in a run; scored: fitness, terms and origin."""
+        """Return the individual with this genome in a run; scored: fitness, terms and origin."""
         genome, sizes = split_genome(genome)
         return cls(
             creature=creature.name,
@@ -80,7 +80,7 @@ class Champion:
         )
 
     def embodied(self, creature: Creature) -> Creature:
-        """Return its own body, from the creature as its files have it.
+        """Return its own body, made from the creature as its files describe it.
 
         Raises:
           UserError: its sizes are those of another creature.
@@ -97,14 +97,14 @@ class Champion:
 
     @property
     def fingerprint(self) -> str:
-        """Hash of all that decides how it moves: body, controller, genome, settings; not of its
-        fitness or where it comes from.
+        """Hash of everything that decides how it moves.
+
+        Body, controller, genome and settings; not the fitness or the origin.
         """
         moves: dict[str, Any] = {
             "creature": self.digest,
             "controller": self.controller,
-            # As float64, which is what a file gives back: a champion has one fingerprint before it
-            # is written and after.
+            # As float64, which a file gives back: writing a champion keeps its fingerprint.
             "genome": {n: np.asarray(array, float).tolist() for n, array in self.genome.items()},
             "settings": {
                 name: value
@@ -122,7 +122,7 @@ class Champion:
         return hashlib.sha256(json.dumps(moves, sort_keys=True).encode()).hexdigest()[:16]
 
     def check_finite(self, creature: Creature) -> None:
-        """Refuses numbers that no joint can follow and that MuJoCo would complain of step by step.
+        """Refuse numbers that no joint can follow and that make MuJoCo warn at every step.
 
         Raises:
           UserError: names the first.
@@ -131,20 +131,21 @@ class Champion:
 
 
 def split_genome(genome: Genome) -> tuple[dict[str, np.ndarray], np.ndarray | None]:
-    """The controller's own arrays by name; and the logarithms of the sizes [..., Z], if it has any
-    (`control.bodied.Bodied`).
+    """Return the controller's arrays by name, and the logarithms of the sizes [..., Z] or None.
+
+    Only genomes of `controllers.sized_body.Bodied` have sizes.
     """
     own = {n.removeprefix("plan."): a for n, a in genome.items() if n.startswith("plan.")}
     return (own, genome["sizes"]) if own else (dict(genome), None)
 
 
 def as_table(settings: Any) -> dict[str, Any]:
-    """Settings as a table, whether they are one already or a dataclass."""
+    """Return settings as a table; they are one already, or a dataclass."""
     return dict(settings) if isinstance(settings, Mapping) else dataclasses.asdict(settings)
 
 
 def write_champion(champion: Champion, creature: Creature, path: Path) -> None:
-    """Writes the file in one go: it is either the old one or the new one."""
+    """Write the file atomically: it is either the old one or the new one."""
     gains = zip(
         creature.joints.names,
         creature.gains.kp,
@@ -178,11 +179,11 @@ def write_champion(champion: Champion, creature: Creature, path: Path) -> None:
 
 
 class DamagedChampion(DamagedFile):
-    """A file that is there and holds no champion."""
+    """Error: the file exists but holds no champion."""
 
 
 def _plain(values: Mapping[str, Any]) -> Mapping[str, Any]:
-    """What was asked of a walk: numbers, a speed above zero, and the name of a gait."""
+    """Check the targets of a walk: finite numbers, a speed above zero, the name of a gait."""
     for name, value in values.items():
         kind = str if name == "gait" else (int, float)
         if not isinstance(value, kind) or isinstance(value, bool):
@@ -204,7 +205,7 @@ class _Origin:
 
 @dataclasses.dataclass(frozen=True)
 class _File:
-    """Schema of `champion.json`, but for what its controller alone knows."""
+    """Schema of `champion.json`, except what depends on its controller."""
 
     __pydantic_config__ = STORED
     schema: Index

@@ -1,7 +1,7 @@
-"""How each kind of genome is written for people and read again.
+"""Serializers: how each kind of genome is written in readable form and read again.
 
-A genome is a handful of named arrays; that is all that evolution, checkpoints and the champion's
-file ask of it. Shapes and names are the controller's own.
+A genome is a set of named arrays; evolution, checkpoints and the champion's file need no more.
+The controller defines their shapes and names.
 """
 
 import functools
@@ -16,18 +16,18 @@ from mjxgait.kinds import ControllerKind, known_controller
 
 
 class Codec(Protocol):
-    """Between the arrays of a kind of genome and what `champion.json` says of it."""
+    """Serializer between the arrays of a kind of genome and their form in `champion.json`."""
 
     def settled(self, genome: Genome, creature: Creature) -> dict[str, np.ndarray]:
-        """The arrays of a champion: those that its file will give back."""
+        """Return the arrays of a champion as its file will give them back."""
         ...
 
     def document(self, genome: Genome, settings: Any, creature: Creature) -> dict[str, Any]:
-        """What people read."""
+        """Return the readable form of a genome."""
         ...
 
     def genome(self, document: Mapping[str, Any], creature: Creature) -> dict[str, np.ndarray]:
-        """The arrays of a document.
+        """Return the arrays of a document.
 
         Raises:
           KeyError, TypeError, ValueError: it is not of this kind.
@@ -35,11 +35,11 @@ class Codec(Protocol):
         ...
 
     def settings(self, table: Mapping[str, Any], where: str) -> Any:
-        """The settings of its controller from a table of the file `where`."""
+        """Return the controller's settings from a table of the file `where`."""
         ...
 
     def check(self, genome: Genome, creature: Creature) -> None:
-        """Refuses numbers that nobody can follow.
+        """Refuse numbers that no joint can follow.
 
         Raises:
           UserError: names the first.
@@ -47,16 +47,16 @@ class Codec(Protocol):
         ...
 
     def shapes(self, settings: Any, creature: Creature) -> dict[str, tuple[int, ...]]:
-        """Shapes that the settings demand of the arrays, as far as they do."""
+        """Return the array shapes that the settings determine."""
         ...
 
     def embodied(self, genome: Genome, settings: Any, task: str, creature: Creature) -> Creature:
-        """The body that the genome grows into; the creature itself where nothing grows."""
+        """Return the body that the genome grows into; the creature itself where none grows."""
         ...
 
 
 def codec_of(controller: str) -> Codec:
-    """Return the serializer of a kind of controller; of one without, its arrays as they are."""
+    """Return the serializer of a kind of controller; the default one if it has none."""
     kind = known_controller(controller)
     return _made(kind) if kind and kind.serializer else PlainCodec()
 

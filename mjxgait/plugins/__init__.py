@@ -1,4 +1,4 @@
-"""Who can take part in a run: the shipped controllers and tasks, and those of a user's own file."""
+"""Controllers and tasks of a run: the shipped ones and those of a user's file."""
 
 from mjxgait.plugins.registry import make_controller, make_task
 from mjxgait.plugins.settings import build_config, config_class, resolve_config

@@ -1,4 +1,4 @@
-"""Whether those that take part fit the creature."""
+"""Check that a controller and a task fit the creature."""
 
 from mjxgait.config.schema import Config
 from mjxgait.controllers.expressions.written import check_programs
@@ -9,10 +9,10 @@ from mjxgait.kinds import controller_kind, known_task, tasks
 
 
 def check_fit(creature: Creature, config: Config) -> None:
-    """Refuses who cannot do with this body what is asked.
+    """Refuse a controller, a task or settings that this body cannot use.
 
     Raises:
-      UserError: says why, and the way out.
+      UserError: gives the reason and a remedy.
     """
     controller, task, name = config.use.controller, config.use.task, creature.name
     grows, kind = controller_kind(controller).grows, known_task(task)
@@ -68,7 +68,7 @@ def check_fit(creature: Creature, config: Config) -> None:
 
 
 def _check_settings(name: str, config: Config) -> None:
-    """Refuse what needs a body that is there, and episodes of which nothing would count."""
+    """Refuse settings that need an existing body, and episodes that end before scoring begins."""
     rollout = config.rollout
     settle = getattr(config.fitness, "settle", 0.0)
     if settle >= rollout.seconds:

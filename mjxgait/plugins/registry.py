@@ -29,7 +29,7 @@ def find(sort: str, name: str) -> type:
 
 
 def meant(use: UseConfig) -> UseConfig:
-    """Return what takes part, with the task that its name means to a body that grows.
+    """Return the controller and the task, its name resolved for a body that grows.
 
     Raises:
       UserError: there is no such controller.
@@ -40,20 +40,20 @@ def meant(use: UseConfig) -> UseConfig:
 
 
 def make_controller(body: "Body", step: float, config: Config) -> "Controller":
-    """What moves the creature. step: s between two control steps."""
+    """Return the creature's controller. step: s between two control steps."""
     kind: Any = find("controller", config.use.controller)
     added = getattr(find("task", config.use.task), "adds", ())
-    # One whose genome depends on what there is to sense is told.
+    # `told` passes settings and observations to controllers with a genome that depends on them.
     told = getattr(kind, "told", None)
     made: Controller = told(body, step, config.controller, added) if told else kind(body, step)
     return made
 
 
 def make_task(body: "Body", step: float, ends: "Termination | Ends", config: Config) -> "Task":
-    """What the creature is to do. ends: what a fall is."""
+    """Return the creature's task. ends: the termination conditions."""
     horizon = max(round(config.rollout.seconds / step), 1)
     kind: Any = find("task", config.use.task)
-    # One whose tally depends on what is asked is told.
+    # `told` passes the settings to tasks with episode statistics that depend on them.
     told = getattr(kind, "told", None)
     made: Task = (
         told(body, step, horizon, ends, config.fitness) if told else kind(body, step, horizon, ends)
@@ -62,7 +62,7 @@ def make_task(body: "Body", step: float, ends: "Termination | Ends", config: Con
 
 
 def what_ends(creature: Creature, config: RolloutConfig) -> Termination:
-    """What ends an episode: what the creature says, where the config says nothing else."""
+    """Return the termination conditions: the creature's, overridden by the config's."""
     if not config.terminate:
         return Termination(min_up=-1.0, height=(-np.inf, np.inf), touch=False)
     given: dict[str, Any] = dataclasses.asdict(config.termination)

@@ -1,6 +1,6 @@
-"""A user's controller in the examiner: its own code, for nobody has written it a second time.
+"""Reference controller of a user-defined controller: its own code.
 
-What the body, the drive and the criteria do is still done twice; the controller is not.
+Body, drive and criteria are still implemented twice; the controller is not.
 """
 
 from collections.abc import Mapping
@@ -28,7 +28,7 @@ class SameCode:
             settings = build(part.Settings, settings, "champion.json: settings")
         genome = {name: jnp.asarray(a, jnp.float32) for name, a in champion.genome.items()}
         plan = controller.prepare(genome, settings)
-        # The time tells how many there are, whatever else it reads.
+        # Always read the time: its length is the number of individuals.
         self.reads: tuple[str, ...] = (*controller.reads, "time")
         self.command: Command = controller.command
         self.every: int = controller.every
@@ -60,6 +60,6 @@ class SameCode:
         return np.asarray(command, float)[:count], {str(i): leaf for i, leaf in enumerate(kept)}
 
     def phase(self, memory: Memory) -> np.ndarray:
-        """See `Twin`: whether it has a cycle is not known."""
+        """See `Twin`: NaN, because the controller may have no cycle."""
         count = len(next(iter(memory.values()))) if memory else 1
         return np.full(count, np.nan)

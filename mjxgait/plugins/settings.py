@@ -1,4 +1,4 @@
-"""The config of a run, with the settings of whoever takes part in it."""
+"""The config of a run, with the settings of its controller and task."""
 
 import dataclasses
 import functools
@@ -44,7 +44,7 @@ def _config_class(tables: tuple[tuple[str, type], ...]) -> type[Config]:
 
 
 def build_config(table: Mapping[str, Any], where: str) -> Config:
-    """The config in a table, of whoever it says takes part.
+    """Return the config of a table, with the settings of the controller and the task it names.
 
     Raises:
       UserError: names the key; or the code that must be named on the command line.

@@ -1,4 +1,4 @@
-"""Controllers and tasks from a file of the user's, named on the command line and nowhere else."""
+"""Controllers and tasks from a user's file, named only on the command line."""
 
 import importlib.util
 import inspect
@@ -20,9 +20,9 @@ _LOADED: dict[tuple[str, str], str] = {}
 
 
 def take_own(arguments: Sequence[str]) -> tuple[list[str], dict[str, str]]:
-    """Loads what `--controller` and `--task` name.
+    """Load what `--controller` and `--task` name.
 
-    Returns the other arguments, and the names under which the parts are known.
+    Returns the other arguments, and by kind the names of the loaded classes.
 
     Raises:
       UserError: says what is wrong with the file or the class.
@@ -42,7 +42,7 @@ def take_own(arguments: Sequence[str]) -> tuple[list[str], dict[str, str]]:
 
 
 def load(kind: str, text: str) -> str:
-    """Makes a part known and returns its name: that of a shipped one as it is, or `file.py:CLASS`.
+    """Register a class and return its name: that of a shipped one unchanged, or `file.py:CLASS`.
 
     Raises:
       UserError: says what is wrong with the file or the class.
@@ -82,23 +82,23 @@ def load(kind: str, text: str) -> str:
 
 
 def loaded() -> tuple[tuple[str, str], ...]:
-    """Kind and `FILE.py:CLASS` of all that has been loaded, for other processes to do the same."""
+    """Return kind and `FILE.py:CLASS` of all loaded classes, for other processes to load."""
     return tuple((kind, text) for (kind, _), text in _LOADED.items())
 
 
 def places_of(use: UseConfig) -> dict[str, str]:
-    """Return by kind the `FILE.py:CLASS` of the loaded code that takes part; paths are absolute."""
+    """Return `FILE.py:CLASS` by kind for the user-defined code of a run; paths are absolute."""
     named = {kind: (kind, getattr(use, kind)) for kind in KINDS}
     return {kind: _LOADED[key] for kind, key in named.items() if key in _LOADED}
 
 
 def is_loaded(kind: str, known: str) -> bool:
-    """Whether `file.py:CLASS` is known here."""
+    """Return True if `file.py:CLASS` is loaded in this process."""
     return (kind, known) in _LOADED
 
 
 def load_all(parts: Sequence[tuple[str, str]]) -> None:
-    """Loads what another process had `loaded`."""
+    """Load what `loaded` returned in another process."""
     for kind, text in parts:
         load(kind, text)
 
@@ -118,7 +118,7 @@ def _module(path: Path, kind: str) -> ModuleType:
     if spec is None or spec.loader is None:
         raise UserError(f"--{kind} {path}: not a file of Python")
     module = importlib.util.module_from_spec(spec)
-    # Its dataclasses look up their own module while they are made.
+    # Dataclasses look up their module while they are defined.
     sys.modules[name] = module
     try:
         spec.loader.exec_module(module)
