@@ -138,8 +138,8 @@ class Examiner:
         the others with a margin of at least 0 are examined, the best margin first. The first that
         passes ends the search, as does the last attempt of the run. If none passes, return the
         first that was examined: the best margin of all if all are negative. A candidate that failed
-        earlier in the run is chosen only if there is no other. If all fail pre-screening, only the
-        best of them is validated.
+        earlier in the run is chosen only if there is no other. Candidates that fail pre-screening
+        are skipped; if all fail, only the best is validated.
         """
         generation, settings = int(state.generation), self.experiment.config.examination
         known: list[Champion] = []

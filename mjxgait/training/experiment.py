@@ -176,7 +176,7 @@ def arrays_of(genome: Any) -> dict[str, np.ndarray]:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Batch:
-    """Evolution runs of one creature as rows `B` of one program: they share lanes and compilation."""
+    """Evolution runs of one creature, the rows `B` of one program: lanes are shared."""
 
     experiments: tuple[Experiment, ...]
 
@@ -211,7 +211,7 @@ class Batch:
         return compile_stages(self.lower(judges), turn, long)
 
     def lower(self, judges: bool = True) -> Iterator[tuple[str, jax.stages.Lowered]]:
-        """Lower the programs of a generation, equal for all settings of a shape; see `lower_stages`."""
+        """Lower the programs of a generation, equal for equal shapes; see `lower_stages`."""
         return lower_stages(self._blueprint, self.rows, self.abstract(), judges)
 
     def bound(self, stages: Stages, evaluator: Evaluator | None = None) -> Step:
@@ -221,7 +221,7 @@ class Batch:
     def lower_judge(
         self, genomes: Any, starts: Starts, asked: Asked | None = None
     ) -> jax.stages.Lowered:
-        """Lower the program that evaluates genomes [B, N, ...] of this size; see `generation.judge`."""
+        """Lower the program that evaluates genomes [B, N, ...]; see `generation.judge`."""
         given = (self.rows.settings, starts, genomes)
         return lowered(self._blueprint, judge, *given, *([] if asked is None else [asked]))
 
