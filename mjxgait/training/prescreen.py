@@ -62,7 +62,7 @@ class Tryout:
 
         ranks: at most `examination.candidates` of them.
         """
-        program = self._program  # first: a compilation in the background makes all that is below
+        program = self._program  # first: compiling makes the properties used below
         padded = np.resize(ranks, self.run.config.examination.candidates)
         genomes = jax.tree.map(lambda leaf: leaf[None, padded], state.genomes)
         numbers, rows = self._batch.known
