@@ -1,4 +1,4 @@
-"""Compilation of a generation as a few programs in a row; only this module jits.
+"""Compilation of a generation as a few programs in a row; no other module of `training` jits.
 
 Only the program that simulates is worth the compiler's best effort.
 """
