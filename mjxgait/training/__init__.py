@@ -1,1 +1,1 @@
-"""A run: the compiled generation, the loop around it, and the folder that it leaves behind."""
+"""Training run: the compiled generation, the loop around it, and the run folder."""

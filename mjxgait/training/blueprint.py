@@ -1,4 +1,4 @@
-"""What the simulator of a run is made of, and the body's numbers where they are inputs of the program."""
+"""Simulator specification of a run, and the body parameters that are inputs of the program."""
 
 import dataclasses
 import functools
@@ -51,12 +51,12 @@ from mjxgait.training.growth import (
 from mjxgait.types import ModelPlant, Plant, pytree
 
 LANES = 64
-"""Simulations of blocks per device."""
+"""Simulations of modular bodies per device."""
 
 
 @pytree
 class Numbers:
-    """All of a body that the program reads. plant: as `Plant.parameters` has them."""
+    """All body parameters that the program reads. plant: see `Plant.parameters`."""
 
     body: GivenBody
     ends: Ends
@@ -64,37 +64,37 @@ class Numbers:
 
 
 class Plan(Protocol):
-    """What the host knows of a program before it is traced."""
+    """Specification of a simulator on the host, before its program is traced."""
 
     @property
     def creature(self) -> Creature:
-        """Under the settings that shape its program."""
+        """The creature with the settings that shape its program."""
         ...
 
     @property
     def numbers(self) -> Numbers | None:
-        """What to hand to the program; None where the body is a constant of it, or grows."""
+        """Body parameters to pass to the program; None if the body is constant in it or grows."""
         ...
 
     @property
     def own(self) -> Simulator:
-        """With all constants in it: what the host asks about the program."""
+        """The simulator with constant body parameters, for the host's own queries."""
         ...
 
     def embodied(self, starts: Starts) -> Starts:
-        """The starts with the bodies that follow from them."""
+        """Return the starts with the body parameters that follow from them."""
         ...
 
     def simulator(self, numbers: Numbers | None = None) -> Simulator:
-        """Of the creature itself, or of whatever body has these numbers."""
+        """Return the simulator of the creature, or of the body with these parameters."""
         ...
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Blueprint:
-    """A creature under the settings that shape its program. plant, lanes: see `make_plant`.
+    """Specification from a creature and settings. plant, lanes: see `make_plant`.
 
-    growth: of the body, where it evolves.
+    growth: computes an individual's body if bodies evolve.
     """
 
     creature: Creature
@@ -105,7 +105,7 @@ class Blueprint:
 
     @property
     def numbers(self) -> Numbers | None:
-        """What to hand to the program; None where the body is a constant of it."""
+        """Body parameters to pass to the program; None if the body is constant in it."""
         if self.config.rollout.body == "constants":
             return None
         ends = what_ends(self.creature, self.config.rollout)
@@ -114,11 +114,11 @@ class Blueprint:
 
     @functools.cached_property
     def own(self) -> Simulator:
-        """With the creature's numbers as constants: what the host asks about the program."""
+        """The simulator with constant body parameters, for the host's own queries."""
         return self.simulator()
 
     def embodied(self, starts: Starts) -> Starts:
-        """The starts with the bodies that their heaviness makes."""
+        """Return the starts with the body parameters that their mass scales give."""
         if starts.heaviness is None:
             return starts
         one, heavier = self.plant.parameters, self.plant.heavier
@@ -126,7 +126,7 @@ class Blueprint:
         return dataclasses.replace(starts, numbers=every(starts.heaviness))
 
     def simulator(self, numbers: Numbers | None = None) -> Simulator:
-        """Of the creature itself, or of whatever body has these numbers."""
+        """Return the simulator of the creature, or of the body with these parameters."""
         if numbers is None:
             ends = what_ends(self.creature, self.config.rollout)
             return self._simulator(self.creature, ends, self.plant)
@@ -147,7 +147,7 @@ class Blueprint:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class GrownBlueprint:
-    """See `Plan`: every genome grows a body of its own. creature: lends its settings and its step."""
+    """See `Plan`; every genome grows its own body. creature: gives settings and time step only."""
 
     creature: Creature
     config: Config
@@ -199,10 +199,10 @@ def _assembled(
     lanes: int,
     growth: Growth | None,
 ) -> Simulator:
-    """Of parts that belong together. lanes: where the settings leave them open.
+    """Assemble a simulator. lanes: used if the settings do not say.
 
     Raises:
-      UserError: the controller reads what nobody senses.
+      UserError: the controller reads an observation that the body does not have.
     """
     check_senses(controller.reads, task.adds)
     return Simulator(
@@ -219,10 +219,11 @@ def _assembled(
 
 
 def draw_up(creature: Creature, config: Config) -> Plan:
-    """The blueprint of a run.
+    """Return the simulator specification of a run.
 
     Raises:
-      UserError: the physics does not support the creature's model, or who takes part does not fit.
+      UserError: the physics does not support the creature's model, or the controller or task does
+        not fit.
     """
     check_fit(creature, config)
     if creature.settings.creature.grows:
@@ -231,7 +232,7 @@ def draw_up(creature: Creature, config: Config) -> Plan:
 
 
 def check_plan(creature: Creature, config: Config) -> None:
-    """Refuse what a program for these settings cannot be made of. Compiles and writes nothing.
+    """Refuse settings that give no program. Compiles and writes nothing.
 
     Raises:
       UserError: see `draw_up`; or the controller reads an observation that the body does not have.

@@ -1,7 +1,7 @@
-"""Orbax checkpoints of the whole evolution state; `stored` tells which are whole and reads them.
+"""Orbax checkpoints of the whole evolution state; `stored` validates and reads them.
 
-They are written in the background, where a disk may fill. Who saves or closes is told so by the
-error that Orbax hands on; what its threads would say on the screen besides is kept off it.
+They are written in the background, where a disk may fill. The error that Orbax passes on reaches
+the caller of `save` or `close`; further output of Orbax's threads is suppressed.
 """
 
 import dataclasses
@@ -31,22 +31,22 @@ from mjxgait.training.stored import (
 )
 
 OVERHEAD = 2**18
-"""Bytes that a checkpoint takes at most beside twice its arrays."""
+"""Largest size of a checkpoint in bytes, on top of twice its arrays."""
 
 
 class Checkpoints:
-    """The checkpoints of one run, written in the background, each complete or absent."""
+    """Checkpoints of one run, written in the background, each complete or absent."""
 
     def __init__(self, run: Path, keep_every: int = 1) -> None:
-        """Besides the latest three, each generation that is a multiple of `keep_every` stays."""
+        """Keep the latest three, and each generation that is a multiple of `keep_every`."""
         _keep_threads_quiet()
         self._run, self._folder = run, (run / FOLDER).resolve()
         options = ocp.CheckpointManagerOptions(
             max_to_keep=3,
             keep_period=keep_every,
             cleanup_tmp_directories=True,
-            # Threads that wait for a folder which cannot be made do so for five minutes, and so
-            # does the end of the program.
+            # Else a thread waits five minutes for a folder that cannot be made, and the program
+            # cannot end before it.
             async_options=ocp.options.AsyncOptions(create_directories_asynchronously=False),
         )
         handlers = {
@@ -62,11 +62,11 @@ class Checkpoints:
         self._begun.set_result(None)
 
     def generations(self) -> list[int]:
-        """The generations there are checkpoints of, oldest first."""
+        """Return the generations that have checkpoints, oldest first."""
         return stored_generations(self._run)
 
     def drop_after(self, generation: int) -> list[int]:
-        """Deletes the checkpoints of later generations; returns which, oldest first."""
+        """Delete the checkpoints of later generations; return these generations, oldest first."""
         later = [known for known in self.generations() if known > generation]
         with disk_errors(self._folder):
             for known in reversed(later):
@@ -74,7 +74,7 @@ class Checkpoints:
         return later
 
     def save(self, state: EvolutionState, creature: str, digest: str) -> None:
-        """Starts to write the state, of one run or of several side by side.
+        """Start to write the state of one run or of a batch.
 
         Raises:
           UserError: the disk is full or cannot be written, now or in an earlier write.
@@ -82,7 +82,7 @@ class Checkpoints:
         self.keep(pack(state), creature, digest)
 
     def keep(self, packed: Packed, creature: str, digest: str) -> None:
-        """Starts to write a packed state; see `save`."""
+        """Start to write a packed state; see `save`."""
         arrays = dict(packed.arrays)
         manifest = Manifest(
             SCHEMA, creature, digest, packed.generation, array_hash(arrays), packed.key_impl
@@ -95,19 +95,19 @@ class Checkpoints:
             self._begun.result()
             # Told before anything of it is written.
             try_room(self._folder, 2 * packed.size + OVERHEAD)
-        # Orbax writes in the background, but takes a tenth of a generation to begin with it.
+        # Orbax writes in the background, but starting takes it a tenth of a generation.
         self._begun = self._beginner.submit(
             self._manager.save, manifest.generation, args=args, force=True
         )
 
     def wait(self) -> None:
-        """Waits until everything is on disk."""
+        """Wait until everything is on disk."""
         with disk_errors(self._folder):
             self._begun.result()
             self._manager.wait_until_finished()
 
     def close(self) -> None:
-        """Waits until everything is on disk, or will never be."""
+        """Wait until every write is done or has failed, and close."""
         with self._beginner, disk_errors(self._folder):
             self.wait()
             self._manager.close()
@@ -115,11 +115,11 @@ class Checkpoints:
     def restore(
         self, abstract: EvolutionState, digest: str, generation: int | None = None
     ) -> EvolutionState:
-        """The state of a generation, the latest by default.
+        """Return the state of a generation, the latest by default.
 
         Args:
-          abstract: a state of the shapes that the run's settings ask for.
-          digest: hash of the creature's files as they are now.
+          abstract: a state with the shapes that the run's settings require.
+          digest: hash of the creature's current files.
 
         Raises:
           UserError: no checkpoint, a damaged or foreign one, or one of other settings.
@@ -129,7 +129,7 @@ class Checkpoints:
         return packed.state(abstract, str(self._folder / str(found)))
 
     def read(self, digest: str, generation: int | None = None) -> Packed:
-        """The packed state of a generation, the latest by default, whatever its shapes.
+        """Return the packed state of a generation, the latest by default, of any shapes.
 
         Raises:
           UserError: no checkpoint, a damaged or foreign one, or one of another random generator.
@@ -140,7 +140,7 @@ class Checkpoints:
 
 
 def _keep_threads_quiet() -> None:
-    """Keeps off the screen what Orbax hands on to the caller anyway, and its advice to programmers."""
+    """Suppress output of Orbax's threads that repeats raised errors or advises programmers."""
     log = logging.getLogger("absl")
     if _told_to_the_caller not in log.filters:
         log.addFilter(_told_to_the_caller)
@@ -149,19 +149,18 @@ def _keep_threads_quiet() -> None:
 
 
 def _told_to_the_caller(record: logging.LogRecord) -> bool:
-    """Lets a record pass that is no error of Orbax's that is raised too, and no warning of it.
+    """Return False for Orbax's warnings, and its log records of errors that are also raised.
 
-    It warns on slow disks that a write waits for the one before, which no user can do anything with.
+    On slow disks it warns that a write waits for the previous one; users can do nothing about it.
     """
     warning = record.levelno <= logging.WARNING
     return "orbax" not in Path(record.pathname).parts or not (record.exc_info or warning)
 
 
 class _WithoutClosedLoops:
-    """A hook for errors that nobody can catch, without those of writes after a failed one.
+    """Hook for unraisable errors that drops those of writes after a failed one.
 
-    Orbax closes its event loop at the first error; the threads of TensorStore, which are not
-    Python's, still report to it.
+    Orbax closes its event loop at the first error; TensorStore's native threads still report to it.
     """
 
     def __init__(self, before: Callable[["sys.UnraisableHookArgs"], Any]) -> None:

@@ -1,4 +1,4 @@
-"""Devices: prepared, shared by a run's arrays, and compiled for."""
+"""JAX devices: setup, placement of a run's arrays, and compiler options."""
 
 import os
 from typing import Literal
@@ -11,11 +11,13 @@ from mjxgait.simulation.rollout import Simulator
 
 
 def prepare_devices(devices: int | None = None, kind: str = "") -> None:
-    """One JAX host device per core, and compiled programs kept in the user's cache folder. Call before JAX's first computation.
+    """Set one JAX host device per core, and keep compiled programs in the user's cache folder.
+
+    Call before JAX's first computation.
 
     Args:
-      devices: another number of them.
-      kind: of machine; its programs lie apart from those of others, for a home folder may be shared.
+      devices: number of devices; one per core by default.
+      kind: machine type. Each type has its own program cache, because a home folder may be shared.
     """
     if jax.config.values["jax_num_cpu_devices"] < 0:
         jax.config.update("jax_num_cpu_devices", devices or cores())
@@ -26,22 +28,24 @@ def prepare_devices(devices: int | None = None, kind: str = "") -> None:
 
 
 def everywhere(simulator: Simulator) -> NamedSharding:
-    """Arrays that every device of a simulator has whole."""
+    """Return the sharding that puts whole arrays on every device of a simulator."""
     return NamedSharding(simulator.mesh, PartitionSpec())
 
 
 Effort = Literal["best", "some", "least"]
-"""Of the compiler, for a part of a generation: what it is worth."""
+"""Compiler effort for a part of a generation."""
 
 
 def compiled(lowered: jax.stages.Lowered, effort: Effort = "best") -> jax.stages.Compiled:
-    """The program."""
+    """Compile a lowered program."""
     return lowered.compile(compiler_options=compiler_options(effort))
 
 
 def compiler_options(effort: Effort) -> dict[str, str | bool]:
-    """Those of this machine's compiler; the fast plant gains a third from the widest vectors, which
-    XLA's CPU compiler does not use by itself.
+    """Return the compiler options for this machine.
+
+    The widest vectors make the lane-major plant a third faster; XLA's CPU compiler does not use
+    them by default.
     """
     if jax.default_backend() != "cpu":
         return {}

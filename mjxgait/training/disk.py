@@ -1,4 +1,4 @@
-"""What a disk refuses, said in one sentence; every other error goes through as it is."""
+"""Disk errors turned into one-sentence messages; other errors pass unchanged."""
 
 import contextlib
 import errno
@@ -12,7 +12,7 @@ from mjxgait.errors import UserError
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 CLOSED = (errno.EROFS, errno.EACCES, errno.EPERM)
 GONE = (errno.ENOENT, errno.EIO, errno.ESTALE, errno.ENODEV, errno.ENXIO)
-"""A folder that somebody took away, or a disk that was pulled out or is broken."""
+"""The folder was removed, or the disk was pulled out or is broken."""
 CURES = (
     dict.fromkeys(FULL, "make room")
     | dict.fromkeys(CLOSED, "make it writable")
@@ -23,7 +23,7 @@ SAFE, AGAIN = "the run is safe up to its latest checkpoint", "go on with --resum
 
 @contextlib.contextmanager
 def disk_errors(path: Path, safe: str = SAFE, again: str = AGAIN) -> Iterator[None]:
-    """Turns what a full, closed or lost disk raises into one sentence.
+    """Turn errors of a full, read-only or lost disk into one sentence.
 
     path: what is being written. safe: what is not lost. again: what to do with room on the disk.
 
@@ -41,7 +41,7 @@ def disk_errors(path: Path, safe: str = SAFE, again: str = AGAIN) -> Iterator[No
 
 
 def require_writable(path: Path) -> None:
-    """Says before long work whether a file can be written; leaves nothing behind.
+    """Check before long work that a file can be written; leaves nothing behind.
 
     Raises:
       UserError: names the file, or the folder that is missing.
@@ -58,9 +58,9 @@ def require_writable(path: Path) -> None:
 
 
 def refusal(error: BaseException) -> int | None:
-    """The error number with which a disk refused to be written; None for any other error.
+    """Return the error number of a failed write; None for any other error.
 
-    TensorStore, which Orbax writes with, wraps it into the text of a ValueError.
+    TensorStore, which Orbax uses, puts its message into the text of a ValueError.
     """
     if isinstance(error, OSError):
         return error.errno if error.errno in CURES else None
@@ -70,7 +70,7 @@ def refusal(error: BaseException) -> int | None:
 
 
 def try_room(folder: Path, size: int) -> None:
-    """Writes a file of this size in bytes that vanishes again.
+    """Write a temporary file of this size in bytes.
 
     Raises:
       OSError: the disk refuses.

@@ -1,4 +1,4 @@
-"""Whether a run is over, from its folder alone: nothing is compiled or simulated."""
+"""Check for finished runs from their folders alone; compiles and simulates nothing."""
 
 import dataclasses
 from pathlib import Path
@@ -17,17 +17,16 @@ from mjxgait.training.stored import Stored, read_stored, stored_generations
 
 
 def end_of(run: Path, creature: Creature, config: Config, stored: Stored) -> str | None:
-    """Return why a run is over at one of its checkpoints; None where it goes on."""
+    """Return why a run is over at one of its checkpoints; None if it goes on."""
     return _stopped(config, stored) or _certified(run, creature, config, stored)
 
 
 def nothing_left(run: Path, creature: Creature, config: Config, kept: Config) -> str | None:
-    """Return a sentence about a run that has nothing left to do, with what would go on with it;
-    None where something is left.
+    """Return a message that a run is complete, with options that continue it; None if it is not.
 
     Args:
-      config: settings to go on with. kept: those of the run folder. Other settings of the
-        examination are a reason to go on.
+      config: settings to go on with. kept: those of the run folder. Changed examination settings
+        are a reason to go on.
 
     Raises:
       UserError: the latest checkpoint is damaged or foreign.
@@ -42,7 +41,7 @@ def nothing_left(run: Path, creature: Creature, config: Config, kept: Config) ->
 
 
 def _stopped(config: Config, stored: Stored) -> str | None:
-    """Return what evolution itself ends with; islands do not wait for each other's growth."""
+    """Return why evolution stops; with islands, failed forced phases end no run."""
     evolution = config.evolution
     if evolution.islands.count > 1:
         forced = dataclasses.replace(evolution.forced, patience=0)
@@ -52,7 +51,7 @@ def _stopped(config: Config, stored: Stored) -> str | None:
 
 
 def _certified(run: Path, creature: Creature, config: Config, stored: Stored) -> str | None:
-    """Return what an early examination that ended the run here would have said."""
+    """Return the reason if a passed early examination ended the run at this checkpoint."""
     generation = stored.manifest.generation
     if generation != stored_generations(run)[-1] or not due(config.examination, generation):
         return None
@@ -67,7 +66,7 @@ def _certified(run: Path, creature: Creature, config: Config, stored: Stored) ->
 
 
 def _examined(run: Path, creature: Creature, config: Config) -> bool:
-    """Return whether the champion is there, with its certificate where the settings want one."""
+    """Return whether the champion exists, with its certificate if the settings require one."""
     try:
         champion = kept_champion(run, creature)
         document = read_certificate(run / CERTIFICATE)
@@ -79,7 +78,7 @@ def _examined(run: Path, creature: Creature, config: Config) -> bool:
 
 
 def _onward(run: Path, config: Config, stored: Stored) -> str:
-    """Return which options go on with a run that is over."""
+    """Return the command that continues a finished run, or advice if no option does."""
     generation, evolution = stored.manifest.generation, config.evolution
     endless = dataclasses.replace(evolution, target=None, generations=generation + 1)
     if _stopped(dataclasses.replace(config, evolution=endless), stored):

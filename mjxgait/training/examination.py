@@ -1,4 +1,4 @@
-"""Who of a population walks: looks at the best few in C MuJoCo and has one of them examined."""
+"""Validation of the best few of a population in C MuJoCo, and the examination of one of them."""
 
 import dataclasses
 import threading
@@ -26,8 +26,9 @@ from mjxgait.training.prescreen import Tryout
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Examined:
-    """A champion and what the examiner says of it; beyond: of the second level, where that is asked
-    for and it has the first.
+    """A champion and its certificate.
+
+    beyond: stress test result, if the settings ask for that level and the certificate passed.
     """
 
     certificate: Certificate
@@ -36,24 +37,24 @@ class Examined:
 
     @property
     def passed(self) -> bool:
-        """Whether it has what was asked for."""
+        """Whether it passed all that the settings ask for."""
         return self.certificate.passed and (self.beyond is None or self.beyond.passed)
 
 
 def passed_or_first(tried: Sequence[Examined]) -> Examined | None:
-    """Of those that were examined, one that is certified, else the first."""
+    """Return the first certified individual of those examined, else the first of all."""
     certified = (one for one in tried if one.certificate.passed)
     return next(certified, tried[0] if tried else None)
 
 
 def why_ended(generation: int, margin: float) -> str:
-    """Why a run is over that an early examination ended."""
+    """Return why a run is over that ended with an early examination."""
     return f"certified with a margin of {margin:.2f} in generation {generation}"
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Seen:
-    """A champion that is looked at before it is examined; margin: by which it is chosen."""
+    """A validated champion, before its examination. margin: used to choose."""
 
     champion: Champion
     glance: Glance
@@ -65,9 +66,10 @@ class Examiner:
     """Chooses individuals of a run on one draw of starts and pushes, and examines them on another.
 
     Attributes:
-      versions: of the packages, for the champions. tell: called with what is about to be done.
-      exams: the run's examinations so far. Each is one more try, and the certificate says which.
-      tryout: in the order of which its best are looked at; None looks at them in their own.
+      versions: package versions, for the champions. tell: called with a message before each step.
+      exams: the run's examinations so far. Each is an attempt; the certificate states its number.
+      tryout: pre-screening that ranks the candidates before validation; None keeps the order by
+        fitness.
     """
 
     experiment: Experiment
@@ -76,18 +78,18 @@ class Examiner:
     exams: Exams
     tryout: Tryout | None = None
     examines: threading.Event = dataclasses.field(default_factory=threading.Event)
-    """Set once a look has become an examination, which takes all cores."""
+    """Set once a validation has reached the examination, which uses all cores."""
     _margins: dict[str, float] = dataclasses.field(default_factory=dict)
-    """Of the champions that did not do on the way, by fingerprint, at most: another look would say the same."""
+    """Upper bound of the margin by fingerprint, of champions that missed it during the run.
+    Validating them again would give the same."""
 
     def early(self, state: EvolutionState) -> Examined | None:
-        """One of the best with its certificate, if it is time to look and it passes.
+        """Return one of the best with its certificate, if validation is due and it passes.
 
-        Depends on nothing but the state, the settings and the examinations that led here, so that a
-        resumed run ends where it would have ended. Looking takes as long as five generations: first
-        comes what evolution knows already, then the tryout if there is one, then the undisturbed
-        walk, then the draw to choose on. The last examination that the settings allow is kept for
-        the end.
+        Depends only on the state, the settings and the earlier examinations, so that a resumed run
+        ends in the same generation. Validation takes as long as five generations, so cheap checks
+        come first: evolution's own metrics, pre-screening if enabled, the undisturbed walk, the
+        draw to choose on. The last examination that the settings allow is kept for the end.
         """
         config, generation = self.experiment.config, int(state.generation)
         if not due(config.examination, generation):
@@ -105,8 +107,9 @@ class Examiner:
         return None
 
     def _in_order(self, state: EvolutionState, ranks: list[int]) -> list[tuple[int, float]]:
-        """These individuals, each with the margin that it has by the tryout, the best first; without
-        a tryout in their own order, and nobody is doubted.
+        """Return the individuals, each with its margin by pre-screening, best first.
+
+        Without pre-screening their order stays, and every margin is infinite.
         """
         if self.tryout is None or not ranks:
             return [(rank, np.inf) for rank in ranks]
@@ -115,7 +118,7 @@ class Examiner:
         return [(ranks[place], self.tryout.margin(shares[place])) for place in order]
 
     def _on_the_way(self, champion: Champion, generation: int) -> Examined | None:
-        """With its certificate, if it passes; nobody is looked at twice."""
+        """Return a champion with its certificate, if it passes; never validate it twice."""
         config, name = self.experiment.config, champion.fingerprint
         wanted = enough(config, generation)
         if self._margins.get(name, np.inf) < wanted or self.exams.failed(name, generation):
@@ -129,13 +132,14 @@ class Examiner:
         return None
 
     def best(self, state: EvolutionState) -> Examined | None:
-        """One of the best few with its certificate, passed or not; None if there are none.
+        """Return one of the best few with its certificate, passed or not; None if there are none.
 
-        Whoever has room to spare is examined at once; when all have been looked at, those who have
-        any, the best margin first. It ends with the first that passes, or when the run has no
-        examination left. If nobody passes it is the first that was examined: the best margin of
-        all if nobody had any. One that has failed on the way is chosen only if there is no other.
-        Of those that have failed the tryout only the best is looked at, and only if all have.
+        A candidate whose margin is at least `enough` is examined at once. When all are validated,
+        the others with a margin of at least 0 are examined, the best margin first. The first that
+        passes ends the search, as does the last attempt of the run. If none passes, return the
+        first that was examined: the best margin of all if all are negative. A candidate that failed
+        earlier in the run is chosen only if there is no other. Candidates that fail pre-screening
+        are skipped; if all fail, only the best is validated.
         """
         generation, settings = int(state.generation), self.experiment.config.examination
         known: list[Champion] = []
@@ -163,17 +167,18 @@ class Examiner:
         return passed_or_first(tried)
 
     def _examined(self, seen: Seen, tried: list[Examined]) -> bool:
-        """Whether it is certified; it is kept among those that were tried."""
+        """Examine a champion, append it to `tried`, and return whether it is certified."""
         tried.append(self._examine(seen))
         return tried[-1].certificate.passed
 
     def _spent(self, generation: int) -> bool:
-        """Whether the run has had all its examinations."""
+        """Return whether the run has no attempt left."""
         return self.exams.taken(generation) >= self.experiment.config.examination.attempts
 
     def _look(self, champion: Champion, wanted: float, beaten: float) -> Seen:
-        """At the undisturbed walk, and if its margin is what is wanted, at the disturbed ones; at
-        all of them only if they can still have a margin of `beaten`.
+        """Validate the undisturbed walk; if its margin reaches `wanted`, also the disturbed ones.
+
+        The disturbed walks stop once a margin of `beaten` is out of reach.
         """
         creature = champion.embodied(self.experiment.creature)
         seen = glance(creature, champion)
@@ -206,15 +211,15 @@ class Examiner:
 
 
 def enough(config: Config, generation: int) -> float:
-    """The margin that is worth an examination on the way.
+    """Return the margin required for an examination during the run.
 
-    Room to spare in the first half of a run's generations, any in the second.
+    It is `examination.enough` in the first half of a run's generations, 0 in the second.
     """
     return config.examination.enough if 2 * generation <= config.evolution.generations else 0.0
 
 
 def due(settings: ExaminationConfig, generation: int) -> bool:
-    """Whether a run looks at its best after this generation, before its last."""
+    """Return whether a run validates its best after this generation, before its last."""
     return (
         bool(settings.every and settings.candidates)
         and generation > 0
@@ -223,7 +228,7 @@ def due(settings: ExaminationConfig, generation: int) -> bool:
 
 
 def _promising(experiment: Experiment, state: EvolutionState, rank: int) -> bool:
-    """Whether an individual is worth an examination."""
+    """Return whether an individual's metrics justify an examination."""
     config, names = experiment.config, experiment.simulator.task.outcomes
     outcome = dict(zip(names, np.asarray(state.outcome[rank]).T, strict=True))
     demands = demands_of(config.use.task, config.wish)

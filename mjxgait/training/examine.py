@@ -1,4 +1,4 @@
-"""Runs that have come to their last generation: one of the best few of each with its certificate."""
+"""Examination of runs that have reached their last generation."""
 
 import io
 from collections.abc import Callable, Sequence
@@ -27,11 +27,12 @@ def examine(
     tell: Callable[[int, int], object],
     stopped: Callable[[], bool],
 ) -> bool:
-    """Leaves champion and certificate in each of these run folders that has none, one per core;
-    whether all have been looked at.
+    """Write champion and certificate to each run folder without one; return whether all are done.
 
-    folder: that they lie in. again: the command that goes on. tell: called with how many are done,
-    and of how many.
+    Each core examines one run at a time.
+
+    folder: contains the run folders. again: command that continues. tell: called with the number
+    of runs done and their total.
 
     Raises:
       UserError: a process was killed from outside, or the folder cannot be written.
@@ -50,13 +51,13 @@ def examine(
 
 
 def _prepare(own: Sequence[tuple[str, str]]) -> None:
-    """Make a process ready: devices, and the code that was loaded in this one."""
+    """Prepare a worker process: devices, and the user's code that this process loaded."""
     prepare_devices()
     load_all(own)
 
 
 def _examine(folder: Path) -> None:
-    """In a process of its own: all that is sent is the folder of a run."""
+    """Examine one run in a worker process, which receives only the run folder."""
     creature, config = open_run(folder)
     experiment, store = build_experiment(creature, config), Checkpoints(folder, config.keep_every)
     try:

@@ -1,4 +1,4 @@
-"""`exams.jsonl`: who of a run has been examined for the certificate, and how often it was tried."""
+"""`exams.jsonl`: the champions of a run that were examined for the certificate."""
 
 import dataclasses
 from pathlib import Path
@@ -25,32 +25,32 @@ class _Exam:
 
 @dataclasses.dataclass(frozen=True)
 class Exams:
-    """One line for each champion that a run has had examined; a file that only grows.
+    """Append-only file with a line for each champion that a run has examined.
 
-    An examination of the same champion says the same, so it counts once: a run that is resumed
-    from an earlier checkpoint, and does again what it did, has not tried more often.
+    Examining a champion again gives the same result, so it counts once: a run that is resumed from
+    an earlier checkpoint and repeats its examinations makes no more attempts.
     """
 
     path: Path
 
     def failed(self, champion: str, generation: int) -> bool:
-        """Whether the champion of this fingerprint has failed up to this generation."""
+        """Return whether the champion of this fingerprint has failed up to this generation."""
         failures = (line for line in self._lines() if not line["passed"])
         return any(
             line["champion"] == champion and line["generation"] <= generation for line in failures
         )
 
     def taken(self, generation: int) -> int:
-        """Examinations up to this generation."""
+        """Return the number of examinations up to this generation."""
         return len(self._until(generation))
 
     def attempt(self, champion: str, generation: int) -> int:
-        """Which of the run's examinations this champion's is, or would be, counted from 1."""
+        """Return the attempt number that this champion has or would have, counted from 1."""
         before = self._until(generation)
         return before.index(champion) + 1 if champion in before else len(before) + 1
 
     def add(self, champion: str, generation: int, passed: bool) -> None:
-        """Writes an examination down, once for each champion."""
+        """Record an examination, once for each champion."""
         if champion in (line["champion"] for line in self._lines()):
             return
         line = {"generation": generation, "champion": champion, "passed": passed}

@@ -1,4 +1,4 @@
-"""Wires the rooms into a run."""
+"""Experiment and batch: one or several runs assembled from creature and config."""
 
 import dataclasses
 from collections.abc import Callable, Hashable, Iterator, Sequence
@@ -43,10 +43,10 @@ Step = Callable[[EvolutionState], tuple[EvolutionState, GenerationMetrics]]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Experiment:
-    """One creature under one config: the pure functions of a run. The starts follow from the seed.
+    """Pure functions of a run: one creature under one config. The starts follow from the seed.
 
-    creature: as its files have it, on the ground of the run. `blueprint.creature` also has the pose
-    ranges that the settings state.
+    creature: as in its files, on the ground of the run. `blueprint.creature` also has the pose
+    ranges of the settings.
     """
 
     creature: Creature
@@ -61,47 +61,50 @@ class Experiment:
 
     @property
     def starts(self) -> Starts:
-        """The starts on which individuals are judged, [R] in each generation."""
+        """The starts on which individuals are evaluated, [R] in each generation."""
         return self.row.starts
 
     @property
     def plant_note(self) -> str:
-        """What a user should know about the physics; empty if there is nothing to say."""
+        """Note for the user on the physics; empty if there is none."""
         return self.simulator.plant.note
 
     @property
     def shape(self) -> Hashable:
-        """What decides on its compiled programs; see `Shape`."""
+        """Key of its compiled programs; see `Shape`."""
         return shape_of(self.creature, self.config), jax.tree.structure(self.row)
 
     def init(self, island: int = 0) -> EvolutionState:
-        """The state of generation -1: a population that nobody has judged.
+        """Return the state of generation -1: a population that is not evaluated yet.
 
-        island: other populations on the same starts are those of other islands; the run's own is 0.
+        island: each number has its own population, on the same starts; 0 is the run's own.
         """
         return begin(self.blueprint, *self._origin(island))
 
     def abstract(self) -> EvolutionState:
-        """Shapes and types of a state."""
+        """Return the shapes and types of a state."""
         shapes: EvolutionState = jax.eval_shape(
             partial(first_state, self.blueprint), *self._origin()
         )
         return shapes
 
     def _origin(self, island: int = 0) -> tuple[Numbers | None, Config, jax.Array]:
-        """What the first state follows from."""
+        """Return the inputs of the first state."""
         key = jax.random.fold_in(key_of(self.config.seed), 0)
         known = (self.blueprint.numbers, self.row.settings)
         return *known, jax.random.fold_in(key, island) if island else key
 
     def simulate(self, genomes: Any, starts: Starts | None = None) -> Episodes:
-        """Genomes [N, ...] on the starts [R] of this run or on others: episodes with leaves [N, R, ...]."""
+        """Simulate genomes [N, ...] on starts [R], by default the run's.
+
+        The episodes have leaves [N, R, ...].
+        """
         rows = _lone((genomes, starts or self.starts, self.row.settings))
         episodes = self.simulator.simulate(*rows)
         return Episodes(_only(episodes.tally), episodes.computed_steps)
 
     def compile(self, evaluator: Evaluator | None = None) -> Step:
-        """A generation by compiled programs; an evaluator elsewhere may judge."""
+        """Compile a generation; `evaluator` evaluates it elsewhere."""
         return self.step(self.stages(judges=evaluator is None), evaluator)
 
     def stages(self, judges: bool = True) -> Stages:
@@ -109,7 +112,7 @@ class Experiment:
         return Batch((self,)).stages(judges)
 
     def step(self, stages: Stages, evaluator: Evaluator | None = None) -> Step:
-        """A generation by programs of this shape."""
+        """Return the generation with compiled programs of this shape."""
         together = Batch((self,)).bound(stages, evaluator)
 
         def alone(state: EvolutionState) -> tuple[EvolutionState, GenerationMetrics]:
@@ -118,9 +121,9 @@ class Experiment:
         return alone
 
     def candidates(self, state: EvolutionState) -> list[int]:
-        """Ranks of the best individuals that differ from each other, as many as the config asks for; best first.
+        """Return the ranks of the best individuals that differ, at most `candidates`; best first.
 
-        Of equal fitness are those that did the same: programs differ in what changes nothing.
+        Equal fitness means equal motion: expressions may differ in parts that have no effect.
         """
         rows = self.simulator.controller.genes(state.genomes, self.config.controller)
         fitness, settings = np.asarray(state.fitness), self.config.examination
@@ -133,12 +136,12 @@ class Experiment:
         return chosen
 
     def place(self, state: EvolutionState) -> EvolutionState:
-        """The state on all devices, where the compiled program wants it."""
+        """Put the state on all devices, as the compiled program requires."""
         return jax.device_put(state, everywhere(self.simulator))
 
     def champion(self, state: EvolutionState, versions: dict[str, str], rank: int = 0) -> Champion:
-        """An individual of a state; rank 0 is the best."""
-        # One transfer instead of one per array: it happens in every generation.
+        """Return an individual of a state; rank 0 is the best."""
+        # One transfer instead of one per array: this runs in every generation.
         genomes, every_term, outcome, fitness, born, generation = jax.device_get(
             (state.genomes, state.terms, state.outcome, state.fitness, state.born, state.generation)
         )
@@ -163,7 +166,7 @@ class Experiment:
 
 
 def arrays_of(genome: Any) -> dict[str, np.ndarray]:
-    """The arrays of a genome by dotted name, as checkpoints have them."""
+    """Return the arrays of a genome by dotted name, as in checkpoints."""
     leaves = jax.tree_util.tree_leaves_with_path(genome)
     return {
         jax.tree_util.keystr(path, simple=True, separator="."): np.asarray(leaf)
@@ -173,7 +176,7 @@ def arrays_of(genome: Any) -> dict[str, np.ndarray]:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Batch:
-    """Evolution runs of one creature, side by side as rows `B` of one computation: they share the lanes and are compiled once."""
+    """Evolution runs of one creature, the rows `B` of one program: lanes are shared."""
 
     experiments: tuple[Experiment, ...]
 
@@ -183,19 +186,20 @@ class Batch:
         return _stack([experiment.row for experiment in self.experiments])
 
     def init(self) -> EvolutionState:
-        """The states before anybody has been judged, leaves [B, ...]."""
+        """Return the states before the first evaluation, leaves [B, ...]."""
         return _stack([experiment.init() for experiment in self.experiments])
 
     def abstract(self) -> EvolutionState:
-        """Shapes and types of the states."""
+        """Return the shapes and types of the states."""
         count, one = len(self.experiments), self.experiments[0].abstract()
         return jax.tree.map(
             lambda leaf: jax.ShapeDtypeStruct((count, *leaf.shape), leaf.dtype), one
         )
 
     def compile(self, evaluator: Evaluator | None = None) -> Step:
-        """A generation of all rows: states and metrics have leaves [B, ...]. evaluator: who judges, if not
-        this machine.
+        """Compile a generation of all rows: states and metrics have leaves [B, ...].
+
+        evaluator: evaluates instead of this machine.
         """
         return self.bound(self.stages(judges=evaluator is None), evaluator)
 
@@ -207,17 +211,17 @@ class Batch:
         return compile_stages(self.lower(judges), turn, long)
 
     def lower(self, judges: bool = True) -> Iterator[tuple[str, jax.stages.Lowered]]:
-        """The programs of a generation, see `lower_stages`; the same for all settings of the same shape."""
+        """Lower the programs of a generation, equal for equal shapes; see `lower_stages`."""
         return lower_stages(self._blueprint, self.rows, self.abstract(), judges)
 
     def bound(self, stages: Stages, evaluator: Evaluator | None = None) -> Step:
-        """The generation of these rows by programs of their shape."""
+        """Return the generation of these rows with compiled programs of their shape."""
         return partial(stages.step, *self.known, evaluator=evaluator)
 
     def lower_judge(
         self, genomes: Any, starts: Starts, asked: Asked | None = None
     ) -> jax.stages.Lowered:
-        """The program that judges so many genomes [B, N, ...]; see `generation.judge`."""
+        """Lower the program that evaluates genomes [B, N, ...]; see `generation.judge`."""
         given = (self.rows.settings, starts, genomes)
         return lowered(self._blueprint, judge, *given, *([] if asked is None else [asked]))
 
@@ -227,7 +231,7 @@ class Batch:
 
     @cached_property
     def known(self) -> tuple[Numbers | None, Row]:
-        """What the programs read of the body and of the rows, on all devices."""
+        """Body parameters and rows that the programs read, on all devices."""
         one = self.experiments[0]
         known: tuple[Numbers | None, Row] = jax.device_put(
             (one.blueprint.numbers, self.rows), everywhere(one.simulator)
@@ -235,12 +239,12 @@ class Batch:
         return known
 
     def place(self, states: EvolutionState) -> EvolutionState:
-        """The states on all devices, where the compiled program wants them."""
+        """Put the states on all devices, as the compiled program requires."""
         return jax.device_put(states, everywhere(self.experiments[0].simulator))
 
 
 def build_experiment(creature: Creature, config: Config) -> Experiment:
-    """Joins the rooms: creature and config to simulator, settings and starts.
+    """Build simulator, settings and starts from creature and config.
 
     Raises:
       UserError: the physics does not support the creature's model.
@@ -254,14 +258,15 @@ def build_batch(
     blueprint: Plan | None = None,
     sources: Sequence[Sequence[int]] = (),
 ) -> Batch:
-    """Runs of one creature whose configs differ in nothing that shapes the program.
+    """Build runs of one creature with configs that share one program.
 
     Args:
-      blueprint: of this creature under settings of the same shape, where it has been drawn up.
-      sources: for each run the others whose best are judged among its children; by default nobody's.
+      blueprint: of this creature, with settings of the same shape; made here by default.
+      sources: for each run, the runs whose best are evaluated among its children; none by default.
 
     Raises:
-      UserError: two configs need different programs, or the physics does not support the creature's model.
+      UserError: two configs need different programs, or the physics does not support the creature's
+        model.
     """
     if len({jax.tree.structure(traced(config)) for config in configs}) != 1:
         raise UserError(
@@ -278,7 +283,7 @@ def build_batch(
 
 
 def _filled_up(sources: Sequence[Sequence[int]]) -> list[list[int]]:
-    """All as long as the longest; a row's own number stands for nobody."""
+    """Pad all to the longest with the row's own number, which means no source."""
     most = max(map(len, sources))
     return [[*rows, *[own] * (most - len(rows))] for own, rows in enumerate(sources)]
 
@@ -288,7 +293,7 @@ def _experiment(creature: Creature, blueprint: Plan, config: Config) -> Experime
     key = jax.random.fold_in(key_of(config.seed), 1)
     rollout = config.rollout
     drawn = dataclasses.replace(rollout, starts=1 + (rollout.starts - 1) * rollout.variety)
-    # Each run's own task: what is told in a trial is not the same for all rows of a program.
+    # Each run needs its own task: the commands in a trial differ between the rows of a program.
     step, ends = float(creature.model.opt.timestep), what_ends(creature, rollout)
     task = make_task(blueprint.own.creature, step, ends, config)
     starts = task.trials(key, creature, drawn)
@@ -298,12 +303,12 @@ def _experiment(creature: Creature, blueprint: Plan, config: Config) -> Experime
 
 
 def _lone(tree: Any) -> Any:
-    """One row [1, ...] of everything."""
+    """Add an axis of one row [1, ...] to all leaves."""
     return jax.tree.map(lambda leaf: leaf[None], tree)
 
 
 def _only(tree: Any) -> Any:
-    """The only row of everything."""
+    """Remove the axis of one row from all leaves."""
     return jax.tree.map(lambda leaf: leaf[0], tree)
 
 

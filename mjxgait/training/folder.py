@@ -1,4 +1,4 @@
-"""The run folder: what lies where, how it is made and opened."""
+"""Run folder: file names, creation and reading."""
 
 import dataclasses
 import json
@@ -43,14 +43,13 @@ CREATURE, METRICS, CHAMPION = "creature", "metrics.jsonl", "champion.json"
 CERTIFICATE, STRESS, EXAMS = "certificate.json", "stress.json", "exams.jsonl"
 PLOT, PLOTS, BODY = "fitness.png", "plots", "body"
 MOTHERS = "mothers"
-"""In a line of the log, of everybody in the population the place that it had itself, or its mother,
-in the generation before."""
+"""Key in a log line: each individual's own place in the previous generation, or its mother's."""
 ISLANDS, MIGRATIONS = "islands", "migrations.jsonl"
 
 
 @dataclasses.dataclass(frozen=True)
 class Numbered:
-    """Schema of a line of a file that a resumed run takes lines out of."""
+    """Schema of a line in files that a resumed run truncates."""
 
     __pydantic_config__ = STORED
     generation: Annotated[int, pydantic.Field(strict=True)]
@@ -58,7 +57,7 @@ class Numbered:
 
 @dataclasses.dataclass(frozen=True)
 class _Metrics:
-    """Schema of a line of `metrics.jsonl`; all else in it is numbers."""
+    """Schema of a line of `metrics.jsonl`; all further fields are numbers."""
 
     __pydantic_config__ = STORED
     generation: Index
@@ -69,11 +68,11 @@ class _Metrics:
 
 
 def check_run(folder: Path | None, creature: Creature, config: Config) -> Path:
-    """Return the folder that a new run may have; by default a new one under runs/. Writes nothing.
+    """Return the folder for a new run, by default a new one under runs/. Writes nothing.
 
     Raises:
-      UserError: the folder holds something already; controller or task does not fit the creature;
-        or the creature's body cannot be examined.
+      UserError: the folder is not empty; controller or task does not fit the creature; or the
+        creature's body cannot be examined.
     """
     check_parts(creature, config)
     folder = folder or new_run_folder(creature.name, config.seed)
@@ -87,13 +86,13 @@ def check_run(folder: Path | None, creature: Creature, config: Config) -> Path:
 
 
 def check_parts(creature: Creature, config: Config) -> None:
-    """Refuse a controller or task that does not fit the creature, and a body that cannot be examined.
+    """Refuse a controller or task that does not fit, and a body that cannot be examined.
 
-    Bodies that grow are checked one by one when they are examined. Of bodies whose sizes evolve the
-    smallest and the largest are checked.
+    Bodies that grow are checked at their examination. If sizes evolve, the smallest and the largest
+    body are checked.
 
     Raises:
-      UserError: says which, and the way out.
+      UserError: names the problem and the remedy.
     """
     check_fit(creature, config)
     if creature.settings.creature.grows:
@@ -104,7 +103,7 @@ def check_parts(creature: Creature, config: Config) -> None:
 
 
 def is_taken(folder: Path) -> bool:
-    """Return whether a folder holds something, or is a file.
+    """Return whether a folder is not empty, or is a file.
 
     Raises:
       UserError: it cannot be read.
@@ -116,7 +115,7 @@ def is_taken(folder: Path) -> bool:
 
 
 def create_run(folder: Path | None, creature: Creature, config: Config) -> Path:
-    """Make the run folder with the exact creature and settings; by default a new one under runs/.
+    """Create the run folder with the exact creature and settings, by default under runs/.
 
     Raises:
       UserError: see `check_run`; or the folder cannot be written.
@@ -132,14 +131,14 @@ def create_run(folder: Path | None, creature: Creature, config: Config) -> Path:
 
 
 def keep_body(folder: Path, creature: Creature) -> None:
-    """Writes a creature folder."""
+    """Write a creature folder."""
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in creature.files.items():
         write_text(folder / name, text)
 
 
 def new_run_folder(creature: str, seed: int) -> Path:
-    """The first folder under runs/ that is not there yet."""
+    """Return the first free folder name under runs/."""
     names = (
         f"{creature}-seed{seed}{suffix}" for suffix in ("", *(f"-{i}" for i in range(2, 10_000)))
     )
@@ -147,7 +146,7 @@ def new_run_folder(creature: str, seed: int) -> Path:
 
 
 def open_run(folder: Path) -> tuple[Creature, Config]:
-    """The creature, on the ground of the run, and the settings of a run folder.
+    """Return the creature, on the ground of the run, and the settings of a run folder.
 
     Raises:
       UserError: it is not a run folder, or its controller or task was not named.
@@ -164,7 +163,7 @@ def open_run(folder: Path) -> tuple[Creature, Config]:
 
 
 def open_champion(folder: Path) -> tuple[Creature, Champion]:
-    """The best individual of a run folder, and the body that it has.
+    """Return the body of a run folder's best individual, and that individual.
 
     Raises:
       UserError: it is not a run folder, or has no champion yet.
@@ -175,7 +174,7 @@ def open_champion(folder: Path) -> tuple[Creature, Champion]:
 
 
 def kept_champion(folder: Path, creature: Creature) -> Champion:
-    """Return what `champion.json` of a run folder holds.
+    """Return the champion in `champion.json` of a run folder.
 
     Raises:
       UserError: there is none, it is damaged, or it is of another body.
@@ -188,7 +187,7 @@ def kept_champion(folder: Path, creature: Creature) -> Champion:
 
 
 def read_metrics(path: Path) -> list[dict[str, Any]]:
-    """The lines of a `metrics.jsonl`; a last line that was cut off by a kill is left out.
+    """Return the lines of a `metrics.jsonl`, without a last line that a kill cut off.
 
     Raises:
       UserError: it is damaged; names the line.
@@ -202,7 +201,7 @@ def read_metrics(path: Path) -> list[dict[str, Any]]:
 
 
 def read_records(path: Path, schema: type) -> list[dict[str, Any]]:
-    """The lines of a file that grows, each as its schema says; see `files.read_lines`."""
+    """Return the lines of an append-only file, checked by schema; see `files.read_lines`."""
     lines = read_lines(path)
     for number, line in enumerate(lines, 1):
         check(schema, line, f"{path}, line {number}", TAKE_OUT)
@@ -210,11 +209,11 @@ def read_records(path: Path, schema: type) -> list[dict[str, Any]]:
 
 
 def truncate_metrics(path: Path, generation: int) -> None:
-    """Takes out the lines after a generation, as a resumed run will write them again."""
+    """Remove the lines after a generation, because a resumed run writes them again."""
     kept = [line for line in read_records(path, Numbered) if line["generation"] <= generation]
     write_lines(path, kept)
 
 
 def write_lines(path: Path, lines: Iterable[Mapping[str, Any]]) -> None:
-    """Write a file with an object in each line in one go."""
+    """Write a file at once, with one JSON object per line."""
     write_text(path, "".join(json.dumps(line) + "\n" for line in lines))

@@ -1,7 +1,7 @@
-"""The parts of a generation of evolution runs side by side: propose, judge (and promote), absorb.
+"""Parts of a generation of a batch of runs: propose, judge (and promote), absorb.
 
-Row by row but for the simulations, so that a row reads nothing of its neighbours, unless it is told
-to have theirs judged among its own.
+All but the simulations goes row by row, so that a row is independent of the others, unless it
+receives migrants from them.
 """
 
 import dataclasses
@@ -30,17 +30,17 @@ from mjxgait.training.blueprint import Numbers, Plan
 from mjxgait.types import Asked, Judged, pytree
 
 LEADERS = 16
-"""Of the best of a row, those that decide whether trials become harder."""
+"""Number of a row's best individuals that decide on the next curriculum level."""
 SENT = 4
-"""Of the best of a row, those that it sends to others, one in each generation in turn."""
+"""Number of a row's best individuals that migrate to other rows in turn, one per generation."""
 
 
 @pytree
 class Row:
-    """What tells one evolution run from another in the same compiled program: its traced settings, and all its starts.
+    """Inputs that differ between runs of one compiled program: traced settings and all starts.
 
-    sources: [S] rows whose best are judged among its children; its own number stands for nobody.
-    None where rows know nothing of each other.
+    sources: [S] rows whose best are evaluated among its children; its own number means no row.
+      None if rows are independent.
     """
 
     settings: Config
@@ -49,7 +49,7 @@ class Row:
 
 
 def evolution_of(simulator: Simulator, settings: Config) -> Evolution:
-    """The genetic algorithm under settings, plain or traced."""
+    """Return the genetic algorithm with these settings, plain or traced."""
     task = simulator.task
 
     def rank(terms: jax.Array, generation: jax.Array) -> jax.Array:
@@ -63,7 +63,7 @@ def evolution_of(simulator: Simulator, settings: Config) -> Evolution:
 def first_state(
     blueprint: Plan, numbers: Numbers | None, settings: Config, key: jax.Array
 ) -> EvolutionState:
-    """That of a run, before anybody has been judged."""
+    """Return the state of a run before the first evaluation."""
     simulator = blueprint.simulator(numbers)
     task, trials = simulator.task, settings.rollout.starts
     state = evolution_of(simulator, settings).init(key, trials, len(task.terms), len(task.outcomes))
@@ -75,7 +75,7 @@ def first_state(
 def propose(
     blueprint: Plan, numbers: Numbers | None, rows: Row, states: EvolutionState
 ) -> tuple[Proposal, Starts]:
-    """What the rows [B] want judged, and on which starts [B, R]."""
+    """Return the proposals of the rows [B], and the starts [B, R] to evaluate them on."""
     simulator = blueprint.simulator(numbers)
 
     def of_row(pair: tuple[Row, EvolutionState]) -> Proposal:
@@ -89,10 +89,10 @@ def propose(
 
 
 def with_guests(sources: jax.Array, states: EvolutionState, proposals: Proposal) -> Proposal:
-    """The proposals [B] with one of the best of each source [B, S] in the place of a last child.
+    """Replace the last children of the proposals [B] by one of the best of each source [B, S].
 
-    Rows differ in what they ask for, so a guest is judged anew. Nobody comes before the rows have
-    been judged themselves.
+    Rows differ in their settings, so migrants are evaluated again. None migrates before the first
+    evaluation of the rows.
     """
     count, own = sources.shape[1], jnp.arange(len(sources))[:, None]
     judged = states.generation[:, None] >= 0
@@ -122,12 +122,12 @@ def judge(
     genomes: object,
     asked: Asked | None = None,
 ) -> Judged:
-    """The verdict on genomes [B, N, ...] as this machine gives it."""
+    """Evaluate genomes [B, N, ...] on this machine."""
     return Local(blueprint.simulator(numbers)).judge(genomes, starts, settings, asked)
 
 
 def first_trials(states: EvolutionState, proposals: Proposal) -> Asked:
-    """Everybody's first trial, of whom nothing is known yet; reads nothing but shapes."""
+    """Request the first trial of every individual, with no known results; reads shapes only."""
     shape = (*proposals.born.shape, states.terms.shape[2])
 
     def nothing(values: jax.Array) -> Any:
@@ -147,7 +147,7 @@ def promote(
     proposals: Proposal,
     judged: Judged,
 ) -> Asked:
-    """The other trials of those who did best in the first, and of those who are judged once more."""
+    """Request the other trials of the best in the first, and of individuals evaluated again."""
     simulator = blueprint.simulator(numbers)
 
     def of_row(given: tuple[Row, EvolutionState, Proposal, Judged]) -> jax.Array:
@@ -168,7 +168,7 @@ def absorb(
     proposals: Proposal,
     judged: Judged,
 ) -> tuple[EvolutionState, GenerationMetrics]:
-    """The rest of the rows' generation."""
+    """Complete the generation of the rows after the evaluation."""
     simulator = blueprint.simulator(numbers)
 
     def of_row(
@@ -183,11 +183,10 @@ def absorb(
 
 
 def climbed(task: Task, settings: Any, state: EvolutionState) -> EvolutionState:
-    """The state after a generation, one level higher if most of the best have mastered theirs and
-    there is a higher one.
+    """Raise the curriculum level after a generation if most of the best have passed it.
 
-    What they were worth at the old level is then forgotten, for it was easier: of those that live
-    on all are judged again, and that they are worth less is no stall.
+    The old level was easier, so fitness at that level is then discarded: all survivors are
+    evaluated again, and their lower fitness does not count as stagnation. The highest level stays.
     """
     if state.level is None:
         return state
@@ -201,7 +200,7 @@ def climbed(task: Task, settings: Any, state: EvolutionState) -> EvolutionState:
 
 
 def next_starts(task: Task, row: Row, state: EvolutionState) -> Starts:
-    """The starts [R] of the next generation, as hard as they are by then."""
+    """Return the starts [R] of the next generation, at its curriculum level."""
     starts = row.starts
     if row.settings.rollout.variety > 1:
         starts = _of_round(row, jnp.maximum(state.generation + 1, 0))
@@ -211,7 +210,7 @@ def next_starts(task: Task, row: Row, state: EvolutionState) -> Starts:
 
 
 def _of_round(row: Row, generation: jax.Array) -> Starts:
-    """The nominal one, and the next of all others in turn."""
+    """Return the nominal start, and the next of the others in turn."""
     others = row.settings.rollout.starts - 1
     turn = 1 + (generation * others + jnp.arange(others)) % (row.starts.friction.shape[0] - 1)
     places = jnp.append(0, turn)

@@ -1,4 +1,4 @@
-"""The body that a genome has, where bodies evolve."""
+"""Bodies computed from genomes, if bodies evolve."""
 
 import dataclasses
 from typing import Any, Protocol
@@ -20,21 +20,21 @@ from mjxgait.types import ModelPlant
 
 
 class Growth(Protocol):
-    """From a genome to the body that is simulated."""
+    """Computation of the simulated body from a genome."""
 
     def body(self, plant: Any, genome: Any, start: Starts) -> Starts:
-        """The start [] with the genome's own body."""
+        """Return the start [] with the genome's own body."""
         ...
 
 
 @dataclasses.dataclass(frozen=True)
 class GraphGrowth:
-    """Bodies of blocks, from graphs."""
+    """Modular bodies from graphs."""
 
     capacity: Capacity
 
     def body(self, plant: TreePlant, genome: Genotype, start: Starts) -> Starts:
-        """See `Growth`. What has no hinge is not bent, and on land all rest on the ground."""
+        """See `Growth`. Parts without a hinge are not bent; on land bodies rest on the ground."""
         tree = body_of(genome.graph, self.capacity).tree
         bent = start.qpos[7:] * tree.moves[1:]
         qpos = plant.rested(tree, jnp.concatenate([start.qpos[:7], bent]))
@@ -43,14 +43,14 @@ class GraphGrowth:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class SizeGrowth:
-    """From sizes to the numbers that the plant reads, and to a start that stands as high."""
+    """Body parameters from evolved sizes, and a start with its height above ground kept."""
 
     proportions: Proportions
 
     def body(self, plant: ModelPlant, genome: Bodied, start: Starts) -> Starts:
         """See `Growth`."""
         known = self.proportions
-        # The trunk's place is -1, where the factor is 1.
+        # The trunk has index -1, where the factor is 1.
         factors = jnp.exp(jnp.append(genome.sizes, 0.0))[known.size_of]
         one = plant.parameters
         if start.heaviness is not None:
@@ -60,7 +60,7 @@ class SizeGrowth:
         return dataclasses.replace(start, qpos=qpos, numbers=plant.resized(one, factors))
 
     def _lift(self, factors: jax.Array) -> jax.Array:
-        """[] m, by which the trunk is higher with these factors [B]."""
+        """Return the rise [] of the trunk in m with these factors [B]."""
         reach, fixed = (
             x.astype(np.float32) for x in (self.proportions.reach, self.proportions.fixed)
         )
@@ -68,10 +68,10 @@ class SizeGrowth:
 
 
 def growth_of(creature: Creature, config: Config) -> SizeGrowth | None:
-    """None where the body stays as it is.
+    """Return the growth of a creature whose sizes evolve; None if they do not.
 
     Raises:
-      UserError: the smallest or the largest body cannot be had.
+      UserError: the smallest or the largest body is impossible.
     """
     if not extreme_bodies(creature, config.evolution.body):
         return None

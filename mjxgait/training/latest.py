@@ -1,4 +1,4 @@
-"""What was made before and is asked for again."""
+"""Cache of the latest values."""
 
 import collections
 from collections.abc import Callable, Hashable
@@ -8,14 +8,14 @@ T = TypeVar("T")
 
 
 class Latest(collections.OrderedDict[Hashable, T]):
-    """Those that were used last, at most `count`."""
+    """Cache of the `count` values used last."""
 
     def __init__(self, count: int) -> None:
         super().__init__()
         self._count = count
 
     def find(self, key: Hashable, make: Callable[[], T]) -> T:
-        """What is known by this key, made now if it is not."""
+        """Return the value of a key; make it if it is missing."""
         if key not in self:
             self[key] = make()
             while len(self) > self._count:

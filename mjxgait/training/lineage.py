@@ -1,4 +1,4 @@
-"""Whose child somebody is, from what the log of a run tells of each generation."""
+"""Ancestors of an individual, from the log of a run."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -8,9 +8,9 @@ from mjxgait.training.folder import MOTHERS
 
 
 def mothers_line(lines: Sequence[Mapping[str, Any]], generation: int, place: int) -> dict[int, int]:
-    """By generation, latest first, the place of somebody's first ancestors in the population.
+    """Return the places of an individual's maternal ancestors by generation, latest first.
 
-    Back to where somebody has no mother, or the log does not tell.
+    The line ends at an individual without a mother or a generation without a log line.
     """
     known = {line["generation"]: line[MOTHERS] for line in lines if MOTHERS in line}
     found = {generation: place}
@@ -21,5 +21,5 @@ def mothers_line(lines: Sequence[Mapping[str, Any]], generation: int, place: int
 
 
 def _mother(places: Sequence[int], place: int) -> int:
-    """The place of somebody's mother; nobody where the log does not tell."""
+    """Return the place of an individual's mother; `NOBODY` if the log does not have it."""
     return places[place] if 0 <= place < len(places) else NOBODY

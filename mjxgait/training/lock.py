@@ -1,8 +1,8 @@
-"""Which process writes a run folder: one at a time, and others can see that it is alive.
+"""Lock of a run folder: one process at a time writes it, and others can see that it is alive.
 
-The operating system holds the lock and lets go of it when the process ends, however that ends. A
-file that a killed process left behind therefore locks nothing. Systems without `flock`, such as
-Windows, have no lock: there a run that is alive is not known as such.
+The operating system holds the lock and releases it when the process ends, even if it is killed. A
+lock file left behind therefore locks nothing. Systems without `flock`, such as Windows, have no
+lock: a live run is not detected there.
 """
 
 import contextlib
@@ -23,18 +23,17 @@ except ImportError:  # pragma: no cover
     fcntl = None  # type: ignore[assignment]
 
 LOCK = "running.lock"
-"""In a folder that is being written; it says which process does, and goes with it."""
+"""File in a folder that is being written; it names the process and is removed with it."""
 TRIES, PAUSE = 5, 0.1
-"""A process that only looks holds the lock for a moment: how often, and after how many seconds, to
-try again."""
+"""Number of attempts, and s between them: a process that only reads holds the lock briefly."""
 
 
 @contextlib.contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Keep a folder for this process as long as the block lasts.
+    """Lock a folder for this process within the block.
 
     Raises:
-      UserError: another process has it, or it cannot be written.
+      UserError: another process holds the lock, or the folder cannot be written.
     """
     file = _acquired(folder)
     try:
@@ -46,7 +45,7 @@ def locked(folder: Path) -> Iterator[None]:
 
 
 def running(run: Path) -> str | None:
-    """Return which process writes a run now, in words; None where none does.
+    """Return a description of the process that writes a run now; None if none does.
 
     A folder of several runs is locked as a whole.
     """
@@ -56,7 +55,7 @@ def running(run: Path) -> str | None:
 
 
 def why_empty(run: Path) -> str:
-    """Return why a run has nothing to show yet."""
+    """Return why a run has no results yet."""
     if who := running(run):
         return f"it runs now ({who}) and has not done its first generation"
     return "the run ended before its first generation was done"
@@ -71,7 +70,7 @@ def _acquired(folder: Path) -> BinaryIO:
         if not _try(file):
             file.close()
             time.sleep(PAUSE)
-        elif not _same(file, path):  # its holder has just ended and taken it away
+        elif not _same(file, path):  # its holder has just ended and removed it
             file.close()
         else:
             with disk_errors(folder):
@@ -84,20 +83,20 @@ def _acquired(folder: Path) -> BinaryIO:
 
 
 def _try(file: BinaryIO, shared: bool = False) -> bool:
-    """Lock an open file; return whether no other process has it. Without locks none ever has."""
+    """Lock an open file; return False if another process holds it. Without `flock` return True."""
     if fcntl is None:
         return True
     try:
         fcntl.flock(file, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
     except BlockingIOError:
         return False
-    except OSError:  # a file system that knows no locks
+    except OSError:  # a file system without locks
         return True
     return True
 
 
 def _same(file: BinaryIO, path: Path) -> bool:
-    """Return whether an open file is still the one of that name."""
+    """Return whether the path still leads to this open file."""
     try:
         return os.path.samestat(os.fstat(file.fileno()), path.stat())
     except FileNotFoundError:
@@ -105,7 +104,7 @@ def _same(file: BinaryIO, path: Path) -> bool:
 
 
 def _holder(path: Path) -> str | None:
-    """Return which process holds a lock; None where none does."""
+    """Return a description of the process that holds a lock; None if none does."""
     try:
         with path.open("rb") as file:
             if _try(file, shared=True):

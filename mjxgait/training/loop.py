@@ -1,4 +1,4 @@
-"""The host loop around the jitted generation: it counts, logs, checkpoints and stops."""
+"""Host loop around the jitted generation: it counts, logs, checkpoints and stops."""
 
 import dataclasses
 import functools
@@ -60,25 +60,24 @@ def train(
     evaluator: Evaluator | None = None,
     begin: Callable[[], object] = lambda: None,
 ) -> bool:
-    """Run, or go on with, the evolution in a run folder; returns whether it came to its end.
+    """Run or resume the evolution in a run folder; return whether it came to its end.
 
     Args:
       resume: go on from a checkpoint, the latest or that of `generation`.
-      evaluator: what evaluates the individuals, if not this machine.
-      begin: makes the folder of a new run; called after the last check.
+      evaluator: evaluates the individuals instead of this machine.
+      begin: creates the folder of a new run; called after the last check.
     """
     experiment = build_experiment(creature, config)
     begin()
     checkpoints = Checkpoints(folder, config.keep_every)
-    # A run that was killed before its first checkpoint begins anew: it will do what it would have
-    # done.
+    # A run that was killed before its first checkpoint starts again, with the same results.
     restored, begun = None, -1
     if resume and (checkpoints.generations() or generation is not None):
         abstract = experiment.abstract()
         restored = checkpoints.restore(abstract, creature.digest, generation)
         begun = int(restored.generation)
         mend_champion(folder, experiment, restored)
-    # First the checkpoints: a kill in between leaves lines too many, never a log with a gap.
+    # Checkpoints first: a kill in between leaves extra log lines, never a gap in the log.
     if later := checkpoints.drop_after(begun):
         names = ", ".join(map(str, later))
         screen.say(f"Dropped the checkpoints after generation {begun}: {names}; they come anew.")
@@ -107,7 +106,7 @@ def train(
 
 
 def mend_champion(folder: Path, experiment: Experiment, state: EvolutionState) -> None:
-    """Write the best of a state as the run's champion where the run has none that can be read."""
+    """Write the best of a state as the run's champion if the run has no readable one."""
     try:
         kept_champion(folder, experiment.creature)
     except UserError:
@@ -120,10 +119,10 @@ def mend_champion(folder: Path, experiment: Experiment, state: EvolutionState) -
 def _compiled(
     experiment: Experiment, evaluator: Evaluator | None, restored: EvolutionState | None
 ) -> tuple[Step, EvolutionState]:
-    """The program of a generation, and the state to begin with, which is the restored one if any.
+    """Return the program of a generation, and the restored or first state.
 
-    The first state has a program of its own, which is compiled meanwhile: the compiler's first
-    seconds on the large one need one core.
+    The first state has its own program. It is compiled in parallel, because the compiler uses one
+    core in its first seconds on the large program.
     """
     if restored is not None:
         return _step(experiment, evaluator), restored
@@ -133,7 +132,7 @@ def _compiled(
 
 
 _COMPILED: Latest[Stages] = Latest(2)
-"""Of the runs of this process, so that the next seed in a notebook need not be traced again."""
+"""Programs of this process's runs, so that the next seed in a notebook is not traced again."""
 
 
 def _step(experiment: Experiment, evaluator: Evaluator | None) -> Step:
@@ -143,7 +142,7 @@ def _step(experiment: Experiment, evaluator: Evaluator | None) -> Step:
 
 
 def conclude(folder: Path, creature: Creature, screen: Screen, examined: Examined | None) -> None:
-    """Leaves the champion of a run that has ended, its body and its certificate."""
+    """Write the champion of a run that has ended, its body and its certificate."""
     if examined is None:
         return
     with disk_errors(folder):
@@ -159,7 +158,7 @@ def conclude(folder: Path, creature: Creature, screen: Screen, examined: Examine
 
 
 def report(folder: Path, screen: Screen, reason: str | None, seconds: float) -> None:
-    """Tells how a run went; reason: why it ended, None when the user interrupted it."""
+    """Print a summary of a run; reason: why it ended, None when the user interrupted it."""
     if lines := read_metrics(folder / METRICS):
         screen.report(
             folder, reason or "interrupted", lines[-1], seconds, interrupted=reason is None
@@ -175,8 +174,10 @@ def _evolve(
     screen: Screen,
     interrupted: threading.Event,
 ) -> tuple[EvolutionState, str | None, Examined | None]:
-    """Generation after generation; returns the last state, why it ended (None when the user
-    interrupted it), and who ended it.
+    """Run generations until the end of the run.
+
+    Returns the last state, why the run ended (None when the user interrupted it), and the certified
+    individual that ended it, if any.
     """
     config, creature = examiner.experiment.config, examiner.experiment.creature
     looks, saved, examined = Looks(examiner), int(state.generation), None
@@ -184,7 +185,7 @@ def _evolve(
         reason, generation = stop_reason(state, config.evolution), int(state.generation)
         over = reason is not None or interrupted.is_set()
         saves = generation > saved and generation % config.checkpoint_every == 0
-        # A checkpoint must not be of a generation that may yet be forgotten.
+        # No checkpoint may be of a generation that validation may still discard.
         if found := looks.found(wait=over or saves or looks.due(state)):
             examined, state = found
             later, generation = generation, int(state.generation)
@@ -212,8 +213,9 @@ def _evolve(
 def _generation(
     folder: Path, experiment: Experiment, step: Step, state: EvolutionState, screen: Screen
 ) -> EvolutionState:
-    """One more, written into the log with its best as champion; before all of the first population
-    have been judged there is none yet.
+    """Run one generation, append it to the log and write its best as champion.
+
+    Nothing is written before the whole first population is evaluated.
     """
     began = time.perf_counter()
     state, metrics = step(state)
@@ -222,7 +224,7 @@ def _generation(
         return state
     line = metrics_line(metrics, time.perf_counter() - began, experiment.simulator.task)
     line |= followed(experiment.simulator.controller.numbers(state.genomes))
-    # The log first: a kill before the checkpoint leaves a line too many, which a resumed run takes out.
+    # The log first: a kill before the checkpoint leaves an extra line, which a resumed run removes.
     with disk_errors(folder), (folder / METRICS).open("a", encoding="utf-8") as log:
         log.write(json.dumps(line) + "\n")
     if np.isfinite(metrics.best):
@@ -235,7 +237,7 @@ def _generation(
 
 
 def metrics_line(metrics: GenerationMetrics, seconds: float, task: Task) -> dict[str, Any]:
-    """What `metrics.jsonl` holds of one generation; numbers that are not finite become null."""
+    """Return the line of `metrics.jsonl` for a generation; non-finite numbers become null."""
     line = {
         field.name: getattr(metrics, field.name).item()
         for field in dataclasses.fields(metrics)
@@ -250,19 +252,19 @@ def metrics_line(metrics: GenerationMetrics, seconds: float, task: Task) -> dict
 
 
 def followed(numbers: Mapping[str, np.ndarray]) -> dict[str, float]:
-    """What a log line has of numbers [P] of a population that is sorted, best first."""
+    """Return best and mean of each quantity [P] of a population that is sorted, best first."""
     best = {f"{name}_best": float(values[0]) for name, values in numbers.items()}
     return best | {f"{name}_mean": float(values.mean()) for name, values in numbers.items()}
 
 
 def named(kind: str, names: Sequence[str], values: jax.Array) -> dict[str, float]:
-    """Numbers of a kind under the names that a log line has for them."""
+    """Return the numbers of a kind under their names in a log line."""
     return {f"{kind}_{name}": float(value) for name, value in zip(names, values, strict=True)}
 
 
 @functools.cache
 def versions() -> dict[str, str]:
-    """Of everything that decides what a run computes."""
+    """Return the versions of Python and the packages that determine a run's results."""
     packages = ("mjxgait", "jax", "jaxlib", "mujoco", "mujoco-mjx")
     return {"python": platform.python_version()} | {
         name: importlib.metadata.version(name) for name in packages
@@ -271,7 +273,7 @@ def versions() -> dict[str, str]:
 
 @contextmanager
 def interruptible() -> Iterator[threading.Event]:
-    """The event is set by the first Ctrl-C; the second one interrupts at once."""
+    """Yield an event that the first Ctrl-C sets; the second one interrupts at once."""
     event = threading.Event()
     if threading.current_thread() is not threading.main_thread():
         yield event

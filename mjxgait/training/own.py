@@ -1,6 +1,6 @@
-"""Where the user's own code of a run lies: its run folder says so, and never has it loaded.
+"""Location of a run's user-defined code, recorded in its run folder and never loaded from there.
 
-A folder may come from anywhere, so what it says is only printed: the user passes it on, or not.
+A folder may come from anywhere, so its entries are only printed; the user decides to pass them on.
 """
 
 import shlex
@@ -15,20 +15,19 @@ from mjxgait.files import write_text
 from mjxgait.plugins.user_code import KINDS, places_of
 
 CONFIG, OWN = "config.toml", "own.toml"
-"""In a run folder: its settings; and FILE.py:CLASS of its controller and of its task, where they are
-the user's."""
+"""Files in a run folder: settings; and FILE.py:CLASS of a user-defined controller or task."""
 
 
 def keep_places(folder: Path, use: UseConfig) -> None:
-    """Write where the loaded code of the user's lies that takes part; nothing where there is none."""
+    """Write the location of the run's user-defined code; nothing if it has none."""
     if places := places_of(use):
         write_text(folder / OWN, tomli_w.dumps(places))
 
 
 def own_options(folder: Path) -> list[str]:
-    """Return the options that name the user's own code of a run; none where it has none.
+    """Return the options that name a run's user-defined code; empty if it has none.
 
-    A run folder without `own.toml` gives only the name of the file: that is where the user is.
+    Without `own.toml` only the file's name is known, which refers to the current folder.
     """
     use, places = _table(folder / CONFIG).get("use"), _table(folder / OWN)
     options: list[str] = []
@@ -40,12 +39,12 @@ def own_options(folder: Path) -> list[str]:
 
 
 def command(*words: object, run: Path) -> str:
-    """Return a command as the user has to type it, with the options that the run needs."""
+    """Return a command as typed in a shell, with the options that the run needs."""
     return shlex.join(["mjxgait", *map(str, words), *own_options(run)])
 
 
 def with_options(error: NotLoaded, folder: Path) -> NotLoaded:
-    """Return the error with the folder that it is about, and the options that are missing."""
+    """Return the error with the run folder and the missing options."""
     return NotLoaded(f"{folder}: {error}", own_options(folder))
 
 
@@ -57,7 +56,7 @@ def _table(path: Path) -> dict[str, object]:
 
 
 def _shown(place: object, name: str) -> str:
-    """Return a place as short as it can be from here; the name where the folder does not say it."""
+    """Return the shortest path from the current folder; the name if the place is not recorded."""
     if not isinstance(place, str) or not place.isprintable():
         return name
     path = Path(place)

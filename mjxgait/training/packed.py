@@ -1,4 +1,4 @@
-"""An evolution state as named arrays of NumPy: as files hold it and as it travels to other machines."""
+"""Evolution state as named NumPy arrays, for files and for transfer to other machines."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -14,9 +14,9 @@ from mjxgait.evolution.state import EvolutionState
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Packed:
-    """A state, of one run or of several side by side.
+    """State of one run or of a batch.
 
-    arrays: by dotted name; its typed key as numbers. key_impl: which random generator that is of.
+    arrays: by dotted name; the typed key as numbers. key_impl: the key's random generator.
     """
 
     arrays: Mapping[str, np.ndarray]
@@ -24,40 +24,40 @@ class Packed:
 
     @property
     def generation(self) -> int:
-        """That the state was left by."""
+        """Generation of the state."""
         return int(np.max(self.arrays["generation"]))
 
     @property
     def size(self) -> int:
-        """Bytes of the arrays."""
+        """Size of the arrays in bytes."""
         return sum(array.nbytes for array in self.arrays.values())
 
     def with_arrays(self, arrays: Mapping[str, np.ndarray]) -> "Packed":
-        """The same with other arrays under these names."""
+        """Return the state with these arrays replaced."""
         return Packed({**self.arrays, **arrays}, self.key_impl)
 
     def row(self, number: int) -> "Packed":
-        """One run's state, of several side by side."""
+        """Return the state of one run of a batch."""
         return Packed({name: array[number] for name, array in self.arrays.items()}, self.key_impl)
 
     def rows(self, some: slice) -> "Packed":
-        """The states of some of several runs side by side."""
+        """Return the states of some runs of a batch."""
         return Packed({name: array[some] for name, array in self.arrays.items()}, self.key_impl)
 
     @property
     def count(self) -> int:
-        """How many runs are side by side."""
+        """Number of runs in the batch."""
         return len(self.arrays["generation"])
 
     def state(self, abstract: EvolutionState, where: str) -> EvolutionState:
-        """The state on the first of this machine's devices.
+        """Return the state on the first of this machine's devices.
 
         Args:
-          abstract: a state of the shapes that the run's settings ask for.
-          where: it was found, for the error.
+          abstract: a state with the shapes that the run's settings require.
+          where: origin of the state, for the error.
 
         Raises:
-          UserError: it is one of other settings, or of another random generator.
+          UserError: the state has other settings or another random generator.
         """
         wanted = _by_name(abstract)
         _check_shapes(self.arrays, wanted, where)
@@ -68,20 +68,20 @@ class Packed:
 
 
 def side_by_side(rows: Sequence[Packed]) -> Packed:
-    """The states of several runs as one, the other way round than `Packed.row`."""
+    """Stack the states of several runs into a batch, the inverse of `Packed.row`."""
     first = rows[0]
     arrays = {name: np.stack([row.arrays[name] for row in rows]) for name in first.arrays}
     return Packed(arrays, first.key_impl)
 
 
 def pack(state: EvolutionState) -> Packed:
-    """The state in NumPy, brought from the devices at once."""
+    """Return the state in NumPy, transferred from the devices at once."""
     impl = str(jax.random.key_impl(state.key))
     return Packed(jax.device_get(_by_name(state)), impl)
 
 
 def _by_name(state: EvolutionState) -> dict[str, Any]:
-    """The arrays of a state by dotted name; its typed key as numbers."""
+    """Return the arrays of a state by dotted name; its typed key as numbers."""
     key = state.key
     plain = (
         jax.eval_shape(jax.random.key_data, key)
@@ -93,10 +93,10 @@ def _by_name(state: EvolutionState) -> dict[str, Any]:
 
 
 def _check_shapes(found: Mapping[str, Any], wanted: Mapping[str, Any], where: str) -> None:
-    """Refuses a state whose arrays are not those that the settings ask for.
+    """Refuse a state with other arrays than the settings require.
 
     Raises:
-      UserError: names the first array of another name, shape or type.
+      UserError: names the first array with another name, shape or type.
     """
     there, here = (
         {name: (tuple(leaf.shape), str(np.dtype(leaf.dtype))) for name, leaf in tree.items()}

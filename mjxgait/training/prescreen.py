@@ -1,7 +1,7 @@
-"""The best of a population on many starts at once, in evolution's own physics.
+"""Pre-screening: the best of a population on many starts at once, in evolution's own physics.
 
-The few starts of a generation say little of who bears all of them, and C MuJoCo takes a hundred times
-as long to find out. So those that are to be looked at there come in the order of what they do here.
+The few starts of a generation predict robustness poorly, and C MuJoCo takes a hundred times as long
+to test it. So candidates are validated there in the order of their results here.
 """
 
 import dataclasses
@@ -22,13 +22,13 @@ from mjxgait.training.devices import compiled
 from mjxgait.training.experiment import Batch, Experiment, build_experiment
 
 OTHER = 1_000_000
-"""Added to a run's seed: other starts than those of its generations."""
+"""Added to a run's seed, for other starts than those of its generations."""
 HARDEST = 10**6
-"""A level at which trials are as hard as they become."""
+"""Curriculum level above any task's highest, so that trials are as hard as they become."""
 
 
 def tried_settings(config: Config) -> Config:
-    """The settings of tryouts: starts as far disturbed, and episodes as long, as the examiner's."""
+    """Return the settings of pre-screening: disturbances and duration as in the examination."""
     exam = CertificateConfig()
     rollout = dataclasses.replace(
         config.rollout,
@@ -45,24 +45,24 @@ def tried_settings(config: Config) -> Config:
 
 
 class Tryout:
-    """Of one run; its program is compiled when it is first asked for, or ahead of that."""
+    """Pre-screening of one run; its program is compiled at first use or in advance by `begin`."""
 
     def __init__(self, experiment: Experiment) -> None:
         self.run = experiment
         self._ahead: Future[jax.stages.Compiled] | None = None
 
     def begin(self) -> None:
-        """Compiles beside whatever comes next."""
+        """Start to compile in the background."""
         pool = ThreadPoolExecutor(1)
         self._ahead = pool.submit(self._compile)
         pool.shutdown(wait=False)
 
     def shares(self, state: EvolutionState, ranks: list[int]) -> np.ndarray:
-        """[N] share of the starts from which each of these individuals manages its task.
+        """Return the share [N] of starts from which each of these individuals manages its task.
 
-        ranks: at most as many as the settings have candidates.
+        ranks: at most `examination.candidates` of them.
         """
-        program = self._program  # first: while it is being compiled ahead all below is being made
+        program = self._program  # first: compiling makes the properties used below
         padded = np.resize(ranks, self.run.config.examination.candidates)
         genomes = jax.tree.map(lambda leaf: leaf[None, padded], state.genomes)
         numbers, rows = self._batch.known
@@ -77,7 +77,7 @@ class Tryout:
         return np.array([trials.mean() for trials in managed])
 
     def margin(self, share: float) -> float:
-        """That of the criteria which disturbed starts decide, if so many manage in C MuJoCo too."""
+        """Return the margin of the disturbed-start criteria if C MuJoCo gave the same share."""
         criteria = self._demands.disturbed(share, 1.0, CertificateConfig())
         return min(criterion.margin for criterion in criteria)
 
@@ -96,7 +96,7 @@ class Tryout:
 
     @cached_property
     def _starts(self) -> Starts:
-        """[1, R], the same for all whom the run tries, and as hard as its trials become."""
+        """Starts [1, R] of all candidates of the run, at the highest curriculum level."""
         row, task = self._trials.row, self._trials.simulator.task
         starts = row.starts
         if task.climbs:
@@ -118,6 +118,6 @@ class Tryout:
 
 
 def tryout_of(experiment: Experiment) -> Tryout | None:
-    """Where the settings of a run want one."""
+    """Return the pre-screening of a run; None if its settings disable it."""
     settings = experiment.config.examination
     return Tryout(experiment) if settings.tryout and settings.candidates else None

@@ -1,6 +1,4 @@
-"""What a run says while it works: a live line in a terminal, one plain line per generation
-elsewhere.
-"""
+"""Progress output of a run: a live line in a terminal, elsewhere one plain line per generation."""
 
 import time
 from collections.abc import Iterator, Mapping
@@ -40,7 +38,7 @@ class Screen:
 
     @contextmanager
     def compiling(self, what: str, experiment: Any) -> Iterator[None]:
-        """Says that the program is being compiled, with the time it takes."""
+        """Show that the program is being compiled, and the time it takes."""
         config = experiment.config
         self.console.print(
             f"{what}: population {config.evolution.population}, {config.rollout.starts} starts of "
@@ -58,7 +56,7 @@ class Screen:
         self.console.print(f"Compiled in {time.perf_counter() - began:.1f} s")
 
     def say(self, text: str) -> None:
-        """A line of its own."""
+        """Print a line."""
         self.console.print(text)
 
     def generation(self, line: Mapping[str, Any], config: Config) -> None:
@@ -90,8 +88,10 @@ class Screen:
             self.console.print(text)
 
     def _seconds(self, line: Mapping[str, Any]) -> float:
-        """Return what a generation takes: as the latest ones did, and with the examinations between
-        them, which the log does not count.
+        """Return the expected time of a generation in s.
+
+        It is the larger of two means: the latest logged times, and the time since the first line,
+        which includes the examinations that the log leaves out.
         """
         self._walls = [*self._walls[-4:], line["wall_s"]]
         now = time.perf_counter(), int(line["generation"])
@@ -100,13 +100,13 @@ class Screen:
         return max(since, sum(self._walls) / len(self._walls))
 
     def close(self) -> None:
-        """Ends the live line, if there is one."""
+        """End the live line, if there is one."""
         if self._status:
             self._status.stop()
             self._status = None
 
     def certificate(self, certificate: Certificate) -> None:
-        """The verdict, measure by measure."""
+        """Print the result, measure by measure."""
         table = Table(*("criterion", "measure", "value", "threshold", ""), box=None, pad_edge=False)
         for row in certificate.rows():
             table.add_row(*row, style="bold" if row[-1] == "FAIL" else None)
@@ -129,7 +129,7 @@ class Screen:
             )
         if said := in_the_way(certificate.criteria):
             self.console.print(said)
-        # Of a motion that strides nowhere the numbers mean little.
+        # The other numbers mean little for a motion that makes no headway.
         if stopped := report.get("obstacle"):
             self.console.print(f"{verdict}: it {stopped}{where}; {certificate.seconds:.0f} s.")
             return
@@ -146,7 +146,7 @@ class Screen:
     def report(
         self, folder: Path, why: str, last: Mapping[str, Any], seconds: float, interrupted: bool
     ) -> None:
-        """The table at the end: how it went and where everything is.
+        """Print the final table: results and file locations.
 
         last: the last line of the metrics.
         """
@@ -168,7 +168,7 @@ class Screen:
             self.console.print(f"To go on: {again}", markup=False)
 
     def next_steps(self, folder: Path, certified: bool) -> None:
-        """Print commands that lead on from a run that has ended."""
+        """Print commands that use the result of a run."""
         steps: dict[tuple[object, ...], str] = {
             ("render", folder, "--out", "walk.webp"): "films it",
             ("share", folder, "--out", "walk.html"): "makes a page to give away",
@@ -182,7 +182,7 @@ class Screen:
 
 
 def what_ends_sooner(config: Config) -> str:
-    """Return what can end a run before its last generation, in words; empty where nothing can."""
+    """Return what can end a run before its last generation, in words; empty if nothing can."""
     evolution, look = config.evolution, config.examination
     reasons = {
         f"once a look at its best, every {look.every} generations, leads to a certificate": bool(
@@ -196,21 +196,21 @@ def what_ends_sooner(config: Config) -> str:
 
 
 def duration(seconds: float) -> str:
-    """Return a time in the unit that suits it."""
+    """Return a time in s, min or h, as text."""
     if seconds < 120:
         return f"{seconds:.0f} s"
     return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"
 
 
 def _best(last: Mapping[str, Any]) -> str:
-    """The best fitness in words; a generation that nobody could be judged in has none."""
+    """Return the best fitness in words; none if no individual could be evaluated."""
     if last["best"] is None:
         return f"none: nobody could be judged in generation {last['generation']}"
     return f"{last['best']:.3f} in generation {last['generation']}"
 
 
 def _outcome(last: Mapping[str, Any]) -> str:
-    """What the best has done, in units of the world: m, s or how often."""
+    """Return the metrics of the best in m, s or counts, as text."""
     prefix = "outcome_"
     named = {k.removeprefix(prefix): v for k, v in last.items() if k.startswith(prefix)}
     told = (f"{name} {'-' if value is None else f'{value:.2f}'}" for name, value in named.items())

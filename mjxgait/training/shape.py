@@ -1,4 +1,4 @@
-"""What decides on the compiled programs of a run: two of the same shape share them."""
+"""Program key: runs with the same key share compiled programs."""
 
 import dataclasses
 import hashlib
@@ -15,8 +15,10 @@ from mjxgait.plugins.registry import find
 
 @dataclasses.dataclass(frozen=True)
 class Shape:
-    """body: its digest. settings: of which only numbers are free. code: whose takes part, as objects: who
-    defines a class anew in a notebook means the new one.
+    """Key of a run's compiled programs.
+
+    body: digest of the creature. settings: their structure; traced numbers may differ. code: the
+    controller and task classes, so that redefining a class in a notebook changes the key.
     """
 
     body: str
@@ -24,11 +26,11 @@ class Shape:
     code: tuple[Hashable, ...]
 
     def name(self, *more: Hashable) -> str:
-        """The same in all processes, as far as body and settings go."""
+        """Return a hash of body and settings, the same in all processes; `code` is left out."""
         return hashlib.sha256(repr((self.body, self.settings, *more)).encode()).hexdigest()[:16]
 
 
 def shape_of(creature: Creature, config: Config) -> Shape:
-    """That of a creature's run under a config."""
+    """Return the program key of a creature's run under a config."""
     code = (find("controller", config.use.controller), find("task", config.use.task))
     return Shape(creature.digest, jax.tree.structure(traced(config)), code)

@@ -1,5 +1,6 @@
-"""The one place that jits: a generation as a few compiled programs in a row, of which only the one
-that simulates is worth the compiler's best effort.
+"""Compilation of a generation as a few programs in a row; no other module of `training` jits.
+
+Only the program that simulates is worth the compiler's best effort.
 """
 
 import contextlib
@@ -35,18 +36,19 @@ from mjxgait.training.generation import (
 from mjxgait.types import Asked, Judged
 
 Turn = Callable[[str], AbstractContextManager[object]]
-"""Whose turn it is to compile a program, by its name, where several processes share a cache."""
+"""Context to compile a named program in, so that processes with a shared cache take turns."""
 
 
 def at_once(name: str) -> AbstractContextManager[object]:
-    """Nobody waits for anybody."""
+    """Compile without waiting for other processes."""
     return contextlib.nullcontext()
 
 
 @dataclasses.dataclass(frozen=True)
 class Stages:
-    """The compiled programs of one shape; see `generation`. judge: None where others judge. promote: None
-    where everybody is tried in all trials.
+    """Compiled programs of one shape; see `generation`.
+
+    judge: None if another evaluator is used. promote: None if all individuals run all trials.
     """
 
     propose: jax.stages.Compiled
@@ -61,7 +63,7 @@ class Stages:
         states: EvolutionState,
         evaluator: Evaluator | None = None,
     ) -> tuple[EvolutionState, GenerationMetrics]:
-        """A generation of the rows [B]. evaluator: who judges instead of this machine's program."""
+        """Run a generation of the rows [B]. evaluator: replaces this machine's program."""
         proposals, starts = self.propose(numbers, rows, states)
 
         def verdict(*asked: Asked) -> Judged:
@@ -84,8 +86,9 @@ class Stages:
 
 
 def lowered(blueprint: Plan, function: Callable[..., Any], *given: Any) -> jax.stages.Lowered:
-    """A part of a generation as a program of these shapes, the same for all settings that have them:
-    what has been compiled once is found again.
+    """Lower a part of a generation for these shapes.
+
+    The program is the same for all settings with these shapes, so the compiler's cache has it.
     """
     placed = everywhere(blueprint.own)
     program = jax.jit(
@@ -97,9 +100,9 @@ def lowered(blueprint: Plan, function: Callable[..., Any], *given: Any) -> jax.s
 def lower_stages(
     blueprint: Plan, rows: Row, states: EvolutionState, judges: bool = True
 ) -> Iterator[tuple[str, jax.stages.Lowered]]:
-    """The programs for rows and states of these shapes, by name, each traced when it is asked for.
+    """Yield the names and programs for rows and states of these shapes, each traced on demand.
 
-    judges: whether one of them does.
+    judges: whether to include the program that evaluates.
     """
     first = lowered(blueprint, propose, rows, states)
     yield "propose", first
@@ -121,10 +124,10 @@ def lower_stages(
 def compile_stages(
     programs: Iterable[tuple[str, jax.stages.Lowered]], turn: Turn = at_once, long: bool = False
 ) -> Stages:
-    """Each compiled while the next is traced.
+    """Compile each program while the next is traced.
 
-    long: whether it takes long to propose (`Variation`): expressions are crossed in half a second by
-    some effort of the compiler's and in three by the least, poses in a hundredth by either.
+    long: whether proposing takes long (`Variation`). Crossover of expressions takes half a second
+    compiled with "some" effort and three with the least; poses take a hundredth with either.
     """
     efforts: dict[str, Effort] = {"propose": "some" if long else "least", "judge": "best"}
 
@@ -140,19 +143,19 @@ def compile_stages(
 def begin(
     blueprint: Plan, numbers: Numbers | None, settings: Config, key: jax.Array
 ) -> EvolutionState:
-    """See `first_state`; the same compiled function for every run, alone or beside others, so that they
-    begin with the same bits.
+    """See `first_state`. All runs, single or in a batch, share one compiled function: they begin
+    with the same bits.
     """
     return _beginning()(blueprint, numbers, settings, key)
 
 
 @functools.cache
 def _beginning() -> Callable[..., EvolutionState]:
-    """Not at import: the options ask which machine this is."""
+    """Return the jitted `first_state`; not at import, because the options depend on the machine."""
     options = compiler_options("least")
     return jax.jit(first_state, static_argnums=0, compiler_options=options)
 
 
 def embodied(blueprint: Plan, starts: Starts) -> Starts:
-    """See `Plan.embodied`; as one program, or each of its hundreds of operations is compiled alone."""
+    """See `Plan.embodied`. Jitted, or each of its hundreds of operations is compiled alone."""
     return jax.jit(blueprint.embodied)(starts)

@@ -1,4 +1,4 @@
-"""Checkpoints as they lie on the disk, read back as NumPy arrays whatever devices wrote them."""
+"""Checkpoints on disk, read as NumPy arrays independently of the devices that wrote them."""
 
 import dataclasses
 import hashlib
@@ -18,16 +18,16 @@ from mjxgait.training.lock import why_empty
 SCHEMA = 2
 FOLDER = "checkpoints"
 MOST_BYTES = 20_000_000_000
-"""Of the arrays of a checkpoint."""
+"""Largest total size of a checkpoint's arrays in bytes."""
 STATE, MANIFEST = "state", "manifest"
 
 
 @dataclasses.dataclass(frozen=True)
 class Manifest:
-    """What a checkpoint says of itself.
+    """Metadata of a checkpoint.
 
     schema: of the state. creature: its name, creature_digest: hash of its files. generation.
-    arrays: hash of all values of the state. key_impl: which random generator the key belongs to.
+    arrays: hash of all values of the state. key_impl: the key's random generator.
     """
 
     schema: Index
@@ -40,20 +40,20 @@ class Manifest:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Stored:
-    """A checkpoint that is whole. arrays: of the state, by dotted name."""
+    """Complete checkpoint. arrays: of the state, by dotted name."""
 
     manifest: Manifest
     arrays: Mapping[str, np.ndarray]
 
 
 class _Damaged(Exception):
-    """A checkpoint that cannot be read, or whose values are not those that were written."""
+    """Unreadable checkpoint, or one with other values than were written."""
 
 
 def stored_generations(run: Path) -> list[int]:
-    """The generations a run has complete checkpoints of, oldest first.
+    """Return the generations that have complete checkpoints, oldest first.
 
-    One that was being written when the run was killed has another name and is left out.
+    A checkpoint that was being written when the run was killed has another name and is left out.
     """
     folder = run / FOLDER
     return (
@@ -64,14 +64,14 @@ def stored_generations(run: Path) -> list[int]:
 
 
 def is_number(name: str) -> bool:
-    """Return whether a folder's name is that of a generation; int() knows fewer digits than str."""
+    """Return whether a folder's name is a generation; `int` accepts fewer digits than `str`."""
     return name.isascii() and name.isdecimal()
 
 
 def read_stored(run: Path, digest: str, generation: int | None = None) -> Stored:
-    """The checkpoint of a generation, the latest by default.
+    """Return the checkpoint of a generation, the latest by default.
 
-    digest: hash of the creature's files as they are now.
+    digest: hash of the creature's current files.
 
     Raises:
       UserError: no checkpoint, a damaged or foreign one; names the newest that is intact.
@@ -99,7 +99,7 @@ def read_stored(run: Path, digest: str, generation: int | None = None) -> Stored
 
 
 def array_hash(arrays: Mapping[str, Any]) -> str:
-    """Hash of named arrays: their names, types, shapes and values."""
+    """Return a hash of named arrays: their names, types, shapes and values."""
     digest = hashlib.sha256()
     for name in sorted(arrays):
         value = np.asarray(arrays[name])
@@ -144,10 +144,10 @@ def _read(folder: Path, digest: str) -> Stored:
 
 
 def _read_arrays(folder: Path) -> dict[str, np.ndarray]:
-    """One after the other.
+    """Read the arrays one after the other.
 
-    Orbax reads all at once in an event loop, which it closes at the first that is broken; those
-    that are still being read then complain on the screen.
+    Orbax reads all at once in an event loop, which it closes at the first broken array; pending
+    reads then print errors.
     """
     place = {"driver": "ocdbt", "base": {"driver": "file", "path": f"{folder.resolve()}/"}}
     keys = tensorstore.KvStore.open(place).result().list().result()

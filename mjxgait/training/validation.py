@@ -1,4 +1,4 @@
-"""Looks at the best of a generation while the generations after it evolve."""
+"""Asynchronous validation of a generation's best while later generations evolve."""
 
 import threading
 from concurrent.futures import Future
@@ -8,10 +8,10 @@ from mjxgait.training.examination import Examined, Examiner, due
 
 
 class Looks:
-    """Of one run, one at a time.
+    """Asynchronous validations of one run, one at a time.
 
-    What comes of a look is what would have come had evolution waited for it: who is certified ends
-    the run in the generation that was looked at, and what has been evolved since is forgotten.
+    The result is the same as if evolution had waited: a certified individual ends the run in the
+    validated generation, and later generations are discarded.
     """
 
     def __init__(self, examiner: Examiner) -> None:
@@ -20,29 +20,29 @@ class Looks:
         self._state: EvolutionState | None = None
 
     def due(self, state: EvolutionState) -> bool:
-        """Whether it is time to look at the best of a generation that has not been looked at."""
+        """Return whether validation of this generation is due and has not begun."""
         settings = self._examiner.experiment.config.examination
         return state is not self._state and due(settings, int(state.generation))
 
     def begin(self, state: EvolutionState) -> None:
-        """Looks, if it is time to; before that all looks must have been `found`."""
+        """Start a validation if it is due; all earlier results must have been `found`."""
         if not self.due(state):
             return
         self._state, self._seen = state, Future()
         self._examiner.examines.clear()
-        # Two programs of all devices at once wait for each other.
+        # Two programs that use all devices would block each other, so pre-screening waits here.
         if self._examiner.tryout is not None:
             self._look(self._seen, state)
             return
-        # Nobody who interrupts a second time waits for it.
+        # A daemon thread: a second Ctrl-C does not wait for it.
         threading.Thread(target=self._look, args=(self._seen, state), daemon=True).start()
 
     def found(self, wait: bool) -> tuple[Examined, EvolutionState] | None:
-        """Who was certified, and the state of that generation, once that is known.
+        """Return the certified individual and the state of its generation, once known; else None.
 
         Args:
-          wait: until it is. Where somebody is being examined it waits anyway: what evolved
-            meanwhile would take the cores of the examination, and be forgotten if that ends well.
+          wait: wait for the result. During an examination it waits anyway: evolution would compete
+            for its cores, and its generations would be discarded if the examination passes.
         """
         if self._seen is None or self._state is None:
             return None
