@@ -2,7 +2,7 @@ import contextlib
 import ctypes
 import gc
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -40,27 +40,29 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
         "--thorough",
         action="store_true",
-        help="run also what the end-to-end net leaves out for time",
+        help="run also what is left out for time: tests marked `thorough`, whole trainings",
     )
     parser.addoption(
         "--matrix", type=Path, help="append a row of Markdown for each training that is tried"
     )
 
 
-@pytest.fixture
-def thorough(request: pytest.FixtureRequest) -> Callable[[str], None]:
-    """Return a function that skips the test with a reason, unless `--thorough` is given."""
-
-    def skip(reason: str) -> None:
-        if not request.config.getoption("--thorough"):
-            pytest.skip(f"{reason}; --thorough runs it")
-
-    return skip
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Skip tests marked `thorough`, unless `--thorough` is given or a planted fault is looked for."""
+    if config.getoption("--thorough") or "MJXGAIT_PLANTED" in os.environ:
+        return
+    for item in items:
+        if mark := item.get_closest_marker("thorough"):
+            item.add_marker(pytest.mark.skip(f"{mark.args[0]}; --thorough runs it"))
 
 
 def pytest_collection_finish() -> None:
-    """Modules and lists of tests stay: no collection of garbage need look at them again."""
+    """Keep modules and lists of tests out of the garbage collection, and collect less often.
+
+    Tracing makes many objects and little garbage.
+    """
     gc.freeze()
+    gc.set_threshold(100_000, 20, 20)
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -1,13 +1,12 @@
 """Proportions as genes: the numbers of a lane's body are those of the scaled files."""
 
-from pathlib import Path
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from helpers import said_by
+from helpers import STOOL, said_by, short_examination
 from jax.tree_util import keystr
 from scipy.spatial.transform import Rotation
 
@@ -79,7 +78,11 @@ def tensors(numbers: Any) -> np.ndarray:
     return whole / moments.max()
 
 
-@pytest.mark.parametrize("shipped", ["crab", "duck"], indirect=True)
+@pytest.mark.parametrize(
+    "shipped",
+    [pytest.param("crab", marks=pytest.mark.thorough("another body")), "duck"],
+    indirect=True,
+)
 def test_a_lanes_body_is_the_one_in_the_scaled_files(shipped: Creature):
     compare_with_the_scaled_files(shipped, fast_plant)
 
@@ -143,8 +146,10 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> mjxgait.Run:
         "rollout": {"seconds": 0.5, "lanes": 8},
         "examination": {"candidates": 1, "every": 0, "draws": 1},
     }
-    stool = Path(__file__).parent / "data" / "stool"
-    return mjxgait.train(stool, out=out, population=8, generations=2, settings=settings, quiet=True)
+    small = {"population": 8, "generations": 2, "settings": settings, "quiet": True}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("mjxgait.certification.certificate.CertificateConfig", short_examination)
+        return mjxgait.train(STOOL, out=out, **small)
 
 
 def test_the_run_keeps_the_body_that_won(run: mjxgait.Run):

@@ -450,7 +450,8 @@ def test_a_short_run_ends_with_a_champion_and_a_verdict(tmp_path: Path, capsys):
     folder, short = tmp_path / "run", tmp_path / "short.toml"
     short.write_text(SHORT + "[hop]\nstay = 1.0\n")
     small = "--population 6 --generations 1 --rollout.seconds 0.4 --rollout.lanes 4"
-    rest = "--examination.candidates 0 --no-plots"
+    rest = "--examination.candidates 0 --no-plots --controller.nodes 16 --controller.depth 4"
+    rest += " --controller.initial-depth 2 4"
     said_by(
         capsys, "train", "--env", "luxo", *small.split(), *rest.split(), "--out", folder, code=0
     )

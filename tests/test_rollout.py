@@ -93,7 +93,9 @@ def test_every_genome_is_judged_on_every_start(experiment: Experiment, episodes:
     assert episodes.computed_steps >= episodes.tally.steps.sum()
 
 
-@pytest.mark.parametrize(("lanes", "devices"), [(5, 2), (16, 1)])
+@pytest.mark.parametrize(
+    ("lanes", "devices"), [(5, 2), pytest.param(16, 1, marks=pytest.mark.thorough("other lanes"))]
+)
 def test_results_do_not_depend_on_lanes_devices_or_turns(
     experiment: Experiment, episodes: Episodes, lanes: int, devices: int
 ):

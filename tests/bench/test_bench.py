@@ -303,7 +303,7 @@ def test_the_command_writes_the_ratios(tmp_path):
     file, body = tmp_path / "bench.json", tmp_path / "body"
     shutil.copytree(STOOL, body)
     with (body / "creature.toml").open("a", encoding="utf-8") as settings:
-        settings.write('\n[train]\nbase = "other_starts"\n')
+        settings.write('\n[train]\nbase = "other_starts"\nrollout = { seconds = 1.0 }\n')
     arguments = [
         "bench",
         "--json",

@@ -30,7 +30,11 @@ def test_what_cannot_be_cut_is_refused():
         block_size(251, 64)
 
 
-@pytest.mark.parametrize("promote", [1.0, 0.5], ids=["all", "the better half goes on"])
+@pytest.mark.parametrize(
+    "promote",
+    [pytest.param(1.0, marks=pytest.mark.thorough("without promotion")), 0.5],
+    ids=["all", "the better half goes on"],
+)
 def test_a_generation_by_blocks_is_that_of_one_program(stool: Creature, promote: float):
     """Who was judged, in which order, and what it cost; terms to the rounding of another program."""
     config = small_config(rollout={"block": 3, "promote": promote})

@@ -140,14 +140,17 @@ def as_it_was():
                 setattr(place, name, value)
 
 
+COMPILES = pytest.mark.thorough("compiles for half a minute")
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("name", FORMS)
-def test_a_script_ends_as_it_should(name: str, tmp_path: Path, as_it_was, thorough, request):
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=COMPILES) if n in LONG else n for n in FORMS]
+)
+def test_a_script_ends_as_it_should(name: str, tmp_path: Path, as_it_was, request):
     """In a copy of its folder, for some write into the documentation beside it."""
     if name == "store_walk.py":
         request.getfixturevalue("examined_in_full")
-    if name in LONG:
-        thorough("compiles for half a minute")
     where = "scripts" if name in SCRIPTS else "benchmarks"
     shutil.copytree(ROOT / where, tmp_path / where)
     (tmp_path / "tests").symlink_to(ROOT / "tests")

@@ -53,7 +53,18 @@ def imported_model(name: str) -> Imported:
     return import_model(path, ImportChoices(search=search, apart=False))
 
 
-@pytest.mark.parametrize("name", [name for name in MODELS if name not in REFUSED])
+ALWAYS = {*FALLS, *FEET, *MASS} - {"icub", "apollo"}
+MORE = pytest.mark.thorough("a model more")
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        name if name in ALWAYS else pytest.param(name, marks=MORE)
+        for name in MODELS
+        if name not in REFUSED
+    ],
+)
 def test_file_to_standing_creature(tmp_path: Path, name: str):
     imported = imported_model(name)
     write_folder(tmp_path / "mine", imported)

@@ -267,9 +267,9 @@ def test_the_first_programs_are_shaped_as_deaps():
     """Ramped half-and-half of depths 2 to 5: mean size and depth within 4 %, and their spread."""
     known = deaps()
     known.addEphemeralConstant("ball", partial(np.random.default_rng(0).uniform, -1, 1))
-    theirs = [gp.PrimitiveTree(gp.genHalfAndHalf(known, 2, 5)) for _ in range(4000)]
+    theirs = [gp.PrimitiveTree(gp.genHalfAndHalf(known, 2, 5)) for _ in range(2000)]
     words = Words(WORDS.functions, WORDS.senses, 512)
-    code = np.asarray(first_programs(4000, words)[0])
+    code = np.asarray(first_programs(2000, words)[0])
     ours = {"size": (code != EMPTY).sum(1), "depth": np.array([plain_depth(row) for row in code])}
     expected = {
         "size": np.array([len(tree) for tree in theirs]),
