@@ -15,7 +15,7 @@ class Starts:
     """Initial conditions and disturbances, one row per simulation.
 
     joint_offset, joint_velocity: [S, J] rad, rad/s; added to the standing pose.
-    friction: [S] factor on sliding friction. mass: [S, nbody] factor on each body's mass and inertia.
+    friction: [S] factor on sliding friction. mass: [S, nbody] factor on mass and inertia.
     stiffness, damping: [S, J] factors on kp and kd.
     delay: [S] control steps by which torques are late.
     slope: [S, 2] rad, rise of the floor along the world's x and y.
@@ -136,7 +136,7 @@ def unfamiliar(
     docs/certificate.md lists those that are new to a champion, by the settings of its run.
 
     Args:
-      gains: half width of each joint's kp and kd, as a share. latency: largest delay in control steps.
+      gains: half width of each joint's kp and kd, as a share. latency: most control steps of delay.
       slope: rad, steepest, in any direction. floor: range of the softness factor, log-uniform:
         softer is as likely as harder if its ends are inverse to each other.
     """
