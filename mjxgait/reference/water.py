@@ -48,7 +48,7 @@ class Water:
         subtree_com: np.ndarray,
         xipos: np.ndarray,
     ) -> np.ndarray:
-        """Return N and N·m [S, nbody, 6] about each body's centre of mass; arrays as in `MjData`."""
+        """Return N, N·m [S, nbody, 6] about each body's centre of mass; arrays as in `MjData`."""
         count = len(geom_xpos)
         rotation = geom_xmat[:, self.blocks].reshape(count, -1, 3, 3)
         arms = np.einsum("sbij,bqj->sbqi", rotation, self.points)
