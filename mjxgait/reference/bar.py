@@ -1,6 +1,6 @@
-"""How far a body stays from a bar across its way, and from all above the bar.
+"""Distance of a body from a bar across its way, and from the space above the bar.
 
-MuJoCo's own distances between true shapes, those that are only for show among them.
+Uses MuJoCo's distances between the true shapes, including visual-only geoms.
 Letters: `S` simulations, `G` geoms.
 """
 
@@ -13,13 +13,13 @@ from mjxgait.reference.layout import start_frame
 RADIUS = 0.01
 """m, half the thickness of the bar along the way."""
 REACH = 10.0
-"""m that the bar reaches up from its lower edge, and to both sides."""
+"""m; reach of the bar up from its lower edge, and to both sides."""
 FAR = 0.1
-"""m; what is farther away is not measured."""
+"""m; larger distances are not measured."""
 
 
 class Clearance:
-    """Looks at geoms and a bar, which is no part of any simulation."""
+    """Distances of geoms from a bar that is not part of the simulation."""
 
     def __init__(self, creature: Creature) -> None:
         start = start_frame(creature)
@@ -31,11 +31,11 @@ class Clearance:
         mujoco.mj_kinematics(self.model, self.data)
 
     def of(self, xpos: np.ndarray, xmat: np.ndarray, bar: np.ndarray) -> np.ndarray:
-        """[S] m of the nearest part, at most `FAR`; below zero where one is inside.
+        """Return the distance [S] in m of the nearest part, at most `FAR`; negative inside the bar.
 
         Args:
           xpos: [S, G, 3] m, of all geoms of the creature's model. xmat: [S, G, 9].
-          bar: [S, 2] m ahead of the start and above the floor, its middle and its lower edge.
+          bar: [S, 2] m, middle of the bar ahead of the start, lower edge above the floor.
         """
         nearest = np.full(len(xpos), FAR)
         along = (xpos - self.place * [1, 1, 0]) @ self.axes.T
@@ -52,7 +52,7 @@ class Clearance:
 
 
 def _with_bar(creature: Creature) -> mujoco.MjModel:
-    """The creature's model, and last a box whose lower edge is at the origin of the world."""
+    """Return the creature's model with the bar as last geom, lower edge at the world's origin."""
     spec = mujoco.MjSpec.from_string(creature.files["creature.xml"])
     body = spec.worldbody.add_body(name="the bar", pos=[0.0, 0.0, REACH])
     size = [RADIUS, REACH, REACH]

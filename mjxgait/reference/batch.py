@@ -9,13 +9,13 @@ from mjxgait.reference.starts import Starts
 
 
 def batch_of(creature: Creature, model: mujoco.MjModel, starts: Starts) -> Batch:
-    """The simulations at their starts."""
+    """Return the simulations at their initial conditions."""
     batch = Batch(model, len(starts), 1, persistent=True)
     batch.expand("geom_friction")[:, :, 0] *= starts.friction[:, None]
     batch.expand("body_mass")[:] *= starts.mass
     batch.expand("body_inertia")[:] *= starts.mass[:, :, None]
     batch.expand("opt.gravity")[:] = _gravity(model, starts.slope)
-    # The impedance and not the time constant, which is as short as the time step allows already.
+    # Softness sets the impedance: the time constant is already as short as the time step allows.
     impedance = batch.expand("geom_solimp")[:, :, :2]
     impedance /= impedance + starts.floor[:, None, None] * (1 - impedance)
     batch.expand("opt.timestep")[:] /= starts.refine
@@ -29,7 +29,7 @@ def batch_of(creature: Creature, model: mujoco.MjModel, starts: Starts) -> Batch
 
 
 def _gravity(model: mujoco.MjModel, slope: np.ndarray) -> np.ndarray:
-    """[S, 3] on slopes [S, 2]: gravity is tilted instead of the floor, see `worlds.sloping`."""
+    """Return gravity [S, 3], tilted instead of the floor by slopes [S, 2]; see `worlds.sloping`."""
     angle = np.linalg.norm(slope, axis=1, keepdims=True)
     uphill = slope / np.where(angle > 0, angle, 1.0)
     change = np.concatenate([-np.sin(angle) * uphill, 1 - np.cos(angle)], 1)

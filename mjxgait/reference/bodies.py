@@ -1,4 +1,4 @@
-"""The bodies that one thread simulates on C MuJoCo: their arrays, what is seen of them, who is down.
+"""Bodies that one thread simulates on C MuJoCo: arrays, observations, falls.
 
 Letters: `S` simulations, `J` actuated joints, `F` feet, `nq nv` as in MuJoCo.
 """
@@ -27,17 +27,16 @@ from mjxgait.reference.water import Bath
 VELOCITY_STAGE = int(mujoco.mjtStage.mjSTAGE_VEL)
 
 BLOWN_UP = 1e4
-"""m/s or rad/s, from which a simulation is stopped: beyond any walk, and before MuJoCo itself
-complains in a log file.
+"""m/s or rad/s at which a simulation stops: beyond any walk, and before MuJoCo writes warnings to a
+log file.
 """
 
 
 class Bodies:
-    """The simulations at their starts, on land raised until none stands deeper in the floor than it
-    should.
+    """Simulations at their initial conditions; on land each is raised out of the floor.
 
-    reads: the senses that the controller asks for; what nobody asks for is not computed. drag: of
-    the water, 0 on land.
+    reads: observations that the controller reads; others are not computed. drag: N·s/m³ of the
+    water, 0 on land.
     """
 
     def __init__(
@@ -63,7 +62,7 @@ class Bodies:
         self.constraint = bind("qfrc_constraint")
         self.geom_xpos, self.geom_xmat = bind("geom_xpos"), bind("geom_xmat")
         self.subtree_com = bind("subtree_com")
-        # Of the step before, which the next one overwrites.
+        # Constraint force of the previous step; the next step overwrites `constraint`.
         self.last_force = np.zeros_like(self.qvel)
         self.sees_feet = any(name in FOOT_SENSES for name in reads)
         self.sees_light = "light" in reads
@@ -73,24 +72,24 @@ class Bodies:
         self.batch.forward(stage=VELOCITY_STAGE)
 
     def step(self, rows: np.ndarray) -> None:
-        """One step of physics, to the new moment and its velocities."""
+        """Advance the physics by one step, up to the velocity stage of the new state."""
         if self.bath:
             self.bath.press(rows)
         self.batch.step(rows, stage=VELOCITY_STAGE)
 
     def push(self, rows: np.ndarray) -> None:
-        """Changes each one's velocity by its push."""
+        """Add each simulation's push to its velocity."""
         root = self.layout.root_dof
         self.qvel[rows, root : root + 2] += self.starts.push[rows]
         self.batch.forward(rows, stage=VELOCITY_STAGE)
 
     def follow(self, rows: np.ndarray, leader: int) -> None:
-        """Puts simulations where another one is."""
+        """Copy the state of one simulation to others."""
         for state in (self.qpos, self.qvel, self.warm_start, self.last_force):
             state[rows] = state[leader]
 
     def state(self, rows: np.ndarray, step: int, goal: np.ndarray) -> State:
-        """What a controller may know at a control step.
+        """Return the state that a controller may observe at a control step.
 
         M and bias belong to the current state: each step ends with the velocity stage of the new
         one. goal: [rows] m ahead of the start.
@@ -119,7 +118,7 @@ class Bodies:
         )
 
     def foot_height(self, rows: np.ndarray) -> np.ndarray:
-        """[rows, F] m above the floor; empty where nobody asks."""
+        """Return heights [rows, F] in m above the floor; empty if unused."""
         if not self.sees_feet:
             return np.zeros((len(rows), 0))
         if self.bath:
@@ -128,13 +127,13 @@ class Bodies:
         return per_foot(self.creature, low)
 
     def foot_pos(self, rows: np.ndarray) -> np.ndarray:
-        """[rows, F, 3] m, the middle of each foot; empty where nobody asks."""
+        """Return the middle [rows, F, 3] of each foot in m; empty if unused."""
         if not self.sees_feet:
             return np.zeros((len(rows), 0, 3))
         return foot_middles(self.creature, self.geom_xpos[rows])
 
     def light(self, rows: np.ndarray) -> np.ndarray:
-        """[rows, F, 3], its direction in each foot's own axes; empty where nobody asks."""
+        """Return the light's direction [rows, F, 3] in each foot's own axes; empty if unused."""
         if not self.sees_light:
             return np.zeros((len(rows), 0, 3))
         light = self.starts.light[rows][:, None]
@@ -146,31 +145,32 @@ class Bodies:
         return seen
 
     def travel(self, rows: np.ndarray) -> np.ndarray:
-        """[rows, 3] m ahead, to the left and up from the start."""
+        """Return the way [rows, 3] from the start in m: forward, left, up."""
         moved = self.xpos[rows, self.creature.trunk] - self.start.place
         return np.stack([moved @ self.start.forward, moved @ self.start.left, moved[:, 2]], 1)
 
     def middle(self, rows: np.ndarray) -> np.ndarray:
-        """[rows, 3] m in the world's axes, from where the trunk starts to the centre of all mass."""
+        """Return the centre of mass [rows, 3] in m from the trunk's start, in world axes."""
         moved: np.ndarray = self.subtree_com[rows, self.creature.trunk] - self.start.place
         return moved
 
     def astray(self, rows: np.ndarray, told: np.ndarray) -> np.ndarray:
-        """[rows] rad that the nose is off the heading that was told."""
+        """Return the nose's heading less the commanded one, [rows] rad."""
         rot = self.xmat[rows, self.creature.trunk].reshape(-1, 3, 3)
         nose = rot @ self.creature.frame.forward
         return wrapped(np.arctan2(nose @ self.start.left, nose @ self.start.forward) - told)
 
     def height(self, rows: np.ndarray) -> np.ndarray:
-        """[rows] m above the ground, of the lowest part."""
+        """Return the height [rows] in m of the lowest part above the ground."""
         return self.solid.lowest(self.geom_xpos[rows], self.geom_xmat[rows])
 
     def sane(self, rows: np.ndarray) -> np.ndarray:
-        """[rows] whether it has not blown up; false for NaN."""
+        """Return whether [rows] have not blown up; false for NaN."""
         return (np.abs(self.qvel[rows]) < BLOWN_UP).all(1)
 
     def down(self, rows: np.ndarray, fall: Fall) -> np.ndarray:
-        """[rows] Negated comparisons, so that a simulation that is NaN counts as down."""
+        """Return whether [rows] are down."""
+        # Negated comparisons, so that NaN counts as down.
         trunk = self.creature.trunk
         up = self.xmat[rows, trunk].reshape(-1, 3, 3)[:, 2] @ self.creature.frame.up
         x, y, z = self.xpos[rows, trunk].T
@@ -187,8 +187,9 @@ class Bodies:
         return ~fine
 
     def _lift(self, model: mujoco.MjModel) -> None:
-        """Raises each start until no part is deeper in the floor than when standing; else joint
-        noise would begin with a kick.
+        """Raise each body until no part is deeper in the floor than when standing.
+
+        Otherwise joint noise would begin with a kick.
         """
         self.batch.forward(stage=VELOCITY_STAGE)
         standing = mujoco.MjData(model)
@@ -201,6 +202,6 @@ class Bodies:
 
 
 def wrapped(angle: np.ndarray) -> np.ndarray:
-    """The same directions in rad from -pi to pi."""
+    """Wrap angles in rad to -pi to pi."""
     turned: np.ndarray = np.remainder(angle + np.pi, 2 * np.pi) - np.pi
     return turned

@@ -1,4 +1,4 @@
-"""The drive of docs/controller.md in NumPy and float64, written from that page alone.
+"""Drive of docs/controller.md in NumPy and float64, written from that page alone.
 
 Letters: `S` simulations, `J` actuated joints, `nv` degrees of freedom.
 """
@@ -15,7 +15,7 @@ from mjxgait.reference.state import State
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Drive:
-    """From a command to the torques of the joints. step: s between two commands."""
+    """Conversion of a command to joint torques. step: s between two commands."""
 
     creature: Creature
     settings: DriveConfig
@@ -29,9 +29,9 @@ class Drive:
         stiffness: np.ndarray | float = 1.0,
         damping: np.ndarray | float = 1.0,
     ) -> np.ndarray:
-        """Joint torques [S, J] in N·m of a command [S, J].
+        """Return joint torques [S, J] in N·m for a command [S, J].
 
-        A pose is followed by stable PD (Tan, Liu & Turk 2011) or plain PD.
+        Stable PD (Tan, Liu & Turk 2011) or plain PD tracks a pose.
         stiffness, damping: factors on kp and kd, [S, J] or one for all.
         """
         limit = self.creature.gains.torque_limit
@@ -59,8 +59,9 @@ class Drive:
     def _predicted_acceleration(
         self, spring_damper: np.ndarray, state: State, damping: np.ndarray
     ) -> np.ndarray:
-        """Of the actuated joints [S, J], with the coming step's damping taken implicitly.
+        """Predict the acceleration [S, J] of the actuated joints.
 
+        The next step's damping is taken implicitly.
         damping: [J] or [S, J], time step times kd.
         """
         dof = self.creature.joints.dof_adr

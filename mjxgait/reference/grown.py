@@ -1,5 +1,4 @@
-"""What is seen besides of a body of blocks: its middle, its momentum, what pushes it, how deep it is
-in the ground.
+"""Additional measurements of a modular body: centre of mass, momentum, drag, depth in the ground.
 
 Letters: `T` frames.
 """
@@ -15,11 +14,11 @@ from mjxgait.creature import Creature
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Grown:
-    """In the world's axes.
+    """Measurements of a modular body, in world axes.
 
-    middle: [T, 3] m, of all mass. momentum: [T, 3] N·s. push: [T, 3] N, of the water on the whole.
-    low: [T] m of the lowest point of the lowest block. buried: [T] the most that a block is in the
-    ground, of its size. sizes: m by name of the part, the cube root of its volume.
+    middle: [T, 3] m, centre of mass. momentum: [T, 3] N·s. push: [T, 3] N, total water force.
+    low: [T] m, lowest point of all blocks. buried: [T] greatest depth of a block in the ground, as
+    a share of its size. sizes: m by name of the part, cube root of its volume.
     """
 
     middle: np.ndarray
@@ -30,7 +29,7 @@ class Grown:
     sizes: Mapping[str, float]
 
     def window(self, frames: slice) -> "Grown":
-        """Some of the frames."""
+        """Return some of the frames."""
         arrays = {
             f.name: getattr(self, f.name)[frames]
             for f in dataclasses.fields(self)
@@ -40,11 +39,10 @@ class Grown:
 
 
 def seen_grown(creature: Creature, qpos: np.ndarray, qvel: np.ndarray, drag: float) -> Grown:
-    """Looks at a motion [T, nq], [T, nv]; frames after it blew up are NaN. drag: N·s/m³ of the water
-    around it; 0 without.
+    """Measure a motion [T, nq], [T, nv]; frames after it blew up are NaN.
 
-    What the water does is summed block by block: over a face, it is the velocity of the block's
-    middle along the normal that counts (docs/blocks.md); the examiner's simulation sums points.
+    drag: N·s/m³ of the water; 0 without. The velocity of a block's middle along the normal gives
+    the force on a face (docs/blocks.md); the reference simulator sums points instead.
     """
     model, data = creature.model, mujoco.MjData(creature.model)
     boxes = np.flatnonzero(model.geom_bodyid > 0)
@@ -72,8 +70,9 @@ def seen_grown(creature: Creature, qpos: np.ndarray, qvel: np.ndarray, drag: flo
 
 
 def _push(half: np.ndarray, rotation: np.ndarray, velocity: np.ndarray, drag: float) -> np.ndarray:
-    """[3] N on a block whose middle moves so: two faces of each kind, each as large as it is."""
+    """Return the force [3] in N on a block with this velocity of its middle."""
     normals = rotation.reshape(3, 3)
+    # Each area is that of two opposite faces.
     areas = 8 * half[[1, 2, 0]] * half[[2, 0, 1]]
     pushed: np.ndarray = -drag * normals @ (areas * (velocity @ normals))
     return pushed

@@ -1,4 +1,4 @@
-"""Where things lie in a MuJoCo model, and how low they reach."""
+"""Indices and frames of a MuJoCo model, and heights of its lowest points."""
 
 import dataclasses
 from typing import Protocol
@@ -13,20 +13,21 @@ FLOOR = "floor"
 
 
 class Ground(Protocol):
-    """What is not the plane z = 0; places and heights in m, of any shape."""
+    """Ground other than the plane z = 0; places and heights in m, of any shape."""
 
     def height(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """At these places of the world."""
+        """Return heights at places in the world."""
         ...
 
     def steepness(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """[2, ...] its change per metre along x and y."""
+        """Return the change [2, ...] of the height per metre along x and y."""
         ...
 
 
 class Layout:
-    """Indices: the free root, and row and column of each stored entry of the mass matrix (its
-    lower triangle).
+    """Indices of the free root, and row and column of each stored mass matrix entry.
+
+    MuJoCo stores the lower triangle.
     """
 
     def __init__(self, model: mujoco.MjModel) -> None:
@@ -37,7 +38,7 @@ class Layout:
         self.mass_column = model.M_colind.copy()
 
     def dense(self, lower: np.ndarray) -> np.ndarray:
-        """Mass matrices [S, nv, nv] from their stored entries [S, nM]."""
+        """Return mass matrices [S, nv, nv] from their stored entries [S, nM]."""
         size = int(self.mass_row[-1]) + 1
         full = np.zeros((len(lower), size, size))
         full[:, self.mass_row, self.mass_column] = lower
@@ -47,7 +48,7 @@ class Layout:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class StartFrame:
-    """Where the trunk starts, and its horizontal directions forward and left there; [3] each."""
+    """Place where the trunk starts, and its horizontal forward and left there; [3] each."""
 
     place: np.ndarray
     forward: np.ndarray
@@ -55,7 +56,7 @@ class StartFrame:
 
 
 def start_frame(creature: Creature) -> StartFrame:
-    """From the standing pose, through MuJoCo's kinematics."""
+    """Compute the start frame from the standing pose with MuJoCo's kinematics."""
     data = mujoco.MjData(creature.model)
     data.qpos[:] = creature.stand_qpos
     mujoco.mj_kinematics(creature.model, data)
@@ -72,29 +73,29 @@ def _horizontal(vector: np.ndarray) -> np.ndarray:
 
 
 def per_foot(creature: Creature, heights: np.ndarray) -> np.ndarray:
-    """[S, F] the least of the heights [S, geoms] of each foot's geoms."""
+    """Return the least height [S, F] of each foot from the heights [S, geoms] of its geoms."""
     feet = range(len(creature.feet.names))
     return np.stack([heights[:, creature.feet.foot_of == foot].min(1) for foot in feet], 1)
 
 
 def foot_middles(creature: Creature, places: np.ndarray) -> np.ndarray:
-    """[S, F, 3] m, the middle of each foot's geoms, from the places [S, ngeom, 3] of all."""
+    """Return the middle [S, F, 3] of each foot's geoms in m. places: [S, ngeom, 3] of all geoms."""
     feet = creature.feet
     own = places[:, list(feet.stepping)]
     return np.stack([own[:, feet.foot_of == foot].mean(1) for foot in range(len(feet.names))], 1)
 
 
 def level_nose(creature: Creature, trunk_rot: np.ndarray) -> np.ndarray:
-    """[S, 3] horizontal unit vectors along the nose of trunks [S, 3, 3]."""
+    """Return horizontal unit vectors [S, 3] along the nose of trunks [S, 3, 3]."""
     nose = trunk_rot @ creature.frame.forward * [1, 1, 0]
     level: np.ndarray = nose / np.maximum(np.linalg.norm(nose, axis=1, keepdims=True), 1e-6)
     return level
 
 
 class LowestPoint:
-    """How far some geoms' lowest points are above the ground, exact for MuJoCo's primitive shapes.
+    """Height of geoms' lowest points above the ground, exact for MuJoCo's primitive shapes.
 
-    On other ground than a plane it is the distance to the plane that touches it below that point.
+    On uneven ground it is the distance to the tangent plane below that point.
     """
 
     def __init__(
@@ -108,7 +109,7 @@ class LowestPoint:
         self.ellipsoid = np.array([e for _, _, e in extents]).reshape(-1, 3)
 
     def heights(self, xpos: np.ndarray, xmat: np.ndarray) -> np.ndarray:
-        """[S, geoms] m, from all geoms' positions [S, ngeom, 3] and rotations [S, ngeom, 9]."""
+        """Return heights [S, geoms] in m. xpos: [S, ngeom, 3], xmat: [S, ngeom, 9] of all geoms."""
         if self.ground:
             return self._above(self.ground, xpos[:, self.geoms], xmat[:, self.geoms])
         down = np.abs(xmat[:, self.geoms, 6:])
@@ -118,7 +119,7 @@ class LowestPoint:
         return xpos[:, self.geoms, 2] - reach - self.floor
 
     def _above(self, ground: Ground, pos: np.ndarray, rot: np.ndarray) -> np.ndarray:
-        """[S, geoms] m above ground that is no plane. pos: [S, geoms, 3]. rot: [S, geoms, 9]."""
+        """Return heights [S, geoms] in m above `ground`. pos: [S, geoms, 3]. rot: [S, geoms, 9]."""
         down = rot[..., 6:]
         round_part = down * self.ellipsoid
         length = np.maximum(np.linalg.norm(round_part, axis=2, keepdims=True), 1e-9)
@@ -129,11 +130,11 @@ class LowestPoint:
         return (z - ground.height(x, y)) * upright - self.radius
 
     def lowest(self, xpos: np.ndarray, xmat: np.ndarray) -> np.ndarray:
-        """[S] m, the least of `heights`; infinite where there is no geom."""
+        """Return the least of `heights`, [S] m; infinite without geoms."""
         return self.heights(xpos, xmat).min(1, initial=np.inf)
 
 
 def colliding_geoms(model: mujoco.MjModel) -> np.ndarray:
-    """Ids of the moving geoms that can touch something."""
+    """Return the ids of the moving geoms that can collide."""
     solid = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
     return np.flatnonzero(solid & (model.geom_bodyid != 0))

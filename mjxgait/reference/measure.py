@@ -1,4 +1,4 @@
-"""From a recorded trajectory to what the criteria need: contacts, slip, clearance, power.
+"""Measurements of a recorded trajectory for the criteria: contacts, slip, clearance, power.
 
 Letters: `T` frames, `J` actuated joints, `N` feet, `B` bodies.
 """
@@ -18,17 +18,17 @@ from mjxgait.reference.starts import Starts
 from mjxgait.reference.terrain import terrain_of
 
 CARRIES = 1e-3
-"""Share of the body weight from which a foot counts as in contact; less is the solver's residue."""
+"""Share of the body weight above which a foot is in contact; less is solver residue."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Dimensions:
-    """The sizes against which a gait is judged, in m, kg, m/s².
+    """Sizes of the body against which a gait is evaluated, in m, kg, m/s².
 
-    torque_limit: N·m per joint. joint_range: rad per joint, infinite where it has none.
-    foot_places: forward and left of the trunk when standing, in m per foot.
-    crawler: whether other parts than feet may touch the floor.
-    partner: joint on the other side, per joint; empty for a body without two like sides.
+    torque_limit: N·m per joint. joint_range: rad per joint, infinite without one.
+    foot_places: m forward and left of the trunk when standing, per foot.
+    crawler: whether parts other than feet may touch the floor.
+    partner: joint on the other side, per joint; empty for an asymmetric body.
     stand_tilt: deg of the trunk's up axis when standing.
     """
 
@@ -51,22 +51,22 @@ class Recording:
     """One simulation, frame by frame.
 
     time_step: s.
-    trunk_pos: [T, 3] m along the start's forward and left, and above the ground.
+    trunk_pos: [T, 3] m forward and left of the start, and above the ground.
     trunk_up: [T] trunk's up axis . world up. pitch, roll: [T] rad.
     joint_pos, joint_vel, torque: [T, J] rad, rad/s, N·m.
     foot_force: [T, N] N, normal. foot_slip: [T, N] m/s, tangential, of the foot's material at the
     contact; 0 without contact.
     foot_height: [T, N] m, lowest point above the ground.
-    touch: [T] whether a part that is neither foot nor ground contact touches the ground.
-    penetration: [T] m, of the deepest contact with the floor.
-    body_speed: [T] m/s, of the fastest body's centre of mass.
+    touch: [T] whether a part other than feet and permitted geoms touches the ground.
+    penetration: [T] m, deepest contact with the floor.
+    body_speed: [T] m/s, centre of mass of the fastest body.
     heading: [T] rad of the trunk, left of the start's forward, without jumps.
-    goal: m ahead of the start; 0 where the task has none.
-    light: [3] m where it is in the world; None where the task has none.
-    clearance: [T] m to the bar, `bar.FAR` at most; None where the task has none.
-    grown: what else is seen of a body of blocks; None of others.
-    foot_ahead: [T, N] m along the trunk's nose from the trunk to the foot; None where nobody looked.
-    overlap_pairs: P names of parts that are ever in each other. overlap: [T, P] m, how deep.
+    goal: m ahead of the start; 0 if the task has none.
+    light: [3] m, place in the world; None if the task has none.
+    clearance: [T] m to the bar, `bar.FAR` at most; None if the task has none.
+    grown: additional measurements of a modular body; None for others.
+    foot_ahead: [T, N] m along the trunk's nose from the trunk to the foot; None if not measured.
+    overlap_pairs: names of the P pairs of parts that ever overlap. overlap: [T, P] m, depth.
     """
 
     dimensions: Dimensions
@@ -95,11 +95,11 @@ class Recording:
 
     @property
     def contact(self) -> np.ndarray:
-        """[T, N] whether the foot carries weight."""
+        """Whether each foot carries weight [T, N]."""
         return self.foot_force > CARRIES * self.dimensions.mass * self.dimensions.gravity
 
     def window(self, begin: float, end: float = np.inf) -> "Recording":
-        """The frames from `begin` to `end` in s."""
+        """Return the frames from `begin` to `end` in s."""
         frames = slice(
             round(begin / self.time_step), None if np.isinf(end) else round(end / self.time_step)
         )
@@ -113,7 +113,7 @@ class Recording:
 
 
 def dimensions(creature: Creature) -> Dimensions:
-    """The sizes of a creature."""
+    """Return the sizes of a creature."""
     model = creature.model
     data = mujoco.MjData(model)
     data.qpos[:] = creature.stand_qpos
@@ -151,17 +151,15 @@ def measure(
     aimed: Starts | None = None,
     drag: float | None = None,
 ) -> Recording:
-    """Looks at one undisturbed simulation again: every stored frame is given to C MuJoCo, whose
-    contacts are then read.
+    """Replay one undisturbed simulation: set every stored frame in C MuJoCo, read its contacts.
 
     Frames after a simulation blew up are NaN, which no criterion accepts.
 
     Args:
-      inside: whether to look for parts in each other, which takes a quarter of the time with
-        meshes.
-      aimed: how the simulations began, where the task has a goal or a bar.
-      drag: N·s/m³ of the water around a body of blocks, 0 on land; None for other bodies. Of what
-        has grown it is excused in no pose that parts are in each other.
+      inside: whether to measure overlaps of parts; with meshes this takes a quarter of the time.
+      aimed: initial conditions, if the task has a goal or a bar.
+      drag: N·s/m³ of the water around a modular body, 0 on land; None for other bodies. In a
+        modular body overlaps of the standing pose count, too.
     """
     start = start_frame(creature)
     qpos, qvel, torque = trajectory.qpos[row], trajectory.qvel[row], trajectory.torque[row]
@@ -209,7 +207,7 @@ def measure(
 
 
 def _ahead(sight: Sight) -> np.ndarray:
-    """[T, N] m from the trunk to each foot, along the level direction of its nose."""
+    """Return the distance [T, N] in m from the trunk to each foot, along its level nose."""
     apart = foot_middles(sight.creature, sight.geom_xpos) - sight.trunk_pos[:, None]
     found: np.ndarray = np.einsum("tnx,tx->tn", apart, level_nose(sight.creature, sight.trunk_rot))
     return found

@@ -1,4 +1,4 @@
-"""What a simulation ends with: when a creature is down, what became of it, and its motion.
+"""Results of simulations: conditions of a fall, metrics and recorded motion.
 
 Letters: `S` simulations, `R` recorded ones (the first of the `S`), `T` control steps, `J` actuated
 joints, `nq nv` as in MuJoCo.
@@ -16,13 +16,13 @@ from mjxgait.creature import Creature
 
 @dataclasses.dataclass(frozen=True)
 class Fall:
-    """When a creature is down; criterion 1.
+    """Conditions of a fall; criterion 1.
 
-    min_up: least product of the trunk's up axis with the world's. height: range of the trunk's
+    min_up: least dot product of the trunk's up axis and the world's. height: range of the trunk's
     height in standing heights.
-    touch: whether a part that is neither foot nor ground contact is down when it touches the floor.
-    tilt: most deg by which the trunk of a walk leans more than in the standing pose; who leans more
-    is not down, but no walk.
+    touch: whether floor contact of a part other than feet and permitted geoms is a fall.
+    tilt: largest tilt in deg of a walk's trunk beyond the standing pose; more is not a fall, but no
+    walk either.
     """
 
     __pydantic_config__ = STRICT
@@ -40,12 +40,13 @@ class Fall:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Trajectory:
-    """Everything needed to look at the recorded simulations again; frames are control steps, before
-    their torque acts.
+    """Recorded simulations, complete enough to replay.
+
+    A frame is a control step before its torque acts. After a simulation blew up its frames are NaN.
 
     time_step: s between frames. qpos: [R, T, nq]. qvel: [R, T, nv]. torque: [R, T, J] N·m.
-    target: [R, T, J] rad that the joints were pulled to; NaN under a controller that sends torques.
-    phase: [R, T] where the controller was in its own cycle, in [0, 1); NaN for one without. A simulation that blew up is NaN from there on.
+    target: [R, T, J] rad, target angles; NaN under a controller that sends torques.
+    phase: [R, T] of the controller's own cycle, in [0, 1); NaN without a cycle.
     """
 
     time_step: float
@@ -57,7 +58,7 @@ class Trajectory:
 
 
 def blank_film(creature: Creature, time_step: float, rows: int, steps: int) -> Trajectory:
-    """What nobody has recorded yet: NaN."""
+    """Return an empty recording, filled with NaN."""
 
     def blank(*width: int) -> np.ndarray:
         return np.full((rows, steps, *width), np.nan)
@@ -77,14 +78,15 @@ def blank_film(creature: Creature, time_step: float, rows: int, steps: int) -> T
 class Outcome:
     """Results of the simulations.
 
-    fell: [S] s, infinite for those that stayed up. travel: [S, 3] m along the start's forward and
-    left and upwards until the end or the fall.
-    The next five have a value after each control step, NaN from the fall on, and are empty where the
-    task does not need them (`path` and `aside` are always there):
-    path, aside: [S, T] m of the trunk forward, and to the left. astray: [S, T] rad, the heading less the commanded one.
-    middle: [S, T, 3] m in the world's axes, from where the trunk starts to the centre of all mass.
+    fell: [S] s, infinite without a fall. travel: [S, 3] m forward, left and up from the start until
+    the end or the fall.
+    clearance: [S] m, least distance to the bar, `bar.FAR` at most; infinite without a bar.
+    The next five have a value after each control step and NaN from the fall on. They are empty if
+    the task does not need them (`path` and `aside` are never empty):
+    path, aside: [S, T] m of the trunk forward, and to the left.
+    astray: [S, T] rad, heading less the commanded one.
+    middle: [S, T, 3] m in world axes, from the trunk's start to the centre of mass.
     low: [S, T] m, lowest solid part above the ground.
-    clearance: [S] m, the least to the bar, `certify.bar.FAR` at most; infinite where there is none.
     """
 
     fell: np.ndarray
@@ -99,11 +101,11 @@ class Outcome:
 
     @property
     def stayed_up(self) -> np.ndarray:
-        """[S] whether never down."""
+        """Whether simulations [S] never fell."""
         return np.isinf(self.fell)
 
     def copy(self, leader: int, rows: np.ndarray) -> None:
-        """Gives some simulations the results of the one that they have been identical to."""
+        """Copy the results of one simulation to others that have been identical to it."""
         own = (self.fell, self.travel, self.path, self.aside, self.clearance, self.astray)
         for values in (*own, self.middle, self.low):
             values[rows] = values[leader]
@@ -112,7 +114,7 @@ class Outcome:
 def blank_outcome(
     count: int, steps: int, film: Trajectory, *, told: bool, middle: bool, low: bool
 ) -> Outcome:
-    """Of S simulations that have not begun.
+    """Return the results of S simulations before their first step.
 
     told: whether they follow a commanded heading. middle, low: whether these are recorded.
     """

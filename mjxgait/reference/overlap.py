@@ -1,6 +1,6 @@
-"""How deep parts of a body stand in each other that are no neighbours.
+"""Overlap depth between parts of a body that are not neighbours.
 
-MuJoCo's own collisions on the true shapes, those that are only for show among them.
+Uses MuJoCo's collisions between the true shapes, including visual-only geoms.
 Letters: `T` frames, `P` pairs of parts.
 """
 
@@ -13,22 +13,23 @@ import numpy as np
 from mjxgait.creature import Creature
 
 ONE_PLACE = 0.02
-"""Hip heights within which the joints between two parts count as one, as a ball joint's three."""
+"""Hip heights within which joints between two parts count as one, as the three of a ball joint."""
 
 FALSE = 2.0
-"""Times the least way out that a contact is deep at most, and it may be at least; corners of boxes are up
-to 1.4 times. Of two cylinders that cross MuJoCo may tell a depth as large as a radius where they hardly
-touch, and of a disc in a box an eighth of the depth that there is."""
+"""Largest credible ratio of contact depth to least way out, or inverse; box corners reach 1.4.
+
+MuJoCo may report a whole radius for crossed cylinders that hardly touch, and an eighth of the true
+depth for a disc in a box."""
 
 ONE_WAY = 0.01
-"""rad by which axes may differ that count as parallel, about."""
+"""Largest difference between parallel axes, about in rad."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Overlaps:
-    """The pairs of parts (bodies) that are ever deeper in each other than in the standing pose.
+    """Pairs of parts (bodies) that ever overlap more deeply than in the standing pose.
 
-    pairs: their names, P. depth: [T, P] m more than when standing; NaN in frames that are NaN.
+    pairs: names, P. depth: [T, P] m beyond the standing pose; NaN in frames that are NaN.
     """
 
     pairs: tuple[tuple[str, str], ...]
@@ -36,8 +37,9 @@ class Overlaps:
 
 
 def overlaps(creature: Creature, qpos: np.ndarray, excused: bool = True) -> Overlaps:
-    """Looks at every frame of a motion; qpos: [T, nq]. excused: whether what is in each other when
-    standing, as somebody has drawn it, counts only beyond that.
+    """Measure the overlaps in every frame of a motion; qpos: [T, nq].
+
+    excused: whether the overlap of the standing pose, part of the model as drawn, is subtracted.
     """
     model = colliding_with_itself(creature)
     data = mujoco.MjData(model)
@@ -57,7 +59,7 @@ def overlaps(creature: Creature, qpos: np.ndarray, excused: bool = True) -> Over
 
 
 def colliding_with_itself(creature: Creature) -> mujoco.MjModel:
-    """The body, every part of which collides with every other but its neighbours, and no floor."""
+    """Return a model without floor in which all parts but neighbours collide."""
     spec = mujoco.MjSpec.from_string(creature.files["creature.xml"])
     for stated in (*spec.excludes, *spec.pairs):
         spec.delete(stated)
@@ -72,10 +74,10 @@ def colliding_with_itself(creature: Creature) -> mujoco.MjModel:
 
 
 def neighbours(model: mujoco.MjModel, creature: Creature) -> list[tuple[int, int]]:
-    """Pairs of bodies that one joint joins, or several at one place; those welded are one. And of
-    two limbs of a body in a plane, whose axes are all parallel: they can only pass each other.
+    """Return pairs of bodies joined by one joint or by several at one place; welded bodies are one.
 
-    MuJoCo leaves parent and child out by itself; they are listed all the same.
+    In a planar body, pairs of limbs with parallel axes are included: they can only pass each other.
+    MuJoCo excludes parent and child by itself; they are listed all the same.
     """
     data = mujoco.MjData(model)
     data.qpos[:] = creature.stand_qpos
@@ -99,7 +101,7 @@ def neighbours(model: mujoco.MjModel, creature: Creature) -> list[tuple[int, int
 
 
 def _chain(model: mujoco.MjModel, body: int) -> frozenset[int]:
-    """The bodies with joints from the root of the tree to this one."""
+    """Return the bodies with joints from the root of the tree to this one."""
     chain = set()
     while body := int(model.body_weldid[body]):
         chain.add(body)
@@ -110,9 +112,7 @@ def _chain(model: mujoco.MjModel, body: int) -> frozenset[int]:
 def _depths(
     model: mujoco.MjModel, data: mujoco.MjData, qpos: np.ndarray
 ) -> dict[tuple[int, int], float]:
-    """How deep each pair of geoms is in each other, m: as deep as the deepest contact, unless that
-    is false.
-    """
+    """Return the overlap depth of each pair of geoms in m: of the deepest contact, unless false."""
     data.qpos[:] = qpos
     mujoco.mj_kinematics(model, data)
     mujoco.mj_collision(model, data)
@@ -125,7 +125,7 @@ def _depths(
 
 
 def _true(model: mujoco.MjModel, data: mujoco.MjData, pair: tuple[int, int], depth: float) -> float:
-    """The least way out instead of a depth that it contradicts, m."""
+    """Return the depth in m, or the least way out if that contradicts it."""
     least = -mujoco.mj_geomDistance(model, data, *pair, model.stat.extent, None)
     believed = depth / FALSE <= least <= FALSE * depth
     return depth if believed or least <= 0 else least

@@ -1,6 +1,6 @@
-"""Frames of a simulation, given to C MuJoCo once more: where its parts are, and what is on the floor.
+"""Replay of a simulation's frames in C MuJoCo: places of the parts, contacts with the floor.
 
-What can be reckoned of all frames at once is reckoned at the end.
+Quantities that need no MuJoCo call per frame are computed for all frames at the end.
 """
 
 import mujoco
@@ -14,7 +14,7 @@ from mjxgait.reference.terrain import terrain_of
 
 
 class Sight:
-    """Reads frames from an MjData; NaN (or a touch) where it has not looked."""
+    """Reader of frames from an MjData; a frame not read is NaN (`touch`: true)."""
 
     def __init__(self, creature: Creature, frames: int, bar: np.ndarray | None) -> None:
         self.creature, self.model = creature, examined_model(creature)
@@ -35,7 +35,7 @@ class Sight:
         )
         self.bar, self.over = bar, None if bar is None else Clearance(creature)
         self.clearance = np.full(frames, np.nan)
-        # What is reckoned at the end, of all frames at once.
+        # Kept for `finish`, which handles all frames at once.
         model, self.seen = self.model, 0
         self.geom_xpos, self.geom_xmat = (
             np.empty((frames, model.ngeom, 3)),
@@ -51,7 +51,7 @@ class Sight:
         )
 
     def look(self, k: int, qpos: np.ndarray, qvel: np.ndarray, torque: np.ndarray) -> None:
-        """At one frame, in the order of time."""
+        """Read one frame; frames come in order of time."""
         data, creature = self.data, self.creature
         data.qpos[:], data.qvel[:] = qpos, qvel
         data.qfrc_applied[creature.joints.dof_adr] = torque
@@ -67,7 +67,7 @@ class Sight:
         self.seen = k + 1
 
     def finish(self) -> None:
-        """What follows from the poses of all frames that were looked at."""
+        """Compute what follows from the poses and contacts of all frames read."""
         seen = slice(self.seen)
         poses = self.geom_xpos[seen], self.geom_xmat[seen]
         self.foot_height[seen] = per_foot(self.creature, self.reach.heights(*poses))
@@ -93,7 +93,7 @@ class Sight:
         self.met.append((np.full(len(geom), k), geom, contact.dist[on_floor], at, axes, pressed))
 
     def _loads(self) -> None:
-        """What the contacts with the floor of all frames come to."""
+        """Compute force, slip, touch and penetration from all contacts with the floor."""
         seen = slice(self.seen)
         self.foot_force[seen] = self.foot_slip[seen] = self.touch[seen] = self.penetration[seen] = 0
         if not self.met:
@@ -116,8 +116,9 @@ class Sight:
 
 
 def _moving(spun: np.ndarray, arm: np.ndarray) -> np.ndarray:
-    """World velocities [..., 3] of material points at arms [..., 3] m from their tree's centre of
-    mass, where the spatial velocities `cvel` [..., 6] are.
+    """Return world velocities [..., 3] of material points at arms [..., 3] m.
+
+    Arms begin at the tree's centre of mass, the reference point of `cvel` [..., 6].
     """
     spin, slide = spun[..., :3], spun[..., 3:]
     # np.cross takes five times as long for so few points.

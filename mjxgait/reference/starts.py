@@ -1,4 +1,4 @@
-"""How simulations begin and are disturbed: starts, bodies, drives, ground and pushes.
+"""Initial conditions and disturbances of simulations: poses, bodies, drives, ground and pushes.
 
 Letters: `S` simulations, `J` actuated joints.
 """
@@ -12,24 +12,22 @@ from mjxgait.creature import Creature
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Starts:
-    """One row per simulation.
+    """Initial conditions and disturbances, one row per simulation.
 
     joint_offset, joint_velocity: [S, J] rad, rad/s; added to the standing pose.
-    friction: [S] factor on the sliding friction. mass: [S, nbody] factor on each body's mass and
-    inertia.
+    friction: [S] factor on sliding friction. mass: [S, nbody] factor on mass and inertia.
     stiffness, damping: [S, J] factors on kp and kd.
-    delay: [S] control steps by which a torque comes too late.
-    slope: [S, 2] rad, how steeply the floor rises along the world's x and y.
-    floor: [S] factor on the softness of the floor, (1 - d) / d with the impedance d of MuJoCo.
+    delay: [S] control steps by which torques are late.
+    slope: [S, 2] rad, rise of the floor along the world's x and y.
+    floor: [S] factor on the floor's softness (1 - d) / d, with MuJoCo's impedance d.
     push_time: [S] s, infinite for none.
     push: [S, 2] m/s, sudden change of the trunk's horizontal velocity in the world.
-    end: [S] s, from which nobody looks any more: who is up until then has stayed up.
-      Infinite for the end of the simulation.
-    goal: [S] m ahead of the start; 0 where the task has none.
-    light: [S, 3] m from where the trunk starts; 0 where there is none.
-    bar: [S, 2] m ahead of the start and above the floor, of a bar's lower edge; infinite where the
+    end: [S] s at which the run stops; one still up then has stayed up. Infinite: never early.
+    goal: [S] m ahead of the start; 0 if the task has none.
+    light: [S, 3] m from the trunk's start; 0 if there is none.
+    bar: [S, 2] m ahead of the start and above the floor, lower edge of the bar; infinite if the
       task has none.
-    refine: [S] physics steps per control step: the controller stays what it was, its torque is held
+    refine: [S] physics steps per control step; the controller is unchanged and its torque is held
       in between.
     """
 
@@ -55,21 +53,21 @@ class Starts:
 
     @property
     def undisturbed(self) -> np.ndarray:
-        """[S] whether nothing disturbs them until they are pushed."""
+        """Whether simulations [S] have no disturbance before their push."""
         plain = {"friction": 1, "mass": 1, "stiffness": 1, "damping": 1, "floor": 1}
         plain |= {"joint_offset": 0, "joint_velocity": 0, "delay": 0, "slope": 0, "refine": 1}
         same = [getattr(self, name) == value for name, value in plain.items()]
         return np.all([s.reshape(len(self), -1).all(1) for s in same], axis=0)
 
     def rows(self, index: slice | np.ndarray) -> "Starts":
-        """Some of the simulations."""
+        """Return some of the simulations."""
         return Starts(
             **{field.name: getattr(self, field.name)[index] for field in dataclasses.fields(self)}
         )
 
 
 def join(*parts: Starts) -> Starts:
-    """All simulations of the parts, in order."""
+    """Concatenate the simulations of the parts."""
     return Starts(
         **{
             f.name: np.concatenate([getattr(p, f.name) for p in parts])
@@ -79,7 +77,7 @@ def join(*parts: Starts) -> Starts:
 
 
 def nominal_starts(creature: Creature, count: int) -> Starts:
-    """Undisturbed ones."""
+    """Return initial conditions without disturbances."""
     joints = len(creature.joints.names)
     return Starts(
         joint_offset=np.zeros((count, joints)),
@@ -110,9 +108,9 @@ def perturbed_starts(
     friction: tuple[float, float] = (0.8, 1.2),
     mass: float = 0.05,
 ) -> Starts:
-    """Noise of these half widths (rad, rad/s, share of each body's mass), a friction factor.
+    """Draw noise (half widths in rad, rad/s, share of each body's mass) and a friction factor.
 
-    All of it is uniform.
+    All distributions are uniform.
     """
     plain = nominal_starts(creature, count)
     return dataclasses.replace(
@@ -133,14 +131,14 @@ def unfamiliar(
     slope: float = 0.0,
     floor: tuple[float, float] = (1.0, 1.0),
 ) -> Starts:
-    """The same starts with further disturbances, most of which evolution does not use by default.
+    """Add further disturbances, most of which evolution does not use by default.
 
-    docs/certificate.md says which of them are new to a champion, by the settings of its run.
+    docs/certificate.md lists those that are new to a champion, by the settings of its run.
 
     Args:
       gains: half width of each joint's kp and kd, as a share. latency: most control steps of delay.
-      slope: rad, steepest, in any direction. floor: range of the softness factor, as many times
-        softer as harder where its ends are each other's inverse.
+      slope: rad, steepest, in any direction. floor: range of the softness factor, log-uniform:
+        softer is as likely as harder if its ends are inverse to each other.
     """
     count, direction = len(starts), rng.uniform(0, 2 * np.pi, len(starts))
     return dataclasses.replace(
@@ -161,9 +159,9 @@ def pushed_starts(
     speed: float | np.ndarray,
     window: tuple[float, float],
 ) -> Starts:
-    """Pushes of a speed in m/s ([] or [count]) at uniform moments of a window in s.
+    """Draw pushes of a speed in m/s ([] or [count]) at uniform moments of a window in s.
 
-    Each quarter of the compass has equally many.
+    Each quarter of the compass gets equally many.
     """
     sector = (np.arange(count) + rng.random(count)) / count
     direction = 2 * np.pi * rng.permutation(sector)

@@ -1,4 +1,4 @@
-"""What the examiner knows of a moment, and the senses by name, written from docs/controller.md.
+"""State of simulations at one moment, and observations by name, written from docs/controller.md.
 
 Letters: `S` simulations, `J` actuated joints, `F` feet, `nv` degrees of freedom.
 """
@@ -12,24 +12,23 @@ from mjxgait.creature import Creature
 from mjxgait.reference.layout import Ground, StartFrame, level_nose
 
 CONTACT_GAP = 0.002
-"""m; a foot nearer to the floor is in contact for a controller."""
+"""m; a foot nearer to the floor counts as in contact."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class State:
-    """Many simulations at one moment.
+    """State of many simulations at one moment.
 
-    start: where all of them stood first. ground: under them; None for the plane z = 0.
+    start: common start frame. ground: None for the plane z = 0.
     time: [S] s since the start. joint_pos: [S, J] rad. velocity: [S, nv] m/s, rad/s.
     trunk_pos: [S, 3] m. trunk_rot: [S, 3, 3], columns are the trunk's axes in the world.
     trunk_vel: [S, 3] m/s, trunk_angvel: [S, 3] rad/s, world frame.
-    foot_height: [S, F] m, lowest point above the floor; empty where nobody asks.
-    foot_pos: [S, F, 3] m, the middle of each foot; likewise.
+    foot_height: [S, F] m, lowest point above the floor; empty if unused.
+    foot_pos: [S, F, 3] m, middle of each foot; empty if unused.
     mass_matrix: [S, nv, nv]. bias: [S, nv], Coriolis and gravity less passive forces.
-    constraint_force: [S, nv], of the previous step's solve.
-    light: [S, F, 3] its direction in the own axes of each foot's geom, 0 where there is none; empty
-    where nobody asks.
-    goal, bar: [S] m ahead of the start; None where the task has none.
+    constraint_force: [S, nv], from the previous step.
+    light: [S, F, 3] direction in the axes of each foot's geom, 0 without a light; empty if unused.
+    goal, bar: [S] m ahead of the start; None if the task has none.
     """
 
     start: StartFrame
@@ -77,7 +76,7 @@ def _right_down(creature: Creature, state: State) -> np.ndarray:
 
 
 def _nose(creature: Creature, state: State) -> tuple[np.ndarray, np.ndarray]:
-    """[S, 3] horizontal unit vectors along the nose and to its left."""
+    """Return horizontal unit vectors [S, 3] along the nose and to its left."""
     nose = level_nose(creature, state.trunk_rot)
     return nose, np.cross([0.0, 0.0, 1.0], nose)
 
@@ -129,12 +128,12 @@ ADDED: Mapping[str, Sense] = {
     "light": lambda creature, state: state.light,
     "bar_distance": lambda creature, state: _left(state, state.bar),
 }
-"""Those that a shipped task adds (docs/hop.md, docs/limbo.md, docs/follow.md)."""
+"""Observations added by shipped tasks (docs/hop.md, docs/limbo.md, docs/follow.md)."""
 FOOT_SENSES = ("foot_height", "contact", "foot_place")
-"""Those for which `foot_height` and `foot_pos` must be told."""
+"""Observations that need `foot_height` or `foot_pos`."""
 
 
 def sense(creature: Creature, state: State, names: Collection[str]) -> dict[str, np.ndarray]:
-    """The senses of these names, each [S, ...]."""
+    """Return the observations of these names, each [S, ...]."""
     known = {**SENSES, **ADDED}
     return {name: known[name](creature, state) for name in names if name in known}

@@ -1,4 +1,4 @@
-"""Steps the simulations of one thread on C MuJoCo, under the twin of the champion's controller.
+"""Simulations of one thread on C MuJoCo, under the champion's reference controller.
 
 Letters: `S` simulations, `R` recorded ones (the first of the `S`), `T` control steps, `J` actuated
 joints, `nq nv` as in MuJoCo.
@@ -29,21 +29,21 @@ from mjxgait.reference.state import State, sense
 from mjxgait.reference.terrain import grounded_model
 
 LOOK = 10
-"""Control steps from one look at who can no longer succeed to the next."""
+"""Control steps between two checks for simulations that can no longer succeed."""
 
 
 def examined_model(creature: Creature) -> mujoco.MjModel:
-    """The creature's own body on its ground, with a converged contact solver."""
+    """Return the creature's model on its ground, with a converged contact solver."""
     model = copy.copy(grounded_model(creature))
     model.opt.iterations, model.opt.ls_iterations = 100, 50
     model.opt.tolerance = 1e-8
-    # A simulation that blows up must not be put back on its feet in silence.
+    # MuJoCo must not silently reset a simulation that blows up.
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     return model
 
 
 class Around(Protocol):
-    """What a simulation must know of the task; see `tasks.Demands`."""
+    """Properties of the task that a simulation needs; see `tasks.Demands`."""
 
     drag: float
     grown: bool
@@ -59,7 +59,7 @@ class Around(Protocol):
 
 
 class Stepping:
-    """The simulations of one thread, of which the first `record` are recorded."""
+    """Simulations of one thread; the first `record` of them are recorded."""
 
     def __init__(
         self,
@@ -82,7 +82,7 @@ class Stepping:
         self.command = np.zeros_like(starts.stiffness)
         self.bar = Clearance(creature) if np.isfinite(starts.bar).any() else None
         self.finest = int(starts.refine.max())
-        # What the controller has sent last, for those whose torques come late.
+        # The latest torques, for simulations with a delay.
         self.sent = np.zeros((int(starts.delay.max()) + 1, *starts.stiffness.shape))
 
     def to_the_end(
@@ -91,10 +91,10 @@ class Stepping:
         heading: np.ndarray | None,
         tell: Callable[[np.ndarray], bool] | None = None,
     ) -> Outcome:
-        """Steps until the end, leaving out what has fallen and is not recorded.
+        """Run to the end; a fallen simulation stops unless it is recorded.
 
-        heading: [S, T] rad that each is told; None where nobody is told any. tell: is told now and
-        then who [S] can no longer succeed, and says whether all may end.
+        heading: [S, T] rad, commanded; None without commands. tell: called every `LOOK` steps with
+        the simulations [S] that can no longer succeed; returns whether all may end.
         """
         count, time_step = len(self.starts), self.creature.model.opt.timestep
         film = blank_film(self.creature, time_step, self.record, steps)
@@ -132,7 +132,7 @@ class Stepping:
     def _watch(
         self, seen: Outcome, running: np.ndarray, k: int, told: np.ndarray | None
     ) -> np.ndarray:
-        """Writes down what came of a control step; which of the running [running] are down."""
+        """Record the results of a control step; return which of the running [running] are down."""
         bodies, now = self.bodies, (k + 1) * self.creature.model.opt.timestep
         seen.travel[running] = bodies.travel(running)
         seen.path[running, k], seen.aside[running, k] = seen.travel[running, :2].T
@@ -152,9 +152,9 @@ class Stepping:
         return down
 
     def _alike(self, heading: np.ndarray | None) -> tuple[int, np.ndarray]:
-        """One simulation that stands for others until they are pushed, and those others.
+        """Return one of the simulations that are identical until pushed, and those it represents.
 
-        Nothing tells them apart before, so a quarter of all steps need not be taken.
+        Stepping only this one until then saves a quarter of all steps.
         """
         starts, alike = self.starts, np.flatnonzero(self.starts.undisturbed)
         aims = np.column_stack([starts.goal, starts.bar, starts.light])
@@ -167,7 +167,7 @@ class Stepping:
         return leader, alike[(alike != leader) & (alike >= self.record)]
 
     def _follow(self, rows: np.ndarray, leader: int) -> None:
-        """Puts simulations where another one is."""
+        """Copy the state of one simulation to others."""
         self.bodies.follow(rows, leader)
         for state in (self.goal, self.command, *self.memory.values()):
             state[rows] = state[leader]
@@ -189,7 +189,7 @@ class Stepping:
     def _physics_step(
         self, running: np.ndarray, k: int, heading: np.ndarray | None
     ) -> tuple[np.ndarray, np.ndarray]:
-        """The command, and the torque that acts, [running, J] each."""
+        """Return the command and the torque that acts, [running, J] each."""
         state, starts = self.bodies.state(running, k, self.goal[running]), self.starts
         if k % self.twin.every == 0:
             self.command[running] = self._act(running, state, heading)
@@ -199,7 +199,7 @@ class Stepping:
         self.sent[k % len(self.sent), running] = self.drive.torque(
             command, state, starts.stiffness[running], starts.damping[running]
         )
-        # Before the first torque has arrived it acts already, as if the body had been held so.
+        # During the initial delay the first torque acts, as if the body had been held with it.
         arrived = np.maximum(k - starts.delay[running], 0) % len(self.sent)
         torque = self.sent[arrived, running]
         self.bodies.applied[running[:, None], self.creature.joints.dof_adr] = torque
@@ -208,10 +208,10 @@ class Stepping:
         return command, torque
 
     def _act(self, running: np.ndarray, state: State, heading: np.ndarray | None) -> np.ndarray:
-        """The command [running, J]; the twin's memory moves on."""
+        """Return the command [running, J] and advance the reference controller's memory."""
         senses = sense(self.creature, state, self.twin.reads)
         if heading is not None:
-            # Told where to go, it does not come back to the line that it left.
+            # With a commanded heading there is no line to return to.
             senses["heading"] = wrapped(senses["heading"] - heading)
             senses["aside"] = np.zeros_like(senses["aside"])
         before = {name: values[running] for name, values in self.memory.items()}
@@ -221,6 +221,6 @@ class Stepping:
         return command
 
     def _pushed(self, rows: np.ndarray, k: int) -> np.ndarray:
-        """Which of some simulations are pushed at a step."""
+        """Return which of some simulations are pushed at a step."""
         time_step = self.creature.model.opt.timestep
         return np.floor(self.starts.push_time[rows] / time_step) == k

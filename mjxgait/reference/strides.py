@@ -1,4 +1,4 @@
-"""Swings, footfalls and strides, from the heights of the feet alone: whatever controller moved them.
+"""Swings, footfalls and strides, from the heights of the feet alone, for any controller.
 
 Letters: `T` frames, `N` feet, `R` strides.
 """
@@ -10,14 +10,14 @@ import numpy as np
 from mjxgait.reference.measure import Recording
 
 SWING = 0.03
-"""Hip heights that a foot rises in a swing, which ends when it is down to half of it."""
+"""Rise of a foot in a swing, in hip heights; the swing ends at half of it."""
 
 
 def stride_starts(recording: Recording) -> np.ndarray:
-    """[R + 1] frames at which a stride begins: the footfalls of one foot; empty where nobody walks.
+    """Return the frames [R + 1] at which strides begin: one foot's footfalls; empty without a walk.
 
-    Of the feet that swing at least as often as the one in the middle it is the foot that falls most
-    evenly: a foot that trembles or scuffs in one stride and not in the next tells no strides.
+    That foot lands most evenly of those that swing at least as often as the median foot. A foot
+    that trembles or scuffs in some strides does not mark strides.
     """
     falls = falls_of_feet(recording)
     usual = sorted(map(len, falls))[(len(falls) - 1) // 2]
@@ -26,35 +26,34 @@ def stride_starts(recording: Recording) -> np.ndarray:
 
 
 def falls_of_feet(recording: Recording) -> list[np.ndarray]:
-    """Frames at which each foot [N] has come down from a swing."""
+    """Return the frames at which each foot [N] has come down from a swing."""
     threshold = SWING * recording.dimensions.hip_height
     return [footfalls(height, threshold) for height in recording.foot_height.T]
 
 
 def footfalls(height: np.ndarray, threshold: float) -> np.ndarray:
-    """Frames at which a foot of this height [T] in m has come down from a swing."""
+    """Return the frames at which a foot of height [T] in m has come down from a swing."""
     swinging, frames = _swinging(height, threshold)
     return frames[1:][np.diff(swinging) < 0]
 
 
 def swings(height: np.ndarray, threshold: float) -> int:
-    """How often a height [T] rises to the threshold after having been below half of it."""
+    """Count the rises of a height [T] to the threshold after it was below half of it."""
     swinging, _ = _swinging(height, threshold)
     return int((np.diff(swinging) > 0).sum())
 
 
 def clearances(window: Recording) -> np.ndarray:
-    """[R, N] m, highest that each foot's lowest point gets in each stride."""
+    """Return the greatest height [R, N] in m of each foot's lowest point in each stride."""
     starts = stride_starts(window)
     peaks = [window.foot_height[a:b].max(0) for a, b in itertools.pairwise(starts)]
     return np.array(peaks) if peaks else np.full((1, window.foot_height.shape[1]), np.nan)
 
 
 def stride_frequency(window: Recording, clearance: float) -> float:
-    """Hz; strides, or swings of the median foot if those are more.
+    """Return the frequency in Hz of strides, or of the median foot's swings if that is higher.
 
-    clearance: height in hip heights that makes a swing; the foot must come down to half of it in
-    between.
+    clearance: height of a swing in hip heights; the foot must come down to half of it in between.
     """
     starts = stride_starts(window)
     if len(starts) < 2:
@@ -66,13 +65,13 @@ def stride_frequency(window: Recording, clearance: float) -> float:
 
 
 def _swinging(height: np.ndarray, threshold: float) -> tuple[np.ndarray, np.ndarray]:
-    """Whether a foot swings (1) or stands (0), at the frames at which that is certain."""
+    """Return swing (1) or stance (0), and the frames at which that is certain."""
     state = np.where(height >= threshold, 1, np.where(height < threshold / 2, 0, -1))
     frames = np.flatnonzero(state >= 0)
     return state[frames], frames
 
 
 def _unevenness(frames: np.ndarray) -> float:
-    """Standard deviation of the times between footfalls over their mean."""
+    """Return the standard deviation of the times between footfalls over their mean."""
     between = np.diff(frames)
     return float(between.std() / between.mean())

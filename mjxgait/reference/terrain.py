@@ -1,6 +1,6 @@
-"""The examiner's own ground, written from docs/ground.md: NumPy heights, and a field for MuJoCo.
+"""Ground of the reference simulator, from docs/ground.md: NumPy heights and a MuJoCo height field.
 
-Nothing here is shared with what evolution computes but the text that says which ground it is.
+It shares only the specification of the ground with the one used in evolution.
 """
 
 import dataclasses
@@ -19,18 +19,18 @@ from mjxgait.reference.layout import (
 )
 
 AHEAD, BEHIND, ASIDE = 60.0, 8.0, 12.0
-"""Body lengths that the field reaches from the start; beyond it there is nothing to stand on."""
+"""Reach of the field from the start in body lengths; there is no ground outside it."""
 CELLS = {"slope": (0.25, 0.25), "steps": (0.05, 2.0), "bumps": (0.1, 0.1), "rough": (0.1, 0.1)}
-"""Hip heights; the grid's spacing along the way and across it."""
+"""Grid spacing along and across the way, in hip heights."""
 THICKNESS = 1.0
-"""m below the lowest point, more than anything sinks in."""
+"""m below the lowest point; more than any body sinks in."""
 NEAR = 1e-4
-"""m; over which the slope is taken."""
+"""m; half the distance over which the slope is measured."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Terrain:
-    """One creature's ground. start: where it begins. hip, level: m, see docs/ground.md."""
+    """Ground of one creature. start: its origin. hip, level: m, see docs/ground.md."""
 
     spec: GroundSpec
     start: StartFrame
@@ -38,7 +38,7 @@ class Terrain:
     level: float
 
     def height(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """m at places in m in the world, of any shape."""
+        """Return heights in m at places in m in the world, of any shape."""
         east, north = x - self.start.place[0], y - self.start.place[1]
         ahead, left = (
             east * axis[0] + north * axis[1] for axis in (self.start.forward, self.start.left)
@@ -46,14 +46,14 @@ class Terrain:
         return self.rise(ahead, left)
 
     def steepness(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """[2, ...] change of the height per metre along x and y."""
+        """Return the change [2, ...] of the height per metre along x and y."""
         x, y = np.asarray(x), np.asarray(y)
         far = NEAR * np.array([1.0, -1.0, 0.0, 0.0]).reshape(4, *(1,) * x.ndim)
         east, west, north, south = self.height(x + far, y + far[[2, 2, 0, 1]])
         return np.stack([east - west, north - south]) / (2 * NEAR)
 
     def rise(self, ahead: np.ndarray, left: np.ndarray) -> np.ndarray:
-        """m at places so far ahead and to the left of the start."""
+        """Return heights in m at places in m ahead and to the left of the start."""
         spec, level = self.spec, self.level
         away = np.clip(((ahead**2 + left**2) / level**2 - 1) / 3, 0, 1)
         full = away**2 * (3 - 2 * away)
@@ -81,7 +81,7 @@ class Terrain:
 
     @functools.cached_property
     def waves(self) -> np.ndarray:
-        """[4, W] cycles per metre ahead and to the left, cycles at the start, m."""
+        """Waves [4, W]: cycles per metre ahead and to the left, cycles at the start, size in m."""
         rough = self.spec.kind == "rough"
         lengths = np.array([1.5, 2.0, 2.7, 3.6, 4.8] if rough else [2.0, 2.0]) * self.hip
         directions, phases = self.draws[: len(lengths)].T
@@ -91,18 +91,18 @@ class Terrain:
 
     @functools.cached_property
     def draws(self) -> np.ndarray:
-        """[5, 2] in [0, 1) of the seed."""
+        """Random numbers [5, 2] in [0, 1) from the seed."""
         return np.random.RandomState(self.spec.seed).random_sample((5, 2))
 
 
 def parabolic_wave(cycles: np.ndarray) -> np.ndarray:
-    """Between -1 and 1 like a sine: a parabola up in one half of each cycle, down in the other."""
+    """Approximate a sine between -1 and 1: per cycle one parabola up and one down."""
     place = cycles % 1.0
     return np.where(place < 0.5, 16 * place * (0.5 - place), -16 * (place - 0.5) * (1 - place))
 
 
 def terrain_of(creature: Creature) -> Ground | None:
-    """The ground that a creature walks on; None where it is the plane z = 0."""
+    """Return the ground of a creature; None for the plane z = 0."""
     if creature.terrain.flat:
         return None
     return Terrain(
@@ -115,9 +115,9 @@ def terrain_of(creature: Creature) -> Ground | None:
 
 @functools.lru_cache(maxsize=2)
 def grounded_model(creature: Creature) -> mujoco.MjModel:
-    """The creature's model with the ground that it walks on as a height field for a floor.
+    """Return the creature's model with its ground as a height field in place of the floor.
 
-    Indices, gravity and friction are the model's own. Do not change it: it is kept.
+    Indices, gravity and friction are the model's own. Do not change the result: it is cached.
     """
     terrain = terrain_of(creature)
     if not isinstance(terrain, Terrain):
@@ -139,7 +139,7 @@ def grounded_model(creature: Creature) -> mujoco.MjModel:
     turn = np.arctan2(forward[1], forward[0]) / 2
     floor.quat = [np.cos(turn), 0.0, 0.0, np.sin(turn)]
     model = spec.compile()
-    # The compiler stretches heights to the full range, so they are set afterwards.
+    # The compiler stretches heights to the full range, so set them afterwards.
     model.hfield_data[:] = ((heights - low) / span).ravel()
     model.opt.gravity[:] = creature.model.opt.gravity
     model.geom_friction[:] = creature.model.geom_friction
@@ -147,7 +147,7 @@ def grounded_model(creature: Creature) -> mujoco.MjModel:
 
 
 def sampled(terrain: Terrain, creature: Creature) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Heights [rows across, columns along] in m, the grid's middle [2] and half its sides [2]."""
+    """Return heights [across, along] in m, the grid's middle [2] and half its sides [2]."""
     along, across = (cell * creature.frame.hip_height for cell in CELLS[terrain.spec.kind])
     length = creature.frame.body_length
     ahead = np.arange(-BEHIND * length, AHEAD * length + along, along)

@@ -1,4 +1,4 @@
-"""Who of many simulations can no longer succeed, so that the rest of them may be left out."""
+"""Early stop of many simulations once those that cannot succeed decide the result."""
 
 from collections.abc import Callable
 
@@ -6,18 +6,18 @@ import numpy as np
 
 
 class Watch:
-    """Kept by all threads that step the simulations.
+    """Lost simulations, shared by all threads that step them.
 
-    lost: [S] who can no longer do what is asked. over: whether that decides it.
+    lost: [S] whether one can no longer succeed. over: whether the result is decided.
     """
 
     def __init__(self, count: int, hopeless: Callable[[np.ndarray], bool]) -> None:
-        """hopeless: whether it is decided once these [S] are lost; more are never better."""
+        """hopeless: whether the losses [S] decide the result; more losses never improve it."""
         self.lost, self.over = np.zeros(count, bool), False
         self._hopeless = hopeless
 
     def tell(self, rows: np.ndarray, lost: np.ndarray) -> bool:
-        """Hears which of some rows are lost by now; whether all may end."""
+        """Record the lost simulations among some rows; return whether all may end."""
         self.lost[rows] |= lost
         self.over = self.over or self._hopeless(self.lost)
         return self.over

@@ -1,4 +1,4 @@
-"""Water in C MuJoCo: what it does to each point of every block's faces, summed up.
+"""Water in C MuJoCo: drag at points of every block's faces, summed per body.
 
 Written from docs/blocks.md. Letters: `S` simulations, `B` blocks, `Q` points of a block's faces.
 """
@@ -9,13 +9,13 @@ from mujoco.batch import Batch
 
 PLACES = np.array([-np.sqrt(0.6), 0.0, np.sqrt(0.6)])
 SHARES = np.array([5.0, 8.0, 5.0]) / 18
-"""Gauss's points on an edge from -1 to 1, and their shares of it: exact for what water does."""
+"""Gauss points on an edge from -1 to 1 and their weights: exact for this drag."""
 
 
 class Water:
-    """It pushes every point of a face along its normal, against its velocity along it.
+    """Drag along the normal of a face, against each point's velocity along it.
 
-    drag: N·s/m³, per area and velocity.
+    drag: N·s/m³, force per area and velocity.
     """
 
     def __init__(self, model: mujoco.MjModel, drag: float) -> None:
@@ -48,14 +48,14 @@ class Water:
         subtree_com: np.ndarray,
         xipos: np.ndarray,
     ) -> np.ndarray:
-        """[S, nbody, 6] N and N·m on every body, about its centre of mass; arrays as in `MjData`."""
+        """Return N, N·m [S, nbody, 6] about each body's centre of mass; arrays as in `MjData`."""
         count = len(geom_xpos)
         rotation = geom_xmat[:, self.blocks].reshape(count, -1, 3, 3)
         arms = np.einsum("sbij,bqj->sbqi", rotation, self.points)
         points = geom_xpos[:, self.blocks, None] + arms
         normals = np.einsum("sbij,qj->sbqi", rotation, self.normals)
         spin, shift = cvel[:, self.bodies, None, :3], cvel[:, self.bodies, None, 3:]
-        # MuJoCo tells a body's velocity at the centre of mass of its whole tree.
+        # MuJoCo gives a body's velocity at the centre of mass of its whole tree.
         velocity = shift + np.cross(spin, points - subtree_com[:, self.roots, None])
         along = (velocity * normals).sum(3, keepdims=True)
         force = -self.drag * self.areas[:, :, None] * along * normals
@@ -68,7 +68,7 @@ class Water:
 
 
 class Bath:
-    """The water around simulations that are stepped together. drag: N·s/m³."""
+    """Water around simulations that are stepped together. drag: N·s/m³."""
 
     def __init__(self, model: mujoco.MjModel, batch: Batch, drag: float) -> None:
         self.water, self.force = Water(model, drag), batch.bind("xfrc_applied")
@@ -76,5 +76,5 @@ class Bath:
         self.seen = tuple(batch.bind(name) for name in names)
 
     def press(self, rows: np.ndarray) -> None:
-        """Lets the water act on some of the simulations, as they move now."""
+        """Apply the water's force to some simulations, at their current velocities."""
         self.force[rows] = self.water.forces(*(array[rows] for array in self.seen))

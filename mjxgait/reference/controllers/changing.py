@@ -1,4 +1,4 @@
-"""A walker that is told to walk otherwise: from a moment on another controller takes over.
+"""Reference controller that changes from one walk to another at a given moment.
 
 Letters: `S` simulations, `J` actuated joints.
 """
@@ -14,14 +14,14 @@ from mjxgait.creature import Creature
 from mjxgait.reference.controllers.protocol import Command, Memory
 
 ROUNDING = 1e-6
-"""Positions by which sums of steps may fall short of the next one."""
+"""Positions by which a sum of steps may fall short of the next position."""
 
 
 class ChangingTwin:
-    """Two controllers of key poses, of which one gives way to the other; both are at the same place of
-    their cycles all the time. Its memory: `cycles` [S] done, `steps` [S], and `change` [S] s.
+    """Blend from one key-pose controller to another; both share one phase.
 
-    changes: [S] s, when each is told. seconds: that it takes.
+    Memory: `cycles` [S] done, `steps` [S], and `change` [S] s.
+    changes: [S] s, moment of the command. seconds: duration of the blend.
     """
 
     command: ClassVar[Command] = "pose"
@@ -43,7 +43,7 @@ class ChangingTwin:
         self.step, self.changes, self.seconds = step, changes, seconds
 
     def init(self, count: int) -> Memory:
-        """See `Twin`; there must be as many as are told to change."""
+        """See `Twin`; `count` must be the number of `changes`."""
         assert count == len(self.changes), "a change for each simulation"
         return {
             "cycles": np.zeros(count),
@@ -75,7 +75,7 @@ class ChangingTwin:
         return place.astype(int) % twin.length
 
     def _rate(self, twin: PoseTwin, target: np.ndarray, joint_pos: np.ndarray) -> np.ndarray:
-        """[S] cycles per step; target, joint_pos: [S, J]."""
+        """Return cycles per step [S]; target, joint_pos: [S, J]."""
         if twin.settings.advance == "clock":
             return np.full(len(target), self.step / twin.tuning["period"])
         error = np.sqrt(((target - joint_pos) ** 2).mean(1))

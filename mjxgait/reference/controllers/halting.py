@@ -1,4 +1,4 @@
-"""A walker that is told to stop: from a moment on its poses become the standing one.
+"""Reference controller that stops: from a given moment its poses blend into the standing pose.
 
 Letters: `S` simulations, `J` actuated joints.
 """
@@ -14,10 +14,10 @@ from mjxgait.reference.controllers.protocol import Memory
 
 
 class HaltingTwin(PoseTwin):
-    """Walks, and stops. Its cycle stays where it is told to; balance goes on.
+    """Key-pose controller that stops on command: the cycle freezes, balance continues.
 
-    halts: [S] s, when each is told. fades: [S] s that it has from the pose that it is in then to the
-    standing one.
+    halts: [S] s, moment of the command. fades: [S] s from the pose at that moment to the standing
+    pose.
     """
 
     def __init__(
@@ -32,7 +32,7 @@ class HaltingTwin(PoseTwin):
         self.halts, self.fades = halts, fades
 
     def init(self, count: int) -> Memory:
-        """See `Twin`; there must be as many as are told to stop."""
+        """See `Twin`; `count` must be the number of `halts`."""
         assert count == len(self.halts), "a halt for each simulation"
         return {**super().init(count), "halt": self.halts.copy(), "fade": self.fades.copy()}
 

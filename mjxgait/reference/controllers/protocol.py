@@ -1,4 +1,4 @@
-"""What the examiner asks of a controller: the contract that all twins share.
+"""Contract of all reference controllers.
 
 `S` simulations, `J` actuated joints.
 """
@@ -10,35 +10,35 @@ import numpy as np
 
 Command = Literal["pose", "torque"]
 Memory = Mapping[str, np.ndarray]
-"""What a controller keeps from one moment to the next: arrays [S, ...] by name."""
+"""State that a controller keeps between control steps: arrays [S, ...] by name."""
 
 
 class Twin(Protocol):
-    """A champion's controller as the examiner moves it. It holds constants only."""
+    """Reference controller of a champion. It holds constants only."""
 
     @property
     def reads(self) -> tuple[str, ...]:
-        """Names of the senses that `act` reads."""
+        """Names of the observations that `act` reads."""
         ...
 
     @property
     def command(self) -> Command:
-        """Whether `act` sends joint angles in rad or torques in N·m."""
+        """Kind of command that `act` sends: joint angles in rad or torques in N·m."""
         ...
 
     @property
     def every(self) -> int:
-        """Control steps from one command to the next; in between the last one holds."""
+        """Control steps between commands; in between the last command holds."""
         ...
 
     def init(self, count: int) -> Memory:
-        """The memory at the start of `count` simulations."""
+        """Return the memory at the start of `count` simulations."""
         ...
 
     def act(self, memory: Memory, senses: Mapping[str, np.ndarray]) -> tuple[np.ndarray, Memory]:
-        """The command [S, J] of this moment, and the memory of the next."""
+        """Return the command [S, J] of this step and the memory for the next."""
         ...
 
     def phase(self, memory: Memory) -> np.ndarray:
-        """Where [S] in its own cycle, in [0, 1); NaN for a controller without one."""
+        """Return the phase [S] of its own cycle, in [0, 1); NaN for a controller without one."""
         ...
