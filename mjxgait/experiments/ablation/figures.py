@@ -16,7 +16,7 @@ LINES = ("-", "--", "-.", ":")
 
 
 def draw_intervals(findings: Sequence[Finding], measure: str, path: Path) -> None:
-    """Draw each run as a dot beside the interquartile mean and interval; shade the base's interval."""
+    """Draw each run as a dot, the interquartile mean and interval; shade the base's interval."""
     with figure((8, 1.2 + 0.45 * len(findings))) as drawing:
         axes = drawing.subplots()
         base = findings[0].estimate

@@ -37,8 +37,9 @@ from mjxgait.training.stored import is_number
 
 MEASURED = "measured.jsonl"
 SECONDS, STARTS, SEED = 22.0, 16, 1000
-"""Duration (s), number of starts and random seed of the walk that evaluates every champion: perturbed
-as in the certificate, from starts unseen in evolution.
+"""Duration (s), starts and random seed of the walk that evaluates every champion.
+
+The starts are perturbed as in the certificate, and unseen in evolution.
 """
 
 

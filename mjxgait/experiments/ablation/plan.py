@@ -33,7 +33,7 @@ Measure = Literal["walk", "up", "certified", "fitness", "area", "generations"]
 
 @dataclasses.dataclass(frozen=True)
 class VariantTable:
-    """One variant: its name, the config keys that it changes, and its own number of generations, if any.
+    """One variant: its name, the config keys that it changes, and its own generations, if any.
 
     config: file or name of a shipped config, used instead of the study's config and base.
     gait: target gait, as in `train --gait`.

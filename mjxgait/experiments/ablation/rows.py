@@ -113,7 +113,7 @@ class _Group:
         return self.recipe, AdvanceRows(self.state, until)
 
     def keep(self, advanced: Advanced) -> None:
-        """Write results to disk: the log first, as a resumed run removes surplus lines; the state last."""
+        """Write results to disk: the log first, the state last; resuming removes surplus lines."""
         assert self.checkpoints is not None
         for lines in advanced.lines:
             self._log(lines)

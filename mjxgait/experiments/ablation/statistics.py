@@ -54,7 +54,10 @@ def trimmed_mean(values: np.ndarray, trim: float = TRIM, axis: int = -1) -> np.n
 
 
 def estimate(values: np.ndarray, trim: float = TRIM) -> Estimate:
-    """Return the trimmed mean with its bias-corrected, accelerated bootstrap interval (Efron 1987)."""
+    """Return the trimmed mean with its BCa interval.
+
+    BCa: bias-corrected and accelerated bootstrap (Efron 1987).
+    """
     return _bootstrap((values,), partial(trimmed_mean, trim=trim), paired=False)
 
 
@@ -93,7 +96,7 @@ def improvement(base: np.ndarray, values: np.ndarray, paired: bool = False) -> E
 
 
 def permutation_p(base: np.ndarray, values: np.ndarray, paired: bool, trim: float = TRIM) -> float:
-    """Return the probability of a difference as large, of either sign, if the variant had no effect.
+    """Return the probability of so large a difference, of either sign, without an effect.
 
     Labels are swapped within seeds; if unpaired, freely.
     """
