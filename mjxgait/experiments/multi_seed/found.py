@@ -21,7 +21,7 @@ SIZE = (420, 300)
 
 @dataclasses.dataclass(frozen=True)
 class Found:
-    """Result of one run. summary: the certificate's, of the motion; margin: None if not examined."""
+    """Result of one run. summary: the certificate's; margin: None if not examined."""
 
     folder: Path
     examined: bool
