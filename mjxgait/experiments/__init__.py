@@ -1,1 +1,1 @@
-"""Many runs, a table and a picture: ablations, repertoires, several seeds."""
+"""Many runs, a table and a picture: ablations, repertoires, multi-seed runs."""

@@ -1,6 +1,5 @@
-"""Ablation studies: variants of the settings times seeds, evolved side by side, compared with error
-bars.
+"""Ablation studies: variants of the settings × seeds, evolved side by side, with error bars.
 
-Data flow: plan (what to run) -> rows (runs it) -> measures (one number per run) -> statistics ->
+Data flow: plan (the runs) -> rows (runs them) -> measures (one number per run) -> statistics ->
 report.
 """

@@ -1,4 +1,4 @@
-"""Pictures of a study: the estimate of every variant, and the curves over the generations."""
+"""Pictures of a study: each variant's estimate, and the curves over the generations."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -16,7 +16,7 @@ LINES = ("-", "--", "-.", ":")
 
 
 def draw_intervals(findings: Sequence[Finding], measure: str, path: Path) -> None:
-    """Each run as a dot, interquartile mean and interval beside it; the base's interval shaded."""
+    """Draw each run as a dot, the interquartile mean and interval; shade the base's interval."""
     with figure((8, 1.2 + 0.45 * len(findings))) as drawing:
         axes = drawing.subplots()
         base = findings[0].estimate
@@ -40,9 +40,9 @@ def draw_intervals(findings: Sequence[Finding], measure: str, path: Path) -> Non
 
 
 def draw_curves(plan: Plan, logs: Sequence[Mapping[str, Any]], path: Path) -> None:
-    """Interquartile mean of the best fitness and the middle half of the runs, for every variant.
+    """Draw each variant's best fitness: interquartile mean and middle half of the runs.
 
-    A run without any counts as the worst.
+    A run without a finite best fitness counts as the worst.
     """
     with figure((8, 4.5)) as drawing:
         axes = drawing.subplots()

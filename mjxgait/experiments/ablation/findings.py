@@ -1,4 +1,4 @@
-"""What a study's measure says of each of its variants."""
+"""Findings of a study: each variant's estimate and its comparison with the base."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -29,7 +29,7 @@ class Finding:
 
 
 def find(plan: Plan, results: Sequence[Result]) -> list[Finding]:
-    """What the study's measure says of every variant, the base first."""
+    """Return a finding per variant by the study's measure, the base first."""
     measure = plan.study.measure
     sign = -1.0 if measure in LOWER_IS_BETTER else 1.0
     values = {
@@ -48,5 +48,5 @@ def find(plan: Plan, results: Sequence[Result]) -> list[Finding]:
 
 
 def trim_of(measure: str) -> float:
-    """Yes and no have no middle half: of them the mean is taken."""
+    """Return the share to trim: 0 (the mean) for yes/no values, which have no middle half."""
     return 0.0 if measure == "certified" else TRIM

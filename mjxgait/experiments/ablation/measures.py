@@ -1,5 +1,6 @@
-"""One number per run and measure: from its log, and from C MuJoCo, where all variants are judged
-alike whatever they evolved for.
+"""One number per run and measure, from its log and from C MuJoCo.
+
+C MuJoCo evaluates all variants alike, whatever fitness they evolved for.
 """
 
 import dataclasses
@@ -36,27 +37,28 @@ from mjxgait.training.stored import is_number
 
 MEASURED = "measured.jsonl"
 SECONDS, STARTS, SEED = 22.0, 16, 1000
-"""Of the walk that judges every champion: perturbed as in the certificate, from starts that no
-evolution has seen.
+"""Duration (s), starts and random seed of the walk that evaluates every champion.
+
+The starts are perturbed as in the certificate, and unseen in evolution.
 """
 
 
 Ways = dict[str, tuple[float, float]]
-"""`walk` and `up` of a champion on each ground."""
+"""A champion's `walk` and `up` on each ground."""
 Judged = tuple[Ways, bool | None]
-"""Of a champion: its ways, and `certified` of its `Result`."""
+"""A champion's `Ways` and the `certified` of its `Result`."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Result:
-    """What became of a run.
+    """Result of a run.
 
     walk: body lengths per second covered before the fall or the end, mean over unseen perturbed
-    starts. up: share of them that stay up and do what criterion 4 asks of the task besides.
-    certified: whether the champion passes the whole certificate; None when nobody asked. fitness:
+    starts. up: share of them that stay up and meet the task's other demands of criterion 4.
+    certified: whether the champion passes the whole certificate; None if not examined. fitness:
     best at the end. area: mean of the best over the generations. generations: until the best
-    reached the study's threshold, one more than there were if it never did.
-    steps: creature-steps that the run lived. finite: whether it found anybody who could be judged.
+    reached the study's threshold; if never, one more than the run had.
+    steps: creature-steps simulated. finite: whether the best fitness at the end is finite.
     elsewhere: `walk` and `up` on the study's further grounds.
     """
 
@@ -73,17 +75,17 @@ class Result:
     elsewhere: Ways = dataclasses.field(default_factory=dict)
 
     def value(self, measure: str) -> float:
-        """Of a measure, as a number."""
+        """Return a measure as a number."""
         return float(getattr(self, measure) or 0.0)
 
     def on(self, ground: str) -> "Result":
-        """With `walk` and `up` of one of the further grounds."""
+        """Return the result with `walk` and `up` of one of the further grounds."""
         walk, up = self.elsewhere[ground]
         return dataclasses.replace(self, walk=walk, up=up, certified=None)
 
 
 def read_logs(folder: Path) -> list[dict[str, Any]]:
-    """Every generation of every run that a study has logged so far."""
+    """Return every generation of every run that a study has logged so far."""
     found = (folder / GROUPS).glob(f"*/{METRICS}")
     known = [file for file in found if is_number(file.parent.name)]
     files = sorted(known, key=lambda file: int(file.parent.name))
@@ -91,15 +93,15 @@ def read_logs(folder: Path) -> list[dict[str, Any]]:
 
 
 def measure(folder: Path, plan: Plan, tell: Callable[[int, int], None]) -> list[Result]:
-    """The result of every run, in the order of the plan, by one process per core.
+    """Return the result of every run in the plan's order, measured by one process per core.
 
-    What has been measured before is not measured again.
+    Results measured before are reused.
 
     Raises:
       UserError: a process was killed from outside, or the folder cannot be written.
     """
     measured = _measured(folder)
-    if measured:  # a last line that was cut off goes, or the next would be written behind it
+    if measured:  # drops a last line that was cut off, or the next would be appended to it
         with disk_errors(folder):
             write_lines(folder / MEASURED, measured)
     known = {(line["variant"], line["seed"]): Result(**line) for line in measured}
@@ -152,25 +154,24 @@ def _result(study: Study, run: Run, lines: Sequence[Mapping[str, Any]], judged: 
 
 
 def _found_somebody(lines: Sequence[Mapping[str, Any]]) -> bool:
-    """Whether the best at the end could be judged."""
+    """Return whether the best fitness at the end is finite."""
     return lines[-1]["best"] is not None
 
 
 def _judge(
     creature_folder: Path, grounds: Sequence[str], examine: bool, path: Path, finite: bool
 ) -> Judged:
-    """In a process of its own: the walk of the champion at `path` on each ground, and if `examine`
-    the verdict on the first.
+    """Evaluate the champion at `path` on each ground; if `examine`, also certify it on the first.
 
-    What is sent there is small. The pool of Python 3.11 hangs where a process is killed while it
-    is sent more than a pipe holds.
+    Runs in its own process. The arguments are small: the pool of Python 3.11 hangs if a process is
+    killed while it receives more than a pipe holds.
     """
     creature = _creature(creature_folder)
     champion = read_champion(path, creature)
     body = champion.embodied(creature)
     walks = {g: walked(body.on(g), champion) if finite else (0.0, 0.0, 0.0) for g in grounds}
-    # One that falls or lags this far behind the speed that the certificate of a walk asks for cannot
-    # pass, so the long examination is spared.
+    # A walk that falls or lags this far behind the certificate's speed cannot pass: skip the long
+    # examination.
     worth = champion.task != "walk" or walks[grounds[0]][2] > 0.4
     ways = {ground: (walk, up) for ground, (walk, up, _) in walks.items()}
     if not examine:
@@ -180,13 +181,14 @@ def _judge(
 
 @functools.cache
 def _creature(folder: Path) -> Creature:
-    """Loaded once in each process."""
+    """Return the creature, loaded once per process."""
     return load_creature(folder)
 
 
 def walked(creature: Creature, champion: Champion) -> tuple[float, float, float]:
-    """Mean speed and share that succeeds over the unseen starts, and the speed from the undisturbed
-    start (0 if it falls).
+    """Return mean speed and success share over the unseen starts, and the nominal start's speed.
+
+    Speeds are in body lengths per second; the nominal one is 0 after a fall.
     """
     config, rng = CertificateConfig(), np.random.default_rng(SEED)
     demands = demands_of(champion.task, champion.wish)

@@ -1,4 +1,4 @@
-"""What a study compares: its file, checked, as variants with the full config of every run."""
+"""Plan of a study: its checked file, as variants with the full config of every run."""
 
 import contextlib
 import dataclasses
@@ -33,11 +33,10 @@ Measure = Literal["walk", "up", "certified", "fitness", "area", "generations"]
 
 @dataclasses.dataclass(frozen=True)
 class VariantTable:
-    """One variant: what it is called, the config keys that it changes, and its own number of
-    generations where it needs one.
+    """One variant: its name, the config keys that it changes, and its own generations, if any.
 
-    config: file or name of a shipped config that it runs instead of the study's config and base.
-    gait: that it is asked for, as `train --gait` asks.
+    config: file or name of a shipped config, used instead of the study's config and base.
+    gait: target gait, as in `train --gait`.
     """
 
     __pydantic_config__ = STRICT
@@ -53,23 +52,22 @@ class Study:
     """A study file.
 
     Attributes:
-      question: what it asks; the report's title.
+      question: the study's question; the report's title.
       env: creature. config: file or name of a shipped config, laid under the variants.
-      seeds: so many, from first_seed on. generations: of every run.
-      measure: what the variants are compared by (docs/ablations.md). threshold: of fitness, for the
-        measure `generations`.
+      seeds: number of seeds, from first_seed on. generations: of every run.
+      measure: measure that compares the variants (docs/ablations.md). threshold: fitness to reach,
+        for the measure `generations`.
       certify: whether every run's champion is examined for its certificate, about 10 s for each
         that may pass.
-      grounds: that every champion is tried on, whatever it evolved on (docs/ground.md); `walk`, `up`
-        and `certified` are of the first, and each further one has a table of its own.
+      grounds: grounds on which every champion is tested, whatever it evolved on (docs/ground.md);
+        `walk`, `up` and `certified` use the first; each further one has its own table.
       paired: whether all variants use the same seeds; else each has its own.
       allow_equal: whether two variants may be equal, as in a test of the method itself.
-      rows: so many runs of one shape are side by side in one program; 0: all of them, which is best on one
-        machine. A cluster hands out so many at a time. With other neighbours the fast step's last
-        bits may differ.
-      physics: of all runs, as `train --physics` has it; by default as the settings say.
+      rows: number of runs of one shape side by side in one program; 0: all, best on one machine. On
+        a cluster, the runs per job. The fast step's last bits may depend on the other rows.
+      physics: of all runs, as in `train --physics`; by default as in the settings.
       base: config keys of all variants.
-      variant: the first is the base that the others are compared with. grid: dotted config keys and
+      variant: variants; the first is the base of the comparisons. grid: dotted config keys and
         their values, instead of variants.
     """
 
@@ -122,19 +120,19 @@ class Plan:
     runs: tuple[Run, ...]
 
     def of(self, variant: str) -> list[Run]:
-        """The runs of a variant, by seed."""
+        """Return the runs of a variant, by seed."""
         return [run for run in self.runs if run.variant == variant]
 
     def upper_bound(self, creature: Creature) -> int:
-        """Creature-steps when nobody ever falls."""
+        """Return the number of creature-steps if no individual falls."""
         return sum(_most_steps(run, creature) for run in self.runs)
 
 
 def read_study(file: Path, over: Mapping[str, Any]) -> Study:
-    """The study in a file or shipped under this name, with options laid over it.
+    """Return the study in a file or shipped under this name, with options laid over it.
 
-    With other generations than the file's, variants that have their own keep their share of
-    evaluations, the initial population's included.
+    If `generations` changes, variants with their own number keep their share of evaluations, which
+    includes the initial population's.
 
     Raises:
       UserError: names the file and the key.
@@ -160,7 +158,7 @@ def read_study(file: Path, over: Mapping[str, Any]) -> Study:
 
 
 def make_plan(study: Study, creature: Creature, where: str) -> Plan:
-    """Every run with its full config.
+    """Return every run with its full config.
 
     Raises:
       UserError: an unknown key, a bad value, two variants of one name, or two that are equal.
@@ -196,7 +194,7 @@ def make_plan(study: Study, creature: Creature, where: str) -> Plan:
 
 
 def check_variants(plan: Plan, creature: Creature, where: str) -> None:
-    """Refuse a study with a variant whose runs could not be examined in the end.
+    """Refuse a study with a variant that could not be examined in the end.
 
     Raises:
       UserError: names the variant and says why; see `check_parts`.
@@ -207,7 +205,7 @@ def check_variants(plan: Plan, creature: Creature, where: str) -> None:
 
 
 def _config(study: Study, table: VariantTable, creature: Creature, where: str) -> Config:
-    """What all runs of a variant have, but for their seeds."""
+    """Return the config of a variant's runs, without their seeds."""
     here = f'{where}: variant "{table.name}"'
     use = {**study.base.get("use", {}), **table.settings.get("use", {})}
     file = table.config or study.config
@@ -227,7 +225,7 @@ def _config(study: Study, table: VariantTable, creature: Creature, where: str) -
 
 @contextlib.contextmanager
 def _told_of(where: str) -> Iterator[None]:
-    """A mistake that is found here is told with where it is."""
+    """Prefix a `UserError` with its place."""
     try:
         yield
     except UserError as error:
@@ -235,8 +233,9 @@ def _told_of(where: str) -> Iterator[None]:
 
 
 def _settled(config: Config, generations: int) -> Config:
-    """All runs go on for all their generations: one that stopped early would be compared with
-    others that had more.
+    """Return the config without early stopping.
+
+    A run that stopped early would be compared with runs of more generations.
     """
     evolution = dataclasses.replace(
         config.evolution,
@@ -261,7 +260,7 @@ def _lay(config: Config, table: Mapping[str, Any], where: str) -> Config:
 
 
 def _grid(study: Study, where: str) -> list[VariantTable]:
-    """The base and every combination of the grid's values."""
+    """Return the base and every combination of the grid's values."""
     rows = [VariantTable("base")]
     for values in itertools.product(*study.grid.values()):
         settings: dict[str, Any] = {}

@@ -1,4 +1,4 @@
-"""The report of a study: tables and words. The same results give the same files, byte for byte."""
+"""Report of a study: tables and text. Equal results give equal files, byte for byte."""
 
 import base64
 import csv
@@ -35,7 +35,7 @@ NAMES = {
     "generations": "generations until the best reaches the threshold; fewer is better",
 }
 OWN_SCALE = ("fitness", "area", "generations")
-"""Measured by each variant's own fitness."""
+"""Measures in units of each variant's own fitness."""
 LEVEL = 0.05
 STYLE = (
     "body{font:16px/1.5 system-ui,sans-serif;max-width:60em;margin:2em auto;padding:0 1em}table{border-collapse:collapse}\
@@ -50,8 +50,9 @@ def write_report(
     logs: Sequence[Mapping[str, Any]],
     command: str,
 ) -> Path:
-    """Writes report.md, report.html, results.csv, generations.parquet and the pictures; returns
-    the path of report.md.
+    """Write report.md, report.html, results.csv, generations.parquet and the pictures.
+
+    Returns the path of report.md.
     """
     findings = find(plan, results)
     with disk_errors(folder):
@@ -70,7 +71,7 @@ def write_report(
 def markdown(
     plan: Plan, results: Sequence[Result], findings: Sequence[Finding], command: str
 ) -> str:
-    """The report."""
+    """Return the report as Markdown."""
     study, base = plan.study, _plain(plan.variants[0])
     means = "Interquartile means" if trim_of(study.measure) else "Means"
     lines = [
@@ -150,7 +151,7 @@ def _table(plan: Plan, results: Sequence[Result], findings: Sequence[Finding]) -
 
 
 def _elsewhere(plan: Plan, results: Sequence[Result]) -> list[str]:
-    """The table and sentences of each further ground."""
+    """Return the table and sentences of each further ground."""
     lines = []
     for ground in plan.study.grounds[1:]:
         there = [result.on(ground) for result in results]
@@ -223,18 +224,18 @@ def _csv(results: Sequence[Result]) -> str:
 
 
 def _cell(value: Any) -> Any:
-    """A value of a CSV file; a text that a spreadsheet would take for a formula begins with a quote."""
+    """Return a CSV value; text that a spreadsheet would read as a formula gets a leading quote."""
     formula = isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r"))
     return f"'{value}" if formula else value
 
 
 def _plain(text: str) -> str:
-    """A user's text within Markdown: in one line, and neither HTML nor a link, a picture or a cell."""
+    """Return a user's text as one line of Markdown, without HTML, link, picture or table cell."""
     return re.sub(r"([\\`<>\[\]|&])", r"\\\1", " ".join(text.split()))
 
 
 def _page(title: str, text: str, folder: Path) -> str:
-    """The report as one page that needs nothing else."""
+    """Return the report as one self-contained HTML page."""
     body = MarkdownIt("commonmark", {"html": False}).enable("table").render(text)
     for name in ("intervals.png", "curves.png"):
         picture = base64.b64encode((folder / name).read_bytes()).decode()

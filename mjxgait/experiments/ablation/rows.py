@@ -1,6 +1,4 @@
-"""Runs a study: its runs are rows of a few compiled programs, one per shape, and share the
-lanes.
-"""
+"""Runs of a study as rows of a few compiled programs, one per shape; rows share the lanes."""
 
 import contextlib
 import json
@@ -27,11 +25,11 @@ from mjxgait.training.packed import Packed
 GROUPS, CHAMPIONS = "groups", "champions"
 
 Progress = Callable[[int, int, dict[str, Any]], None]
-"""Called with the group, the number of groups and what to tell."""
+"""Callback with the group, the number of groups and the progress to report."""
 
 
 def groups(plan: Plan) -> list[list[Run]]:
-    """The runs that share a program and are side by side in it, in the order of the plan."""
+    """Return the runs that share a program, side by side, in the plan's order."""
     found: dict[Any, list[Run]] = {}
     for run in plan.runs:
         found.setdefault(jax.tree.structure(traced(run.config)), []).append(run)
@@ -42,7 +40,7 @@ def groups(plan: Plan) -> list[list[Run]]:
 
 
 def champion_path(folder: Path, plan: Plan, run: Run) -> Path:
-    """Where the best individual of a run lies once the run has ended."""
+    """Return the file of a run's best individual, written at the end of the run."""
     return folder / CHAMPIONS / f"{plan.variants.index(run.variant)}-{run.seed}.json"
 
 
@@ -54,11 +52,11 @@ def run_study(
     crew: Crew,
     stride: int = 1,
 ) -> bool:
-    """Runs, or goes on with, all groups; returns whether they came to their end.
+    """Run or resume all groups; return whether all were completed.
 
     Args:
-      crew: who does the work; this process alone does one group after the other.
-      stride: generations from one checkpoint of a group to the next.
+      crew: scheduler; this process alone runs one group after the other.
+      stride: generations between two checkpoints of a group.
     """
     parts = groups(plan)
     left = {
@@ -83,7 +81,7 @@ def run_study(
 
 
 class _Group:
-    """The rows of one program, in a folder of their own below the study's."""
+    """Rows of one program, in their own folder below the study's."""
 
     def __init__(
         self,
@@ -103,11 +101,11 @@ class _Group:
 
     @property
     def generation(self) -> int:
-        """That its rows have come to."""
+        """Generation that the rows have reached; -1 before the first."""
         return -1 if self.state is None else self.state.generation
 
     def work(self, tell: Callable[[dict[str, Any]], None] | None = None) -> tuple[Recipe, Job]:
-        """What is to be done next. tell: at its beginning, which is when its folder is made."""
+        """Return the next job. tell: only on the first call, which makes the folder."""
         if tell:
             self._begin()
             tell({"compiling": len(self.runs)})
@@ -115,7 +113,7 @@ class _Group:
         return self.recipe, AdvanceRows(self.state, until)
 
     def keep(self, advanced: Advanced) -> None:
-        """Puts on disk what has come back: first the log, for a resumed run takes lines out, last the state."""
+        """Write results to disk: the log first, the state last; resuming removes surplus lines."""
         assert self.checkpoints is not None
         for lines in advanced.lines:
             self._log(lines)
@@ -127,7 +125,7 @@ class _Group:
         self.checkpoints.keep(self.state, self.creature.name, self.creature.digest)
 
     def news(self, advanced: Advanced) -> dict[str, Any]:
-        """What there is to tell of it."""
+        """Return the progress to report."""
         return {
             "generation": self.generation,
             "of": self.last,
@@ -138,7 +136,7 @@ class _Group:
         }
 
     def close(self) -> None:
-        """Waits until everything is on disk."""
+        """Wait until everything is on disk."""
         if self.checkpoints is not None:
             self.checkpoints.close()
             self.checkpoints = None
@@ -153,9 +151,9 @@ class _Group:
         truncate_metrics(self.folder / METRICS, self.generation)
 
     def _log(self, lines: list[dict[str, Any]]) -> None:
-        """One line per run that has not come to its own end.
+        """Append one line per run that has not ended.
 
-        Wall time is left out: it is not a run's own, and never the same twice.
+        Wall time is left out: the rows share it, and it is never the same twice.
         """
         with disk_errors(self.folder), (self.folder / METRICS).open("a", encoding="utf-8") as log:
             for run, line in zip(self.runs, lines, strict=True):

@@ -1,8 +1,8 @@
-"""Comparisons of samples of runs, with error bars. Values: [S], one per seed; higher is better.
+"""Comparisons of samples of runs with error bars. Values: [S], one per seed; higher is better.
 
 Follows Agarwal et al. 2021, "Deep reinforcement learning at the edge of the statistical precipice":
-interquartile means, intervals instead of points, probability of improvement. All random draws are
-from a fixed seed: the same values give the same numbers.
+interquartile means, intervals instead of points, probability of improvement. Random draws use a
+fixed seed: equal values give equal numbers.
 """
 
 import dataclasses
@@ -16,9 +16,9 @@ from scipy.stats import DegenerateDataWarning
 
 RESAMPLES = 9999
 TRIM = 0.25
-"""Share cut off at either end: what is left is the interquartile mean.
+"""Share cut off at either end, for the interquartile mean.
 
-0 is the mean, which is what a share of successes needs.
+0 gives the mean, which a share of successes needs.
 """
 CONFIDENCE = 0.95
 
@@ -34,7 +34,7 @@ class Estimate:
 
 @dataclasses.dataclass(frozen=True)
 class Comparison:
-    """A variant against the base.
+    """Comparison of a variant with the base.
 
     difference: of trimmed means. improvement: probability that a run of the variant beats one of
     the base.
@@ -49,19 +49,22 @@ class Comparison:
 
 
 def trimmed_mean(values: np.ndarray, trim: float = TRIM, axis: int = -1) -> np.ndarray:
-    """Mean of what is left between the ends; by default of the middle half."""
+    """Return the mean without the ends; by default of the middle half."""
     return np.asarray(stats.trim_mean(values, trim, axis=axis))
 
 
 def estimate(values: np.ndarray, trim: float = TRIM) -> Estimate:
-    """Trimmed mean with its bias-corrected and accelerated bootstrap interval (Efron 1987)."""
+    """Return the trimmed mean with its BCa interval.
+
+    BCa: bias-corrected and accelerated bootstrap (Efron 1987).
+    """
     return _bootstrap((values,), partial(trimmed_mean, trim=trim), paired=False)
 
 
 def compare(
     base: np.ndarray, variants: Sequence[np.ndarray], paired: bool, trim: float = TRIM
 ) -> list[Comparison]:
-    """Each variant against the base.
+    """Compare each variant with the base.
 
     paired: whether the i-th values of both come from the same seed.
     """
@@ -79,8 +82,9 @@ def compare(
 
 
 def improvement(base: np.ndarray, values: np.ndarray, paired: bool = False) -> Estimate:
-    """Probability that a run of the variant is better than one of the base; ties count half
-    (Mann & Whitney's U over all pairs).
+    """Return the probability that a run of the variant beats one of the base.
+
+    Ties count half (Mann & Whitney's U over all pairs).
     """
 
     def better(a: np.ndarray, b: np.ndarray, axis: int = -1) -> np.ndarray:
@@ -92,8 +96,9 @@ def improvement(base: np.ndarray, values: np.ndarray, paired: bool = False) -> E
 
 
 def permutation_p(base: np.ndarray, values: np.ndarray, paired: bool, trim: float = TRIM) -> float:
-    """Chance of a difference as large, either way, if the variant did nothing: labels swapped
-    within seeds, or anyhow when unpaired.
+    """Return the probability of so large a difference, of either sign, without an effect.
+
+    Labels are swapped within seeds; if unpaired, freely.
     """
     kind = "samples" if paired else "independent"
     rng = np.random.default_rng(0)
@@ -105,7 +110,7 @@ def permutation_p(base: np.ndarray, values: np.ndarray, paired: bool, trim: floa
 
 
 def holm(ps: Sequence[float]) -> list[float]:
-    """p values corrected for their number (Holm 1979)."""
+    """Return p values corrected for their number (Holm 1979)."""
     order = np.argsort(ps, kind="stable")
     scaled = [min(1.0, (len(ps) - rank) * ps[i]) for rank, i in enumerate(order)]
     corrected = np.empty(len(ps))
@@ -114,7 +119,7 @@ def holm(ps: Sequence[float]) -> list[float]:
 
 
 def share(successes: int, count: int) -> Estimate:
-    """A share with its Wilson score interval (Wilson 1927)."""
+    """Return a share with its Wilson score interval (Wilson 1927)."""
     interval = stats.binomtest(successes, count).proportion_ci(CONFIDENCE, method="wilson")
     return Estimate(successes / count, float(interval.low), float(interval.high))
 
@@ -126,7 +131,7 @@ def _gap(base: np.ndarray, values: np.ndarray, trim: float, axis: int = -1) -> n
 def _bootstrap(
     samples: tuple[np.ndarray, ...], statistic: Callable[..., np.ndarray], paired: bool
 ) -> Estimate:
-    """BCa where it is defined, percentiles where it is not (many equal values)."""
+    """Return a statistic with its BCa interval, or percentiles if undefined (many equal values)."""
     value = float(statistic(*samples, axis=-1))
     for method in ("BCa", "percentile"):
         with (

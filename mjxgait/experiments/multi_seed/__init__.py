@@ -1,1 +1,1 @@
-"""Several runs of one creature that differ in nothing but their seed, and all their champions in one picture."""
+"""Several runs of one creature with different seeds, and their champions in one picture."""

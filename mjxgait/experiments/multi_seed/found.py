@@ -1,4 +1,4 @@
-"""Who has come of the runs of a zoo: as values, as a table and as a picture."""
+"""Results of a multi-seed run (zoo): as values, as a table and as a picture."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -14,14 +14,14 @@ from mjxgait.training.folder import CERTIFICATE, CHAMPION
 
 COLUMNS = 4
 SECONDS = 2.0
-"""Into its motion that each is shown."""
+"""Time into its motion at which each champion is shown, s."""
 SIZE = (420, 300)
-"""Pixels of each."""
+"""Pixels of each champion's picture."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Found:
-    """Of one run. summary: what the examiner says of its motion; margin: None before an examination."""
+    """Result of one run. summary: the certificate's; margin: None if not examined."""
 
     folder: Path
     examined: bool
@@ -29,16 +29,16 @@ class Found:
     summary: str
     margin: float | None
     verdict: str
-    """In a few words."""
+    """Result in a few words."""
 
 
 def found_in(folders: Sequence[Path]) -> list[Found]:
-    """Of all of them."""
+    """Return the result of each run."""
     return [_found(folder) for folder in folders]
 
 
 def table(found: Sequence[Found]) -> Table:
-    """For the screen, a row per run."""
+    """Return the table for the screen, a row per run."""
     shown = Table(box=None, pad_edge=False)
     for heading in ("run", "motion", "margin", ""):
         shown.add_column(heading, justify="right" if heading == "margin" else "left")
@@ -49,13 +49,13 @@ def table(found: Sequence[Found]) -> Table:
 
 
 def size(found: Sequence[Found]) -> tuple[float, float]:
-    """Inches of the picture."""
+    """Return the picture's width and height in inches."""
     columns = min(len(found), COLUMNS)
     return 3.2 * columns, 0.4 + 2.8 * -(-len(found) // columns)
 
 
 def draw_zoo(drawing: Figure, name: str, found: Sequence[Found]) -> None:
-    """All champions as the second simulator moves them, each as large as its picture allows."""
+    """Draw all champions as C MuJoCo simulates them, each as large as its picture allows."""
     columns = min(len(found), COLUMNS)
     fields = drawing.subplots(-(-len(found) // columns), columns, squeeze=False)
     for axes in fields.flat:

@@ -1,4 +1,4 @@
-"""Which runs a zoo is of, and where they lie."""
+"""Seeds and run folders of a multi-seed run (zoo)."""
 
 import dataclasses
 from pathlib import Path
@@ -27,9 +27,9 @@ ZOO = "zoo.toml"
 
 @dataclasses.dataclass(frozen=True)
 class Seeds:
-    """Of the runs of a folder, in order.
+    """Seeds of a folder's runs, in order.
 
-    together: so many are rows of one program, which decides on their last bits; 0: all.
+    together: number of runs per program, which affects their last bits; 0: all.
     """
 
     __pydantic_config__ = STRICT
@@ -37,20 +37,20 @@ class Seeds:
     together: Whole = 0
 
     def folders(self, zoo: Path) -> list[Path]:
-        """A run folder for each."""
+        """Return a run folder per seed."""
         return [zoo / f"seed{seed}" for seed in self.seeds]
 
 
 def is_zoo(folder: Path) -> bool:
-    """Whether several runs lie in it, rather than one."""
+    """Return whether a folder holds several runs, not one."""
     return (folder / ZOO).is_file()
 
 
 def read_seeds(zoo: Path) -> Seeds:
-    """The runs of a folder.
+    """Return the seeds of a folder.
 
     Raises:
-      UserError: what says which they are cannot be read, or names none.
+      UserError: their file cannot be read, or names none.
     """
     seeds = build(Seeds, read_toml(zoo / ZOO), str(zoo / ZOO))
     if not seeds.seeds:
@@ -59,13 +59,12 @@ def read_seeds(zoo: Path) -> Seeds:
 
 
 def folders_of(zoo: Path) -> list[Path]:
-    """Their folders; see `read_seeds`."""
+    """Return the run folders; see `read_seeds`."""
     return read_seeds(zoo).folders(zoo)
 
 
 def check_zoo(zoo: Path | None, creature: Creature, config: Config, runs: int) -> Path:
-    """Return the folder that several new runs may have; by default a new one under runs/. Writes
-    nothing.
+    """Return the folder for several new runs, by default a new one under runs/; write nothing.
 
     Raises:
       UserError: fewer than two runs, or islands, which have rows of their own; see `check_parts`.
@@ -90,8 +89,9 @@ def check_zoo(zoo: Path | None, creature: Creature, config: Config, runs: int) -
 def create_zoo(
     zoo: Path | None, creature: Creature, config: Config, runs: int, together: int = 0
 ) -> Path:
-    """Make a folder with a run folder for each seed, from the config's on; by default a new one
-    under runs/. together: see `Seeds`.
+    """Make a folder, by default under runs/, with a run folder per seed from the config's on.
+
+    together: see `Seeds`.
 
     Raises:
       UserError: see `check_zoo` and `check_plan`; or the folder cannot be written.
@@ -103,14 +103,14 @@ def create_zoo(
     seeds = Seeds(tuple(range(config.seed, config.seed + runs)), together)
     for seed, folder in zip(seeds.seeds, seeds.folders(zoo), strict=True):
         create_run(folder, creature, to_the_last(dataclasses.replace(config, seed=seed)))
-    # Last: what is whole can be gone on with.
+    # Written last: a folder with this file is complete and can be resumed.
     with disk_errors(zoo):
         write_text(zoo / ZOO, dump_toml(seeds))
     return zoo
 
 
 def to_the_last(config: Config) -> Config:
-    """Without what ends a run before its last generation: the rows of a program go on together."""
+    """Return the config without early stopping: the rows of a program advance together."""
     forced = dataclasses.replace(config.evolution.forced, patience=0)
     examination = dataclasses.replace(config.examination, every=0)
     evolution = dataclasses.replace(config.evolution, target=None, forced=forced)

@@ -1,1 +1,1 @@
-"""A whole set of walks that blend: a grid of speeds and turns, evolved side by side (docs/repertoire.md)."""
+"""Set of walks that blend: a grid of speeds and turns, evolved together (docs/repertoire.md)."""

@@ -1,7 +1,7 @@
-"""What lies half way between two walks of a repertoire, tried in C MuJoCo.
+"""Half-way blends between two walks of a repertoire, tested in C MuJoCo.
 
-An engine blends poses and knows no physics. Here the two controllers are blended and their body is
-simulated: where that walks, the engine's blend is near to what the body can do.
+An engine blends poses without physics. Here the two controllers are blended and the body is
+simulated: if it walks, the engine's blend is near to what the body can do.
 """
 
 import dataclasses
@@ -21,24 +21,24 @@ from mjxgait.experiments.repertoire.pairs import Pair, certified_pairs, of_each
 from mjxgait.training.folder import open_champion
 
 WALKS = (1, 2, 3)
-"""Numbers of the criteria that say whether it walks: up, ahead, in a rhythm."""
+"""Numbers of the criteria that decide whether a blend walks: up, ahead, in a rhythm."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Blend:
-    """Of two neighbours that are certified. fails: criteria of a walk that it does not meet."""
+    """Blend of two certified neighbours. fails: criteria of a walk that it does not meet."""
 
     between: tuple[Cell, Cell]
     fails: tuple[str, ...]
 
     @property
     def walks(self) -> bool:
-        """Whether it meets all of them."""
+        """Whether the blend meets all criteria of a walk."""
         return not self.fails
 
     @property
     def entry(self) -> dict[str, Any]:
-        """For the table."""
+        """Entry of the table."""
         names = [cell.name for cell in self.between]
         return {"between": names, "walks": self.walks, "fails": list(self.fails)}
 
@@ -50,12 +50,12 @@ def blends(
     found: list[Found],
     tell: Callable[[int, int], object],
 ) -> list[Blend]:
-    """Of all that `certified_pairs` has. tell: called with how many are done, and of how many."""
+    """Return a blend for each of the `certified_pairs`. tell: called with counts done and total."""
     return of_each(_blended, folder, certified_pairs(creature, grid, found), tell)
 
 
 def _blended(folder: Path, pair: Pair) -> Blend:
-    """In a process of its own: all that is sent is where the walks are."""
+    """Test a pair in its own process, which receives only the walks' place."""
     (creature, one), (_, other) = (open_champion(folder / cell.name) for cell in pair)
     seen = glance(creature, half_way(one, other, creature))
     judged = [criterion for criterion in seen.criteria if criterion.number in WALKS]
@@ -63,9 +63,7 @@ def _blended(folder: Path, pair: Pair) -> Blend:
 
 
 def half_way(one: Champion, other: Champion, creature: Creature) -> Champion:
-    """The mean of two controllers, each pose with the pose in its place, told the mean of what both
-    were told.
-    """
+    """Return the mean of two controllers, pose by pose, with the mean of their targets."""
     cycles = [_cycle(champion, creature) for champion in (one, other)]
     genome = {
         "key_poses": np.mean(cycles, axis=0),
@@ -80,7 +78,7 @@ def half_way(one: Champion, other: Champion, creature: Creature) -> Champion:
 
 
 def _cycle(champion: Champion, creature: Creature) -> np.ndarray:
-    """All poses [C, J] of its cycle."""
+    """Return all poses [C, J] of a champion's cycle."""
     poses = champion.genome["key_poses"]
     if not (champion.settings.mirror and creature.mirror.symmetric):
         return poses

@@ -1,4 +1,4 @@
-"""What a cell of the grid is as a run: its settings, and its genomes made of others'."""
+"""Cells of the grid as runs: settings, and genomes made from other cells' genomes."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -17,7 +17,7 @@ GENOMES = (POSES, "genomes.tuning")
 
 
 def check(config: Config) -> None:
-    """Refuses what no repertoire can be made of.
+    """Refuse settings that no repertoire can be made of.
 
     Raises:
       UserError: another task or controller, or a body that evolves.
@@ -34,13 +34,15 @@ def check(config: Config) -> None:
 
 
 def has_mirror(creature: Creature) -> bool:
-    """Whether a turn to the right is the mirror image of one to the left."""
+    """Return whether a right turn is the mirror image of a left turn."""
     return creature.mirror.symmetric
 
 
 def settings_of(cell: Cell, grid: Grid, creature: Creature, base: Config) -> Config:
-    """The settings of a cell's run. Where there are turns, who walks straight on has the controller of
-    who turns: its population is what those begin with.
+    """Return the settings of a cell's run.
+
+    If the grid has turns, straight cells use the turning cells' controller settings: the turning
+    cells begin with the straight populations.
     """
     speed = f"{cell.speed:.6f}"
     config = wished(base, creature, Wishes(speed=speed, turn=cell.turn or None))
@@ -48,25 +50,25 @@ def settings_of(cell: Cell, grid: Grid, creature: Creature, base: Config) -> Con
         turning = wished(base, creature, Wishes(speed=speed, turn=grid.turns[-1]))
         config = dataclasses.replace(config, controller=turning.controller)
     forced = dataclasses.replace(config.evolution.forced, patience=0)
-    # All rows of a program go on together.
+    # The rows of a program advance together: none may stop early.
     evolution = dataclasses.replace(config.evolution, target=None, forced=forced)
     return dataclasses.replace(config, evolution=evolution)
 
 
 def mirror_image(state: Packed, creature: Creature) -> Packed:
-    """A population in a mirror: what turned to the left turns to the right."""
+    """Return a population's mirror image: left turns become right turns."""
     return state.with_arrays({POSES: mirrored(state.arrays[POSES], creature)})
 
 
 def mirrored(poses: np.ndarray, creature: Creature) -> np.ndarray:
-    """Poses [..., J], left and right exchanged."""
+    """Return poses [..., J] with left and right exchanged."""
     sign = creature.mirror.sign.astype(poses.dtype)
     swapped: np.ndarray = sign * poses[..., creature.mirror.partner]
     return swapped
 
 
 def planted(cells: list[Cell], straight: Mapping[float, Packed]) -> dict[str, np.ndarray]:
-    """What turning cells begin with, [B, P, ...]: who walks straight on at their speed."""
+    """Return the turning cells' first genomes, [B, P, ...]: the straight ones of the same speed."""
     return {
         name: np.stack([straight[cell.speed].arrays[name] for cell in cells]) for name in GENOMES
     }

@@ -1,6 +1,6 @@
-"""Whether a creature that walks one way can go over to a neighbour's while it walks, in C MuJoCo.
+"""Changes from one walk to a neighbouring walk while walking, tested in C MuJoCo.
 
-Letters: `S` moments at which it is told to, `T` control steps.
+Letters: `S` moments at which the change is commanded, `T` control steps.
 """
 
 import dataclasses
@@ -24,16 +24,14 @@ from mjxgait.rendering.walk import WARMUP
 from mjxgait.training.folder import open_champion
 
 MOMENTS, SECONDS = 8, 1.0
-"""It is told at one of so many moments of a second, and has so many s to change."""
+"""Number of moments within a second at which the change is commanded, and its duration, s."""
 SETTLES, WATCHED = 3.0, 5.0
-"""s from then on until it must walk as it was told, and s that it must."""
+"""Time to settle after the change, and time for which the body must then walk as commanded, s."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Change:
-    """From one certified walk to a neighbour that is certified. share: of the moments from which it
-    succeeds.
-    """
+    """Change between certified neighbours. share: of the moments at which it succeeds."""
 
     begins: Cell
     ends: Cell
@@ -41,7 +39,7 @@ class Change:
 
     @property
     def entry(self) -> dict[str, Any]:
-        """For the table."""
+        """Entry of the table."""
         return {
             "from": self.begins.name,
             "to": self.ends.name,
@@ -57,20 +55,20 @@ def changes(
     found: list[Found],
     tell: Callable[[int, int], object],
 ) -> list[Change]:
-    """Of all certified neighbours, there and back. tell: as of `blends`."""
+    """Return the changes of all certified neighbours, there and back. tell: as for `blends`."""
     pairs = certified_pairs(creature, grid, found)
     ways = [way for one, other in pairs for way in ((one, other), (other, one))]
     return of_each(_changed, folder, ways, tell)
 
 
 def _changed(folder: Path, way: Pair) -> Change:
-    """In a process of its own: all that is sent is where the walks are."""
+    """Test a change in its own process, which receives only the walks' place."""
     (creature, before), (_, after) = (open_champion(folder / cell.name) for cell in way)
     return Change(*way, float(succeeds(creature, before, after).mean()))
 
 
 def succeeds(creature: Creature, before: Champion, after: Champion) -> np.ndarray:
-    """[S] whether it stays up, and walks as fast and looks where it is told to once it has settled."""
+    """Return [S]: whether the body stays up, settles, and keeps the commanded speed and heading."""
     step = float(creature.model.opt.timestep)
     moments = WARMUP + np.arange(MOMENTS) / MOMENTS
     steps = round((moments[-1] + SECONDS + SETTLES + WATCHED) / step)
@@ -92,7 +90,7 @@ def succeeds(creature: Creature, before: Champion, after: Champion) -> np.ndarra
 def told_headings(
     before: Champion, after: Champion, moments: np.ndarray, steps: int, step: float
 ) -> np.ndarray | None:
-    """[S, T] rad: turning as the one walk does, then as the other; None where neither turns."""
+    """Return headings [S, T] rad: turning as one walk, then as the other; None if neither turns."""
     rates = [np.radians(champion.wish.get("turn", 0.0)) for champion in (before, after)]
     if not any(rates):
         return None
@@ -102,7 +100,7 @@ def told_headings(
 
 
 def _as_told(creature: Creature, outcome: Outcome, speed: float) -> np.ndarray:
-    """[S] over the last seconds: by chords of a second, and the mean heading."""
+    """Return [S] for the last seconds: speed by chords of a second, and the mean heading."""
     limits, film = CertificateConfig().wishes, outcome.trajectory
     watched, second = round(WATCHED / film.time_step), round(1.0 / film.time_step)
     root = creature.root_qpos

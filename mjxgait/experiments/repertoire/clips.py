@@ -1,4 +1,4 @@
-"""All certified walks of a repertoire as clips of one file, and the table of where they belong."""
+"""Certified walks of a repertoire as clips of one file, and the table of their places."""
 
 import json
 from collections.abc import Sequence
@@ -26,7 +26,7 @@ CLIPS, TABLE = "repertoire.glb", "repertoire.json"
 
 
 def clips_of(folder: Path, found: Sequence[Found], rate: int) -> dict[str, WalkLoop]:
-    """A stride of each certified walk by name, all in phase, and the standing pose."""
+    """Return a stride of each certified walk by name, all in phase, and the standing pose."""
     loops = {
         one.cell.name: stride_in_phase(champion_of(folder / one.cell.name, LOOP_SECONDS).walk, rate)
         for one in found
@@ -45,7 +45,7 @@ def write_clips(
     ways: Sequence[Transition],
     travelling: bool,
 ) -> None:
-    """Writes the GLB, and the JSON beside it."""
+    """Write the GLB and the JSON beside it."""
     document = table_of(file.name, loops, found, travelling)
     document["blends"] = [blend.entry for blend in between]
     document["changes"] = [change.entry for change in changed]
@@ -59,7 +59,7 @@ def write_clips(
 def table_of(
     file: str, loops: dict[str, WalkLoop], found: Sequence[Found], travelling: bool
 ) -> dict[str, Any]:
-    """What `repertoire.json` holds: for each clip the place where a blend space wants it."""
+    """Return the content of `repertoire.json`: each clip's place in a blend space."""
     walk = next(iter(loops.values())).walk
     by_name = {one.cell.name: one for one in found}
     clips = [_entry(name, loop, by_name.get(name)) for name, loop in loops.items()]
@@ -80,7 +80,7 @@ def table_of(
 
 
 def _entry(name: str, loop: WalkLoop, one: Found | None) -> dict[str, Any]:
-    """speed and turn are those of the clip as it is, to be blended by; asked: the cell's."""
+    """Return a clip's entry. speed, turn: measured, for blending; asked: the cell's targets."""
     duration = float(loop.times[-1])
     entry: dict[str, Any] = {
         "name": name,

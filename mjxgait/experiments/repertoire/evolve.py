@@ -1,7 +1,7 @@
-"""The evolution of a repertoire: first all that walk straight on, then, from these, all that turn.
+"""Evolution of a repertoire: first all straight walks, then, from these, all turning walks.
 
-Each of the two is one program, whose rows are the cells. In every generation a cell has one of the
-best of each of its neighbours judged among its own children. Each cell is a run folder of its own.
+Each of the two is one program with a row per cell. In every generation a cell evaluates, among its
+offspring, one of the best individuals of each neighbour. Each cell has its own run folder.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,7 +16,7 @@ from mjxgait.experiments.repertoire.cells import has_mirror, mirror_image, plant
 from mjxgait.experiments.repertoire.grid import Cell, Grid
 
 Tell = Callable[[str, int, int, Advanced | None], object]
-"""Called with what is evolved, the generation, the last one, and what has come back, if something has."""
+"""Callback with the evolved part, the generation, the last generation, and a result, if any."""
 
 
 def evolve(
@@ -27,7 +27,7 @@ def evolve(
     tell: Tell,
     stopped: Callable[[], bool],
 ) -> bool:
-    """Evolves all cells of a folder, or goes on with them; returns whether they came to their end."""
+    """Evolve all cells of a folder, or resume them; return whether all were completed."""
     straight = [cell for cell in grid.cells if not cell.turn]
     both = not has_mirror(creature)
     turning = [cell for cell in grid.cells if cell.turn > 0 or (cell.turn and both)]
@@ -42,8 +42,9 @@ def evolve(
 
 
 def _side(folder: Path, creature: Creature, grid: Grid, cells: Sequence[Cell]) -> Rows:
-    """Cells that are rows of one program; those to the right of a symmetric body are the mirror
-    images of those to the left, and lie in folders of their own too.
+    """Return cells as rows of one program.
+
+    A symmetric body's right turns are mirror images of its left turns; they have folders, too.
     """
     near = [[n for n in grid.neighbours(cell) if n in cells] for cell in cells]
     sources = [[cells.index(n) for n in known] for known in near]

@@ -1,4 +1,4 @@
-"""What is reachable: cell by cell what the examiner found, as values, as a table and as a picture."""
+"""Reachable walks: each cell's examination, as values, as a table and as a picture."""
 
 import dataclasses
 import textwrap
@@ -17,17 +17,17 @@ from mjxgait.rendering.style import DARK, MIDDLE, PALE
 from mjxgait.training.folder import CERTIFICATE
 
 LINE = 20
-"""Characters of a line in a field of the picture."""
+"""Characters per line in a field of the picture."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Found:
-    """Of one cell.
+    """Result of one cell.
 
-    speed: m/s, along the heading that it was told. heading_off: deg, farthest from that. duty:
-    mean duty factor of the feet. fails: criteria that it does not meet; none if it is certified, or
-    has not been examined. reservation: why it is not certified though it passes all.
-    Numbers are None where there was no walk to measure.
+    speed: m/s, along the commanded heading. heading_off: deg, largest deviation from it. duty:
+    mean duty factor of the feet. fails: criteria that it does not meet; none if certified or not
+    examined. reservation: why it is not certified though it passes all.
+    Numbers are None without a walk to measure.
     """
 
     cell: Cell
@@ -42,12 +42,12 @@ class Found:
 
 
 def found_in(folder: Path, grid: Grid) -> list[Found]:
-    """Of all cells."""
+    """Return the result of each cell."""
     return [_found(cell, read_certificate(folder / cell.name / CERTIFICATE)) for cell in grid.cells]
 
 
 def table(found: list[Found]) -> Table:
-    """For the screen, a row per cell."""
+    """Return the table for the screen, a row per cell."""
     shown = Table(box=None, pad_edge=False)
     for heading in ("clip", "m/s", "asked", "deg/s", "duty", "gait", "margin", "off deg", ""):
         shown.add_column(heading, justify="left" if heading in ("clip", "gait", "") else "right")
@@ -67,7 +67,7 @@ def table(found: list[Found]) -> Table:
 
 
 def draw_map(drawing: Figure, creature: str, grid: Grid, found: list[Found]) -> None:
-    """A field per cell, dark where it is certified, with what was measured in it."""
+    """Draw a field per cell with its measurements, dark if certified."""
     axes = drawing.add_subplot()
     turns = sorted({cell.turn for cell in grid.cells}, reverse=True)
     for one in found:
@@ -126,7 +126,7 @@ def _said(one: Found) -> str:
 
 
 def _reason(one: Found) -> list[str]:
-    """Why it is not certified, in words that are short."""
+    """Return in short lines why a cell is not certified."""
     if not one.fails:
         return textwrap.wrap(one.reservation or "not examined", LINE)
     more = len(one.fails) - 3

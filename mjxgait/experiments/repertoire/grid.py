@@ -1,4 +1,4 @@
-"""The grid: which walks are asked for, what they are called, and who is whose neighbour."""
+"""Grid of a repertoire: target walks, their names and their neighbours."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -25,20 +25,20 @@ class Cell:
 
     @property
     def name(self) -> str:
-        """Of its run folder and of its clip; without dots, which engines do not allow in names."""
+        """Name of its run folder and clip; without dots, which engines do not allow in names."""
         side = "left" if self.turn > 0 else "right"
         turn = f"{side}{abs(self.turn):g}".replace(".", "p") if self.turn else "straight"
         return f"walk_{round(100 * self.speed):03d}_{turn}"
 
     @property
     def mirrored(self) -> "Cell":
-        """The same to the other side."""
+        """Same walk to the other side."""
         return Cell(self.speed, -self.turn or 0.0)
 
 
 @dataclasses.dataclass(frozen=True)
 class Grid:
-    """What is asked for.
+    """Target speeds and turns.
 
     Attributes:
       speeds: m/s, ascending.
@@ -51,7 +51,7 @@ class Grid:
 
     @classmethod
     def of(cls, speeds: Sequence[float], turns: Sequence[float]) -> "Grid":
-        """In whatever order they come.
+        """Return the grid of speeds and turns in any order.
 
         Raises:
           UserError: there is no speed, or two walks would have one name.
@@ -72,10 +72,10 @@ class Grid:
 
     @classmethod
     def read(cls, folder: Path) -> "Grid":
-        """That of a folder.
+        """Return the grid of a folder.
 
         Raises:
-          UserError: it holds none.
+          UserError: the folder holds none.
         """
         if not (folder / GRID).is_file():
             raise UserError(f"{folder}: not the folder of a repertoire (it has no {GRID})")
@@ -83,17 +83,17 @@ class Grid:
 
     @property
     def text(self) -> str:
-        """Of the file that `read` reads."""
+        """Text of the file that `read` reads."""
         return dump_toml(self)
 
     @cached_property
     def cells(self) -> tuple[Cell, ...]:
-        """All of them, by speed, from the right to the left."""
+        """All cells, by speed, from right to left."""
         sides = (*(-turn for turn in reversed(self.turns)), 0.0, *self.turns)
         return tuple(Cell(speed, turn) for speed in self.speeds for turn in sides)
 
     def neighbours(self, cell: Cell) -> list[Cell]:
-        """Those next to it, in speed or in turn."""
+        """Return the cells next to a cell, in speed or in turn."""
         at, wide = self.cells.index(cell), 2 * len(self.turns) + 1
         row, column = divmod(at, wide)
         near = ((row - 1, column), (row + 1, column), (row, column - 1), (row, column + 1))
@@ -103,5 +103,5 @@ class Grid:
 
     @property
     def pairs(self) -> list[tuple[Cell, Cell]]:
-        """Each two that are next to each other, once."""
+        """Each pair of neighbours, once."""
         return [(a, b) for a in self.cells for b in self.neighbours(a) if a < b]

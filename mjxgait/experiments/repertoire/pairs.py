@@ -1,4 +1,4 @@
-"""Neighbours of a repertoire that are certified, and what is tried of each two of them."""
+"""Pairs of certified neighbours of a repertoire, and a test of each pair."""
 
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -18,8 +18,9 @@ Tried = TypeVar("Tried")
 
 
 def certified_pairs(creature: Creature, grid: Grid, found: list[Found]) -> list[Pair]:
-    """All neighbours that are both certified; of a symmetric body's turns those to the left, whose
-    mirror images the others are.
+    """Return all neighbours that are both certified.
+
+    A symmetric body's right turns are left out: they are mirror images of the left turns.
     """
     known = {one.cell for one in found if one.certified}
     lowest = 0.0 if has_mirror(creature) else -np.inf
@@ -36,9 +37,9 @@ def of_each(
     pairs: Sequence[Pair],
     tell: Callable[[int, int], object],
 ) -> list[Tried]:
-    """What comes of each pair, in their order, one per core.
+    """Return the work's result for each pair, in order; one pair per core.
 
-    tell: called with how many are done, and of how many.
+    tell: called with the counts done and total.
 
     Raises:
       UserError: a process was killed from outside.

@@ -1,4 +1,4 @@
-"""A repertoire as a page to give away, in which it is driven."""
+"""Repertoire as a web page to share, with a creature to steer."""
 
 from pathlib import Path
 
@@ -14,7 +14,7 @@ RATE = 60
 
 
 def write_driven(folder: Path, out: Path) -> str:
-    """Write the page of a repertoire's certified walks; return that nothing is to be said of it.
+    """Write the page of a repertoire's certified walks; return an empty note.
 
     Raises:
       UserError: no repertoire, none of its walks is certified, or the file cannot be written.
@@ -32,7 +32,7 @@ def write_driven(folder: Path, out: Path) -> str:
 
 
 def _blends(folder: Path) -> str:
-    """How many blends were tried as physics, and how many walked."""
+    """Return a line with the number of blends tried as physics, and of those that walked."""
     try:
         tried = read_json(folder / TABLE)["blends"]
         walking = sum(bool(blend["walks"]) for blend in tried)

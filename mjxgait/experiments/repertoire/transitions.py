@@ -1,7 +1,7 @@
-"""How a walk of a repertoire begins and ends: from standing into its stride, and out of it.
+"""Starts and stops of a repertoire's walks: from standing into the stride, and out of it.
 
-Both are simulated in C MuJoCo, undisturbed, and move their root as the body moved. Letters: `S` ways
-to stop, `T` frames, `J` actuated joints.
+Both are simulated in C MuJoCo, undisturbed, and move their root as the body moved.
+Letters: `S` ways to stop, `T` frames, `J` actuated joints.
 """
 
 import dataclasses
@@ -24,25 +24,23 @@ from mjxgait.rendering.walk import WARMUP, Walk
 
 IDLE = "idle"
 BEGINS_BY, NEAR = 4.0, 0.03
-"""s by which a walk is in its stride, and rad by which its joints may be off where it is, root mean
-square.
-"""
+"""Time by which a walk is in its stride, s, and RMS joint error that is then allowed, rad."""
 PLACES, FADES = 8, (0.2, 0.5, 1.0)
-"""Ways to stop: moments of a stride at which it is told to, and s that its poses have to become the
-standing one."""
+"""Ways to stop: number of moments in a stride at which the stop is commanded, and times in which
+the poses become the standing pose, s."""
 SETTLES, STILL = 3.0, 0.02
-"""s from the last of these moments on until it must be still; m/s per sqrt(g * hip height) of the
-trunk that are still."""
+"""Time after the last of these moments by which the body must be still, s; trunk speed below which
+it is still, m/s per sqrt(g * hip height)."""
 RESTS = 0.3
-"""s that it is seen to be still."""
+"""Time at rest that the clip shows, s."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Transition:
-    """From one clip into another.
+    """Transition from one clip into another.
 
-    loop: the motion; None where no way was found. gaps: rad by which the joints are off those of the
-    clip before and the clip after, where these meet, root mean square.
+    loop: the motion; None if no way was found. gaps: RMS joint differences (rad) from the clip
+    before and the clip after, where they meet.
     """
 
     begins: str
@@ -52,16 +50,16 @@ class Transition:
 
     @property
     def name(self) -> str:
-        """Of its clip."""
+        """Name of its clip."""
         return f"{self.ends}_start" if self.begins == IDLE else f"{self.begins}_stop"
 
     def __bool__(self) -> bool:
-        """Whether it was found."""
+        """Return whether a motion was found."""
         return self.loop is not None
 
     @property
     def entry(self) -> dict[str, Any]:
-        """For the table."""
+        """Entry of the table."""
         ends = {"name": self.name, "from": self.begins, "to": self.ends}
         if self.loop is None or self.loop.path is None:
             return ends | {"found": False}
@@ -75,14 +73,15 @@ class Transition:
 
 
 def transitions(found: Sequence[Found], loops: dict[str, WalkLoop]) -> list[Transition]:
-    """A start and a stop for each certified walk straight on, made of the walk that its clip is of."""
+    """Return a start and a stop per certified straight walk, made from its clip's walk."""
     names = [one.cell.name for one in found if one.certified and not one.cell.turn]
     return [of(loops[name].walk, name, loops) for name in names for of in (start_of, stop_of)]
 
 
 def start_of(walk: Walk, name: str, loops: dict[str, WalkLoop]) -> Transition:
-    """From standing to the first footfall at which it is near to the clip's begin; to the nearest of
-    the first seconds where none is.
+    """Return the start: from standing to the first footfall near the clip's first pose.
+
+    If none is near enough: to the nearest footfall of the first seconds.
     """
     falls = falls_of_first_foot(walk)
     falls = falls[falls * walk.time_step <= BEGINS_BY]
@@ -97,8 +96,9 @@ def start_of(walk: Walk, name: str, loops: dict[str, WalkLoop]) -> Transition:
 
 
 def stop_of(walk: Walk, name: str, loops: dict[str, WalkLoop]) -> Transition:
-    """From that footfall which is most like the clip's begin to standing still, in the way that is
-    soonest over of those that end up.
+    """Return the stop: from the footfall most like the clip's first pose to standing still.
+
+    The shortest of the ways that end upright is taken.
     """
     falls = falls_of_first_foot(walk)
     settled = falls[falls * walk.time_step >= WARMUP]
@@ -118,10 +118,9 @@ def stop_of(walk: Walk, name: str, loops: dict[str, WalkLoop]) -> Transition:
 
 
 def halted(walk: Walk, moments: np.ndarray) -> list[np.ndarray]:
-    """Poses [T, nq] until it has been still for a while, for each way to stop; none where it falls or
-    does not come to rest.
+    """Return the poses [T, nq] of each way to stop, until still for `RESTS`.
 
-    moments: [PLACES] s at which it is told to.
+    There are none after a fall or without coming to rest. moments: [PLACES] s of the command.
     """
     creature, step = walk.creature, walk.time_step
     halts, fades = (each.ravel() for each in np.meshgrid(moments, FADES))
@@ -144,10 +143,10 @@ def halted(walk: Walk, moments: np.ndarray) -> list[np.ndarray]:
 def _motion(
     walk: Walk, qpos: np.ndarray, like: WalkLoop, places: tuple[np.ndarray, np.ndarray]
 ) -> WalkLoop:
-    """Poses [T, nq] as a clip whose root moves as the body moved.
+    """Return poses [T, nq] as a clip; its root moves as the body moved.
 
-    places: [2] m, where the trunk is above the root as the clip begins and as it ends: where the
-    clips before and after have it.
+    places: [2] m, the trunk's place over the root at the clip's begin and end, as in the clips
+    before and after.
     """
     count = max(round((len(qpos) - 1) * walk.time_step * like.rate), 1)
     share = np.linspace(0.0, 1.0, count + 1)[:, None]
@@ -161,17 +160,17 @@ def _motion(
 
 
 def _place(walk: Walk) -> slice:
-    """Of the trunk in the world, among the numbers of a pose; its height comes after."""
+    """Return the slice of a pose with the trunk's horizontal position; the height follows."""
     first = walk.creature.root_qpos
     return slice(first, first + 2)
 
 
 def _likest(walk: Walk, frames: np.ndarray, pose: np.ndarray) -> int:
-    """Of some frames that in which the walk is nearest to a pose [nq]."""
+    """Return the frame, of some, at which the walk is nearest to a pose [nq]."""
     return int(min(frames, key=lambda frame: _apart(walk, walk.qpos[frame], pose)))
 
 
 def _apart(walk: Walk, one: np.ndarray, other: np.ndarray) -> float:
-    """rad between the actuated joints of two poses [nq], root mean square."""
+    """Return the RMS difference of two poses' [nq] actuated joints, rad."""
     joints = walk.creature.joints.qpos_adr
     return float(np.sqrt(np.mean((one[joints] - other[joints]) ** 2)))
