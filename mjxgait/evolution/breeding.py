@@ -103,7 +103,7 @@ class Nursery:
         return _either(new[first], child, mutant), new[first] & of_two[first]
 
     def _draw(self, key: jax.Array, pool: Any, among: jax.Array | int) -> tuple[Any, jax.Array]:
-        """Return a child of two or of one of the first `among`, and whether it has two parents []."""
+        """Return a child of two or one of the first `among`, and whether it has two parents []."""
         config = self.config
         key_parents, key_cross, key_whether, key_mutate, key_mutated = jax.random.split(key, 5)
         mother, father = (

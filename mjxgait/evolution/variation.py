@@ -143,7 +143,10 @@ def jittered(
     rate: jax.Array | float,
     sigma: jax.Array | float,
 ) -> jax.Array:
-    """Move each value [E] with probability `rate` by a Gaussian of `sigma` ranges; clip to the box."""
+    """Move each value [E] with probability `rate` by a Gaussian of `sigma` ranges.
+
+    Results are clipped to the box.
+    """
     key_which, key_by = jax.random.split(key)
     moved = values + sigma * (high - low) * jax.random.normal(key_by, values.shape)
     return jnp.clip(
