@@ -55,7 +55,7 @@ class TaskKind:
     modular: whether it is only for bodies that grow.
     water: whether these bodies are in water.
     called: the user's name for the task; one name may mean one task for a body from a model and
-    another for one that grows.
+      another for one that grows.
     tables: tables of the certificate's settings that apply only to this task or related ones.
     """
 

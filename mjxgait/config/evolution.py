@@ -74,7 +74,7 @@ class EvolutionConfig:
         children born so far (they rank last).
       unique_children: redraws a child that equals a member of the pool or a sibling, before it is
         simulated.
-      survival: of the `best` of parents and children, or of `children` alone, and the best so far.
+      survival: the `best` of parents and children survive, or the `children` and the best so far.
       elite: share of the population, the best, that survives among the children and is evaluated
         with them, for survival of children.
       remember: the elite's earlier evaluations count too: the fitness is the mean of all rounds.
@@ -84,7 +84,7 @@ class EvolutionConfig:
         one of them, or re-draw all eight, as classic GAs do.
       redrawn: share of `mixed` mutations that re-draw.
       mutation_rate: share of offspring mutated.
-      sigma: of the gaussian mutation, in units of the range of each joint.
+      sigma: standard deviation of the gaussian mutation, in units of the range of each joint.
       body: largest factor by which the parts below the trunk may grow or shrink, each mirrored pair
         by a gene of its own (docs/creature.md); 1 leaves the body unchanged.
       tuning_rate: chance that a tuning gene of a mutated offspring changes; likewise a body gene.

@@ -80,7 +80,7 @@ class RolloutConfig:
         mjx always takes MJX. Both give the same motion within tolerances (docs/performance.md).
       lanes: simulations in flight per device; 0 lets the program choose.
       block: most individuals that a machine of a cluster evaluates at once (docs/cluster.md).
-      body: its numbers are constants of the compiled program, which is faster, or inputs: then
+      body: its parameters are constants of the compiled program, which is faster, or inputs: then
         another body of the same topology needs no compilation.
       ground: flat, slope:0.1, steps:0.05, bumps:0.05 or rough:0.05, in hip heights
         (docs/ground.md).

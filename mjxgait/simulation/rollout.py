@@ -225,9 +225,10 @@ class Simulator:
         job: jax.Array,
         episode: jax.Array,
     ) -> Lane:
-        """Return the lane at the start of an episode []; in its number, the start changes fastest.
+        """Return the lane at the start of an episode.
 
-        plans: leaves [B, N, ...], the controller's. own: each genome's own starts, if any.
+        episode: [] number over (row, individual, start), the start fastest. plans: leaves [B, N,
+        ...], the controller's. own: each genome's own starts, if any.
         """
         count, individuals = starts.friction.shape[1], jax.tree.leaves(plans)[0].shape[1]
         row, individual = episode // (individuals * count), episode // count % individuals
