@@ -1,6 +1,6 @@
 """Evolve a stable walk for any creature.
 
-You give it a body; it gives you a walk that physics agrees with, examined in a second simulator.
+Give it a body and it returns a walk that holds up in physics, tested in a second simulator.
 
     import mjxgait
 
@@ -35,7 +35,7 @@ __all__ = ["Run", "examine", "load_creature", "open", "refine", "train", "walk"]
 
 
 def __getattr__(name: str) -> Any:
-    """What is asked for, imported then: the command line must not wait for it."""
+    """Import a public name on first use: the command line must not wait for it."""
     if name in __all__:
         from mjxgait import api as library
 
@@ -44,5 +44,5 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    """For `help(mjxgait)` and completion, which look at nothing that is not listed."""
+    """List the public names too, for `help(mjxgait)` and completion, which read only this list."""
     return sorted({*globals(), *__all__})

@@ -1,4 +1,4 @@
-"""The cores of the machine, and processes that use one each."""
+"""CPU cores of the machine, and processes that use one each."""
 
 import concurrent.futures
 import multiprocessing
@@ -21,13 +21,13 @@ SINGLE_THREADED = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM
 
 
 def cores() -> int:
-    """That this process may use; a container often has fewer than the machine."""
+    """Return the number of cores available to this process; in a container often not all."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @contextmanager
 def single_threaded() -> Iterator[None]:
-    """Processes that are started in here use one thread each for their linear algebra.
+    """Limit processes started in this block to one linear algebra thread each.
 
     None of them looks for modules in the current folder.
     """
@@ -39,8 +39,7 @@ def single_threaded() -> Iterator[None]:
 def process_per_core(
     most: int | None = None, prepare: Callable[[], object] | None = None
 ) -> Iterator[concurrent.futures.Executor]:
-    """A pool of fresh processes, not more than `most`; Ctrl-C is left to the process that waits
-    for them.
+    """Yield a pool of fresh processes, at most `most`; only the waiting process handles Ctrl-C.
 
     prepare: called in each before its first work.
     """
@@ -56,7 +55,7 @@ def process_per_core(
             _start(pool, count)
             yield pool
         except concurrent.futures.BrokenExecutor:
-            # The pool waits for ever for one that was being started while another was killed.
+            # The pool waits forever for a process that was starting while another was killed.
             for child in multiprocessing.active_children():
                 child.kill()
             raise
@@ -64,7 +63,7 @@ def process_per_core(
 
 @contextmanager
 def survivable(folder: Path, again: str) -> Iterator[None]:
-    """Says what to do where somebody, such as a system out of memory, killed a process of ours.
+    """Raise a UserError with the way to go on if a process was killed, such as for lack of memory.
 
     again: the command that goes on.
     """
@@ -87,10 +86,10 @@ def one_per_core(
     prepare: Callable[[], object] | None = None,
     stopped: Callable[[], bool] = lambda: False,
 ) -> list[Done] | None:
-    """What comes of each, in their order; None if it was stopped before all were done.
+    """Return the result of each item, in order; None if stopped before all were done.
 
-    tell: called with how many are done, and of how many. folder, again: see `survivable`. prepare:
-    see `process_per_core`.
+    tell: called with the number done and the total. folder, again: see `survivable`. prepare: see
+    `process_per_core`.
 
     Raises:
       UserError: a process was killed from outside.
@@ -113,10 +112,10 @@ def one_per_core(
 
 
 def _start(pool: concurrent.futures.Executor, count: int) -> None:
-    """All processes at once, so that none is started later while another is killed.
+    """Start all processes at once, so that none starts later while another is killed.
 
-    Who loses one closes the pool's queues. One that is being started then meets a closed handle
-    (OSError), or its number taken by another file (ValueError).
+    A pool that loses a process closes its queues. A process being started then meets a closed
+    handle (OSError), or its number taken by another file (ValueError).
     """
     try:
         for _ in range(count):

@@ -1,21 +1,21 @@
-"""The one error that a user's mistake raises, and the words it is made of."""
+"""Error for a user's mistake, and helpers for its message."""
 
 import difflib
 from collections.abc import Iterable, Sequence
 
 INTERRUPTED = 130
-"""Exit code of a run that the user interrupted."""
+"""Exit code of a run interrupted by the user."""
 
 
 class UserError(Exception):
-    """A mistake in what the user gave: one sentence that names the thing and the way out.
+    """Mistake in the user's input: one sentence that names the thing and the way out.
 
     The command line exits with code 2.
     """
 
 
 class NotLoaded(UserError):
-    """A controller or a task that is code of the user's own and was not named on the command line.
+    """User-defined controller or task that was not named on the command line.
 
     options: words that name all such code of a run; empty where no run is known.
     """
@@ -26,7 +26,7 @@ class NotLoaded(UserError):
 
 
 def not_loaded(kind: str, name: str) -> NotLoaded:
-    """Return the error of a controller or a task that was not named."""
+    """Return the error for a controller or a task that was not named."""
     return NotLoaded(
         f'the {kind} is "{name}", which is no part of this program; code is never loaded from a '
         f"run folder or a settings file: name it with --{kind} FILE.py:CLASS"
@@ -34,7 +34,7 @@ def not_loaded(kind: str, name: str) -> NotLoaded:
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """` (did you mean "x"?)`, or the list of what is known when nothing is near."""
+    """Return ` (did you mean "x"?)`, or the list of known words when none is near."""
     names = sorted(known)
     near = difflib.get_close_matches(word, names, n=1, cutoff=0.6)
     if near:

@@ -1,6 +1,4 @@
-"""Files that may be damaged or a stranger's, read within bounds; and files that are written whole or
-not at all.
-"""
+"""Bounded reading of files that may be damaged or untrusted, and atomic writing of files."""
 
 import contextlib
 import errno
@@ -15,18 +13,18 @@ from typing import Any
 from mjxgait.errors import UserError
 
 MOST_TEXT, MOST_LINES = 50_000_000, 400_000_000
-"""Bytes of a text file, and of one with a line for each generation."""
+"""Size limits, bytes: of a text file, and of one with a line for each generation."""
 TAKE_OUT = "take the line out, or the file away"
 MOST_DEPTH = 60
-"""Tables and lists within each other."""
+"""Limit on the nesting of tables and lists."""
 UNSHOWN = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff]")
-"""Control codes, which a terminal obeys, and halves of characters, which it cannot be given."""
+"""Control codes, which a terminal obeys, and lone surrogates, which it cannot print."""
 MOST_WHOLE = 2**64
-"""No whole number of ours is larger; one that is has no float."""
+"""Limit on whole numbers: ours are smaller; a larger one may have no float."""
 
 
 class DamagedFile(UserError):
-    """A file that is there and does not hold what it should."""
+    """File that exists but has invalid content."""
 
 
 def read_bytes(path: Path, most: int = MOST_TEXT) -> bytes:
@@ -38,7 +36,7 @@ def read_bytes(path: Path, most: int = MOST_TEXT) -> bytes:
       UserError: it is missing, no regular file, too large or cannot be read.
     """
     try:
-        # Without O_NONBLOCK the opening of a pipe waits for somebody to write into it.
+        # Without O_NONBLOCK, opening a pipe waits for a writer.
         number = os.open(
             path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
         )
@@ -66,18 +64,18 @@ def read_text(path: Path, most: int = MOST_TEXT) -> str:
 
 
 def read_json(path: Path, most: int = MOST_TEXT) -> Any:
-    """Return what a JSON file holds.
+    """Return the content of a JSON file.
 
     Raises:
-      UserError: see `read_text`; or it is no JSON, or none of ours (`check_tree`).
+      UserError: see `read_text`; or it is no JSON, or refused by `check_tree`.
     """
     return _parsed(read_text(path, most), str(path))
 
 
 def read_lines(path: Path, most: int = MOST_LINES) -> list[dict[str, Any]]:
-    """Return the objects of a file with one in each line; none where there is no file.
+    """Return the objects of a file with one in each line; an empty list if there is no file.
 
-    A last line that was cut off by a kill is left out.
+    A last line cut off by a kill is left out.
 
     Raises:
       UserError: see `read_text`; or a line is no JSON object.
@@ -92,7 +90,7 @@ def read_lines(path: Path, most: int = MOST_LINES) -> list[dict[str, Any]]:
 
 
 def check_tree(value: Any) -> None:
-    """Refuse nested tables and lists that nothing of ours writes.
+    """Refuse nested tables and lists that this program never writes.
 
     Raises:
       ValueError: too deep, a whole number too large, or text that cannot be shown.
@@ -117,21 +115,21 @@ def check_tree(value: Any) -> None:
 
 
 def write_bytes(path: Path, data: bytes) -> None:
-    """Write a file in one go: it is either the old one or the new one."""
+    """Write a file atomically: it holds either the old content or the new."""
     with replaced(path) as beside:
         beside.write_bytes(data)
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file in UTF-8 in one go; see `write_bytes`."""
+    """Write a text file in UTF-8 atomically; see `write_bytes`."""
     write_bytes(path, text.encode("utf-8"))
 
 
 @contextlib.contextmanager
 def replaced(path: Path) -> Iterator[Path]:
-    """Give the path of a file that takes the place of `path` when the block ends without an error.
+    """Yield the path of a file that replaces `path` when the block ends without an error.
 
-    A device or a pipe has no other in its place: it is written itself.
+    A device or a pipe cannot be replaced: it is written directly.
     """
     real = path.resolve()
     if real.exists() and not real.is_file():

@@ -1,8 +1,8 @@
 """Kinds of controllers and of tasks: one object for each, found by its name.
 
-A slice (a folder of `controllers/` or `tasks/`) says in its `__init__.py` which kinds it has. Code of
-the user's own registers the same objects. Parts are imported when they are first used: the reference
-simulator must not import JAX, and JAX takes a second to import.
+The `__init__.py` of a slice (a folder of `controllers/` or `tasks/`) lists its kinds. User-defined
+code registers the same objects. Parts are imported on first use: the reference simulator must not
+import JAX, and JAX takes a second to import.
 """
 
 import dataclasses
@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 from mjxgait.errors import UserError, did_you_mean, not_loaded
 
 Part = Any
-"""An object, or where it is: `module:name` within the slice's folder."""
+"""An object, or its location: `module:name` within the slice's folder."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -25,7 +25,7 @@ class ControllerKind:
     name: as in the settings (`use.controller`).
     home: the slice's package.
     controller: the class that moves bodies in the compiled program, a `Controller`.
-    reference: from creature, champion and step (s) to the same controller in NumPy, a `Twin`.
+    reference: from creature, champion and step (s) to the reference controller in NumPy, a `Twin`.
     serializer: a `Codec`; None writes the genome's arrays as they are.
     report: a `GenomeView`; None shows the arrays as they are.
     grows: whether a genome grows its own body.
@@ -40,7 +40,7 @@ class ControllerKind:
     grows: bool = False
 
     def part(self, name: str) -> Any:
-        """Return one of the parts, imported if need be."""
+        """Return one of the parts, imported if necessary."""
         return _found(self.home, getattr(self, name))
 
 
@@ -52,11 +52,11 @@ class TaskKind:
     home: the slice's package.
     task: the class that is traced into the compiled program, a `Task`.
     criteria: the acceptance criteria, a `Demands`.
-    modular: whether it is for bodies that grow, and for these alone.
+    modular: whether it is only for bodies that grow.
     water: whether these bodies are in water.
-    called: the name that a user gives it; one name may mean one task for a body that is there and
+    called: the user's name for the task; one name may mean one task for a body from a model and
       another for one that grows.
-    tables: of the certificate's settings, those that count for this task alone or for its relatives.
+    tables: tables of the certificate's settings that apply only to this task or related ones.
     """
 
     name: str
@@ -69,17 +69,17 @@ class TaskKind:
     tables: tuple[str, ...] = ()
 
     def part(self, name: str) -> Any:
-        """Return one of the parts, imported if need be."""
+        """Return one of the parts, imported if necessary."""
         return _found(self.home, getattr(self, name))
 
 
 Kind = TypeVar("Kind", ControllerKind, TaskKind)
 _OWN: dict[tuple[str, str], Any] = {}
-"""Kinds of the user's own, by "controller" or "task" and name."""
+"""User-defined kinds, by "controller" or "task" and name."""
 
 
 def register(kind: ControllerKind | TaskKind) -> None:
-    """Add a kind of the user's own for as long as the program runs."""
+    """Add a user-defined kind until the program ends."""
     sort = "controller" if isinstance(kind, ControllerKind) else "task"
     _OWN[sort, kind.name] = kind
 
@@ -102,13 +102,13 @@ def shipped(sort: str) -> Mapping[str, ControllerKind | TaskKind]:
 
 
 def known_controller(name: str) -> ControllerKind | None:
-    """Return a kind of controller, shipped or the user's own; None if there is none of that name."""
+    """Return a kind of controller, shipped or user-defined; None if the name is unknown."""
     found: ControllerKind | None = _OWN.get(("controller", name)) or controllers().get(name)
     return found
 
 
 def known_task(name: str) -> TaskKind | None:
-    """Return a kind of task, shipped or the user's own; None if there is none of that name."""
+    """Return a kind of task, shipped or user-defined; None if the name is unknown."""
     found: TaskKind | None = _OWN.get(("task", name)) or tasks().get(name)
     return found
 
@@ -117,7 +117,7 @@ def controller_kind(name: str) -> ControllerKind:
     """Return a kind of controller.
 
     Raises:
-      UserError: there is none of that name, or it is code that was not named on the command line.
+      UserError: the name is unknown, or it is code that was not named on the command line.
     """
     return known_controller(name) or _refuse("controller", name)
 
@@ -126,19 +126,19 @@ def task_kind(name: str) -> TaskKind:
     """Return a kind of task.
 
     Raises:
-      UserError: there is none of that name, or it is code that was not named on the command line.
+      UserError: the name is unknown, or it is code that was not named on the command line.
     """
     return known_task(name) or _refuse("task", name)
 
 
 def in_water(task: str) -> bool:
-    """Tell whether a task is done in water."""
+    """Tell whether a task takes place in water."""
     kind = known_task(task)
     return kind is not None and kind.water
 
 
 def meant_of_grown(task: str) -> str:
-    """Return the task that a name means to a body that grows."""
+    """Return the task that a name means for a body that grows."""
     called = {kind.called: kind.name for kind in tasks().values() if kind.called}
     return called.get(task, task)
 

@@ -1,8 +1,8 @@
-"""How a process of our own is started: never with code of the folder that the user stands in.
+"""Start of the program's own processes, without code from the current folder.
 
 Python puts the current folder, or the folder of the script, first on the path of modules; a file
-`json.py` there would be run in place of Python's own. `-P` leaves it out, and `PYTHONSAFEPATH` does
-so for processes that are started further down.
+`json.py` there would run in place of Python's own. `-P` leaves it out, and `PYTHONSAFEPATH` does so
+for processes started further down.
 """
 
 import os
@@ -14,18 +14,18 @@ SAFE_PATH = {"PYTHONSAFEPATH": "1"}
 
 
 def python_command(module: str, *words: str) -> list[str]:
-    """Return the command that runs a module of ours in a new process."""
+    """Return the command that runs a module of this package in a new process."""
     return [sys.executable, "-P", "-m", module, *words]
 
 
 def safe_environment() -> dict[str, str]:
-    """Return the environment of a new process of ours."""
+    """Return the environment of a new process."""
     return {**os.environ, **SAFE_PATH}
 
 
 @contextmanager
 def environment(values: Mapping[str, str]) -> Iterator[None]:
-    """Set variables of the environment as long as the block lasts."""
+    """Set environment variables for the duration of the block."""
     before = {name: os.environ.get(name) for name in values}
     os.environ.update(values)
     try:

@@ -1,4 +1,4 @@
-"""Shapes and the pytrees that rooms hand to each other.
+"""Pytrees that packages exchange, and the letters of their shapes.
 
 Letters used in every shape: `P` population, `N` individuals being evaluated, `R` starts per
 individual, `L` lanes (simulations in flight), `K` key poses, `J` actuated joints, `G` watched geoms
@@ -13,28 +13,27 @@ import numpy as np
 
 T = TypeVar("T")
 Number = jax.Array | np.ndarray
-"""A constant of the program where it is of NumPy."""
+"""A NumPy array is a constant of the program."""
 
 
 @dataclass_transform(frozen_default=True)
 def pytree(cls: type[T]) -> type[T]:
-    """Makes a class a frozen dataclass that JAX treats as a pytree."""
+    """Make a class a frozen dataclass that JAX treats as a pytree."""
     return jax.tree_util.register_dataclass(dataclasses.dataclass(frozen=True)(cls))
 
 
 @pytree
 class BodyState:
-    """All that the physics carries from one step to the next.
+    """State that the physics carries from one step to the next.
 
     qpos: [nq] m, rad, unit quaternion.
     qvel: [nv] m/s, rad/s.
     warmstart: [nv] previous acceleration, where the contact solver starts.
     constraint_force: [nv] N, N·m; generalised force of the previous contact solve.
     friction: [] factor on the floor's sliding friction.
-    parameters: the numbers of this lane's own body, as `Plant.parameters_of` reads them; None
-      where it has the plant's.
-    ground: a `Ground`, what this lane's creature walks on; None for the plane z = 0, which costs
-      nothing.
+    parameters: this lane's own body parameters, as from `Plant.parameters_of`; None where the
+    plant's apply.
+    ground: a `Ground` under this lane's creature; None for the plane z = 0, which costs nothing.
     """
 
     qpos: jax.Array
@@ -48,7 +47,7 @@ class BodyState:
 
 @pytree
 class Sensed:
-    """What a controller and the fitness may know of one moment.
+    """Quantities of one moment that a controller and the fitness may use.
 
     joint_pos, joint_vel: [J] rad, rad/s.
     bias: [nv] Coriolis and gravity less passive forces (`C` of stable PD).
@@ -57,11 +56,16 @@ class Sensed:
     geom_pos: [G, 3] m, centres of the watched geoms. geom_low: [G] m, height of their lowest points
     above the ground under them.
     floor: [] m, height of the ground under the trunk; None where it is the plane z = 0.
-    middle: [3] m, of all mass; momentum: [3] kg·m/s of all; washed: [3] N, what the water does to it
-    as a whole, 0 where there is none; past: [] rad, how far the hinge that is furthest past its range
-    is past it; sunk: [] how deep the block that is deepest in the ground is in it, of its size (the
-    cube root of its volume), negative where all are above; geom_rot: [G, 3, 3], rows are the own axes
-    of each watched block in the world, where there is something to see. None of bodies of a model.
+
+    The rest is for modular bodies; None for bodies of a model.
+    middle: [3] m, centre of all mass.
+    momentum: [3] kg·m/s, total.
+    washed: [3] N, total force of the water, 0 where there is none.
+    past: [] rad, largest excess of a hinge beyond its range.
+    sunk: [] depth of the deepest block in the ground, in units of the block's size (the cube root
+    of its volume); negative where all are above.
+    geom_rot: [G, 3, 3], rows are the own axes of each watched block in the world; only where vision
+    needs it.
     """
 
     joint_pos: jax.Array
@@ -84,10 +88,10 @@ class Sensed:
 
 @pytree
 class Judged:
-    """The verdict on N genomes in R trials each.
+    """Results of N genomes in R trials each.
 
-    terms: [N, R, F], of the fitness. outcome: [N, R, O], what a person would measure. failed: [N, R]
-    whether the episode ended early. sim_steps, computed_steps: [].
+    terms: [N, R, F], of the fitness. outcome: [N, R, O], metrics. failed: [N, R] whether the
+    episode ended early. sim_steps, computed_steps: [].
     """
 
     terms: jax.Array
@@ -99,10 +103,10 @@ class Judged:
 
 @pytree
 class Asked:
-    """Which trials of some genomes are to be run, and what is known of the others.
+    """Trials of some genomes to run, and the known results of the others.
 
-    wanted: [B, N, R]. known: leaves [B, N, R, ...], NaN where nothing is; its steps, [B], are those
-    that have been spent on them.
+    wanted: [B, N, R]. known: leaves [B, N, R, ...], NaN where unknown; its steps, [B], are those
+    spent on them so far.
     """
 
     wanted: Number
@@ -118,52 +122,56 @@ class Plant(Protocol):
 
     @property
     def lane_axis(self) -> int:
-        """Where the axis of the lanes is."""
+        """Position of the axis of the lanes."""
         ...
 
     @property
     def note(self) -> str:
-        """What a user should know about the choice of this plant; empty if nothing."""
+        """Note to the user about the choice of this plant; empty if there is none."""
         ...
 
     def forward(self, state: BodyState) -> tuple[Sensed, Any]:
-        """Position and velocity dependent terms of the current state, and the plant's own
-        workings for the two calls below.
+        """Compute the current state's position and velocity dependent terms.
+
+        Also return the plant's step data (`workings`) for the two calls below.
         """
         ...
 
     def solve_damped(self, workings: Any, damping: jax.Array, force: jax.Array) -> jax.Array:
-        """Accelerations `(M + diag(damping))^-1 force`; damping and force: `[nv]` per lane."""
+        """Return accelerations `(M + diag(damping))^-1 force`; both arguments `[nv]` per lane."""
         ...
 
     def advance(self, state: BodyState, workings: Any, torque: jax.Array) -> BodyState:
-        """The state one `sim_dt` later under applied generalised forces `torque` `[nv]`;
-        friction passes through.
+        """Return the state one `sim_dt` later under applied generalised forces `torque` `[nv]`.
+
+        Friction passes through.
         """
         ...
 
     def overlap(self, state: BodyState) -> jax.Array:
-        """The deepest [] m that parts are in each other, beyond their depth when standing.
+        """Return the deepest overlap [] of parts, m, beyond their overlap when standing.
 
-        Parts that are neighbours do not count; negative where all are apart.
+        Neighbouring parts do not count; negative where all are apart.
         """
         ...
 
 
 class ModelPlant(Plant, Protocol):
-    """The physics of one creature's model, whose numbers may be others."""
+    """Physics of one creature's model with replaceable parameters."""
 
     @property
     def parameters(self) -> Any:
-        """The numbers of the body that all lanes have: the plant's own pytree, without lanes.
+        """Parameters of the body that all lanes have: the plant's own pytree, without lanes.
 
         They are constants of the program, or its inputs (`with_parameters`). A `BodyState` with
-        parameters has its own instead.
+        parameters uses those instead.
         """
         ...
 
     def parameters_of(self, model: Any, layout: Any, crossings: Any = None) -> Any:
-        """The numbers of another body of the same topology, from what this plant was made of.
+        """Return the parameters of another body of the same topology.
+
+        model, layout, crossings: the other body's, as in the construction of this plant.
 
         Raises:
           OtherTopology: more than numbers differs; the message says what.
@@ -171,21 +179,21 @@ class ModelPlant(Plant, Protocol):
         ...
 
     def with_parameters(self, parameters: Any) -> Self:
-        """The plant of another body: constants as `parameters_of` reads them, or traced arrays."""
+        """Return the plant of another body: constants as from `parameters_of`, or traced arrays."""
         ...
 
     def heavier(self, parameters: Any, factor: Number) -> Any:
-        """One body's numbers with its masses and inertias times factor, [] or [nbody - 1].
+        """Return one body's parameters with masses and inertias times factor, [] or [nbody - 1].
 
-        What follows from them (the weights of constraints) is computed anew.
+        Dependent numbers (the weights of constraints) are computed anew.
         """
         ...
 
     def resized(self, parameters: Any, factor: Number) -> Any:
-        """One body's numbers with each part's lengths times factor [nbody - 1], its mass times the
-        third power and its inertia times the fifth (`creature.scale`).
+        """Return one body's parameters with each part's lengths times factor [nbody - 1].
 
-        Weights of constraints are computed anew. The depth at which two bars may stand is scaled
+        Its mass is scaled by the third power and its inertia by the fifth (`creature.scale`).
+        Weights of constraints are computed anew. The allowed standing overlap of two bars is scaled
         by the mean of their factors.
         """
         ...

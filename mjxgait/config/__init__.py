@@ -1,2 +1,1 @@
-"""What a run can be told: the settings, how files lay them over each other, and what of them the
-compiled program reads."""
+"""Settings of a run: schema, layers of files, and the part that the compiled program reads."""

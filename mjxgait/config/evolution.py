@@ -1,4 +1,4 @@
-"""The genetic algorithm's settings, as frozen dataclasses."""
+"""Settings of the genetic algorithm, as frozen dataclasses."""
 
 import dataclasses
 from typing import Annotated, Literal
@@ -21,22 +21,19 @@ from mjxgait.config.tables import (
 
 @dataclasses.dataclass(frozen=True)
 class ForcedConfig:
-    """Forced evolution: a spell of rapid mutation and newcomers when growth stalls.
+    """Forced evolution: a phase of rapid mutation and immigrants when growth stalls.
 
     Attributes:
-      enabled: whether there are such spells.
+      enabled: allows forced phases.
       window: generations over which best and mean are watched.
       gain: relative growth below which both have stalled.
-      newcomers: share of new random genomes among a forced generation's offspring, the others
-        are mutants.
-      mutations: how many times each mutant is mutated.
-      accept: quantile of the population's fitness that an offspring must reach to be taken
-        in.
+      newcomers: share of new random genomes among a forced generation's offspring, the others are
+        mutants.
+      mutations: number of mutations of each mutant.
+      accept: quantile of the population's fitness that an offspring must reach to be accepted.
       refresh: share of the population to replace.
-      limit: generations a spell lasts at most; 0 lets it last until the population is
-        refreshed.
-      patience: spells in a row without a better best after which the run stops; 0 never stops
-        it.
+      limit: longest phase, in generations; 0 lets it last until the population is refreshed.
+      patience: phases in a row without a better best after which the run stops; 0 never stops it.
     """
 
     __pydantic_config__ = STRICT
@@ -53,56 +50,53 @@ class ForcedConfig:
 
 @dataclasses.dataclass(frozen=True)
 class EvolutionConfig:
-    """The genetic algorithm; `mjxgait/evolution/breeding.py` says how parents and children are drawn.
+    """Genetic algorithm; see `mjxgait/evolution/breeding.py` for draws of parents and children.
 
     Attributes:
-      population: P, individuals that live from one generation to the next.
-      generations: cap on the generations of a run.
+      population: P, individuals that survive from one generation to the next.
+      generations: maximum number of generations.
       target: fitness at which a run stops.
       growth: the population grows to this multiple of P, then is culled back to P.
       pose_range: share of each joint's pose range, about its middle, in which key poses lie.
-      pose_span: deg; width of every hinge's pose range, about its middle in creature.toml, as
-        far as the joint's range in creature.xml allows; 0 leaves the ranges of creature.toml.
+      pose_span: deg; width of every hinge's pose range, about its middle in creature.toml, as far
+        as the joint's range in creature.xml allows; 0 keeps the ranges of creature.toml.
       initial: uniform draws or a Latin hypercube.
-      initial_spread: share of each gene's range, about its middle, in which the first genomes
-        lie.
-      initial_choice: so many are drawn and judged for each place of the first generation.
+      initial_spread: share of each gene's range, about its middle, in which the first genomes lie.
+      initial_choice: genomes drawn and evaluated for each place of the first generation.
       selection: how parents are drawn: any, by rank, or the best of some rivals.
-      rivals: of a tournament.
-      proportional: parents are drawn in proportion to their fitness instead.
+      rivals: tournament size.
+      proportional: draws parents in proportion to their fitness instead.
       crossover: share of offspring with two parents, the others have one.
       crossing: `permute` draws K poses from the parents' 2K in any order (Wilson); `align` leaves
         each pose in its place; `mixed` is one or the other for each child.
       permuted: share of `mixed` crossovers that permute.
-      pool: whom parents are drawn from: last generation's survivors, or `growing`, which also
-        holds the children born so far (they rank last).
-      unique_children: a child that equals somebody of the pool or a sibling is drawn anew
-        before it is simulated.
-      survival: of the `best` of parents and children, or of `children` alone, and the best so
-        far.
-      elite: that share of the population, the best, lives on among the children and is judged
+      pool: source of parents: last generation's survivors, or `growing`, which also holds the
+        children born so far (they rank last).
+      unique_children: redraws a child that equals a member of the pool or a sibling, before it is
+        simulated.
+      survival: the `best` of parents and children survive, or the `children` and the best so far.
+      elite: share of the population, the best, that survives among the children and is evaluated
         with them, for survival of children.
-      remember: whether their earlier rounds count as well: the mean of all rounds is what those
-        are worth that are judged once more.
-      mutation: `redraw` re-draws two joints of one pose, `single` one joint, `pose` a whole
-        pose, `gaussian` moves every joint of one pose by sigma, `mixed` is one or the other
-        of the first and the last. `bit` and `byte` read the value of one joint as 8 bits over
-        its range and flip one of them, or re-draw all eight, as classic GAs do.
+      remember: the elite's earlier evaluations count too: the fitness is the mean of all rounds.
+      mutation: `redraw` re-draws two joints of one pose, `single` one joint, `pose` a whole pose,
+        `gaussian` moves every joint of one pose by sigma, `mixed` is one or the other of the first
+        and the last. `bit` and `byte` read the value of one joint as 8 bits over its range and flip
+        one of them, or re-draw all eight, as classic GAs do.
       redrawn: share of `mixed` mutations that re-draw.
       mutation_rate: share of offspring mutated.
-      sigma: of the gaussian mutation, in units of the range of each joint.
-      body: how many times larger or smaller the parts below the trunk may become, each
-        mirrored pair by a gene of its own (docs/creature.md); 1 leaves the body as it is.
-      tuning_rate: chance that a tuning gene of a mutated offspring changes; likewise a
-        body's.
-      tuning_sigma: by how much it changes, in units of its range; likewise a body's.
+      sigma: standard deviation of the gaussian mutation, in units of the range of each joint.
+      body: largest factor by which the parts below the trunk may grow or shrink, each mirrored pair
+        by a gene of its own (docs/creature.md); 1 leaves the body unchanged.
+      tuning_rate: chance that a tuning gene of a mutated offspring changes; likewise a body gene.
+      tuning_sigma: size of that change, in units of the gene's range; likewise a body gene's.
       remove_duplicates: of individuals with the same genome only one survives.
-      same: what makes a duplicate: the same `genome`, or the same `verdict` to the bit, for those of
-        which much may do nothing: a child lives in its parent's place. By genome in a spell.
-      lineage: whether a run's metrics tell whose child each is, not of islands.
-      family: of the population, the largest share that descends, mother by mother, from one of the
-        first generation: so that not all become one family.
-      forced: a spell of rapid mutation and newcomers when growth stalls.
+      same: what makes a duplicate: the same `genome`, or the same `verdict` (results) to the bit,
+        for genomes with many neutral genes: a child replaces its parent. By genome in a forced
+        phase.
+      lineage: records in a run's metrics the mother of each child, not for islands.
+      family: largest share of the population that may descend, mother by mother, from one of the
+        first generation: keeps one family from taking over.
+      forced: a phase of rapid mutation and immigrants when growth stalls.
       islands: several such populations that exchange their best (docs/cluster.md).
     """
 
@@ -164,7 +158,7 @@ class EvolutionConfig:
 
     @property
     def follows(self) -> bool:
-        """Whether it is known whose child each is."""
+        """Tell whether mothers are recorded."""
         return self.lineage or self.family < 1
 
     @property
@@ -174,5 +168,5 @@ class EvolutionConfig:
 
     @property
     def elites(self) -> int:
-        """Of the best that are judged again in each generation."""
+        """Number of the best evaluated again in each generation."""
         return max(round(self.elite * self.population), 1) if self.elite else 0

@@ -1,4 +1,4 @@
-"""Several populations of one run that exchange their best."""
+"""Settings of islands: several populations of one run that exchange their best."""
 
 import dataclasses
 from typing import Annotated, Literal
@@ -13,14 +13,14 @@ from mjxgait.config.tables import (
 
 @dataclasses.dataclass(frozen=True)
 class IslandsConfig:
-    """Populations apart from each other, each of the whole `population`, on the same starts.
+    """Separate populations, each of the whole `population`, on the same starts.
 
     Attributes:
-      count: of them; 1 is the plain algorithm.
-      every: generations between exchanges; 0: there are none.
-      migrants: of the best of an island, copied over the worst of another; of all that come to one the
-        best stay, at most half its population.
-      topology: who they go to: the next island of the ring, or all the others.
+      count: number of islands; 1 is the plain algorithm.
+      every: generations between exchanges; 0: none.
+      migrants: best individuals of an island, copied over the worst of another; of all that reach
+        an island the best stay, at most half its population.
+      topology: where they go: to the next island of the ring, or to all the others.
     """
 
     __pydantic_config__ = STRICT
@@ -30,7 +30,7 @@ class IslandsConfig:
     topology: Annotated[Literal["ring", "all"], HOST] = "ring"
 
     def sources(self, island: int) -> list[int]:
-        """Whose migrants come to an island."""
+        """Return the islands that send migrants to an island."""
         if self.topology == "ring":
             return [(island - 1) % self.count] if self.count > 1 else []
         return [other for other in range(self.count) if other != island]

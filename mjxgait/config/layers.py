@@ -1,4 +1,4 @@
-"""How the layers of settings are laid over each other."""
+"""Merging of the layers of settings."""
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
@@ -11,7 +11,7 @@ from mjxgait.config.tables import build, merge, read_toml
 from mjxgait.errors import UserError, did_you_mean
 
 Layer = tuple[str, Mapping[str, Any]]
-"""The name of a source of settings in errors, and its table."""
+"""Name of a source of settings in errors, and its table."""
 Meant = Callable[[UseConfig], UseConfig]
 
 
@@ -25,16 +25,16 @@ def resolve_config(
 ) -> Config:
     """Resolve the layers: `configs/default.toml`, then the creature's `[train]`, then the file.
 
-    A file may begin with `standalone = true`: then nothing but the built-in defaults lies under it.
-    A file or `[train]` may name a `base`, see `over_base`.
-    Tables `[train.task.NAME]` of the creature and `[task.NAME]` of the file hold keys for the task of
-    that name. Each lies over the rest of its layer, and over the table of the task that `like` names.
-    Tables `[creature.NAME]` of the file hold keys for the creature of that name; they lie on top.
-    What default.toml and `[train]` say to a controller or a task that takes no part is left out.
+    A file may begin with `standalone = true`: then only the built-in defaults lie under it. A file
+    or `[train]` may name a `base`, see `over_base`. Tables `[train.task.NAME]` of the creature and
+    `[task.NAME]` of the file hold keys for that task. Each lies over the rest of its layer, and
+    over the table of the task named by `like`. Tables `[creature.NAME]` of the file hold keys for
+    that creature; they lie on top. Keys of default.toml and `[train]` for an unused controller or
+    task are dropped.
 
     Args:
-      use: controller and task, over what the layers say. config_class: the class with their settings.
-      meant: controller and task under the names that the program uses.
+      use: controller and task, over those of the layers. config_class: the class with their
+        settings. meant: controller and task under the names that the program uses.
 
     Raises:
       UserError: names the layer and the key.
@@ -69,7 +69,7 @@ def resolve_config(
 
 
 def over_base(table: Mapping[str, Any], where: str) -> dict[str, Any]:
-    """A table of settings laid over the shipped config that its key `base` names, if it has one.
+    """Merge a table of settings over the shipped config named by its key `base`, if it has one.
 
     Raises:
       UserError: there is no such config.
@@ -86,7 +86,7 @@ def over_base(table: Mapping[str, Any], where: str) -> dict[str, Any]:
 
 
 def _layers_of(tables: Mapping[str, Any], use: UseConfig, meant: Meant, where: str) -> list[Layer]:
-    """Return the layers of the task in `use`: those of each table whose name means this task."""
+    """Return the layers of the task in `use`, from each table whose name means this task."""
     names = [n for n in tables if meant(dataclasses.replace(use, task=n)).task == use.task]
     return [layer for name in names for layer in _tables_of(tables, name, where)]
 
@@ -97,9 +97,9 @@ def _check_other_tasks(
     config_class: Callable[[UseConfig], type[Config]],
     meant: Meant,
 ) -> None:
-    """Check a file's tables of the tasks that take no part, so that a mistake shows in every run.
+    """Check a file's tables of the unused tasks, so that a mistake shows in every run.
 
-    A task of the user's own is known only where it takes part.
+    A user-defined task is known only where it is used.
 
     Raises:
       UserError: names the table and the key.
@@ -119,9 +119,9 @@ def _check_other_tasks(
 
 
 def _tables_of(tables: Mapping[str, Any], task: str, where: str) -> list[Layer]:
-    """Return the layers of a task: its table, over the table of the task that `like` names.
+    """Return the layers of a task: its table, over the table of the task named by `like`.
 
-    where: how the name of each table begins, such as `mine.toml: [task`.
+    where: beginning of each table's name, such as `mine.toml: [task`.
 
     Raises:
       UserError: there is no such table, it is not a table, or it chooses controller or task.
@@ -153,9 +153,9 @@ def _chosen(layers: Sequence[tuple[str, Mapping[str, Any]]], use: Mapping[str, s
 
 
 def _without_absent(layer: Mapping[str, Any], use: UseConfig, meant: Meant) -> dict[str, Any]:
-    """A layer without what it says to a controller or a task that takes no part.
+    """Drop a layer's keys for an unused controller or task.
 
-    It was written for those that it names itself, and else for those of the default.
+    The layer was written for the controller and task that it names, or else for the default ones.
     """
     written = meant(build(UseConfig, layer.get("use", {}), "[use]"))
     absent = {
@@ -167,10 +167,10 @@ def _without_absent(layer: Mapping[str, Any], use: UseConfig, meant: Meant) -> d
 
 @dataclasses.dataclass(frozen=True)
 class _FileLayers:
-    """What a user's file holds.
+    """Content of a user's file.
 
-    general: the layer for all. creature: the layer for the creature at hand. tasks: the tables by
-    task. where: how the names of these tables begin in an error.
+    general: the layer for all creatures. creature: the layer for this run's creature. tasks: the
+    tables by task. where: beginning of these tables' names in an error.
     """
 
     standalone: bool = False
@@ -204,7 +204,7 @@ def _file_layers(file: Path, creature_name: str) -> _FileLayers:
             )
         if not isinstance(own, Mapping):
             raise UserError(f"{path}: creature.{name} = {own!r}: give a table of config keys")
-        # That of the creature at hand is read below, for whoever takes part.
+        # `resolve_config` checks this creature's own, with the controller and task in use.
         if name != creature_name and "use" not in {**general, **own}:
             build(Config, own, f"{path}: [creature.{name}]")
     mine = (f"{path}: [creature.{creature_name}]", creatures.get(creature_name, {}))

@@ -1,4 +1,4 @@
-"""How individuals are judged, as frozen dataclasses."""
+"""Settings of the evaluation of individuals, as frozen dataclasses."""
 
 import dataclasses
 from typing import Annotated, Literal
@@ -25,14 +25,13 @@ GroundText = Annotated[str, pydantic.AfterValidator(check_ground)]
 
 @dataclasses.dataclass(frozen=True)
 class TerminationConfig:
-    """What ends an episode early; a key that is not given is as creature.toml has it.
+    """Conditions that end an episode early; a key that is not given has its value in creature.toml.
 
     Attributes:
-      min_up: cosine of the trunk's tilt below which it has tipped over; -1 never ends an
-        episode.
+      min_up: cosine of the trunk's tilt below which it has tipped over; -1 never ends an episode.
       height: lowest and highest trunk height, in standing heights.
-      touch: whether an episode ends when a part touches the floor that must not. Only then
-        may evolution leave out the contacts of these parts.
+      touch: ends an episode when a part touches the floor that must not. Only then may evolution
+        leave out the contacts of these parts.
     """
 
     __pydantic_config__ = STRICT
@@ -47,43 +46,42 @@ class TerminationConfig:
 
 @dataclasses.dataclass(frozen=True)
 class RolloutConfig:
-    """How individuals are judged.
+    """Evaluation of individuals.
 
     Attributes:
       seconds: length of an episode.
-      starts: R, episodes per individual; the first is nominal, the others are perturbed, the
-        same for all.
-      promote: share of a generation, those who do best in the first start, that is tried in the
-        others too; the rest is dropped. 1 tries everybody in all.
-      step: s of the simulation, of bodies that grow; 0 takes that of creature.xml.
-      variety: so many times as many perturbed starts there are in all; each generation takes
-        the next ones. With more than 1 everybody must be judged anew: `evolution.elite`.
-      joint_noise: rad; half width of the uniform perturbation of each joint at a perturbed
-        start.
+      starts: R, episodes per individual; the first is nominal, the others are perturbed, the same
+        for all.
+      promote: share of a generation, the best in the first start, that runs the other starts too;
+        the rest is dropped. 1 runs all individuals in all starts.
+      step: s; simulation step of bodies that grow; 0 takes that of creature.xml.
+      variety: multiple of the perturbed starts to draw in all; each generation takes the next ones.
+        Above 1 every individual must be evaluated anew: `evolution.elite`.
+      joint_noise: rad; half width of the uniform perturbation of each joint at a perturbed start.
       velocity_noise: rad/s; the same for the speeds of the joints.
       friction: range of the factor on the floor's friction.
       push: sudden change of the trunk's horizontal velocity at a random moment of a perturbed
         start, in units of sqrt(g * hip height).
-      gains: half width of the uniform change of each joint's kp and kd in a perturbed start,
-        as a share.
-      masses: the same for each part's mass and inertia, which then differ from lane to lane;
-        a step costs a third more (docs/performance.md).
-      latency: most control steps by which the torques of a perturbed start come late.
-      slope: deg; the ground of a perturbed start slopes by so much at most, to any side. Not with a
+      gains: half width of the uniform change of each joint's kp and kd in a perturbed start, as a
+        share.
+      masses: the same for each part's mass and inertia, which then differ from lane to lane; a step
+        costs a third more (docs/performance.md).
+      latency: most control steps by which the torques of a perturbed start are delayed.
+      slope: deg; largest slope of the ground in a perturbed start, to any side. Not with a
         `ground`, which all starts have.
-      rough: hip heights; that ground rises and falls by so much besides.
-      terminate: whether an episode ends when the creature falls; if not, its whole body meets
-        the floor.
-      termination: what counts as falling, where it differs from creature.toml.
+      rough: hip heights; largest rise and fall of that ground, on top of the slope.
+      terminate: ends an episode when the creature falls; otherwise its whole body collides with the
+        floor.
+      termination: definition of a fall, where it differs from creature.toml.
       worst: share of the worst start in the score; the mean of the starts has the rest.
-      caution: standard errors of its starts' mean by which the score is less: who was lucky on few
-        is not believed as one that did well on many.
-      physics: auto takes this program's own step, and MJX for a model that it does not know; mjx
-        always takes MJX. Both give the same motion within tolerances (docs/performance.md).
+      caution: standard errors of its starts' mean subtracted from the score: discounts luck on few
+        starts.
+      physics: auto takes this program's own step, and MJX for a model outside that step's scope;
+        mjx always takes MJX. Both give the same motion within tolerances (docs/performance.md).
       lanes: simulations in flight per device; 0 lets the program choose.
-      block: individuals that a machine of a cluster judges at once, at most (docs/cluster.md).
-      body: its numbers are constants of the compiled program, which is faster, or inputs:
-        then another body of the same make-up needs no compilation.
+      block: most individuals that a machine of a cluster evaluates at once (docs/cluster.md).
+      body: its parameters are constants of the compiled program, which is faster, or inputs: then
+        another body of the same topology needs no compilation.
       ground: flat, slope:0.1, steps:0.05, bumps:0.05 or rough:0.05, in hip heights
         (docs/ground.md).
     """
@@ -121,10 +119,10 @@ class RolloutConfig:
 
     @property
     def promotes(self) -> bool:
-        """Whether not everybody is tried in all starts."""
+        """Tell whether only a share of the individuals runs all starts."""
         return self.promote < 1 and self.starts > 1
 
     @property
     def uneven(self) -> bool:
-        """Whether perturbed starts have uneven ground of their own."""
+        """Tell whether perturbed starts have uneven ground of their own."""
         return bool(self.slope or self.rough)

@@ -1,4 +1,4 @@
-"""Everything a run can be told, as frozen dataclasses."""
+"""Settings of a run, as frozen dataclasses."""
 
 import dataclasses
 from typing import Annotated, Literal
@@ -20,25 +20,25 @@ from mjxgait.tasks.walk.config import WalkConfig
 
 @dataclasses.dataclass(frozen=True)
 class ExaminationConfig:
-    """Who is chosen for the examination in C MuJoCo that ends a run.
+    """Choice of the champion for the final examination in C MuJoCo.
 
     Attributes:
-      every: generations between looks on the way at the best, if it is promising; 0 examines only
-        after the last generation.
-      enough: margin on the draw to choose on that leads to an examination in the first half of the
+      every: generations between checks of the best during the run, if it is promising; 0 examines
+        only after the last generation.
+      enough: margin on the selection draw that leads to an examination in the first half of the
         generations; in the second any pass does.
-      draws: perturbed starts, and as many pushes, to choose on; the examination draws others.
-      caution: standard errors by which the shares on that draw count less: the champion that is
-        chosen by them is often a lucky one.
-      attempts: examinations of a run, the one at its end included.
-      candidates: so many of the best, different from each other, are looked at in the end, until
-        one has enough margin; 0 leaves all examinations out.
-      on_the_way: so many of them are looked at on the way. With few starts in each generation the
+      draws: perturbed starts, and as many pushes, for selection; the examination draws others.
+      caution: standard errors subtracted from the shares on that draw: the champion selected by
+        them is often a lucky one.
+      attempts: examinations of a run, the final one included.
+      candidates: number of the best, different from each other, validated at the end, until one has
+        enough margin; 0 leaves all examinations out.
+      on_the_way: number of them validated during the run. With few starts in each generation the
         first is often the luckiest.
-      tryout: so many starts on which all candidates are tried in evolution's physics before one is
-        looked at, the best first; 0 takes them by their fitness.
+      tryout: starts on which all candidates run in evolution's physics before one is validated, the
+        best first; 0 takes them by their fitness.
       difference: in units of each gene's range, root mean square; what counts as different.
-      level: what ends a run early: one that walks by the certificate, or that walks anywhere
+      level: what ends a run early: a walk that passes the certificate, or one that walks anywhere
         (docs/certificate.md).
     """
 
@@ -57,7 +57,7 @@ class ExaminationConfig:
 
 @dataclasses.dataclass(frozen=True)
 class UseConfig:
-    """Who takes part.
+    """Controller and task of a run.
 
     Attributes:
       controller: what moves the creature: poses, program (docs/programs.md), brain
@@ -73,20 +73,20 @@ class UseConfig:
 
 @dataclasses.dataclass(frozen=True)
 class Config:
-    """A run's settings.
+    """Settings of a run.
 
     Attributes:
-      seed: Of all randomness.
-      checkpoint_every: Generations between checkpoints, which is what a killed run loses at
-        most; the latest three stay.
+      seed: Random seed.
+      checkpoint_every: Generations between checkpoints, the most that a killed run loses; the
+        latest three stay.
       keep_every: Checkpoints of generations that are a multiple of this are kept for good.
-      use: Who takes part.
-      controller: What moves the creature.
-      drive: How the joints' motors follow.
-      rollout: How individuals are judged.
-      fitness: What is wanted of them.
+      use: Controller and task.
+      controller: Controller settings.
+      drive: Motor settings.
+      rollout: Evaluation of individuals.
+      fitness: Fitness terms and their weights.
       evolution: The genetic algorithm.
-      examination: Who is examined.
+      examination: Choice of the champion to examine.
     """
 
     __pydantic_config__ = STRICT
@@ -110,6 +110,6 @@ class Config:
 
     @property
     def wish(self) -> dict[str, float | str]:
-        """What is asked of a walk, by name; of who does something else nothing can be."""
+        """Walk targets by name; empty for tasks other than walk."""
         asked = getattr(self.fitness, "wish", None)
         return asked.table if asked is not None else {}

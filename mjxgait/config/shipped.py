@@ -1,4 +1,4 @@
-"""Where the creatures and configs lie that come with the program."""
+"""Locations of the shipped creatures and configs."""
 
 from importlib import resources
 from pathlib import Path
@@ -8,34 +8,34 @@ from mjxgait.errors import UserError, did_you_mean
 
 
 def data_folder(kind: Literal["envs", "configs"]) -> Path:
-    """Where the shipped creatures or configs lie: inside the installed package, or beside it in a checkout."""
+    """Return the folder of shipped creatures or configs: in the package or in the checkout."""
     package = Path(str(resources.files("mjxgait")))
     packaged = package / "data" / kind
     return packaged if packaged.is_dir() else package.parent / kind
 
 
 def install_command(extra: str) -> str:
-    """Return the command that installs an extra, of the package or of the checkout that runs."""
+    """Return the command that installs an extra, of the package or of the checkout in use."""
     checkout = Path(str(resources.files("mjxgait"))).parent
     if not (checkout / "pyproject.toml").is_file():
         return f'pip install "mjxgait[{extra}]"'
-    # Editable: a plain install would put a copy of the package in the place of the checkout.
+    # Editable: a plain install would replace the checkout by a copy of the package.
     place = "." if checkout.resolve() == Path.cwd().resolve() else checkout
     return f'pip install -e "{place}[{extra}]"'
 
 
 def shipped_creatures() -> list[str]:
-    """Names of the creatures that come with the program."""
+    """Return the names of the shipped creatures."""
     return sorted(path.parent.name for path in data_folder("envs").glob("*/creature.toml"))
 
 
 def shipped_configs() -> list[str]:
-    """Names of the configs that come with the program."""
+    """Return the names of the shipped configs."""
     return sorted(path.stem for path in data_folder("configs").glob("*.toml"))
 
 
 def find_creature(name: str) -> Path:
-    """The folder of a shipped creature, or the folder at a path.
+    """Return the folder of a shipped creature, or the folder at a path.
 
     Raises:
       UserError: lists the known creatures.

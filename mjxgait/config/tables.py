@@ -1,4 +1,7 @@
-"""Strict reading of TOML tables into frozen dataclasses: unknown keys, wrong types and bad ranges are named, none is dropped in silence."""
+"""Strict reading of TOML tables into frozen dataclasses.
+
+Unknown keys, wrong types and bad ranges are errors that name the key; none is dropped silently.
+"""
 
 import dataclasses
 import reprlib
@@ -35,40 +38,38 @@ def _ordered(interval: tuple[float, float]) -> tuple[float, float]:
 Interval = Annotated[tuple[Finite, Finite], pydantic.AfterValidator(_ordered)]
 
 SHAPE = "shape"
-"""Marks what decides the shape of the compiled program; every other number or choice is a value
-that the program is handed.
-"""
+"""Marks a setting that decides the shape of the compiled program; all others are its inputs."""
 
 KIND = "kind"
-"""Marks a text of which only what stands before the first colon shapes the compiled program."""
+"""Marks a text that shapes the compiled program only by its part before the first colon."""
 
 HOST = "host"
-"""Marks what only the host reads, never the compiled program."""
+"""Marks a setting that only the host reads, never the compiled program."""
 
 MOST_TOML = 8_000_000
-"""Bytes of a file."""
+"""Size limit of a file, bytes."""
 Number = Annotated[float, pydantic.Field(strict=True)]
 Text = pydantic.StrictStr
 Flag = pydantic.StrictBool
 Index = Annotated[int, pydantic.Field(strict=True, ge=0)]
-"""What the schemas of files that a program wrote are made of: no text stands for a number."""
+"""Types for schemas of files written by a program: they never read a number from text."""
 STORED = pydantic.ConfigDict(extra="ignore")
-"""What a schema of such a file names as its `__pydantic_config__`: keys may be added to it."""
+"""`__pydantic_config__` of a schema of such a file: keys may be added to it."""
 
 UNKNOWN = "unexpected_keyword_argument"
 STRICT = pydantic.ConfigDict(extra="forbid")
-"""What a dataclass read by `build` names as its `__pydantic_config__`."""
+"""`__pydantic_config__` of a dataclass read by `build`."""
 
 
 @dataclasses.dataclass(frozen=True)
 class NoSettings:
-    """Of a part that has none."""
+    """Settings of a part that has none."""
 
     __pydantic_config__ = STRICT
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """The table in a TOML file; UserError names the file and the line of what is wrong."""
+    """Return the table in a TOML file; UserError names the file and the faulty line."""
     text = read_text(path, MOST_TOML)
     try:
         table = tomllib.loads(text)
@@ -79,12 +80,12 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 
 def dump_toml(value: Any) -> str:
-    """TOML text of a dataclass; keys that are None are left out."""
+    """Return the TOML text of a dataclass; keys that are None are left out."""
     return tomli_w.dumps(_without_none(dataclasses.asdict(value)))
 
 
 def merge(base: Table, over: Table) -> dict[str, Any]:
-    """`base` with the keys of `over` laid on top, table by table."""
+    """Return `base` with the keys of `over` laid on top, table by table."""
     merged = dict(base)
     for key, value in over.items():
         old = merged.get(key)
@@ -95,25 +96,26 @@ def merge(base: Table, over: Table) -> dict[str, Any]:
 
 
 def build(cls: type[T], table: Table, where: str) -> T:
-    """`cls` (a dataclass, nested ones included) from a table.
+    """Build `cls` (a dataclass, nested ones included) from a table.
 
     Args:
-      where: what to call the source in errors, such as `configs/mine.toml`.
+      where: name of the source in errors, such as `configs/mine.toml`.
 
     Raises:
-      UserError: names the first key that is unknown, missing, of a wrong type or out of range, and what it may be.
+      UserError: names the first key that is unknown, missing, of a wrong type or out of range, and
+        the allowed values.
     """
     try:
         return _adapter(cls).validate_python(dict(table))  # type: ignore[arg-type]
     except pydantic.ValidationError as error:
         problems = error.errors(include_url=False)
-        # A misspelt key is also a missing one: the misspelling is what the user can mend.
+        # A misspelt key is also a missing one: report the misspelling, which the user can correct.
         problems.sort(key=lambda problem: problem["type"] != UNKNOWN)
         raise UserError(f"{where}: {_sentence(cls, problems[0])}") from None
 
 
 def check(cls: type, document: Any, where: str, cure: str) -> None:
-    """Refuse a document that a program wrote and that is not as the schema `cls` says.
+    """Refuse a document written by a program that violates the schema `cls`.
 
     Args:
       cure: the way out.
@@ -130,7 +132,7 @@ def check(cls: type, document: Any, where: str, cure: str) -> None:
 
 
 def check_whole(value: Any, table: Table, where: str) -> None:
-    """Refuse a table that lacks keys which `dump_toml` writes of the dataclass it was read into.
+    """Refuse a table that lacks keys which `dump_toml` writes for the dataclass read from it.
 
     Raises:
       UserError: names the first.
@@ -156,7 +158,7 @@ def _missing(wanted: Table, table: Table, prefix: str = "") -> str | None:
 
 @cache
 def _adapter(cls: type) -> pydantic.TypeAdapter:
-    """What checks tables for a dataclass; to make one takes longer than to use it."""
+    """Return the validator of a dataclass, cached: making one takes longer than using it."""
     return pydantic.TypeAdapter(cls)
 
 
@@ -175,7 +177,7 @@ def _sentence(cls: type, problem: Mapping[str, Any]) -> str:
 
 
 def _keys(cls: type, parents: list[str]) -> list[str]:
-    """Names of the fields of the dataclass at a dotted place within `cls`."""
+    """Return the names of the fields of the dataclass at a dotted place within `cls`."""
     for name in parents:
         fields = {field.name: field for field in dataclasses.fields(cls)}
         if name in fields:
@@ -202,7 +204,7 @@ def _without_none(value: Any) -> Any:
 
 
 def flat(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """The leaves of nested tables by dotted key; tuples as lists, as TOML and JSON have them."""
+    """Return the leaves of nested tables by dotted key; tuples as lists, as in TOML and JSON."""
     leaves: dict[str, Any] = {}
     for key, value in table.items():
         if isinstance(value, Mapping):

@@ -1,8 +1,8 @@
-"""The config as the compiled program reads it: a pytree whose leaves are its numbers and choices.
+"""Config as the compiled program reads it: a pytree with its numbers and choices as leaves.
 
-Its structure is what decides the shape of the program: two configs of the same structure run in the same compiled program, and many of
-them can be stacked and run side by side. Nothing is compiled anew because a weight or a rate has changed, but for a weight
-by which there is a term or none.
+Its structure decides the shape of the program. Configs of the same structure run in the same
+compiled program, and many of them can be stacked and run side by side. A changed weight or rate
+compiles nothing anew, except a weight marked `SHAPE`: its zero removes a term.
 """
 
 import dataclasses
@@ -18,7 +18,7 @@ from mjxgait.types import pytree
 
 @pytree
 class Choice:
-    """One of some named options, as the program sees it: index: []."""
+    """One of several named options in the compiled program. index: []."""
 
     index: jax.Array
     options: tuple[str, ...] = dataclasses.field(metadata={"static": True})
@@ -26,7 +26,7 @@ class Choice:
 
 @dataclasses.dataclass(frozen=True)
 class HostOnly:
-    """In the place of a setting that the compiled program must not read: it is no number and no truth."""
+    """Placeholder for a setting that the compiled program must not read as number or condition."""
 
     name: str
 
@@ -35,14 +35,14 @@ class HostOnly:
 
 
 def chosen(value: Any, option: str) -> jax.Array:
-    """Whether [] a choice of the config, plain or traced, is this option."""
+    """Tell whether [] a choice of the config, plain or traced, is this option."""
     if isinstance(value, Choice):
         return value.index == value.options.index(option)
     return jnp.asarray(value == option)
 
 
 def traced(config: Config) -> Config:
-    """The config with arrays as numbers and `Choice` as choices; what only the host reads is not in it."""
+    """Return the config with arrays for numbers and `Choice` for choices, without host settings."""
     return _traced(config)
 
 
@@ -57,7 +57,7 @@ def _traced(config: Any) -> Any:
         elif role is SHAPE:
             values[field.name] = value
         elif value is None:
-            # Not asked for: the program has no place for it.
+            # Not requested: the program has no input for it.
             values[field.name] = None
         elif role is KIND:
             values[field.name] = value.split(":")[0]
@@ -77,7 +77,10 @@ def _leaf(value: Any, hint: Any) -> Any:
 
 
 def _fields(cls: type) -> list[tuple[Any, Any, str]]:
-    """Each field of a config class with its type and its role: `SHAPE`, `KIND`, `HOST`, or empty for a value of the program."""
+    """Return each field of a config class with its type and role.
+
+    The role is `SHAPE`, `KIND`, `HOST`, or empty for an input of the program.
+    """
     hints = get_type_hints(cls, include_extras=True)
     rows = []
     for field in dataclasses.fields(cls):
@@ -95,7 +98,7 @@ _REGISTERED: set[type] = set()
 
 
 def register(cls: type) -> None:
-    """Makes a config class, and those within it, pytrees."""
+    """Register a config class, and those within it, as pytrees."""
     if cls in _REGISTERED:
         return
     _REGISTERED.add(cls)

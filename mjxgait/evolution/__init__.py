@@ -1,1 +1,1 @@
-"""Evolution: whom to try next, and who survives."""
+"""Evolution: proposal of genomes and selection of survivors."""

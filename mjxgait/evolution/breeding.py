@@ -1,9 +1,9 @@
-"""Who has children with whom, and children born one after another.
+"""Parent selection, and sequential breeding.
 
-One after another, as in the thesis: "Two parent genomes were chosen randomly from the population
+Sequential breeding follows the thesis: "Two parent genomes were chosen randomly from the population
 and their pose combinations were permuted to produce unique children. The parents and children were
-all returned into the population" (Wilson, 3.5): a child may have an elder one as its parent, and
-none is like anybody before it.
+all returned into the population" (Wilson, 3.5). A child may have an elder sibling as its parent,
+and each child differs from every genome before it.
 """
 
 import dataclasses
@@ -17,19 +17,16 @@ from mjxgait.config.traced import chosen
 from mjxgait.evolution.variation import Variation
 
 TRIES = 16
-"""Drawings of a child that must be new; if all bring somebody who is there, the first is
-mutated.
-"""
+"""Draws of a child that must be new; if all give existing genomes, the first is mutated."""
 
 
 def parents(
     key: jax.Array, count: int, population: jax.Array | int, selection: Any, rivals: int = 2
 ) -> tuple[jax.Array, jax.Array]:
-    """Places [count] of mothers and fathers in a population sorted best first; never the same
-    individual twice.
+    """Draw places [count] of mothers and fathers in a population sorted best first.
 
-    `uniform` draws all alike; `rank` falls linearly to zero with rank (Baker 1985, pressure 2);
-    `tournament` takes the best of so many rivals.
+    The two parents are never the same individual. `uniform` draws all alike; `rank` falls linearly
+    to zero with rank (Baker 1985, pressure 2); `tournament` takes the best of `rivals`.
     """
     key_mother, key_father = jax.random.split(key)
 
@@ -52,9 +49,9 @@ def parents(
 def proportional_parents(
     key: jax.Array, count: int, fitness: jax.Array
 ) -> tuple[jax.Array, jax.Array]:
-    """The same, each as often as its fitness [P] is to that of the others (Sims 1994).
+    """Draw parents as `parents` does, each in proportion to its fitness [P] (Sims 1994).
 
-    Who has none, or less, has no children, but where nobody has any.
+    Individuals with fitness <= 0 are never selected, unless all have fitness <= 0.
     """
     key_mother, key_father = jax.random.split(key)
     share = jnp.where(fitness > 0, fitness, 0.0)
@@ -68,15 +65,15 @@ def proportional_parents(
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Nursery:
-    """Children of a generation, born in turn. config: plain or traced, but for its shapes."""
+    """Sequential breeding of a generation's children. config: plain or traced; shapes are plain."""
 
     config: EvolutionConfig
     variation: Variation
 
     def children(self, key: jax.Array, adults: Any) -> tuple[Any, jax.Array]:
-        """Children [M, ...] of genomes [P, ...], best first, and whether each is a crossing [M].
+        """Return children [M, ...] of genomes [P, ...], best first, and which [M] are crossovers.
 
-        A mutant for want of a new child is none.
+        A child that was mutated because no unique crossover was found does not count as crossover.
         """
         count = self.config.offspring
         pool = jax.tree.map(lambda leaf: _with_room(leaf, count), adults)
@@ -91,7 +88,7 @@ class Nursery:
         return jax.tree.map(lambda leaf: leaf[self.config.population :], pool), of_two
 
     def _child(self, key: jax.Array, pool: Any, size: jax.Array) -> tuple[Any, jax.Array]:
-        """The next child of a pool whose first `size` [] places are taken."""
+        """Return the next child of a pool that fills its first `size` [] places."""
         among = size if self.config.pool == "growing" else self.config.population
         if not self.config.unique_children:
             return self._draw(key, pool, among)
@@ -106,7 +103,7 @@ class Nursery:
         return _either(new[first], child, mutant), new[first] & of_two[first]
 
     def _draw(self, key: jax.Array, pool: Any, among: jax.Array | int) -> tuple[Any, jax.Array]:
-        """A child of two of the first `among`, or a mutant of one; and which of the two []."""
+        """Return a child of two or one of the first `among`, and whether it has two parents []."""
         config = self.config
         key_parents, key_cross, key_whether, key_mutate, key_mutated = jax.random.split(key, 5)
         mother, father = (
@@ -115,7 +112,7 @@ class Nursery:
         )
         crosses = jax.random.bernoulli(key_whether, config.crossover)
         child = _either(crosses, self.variation.cross(key_cross, mother, father), mother)
-        # As among children born all at once: that of one parent is mutated, if there is mutation.
+        # As in simultaneous breeding: a child of one parent is always mutated, unless rate 0.
         mutates = jax.random.bernoulli(key_mutated, config.mutation_rate) | (
             ~crosses & (jnp.asarray(config.mutation_rate) > 0)
         )
@@ -127,7 +124,7 @@ def _with_room(leaf: jax.Array, count: int) -> jax.Array:
 
 
 def _holds(pool: Any, size: jax.Array, genome: Any) -> jax.Array:
-    """Whether [] one of the first `size` of a pool equals a genome."""
+    """Tell whether [] one of the first `size` of a pool equals a genome."""
     same = [
         jnp.all(leaf == one, axis=tuple(range(1, leaf.ndim)))
         for leaf, one in zip(jax.tree.leaves(pool), jax.tree.leaves(genome), strict=True)

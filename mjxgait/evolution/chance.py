@@ -1,9 +1,9 @@
-"""The random numbers of a run, by a generator that costs the compiler little.
+"""Random numbers of a run, from a generator that compiles quickly.
 
-JAX's own, Threefry, has twenty rounds, which are written out wherever evolution draws: a tenth to
-three fifths of the time to compile what proposes. What evolves needs no cipher. Here the 32 bits at a
-place of a stream are its number, mixed with one half of the key and then with the other by an integer
-hash of two rounds.
+JAX's own, Threefry, has twenty rounds, which are written out wherever evolution draws. They take a
+tenth to three fifths of the time to compile `propose`. Evolution needs no cipher. Here the 32 bits
+at a place of a stream are the place's number, mixed with one half of the key and then with the
+other by an integer hash of two rounds.
 """
 
 import math
@@ -15,20 +15,20 @@ from jax.extend.random import define_prng_impl
 from mjxgait.errors import UserError
 
 NAME = "hashed"
-"""As checkpoints tell which generator a key belongs to."""
+"""Name of the generator, stored in checkpoints beside a key."""
 STEP = 0x9E3779B9
-"""From one place of a stream to the next; odd, so that no two places are the same."""
+"""Distance between places of a stream; odd, so that no two places are the same."""
 SPLIT, FOLD, DRAW = 0x243F6A88, 0x85A308D3, 0x13198A2E
-"""What the same key is used for tells its streams apart; the first digits of pi."""
+"""Constants that separate the streams of one key by their use; the first digits of pi."""
 
 
 def key_of(seed: int) -> jax.Array:
-    """The key [] that all draws of a run follow from, by `jax.random` as usual."""
+    """Return the key [] of all draws of a run, for use with `jax.random`."""
     return jax.random.key(seed, impl=_HASHED)
 
 
 def key_from(data: jax.Array, generator: str, where: str) -> jax.Array:
-    """A key [...] from its numbers [..., 2].
+    """Return a key [...] from its numbers [..., 2].
 
     Raises:
       UserError: see `check_generator`.
@@ -38,10 +38,10 @@ def key_from(data: jax.Array, generator: str, where: str) -> jax.Array:
 
 
 def check_generator(generator: str, where: str) -> None:
-    """Refuses a run of another generator, whose draws nobody could go on with.
+    """Refuse a run of another generator: its draws cannot be continued.
 
     Raises:
-      UserError: says so, and where it was found.
+      UserError: the generator is another; the message names it and `where`.
     """
     if generator != NAME:
         raise UserError(
@@ -51,7 +51,7 @@ def check_generator(generator: str, where: str) -> None:
 
 
 def _mixed(x: jax.Array) -> jax.Array:
-    """Another 32 bits for each 32 bits: every bit of one changes about half of the other's.
+    """Hash each 32 bits to another 32 bits: every input bit changes about half of the output bits.
 
     Source: Wellons, hash-prospector, the two-round function with the least bias.
     """
@@ -79,7 +79,7 @@ def _split(key: jax.Array, shape: tuple[int, ...]) -> jax.Array:
 
 def _fold_in(key: jax.Array, data: jax.Array | int) -> jax.Array:
     number = jnp.uint32(data)
-    # Two places for each number leave none for its highest bit, which goes into the key.
+    # Two places per number leave none for its highest bit, so that bit goes into the key.
     return _bits(key + (number >> 31), 2 * number + _places((2,)), FOLD)
 
 

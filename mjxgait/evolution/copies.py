@@ -1,4 +1,4 @@
-"""Who is a copy of somebody else, of whom only one survives.
+"""Detection of copies; only one of each survives.
 
 Letters: `P` population, `M` offspring; `R`, `F` trials and terms.
 """
@@ -20,13 +20,15 @@ def first_of_kind(
     verdicts: jax.Array,
     anew: jax.Array,
 ) -> jax.Array:
-    """Whether each of the old and the offspring [P + M] is the first of its kind: who is judged anew
-    comes before its old self, and of the same verdict a child before its parent, so that what does
-    nothing drifts.
+    """Tell for each of the old and the offspring [P + M] whether it is the first of its kind.
+
+    An individual evaluated again comes before its old self. Of equal results, a child comes before
+    its parent, so that neutral mutations drift.
 
     Args:
-      same: what makes a copy, `evolution.same`. verdicts: [M, R, F] terms of this round alone; who
-        has none is no first. anew: [] whether the first of the offspring are old ones.
+      same: definition of a copy, `evolution.same`. verdicts: [M, R, F] terms of this round alone;
+        an individual without any is never first. anew: [] whether the first of the offspring are
+        old ones.
     """
     old, new = state.genomes, proposal.offspring
     itself = _new_first(old, new)
@@ -42,10 +44,10 @@ def first_of_kind(
 
 
 def together(old: Any, new: Any) -> Any:
-    """One after the other: leaves [P + M, ...] of leaves [P, ...] and [M, ...]."""
+    """Concatenate leaves [P, ...] and [M, ...] to [P + M, ...]."""
     return jax.tree.map(lambda a, b: jnp.concatenate([a, b]), old, new)
 
 
 def _new_first(old: Any, new: Any) -> jax.Array:
-    """Whether each of both [P + M] is the first of its kind, the new before the old."""
+    """Tell for each of both [P + M] whether it is the first of its kind, the new before the old."""
     return jnp.roll(first_occurrence(together(new, old)), len(jax.tree.leaves(old)[0]))

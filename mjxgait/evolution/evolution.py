@@ -1,8 +1,8 @@
-"""The genetic algorithm: one generation as a pure function of its state, whatever a genome drives.
+"""Genetic algorithm: one generation as a pure function of its state, for any kind of genome.
 
-A run begins with a population that nobody has judged (`seeding`): the first call judges it, so that
-the physics is traced and compiled once. Forced evolution (Wilson) is another way to fill the same
-offspring slots, chosen by a flag in the state.
+A run begins with a population that has not been evaluated (`seeding`). The first call evaluates it,
+so that the physics is traced and compiled once. Forced evolution (Wilson) fills the same offspring
+slots in another way, chosen by a flag in the state.
 """
 
 import dataclasses
@@ -32,7 +32,7 @@ from mjxgait.types import Judged
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Evolution:
-    """The algorithm with its parts, around whoever judges: `propose`, then `absorb` the verdict.
+    """Algorithm and its operators around the simulation: `propose`, then `absorb` the results.
 
     config: plain or traced. rank: terms [..., R, F], generation [] -> fitness [...], higher is
     better.
@@ -43,7 +43,7 @@ class Evolution:
     rank: Callable[[jax.Array, jax.Array], jax.Array]
 
     def init(self, key: jax.Array, trials: int, terms: int, outcomes: int) -> EvolutionState:
-        """The state before anybody has been judged. trials, terms, outcomes: R, F, O."""
+        """Return the state before any evaluation. trials, terms, outcomes: R, F, O."""
         key, key_create = jax.random.split(key)
         count, window = self.config.population, self.config.forced.window
         integer = jnp.zeros((), jnp.int32)
@@ -70,14 +70,14 @@ class Evolution:
         )
 
     def propose(self, state: EvolutionState) -> Proposal:
-        """The offspring of a generation."""
+        """Return the offspring of a generation."""
         key, key_offspring = jax.random.split(state.key)
         offspring, origin, mothers = self._offspring(key_offspring, state, self._seeding(state))
         born = jnp.full(self.config.offspring, state.generation + 1)
         return self._with_elite(state, Proposal(key, offspring, origin, born, mothers))
 
     def _with_elite(self, state: EvolutionState, proposal: Proposal) -> Proposal:
-        """With the best parents in the first places, to be judged once more."""
+        """Put the best parents in the first places, to be evaluated once more."""
         count, now = self._again(state)
         if not count:
             return proposal
@@ -96,16 +96,16 @@ class Evolution:
         )
 
     def _again(self, state: EvolutionState) -> tuple[int, jax.Array]:
-        """How many of the best are judged again beside the children, and whether they are now."""
+        """Return the number of best parents to evaluate again, and whether [] that happens now."""
         if self.config.elites or state.stale is None:
             return self.config.elites, jnp.ones((), bool)
         return min(self.config.population, self.config.offspring), state.stale
 
     def _stay(self, state: EvolutionState) -> jax.Array:
-        """Whether [] parents live on although only children survive otherwise.
+        """Tell whether [] parents survive although otherwise only children do.
 
-        A forced generation replaces the worst of the population and no more. Its parents keep the
-        fitness of the generation before.
+        A forced generation replaces only the worst of the population. Its parents keep the fitness
+        of the generation before.
         """
         if not self.config.elites:
             return jnp.zeros((), bool)
@@ -114,8 +114,9 @@ class Evolution:
     def promising(
         self, state: EvolutionState, proposal: Proposal, judged: Judged, share: float
     ) -> jax.Array:
-        """Who [M] is worth more trials than the first, which alone has been judged: that share of all,
-        and whoever is judged once more.
+        """Select the offspring [M] that deserve more trials than the first, evaluated alone so far.
+
+        These are the best `share` of all, and the parents that are evaluated once more.
         """
         generation = jnp.maximum(state.generation + 1, 0)
         worth = self._fitness(proposal.offspring, judged.terms[:, :1], generation)
@@ -127,7 +128,7 @@ class Evolution:
     def absorb(
         self, state: EvolutionState, proposal: Proposal, judged: Judged
     ) -> tuple[EvolutionState, GenerationMetrics]:
-        """The rest of a generation: survival, and the decision whether the next one is forced."""
+        """Select the survivors, and decide whether the next generation is forced."""
         seeding = self._seeding(state)
         recalled, rounds = self._recalled(state, judged)
         generation = jnp.where(seeding, jnp.where(self._filled(state), 0, -1), state.generation + 1)
@@ -145,8 +146,9 @@ class Evolution:
         return state, metrics(self.config, state, judged, was_forced, told)
 
     def _recalled(self, state: EvolutionState, judged: Judged) -> tuple[Judged, jax.Array | None]:
-        """The verdict, in which those that are judged once more have the mean of all their rounds; and
-        how many [M] these are.
+        """Average the terms of parents evaluated once more over all their rounds.
+
+        Also return the number of rounds [M].
         """
         if state.rounds is None:
             return judged, None
@@ -158,7 +160,7 @@ class Evolution:
 
     @property
     def _candidates(self) -> jax.Array:
-        """[] who is judged for the first generation."""
+        """Number [] of genomes evaluated for the first generation."""
         return jnp.asarray(self.config.initial_choice * self.config.population)
 
     def _fitness(self, genomes: Any, terms: jax.Array, generation: jax.Array) -> jax.Array:
@@ -174,8 +176,9 @@ class Evolution:
     def _offspring(
         self, key: jax.Array, state: EvolutionState, seeding: jax.Array
     ) -> tuple[Any, jax.Array, jax.Array | None]:
-        """Genomes [M, ...], their origins and their mothers' places [M]: the unjudged initial
-        population, forced ones, or children.
+        """Return genomes [M, ...], their origins and their mothers' places [M].
+
+        The genomes are the unevaluated initial population, forced offspring, or children.
         """
         key_children, key_forced = jax.random.split(key)
         places = state.seeded + jnp.arange(self.config.offspring)
@@ -199,7 +202,7 @@ class Evolution:
     def _children(
         self, key: jax.Array, state: EvolutionState
     ) -> tuple[Any, jax.Array, jax.Array | None]:
-        """Genomes, origins and mothers' places, which are not followed of those born in turn."""
+        """Return genomes, origins and mothers' places; no places in sequential breeding."""
         config, count = self.config, self.config.offspring
         if config.pool == "growing" or config.unique_children:
             bred, of_two = Nursery(config, self.variation).children(key, state.genomes)
@@ -219,8 +222,7 @@ class Evolution:
         crosses = jax.random.bernoulli(key_whether, config.crossover, (count,))
         child = _pick(crosses, crossed, mother)
         mutated = jax.vmap(self.variation.mutate)(jax.random.split(key_mutate, count), child)
-        # A child of one parent that is not mutated would be a duplicate, unless the algorithm knows
-        # no mutation at all.
+        # An unmutated child of one parent would be a duplicate; at rate 0 it is kept.
         mutates = jax.random.bernoulli(key_mutated, config.mutation_rate, (count,)) | (
             ~crosses & (config.mutation_rate > 0)
         )
@@ -230,8 +232,9 @@ class Evolution:
     def _forced(
         self, keys: jax.Array, state: EvolutionState, created: Any
     ) -> tuple[Any, jax.Array, jax.Array]:
-        """Newcomers and often mutated ones, origins, and whose mutants they are. keys: [1 +
-        mutations].
+        """Return immigrants and repeatedly mutated genomes, origins, and the mutants' parents.
+
+        keys: [1 + mutations].
         """
         config, count = self.config.forced, self.config.offspring
         newcomers = jnp.round(config.newcomers * count)
@@ -249,7 +252,7 @@ class Evolution:
     def _plant(
         self, state: EvolutionState, proposal: Proposal, judged: Judged, generation: jax.Array
     ) -> EvolutionState:
-        """The best P of the judged candidates, then those that nobody has judged yet, in order."""
+        """Keep the best P of the evaluated candidates, then those not evaluated yet, in order."""
         count = self.config.population
         pool = together(
             (state.genomes, state.terms, state.outcome),
@@ -282,9 +285,10 @@ class Evolution:
         rounds: jax.Array | None,
         generation: jax.Array,
     ) -> tuple[EvolutionState, jax.Array | None]:
-        """The P best of the grown population, without duplicates, and the places of their mothers;
-        in a forced generation what was fit enough goes before the old. verdicts: [M, R, F] of this
-        round alone.
+        """Return the P best of the grown population, without duplicates, and their mothers' places.
+
+        In a forced generation, offspring that are fit enough go before the old. verdicts: [M, R, F]
+        of this round alone.
         """
         count = self.config.population
         pool = together(
@@ -311,7 +315,7 @@ class Evolution:
             fitness = jnp.where(fresh | stay | ~now, fitness, -jnp.inf)
         lives = distinct & (fresh | stay | chosen(self.config.survival, "best"))
         tier = jnp.where(state.forced & children, jnp.where(admitted, 2, 0), jnp.where(lives, 1, 0))
-        if not self.config.elites:  # the best is never lost, whatever the tiers say
+        if not self.config.elites:  # the best always survives, whatever its tier
             best = jnp.arange(fitness.shape[0]) == jnp.argmax(fitness)
             tier = jnp.where(best & distinct, 3, tier)
         family = families(state, proposal.mothers)
@@ -342,17 +346,17 @@ class Evolution:
 
 
 def _own(state: EvolutionState) -> jax.Array:
-    """[P] everybody's own place."""
+    """Return each individual's own place [P]."""
     return jnp.arange(state.fitness.shape[0])
 
 
 def _pick(condition: jax.Array, yes: Any, no: Any) -> Any:
-    """Row by row [M] from one or the other pytree of leaves [M, ...]."""
+    """Choose row by row [M] from one of two pytrees of leaves [M, ...]."""
     return jax.tree.map(
         lambda a, b: jnp.where(condition.reshape(-1, *[1] * (a.ndim - 1)), a, b), yes, no
     )
 
 
 def _without_key(state: EvolutionState) -> EvolutionState:
-    """Typed keys cannot be chosen between with `where`; the caller sets the next one."""
+    """Drop the key: `where` cannot choose between typed keys; the caller sets the next one."""
     return dataclasses.replace(state, key=jnp.zeros(()))

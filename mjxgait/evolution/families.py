@@ -1,4 +1,4 @@
-"""Who descends from whom, so that not all of a population become one family.
+"""Lineages: limits that keep one family from filling the population.
 
 Letters: `P` population, `M` offspring, `N` all of them.
 """
@@ -10,9 +10,9 @@ from mjxgait.evolution.state import NOBODY, EvolutionState
 
 
 def families(state: EvolutionState, mothers: jax.Array | None) -> jax.Array | None:
-    """[P + M] of the old and of the offspring; None where that is not followed.
+    """Return the lineages [P + M] of the old and the offspring; None where they are not recorded.
 
-    mothers: [M] places of the offspring's; who has none begins a family of its own.
+    mothers: [M] places of the offspring's; an offspring without a mother begins a lineage.
     """
     if state.family is None or mothers is None:
         return None
@@ -23,7 +23,7 @@ def families(state: EvolutionState, mothers: jax.Array | None) -> jax.Array | No
 
 
 def place_in_family(family: jax.Array, rank: jax.Array, counts: jax.Array) -> jax.Array:
-    """[N] how many of its family that count are before each, by their rank [N] among all."""
+    """Count [N] the counted members of its lineage that are before each, by rank [N] among all."""
     before = rank[:, None] > rank
     return jnp.sum(before & (family[:, None] == family) & counts, axis=1)
 
@@ -31,8 +31,10 @@ def place_in_family(family: jax.Array, rank: jax.Array, counts: jax.Array) -> ja
 def with_share(
     family: jax.Array, most: int, tier: jax.Array, fitness: jax.Array, counts: jax.Array
 ) -> jax.Array:
-    """The tiers [N], above all others those who count and are among the first so many of their
-    family: sooner an old one of another family lives than one more of a family that has its share.
+    """Raise the tier [N] of the first `most` counted members of each lineage above all others.
+
+    An old individual of another lineage thus survives before one more of a lineage that has its
+    share.
     """
     rank = jnp.argsort(jnp.lexsort((-fitness, -tier)))
     return tier + 2 * (counts & (place_in_family(family, rank, counts) < most))

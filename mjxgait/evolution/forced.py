@@ -1,4 +1,4 @@
-"""Forced evolution (Wilson): when it begins and ends, and whom it takes in."""
+"""Forced evolution (Wilson): beginning, end and admission."""
 
 import dataclasses
 
@@ -13,8 +13,9 @@ from mjxgait.evolution.state import EvolutionState
 def admitted(
     config: EvolutionConfig, state: EvolutionState, fitness: jax.Array, candidates: jax.Array
 ) -> jax.Array:
-    """Which of the candidates [P + M] a forced generation takes in: fit enough, best first,
-    as many as the spell has room for.
+    """Select the candidates [P + M] that a forced generation admits.
+
+    These are fit enough, best first, up to the room left in the phase.
     """
     old = jnp.sort(fitness[: config.population])
     enough = old[
@@ -34,9 +35,7 @@ def _room(config: EvolutionConfig) -> jax.Array:
 
 
 def decided(whole: EvolutionConfig, state: EvolutionState) -> EvolutionState:
-    """Begins a spell of forced evolution when best and mean have stalled over the window;
-    ends it when it has done its work.
-    """
+    """Begin a forced phase when best and mean stall over the window; end it when it is done."""
     config = whole.forced
     best, mean = state.fitness[0], finite_mean(state.fitness)
     bests, means = (
@@ -67,9 +66,10 @@ def decided(whole: EvolutionConfig, state: EvolutionState) -> EvolutionState:
 
 
 def begun_anew(state: EvolutionState, now: jax.Array) -> EvolutionState:
-    """Where now [], what growth was before counts no more: everybody is worth something else.
+    """Where now [], forget earlier growth: every individual's fitness has changed.
 
-    The window then begins with the next generation, for this one's best was still worth the old.
+    The window then begins with the next generation, because this one's best is still a fitness of
+    the old trials.
     """
     return dataclasses.replace(
         state,

@@ -1,4 +1,4 @@
-"""What there is to tell of a generation."""
+"""Metrics of a generation."""
 
 import jax
 import jax.numpy as jnp
@@ -16,7 +16,10 @@ def metrics(
     forced: jax.Array,
     mothers: jax.Array | None,
 ) -> GenerationMetrics:
-    """Of a state that is sorted, and the verdict that led to it. forced: [] whether it was."""
+    """Compute the metrics of a sorted state and the evaluation that led to it.
+
+    forced: [] whether the generation was.
+    """
     quartiles = jnp.nanpercentile(
         jnp.where(jnp.isfinite(state.fitness), state.fitness, jnp.nan),
         jnp.array([25, 50, 75]),
@@ -46,7 +49,7 @@ def metrics(
 
 
 def finite_mean(values: jax.Array) -> jax.Array:
-    """[] of the values [N] that are finite; -inf if none is."""
+    """Return the mean [] of the finite values [N]; -inf if none is finite."""
     finite = jnp.isfinite(values)
     return jnp.where(
         jnp.any(finite),

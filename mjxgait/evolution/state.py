@@ -1,4 +1,4 @@
-"""What evolution carries from generation to generation, tells of one, and when it is over."""
+"""Data that evolution carries between generations, metrics of one generation, and stop reasons."""
 
 from enum import IntEnum
 from typing import Any
@@ -9,11 +9,11 @@ from mjxgait.config.evolution import EvolutionConfig
 from mjxgait.types import pytree
 
 NOBODY = -1
-"""The mother's place of one that has none, or of whom it is not known."""
+"""Mother's place of an individual without a mother, or with an unknown one."""
 
 
 class Origin(IntEnum):
-    """How an individual came to be."""
+    """Origin of an individual."""
 
     INITIAL = 0
     CROSSOVER = 1
@@ -23,20 +23,22 @@ class Origin(IntEnum):
 
 @pytree
 class EvolutionState:
-    """Everything that the next generation reads. The population is sorted, best first, once it has
-    been judged.
+    """State that the next generation reads; the population is sorted, best first, once evaluated.
 
-    genomes: leaves [P, ...]. terms: [P, R, F]. outcome: [P, R, O]. fitness: [P]. born: [P] generation of birth. origin: [P] an `Origin`.
-    key: of all coming randomness. generation: [] -1 while seeding. seeded: [] how many of the initial population have been judged.
-    best_history, mean_history: [W] of the latest generations, newest last. quiet: [] generations since the last spell.
-    forced: [] whether the next generation is forced. spell_age, refreshed: [] of the current spell.
-    spell_best: [] best fitness when the last spell began. barren: [] spells in a row that began
+    genomes: leaves [P, ...]. terms: [P, R, F]. outcome: [P, R, O]. fitness: [P]. born: [P]
+    generation of birth. origin: [P] an `Origin`.
+    key: for all future random numbers. generation: [] -1 while seeding. seeded: [] number of the
+    initial population evaluated so far.
+    best_history, mean_history: [W] of the latest generations, newest last. quiet: [] generations
+    since the last forced phase.
+    forced: [] whether the next generation is forced. spell_age, refreshed: [] of the current phase.
+    spell_best: [] best fitness when the last phase began. barren: [] phases in a row that began
     without a better best than the one before.
-    rounds: [P] of which `terms` is the mean; None where nobody's earlier rounds count.
-    level: [] how often the trials have become harder; None where they never do.
-    stale: [] whether they have since `terms` were judged; None likewise.
-    family: [P] who of the first generation is the first of their mothers; None where a family may
-    be of any size.
+    rounds: [P] of which `terms` is the mean; None where earlier rounds do not count.
+    level: [] number of times the trials have become harder; None without a curriculum.
+    stale: [] whether they have since `terms` were evaluated; None likewise.
+    family: [P] first-generation ancestor along the mothers; None where a lineage may be of any
+    size.
     """
 
     genomes: Any
@@ -64,13 +66,13 @@ class EvolutionState:
 
 @pytree
 class GenerationMetrics:
-    """What there is to tell of a generation; scalars but for best_terms [F] and best_outcome [O],
-    the mean over the trials of the best individual's terms and outcome.
+    """Metrics of a generation: scalars except best_terms [F] and best_outcome [O].
 
-    unique: different genomes. spread: mean standard deviation of a gene. failures: how many of the
-    offspring's episodes ended early. mothers: [P] the places that the population, or its mothers,
-    had in the generation before; None where that is not followed. level: of the next generation's
-    trials; None where they never become harder.
+    best_terms, best_outcome: mean over the trials of the best individual. unique: different
+    genomes. spread: mean standard deviation of a gene. failures: number of the offspring's episodes
+    that ended early. mothers: [P] places of the population, or of its mothers, in the generation
+    before; None where that is not recorded. level: of the next generation's trials; None without a
+    curriculum.
     """
 
     generation: jax.Array
@@ -96,10 +98,10 @@ class GenerationMetrics:
 
 @pytree
 class Proposal:
-    """What a generation wants judged.
+    """Offspring that a generation submits for evaluation.
 
     key: of the next generation. offspring: leaves [M, ...]; origin, born: [M]. mothers: [M] places
-    of their first parents, or `NOBODY`; None where that is not followed.
+    of their first parents, or `NOBODY`; None where that is not recorded.
     """
 
     key: jax.Array
@@ -110,7 +112,7 @@ class Proposal:
 
 
 def stop_reason(state: EvolutionState, config: EvolutionConfig) -> str | None:
-    """Why a run is over after this generation, in words; None while it goes on.
+    """Explain in words why a run ends after this generation; None while it continues.
 
     Reads the state on the host.
     """

@@ -1,7 +1,7 @@
-"""How genomes are made from nothing and from other genomes: arrays in, arrays out.
+"""Creation and variation of genomes: arrays in, arrays out.
 
-Functions for one genome, mapped over the offspring where they are called. What every kind of genome
-may use is here; operators of a kind of its own are beside its controller.
+The functions take one genome; callers map them over the offspring. This module holds what any kind
+of genome may use; operators of one kind are beside its controller.
 """
 
 import dataclasses
@@ -30,11 +30,11 @@ class Box:
 
 @dataclasses.dataclass(frozen=True)
 class Variation:
-    """The operators that evolution calls; it knows a genome only as a pytree.
+    """Operators that evolution calls; a genome is only a pytree to them.
 
     create: key, count -> genomes [count, ...]. cross: key, genome, genome -> genome. mutate: key,
-    genome -> genome. price: genomes [N, ...] -> [N], by which fitness is less; None: free.
-    long: whether they walk along a genome place by place, and so are worth some of the compiler's time.
+    genome -> genome. price: genomes [N, ...] -> [N], subtracted from the fitness; None: free.
+    long: whether they loop along a genome place by place, which justifies some compile time.
     first: genomes [G, ...] that take the first places of the first generation; None: all are drawn.
     """
 
@@ -46,7 +46,7 @@ class Variation:
     first: Any = None
 
     def begin(self, key: jax.Array, count: int) -> Any:
-        """Genomes [count, ...] of the first generation: those given, and others created."""
+        """Return genomes [count, ...] of the first generation: `first`, the rest created."""
         created = self.create(key, count)
         if self.first is None:
             return created
@@ -54,7 +54,7 @@ class Variation:
 
 
 def creation(box: Box, config: EvolutionConfig) -> Callable[[jax.Array, int], Any]:
-    """How the first genomes are drawn from a box: uniformly or as a Latin hypercube."""
+    """Return a function that draws first genomes from a box, uniformly or as a Latin hypercube."""
 
     def create(key: jax.Array, count: int) -> Any:
         return jax.tree.map(
@@ -67,7 +67,7 @@ def creation(box: Box, config: EvolutionConfig) -> Callable[[jax.Array, int], An
 
 
 def real_variation(box: Box, config: EvolutionConfig) -> Variation:
-    """Operators of genomes that are nothing but reals in a box: uniform crossover, Gaussian jumps."""
+    """Return operators for genomes of reals in a box: uniform crossover, Gaussian jumps."""
 
     def cross(key: jax.Array, mother: Any, father: Any) -> Any:
         def mixed(key: jax.Array, a: jax.Array, b: jax.Array) -> jax.Array:
@@ -86,14 +86,14 @@ def real_variation(box: Box, config: EvolutionConfig) -> Variation:
 
 
 def _leafwise(key: jax.Array, function: Callable[..., jax.Array], *trees: Any) -> Any:
-    """The function of a key and one array of each tree, with a key of its own for each."""
+    """Apply the function to a separate key and one array of each tree, leaf by leaf."""
     leaves, shape_of = jax.tree.flatten(trees[0])
     columns = zip(jax.random.split(key, len(leaves)), *map(jax.tree.leaves, trees), strict=True)
     return jax.tree.unflatten(shape_of, [function(*column) for column in columns])
 
 
 def narrowed(box: Box, share: jax.Array | float) -> Box:
-    """The middle of a box, `share` of its width in every gene."""
+    """Return the middle of a box, `share` of its width in every gene."""
 
     def edge(near: Any, far: Any) -> Any:
         return jax.tree.map(lambda a, b: a + 0.5 * (1 - share) * (b - a), near, far)
@@ -102,7 +102,7 @@ def narrowed(box: Box, share: jax.Array | float) -> Box:
 
 
 def in_ranges(genomes: Any, box: Box) -> np.ndarray:
-    """Genomes [N, ...] as rows [N, genes], each gene in units of its range."""
+    """Return genomes [N, ...] as rows [N, genes], each gene in units of its range."""
     scaled = jax.tree.map(
         lambda leaf, low, high: np.asarray((leaf - low) / jnp.maximum(high - low, 1e-9)),
         genomes,
@@ -113,13 +113,14 @@ def in_ranges(genomes: Any, box: Box) -> np.ndarray:
 
 
 def uniform(key: jax.Array, box: Box, count: int) -> Any:
-    """Genomes [count, ...] drawn uniformly from the box."""
+    """Draw genomes [count, ...] uniformly from the box."""
     return _draw(key, box, count, lambda key, shape: jax.random.uniform(key, shape))
 
 
 def latin_hypercube(key: jax.Array, box: Box, count: int) -> Any:
-    """Genomes [count, ...] with one value of every gene in each of `count` slices of its range
-    (McKay, Beckman & Conover 1979).
+    """Draw genomes [count, ...], one value of every gene in each of `count` slices of its range.
+
+    Source: McKay, Beckman & Conover 1979.
     """
 
     def draw(key: jax.Array, shape: tuple[int, ...]) -> jax.Array:
@@ -142,8 +143,9 @@ def jittered(
     rate: jax.Array | float,
     sigma: jax.Array | float,
 ) -> jax.Array:
-    """Values [E], each moved with probability `rate` by a Gaussian of `sigma` ranges; never
-    leaves the box.
+    """Move each value [E] with probability `rate` by a Gaussian of `sigma` ranges.
+
+    Results are clipped to the box.
     """
     key_which, key_by = jax.random.split(key)
     moved = values + sigma * (high - low) * jax.random.normal(key_by, values.shape)
@@ -153,16 +155,15 @@ def jittered(
 
 
 def first_occurrence(genomes: Any) -> jax.Array:
-    """Whether each genome [N] (leaves [N, ...]) is the first of its kind: a later equal one is a
-    duplicate.
+    """Tell for each genome [N] (leaves [N, ...]) whether it is the first of its kind.
 
-    Sorts by a random projection, so the cost grows as N log N; equal genomes have equal
-    projections, and neighbours are compared in full.
+    Sorts by a random projection, so the cost grows as N log N. Equal genomes have equal
+    projections; neighbours are compared in full.
     """
     rows = jnp.concatenate(
         [leaf.reshape(leaf.shape[0], -1) for leaf in jax.tree.leaves(genomes)], axis=1
     )
-    # Elementwise product and sum, row by row alike: a matrix product may round equal rows
+    # Elementwise product and sum treat all rows alike: a matrix product may round equal rows
     # differently at different places.
     projection = jnp.sum(rows * jax.random.normal(key_of(0), (rows.shape[1],)), axis=1)
     order = jnp.argsort(projection, stable=True)

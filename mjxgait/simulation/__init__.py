@@ -1,1 +1,1 @@
-"""Many episodes as one computation."""
+"""Simulation of many episodes as one computation."""

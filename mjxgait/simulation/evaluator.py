@@ -1,4 +1,4 @@
-"""Genomes in, verdict out: the one contract between evolution and whoever simulates."""
+"""Evaluation of genomes: the one contract between evolution and a simulation backend."""
 
 import dataclasses
 from functools import partial
@@ -16,32 +16,32 @@ from mjxgait.types import Asked, Judged
 
 
 class Evaluator(Protocol):
-    """Judges the genomes of several evolution runs, the rows `B`."""
+    """Evaluator of the genomes of several evolution runs, the rows `B`."""
 
     def judge(
         self, genomes: Any, trials: Starts, settings: Config, asked: Asked | None = None
     ) -> Judged:
-        """The verdict, leaves [B, N, ...], on genomes [B, N, ...] in the trials [B, R] of their row.
+        """Return the results, leaves [B, N, ...], of genomes [B, N, ...] in the trials [B, R].
 
-        settings: traced, leaves [B, ...]. asked: which of the trials to run; None is all.
+        settings: traced, leaves [B, ...]. asked: the trials to run; None is all.
         """
         ...
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Local:
-    """On this machine's devices, as a part of the program that calls it."""
+    """Evaluator on this machine's devices, as a part of the program that calls it."""
 
     simulator: Simulator
 
     def judge(
         self, genomes: Any, trials: Starts, settings: Config, asked: Asked | None = None
     ) -> Judged:
-        """See `Evaluator`. Row by row but for the simulations: no row reads anything of its neighbours."""
+        """See `Evaluator`. Outside the simulations, each row reads only its own data."""
         wanted = None if asked is None else jnp.asarray(asked.wanted)
         episodes = self.simulator.simulate(genomes, trials, settings, wanted)
         lived = jnp.sum(episodes.tally.steps, axis=(1, 2))
-        # Idle lanes are nobody's: each row bears a part in proportion to the steps that it lived.
+        # Idle lanes belong to no row: each row is charged in proportion to its own steps.
         share = lived / jnp.maximum(jnp.sum(lived), 1)
         computed = jnp.round(episodes.computed_steps * share).astype(jnp.int32)
 
@@ -53,7 +53,7 @@ class Local:
         return judged if asked is None else completed(judged, asked)
 
     def verdict(self, settings: Config, episodes: Episodes) -> Judged:
-        """On one row's episodes, tally with leaves [N, R, ...]."""
+        """Return the results of one row's episodes, statistics with leaves [N, R, ...]."""
         task, tally = self.simulator.task, episodes.tally
 
         def each(function: Any, names: tuple[str, ...]) -> jax.Array:
@@ -70,7 +70,7 @@ class Local:
 
 
 def completed(judged: Judged, asked: Asked) -> Judged:
-    """The verdict with what is known of the trials that were not run; all leaves [B, ...]."""
+    """Fill in the known results of the trials that were not run; all leaves [B, ...]."""
 
     def pick(new: jax.Array, known: jax.Array) -> jax.Array:
         wanted = jnp.asarray(asked.wanted)

@@ -1,7 +1,9 @@
-"""Simulates many episodes: a fixed number of lanes per device, each taking the next waiting episode when its own has ended.
+"""Simulation of many episodes on a fixed number of lanes per device.
 
-Cost follows the steps that creatures live, memory the number of lanes, whatever the population and the length of the episode. The episodes
-may belong to several evolution runs, the rows `B` of every array here, each with its own starts and settings: they share the lanes.
+Each lane takes the next waiting episode when its own has ended. Cost follows the number of
+simulated steps, memory the number of lanes, whatever the population and the length of the episode.
+The episodes may belong to several evolution runs, the rows `B` of every array here. Each row has
+its own starts and settings; the rows share the lanes.
 """
 
 import dataclasses
@@ -29,14 +31,16 @@ from mjxgait.types import (
 )
 
 CHECK_EVERY = 16
-"""Steps between two looks at which lanes are free (a look costs about as much as a step),
-and at how deep parts are in each other."""
+"""Steps between checks for free lanes, which cost about a step each, and for overlap of parts."""
 AXIS = "lanes"
 
 
 @pytree
 class Episodes:
-    """All episodes of a generation: tally with leaves [B, N, R, ...], and the steps computed [] for them, those of idle lanes included."""
+    """All episodes of a generation.
+
+    tally: leaves [B, N, R, ...]. computed_steps: [], those of idle lanes included.
+    """
 
     tally: Any
     computed_steps: jax.Array
@@ -44,7 +48,7 @@ class Episodes:
 
 @pytree
 class Late:
-    """Torques that are on their way. delay: [] control steps. recent: [D, J], newest first."""
+    """Delayed torques. delay: [] control steps. recent: [D, J], newest first."""
 
     delay: jax.Array
     recent: jax.Array
@@ -56,8 +60,8 @@ class Lane:
 
     job: [] place in the device's queue. plan, memory: the controller's. tally, aim, standards: the
     task's. rules: the drive's. push as in `Starts`.
-    command: [J] the controller's latest; None where each step has one of its own.
-    late: None where torques always come at once.
+    command: [J] the controller's latest; None where the controller acts in every step.
+    late: None where torques are never delayed.
     """
 
     job: jax.Array
@@ -76,10 +80,10 @@ class Lane:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Simulator:
-    """Everything static about the episodes of one creature.
+    """Static part of the episodes of one creature.
 
-    steps: T per episode. lanes: L per device. mesh: the devices. bodies: makes of a genome and a
-    start that with its own body; None where all have the plant's.
+    steps: T per episode. lanes: L per device. mesh: the devices. bodies: maps a genome and a start
+    to that start with the genome's own body; None where all have the plant's.
     """
 
     creature: Body
@@ -95,10 +99,10 @@ class Simulator:
     def simulate(
         self, genomes: Any, starts: Starts, settings: Config, wanted: jax.Array | None = None
     ) -> Episodes:
-        """Every genome (leaves [B, N, ...]) on every start [B, R] of its row, under the row's traced settings, leaves [B, ...].
+        """Simulate every genome (leaves [B, N, ...]) on every start [B, R] of its row.
 
-        The order of results is the order of the genomes. wanted: [B, N, R] episodes to simulate; the
-        tallies of the others are all zero. None is all.
+        settings: traced, leaves [B, ...]. Results are in the order of the genomes. wanted: [B, N,
+        R] episodes to simulate; None is all. The statistics of the others are all zero.
         """
         shape = (*jax.tree.leaves(genomes)[0].shape[:2], starts.friction.shape[1])
         total, devices = int(np.prod(shape)), self.mesh.size
@@ -130,8 +134,9 @@ class Simulator:
     def _turns(
         self, plans: Any, shape: tuple[int, ...], wanted: jax.Array | None = None
     ) -> jax.Array | None:
-        """The episodes [B * N * R] in the order in which they are simulated, those of plans [B, N, ...]
-        whose commands take longest first, and who is not wanted last; None where all are alike.
+        """Return the order [B * N * R] in which episodes are simulated; None where all are alike.
+
+        Plans [B, N, ...] with the slowest commands come first, unwanted episodes last.
         """
         loads = jax.vmap(jax.vmap(self.controller.load))(plans)
         if loads is None and wanted is None:
@@ -141,7 +146,7 @@ class Simulator:
         return jnp.argsort(last.reshape(-1)).astype(jnp.int32)
 
     def _own_starts(self, genomes: Any, starts: Starts) -> Starts | None:
-        """Leaves [B, N, R, ...]; None where they depend on nobody."""
+        """Return each genome's own starts [B, N, R, ...]; None where all bodies are the plant's."""
         if self.bodies is None:
             return None
         each = jax.vmap(jax.vmap(self.bodies, (None, 0)), (0, None))
@@ -157,7 +162,10 @@ class Simulator:
         *,
         total: int,
     ) -> tuple[Any, jax.Array]:
-        """Works off one device's queue of jobs [Q]: tally with leaves [Q, ...], and the computed steps [1]."""
+        """Run one device's queue of jobs [Q].
+
+        Return the statistics, leaves [Q, ...], and the computed steps [1].
+        """
         queue = jobs.shape[0]
         lanes = min(self.lanes, queue)
         waiting = jnp.sum(jobs < total)
@@ -193,8 +201,9 @@ class Simulator:
             lambda leaf: jnp.zeros((queue, *leaf.shape), leaf.dtype), self.task.init()
         )
         carry = (fresh(jnp.arange(lanes)), results, jnp.int32(lanes), jnp.int32(0))
-        # Not a while_loop: XLA's CPU compiler aborts on the fast plant's kernels in a loop whose length it does not know. Whenever a lane
-        # is free it takes a job, so this many rounds always suffice (Graham 1966); what is left of them costs next to nothing.
+        # Not a while_loop: XLA's CPU compiler aborts on the lane_major kernels in a loop of unknown
+        # length. A free lane always takes a job, so this many rounds suffice (Graham 1966); rounds
+        # left over cost next to nothing.
         longest = -(-self.steps // CHECK_EVERY) + 1
         most = -(-queue * longest // lanes) + longest
         carry = jax.lax.fori_loop(
@@ -216,9 +225,10 @@ class Simulator:
         job: jax.Array,
         episode: jax.Array,
     ) -> Lane:
-        """The lane at the start of an episode []: of row, individual and start, the start changes fastest.
+        """Return the lane at the start of an episode.
 
-        plans: leaves [B, N, ...], the controller's. own: starts of each, where they have their own.
+        episode: [] number over (row, individual, start), the start fastest. plans: leaves [B, N,
+        ...], the controller's. own: each genome's own starts, if any.
         """
         count, individuals = starts.friction.shape[1], jax.tree.leaves(plans)[0].shape[1]
         row, individual = episode // (individuals * count), episode // count % individuals
@@ -253,13 +263,13 @@ class Simulator:
 
     @property
     def _holds(self) -> bool:
-        """Whether commands stay for several steps."""
+        """Tell whether a command is held for several steps."""
         return self.controller.every > 1
 
     def _step(self, k: jax.Array, lane: Lane) -> Lane:
-        """All lanes one control step on. A lane whose episode has ended moves on too, but its tally stands still.
+        """Advance all lanes by one control step; statistics of ended episodes stay the same.
 
-        k: [] steps since lanes took their latest episodes, as all lanes have it.
+        k: [] steps since lanes took their latest episodes, the same for all lanes.
         """
         body = self._per_lane(_push)(lane)
         sensed, workings = self.plant.forward(body)
@@ -277,7 +287,7 @@ class Simulator:
         )
 
     def _command(self, k: jax.Array, lane: Lane, sensed: Sensed) -> tuple[jax.Array, Any]:
-        """The commands of a step, and the controllers' memories."""
+        """Return the commands of a step, and the controllers' memories."""
 
         def asked() -> tuple[jax.Array, Any]:
             return self._per_lane(self._act)(lane, sensed)
@@ -288,27 +298,27 @@ class Simulator:
         return jax.lax.cond(due, asked, lambda: (lane.command, lane.memory))
 
     def _act(self, lane: Lane, sensed: Sensed) -> tuple[jax.Array, Any]:
-        """The controller's command [J] and its memory."""
+        """Return the controller's command [J] and its memory."""
         time, names = lane.tally.steps * self.drive.step, self.controller.reads
         senses = sense(self.creature, sensed, time, names)
         senses |= self.task.senses(lane.aim, sensed)
         return self.controller.act(lane.plan, lane.memory, senses)
 
     def _look_for_overlap(self, lane: Lane) -> Lane:
-        """The lanes with the deepest that parts were in each other, where an episode goes on."""
+        """Record the deepest overlap of parts where an episode is still running."""
         tally, depth = lane.tally, self.plant.overlap(lane.body)
         going = (tally.reason == FINISHED) & (tally.steps < self.steps)
-        # A comparison, not a maximum: a state that is NaN is for the next step to find.
+        # A comparison, not a maximum: the next step handles a state that is NaN.
         deeper = jnp.where(going & (depth > tally.overlap), depth, tally.overlap)
         return dataclasses.replace(lane, tally=dataclasses.replace(tally, overlap=deeper))
 
     def reason(self, sensed: Sensed, aim: Any) -> jax.Array:
-        """Why [] an episode ends at this moment; `FINISHED` while all is well."""
+        """Return why [] an episode ends now; `FINISHED` while it goes on."""
         ended = self.task.ended(sensed, aim)
         return jnp.where(_finite(sensed), ended, NONFINITE).astype(jnp.int32)
 
     def _judge(self, lane: Lane, sensed: Sensed, torque: jax.Array) -> Any:
-        """The tally after a step; one that has ended stands still."""
+        """Update the statistics after a step, unless the episode has ended."""
         tally = lane.tally
         going = (tally.reason == FINISHED) & (tally.steps < self.steps)
         reason = self.reason(sensed, lane.aim)
@@ -321,7 +331,7 @@ class Simulator:
 
 
 def _finite(sensed: Sensed) -> jax.Array:
-    """Whether [] all that a step depends on is finite."""
+    """Tell whether [] all that a step depends on is finite."""
     seen = (sensed.joint_vel, sensed.trunk_pos, sensed.trunk_rot, sensed.bias)
     return jnp.isfinite(sum(jnp.sum(part) for part in seen))
 
@@ -336,9 +346,10 @@ def _push(lane: Lane) -> BodyState:
 
 
 def _arriving(late: Late, step: jax.Array, torque: jax.Array) -> tuple[jax.Array, Late]:
-    """The torques [J] that arrive at a step [], and those on their way with the step's own.
+    """Return the torques [J] that arrive at a step [], and those still delayed.
 
-    Before the first has arrived it acts already, as if the body had been held so.
+    The latter include this step's own. Before the first torque arrives it already acts, as if the
+    body had been held so.
     """
     known = jnp.concatenate([torque[None], jnp.where(step == 0, torque, late.recent)])
     arriving = torque
