@@ -116,7 +116,7 @@ def measure(options: argparse.Namespace, engine: str, lanes: str) -> None:
     # Imported here: the parent process needs neither JAX nor the card.
     import jax
 
-    from mjxgait.training.devices import compiled, everywhere, prepare_devices
+    from mjxgait.training.stages import compiled, everywhere, prepare_devices
 
     prepare_devices()
     jax.config.update("jax_enable_compilation_cache", False)
@@ -157,7 +157,7 @@ def workload(options: argparse.Namespace, engine: str, lanes: int) -> tuple[Any,
     import jax.numpy as jnp
 
     from mjxgait.bench.workload import walking
-    from mjxgait.config.shipped import find_creature
+    from mjxgait.config.layers import find_creature
     from mjxgait.creature import load_creature
     from mjxgait.training.experiment import Batch, build_experiment
 

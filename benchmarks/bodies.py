@@ -26,11 +26,11 @@ import jax.numpy as jnp
 import numpy as np
 
 from mjxgait.bench.machine import machine_facts
-from mjxgait.config.shipped import find_creature
+from mjxgait.config.layers import find_creature
 from mjxgait.controllers import spd
 from mjxgait.creature import Creature, load_creature
 from mjxgait.physics import make_plant
-from mjxgait.training.devices import prepare_devices
+from mjxgait.training.stages import prepare_devices
 from mjxgait.types import BodyState, Plant, Sensed
 
 LANES = 64

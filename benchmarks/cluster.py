@@ -36,16 +36,15 @@ from mjxgait.api import load_creature
 from mjxgait.config.schema import Config
 from mjxgait.config.tables import build, merge
 from mjxgait.creature import Creature
-from mjxgait.distributed.chunks import Blocks
 from mjxgait.distributed.connect import connected
 from mjxgait.distributed.jobs import AdvanceRows, Job
 from mjxgait.distributed.recipe import Recipe
+from mjxgait.distributed.rows import Blocks
 from mjxgait.distributed.scheduler import Crew
 from mjxgait.plugins import resolve_config
-from mjxgait.training.checkpoint import Checkpoints
-from mjxgait.training.devices import prepare_devices
+from mjxgait.training.checkpoint import Checkpoints, pack
 from mjxgait.training.experiment import build_experiment
-from mjxgait.training.packed import pack
+from mjxgait.training.stages import prepare_devices
 
 SIZES = (64, 256, 1024, 4096)
 """Individuals per chunk; the population has the largest size."""

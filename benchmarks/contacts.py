@@ -31,10 +31,10 @@ import tomli_w
 from mujoco import rollout
 
 from mjxgait.bench.machine import machine_facts
-from mjxgait.config.shipped import data_folder
+from mjxgait.config.layers import data_folder
 from mjxgait.creature import Creature, load_creature
 from mjxgait.physics import make_plant
-from mjxgait.training.devices import prepare_devices
+from mjxgait.training.stages import prepare_devices
 from mjxgait.types import BodyState, Plant
 
 LANES = 64

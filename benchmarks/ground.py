@@ -22,13 +22,13 @@ import numpy as np
 from bodies import LANES, STEPS, follow, start, timed
 
 from mjxgait.bench.machine import machine_facts
-from mjxgait.config.shipped import find_creature
+from mjxgait.config.layers import find_creature
 from mjxgait.creature import Creature, load_creature
-from mjxgait.creature.frame import start_place
+from mjxgait.creature.creature import start_place
 from mjxgait.creature.ground.spec import parse_ground
 from mjxgait.creature.ground.surface import lay_ground, named_draws
 from mjxgait.physics import make_plant
-from mjxgait.training.devices import prepare_devices
+from mjxgait.training.stages import prepare_devices
 from mjxgait.types import BodyState, Plant, Sensed
 
 WIDE = {"xla_cpu_prefer_vector_width": "512"}

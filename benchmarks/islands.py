@@ -18,16 +18,16 @@ import jax.numpy as jnp
 import numpy as np
 
 from mjxgait.api import load_creature
-from mjxgait.config.islands import IslandsConfig
+from mjxgait.config.evolution import IslandsConfig
 from mjxgait.config.schema import Config
 from mjxgait.config.tables import build, merge
-from mjxgait.distributed.migration import exchanged
+from mjxgait.distributed.islands import exchanged
 from mjxgait.evolution.state import EvolutionState
-from mjxgait.experiments.ablation.statistics import compare, estimate
+from mjxgait.experiments.ablation.findings import compare, estimate
 from mjxgait.plugins import resolve_config
-from mjxgait.training.devices import prepare_devices
+from mjxgait.training.checkpoint import Packed, pack
 from mjxgait.training.experiment import build_batch
-from mjxgait.training.packed import Packed, pack
+from mjxgait.training.stages import prepare_devices
 
 WAYS = {
     "one population": IslandsConfig(1, 0),

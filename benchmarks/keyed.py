@@ -14,9 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-from mjxgait.animation.keys.departure import departure_of
+from mjxgait.animation.keys.refine import departure_of
 from mjxgait.certification import judged, read_certificate
-from mjxgait.config.shipped import find_creature
+from mjxgait.config.layers import find_creature
 from mjxgait.creature import Creature, load_creature
 from mjxgait.processes import python_command
 from mjxgait.training.folder import CERTIFICATE

@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 
 from mjxgait.certification import judged
-from mjxgait.certification.simulate import simulate
+from mjxgait.certification.trials import simulate
 from mjxgait.creature import Creature
 from mjxgait.creature.overlap import NEAR, neighbours
 from mjxgait.reference.starts import nominal_starts

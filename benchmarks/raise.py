@@ -35,7 +35,7 @@ import numpy as np
 from mjxgait.certification import CertificateConfig, push_ladder
 from mjxgait.certification.certificate import half_point
 from mjxgait.certification.config import PushesConfig
-from mjxgait.certification.simulate import simulate
+from mjxgait.certification.trials import simulate
 from mjxgait.certification.worlds import slippery, sloping
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature

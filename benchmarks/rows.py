@@ -15,13 +15,12 @@ from statistics import median
 
 import jax
 
-from mjxgait.config.layers import resolve_config
+from mjxgait.config.layers import find_creature, resolve_config
 from mjxgait.config.schema import Config
-from mjxgait.config.shipped import find_creature
 from mjxgait.config.tables import build, merge
 from mjxgait.creature import load_creature
-from mjxgait.training.devices import prepare_devices
 from mjxgait.training.experiment import build_batch, build_experiment
+from mjxgait.training.stages import prepare_devices
 
 
 def main() -> None:

@@ -54,9 +54,7 @@ def main() -> None:
         loop,
         stages,
     )
-    from mjxgait.training import (
-        validation as looks,
-    )
+    from mjxgait.training import examination as looks
 
     watch = Stopwatch()
     watch.add("imports", time.perf_counter() - BEGAN)

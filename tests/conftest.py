@@ -22,7 +22,7 @@ import jax
 import pytest
 from helpers import STOOL
 
-from mjxgait.config.shipped import data_folder
+from mjxgait.config.layers import data_folder
 from mjxgait.creature import Creature, load_creature
 
 OLDER = "--xla_cpu_use_fusion_emitters=false"

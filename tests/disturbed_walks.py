@@ -7,7 +7,7 @@ import numpy as np
 from certify_made_up import LEGS, TOML, XML, make_champion
 from helpers import small_config
 
-from mjxgait.certification.simulate import simulate
+from mjxgait.certification.trials import simulate
 from mjxgait.champion import Champion
 from mjxgait.config.schema import Config
 from mjxgait.creature import Creature, load_creature

@@ -28,7 +28,7 @@ from mjxgait.controllers.key_poses.config import (
     gene_names,
 )
 from mjxgait.creature import Creature
-from mjxgait.tasks.score import in_order
+from mjxgait.tasks.base import in_order
 from mjxgait.tasks.walk.config import WalkConfig
 from mjxgait.tasks.walk.fitness import signed_weights, terms_under
 from mjxgait.training.experiment import Batch

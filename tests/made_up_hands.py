@@ -7,11 +7,10 @@ import numpy as np
 from viewing.made_up import metrics_line
 
 from mjxgait.distributed.jobs import Advanced, AdvanceRows
-from mjxgait.distributed.programs import Programs
-from mjxgait.distributed.recipe import Recipe
+from mjxgait.distributed.recipe import Programs, Recipe
 from mjxgait.distributed.scheduler import Crew, Report, Worker
-from mjxgait.experiments.repertoire.cells import POSES
-from mjxgait.training.packed import pack
+from mjxgait.experiments.repertoire.grid import POSES
+from mjxgait.training.checkpoint import pack
 
 PROGRAMS = Programs()
 

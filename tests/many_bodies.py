@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 
-from mjxgait.physics.layout import SenseLayout
+from mjxgait.physics.derived import SenseLayout
 from mjxgait.types import BodyState, Plant
 
 XML = """

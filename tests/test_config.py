@@ -8,14 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from mjxgait.config.layers import over_base
+from mjxgait.config.layers import data_folder, find_creature, over_base
 from mjxgait.config.schema import Config, UseConfig
-from mjxgait.config.shipped import data_folder, find_creature
 from mjxgait.config.tables import build, dump_toml, read_toml
 from mjxgait.errors import UserError
 from mjxgait.kinds import controllers, tasks
 from mjxgait.plugins import resolve_config
-from mjxgait.plugins.settings import build_config, config_class
+from mjxgait.plugins.registry import build_config, config_class
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import sys
 LOSES_ONE = """
 import multiprocessing, threading, time
 from concurrent.futures.process import BrokenProcessPool
-from mjxgait.cores import process_per_core
+from mjxgait.processes import process_per_core
 
 def kill_the_first():
     while not (children := multiprocessing.active_children()):

@@ -22,10 +22,10 @@ from mjxgait.cli import certify
 from mjxgait.config.schema import Config
 from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import UserError
-from mjxgait.inspect.islands import island_facts
+from mjxgait.inspect.sections import island_facts
 from mjxgait.rendering.curves import columns
 from mjxgait.rendering.walk import record_walk
-from mjxgait.training.exams import Exams
+from mjxgait.training.examination import Exams
 from mjxgait.training.folder import (
     CERTIFICATE,
     CHAMPION,

@@ -15,11 +15,15 @@ from mjxgait.config.schema import Config
 from mjxgait.config.traced import traced
 from mjxgait.controllers.key_poses.controller import Genome
 from mjxgait.controllers.key_poses.operators import pose_variation
-from mjxgait.evolution.breeding import parents, proportional_parents
+from mjxgait.evolution.breeding import (
+    families,
+    first_of_kind,
+    parents,
+    place_in_family,
+    proportional_parents,
+)
 from mjxgait.evolution.chance import key_of
-from mjxgait.evolution.copies import first_of_kind
 from mjxgait.evolution.evolution import Evolution
-from mjxgait.evolution.families import families, place_in_family
 from mjxgait.evolution.state import (
     NOBODY,
     EvolutionState,

@@ -11,21 +11,21 @@ from jax.tree_util import keystr
 from scipy.spatial.transform import Rotation
 
 import mjxgait
-from mjxgait.certification.simulate import simulate
+from mjxgait.certification.trials import simulate
 from mjxgait.champion import Champion, read_champion
-from mjxgait.controllers.sized_body import Bodied
+from mjxgait.controllers.base import Bodied
 from mjxgait.creature import Creature, load_creature
 from mjxgait.creature.overlap import find_crossings
 from mjxgait.creature.proportions import grown, proportions
 from mjxgait.evolution.chance import key_of
 from mjxgait.inspect import facts, read_snapshot
+from mjxgait.physics.derived import sense_layout
 from mjxgait.physics.lane_major import fast_plant
-from mjxgait.physics.layout import sense_layout
 from mjxgait.physics.mjx import mjx_plant
 from mjxgait.reference.starts import nominal_starts
 from mjxgait.tasks.starts import draw_starts
+from mjxgait.training.blueprint import SizeGrowth
 from mjxgait.training.folder import BODY, CHAMPION
-from mjxgait.training.growth import SizeGrowth
 
 MOST = 1.3
 

@@ -29,8 +29,8 @@ from mjxgait.errors import UserError
 from mjxgait.evolution.state import EvolutionState
 from mjxgait.inspect.snapshot import read_snapshot
 from mjxgait.training import examination, loop
-from mjxgait.training.examination import Examiner, due
-from mjxgait.training.exams import Exams
+from mjxgait.training.examination import Examiner, Exams, due
+from mjxgait.training.examination import Looks as RunLooks
 from mjxgait.training.experiment import Experiment, build_experiment
 from mjxgait.training.folder import (
     CERTIFICATE,
@@ -40,7 +40,6 @@ from mjxgait.training.folder import (
 )
 from mjxgait.training.screen import Screen
 from mjxgait.training.stored import stored_generations
-from mjxgait.training.validation import Looks as RunLooks
 
 SECONDS = 0.4
 

@@ -15,7 +15,7 @@ from rich.console import Console
 
 from mjxgait.cli import main
 from mjxgait.cli.view import following
-from mjxgait.training.own import own_options
+from mjxgait.training.folder import own_options
 from mjxgait.training.screen import Screen
 
 PAGE = Path(__file__).parents[1] / "docs" / "extending.md"
@@ -187,7 +187,7 @@ def test_the_page_that_follows_a_run_is_given_the_same_code(folder: Path, traine
         ("--controller my.py:Nobody", 'has no class "Nobody"'),
         (
             "--controller my.py:Stand",
-            "must inherit from mjxgait.controllers.real_genome.RealController",
+            "must inherit from mjxgait.controllers.base.RealController",
         ),
         ("--controller half.py:Half", "Half lacks act"),
         ("--controller broken.py:X", "cannot be loaded (ZeroDivisionError"),
@@ -201,7 +201,7 @@ def test_the_page_that_follows_a_run_is_given_the_same_code(folder: Path, traine
 )
 def test_a_mistake_is_one_sentence(folder: Path, arguments, words, capfd, monkeypatch):
     monkeypatch.chdir(folder)
-    head = "from mjxgait.controllers.real_genome import RealController\n"
+    head = "from mjxgait.controllers.base import RealController\n"
     bounds = "    def bounds(self, settings):\n        return {'a': (0.0, 1.0)}\n"
     act = "    def act(self, plan, memory, senses):\n        return 0, memory\n"
     (folder / "half.py").write_text(f"{head}class Half(RealController):\n{bounds}")

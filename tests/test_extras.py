@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from mjxgait.animation.export import export_usd
-from mjxgait.config import shipped
-from mjxgait.config.shipped import install_command
+from mjxgait.config import layers
+from mjxgait.config.layers import install_command
 from mjxgait.errors import UserError
 
 ROOT = Path(__file__).parents[1]
@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[1]
 @pytest.fixture
 def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A package in a folder that has no project file yet."""
-    monkeypatch.setattr(shipped.resources, "files", lambda name: tmp_path / "src" / name)
+    monkeypatch.setattr(layers.resources, "files", lambda name: tmp_path / "src" / name)
     (tmp_path / "src" / "mjxgait").mkdir(parents=True)
     return tmp_path / "src"
 

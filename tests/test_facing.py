@@ -13,7 +13,7 @@ from mjxgait.api import load_creature
 from mjxgait.config.schema import Config
 from mjxgait.controllers.observations import SENSES
 from mjxgait.creature import Creature
-from mjxgait.creature.facing import WAYS, facing
+from mjxgait.creature.scale import WAYS, facing
 from mjxgait.creature.settings import Balance, Steering, Stepping
 from mjxgait.errors import UserError
 from mjxgait.training.folder import create_run, open_run

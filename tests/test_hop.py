@@ -11,36 +11,34 @@ import pytest
 from helpers import SHORT, altered, pose_champion, said_by
 
 from mjxgait.certification import record
-from mjxgait.certification.simulate import simulate
-from mjxgait.config.rollout import RolloutConfig
-from mjxgait.config.shipped import find_creature
+from mjxgait.certification.trials import simulate
+from mjxgait.config.layers import find_creature
+from mjxgait.config.schema import RolloutConfig
 from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import UserError
 from mjxgait.evolution.chance import key_of
 from mjxgait.plugins import resolve_config
-from mjxgait.plugins.settings import build_config
+from mjxgait.plugins.registry import build_config
 from mjxgait.plugins.user_code import load
 from mjxgait.reference.starts import nominal_starts
-from mjxgait.tasks.falls import Reason
+from mjxgait.tasks.base import Reason
 from mjxgait.tasks.hop.config import (
     GOALS,
     NOMINAL_GOAL,
     HopConfig,
     HopWeights,
 )
-from mjxgait.tasks.hop.fitness import (
+from mjxgait.tasks.hop.stats import (
     STYLE,
     TERMS,
-    fitness_terms,
-    signed_weights,
-    terms_under,
-)
-from mjxgait.tasks.hop.stats import (
     Tally,
     away,
     empty,
+    fitness_terms,
     goal_distance,
     rested,
+    signed_weights,
+    terms_under,
     updated,
 )
 from mjxgait.tasks.hop.task import Hop
@@ -363,7 +361,7 @@ def test_evolution_weighs_energy_and_sub_goals_where_they_have_a_weight(stool: C
 
 REACH = """
 import jax.numpy as jnp
-from mjxgait.controllers.real_genome import RealController
+from mjxgait.controllers.base import RealController
 
 
 class Reach(RealController):

@@ -11,8 +11,8 @@ from helpers import STOOL, program_text, small_config
 
 from mjxgait.creature import Creature, load_creature
 from mjxgait.creature.overlap import find_crossings
+from mjxgait.physics.derived import sense_layout
 from mjxgait.physics.lane_major import fast_plant
-from mjxgait.physics.layout import sense_layout
 from mjxgait.training.blueprint import Numbers
 from mjxgait.training.experiment import Batch, build_experiment
 from mjxgait.types import BodyState

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 import mjxgait.tasks
-from mjxgait.certification.tasks import demands_of
+from mjxgait.certification.acceptance import demands_of
 from mjxgait.errors import UserError
 from mjxgait.kinds import controllers, in_water, meant_of_grown, task_kind, tasks
 from mjxgait.plugins.registry import find

@@ -12,27 +12,26 @@ import pytest
 from helpers import SHORT, STOOL, pose_champion, said_by
 
 from mjxgait.certification import CertificateConfig, record
-from mjxgait.certification.simulate import simulate
-from mjxgait.certification.tasks import demands_of, promising
+from mjxgait.certification.acceptance import demands_of, promising
+from mjxgait.certification.trials import simulate
 from mjxgait.champion import Champion
-from mjxgait.config.rollout import RolloutConfig
-from mjxgait.config.shipped import find_creature
+from mjxgait.config.layers import find_creature
+from mjxgait.config.schema import RolloutConfig
 from mjxgait.creature import Creature, load_creature
 from mjxgait.creature.geometry import support_extents
 from mjxgait.errors import UserError
 from mjxgait.evolution.chance import key_of
 from mjxgait.evolution.state import EvolutionState
-from mjxgait.plugins.settings import build_config
-from mjxgait.reference.bar import FAR, Clearance
-from mjxgait.reference.bar import RADIUS as EXAMINED_RADIUS
+from mjxgait.plugins.registry import build_config
+from mjxgait.reference.layout import FAR, Clearance
+from mjxgait.reference.layout import RADIUS as EXAMINED_RADIUS
 from mjxgait.reference.measure import Recording
 from mjxgait.reference.outcome import Outcome, Trajectory
 from mjxgait.reference.starts import nominal_starts, perturbed_starts
-from mjxgait.tasks.hop import limbo_config as evolution
-from mjxgait.tasks.hop.bar import bar_distance, intrusion
-from mjxgait.tasks.hop.fitness import signed_weights, terms_under
-from mjxgait.tasks.hop.limbo import Aim, Limbo
-from mjxgait.tasks.hop.limbo_config import BAR_PLACE, LimboConfig, LimboWeights
+from mjxgait.tasks.hop import config as evolution
+from mjxgait.tasks.hop.config import BAR_PLACE, LimboConfig, LimboWeights
+from mjxgait.tasks.hop.limbo import Aim, Limbo, bar_distance, intrusion
+from mjxgait.tasks.hop.stats import signed_weights, terms_under
 from mjxgait.tasks.hop.thresholds import LimboConfig as Demanded
 from mjxgait.training.experiment import build_experiment
 from mjxgait.training.generation import (
@@ -265,7 +264,7 @@ def test_the_bar_comes_down_a_step_when_most_of_the_best_have_mastered_it(
 def test_all_goals_lie_beyond_the_bar(luxo: Creature):
     task = Limbo(luxo, STEP, HORIZON, luxo.settings.termination)
     goals = np.asarray(task.trials(key_of(0), luxo, RolloutConfig(starts=100)).goal)
-    assert goals[0] == np.float32(evolution.NOMINAL_GOAL)
+    assert goals[0] == np.float32(evolution.LIMBO_NOMINAL_GOAL)
     assert goals.min() > BAR_PLACE + luxo.frame.body_length
     with pytest.raises(UserError, match=r"slope:0.1.*flat"):
         task.trials(key_of(0), luxo, RolloutConfig(ground="slope:0.1"))
@@ -290,7 +289,7 @@ def test_evolution_and_examiner_mean_the_same_bar_and_the_same_goals():
     demands = Demanded()
     assert (demands.place, EXAMINED_RADIUS) == (BAR_PLACE, evolution.BAR_RADIUS)
     assert demands.height == LimboConfig().height == HEIGHT
-    assert (demands.goals, demands.nominal) == (evolution.GOALS, evolution.NOMINAL_GOAL)
+    assert (demands.goals, demands.nominal) == (evolution.LIMBO_GOALS, evolution.LIMBO_NOMINAL_GOAL)
 
 
 def test_the_clearance_is_the_distance_of_the_nearest_part(luxo: Creature, looker: Clearance):
@@ -382,4 +381,4 @@ def test_a_short_run_ends_with_a_champion_and_a_verdict(tmp_path: Path, capsys):
     said_by(capsys, "certify", folder, "--config", short, code=0)
     certificate = json.loads((folder / "certificate.json").read_text())
     assert [c["number"] for c in certificate["criteria"]] == [1, 2, 3, 4, 6, 8, 9]
-    assert certificate["report"]["goal"] == evolution.NOMINAL_GOAL
+    assert certificate["report"]["goal"] == evolution.LIMBO_NOMINAL_GOAL

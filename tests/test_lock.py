@@ -17,21 +17,16 @@ from helpers import STOOL, said_by
 from mjxgait.config.schema import Config
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
-from mjxgait.training import lock
+from mjxgait.training import stored
 from mjxgait.training.folder import create_run
-from mjxgait.training.lock import (
-    LOCK,
-    locked,
-    running,
-    why_empty,
-)
+from mjxgait.training.stored import LOCK, locked, running, why_empty
 
 pytest.importorskip("fcntl", reason="this system has no flock")
 
 HOLD = """
 import sys
 from pathlib import Path
-from mjxgait.training.lock import locked
+from mjxgait.training.stored import locked
 with locked(Path(sys.argv[1])):
     print("locked", flush=True)
     sys.stdin.read()
@@ -78,8 +73,8 @@ def test_a_look_does_not_keep_a_process_from_beginning(tmp_path: Path, monkeypat
     """One that looks holds the lock for a moment."""
     (tmp_path / LOCK).touch()
     looks = (tmp_path / LOCK).open("rb")
-    assert lock._try(looks, shared=True)
-    monkeypatch.setattr("mjxgait.training.lock.time.sleep", lambda seconds: looks.close())
+    assert stored._try(looks, shared=True)
+    monkeypatch.setattr("mjxgait.training.stored.time.sleep", lambda seconds: looks.close())
     with locked(tmp_path):
         assert running(tmp_path) == ME
 
@@ -88,7 +83,7 @@ def test_a_lock_that_was_just_taken_away_is_not_mistaken_for_the_new_one(
     tmp_path: Path, monkeypatch
 ):
     """Two would have the folder: one the old file, one the new."""
-    attempt, files = lock._try, []
+    attempt, files = stored._try, []
 
     def late(file, shared=False):
         if not files:
@@ -97,7 +92,7 @@ def test_a_lock_that_was_just_taken_away_is_not_mistaken_for_the_new_one(
         return attempt(file, shared)
 
     with monkeypatch.context() as patch:
-        patch.setattr(lock, "_try", late)
+        patch.setattr(stored, "_try", late)
         held = locked(tmp_path)
         held.__enter__()
     assert len(files) == 2

@@ -13,10 +13,9 @@ import pytest
 from viewing.made_up import treading, write_run
 
 from mjxgait.bench.scaling import Point, measure
-from mjxgait.cores import process_per_core
 from mjxgait.creature import Creature
 from mjxgait.importer import import_model
-from mjxgait.processes import SAFE_PATH, python_command, safe_environment
+from mjxgait.processes import SAFE_PATH, process_per_core, python_command, safe_environment
 from mjxgait.rendering.gl import working_backend
 from mjxgait.rendering.stage import Stage
 from mjxgait.rendering.walk import record_walk

@@ -13,17 +13,15 @@ import numpy as np
 import pytest
 from helpers import small_config, weight_vector
 
-from mjxgait.config.layers import resolve_config
+from mjxgait.config.layers import find_creature, resolve_config
 from mjxgait.config.schema import Config
-from mjxgait.config.shipped import find_creature
 from mjxgait.controllers.key_poses.controller import Genome
 from mjxgait.creature import Creature, load_creature
 from mjxgait.evolution.chance import key_of
 from mjxgait.evolution.variation import Box, uniform
 from mjxgait.simulation.evaluator import Local
 from mjxgait.simulation.rollout import Episodes
-from mjxgait.tasks.falls import Reason
-from mjxgait.tasks.score import in_order, score
+from mjxgait.tasks.base import Reason, in_order, score
 from mjxgait.tasks.starts import NEVER, Starts, draw_starts
 from mjxgait.tasks.walk.fitness import (
     BEYOND,

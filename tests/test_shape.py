@@ -8,7 +8,7 @@ from helpers import small_config
 from mjxgait import kinds
 from mjxgait.creature import Creature
 from mjxgait.plugins import registry
-from mjxgait.training.shape import shape_of
+from mjxgait.training.experiment import shape_of
 
 
 def test_numbers_are_free(stool: Creature):

@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 from helpers import STOOL, small_config
 
-from mjxgait.controllers.drive import Rules
-from mjxgait.controllers.spd import limited_torque, pd_force
+from mjxgait.controllers.spd import Rules, limited_torque, pd_force
 from mjxgait.creature import Creature, load_creature
 from mjxgait.simulation.rollout import Simulator
 from mjxgait.training.experiment import build_experiment

@@ -3,7 +3,7 @@
 import pytest
 
 from mjxgait.creature import Creature
-from mjxgait.plugins.settings import resolve_config
+from mjxgait.plugins.registry import resolve_config
 from mjxgait.training.experiment import build_experiment
 from mjxgait.training.stages import compile_stages
 

@@ -28,9 +28,8 @@ from mjxgait.creature.scale import load_files
 from mjxgait.errors import UserError
 from mjxgait.importer import ImportChoices, import_model
 from mjxgait.plugins import resolve_config
-from mjxgait.reference.controllers.changing import ChangingTwin
-from mjxgait.reference.controllers.halting import HaltingTwin
-from mjxgait.reference.controllers.protocol import Twin
+from mjxgait.reference.changing import ChangingTwin, HaltingTwin
+from mjxgait.reference.controllers import Twin
 from mjxgait.reference.layout import start_frame
 from mjxgait.reference.state import State
 from mjxgait.reference.state import sense as examiner_sense

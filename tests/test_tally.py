@@ -21,9 +21,8 @@ from disturbed_walks import (
 from recorded_tally import Frames, end, tally_of
 
 from mjxgait.creature import Creature
-from mjxgait.tasks.falls import Reason, why_fallen
-from mjxgait.tasks.walk.stats import CONTACT_GAP, Judge, Tally
-from mjxgait.tasks.walk.target_stats import WishTally, wish_tally, wish_updated
+from mjxgait.tasks.base import Reason, why_fallen
+from mjxgait.tasks.walk.stats import CONTACT_GAP, Judge, Tally, WishTally, wish_tally, wish_updated
 from mjxgait.types import Sensed
 
 

@@ -11,21 +11,21 @@ from certify_made_up import walk
 from test_hop import HORIZON, REACH, STEP, moment, reaching
 
 from mjxgait.certification import CertificateConfig
-from mjxgait.certification.simulate import simulate
-from mjxgait.certification.tasks import demands_of, promising
+from mjxgait.certification.acceptance import demands_of, promising
+from mjxgait.certification.trials import simulate
 from mjxgait.creature import Creature
 from mjxgait.reference.measure import Recording
 from mjxgait.reference.outcome import Outcome, Trajectory
 from mjxgait.reference.starts import nominal_starts
-from mjxgait.tasks.hop import travel_criteria as travel
+from mjxgait.tasks.hop import criteria as travel
 from mjxgait.tasks.hop.config import (
     GOALS,
     NEAR,
     NOMINAL_GOAL,
     TravelConfig,
 )
+from mjxgait.tasks.hop.task import Aim, Travel
 from mjxgait.tasks.hop.thresholds import TravelConfig as Demanded
-from mjxgait.tasks.hop.travel import Aim, Travel
 
 CONFIG, DEMANDS = CertificateConfig(), demands_of("travel")
 

@@ -10,13 +10,12 @@ import pytest
 from helpers import STOOL, Shares, small_config
 
 from mjxgait.certification import CertificateConfig
+from mjxgait.config.layers import find_creature
 from mjxgait.config.schema import Config
-from mjxgait.config.shipped import find_creature
 from mjxgait.creature import load_creature
 from mjxgait.plugins import resolve_config
 from mjxgait.training import prescreen as tryout
-from mjxgait.training.examination import Examiner
-from mjxgait.training.exams import Exams
+from mjxgait.training.examination import Examiner, Exams
 from mjxgait.training.experiment import Experiment, build_experiment
 from mjxgait.training.prescreen import Tryout, tried_settings, tryout_of
 

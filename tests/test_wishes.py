@@ -16,25 +16,18 @@ from hypothesis import strategies as st
 from mjxgait.certification.describe import gait_name
 from mjxgait.certification.stress import StressConfig
 from mjxgait.champion import read_champion, write_champion
+from mjxgait.config.layers import data_folder, shipped_creatures
 from mjxgait.config.schema import Config, UseConfig
-from mjxgait.config.shipped import data_folder, shipped_creatures
 from mjxgait.config.traced import traced
 from mjxgait.creature import Creature, load_creature
-from mjxgait.creature.facing import facing
-from mjxgait.creature.scale import SETTINGS, load_files
+from mjxgait.creature.scale import SETTINGS, facing, load_files
 from mjxgait.errors import UserError
 from mjxgait.evolution.chance import key_of
 from mjxgait.plugins import resolve_config
 from mjxgait.plugins.fit import check_fit
-from mjxgait.tasks.score import in_order, score
+from mjxgait.tasks.base import in_order, score
 from mjxgait.tasks.walk.config import WalkConfig, Weights, WishWeights
 from mjxgait.tasks.walk.fitness import REWARDS, TERMS, terms_under
-from mjxgait.tasks.walk.footfalls import (
-    Footfalls,
-    gait_missed,
-    no_footfalls,
-    stepped,
-)
 from mjxgait.tasks.walk.gaits import (
     GAITS,
     animal_stride,
@@ -42,7 +35,7 @@ from mjxgait.tasks.walk.gaits import (
     placed,
     stations_of,
 )
-from mjxgait.tasks.walk.stats import Tally
+from mjxgait.tasks.walk.stats import Footfalls, Tally, gait_missed, no_footfalls, stepped
 from mjxgait.tasks.walk.targets import (
     Wishes,
     configured,

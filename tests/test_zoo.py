@@ -18,9 +18,8 @@ from mjxgait.champion import write_champion
 from mjxgait.creature import Creature
 from mjxgait.distributed.rows import Rows
 from mjxgait.distributed.scheduler import Crew
-from mjxgait.experiments.multi_seed.found import found_in
-from mjxgait.experiments.multi_seed.seeds import create_zoo, folders_of, read_seeds
-from mjxgait.experiments.repertoire.cells import POSES
+from mjxgait.experiments.multi_seed import create_zoo, folders_of, found_in, read_seeds
+from mjxgait.experiments.repertoire.grid import POSES
 from mjxgait.training.folder import (
     CERTIFICATE,
     CHAMPION,

@@ -7,13 +7,15 @@ run.champion, run.certificate, run.metrics()
 mjxgait.walk(run)["trunk_z"]
 """
 
-from mjxgait.api.look import (
+from mjxgait.api.make import (
     examine,
     examine_expressions,
+    load_creature,
+    refine,
+    train,
     verify,
     walk,
 )
-from mjxgait.api.make import load_creature, refine, train
 from mjxgait.api.run import Run, open
 
 __all__ = [

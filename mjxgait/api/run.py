@@ -20,7 +20,7 @@ from mjxgait.training.folder import (
 )
 
 if TYPE_CHECKING:  # it imports all drawing code
-    from mjxgait.animation.keys.departure import Departure
+    from mjxgait.animation.keys.refine import Departure
 
 Place = str | Path
 
@@ -72,7 +72,7 @@ class Run:
         Raises:
           UserError: the run was not made by `refine`, or has no champion.
         """
-        from mjxgait.animation.keys.departure import departure_of
+        from mjxgait.animation.keys.refine import departure_of
 
         return departure_of(self.folder)
 

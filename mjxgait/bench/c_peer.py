@@ -4,17 +4,22 @@ The shared object of the installed mujoco package does the physics, in double pr
 """
 
 import ctypes
+import multiprocessing
 import shutil
 import subprocess
+import time
+from collections.abc import Callable
+from multiprocessing.connection import Connection
 from pathlib import Path
+from typing import Protocol
 
 import mujoco
 import numpy as np
 
-from mjxgait.bench.bare import bare_model
 from mjxgait.bench.mujoco_peer import Law, check_controller, quiet
-from mjxgait.bench.workload import Workload
+from mjxgait.bench.workload import Lap, Workload, bare_model
 from mjxgait.creature import Creature
+from mjxgait.processes import cores, single_threaded
 from mjxgait.reference.layout import LowestPoint
 
 SOURCE = Path(__file__).with_suffix(".c")
@@ -158,3 +163,77 @@ def _episodes(workload: Workload, law: Law, model: mujoco.MjModel) -> dict[str, 
         "geom_friction": model.geom_friction[:, 0],
         "pair_friction": model.pair_friction[:, 0],
     }
+
+
+class Peer(Protocol):
+    """A contestant's share of the work."""
+
+    def lap(self) -> tuple[int, float]:
+        """Simulate all its episodes; return useful steps, and the sum of distances forward in m."""
+        ...
+
+
+class Workers:
+    """Processes that wait between laps, so that they take no time from other contestants.
+
+    startup: s until all were ready.
+    """
+
+    def __init__(
+        self,
+        peer: Callable[[Workload, int, int], Peer],
+        workload: Workload,
+        count: int | None = None,
+    ) -> None:
+        count = count or cores()
+        self.episodes = workload.episodes
+        began = time.perf_counter()
+        context = multiprocessing.get_context("spawn")
+        pairs = [context.Pipe() for _ in range(count)]
+        self.processes = [
+            context.Process(target=_serve, args=(theirs, peer, workload, i, count), daemon=True)
+            for i, (_, theirs) in enumerate(pairs)
+        ]
+        with single_threaded():
+            for process in self.processes:
+                process.start()
+        self.pipes = [ours for ours, _ in pairs]
+        for _, theirs in pairs:
+            theirs.close()
+        for pipe in self.pipes:
+            pipe.recv()
+        self.startup = time.perf_counter() - began
+
+    def lap(self) -> Lap:
+        """Run the workload once."""
+        began = time.perf_counter()
+        for pipe in self.pipes:
+            pipe.send("go")
+        results = [pipe.recv() for pipe in self.pipes]
+        seconds = time.perf_counter() - began
+        steps, forward, processor = (sum(values) for values in zip(*results, strict=True))
+        return Lap(seconds, steps, forward / self.episodes, processor)
+
+    def close(self) -> None:
+        """End the processes."""
+        for pipe in self.pipes:
+            pipe.close()
+        for process in self.processes:
+            process.join()
+
+
+def _serve(
+    pipe: Connection,
+    peer: Callable[[Workload, int, int], Peer],
+    workload: Workload,
+    first: int,
+    stride: int,
+) -> None:
+    contestant = peer(workload, first, stride)
+    try:
+        pipe.send("ready")
+        while pipe.recv():
+            began = time.process_time()
+            pipe.send((*contestant.lap(), time.process_time() - began))
+    except (EOFError, KeyboardInterrupt):
+        pass

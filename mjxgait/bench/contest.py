@@ -17,16 +17,13 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from mjxgait.bench.c_peer import CPeer, NoCompiler, build
-from mjxgait.bench.limits import distance_to_limit, step_cost
-from mjxgait.bench.machine import machine_facts, measured_peak
-from mjxgait.bench.ours import Ours, as_workload, half_and_half
-from mjxgait.bench.overhead import overhead
-from mjxgait.bench.workers import Workers
+from mjxgait.bench.c_peer import CPeer, NoCompiler, Workers, build
+from mjxgait.bench.machine import distance_to_limit, machine_facts, measured_peak, step_cost
+from mjxgait.bench.ours import Ours, as_workload, half_and_half, overhead
 from mjxgait.bench.workload import Lap, Workload
+from mjxgait.config.layers import install_command
 from mjxgait.config.schema import Config
-from mjxgait.config.shipped import install_command
-from mjxgait.cores import cores
+from mjxgait.processes import cores
 
 DART_STRIDE = 4
 """DART is so slow that it gets only every fourth genome."""

@@ -13,7 +13,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from mjxgait.config.rollout import RolloutConfig
+from mjxgait.config.schema import RolloutConfig
 from mjxgait.processes import python_command, safe_environment
 
 POPULATIONS = (32, 128, 512, 2048, 8192)
@@ -83,7 +83,7 @@ def measure_here(creature: str, point: Point) -> dict[str, Any]:
     """
     from mjxgait.bench.ours import Ours
     from mjxgait.bench.workload import walking
-    from mjxgait.config.shipped import find_creature
+    from mjxgait.config.layers import find_creature
     from mjxgait.creature import load_creature
 
     folder = find_creature(creature)

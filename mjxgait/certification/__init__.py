@@ -12,7 +12,7 @@ from mjxgait.certification.certificate import (
 )
 from mjxgait.certification.config import CertificateConfig
 from mjxgait.certification.criteria import Criterion, Measure
-from mjxgait.certification.trial_run import rehearse
+from mjxgait.certification.trials import rehearse
 from mjxgait.certification.validity import outdated, read_certificate, read_stress
 from mjxgait.certification.verdict import (
     Verdict,

@@ -8,14 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from mjxgait.certification import criteria, draws
+from mjxgait.certification import criteria, trials
+from mjxgait.certification.acceptance import demands_of, how_simulated
 from mjxgait.certification.check_body import check_body
 from mjxgait.certification.config import CertificateConfig
 from mjxgait.certification.criteria import Criterion
-from mjxgait.certification.draws import AIMS
-from mjxgait.certification.simulate import simulate
-from mjxgait.certification.steering import told_to_turn
-from mjxgait.certification.tasks import demands_of, how_simulated
+from mjxgait.certification.trials import AIMS, simulate, told_to_turn
 from mjxgait.certification.verdict import Verdict, judge, judged
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
@@ -170,15 +168,15 @@ def certify(
     config = config or CertificateConfig()
     began = time.perf_counter()
     seen = seen or glance(creature, champion, config)
-    draw, demands = draws.own(champion, config), demands_of(champion.task, champion.wish)
-    disturbed = draws.starts(creature, config, draw, config.starts.count)
+    draw, demands = trials.own(champion, config), demands_of(champion.task, champion.wish)
+    disturbed = trials.starts(creature, config, draw, config.starts.count)
     groups = [
         nominal_starts(creature, 1),
         demands.aimed(disturbed, config, draw.generator(AIMS)),
     ]
     if demands.pushed:
-        groups += [draws.pushes(creature, config, draw, config.pushes.count)]
-        groups += draws.ladder(creature, config, draw)
+        groups += [trials.pushes(creature, config, draw, config.pushes.count)]
+        groups += trials.ladder(creature, config, draw)
     starts = demands.aimed(join(*groups), config)
     outcome = simulate(
         creature, champion, starts, config.seconds, fall=demands.fall(config), threads=threads
@@ -260,7 +258,7 @@ def push_ladder(
 
     Push speeds are in units of sqrt(g * hip height).
     """
-    groups = draws.ladder(creature, config, draws.common(config))
+    groups = trials.ladder(creature, config, trials.common(config))
     starts = demands_of(champion.task, champion.wish).aimed(join(*groups), config)
     fall = demands_of(champion.task, champion.wish).fall(config)
     outcome = simulate(creature, champion, starts, config.seconds, fall=fall, threads=threads)

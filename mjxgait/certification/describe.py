@@ -1,17 +1,155 @@
 """Description of a gait without thresholds: speed, effort, rhythm, footfalls and name.
 
+Letters: `F` frequencies, `J` actuated joints.
+
+Times of footfalls do not count: in a canter the left and the right fall at different times.
+Letters: `J` actuated joints, `N` feet.
+
 `N` feet.
 """
 
 import itertools
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from mjxgait.certification.criteria import speed
-from mjxgait.certification.likeness import likeness
-from mjxgait.reference.measure import Dimensions, Recording
-from mjxgait.reference.strides import stride_frequency, stride_starts
+from mjxgait.reference.measure import (
+    Dimensions,
+    Recording,
+    falls_of_feet,
+    stride_frequency,
+    stride_starts,
+)
+from mjxgait.tasks.walk.gaits import animal_duty, animal_stride, stations_of, transition
+
+SLOWEST = 20.0
+"""Hz; slower motion may belong to a stride."""
+MULTIPLE = 7
+"""Multiple of the stride frequency at which an animal changes from trot to gallop.
+
+Small animals stride fast.
+"""
+BAND = 2.0
+"""Hz, width of the search band.
+
+A footfall shakes a joint at all frequencies, a vibration at one.
+"""
+
+
+def buzz(window: Recording) -> float:
+    """Return the strongest vibration of a joint over the speed of all joints (root mean squares).
+
+    The vibration is the largest speed of any joint within any band of 2 Hz, from 20 Hz on, or
+    from `MULTIPLE` times the transition frequency if that is higher.
+    """
+    speed, step = window.joint_vel, window.time_step
+    if not np.isfinite(speed).all() or not speed.any():
+        return np.nan
+    power, spacing = _power(speed, step), 1 / (len(speed) * step)
+    first = int(np.ceil(max(SLOWEST, MULTIPLE * transition(window.dimensions.mass)) / spacing))
+    sums = np.cumsum(np.pad(power, ((1, 0), (0, 0))), axis=0)[first:]
+    width = max(round(BAND / spacing), 1)
+    bands = sums[width:] - sums[:-width]
+    return float(np.sqrt(bands.max(initial=0.0) / (speed**2).mean(0).mean()))
+
+
+def _power(speed: np.ndarray, step: float) -> np.ndarray:
+    """Power [F, J] in (rad/s)² at each frequency from 0 on; its sum is a joint's mean square."""
+    taper = np.hanning(len(speed))[:, None]
+    waves: np.ndarray = np.abs(np.fft.rfft(speed * taper, axis=0)) ** 2
+    total = waves.sum(0)
+    scale = (speed**2).mean(0) / np.where(total > 0, total, 1.0)
+    return waves * scale
+
+
+STILL = 0.2
+"""Least amplitude to divide by, as a share of the root mean square amplitude of all joints."""
+
+
+def amplitudes_apart(window: Recording) -> float:
+    """Largest difference between amplitudes of a joint and its mirror image, over the larger.
+
+    An amplitude is the standard deviation of the angle. A pair that hardly moves is no limp.
+    """
+    partner = list(window.dimensions.partner)
+    amplitude = window.joint_pos.std(0)
+    least = STILL * np.sqrt((amplitude**2).mean())
+    larger = np.maximum(np.maximum(amplitude, amplitude[partner]), least)
+    apart = np.abs(amplitude - amplitude[partner]) / np.where(larger > 0, larger, 1.0)
+    return float(apart.max(initial=0.0))
+
+
+def duties_apart(window: Recording) -> float:
+    """Largest difference between the duty factors of a left foot and the right one beside it."""
+    duty = window.contact.mean(0)
+    return max((abs(float(duty[a] - duty[b])) for a, b in pairs_of(window)), default=0.0)
+
+
+def sides(window: Recording) -> dict[str, Any] | None:
+    """Return the report's entry on left and right; None for a body without two like sides."""
+    if not window.dimensions.partner:
+        return None
+    return {"amplitude": amplitudes_apart(window), "duty_factor": duties_apart(window)}
+
+
+def pairs_of(window: Recording) -> list[tuple[int, int]]:
+    """Pairs of left and right feet beside each other."""
+    at = {station: foot for foot, station in enumerate(stations_of(window.dimensions.foot_places))}
+    return [(foot, at[rank, False]) for (rank, left), foot in at.items() if left]
+
+
+def likeness(window: Recording, clearance: float) -> dict[str, float]:
+    """Compare a walk with that of an animal with such legs at this speed.
+
+    stride, duty_factor: over the animal's. reach: see `standing`. pitch: mean deg of the nose above
+    the horizon. patter: see `patter`; an animal has none.
+    clearance: rise of a foot in a swing, in hip heights.
+    """
+    hip, v = window.dimensions.hip_height, speed(window)
+    stride = v / stride_frequency(window, clearance)
+    return {
+        "stride": float(stride / animal_stride(v, hip)) if v > 0 else np.nan,
+        "duty_factor": float(window.contact.mean() / animal_duty(v, hip)),
+        "reach": standing(window),
+        "pitch": -float(np.degrees(window.pitch.mean())),
+        "patter": patter(window),
+    }
+
+
+def in_words(report: Mapping[str, Any]) -> str | None:
+    """Return a sentence on a report; None if it is of no walk, or of one without progress."""
+    found = report.get("likeness", {})
+    stride, duty = found.get("stride"), found.get("duty_factor")
+    if stride is None or duty is None or not np.isfinite([stride, duty]).all():
+        return None
+    told = f"Strides are {stride:.2f} and duty factors {duty:.2f} of an animal's at this speed"
+    if (often := found.get("patter") or 0.0) < 0.5:
+        return f"{told}."
+    return f"{told}; in each of them a foot loses the floor for a moment {often:.1f} times."
+
+
+def patter(window: Recording) -> float:
+    """Contact flicker: touchdowns per stride that end no swing, mean of the feet."""
+    carries = window.contact
+    touchdowns = (carries[1:] & ~carries[:-1]).sum(0)
+    swung = np.array(list(map(len, falls_of_feet(window))))
+    strides = max(np.sort(swung)[len(swung) // 2], 1)
+    return float(np.maximum(touchdowns - swung, 0).mean() / strides)
+
+
+def standing(window: Recording) -> float:
+    """Mean offset of stance from its place at rest, forward or back, in hip heights.
+
+    Each foot's offset is its mean over all frames in which it carries weight.
+    """
+    if window.foot_ahead is None:
+        return np.nan
+    size, carries = window.dimensions, window.contact
+    moved = window.foot_ahead - np.array(size.foot_places)[:, 0]
+    middles = (moved * carries).sum(0) / np.maximum(carries.sum(0), 1)
+    return float(np.abs(middles).mean() / size.hip_height)
 
 
 def describe(window: Recording, clearance: float) -> dict[str, Any]:

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from mjxgait.certification.config import CertificateConfig
-from mjxgait.certification.draws import common
-from mjxgait.certification.simulate import simulate
+from mjxgait.certification.trials import common, simulate
 from mjxgait.certification.worlds import slippery
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature

@@ -9,8 +9,8 @@ from typing import Any
 
 import tyro
 
-from mjxgait.config.rollout import Physics
-from mjxgait.config.shipped import find_creature
+from mjxgait.config.layers import find_creature
+from mjxgait.config.schema import Physics
 from mjxgait.config.tables import (
     build,
     check_whole,
@@ -18,11 +18,11 @@ from mjxgait.config.tables import (
     read_toml,
 )
 from mjxgait.creature import Creature, load_creature
-from mjxgait.creature.step import at_step
+from mjxgait.creature.scale import at_step
 from mjxgait.errors import INTERRUPTED, UserError
 from mjxgait.files import write_text
 from mjxgait.training.folder import CREATURE, is_taken
-from mjxgait.training.lock import locked
+from mjxgait.training.stored import locked
 
 STUDY = "study.toml"
 OVER = ("env", "seeds", "first_seed", "generations", "config", "rows", "physics")
@@ -75,9 +75,9 @@ class AblateOptions:
 def ablate_command(arguments: Sequence[str]) -> int:
     """Return the exit code."""
     options = tyro.cli(AblateOptions, args=list(arguments), prog="mjxgait ablate")
-    from mjxgait.experiments.ablation.measures import measure, read_logs
     from mjxgait.experiments.ablation.plan import check_variants, make_plan, read_study
     from mjxgait.experiments.ablation.report import write_report
+    from mjxgait.experiments.ablation.rows import measure, read_logs
 
     folder = (
         options.resume
@@ -105,7 +105,7 @@ def ablate_command(arguments: Sequence[str]) -> int:
     # JAX takes a second to import, so the study is checked first.
     from mjxgait.experiments.ablation.rows import groups
     from mjxgait.training.blueprint import check_plan
-    from mjxgait.training.devices import prepare_devices
+    from mjxgait.training.stages import prepare_devices
 
     prepare_devices()
     hours = _hours(plan.upper_bound(creature), len(parts := groups(plan)))
@@ -151,7 +151,7 @@ def _run(
 
     begin: makes the folder of a new study; called after the last check.
     """
-    from mjxgait.distributed.dashboard import crew_at
+    from mjxgait.distributed.evolve import crew_at
     from mjxgait.experiments.ablation.rows import run_study
 
     tell, stride = (screen.part, STRIDE) if cluster else (screen.generation, 1)

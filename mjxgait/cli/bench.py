@@ -8,7 +8,7 @@ from typing import Any
 
 import tyro
 
-from mjxgait.config.shipped import data_folder, find_creature
+from mjxgait.config.layers import data_folder, find_creature
 from mjxgait.creature import load_creature
 from mjxgait.errors import UserError
 from mjxgait.files import write_text

@@ -9,8 +9,8 @@ import tyro
 from mjxgait.api import examine, examine_expressions
 from mjxgait.errors import UserError
 from mjxgait.files import write_text
-from mjxgait.training.disk import disk_errors, require_writable
 from mjxgait.training.folder import CERTIFICATE
+from mjxgait.training.stored import disk_errors, require_writable
 
 
 @dataclasses.dataclass(frozen=True)

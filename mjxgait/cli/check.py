@@ -7,12 +7,12 @@ from pathlib import Path
 import tyro
 
 from mjxgait.certification.check_body import check_body
-from mjxgait.config.shipped import find_creature
+from mjxgait.config.layers import find_creature
 from mjxgait.creature import load_creature
 from mjxgait.errors import UserError
 from mjxgait.files import replaced
 from mjxgait.tasks.walk.targets import Wishes, configured
-from mjxgait.training.disk import require_writable
+from mjxgait.training.stored import require_writable
 
 
 @dataclasses.dataclass(frozen=True)

@@ -5,12 +5,7 @@ from collections.abc import Sequence
 
 import tyro
 
-from mjxgait.config.shipped import (
-    data_folder,
-    find_creature,
-    shipped_configs,
-    shipped_creatures,
-)
+from mjxgait.config.layers import data_folder, find_creature, shipped_configs, shipped_creatures
 from mjxgait.creature import load_creature
 
 

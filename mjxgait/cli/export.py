@@ -38,9 +38,9 @@ def export_command(arguments: Sequence[str]) -> int:
         export_usd,
         walk_loop,
     )
-    from mjxgait.rendering.cast import LOOP_SECONDS, champion_of
-    from mjxgait.rendering.doubt import doubt
-    from mjxgait.training.disk import require_writable
+    from mjxgait.rendering.video import LOOP_SECONDS, champion_of
+    from mjxgait.rendering.walk import doubt
+    from mjxgait.training.stored import require_writable
 
     writers = {".glb": export_glb, ".bvh": export_bvh, ".usda": export_usd, ".usdc": export_usd}
     if (kind := options.out.suffix.lower()) not in writers:

@@ -10,8 +10,7 @@ import numpy as np
 import tyro
 
 from mjxgait.api import Run, load_creature
-from mjxgait.config.rollout import Physics
-from mjxgait.config.schema import Config
+from mjxgait.config.schema import Config, Physics
 from mjxgait.config.tables import read_toml
 from mjxgait.creature import Creature
 from mjxgait.errors import INTERRUPTED, UserError
@@ -70,11 +69,11 @@ class RefineOptions:
 def refine_command(arguments: Sequence[str]) -> int:
     """Return the exit code."""
     options = tyro.cli(RefineOptions, args=list(arguments), prog="mjxgait refine")
-    from mjxgait.animation.keys import bring, front
+    from mjxgait.animation.keys import bring, refine
     from mjxgait.animation.keys.refine import base_settings, begin, refining
 
     if options.resume:
-        runs = front.runs_in(options.resume)
+        runs = refine.runs_in(options.resume)
         return _front(options.resume, runs) if runs else _resumed(options.resume)
     if options.keys is None:
         raise UserError("name the file with the cycle: mjxgait refine --env duck --keys walk.glb")
@@ -99,17 +98,17 @@ def refine_command(arguments: Sequence[str]) -> int:
         write = partial(begin, folder, creature, configs[0], options.keys, brought)
         return _run(folder, creature, configs[0], write)
     out = options.out or new_run_folder(creature.name, options.seed)
-    front.check_front(out, options.keep)
+    refine.check_front(out, options.keep)
     _check(creature, configs[0])
     for keep, config in zip(options.keep, configs, strict=True):
-        begin(front.folder_of(out, keep), creature, config, options.keys, brought)
-    return _front(out, front.runs_in(out))
+        begin(refine.folder_of(out, keep), creature, config, options.keys, brought)
+    return _front(out, refine.runs_in(out))
 
 
 def _check(creature: Creature, config: Config) -> None:
     """Refuse an invalid creature or config before anything is written."""
     from mjxgait.training.blueprint import check_plan
-    from mjxgait.training.devices import prepare_devices
+    from mjxgait.training.stages import prepare_devices
 
     check_parts(creature, config)
     prepare_devices()
@@ -118,14 +117,14 @@ def _check(creature: Creature, config: Config) -> None:
 
 def _front(out: Path, runs: Sequence[Path]) -> int:
     """Finish all runs of a trade-off plot, the most faithful first, and draw it."""
-    from mjxgait.animation.keys import front
+    from mjxgait.animation.keys import refine
 
     for run in runs:
         print(f"{run}:")
-        if not front.finished(run) and _resumed(run) == INTERRUPTED:
+        if not refine.finished(run) and _resumed(run) == INTERRUPTED:
             print(f"To go on: mjxgait refine --resume {out}")
             return INTERRUPTED
-    print(f"Side by side: {front.draw(out)}")
+    print(f"Side by side: {refine.draw(out)}")
     return 0
 
 
@@ -154,8 +153,8 @@ def _run(
     write: makes the folder of a new run.
     """
     from mjxgait.distributed.evolve import evolve
-    from mjxgait.training.devices import prepare_devices
     from mjxgait.training.screen import Screen
+    from mjxgait.training.stages import prepare_devices
 
     prepare_devices()
     screen = Screen()
@@ -172,8 +171,7 @@ def _run(
 
 def _tell(folder: Path, creature: Creature) -> None:
     """Print the departure of a run's champion from the original cycle."""
-    from mjxgait.animation.keys.departure import departure_of
-    from mjxgait.animation.keys.refine import read_original
+    from mjxgait.animation.keys.refine import departure_of, read_original
 
     original, found = read_original(folder, creature), departure_of(folder)
     moved = "" if found.moved is None else f", as moved {found.moved:.1f}"

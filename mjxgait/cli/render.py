@@ -56,23 +56,23 @@ def render_command(arguments: Sequence[str]) -> int:
     # If the variable names a missing GL library, the import of MuJoCo fails: only the drawing
     # process may see it.
     wanted = os.environ.pop("MUJOCO_GL", None)
-    from mjxgait.rendering import cast, video
-    from mjxgait.rendering.doubt import doubt
+    from mjxgait.rendering import video
     from mjxgait.rendering.stage import Stage
+    from mjxgait.rendering.walk import doubt
 
     generations = _check(options)
     video.require_writer(options.out)
     still = options.out.suffix.lower() == ".png"
     alone = not (options.top or generations or len(options.runs) > 1)
-    seconds = options.seconds or (cast.LOOP_SECONDS if still and alone else SECONDS)
+    seconds = options.seconds or (video.LOOP_SECONDS if still and alone else SECONDS)
     if alone:
-        runners = [cast.champion_of(options.runs[0], seconds)]
+        runners = [video.champion_of(options.runs[0], seconds)]
     elif options.top:
-        runners = cast.top_of(options.runs[0], options.top, seconds)
+        runners = video.top_of(options.runs[0], options.top, seconds)
     elif generations:
-        runners = cast.through_generations(options.runs[0], generations, seconds)
+        runners = video.through_generations(options.runs[0], generations, seconds)
     else:
-        runners = cast.champions_of(options.runs, seconds)
+        runners = video.champions_of(options.runs, seconds)
     stage = Stage([runner.walk for runner in runners], *(options.size or SIZE), options.camera)
     if still:
         _still(runners, stage, options)

@@ -11,8 +11,7 @@ import tyro
 from rich.console import Console
 
 from mjxgait.api import load_creature
-from mjxgait.config.rollout import Physics
-from mjxgait.config.schema import Config
+from mjxgait.config.schema import Config, Physics
 from mjxgait.config.tables import build, merge
 from mjxgait.creature import Creature
 from mjxgait.errors import INTERRUPTED, UserError
@@ -20,14 +19,13 @@ from mjxgait.experiments.repertoire.grid import GRID, Cell, Grid
 from mjxgait.files import replaced, write_text
 from mjxgait.plugins import resolve_config
 from mjxgait.tasks.walk.targets import Wishes, speed_of, wished
-from mjxgait.training.disk import disk_errors
 from mjxgait.training.folder import (
     check_parts,
     create_run,
     is_taken,
     open_run,
 )
-from mjxgait.training.lock import locked
+from mjxgait.training.stored import disk_errors, locked
 
 MAP = "map.png"
 OF_FILES = ("rate", "travelling", "blends", "cluster")
@@ -88,11 +86,11 @@ def repertoire_command(arguments: Sequence[str]) -> int:
     plan = None if options.resume else planned(options)
     folder, grid = _resumed(options) if plan is None else (plan.folder, plan.grid)
     # JAX takes a second to import, so the options are checked first.
-    from mjxgait.distributed.dashboard import crew_at
-    from mjxgait.experiments.repertoire.evolve import evolve
-    from mjxgait.training.devices import prepare_devices
-    from mjxgait.training.examine import examine
+    from mjxgait.distributed.evolve import crew_at
+    from mjxgait.experiments.repertoire.grid import evolve
+    from mjxgait.training.ended import examine
     from mjxgait.training.loop import interruptible
+    from mjxgait.training.stages import prepare_devices
 
     prepare_devices(1 if options.cluster else None)
     console, began = Console(highlight=False, soft_wrap=True, markup=False), time.perf_counter()
@@ -132,7 +130,7 @@ def planned(options: RepertoireOptions) -> Planned:
     Raises:
       UserError: invalid options, or the folder is not empty.
     """
-    from mjxgait.experiments.repertoire.cells import check, settings_of
+    from mjxgait.experiments.repertoire.grid import check, settings_of
 
     creature = load_creature(options.env, tell=print)
     grid = Grid.of([speed_of(text, creature) for text in options.speeds], options.turns)
@@ -195,17 +193,16 @@ def _leave(
     folder: Path, creature: Creature, grid: Grid, options: RepertoireOptions, screen: "_Screen"
 ) -> None:
     """Write the map, and the clips if there are any."""
-    from mjxgait.experiments.repertoire.blends import blends
-    from mjxgait.experiments.repertoire.changes import changes
     from mjxgait.experiments.repertoire.clips import (
         CLIPS,
         TABLE,
         clips_of,
+        transitions,
         write_clips,
     )
     from mjxgait.experiments.repertoire.found import draw_map, found_in, table
-    from mjxgait.experiments.repertoire.transitions import transitions
-    from mjxgait.rendering.style import figure
+    from mjxgait.experiments.repertoire.neighbours import blends, changes
+    from mjxgait.rendering.curves import figure
 
     found, console = found_in(folder, grid), screen.console
     console.print(table(found))

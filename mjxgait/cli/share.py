@@ -32,9 +32,9 @@ def share_command(arguments: Sequence[str]) -> int:
         raise UserError(
             f'{options.out}: cannot write "{options.out.suffix}"; end the name with .html'
         )
+    from mjxgait.experiments.repertoire.clips import write_driven
     from mjxgait.experiments.repertoire.grid import GRID
-    from mjxgait.experiments.repertoire.share import write_driven
-    from mjxgait.training.disk import require_writable
+    from mjxgait.training.stored import require_writable
     from mjxgait.web.page import write_page
 
     require_writable(options.out)

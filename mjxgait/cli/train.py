@@ -12,21 +12,13 @@ import tyro
 
 from mjxgait.api import Run, load_creature
 from mjxgait.cli.zoo import evolve_zoo
-from mjxgait.config.rollout import Physics
-from mjxgait.config.schema import Config, ExaminationConfig
+from mjxgait.config.schema import Config, ExaminationConfig, Physics
 from mjxgait.config.tables import build, merge
 from mjxgait.controllers.expressions.written import with_expressions
 from mjxgait.creature import Creature
-from mjxgait.creature.facing import Way
-from mjxgait.creature.scale import parse_scales
-from mjxgait.creature.step import at_step
+from mjxgait.creature.scale import Way, at_step, parse_scales
 from mjxgait.errors import INTERRUPTED, UserError
-from mjxgait.experiments.multi_seed.seeds import (
-    check_zoo,
-    create_zoo,
-    folders_of,
-    is_zoo,
-)
+from mjxgait.experiments.multi_seed import check_zoo, create_zoo, folders_of, is_zoo
 from mjxgait.plugins.registry import meant
 from mjxgait.tasks.walk.targets import (
     WISHES,
@@ -34,17 +26,17 @@ from mjxgait.tasks.walk.targets import (
     configured,
     hint,
 )
-from mjxgait.training.disk import disk_errors
 from mjxgait.training.folder import (
     METRICS,
     PLOT,
     PLOTS,
     check_run,
+    command,
     create_run,
     open_run,
     read_metrics,
 )
-from mjxgait.training.own import command
+from mjxgait.training.stored import disk_errors
 
 if TYPE_CHECKING:  # JAX takes a second to import
     from mjxgait.training.screen import Screen
@@ -179,8 +171,8 @@ def _evolve(options: TrainOptions, folder: Path, creature: Creature, config: Con
     # JAX takes a second to import, so the options are checked first.
     from mjxgait.cli.view import following
     from mjxgait.distributed.evolve import evolve
-    from mjxgait.training.devices import prepare_devices
     from mjxgait.training.screen import Screen
+    from mjxgait.training.stages import prepare_devices
 
     prepare_devices(1 if options.cluster else None)
     screen, resumed = Screen(), options.resume is not None

@@ -8,12 +8,10 @@ from typing import Any
 from rich.console import Console
 
 from mjxgait.errors import INTERRUPTED
-from mjxgait.experiments.multi_seed.seeds import read_seeds
+from mjxgait.experiments.multi_seed import read_seeds
 from mjxgait.files import replaced
-from mjxgait.training.disk import disk_errors
-from mjxgait.training.folder import open_run
-from mjxgait.training.lock import locked
-from mjxgait.training.own import command
+from mjxgait.training.folder import command, open_run
+from mjxgait.training.stored import disk_errors, locked
 
 PICTURE = "zoo.png"
 
@@ -26,11 +24,11 @@ def evolve_zoo(
     cluster: address of the cluster to use instead of this machine. begin: makes the folder of new
     runs; called after the last check.
     """
-    from mjxgait.distributed.dashboard import crew_at
+    from mjxgait.distributed.evolve import crew_at
     from mjxgait.distributed.rows import Rows
-    from mjxgait.training.devices import prepare_devices
-    from mjxgait.training.examine import examine
+    from mjxgait.training.ended import examine
     from mjxgait.training.loop import interruptible
+    from mjxgait.training.stages import prepare_devices
 
     prepare_devices(1 if cluster else None)
     console, began = Console(highlight=False, soft_wrap=True, markup=False), time.perf_counter()
@@ -57,13 +55,8 @@ def evolve_zoo(
 
 
 def _leave(zoo: Path, name: str, folders: list[Path], console: Console) -> None:
-    from mjxgait.experiments.multi_seed.found import (
-        draw_zoo,
-        found_in,
-        size,
-        table,
-    )
-    from mjxgait.rendering.style import figure
+    from mjxgait.experiments.multi_seed import draw_zoo, found_in, size, table
+    from mjxgait.rendering.curves import figure
 
     found = found_in(folders)
     console.print(table(found))

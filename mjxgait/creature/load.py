@@ -25,10 +25,9 @@ from mjxgait.creature.creature import (
     SLIDE,
     Creature,
 )
-from mjxgait.creature.mirrored import mirrored
+from mjxgait.creature.geometry import check_world
+from mjxgait.creature.joints import mirrored, stepping_of
 from mjxgait.creature.settings import CreatureSettings, JointException
-from mjxgait.creature.stepping import stepping_of
-from mjxgait.creature.world import check_world
 from mjxgait.errors import UserError, did_you_mean
 from mjxgait.files import read_text
 from mjxgait.tasks.walk.gaits import stations_of

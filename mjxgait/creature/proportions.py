@@ -9,8 +9,7 @@ from collections.abc import Mapping
 import mujoco
 import numpy as np
 
-from mjxgait.creature.creature import Creature
-from mjxgait.creature.frame import vertical_freedom
+from mjxgait.creature.creature import Creature, vertical_freedom
 from mjxgait.creature.geometry import DOWN, geom_reach, shapes
 from mjxgait.creature.scale import load_files, scaled_files
 from mjxgait.errors import UserError

@@ -1,18 +1,90 @@
 """Run of one population or of several, on this machine or on a cluster."""
 
 import contextlib
-from collections.abc import Callable
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from rich.console import Console
+from rich.live import Live
+from rich.table import Table
 
 from mjxgait.config.schema import Config
 from mjxgait.creature import Creature
 from mjxgait.distributed import islands
-from mjxgait.distributed.chunks import Blocks
-from mjxgait.distributed.dashboard import crew_at
+from mjxgait.distributed.connect import connected
+from mjxgait.distributed.rows import Blocks
+from mjxgait.distributed.scheduler import Crew, Here
 from mjxgait.errors import UserError
 from mjxgait.training import loop
-from mjxgait.training.lock import locked
 from mjxgait.training.screen import Screen
+from mjxgait.training.stored import locked
+
+A_SECOND = 4
+"""Table updates per second; with thousands of workers one takes as long as handing out work."""
+
+
+@contextlib.contextmanager
+def crew_at(address: str | None, console: Console | None = None) -> Iterator[Crew]:
+    """Yield the crew of the cluster at an address, shown live; without one this process alone.
+
+    Raises:
+      UserError: see `connected`.
+    """
+    if address is None:
+        yield Crew(Here())
+        return
+    with Board(console) as board, connected(address, board.tell, board.watch) as crew:
+        yield crew
+
+
+class Board:
+    """Live table of what each machine does."""
+
+    def __init__(self, console: Console | None = None) -> None:
+        self.console = console or Console(highlight=False, soft_wrap=True, markup=False)
+        self._live = Live(console=self.console, transient=True, refresh_per_second=A_SECOND)
+        self._shown = 0.0
+
+    def __enter__(self) -> Self:
+        if self.console.is_terminal:
+            self._live.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        at: TracebackType | None,
+    ) -> None:
+        self._live.stop()
+
+    def tell(self, said: str) -> None:
+        """Print a message on its own line."""
+        self.console.print(f"cluster: {said}")
+
+    def watch(self, crew: Crew) -> None:
+        """Update the table."""
+        if self.console.is_terminal and time.monotonic() - self._shown > 1 / A_SECOND:
+            self._shown = time.monotonic()
+            self._live.update(table(crew))
+
+
+def table(crew: Crew) -> Table:
+    """Make a row per machine: its workers, how many of them work, and the jobs it has done."""
+    busy = Counter(worker.node for worker in crew.busy)
+    there = busy + Counter(worker.node for worker in crew.idle)
+    shown = Table("machine", box=None, pad_edge=False)
+    for heading in ("workers", "at work", "done"):
+        shown.add_column(heading, justify="right")
+    for node in sorted(there.keys() | crew.done.keys()):
+        counts = (there[node], busy[node], crew.done.get(node, 0))
+        shown.add_row(node, *map(str, counts))
+    shown.caption = f"pieces of work left: {crew.open}"
+    return shown
 
 
 def evolve(

@@ -8,24 +8,22 @@ may be lost.
 import dataclasses
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from mjxgait.champion import write_champion
+from mjxgait.config.evolution import IslandsConfig
 from mjxgait.config.schema import Config
 from mjxgait.creature import Creature
 from mjxgait.distributed.jobs import Advanced, AdvanceIsland, Lines
-from mjxgait.distributed.migration import exchanged, gathered, together
 from mjxgait.distributed.recipe import Recipe
 from mjxgait.distributed.scheduler import Crew
 from mjxgait.evolution.state import stop_reason
-from mjxgait.training.checkpoint import Checkpoints
-from mjxgait.training.disk import disk_errors
-from mjxgait.training.examination import Examined, Examiner, why_ended
-from mjxgait.training.exams import Exams
+from mjxgait.training.checkpoint import Checkpoints, Packed
+from mjxgait.training.examination import Examined, Examiner, Exams, why_ended
 from mjxgait.training.experiment import Experiment, build_experiment
 from mjxgait.training.folder import (
     CHAMPION,
@@ -33,17 +31,113 @@ from mjxgait.training.folder import (
     ISLANDS,
     METRICS,
     MIGRATIONS,
+    MOTHERS,
     truncate_metrics,
 )
-from mjxgait.training.loop import (
-    conclude,
-    interruptible,
-    report,
-    versions,
-)
-from mjxgait.training.packed import Packed
+from mjxgait.training.loop import conclude, interruptible, report, versions
 from mjxgait.training.prescreen import tryout_of
 from mjxgait.training.screen import Screen
+from mjxgait.training.stored import disk_errors
+
+OF_EACH = ("terms", "outcome", "fitness", "born", "origin", "rounds")
+"""Arrays [P, ...] of a state, besides those of the genomes."""
+SUMS = ("failures", "episodes", "evaluations", "sim_steps", "computed_steps", "unique")
+MEANS = ("mean", "median", "lower_quartile", "upper_quartile", "spread")
+"""Metrics summed or averaged over the islands; the other metrics are those of the best one."""
+
+
+def exchanged(states: Sequence[Packed], config: IslandsConfig) -> list[Packed]:
+    """Return the states after each island's best have replaced the worst of others.
+
+    All states are of the same generation. Individuals evaluated on easier trials than an island's
+    do not migrate to it.
+    """
+    found = [_individuals(state.arrays) for state in states]
+
+    def come(island: int) -> list[dict[str, np.ndarray]]:
+        least = _level(states[island])
+        sources = [i for i in config.sources(island) if _level(states[i]) >= least]
+        return [_first(found[i], config.migrants) for i in sources]
+
+    return [_taken_in(state, come(island)) for island, state in enumerate(states)]
+
+
+def gathered(states: Sequence[Packed]) -> Packed:
+    """Return the best of all islands as one population of the same size.
+
+    All else is the best island's. Of islands whose trials differ in difficulty, only those with the
+    hardest count.
+    """
+    hardest = max(map(_level, states))
+    states = [state for state in states if _level(state) == hardest]
+    leader = int(np.nanargmax([_comparable(state.arrays["fitness"])[0] for state in states]))
+    size = len(states[leader].arrays["fitness"])
+    found = [_individuals(state.arrays) for state in states]
+    return states[leader].with_arrays(_sorted(_joined(found), size))
+
+
+def together(lines: Sequence[Mapping[str, Any]], seconds: float) -> dict[str, Any]:
+    """Return one metrics line for all islands; `island` is the index of the best one.
+
+    seconds: of all islands for a generation, compilation included. Islands that took turns took
+    the sum of their own times, which exclude it.
+    """
+    bests = [-np.inf if line["best"] is None else line["best"] for line in lines]
+    leader = int(np.argmax(bests))
+    line = dict(lines[leader]) | {"island": leader}
+    # A migrant has no mother on this island.
+    line.pop(MOTHERS, None)
+    line |= {name: sum(each[name] for each in lines) for name in SUMS}
+    for name in MEANS:
+        known = [each[name] for each in lines if each[name] is not None]
+        line[name] = float(np.mean(known)) if known else None
+    worst = [each["worst"] for each in lines if each["worst"] is not None]
+    line["worst"] = min(worst, default=None)
+    line["forced"] = any(each["forced"] for each in lines)
+    line["wall_s"] = round(min(seconds, sum(each["wall_s"] for each in lines)), 4)
+    line["steps_per_second"] = round(line["sim_steps"] / max(line["wall_s"], 1e-9))
+    return line
+
+
+def _taken_in(state: Packed, migrants: Sequence[Mapping[str, np.ndarray]]) -> Packed:
+    """Replace the worst of a population by migrants, at most half of it; sort best first."""
+    if not migrants:
+        return state
+    size = len(state.arrays["fitness"])
+    come = _sorted(_joined(migrants), size // 2)
+    stay = _first(_individuals(state.arrays), size - len(come["fitness"]))
+    return state.with_arrays(_sorted(_joined([stay, come]), size))
+
+
+def _level(state: Packed) -> int:
+    """Number of times that the trials have become harder."""
+    return int(state.arrays.get("level", 0))
+
+
+def _individuals(arrays: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    return {
+        name: array
+        for name, array in arrays.items()
+        if name in OF_EACH or name.partition(".")[0] == "genomes"
+    }
+
+
+def _first(arrays: Mapping[str, np.ndarray], count: int) -> dict[str, np.ndarray]:
+    return {name: array[:count] for name, array in arrays.items()}
+
+
+def _joined(parts: Sequence[Mapping[str, np.ndarray]]) -> dict[str, np.ndarray]:
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+def _sorted(arrays: Mapping[str, np.ndarray], count: int) -> dict[str, np.ndarray]:
+    """Return the best `count`, best first; ties keep their order."""
+    order = np.argsort(-_comparable(arrays["fitness"]), kind="stable")[:count]
+    return {name: array[order] for name, array in arrays.items()}
+
+
+def _comparable(fitness: np.ndarray) -> np.ndarray:
+    return np.where(np.isnan(fitness), -np.inf, fitness)
 
 
 def train(

@@ -9,13 +9,12 @@ import jax
 import numpy as np
 
 from mjxgait.champion import Champion
-from mjxgait.distributed.programs import Programs
-from mjxgait.distributed.recipe import Recipe
+from mjxgait.distributed.recipe import Programs, Recipe
 from mjxgait.evolution.state import EvolutionState, GenerationMetrics, stop_reason
 from mjxgait.tasks.starts import Starts
+from mjxgait.training.checkpoint import Packed, pack
 from mjxgait.training.experiment import Batch, Step
 from mjxgait.training.loop import followed, metrics_line, versions
-from mjxgait.training.packed import Packed, pack
 from mjxgait.types import Asked, Judged
 
 Lines = list[dict[str, Any]]

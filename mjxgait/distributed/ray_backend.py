@@ -1,14 +1,21 @@
 """Ray backend: one worker per core of every machine with the same versions as this one.
 
+A result's bits thus do not depend on a machine's number of cores. Nothing here imports JAX before
+`ENVIRONMENT` is set.
+
 Each worker is an actor that stays on its machine. Ray repeats nothing: losses are reported to the
 crew, and a new worker starts if the machine still lives.
 """
 
+import contextlib
 import dataclasses
+import os
 import sys
+import tempfile
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import ray
@@ -16,12 +23,80 @@ from ray import cloudpickle
 from ray.exceptions import RayActorError, RayError, RayTaskError
 from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
-from mjxgait.distributed import nodes
+from mjxgait.distributed import connect
+from mjxgait.distributed.connect import Machine
 from mjxgait.distributed.jobs import Job
-from mjxgait.distributed.nodes import Machine
 from mjxgait.distributed.recipe import Recipe
 from mjxgait.distributed.scheduler import Report, Worker
-from mjxgait.distributed.worker import RemoteWorker
+
+ENVIRONMENT = {
+    "NPROC": "1",  # XLA's threads
+    "OMP_NUM_THREADS": "1",
+    "OPENBLAS_NUM_THREADS": "1",
+    "JAX_NUM_CPU_DEVICES": "1",
+    "JAX_PLATFORMS": "cpu",
+}
+
+ROOM = 2**20
+"""Bytes that a creature's files or a lock may take."""
+
+
+class RemoteWorker:
+    """An actor that runs jobs. tag: of its kind of machine, see `Machine`."""
+
+    def __init__(self, tag: str) -> None:
+        os.environ.update(ENVIRONMENT)
+        from mjxgait.distributed.recipe import Programs
+        from mjxgait.training.stages import prepare_devices
+
+        prepare_devices(1, tag)
+        self._programs = Programs(_turn)
+
+    def ready(self) -> int:
+        """Return the process id, once the worker can work.
+
+        Raises:
+          OSError: there is no room for a creature's files.
+        """
+        from mjxgait.training.stored import try_room
+
+        try_room(Path(tempfile.gettempdir()), ROOM)
+        return os.getpid()
+
+    def do(self, recipe: Any, job: Any) -> tuple[Any, float]:
+        """Return the job's result and its duration in s."""
+        began = time.perf_counter()
+        result = job.do(self._programs, recipe)
+        return result, time.perf_counter() - began
+
+
+@contextlib.contextmanager
+def _turn(name: str, patience: float = -1.0) -> Iterator[None]:
+    """Let one worker of a machine compile a program; the others then find it in the cache.
+
+    Without a writable cache each compiles at once. patience: s; waits forever by default.
+    """
+    import filelock
+    import jax
+
+    from mjxgait.training.stored import try_room
+
+    folder = Path(jax.config.values["jax_compilation_cache_dir"])
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        try_room(folder, ROOM)
+        lock = filelock.FileLock(folder / f"{name}.lock")
+        lock.acquire(timeout=patience)
+    except filelock.Timeout:
+        raise
+    except OSError:
+        yield
+        return
+    try:
+        yield
+    finally:
+        lock.release()
+
 
 EVERY = 1.0
 """Seconds between two checks for new machines."""
@@ -51,7 +126,7 @@ class Machines:
     def __init__(self, tell: Callable[[str], object]) -> None:
         self._tell = tell
         # `look` must run where mjxgait may be missing.
-        cloudpickle.register_pickle_by_value(sys.modules[nodes.__name__])
+        cloudpickle.register_pickle_by_value(sys.modules[connect.__name__])
         self._looking: dict[Any, Node] = {}
         self._coming: dict[Any, Worker] = {}
         self._working: dict[Any, Worker] = {}
@@ -127,7 +202,7 @@ class Machines:
         self._met[address] += 1
         name = address if self._met[address] == 1 else f"{address} ({self._met[address]})"
         node = self._nodes[row["NodeID"]] = Node(row["NodeID"], name, cores)
-        ask = ray.remote(nodes.look).options(num_cpus=0, max_retries=0, **_on(node))
+        ask = ray.remote(connect.look).options(num_cpus=0, max_retries=0, **_on(node))
         self._looking[ask.remote()] = node
 
     def _meet(self, ref: Any, refuse: bool = False) -> None:
@@ -139,8 +214,8 @@ class Machines:
             self._tell(f"{node.name} does not say what it has ({_why(error)}); it is left alone")
             return
         if refuse:
-            nodes.require_same(node.name, found)
-        if said := nodes.mismatch(node.name, found):
+            connect.require_same(node.name, found)
+        if said := connect.mismatch(node.name, found):
             self._tell(f"{said}; it is left alone")
         else:
             self._welcome(node, found)

@@ -12,7 +12,7 @@ from statistics import median
 from typing import Any, Protocol
 
 from mjxgait.distributed.jobs import Job
-from mjxgait.distributed.recipe import Recipe
+from mjxgait.distributed.recipe import Programs, Recipe
 from mjxgait.errors import UserError
 
 LATE = 2.0
@@ -216,3 +216,28 @@ class Crew:
         elif self._alone_since is not None and self._clock() - self._alone_since > ALONE:
             self._alone_since = None
             self._tell("nobody is there to work; waiting for machines to join")
+
+
+class Here:
+    """See `Hands`. programs: those that this process has already compiled."""
+
+    def __init__(self, programs: Programs | None = None) -> None:
+        self._programs = programs or Programs()
+        self._coming = [Worker(0, "here")]
+        self._work: tuple[Worker, Recipe, Job] | None = None
+
+    def arrivals(self) -> list[Worker]:
+        """See `Hands`."""
+        coming, self._coming = self._coming, []
+        return coming
+
+    def start(self, worker: Worker, recipe: Recipe, job: Job) -> None:
+        """See `Hands`."""
+        self._work = worker, recipe, job
+
+    def wait(self, seconds: float) -> list[Report]:
+        """See `Hands`. An error of the job is raised unchanged."""
+        if self._work is None:
+            return []
+        (worker, recipe, job), self._work = self._work, None
+        return [Report(worker, job.do(self._programs, recipe))]

@@ -14,17 +14,24 @@ import jax.numpy as jnp
 
 from mjxgait.config.evolution import EvolutionConfig
 from mjxgait.config.traced import chosen
-from mjxgait.evolution import forced
-from mjxgait.evolution.breeding import Nursery, parents, proportional_parents
-from mjxgait.evolution.copies import first_of_kind, together
-from mjxgait.evolution.families import families, with_share
-from mjxgait.evolution.metrics import metrics
+from mjxgait.evolution.breeding import (
+    Nursery,
+    families,
+    first_of_kind,
+    parents,
+    proportional_parents,
+    together,
+    with_share,
+)
 from mjxgait.evolution.state import (
     NOBODY,
     EvolutionState,
     GenerationMetrics,
     Origin,
     Proposal,
+    admitted,
+    decided,
+    metrics,
 )
 from mjxgait.evolution.variation import Variation
 from mjxgait.types import Judged
@@ -139,7 +146,7 @@ class Evolution:
         )
         was_forced = state.forced
         state = dataclasses.replace(state, key=proposal.key, generation=generation)
-        state = forced.decided(self.config, state)
+        state = decided(self.config, state)
         told = None
         if self.config.lineage and mothers is not None:
             told = jnp.where(seeding, NOBODY, mothers)
@@ -309,24 +316,24 @@ class Evolution:
         first = first_of_kind(self.config.same, self.variation, state, proposal, verdicts, anew)
         distinct = first | jnp.logical_not(self.config.remove_duplicates)
         children = jnp.arange(fitness.shape[0]) >= count + self.config.elites
-        admitted = forced.admitted(self.config, state, fitness, children & distinct)
+        taken_in = admitted(self.config, state, fitness, children & distinct)
         stay = self._stay(state)
         if again:  # The old were not simulated in this round.
             fitness = jnp.where(fresh | stay | ~now, fitness, -jnp.inf)
         lives = distinct & (fresh | stay | chosen(self.config.survival, "best"))
-        tier = jnp.where(state.forced & children, jnp.where(admitted, 2, 0), jnp.where(lives, 1, 0))
+        tier = jnp.where(state.forced & children, jnp.where(taken_in, 2, 0), jnp.where(lives, 1, 0))
         if not self.config.elites:  # the best always survives, whatever its tier
             best = jnp.arange(fitness.shape[0]) == jnp.argmax(fitness)
             tier = jnp.where(best & distinct, 3, tier)
         family = families(state, proposal.mothers)
         if family is not None:
             most = max(round(self.config.family * count), 1)
-            fit = distinct & (admitted | ~(state.forced & fresh))
+            fit = distinct & (taken_in | ~(state.forced & fresh))
             tier = with_share(family, most, tier, fitness, fit)
         kept = jnp.lexsort((-fitness, -tier))[:count]
         kept = kept[jnp.argsort(-fitness[kept], stable=True)]
         genomes, terms, outcome, born, origin, rounds = jax.tree.map(lambda leaf: leaf[kept], pool)
-        refreshed = state.refreshed + jnp.where(state.forced, jnp.sum(admitted[kept]), 0)
+        refreshed = state.refreshed + jnp.where(state.forced, jnp.sum(taken_in[kept]), 0)
         mothers = proposal.mothers
         if mothers is not None:
             mothers = jnp.append(_own(state), mothers)[kept]

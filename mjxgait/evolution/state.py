@@ -1,12 +1,15 @@
-"""Data that evolution carries between generations, metrics of one generation, and stop reasons."""
+"""State of evolution from generation to generation, its metrics, and forced evolution."""
 
+import dataclasses
 from enum import IntEnum
 from typing import Any
 
 import jax
+import jax.numpy as jnp
 
 from mjxgait.config.evolution import EvolutionConfig
-from mjxgait.types import pytree
+from mjxgait.evolution.variation import first_occurrence
+from mjxgait.types import Judged, pytree
 
 NOBODY = -1
 """Mother's place of an individual without a mother, or with an unknown one."""
@@ -129,3 +132,125 @@ def stop_reason(state: EvolutionState, config: EvolutionConfig) -> str | None:
     if int(state.generation) >= config.generations:
         return f"all {config.generations} generations are done"
     return None
+
+
+def metrics(
+    config: EvolutionConfig,
+    state: EvolutionState,
+    judged: Judged,
+    forced: jax.Array,
+    mothers: jax.Array | None,
+) -> GenerationMetrics:
+    """Compute the metrics of a sorted state and the evaluation that led to it.
+
+    forced: [] whether the generation was.
+    """
+    quartiles = jnp.nanpercentile(
+        jnp.where(jnp.isfinite(state.fitness), state.fitness, jnp.nan),
+        jnp.array([25, 50, 75]),
+        method="nearest",
+    )
+    spreads = [jnp.mean(jnp.std(leaf, axis=0)) for leaf in jax.tree.leaves(state.genomes)]
+    return GenerationMetrics(
+        generation=state.generation,
+        best=state.fitness[0],
+        mean=finite_mean(state.fitness),
+        median=quartiles[1],
+        lower_quartile=quartiles[0],
+        upper_quartile=quartiles[2],
+        worst=state.fitness[-1],
+        unique=jnp.sum(first_occurrence(state.genomes)),
+        spread=sum(spreads, jnp.zeros(())) / len(spreads),
+        forced=forced,
+        failures=jnp.sum(judged.failed),
+        episodes=jnp.sum(judged.failed | jnp.isfinite(judged.terms).all(-1)),
+        evaluations=jnp.int32(config.offspring),
+        sim_steps=judged.sim_steps,
+        computed_steps=judged.computed_steps,
+        best_terms=jnp.mean(state.terms[0], axis=0),
+        best_outcome=jnp.mean(state.outcome[0], axis=0),
+        mothers=mothers,
+    )
+
+
+def finite_mean(values: jax.Array) -> jax.Array:
+    """Return the mean [] of the finite values [N]; -inf if none is finite."""
+    finite = jnp.isfinite(values)
+    return jnp.where(
+        jnp.any(finite),
+        jnp.sum(jnp.where(finite, values, 0.0)) / jnp.maximum(jnp.sum(finite), 1),
+        -jnp.inf,
+    )
+
+
+def admitted(
+    config: EvolutionConfig, state: EvolutionState, fitness: jax.Array, candidates: jax.Array
+) -> jax.Array:
+    """Select the candidates [P + M] that a forced generation admits.
+
+    These are fit enough, best first, up to the room left in the phase.
+    """
+    old = jnp.sort(fitness[: config.population])
+    enough = old[
+        jnp.floor(config.forced.accept * jnp.float32(config.population - 1)).astype(jnp.int32)
+    ]
+    fit = candidates & (fitness >= enough) & jnp.isfinite(fitness)
+    place = jnp.argsort(jnp.argsort(jnp.where(fit, -fitness, jnp.inf), stable=True))
+    return fit & (place < _room(config) - state.refreshed)
+
+
+def _room(config: EvolutionConfig) -> jax.Array:
+    return jnp.clip(
+        jnp.round(config.forced.refresh * jnp.float32(config.population)),
+        1,
+        config.population - 1,
+    )
+
+
+def decided(whole: EvolutionConfig, state: EvolutionState) -> EvolutionState:
+    """Begin a forced phase when best and mean stall over the window; end it when it is done."""
+    config = whole.forced
+    best, mean = state.fitness[0], finite_mean(state.fitness)
+    bests, means = (
+        jnp.append(state.best_history[1:], best),
+        jnp.append(state.mean_history[1:], mean),
+    )
+    age = jnp.where(state.forced, state.spell_age + 1, 0)
+    spent = (jnp.asarray(config.limit) > 0) & (age >= config.limit)
+    ends = state.forced & (spent | (state.refreshed >= _room(whole)))
+    quiet = jnp.where(state.forced | (state.generation <= 0), 0, state.quiet + 1)
+    stalled = (quiet >= config.window) & ~_grown(bests, config.gain) & ~_grown(means, config.gain)
+    begins = stalled & ~state.forced & config.enabled
+    first = ~jnp.isfinite(state.spell_best)
+    pays = first | _grown(jnp.stack([state.spell_best, best]), config.gain)
+    return dataclasses.replace(
+        state,
+        best_history=bests,
+        mean_history=means,
+        quiet=quiet,
+        forced=begins | (state.forced & ~ends),
+        spell_age=jnp.where(begins, 0, age).astype(jnp.int32),
+        refreshed=jnp.where(begins, 0, state.refreshed).astype(jnp.int32),
+        spell_best=jnp.where(begins, best, state.spell_best),
+        barren=jnp.where(begins, jnp.where(pays, 0, state.barren + 1), state.barren).astype(
+            jnp.int32
+        ),
+    )
+
+
+def begun_anew(state: EvolutionState, now: jax.Array) -> EvolutionState:
+    """Where now [], forget earlier growth: every individual's fitness has changed.
+
+    The window then begins with the next generation, because this one's best is still a fitness of
+    the old trials.
+    """
+    return dataclasses.replace(
+        state,
+        quiet=jnp.where(now, -1, state.quiet),
+        barren=jnp.where(now, 0, state.barren),
+        spell_best=jnp.where(now, -jnp.inf, state.spell_best),
+    )
+
+
+def _grown(history: jax.Array, gain: jax.Array | float) -> jax.Array:
+    return history[-1] - history[0] > gain * jnp.maximum(jnp.abs(history[0]), 1.0)

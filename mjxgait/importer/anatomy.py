@@ -9,8 +9,139 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from mjxgait.importer.parts import Shape, read_shapes
-from mjxgait.importer.root import turn_up
+from mjxgait.creature.geometry import ancestors
+from mjxgait.errors import UserError
+from mjxgait.importer.parts import FREE, HINGE, SLIDE, Notes, Shape, read_shapes
+
+UP_AXES = {"x": np.array([1.0, 0, 0]), "y": np.array([0, 1.0, 0]), "z": np.array([0, 0, 1.0])}
+
+
+def find_root(model: mujoco.MjModel) -> int:
+    """Return the body with the most joints in its subtree, then the most mass.
+
+    A chain of bodies that only carry root slides is skipped.
+    """
+    tops = [b for b in range(1, model.nbody) if model.body_parentid[b] == 0]
+
+    def weight(top: int) -> tuple[int, float]:
+        inside = [b for b in range(1, model.nbody) if top in ancestors(model, b)]
+        return sum(int(model.body_jntnum[b]) for b in inside), float(model.body_subtreemass[top])
+
+    if not tops:
+        raise UserError("the model has no body; there is nothing that could walk")
+    root = max(tops, key=weight)
+    while True:
+        children = [
+            b for b in range(1, model.nbody) if model.body_parentid[b] == root and b != root
+        ]
+        slides = _types(model, root) and all(t in (SLIDE, HINGE) for t in _types(model, root))
+        carries = len(children) == 1 and model.body_mass[root] < 1e-2 * model.body_subtreemass[root]
+        leads_on = children and SLIDE in _types(model, children[0])
+        below = children and any(t == SLIDE for t in _types(model, root))
+        if carries and (leads_on or (slides and below)):
+            root = children[0]
+        else:
+            return root
+
+
+def _types(model: mujoco.MjModel, body: int) -> list[int]:
+    start = int(model.body_jntadr[body])
+    return (
+        [int(t) for t in model.jnt_type[start : start + int(model.body_jntnum[body])]]
+        if start >= 0
+        else []
+    )
+
+
+def in_plane(model: mujoco.MjModel, root: int) -> bool:
+    """Return whether the file's root can slide and turn in at most one plane."""
+    types = _types(model, root)
+    return SLIDE in types and types.count(HINGE) <= 1
+
+
+def tell_root_joints(model: mujoco.MjModel, root: int, notes: Notes) -> None:
+    """Report the replacement of the joints that hold the root in the world."""
+    types = _types(model, root)
+    if types == [FREE]:
+        return
+    if not types:
+        notes.change(
+            f'free joint added to "{model.body(root).name}"',
+            "the file fixes the trunk in the world",
+        )
+    else:
+        notes.change(
+            f'free joint in place of the {len(types)} root joints of "{model.body(root).name}"',
+            "the trunk must be free to fall; a body that lives in a plane gets feet that are wide "
+            "across instead",
+        )
+
+
+def unit_length(model: mujoco.MjModel, bodies: list[int], notes: Notes) -> float:
+    """Unit of length in m: a body of more than 40 m is in millimetres."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    span = float(np.ptp(data.xpos[bodies], axis=0).max(initial=0))
+    if span < 40:
+        return 1.0
+    notes.change(
+        "all lengths divided by 1000",
+        f"the body would be {span:.0f} m long, so the file is taken to be in millimetres",
+    )
+    return 1e-3
+
+
+def up_axis(
+    model: mujoco.MjModel,
+    bodies: list[int],
+    root: int,
+    qpos: np.ndarray,
+    up: str | None,
+    notes: Notes,
+) -> np.ndarray:
+    """Up unit vector [3] in the file's world."""
+    gravity = model.opt.gravity
+    if up:
+        notes.guess("up", up, "high", "as told")
+        return UP_AXES[up]
+    strongest = int(np.abs(gravity).argmax())
+    if abs(gravity[strongest]) > 1 and strongest != 2:
+        notes.change(
+            "turned so that z is up", f"the file's gravity is {np.round(gravity, 2).tolist()}"
+        )
+        notes.guess("up", "xyz"[strongest], "high", "the file's gravity")
+        return -np.sign(gravity[strongest]) * np.eye(3)[strongest]
+    data = mujoco.MjData(model)
+    data.qpos[:] = qpos
+    mujoco.mj_kinematics(model, data)
+    leaves = [b for b in bodies if not (model.body_parentid == b).any()]
+    hips = [
+        next(
+            (
+                b
+                for b in reversed(ancestors(model, leaf))
+                if b != root and root in ancestors(model, b)
+            ),
+            leaf,
+        )
+        for leaf in leaves
+    ]
+    below = (data.xpos[hips] - data.xpos[leaves]).mean(0) if leaves else np.zeros(3)
+    if below[1] > 1.3 * abs(below[2]) and below[1] > abs(below[0]):
+        notes.change("turned so that z is up", "the limbs end below the trunk along y, not along z")
+        notes.guess("up", "y", "medium", "the limbs hang along it (--up says otherwise)")
+        return UP_AXES["y"]
+    notes.guess("up", "z", "high", "the convention; the limbs do not say otherwise")
+    return UP_AXES["z"]
+
+
+def turn_up(axis: np.ndarray) -> np.ndarray:
+    """Rotation [3, 3] that takes an axis to z, the identity if it is z already."""
+    if axis[2] > 0.99:
+        return np.eye(3)
+    side = np.roll(axis, 1) if axis[1] else np.array([0.0, 1.0, 0.0])
+    side = side - axis * (side @ axis)
+    return np.stack([side, np.cross(axis, side), axis])
 
 
 @dataclasses.dataclass(eq=False)

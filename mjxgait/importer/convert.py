@@ -12,23 +12,20 @@ import numpy as np
 from mjxgait.animation.clips.clip import ELSEWHERE
 from mjxgait.creature import geometry
 from mjxgait.errors import UserError
+from mjxgait.importer.anatomy import in_plane
 from mjxgait.importer.balance import steady_balance
-from mjxgait.importer.body import Puppet
+from mjxgait.importer.body import Puppet, creature_xml
+from mjxgait.importer.checks import check_same, tell_dropped, tell_left_out
+from mjxgait.importer.clean import clean_mjcf, clean_urdf
 from mjxgait.importer.find import find_anatomy
-from mjxgait.importer.left_out import tell_dropped, tell_left_out
-from mjxgait.importer.manner import manner
-from mjxgait.importer.mjcf import clean_mjcf
-from mjxgait.importer.notes import Notes, listed
 from mjxgait.importer.orient import (
     find_forward,
     find_mirror,
     is_planar,
     yaw_to,
 )
-from mjxgait.importer.parts import one_line, plain_names, rotation
+from mjxgait.importer.parts import Notes, listed, one_line, plain_names, rotation
 from mjxgait.importer.rigged import RIGS, model_of
-from mjxgait.importer.root import in_plane
-from mjxgait.importer.same import check_same
 from mjxgait.importer.skeleton import build_bodies
 from mjxgait.importer.source import Places, Source, parse_xml
 from mjxgait.importer.stance import stance_of
@@ -38,15 +35,13 @@ from mjxgait.importer.standing import (
     offered_poses,
     standing,
 )
-from mjxgait.importer.urdf import clean_urdf
 from mjxgait.importer.worker import (
     GIGABYTES,
     SECONDS,
     compile_apart,
     compile_here,
 )
-from mjxgait.importer.write_toml import creature_toml
-from mjxgait.importer.write_xml import creature_xml
+from mjxgait.importer.write_toml import creature_toml, manner
 
 XML, TOML, README = WRITTEN = ("creature.xml", "creature.toml", "README.md")
 """Files of a creature folder that an import makes."""

@@ -8,21 +8,21 @@ import numpy as np
 
 from mjxgait.creature.geometry import ancestors
 from mjxgait.errors import UserError
-from mjxgait.importer.anatomy import Anatomy, measured
+from mjxgait.importer.anatomy import (
+    Anatomy,
+    find_root,
+    measured,
+    tell_root_joints,
+    unit_length,
+    up_axis,
+)
 from mjxgait.importer.legs import (
     NoLegs,
     find_feet,
     lowered_limbs,
     movable_joints,
 )
-from mjxgait.importer.notes import Notes, listed
-from mjxgait.importer.parts import HINGE, SLIDE
-from mjxgait.importer.root import (
-    find_root,
-    tell_root_joints,
-    unit_length,
-    up_axis,
-)
+from mjxgait.importer.parts import HINGE, SLIDE, Notes, listed
 
 MOST_BODIES, MOST_JOINTS = 400, 60
 ENOUGH = 6

@@ -5,9 +5,8 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from mjxgait.creature import Creature
-from mjxgait.importer.hold import Held, hold
-from mjxgait.rendering.camera import Camera
-from mjxgait.rendering.floor import DARK_INK, font
+from mjxgait.importer.balance import Held, hold
+from mjxgait.rendering.floor import DARK_INK, Camera, font
 from mjxgait.rendering.painter import Painter, paint
 from mjxgait.rendering.shapes import Silhouettes
 

@@ -9,19 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
-from mjxgait.animation.clips.read_bvh import rig_of_bvh
-from mjxgait.animation.clips.rig import Rig
-from mjxgait.animation.clips.rig_of_glb import rig_of_glb
+from mjxgait.animation.clips.clip import Rig
+from mjxgait.animation.clips.read_glb import rig_of_glb
+from mjxgait.animation.clips.read_text import rig_of_bvh
 from mjxgait.errors import UserError
-from mjxgait.importer.hinges import Hinge, hinges_of
-from mjxgait.importer.notes import (
-    Confidence,
-    Guess,
-    Notes,
-    listed,
-)
-from mjxgait.importer.parts import plain_names
-from mjxgait.importer.plan import Plan
+from mjxgait.importer.parts import Confidence, Guess, Notes, listed, plain_names
+from mjxgait.importer.rig import Hinge, Plan, hinges_of
 
 RIGS: Mapping[str, Callable[[Path], Rig]] = {".bvh": rig_of_bvh, ".glb": rig_of_glb}
 UP, OTHER, SURER = "y", "z", 1.5

@@ -8,13 +8,14 @@ import mujoco
 import numpy as np
 
 from mjxgait.importer.anatomy import Anatomy
-from mjxgait.importer.notes import Notes, listed
 from mjxgait.importer.parts import (
     BALL,
     HINGE,
     Body,
     Joint,
+    Notes,
     Shape,
+    listed,
     plain_names,
     quaternion,
     rotation,

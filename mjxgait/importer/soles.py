@@ -4,10 +4,10 @@ import dataclasses
 
 import numpy as np
 
-from mjxgait.importer.notes import Notes
 from mjxgait.importer.parts import (
     GEOM,
     Body,
+    Notes,
     Shape,
     quaternion,
     rotation,

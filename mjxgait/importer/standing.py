@@ -7,11 +7,10 @@ import mujoco
 import numpy as np
 
 from mjxgait.importer.anatomy import Anatomy
-from mjxgait.importer.body import Puppet
+from mjxgait.importer.balance import Held, hold
+from mjxgait.importer.body import Puppet, compile_own, creature_xml
 from mjxgait.importer.drive import Drive, plan_drive
-from mjxgait.importer.hold import Held, hold
-from mjxgait.importer.notes import Notes
-from mjxgait.importer.parts import Body
+from mjxgait.importer.parts import Body, Notes
 from mjxgait.importer.soles import guard_parts, lay_soles
 from mjxgait.importer.source import Source
 from mjxgait.importer.stance import (
@@ -21,7 +20,6 @@ from mjxgait.importer.stance import (
     level,
     stance_of,
 )
-from mjxgait.importer.write_xml import compile_own, creature_xml
 
 SINK = 0.0005
 """m, initial depth of the feet in the floor, about as deep as they rest."""

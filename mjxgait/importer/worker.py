@@ -17,7 +17,7 @@ import mujoco
 import numpy as np
 
 from mjxgait.errors import UserError
-from mjxgait.importer.missing import leave_out, lost, put_stand_in
+from mjxgait.importer.source import leave_out, lost, put_stand_in
 from mjxgait.processes import python_command, safe_environment
 
 SECONDS, GIGABYTES = 10.0, 1.0

@@ -1,6 +1,5 @@
 """Content of a checkpoint, read without compiling or simulating anything (docs/seeing.md)."""
 
-from mjxgait.inspect.difference import differences, print_differences
 from mjxgait.inspect.facts import facts, individual_facts
 from mjxgait.inspect.runs import (
     just_begun,
@@ -10,7 +9,7 @@ from mjxgait.inspect.runs import (
     runs_in,
 )
 from mjxgait.inspect.snapshot import Snapshot, read_snapshot
-from mjxgait.inspect.text import print_facts, print_individual
+from mjxgait.inspect.text import differences, print_differences, print_facts, print_individual
 
 __all__ = [
     "Snapshot",

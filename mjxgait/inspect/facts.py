@@ -18,18 +18,17 @@ from mjxgait.certification import (
     read_certificate,
     read_stress,
 )
-from mjxgait.certification.likeness import in_words
+from mjxgait.certification.describe import in_words
 from mjxgait.config.tables import flat
 from mjxgait.errors import UserError
 from mjxgait.evolution.state import Origin
-from mjxgait.inspect.genomes import view_of
-from mjxgait.inspect.islands import island_facts
+from mjxgait.inspect.sections import island_facts, view_of
 from mjxgait.inspect.snapshot import Snapshot
 from mjxgait.plugins import make_task, resolve_config
 from mjxgait.plugins.registry import what_ends
 from mjxgait.tasks.base import Task
 from mjxgait.training.folder import CERTIFICATE, STRESS, kept_champion
-from mjxgait.training.lock import running
+from mjxgait.training.stored import running
 
 KINDS = {
     Origin.INITIAL: "initial",

@@ -12,8 +12,7 @@ from mjxgait.inspect.facts import facts
 from mjxgait.inspect.snapshot import read_snapshot
 from mjxgait.inspect.text import ago, show
 from mjxgait.training.folder import CONFIG
-from mjxgait.training.lock import running, why_empty
-from mjxgait.training.stored import stored_generations
+from mjxgait.training.stored import running, stored_generations, why_empty
 
 
 def runs_in(folder: Path) -> list[Path]:

@@ -6,13 +6,13 @@ from typing import Any
 import mujoco
 from numpy.typing import ArrayLike
 
-from mjxgait.config.rollout import Physics
+from mjxgait.config.schema import Physics
 from mjxgait.creature import Creature
 from mjxgait.creature.overlap import find_crossings
 from mjxgait.errors import UserError
+from mjxgait.physics.derived import OtherTopology, sense_layout
 from mjxgait.physics.lane_major import UnsupportedModel, fast_plant
-from mjxgait.physics.lane_major.support import check_supported
-from mjxgait.physics.layout import OtherTopology, sense_layout
+from mjxgait.physics.lane_major.model import check_supported
 from mjxgait.types import ModelPlant
 
 SLOWER = "15 to 30"

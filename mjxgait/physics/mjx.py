@@ -18,7 +18,7 @@ from mjxgait.creature.ground.surface import (
     height,
 )
 from mjxgait.creature.overlap import Crossings
-from mjxgait.physics.layout import OtherTopology, SenseLayout
+from mjxgait.physics.derived import OtherTopology, SenseLayout, deepest, single
 from mjxgait.physics.mjx_parameters import (
     ModelNumbers,
     heavier,
@@ -28,7 +28,6 @@ from mjxgait.physics.mjx_parameters import (
     resized,
     reweighed,
 )
-from mjxgait.physics.overlap import deepest, single
 from mjxgait.types import BodyState, Number, Sensed
 
 GEOM = mujoco.mjtGeom

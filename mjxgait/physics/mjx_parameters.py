@@ -13,9 +13,14 @@ import numpy as np
 
 from mjxgait.creature import geometry
 from mjxgait.creature.overlap import Crossings
-from mjxgait.physics.layout import SenseLayout
-from mjxgait.physics.overlap import Bars, read_bars, resized_bars
-from mjxgait.physics.weights import inverse_weights, weight_groups
+from mjxgait.physics.derived import (
+    Bars,
+    SenseLayout,
+    inverse_weights,
+    read_bars,
+    resized_bars,
+    weight_groups,
+)
 from mjxgait.types import Number, pytree
 
 with contextlib.redirect_stdout(

@@ -1,6 +1,11 @@
 """Controllers and tasks of a run: the shipped ones and those of a user's file."""
 
-from mjxgait.plugins.registry import make_controller, make_task
-from mjxgait.plugins.settings import build_config, config_class, resolve_config
+from mjxgait.plugins.registry import (
+    build_config,
+    config_class,
+    make_controller,
+    make_task,
+    resolve_config,
+)
 
 __all__ = ["build_config", "config_class", "make_controller", "make_task", "resolve_config"]

@@ -5,6 +5,7 @@ joints, `nq nv` as in MuJoCo.
 """
 
 import dataclasses
+from collections.abc import Callable
 from typing import Annotated
 
 import numpy as np
@@ -129,3 +130,21 @@ def blank_outcome(
         middle=np.full((count, steps if middle else 0, 3), np.nan),
         low=np.full((count, steps if low else 0), np.nan),
     )
+
+
+class Watch:
+    """Lost simulations, shared by all threads that step them.
+
+    lost: [S] whether one can no longer succeed. over: whether the result is decided.
+    """
+
+    def __init__(self, count: int, hopeless: Callable[[np.ndarray], bool]) -> None:
+        """hopeless: whether the losses [S] decide the result; more losses never improve it."""
+        self.lost, self.over = np.zeros(count, bool), False
+        self._hopeless = hopeless
+
+    def tell(self, rows: np.ndarray, lost: np.ndarray) -> bool:
+        """Record the lost simulations among some rows; return whether all may end."""
+        self.lost[rows] |= lost
+        self.over = self.over or self._hopeless(self.lost)
+        return self.over

@@ -1,16 +1,208 @@
-"""Replay of a simulation's frames in C MuJoCo: places of the parts, contacts with the floor.
+"""Measurements of recorded frames: places of parts, floor contact, overlap, grown bodies.
+
+Uses MuJoCo's collisions between the true shapes, including visual-only geoms.
+Letters: `T` frames, `P` pairs of parts.
+
+Letters: `T` frames.
 
 Quantities that need no MuJoCo call per frame are computed for all frames at the end.
 """
+
+import dataclasses
+import itertools
+from collections.abc import Mapping
 
 import mujoco
 import numpy as np
 
 from mjxgait.creature import Creature
-from mjxgait.reference.bar import Clearance
-from mjxgait.reference.layout import LowestPoint, per_foot
+from mjxgait.reference.layout import Clearance, LowestPoint, per_foot
 from mjxgait.reference.stepping import examined_model
 from mjxgait.reference.terrain import terrain_of
+
+ONE_PLACE = 0.02
+"""Hip heights within which joints between two parts count as one, as the three of a ball joint."""
+
+FALSE = 2.0
+"""Largest credible ratio of contact depth to least way out, or inverse; box corners reach 1.4.
+
+MuJoCo may report a whole radius for crossed cylinders that hardly touch, and an eighth of the true
+depth for a disc in a box."""
+
+ONE_WAY = 0.01
+"""Largest difference between parallel axes, about in rad."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Overlaps:
+    """Pairs of parts (bodies) that ever overlap more deeply than in the standing pose.
+
+    pairs: names, P. depth: [T, P] m beyond the standing pose; NaN in frames that are NaN.
+    """
+
+    pairs: tuple[tuple[str, str], ...]
+    depth: np.ndarray
+
+
+def overlaps(creature: Creature, qpos: np.ndarray, excused: bool = True) -> Overlaps:
+    """Measure the overlaps in every frame of a motion; qpos: [T, nq].
+
+    excused: whether the overlap of the standing pose, part of the model as drawn, is subtracted.
+    """
+    model = colliding_with_itself(creature)
+    data = mujoco.MjData(model)
+    usual = _depths(model, data, creature.stand_qpos) if excused else {}
+    found: dict[tuple[int, int], np.ndarray] = {}
+    finite = np.isfinite(qpos).all(1)
+    for k in np.flatnonzero(finite):
+        for geoms, depth in _depths(model, data, qpos[k]).items():
+            more = depth - usual.get(geoms, 0.0)
+            if more > 0:
+                one, other = sorted(int(model.geom_bodyid[g]) for g in geoms)
+                of_pair = found.setdefault((one, other), np.zeros(len(qpos)))
+                of_pair[k] = max(of_pair[k], more)
+    names = tuple((model.body(a).name, model.body(b).name) for a, b in found)
+    depths = np.array(list(found.values())).reshape(len(found), len(qpos)).T
+    return Overlaps(names, np.where(finite[:, None], depths, np.nan))
+
+
+def colliding_with_itself(creature: Creature) -> mujoco.MjModel:
+    """Return a model without floor in which all parts but neighbours collide."""
+    spec = mujoco.MjSpec.from_string(creature.files["creature.xml"])
+    for stated in (*spec.excludes, *spec.pairs):
+        spec.delete(stated)
+    for body in spec.bodies:
+        body.name = body.name or f"body {body.id}"
+    for geom in spec.geoms:
+        geom.contype = geom.conaffinity = int(geom.parent.name != "world")
+        geom.margin = geom.gap = 0.0
+    for a, b in neighbours(spec.compile(), creature):
+        spec.add_exclude(bodyname1=spec.bodies[a].name, bodyname2=spec.bodies[b].name)
+    return spec.compile()
+
+
+def neighbours(model: mujoco.MjModel, creature: Creature) -> list[tuple[int, int]]:
+    """Return pairs of bodies joined by one joint or by several at one place; welded bodies are one.
+
+    In a planar body, pairs of limbs with parallel axes are included: they can only pass each other.
+    MuJoCo excludes parent and child by itself; they are listed all the same.
+    """
+    data = mujoco.MjData(model)
+    data.qpos[:] = creature.stand_qpos
+    mujoco.mj_kinematics(model, data)
+    chains = [_chain(model, body) for body in range(model.nbody)]
+
+    def joined(one: int, other: int) -> bool:
+        between = chains[one] ^ chains[other]
+        if len(between) < 2:
+            return True
+        joints = np.isin(model.jnt_bodyid, list(between))
+        reach = np.linalg.norm(np.ptp(data.xanchor[joints], axis=0))
+        if reach <= ONE_PLACE * creature.frame.hip_height:
+            return True
+        both = between - chains[one] and between - chains[other]
+        passing = creature.settings.creature.planar and both
+        return bool(passing) and np.linalg.matrix_rank(data.xaxis[joints], tol=ONE_WAY) == 1
+
+    moving = range(1, model.nbody)
+    return [(a, b) for a, b in itertools.combinations(moving, 2) if joined(a, b)]
+
+
+def _chain(model: mujoco.MjModel, body: int) -> frozenset[int]:
+    """Return the bodies with joints from the root of the tree to this one."""
+    chain = set()
+    while body := int(model.body_weldid[body]):
+        chain.add(body)
+        body = int(model.body_parentid[body])
+    return frozenset(chain)
+
+
+def _depths(
+    model: mujoco.MjModel, data: mujoco.MjData, qpos: np.ndarray
+) -> dict[tuple[int, int], float]:
+    """Return the overlap depth of each pair of geoms in m: of the deepest contact, unless false."""
+    data.qpos[:] = qpos
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_collision(model, data)
+    depths: dict[tuple[int, int], float] = {}
+    for (a, b), distance in zip(
+        data.contact.geom.tolist(), data.contact.dist.tolist(), strict=True
+    ):
+        depths[a, b] = max(depths.get((a, b), 0.0), -distance)
+    return {pair: _true(model, data, pair, depth) for pair, depth in depths.items()}
+
+
+def _true(model: mujoco.MjModel, data: mujoco.MjData, pair: tuple[int, int], depth: float) -> float:
+    """Return the depth in m, or the least way out if that contradicts it."""
+    least = -mujoco.mj_geomDistance(model, data, *pair, model.stat.extent, None)
+    believed = depth / FALSE <= least <= FALSE * depth
+    return depth if believed or least <= 0 else least
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Grown:
+    """Measurements of a modular body, in world axes.
+
+    middle: [T, 3] m, centre of mass. momentum: [T, 3] N·s. push: [T, 3] N, total water force.
+    low: [T] m, lowest point of all blocks. buried: [T] greatest depth of a block in the ground, as
+    a share of its size. sizes: m by name of the part, cube root of its volume.
+    """
+
+    middle: np.ndarray
+    momentum: np.ndarray
+    push: np.ndarray
+    low: np.ndarray
+    buried: np.ndarray
+    sizes: Mapping[str, float]
+
+    def window(self, frames: slice) -> "Grown":
+        """Return some of the frames."""
+        arrays = {
+            f.name: getattr(self, f.name)[frames]
+            for f in dataclasses.fields(self)
+            if f.name != "sizes"
+        }
+        return Grown(**arrays, sizes=self.sizes)
+
+
+def seen_grown(creature: Creature, qpos: np.ndarray, qvel: np.ndarray, drag: float) -> Grown:
+    """Measure a motion [T, nq], [T, nv]; frames after it blew up are NaN.
+
+    drag: N·s/m³ of the water; 0 without. The velocity of a block's middle along the normal gives
+    the force on a face (docs/blocks.md); the reference simulator sums points instead.
+    """
+    model, data = creature.model, mujoco.MjData(creature.model)
+    boxes = np.flatnonzero(model.geom_bodyid > 0)
+    half, size = model.geom_size[boxes], np.cbrt(8 * model.geom_size[boxes].prod(1))
+    middle, momentum, push = (np.full((len(qpos), 3), np.nan) for _ in range(3))
+    low, buried = (np.full(len(qpos), np.nan) for _ in range(2))
+    velocity = np.zeros(6)
+    for k in np.flatnonzero(np.isfinite(qpos).all(1) & np.isfinite(qvel).all(1)):
+        data.qpos[:], data.qvel[:] = qpos[k], qvel[k]
+        mujoco.mj_fwdPosition(model, data)
+        mujoco.mj_fwdVelocity(model, data)
+        momentum[k] = push[k] = 0.0
+        for box in boxes:
+            kind, mass = mujoco.mjtObj.mjOBJ_GEOM, model.body_mass[model.geom_bodyid[box]]
+            mujoco.mj_objectVelocity(model, data, kind, box, velocity, 0)
+            momentum[k] += mass * velocity[3:]
+            push[k] += _push(model.geom_size[box], data.geom_xmat[box], velocity[3:], drag)
+        middle[k] = data.subtree_com[creature.trunk]
+        reach = (np.abs(data.geom_xmat[boxes, 6:]) * half).sum(1)
+        lows = data.geom_xpos[boxes, 2] - reach
+        low[k], buried[k] = lows.min(), (-lows / size).max()
+    names = [model.body(model.geom_bodyid[box]).name for box in boxes]
+    sizes = dict(zip(names, size.tolist(), strict=True))
+    return Grown(middle, momentum, push, low, np.maximum(buried, 0.0), sizes)
+
+
+def _push(half: np.ndarray, rotation: np.ndarray, velocity: np.ndarray, drag: float) -> np.ndarray:
+    """Return the force [3] in N on a block with this velocity of its middle."""
+    normals = rotation.reshape(3, 3)
+    # Each area is that of two opposite faces.
+    areas = 8 * half[[1, 2, 0]] * half[[2, 0, 1]]
+    pushed: np.ndarray = -drag * normals @ (areas * (velocity @ normals))
+    return pushed
 
 
 class Sight:

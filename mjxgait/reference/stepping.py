@@ -13,10 +13,9 @@ import numpy as np
 
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
-from mjxgait.reference.bar import Clearance
 from mjxgait.reference.bodies import Bodies, wrapped
 from mjxgait.reference.controllers import Twin, twin_of
-from mjxgait.reference.drive import Drive
+from mjxgait.reference.layout import Clearance
 from mjxgait.reference.outcome import (
     Fall,
     Outcome,
@@ -25,7 +24,7 @@ from mjxgait.reference.outcome import (
     blank_outcome,
 )
 from mjxgait.reference.starts import Starts
-from mjxgait.reference.state import State, sense
+from mjxgait.reference.state import Drive, State, sense
 from mjxgait.reference.terrain import grounded_model
 
 LOOK = 10

@@ -1,26 +1,69 @@
-"""Plots of a run over its generations: fitness, contributions of the terms, diversity, size.
+"""Plots of a run over its generations, in the style of all plots.
 
 lines: of `metrics.jsonl`.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import matplotlib
+import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 
+from mjxgait.certification.stress import Stress
 from mjxgait.files import replaced
-from mjxgait.rendering.style import (
-    ACCENT,
-    DARK,
-    MIDDLE,
-    PALE,
-    Figures,
-    figure,
-)
+
+matplotlib.use("Agg")
+
+
+Figures = Mapping[str, tuple[tuple[float, float], Callable[[Figure], None]]]
+"""Size in inches and drawing function by file name."""
+FORMATS = ("png", "svg")
+SETTINGS = {
+    "font.size": 10,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.titlesize": 11,
+    "axes.titlelocation": "left",
+    "axes.grid": True,
+    "grid.color": "0.9",
+    "grid.linewidth": 0.6,
+    "axes.axisbelow": True,
+    "legend.frameon": False,
+    "hatch.linewidth": 0.5,
+    "savefig.dpi": 120,
+    "svg.hashsalt": "mjxgait",
+}
+DARK, MIDDLE, PALE = "0.1", "0.45", "0.85"
+ACCENT = "tab:orange"
+
+
+@contextmanager
+def figure(size: tuple[float, float]) -> Iterator[Figure]:
+    """Yield an empty figure of this size in inches, and close it at the end."""
+    with plt.rc_context(SETTINGS):
+        drawing = plt.figure(figsize=size, layout="constrained")
+        try:
+            yield drawing
+        finally:
+            plt.close(drawing)
+
+
+def save(drawing: Figure, path: Path, formats: Sequence[str] = FORMATS) -> list[Path]:
+    """Write the figure once per format. path: without a suffix."""
+    files = [path.with_name(f"{path.name}.{kind}") for kind in formats]
+    for file in files:
+        # Without a date, equal plots are equal files.
+        with replaced(file) as beside:
+            drawing.savefig(beside, metadata={"Date": None} if file.suffix == ".svg" else None)
+    return files
+
 
 Lines = Sequence[Mapping[str, Any]]
 MAIN_TERMS = 7
@@ -188,3 +231,17 @@ def _label_generations(axes: Axes, generation: np.ndarray) -> None:
     axes.set_xlabel("generation")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_xlim(generation[0] - 0.5, max(generation[-1], generation[0] + 1) + 0.5)
+
+
+def draw_stress(drawing: Figure, found: Stress) -> None:
+    """Draw the share of starts that passed each trial; dark if sufficient."""
+    axes = drawing.add_subplot()
+    names = [trial.name for trial in found.trials]
+    shares = [trial.share for trial in found.trials]
+    colours = [DARK if trial.passed else PALE for trial in found.trials]
+    bars = axes.barh(names, shares, color=colours, edgecolor=DARK)
+    axes.bar_label(bars, [f"{share:.0%}" for share in shares], padding=3)
+    axes.axvline(found.config.share, color=DARK, linestyle=":")
+    axes.set(xlim=(0, 1.12), xlabel=f"share of {found.config.starts} starts")
+    axes.invert_yaxis()
+    axes.set_title("It walks anywhere" if found.passed else "It does not walk anywhere yet")

@@ -5,12 +5,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from mjxgait.rendering.style import (
-    ACCENT,
-    DARK,
-    MIDDLE,
-    Figures,
-)
+from mjxgait.rendering.curves import ACCENT, DARK, MIDDLE, Figures
 from mjxgait.rendering.walk import Walk
 
 STRIDES = 2

@@ -11,12 +11,9 @@ import mujoco
 import numpy as np
 from PIL import Image, ImageDraw, ImageFilter
 
-from mjxgait.rendering.camera import Camera
-from mjxgait.rendering.floor import draw_floor
-from mjxgait.rendering.relief import LIGHT as TOWARDS_LAMP
-from mjxgait.rendering.relief import Relief
-from mjxgait.rendering.shapes import Silhouettes, hit
-from mjxgait.rendering.triangles import fill_mesh
+from mjxgait.rendering.floor import LIGHT as TOWARDS_LAMP
+from mjxgait.rendering.floor import Camera, Relief, draw_floor
+from mjxgait.rendering.shapes import Silhouettes, fill_mesh, hit
 
 SMOOTH = 2
 """Rays per pixel and direction."""

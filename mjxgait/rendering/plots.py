@@ -8,40 +8,28 @@ import numpy as np
 
 from mjxgait.config.schema import Config
 from mjxgait.controllers.sims_brain.reference import BrainTwin
-from mjxgait.controllers.sims_brain.reference_body.material import IN_LIGHT
+from mjxgait.controllers.sims_brain.reference_body import IN_LIGHT
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.plugins import make_task
 from mjxgait.plugins.registry import what_ends
-from mjxgait.reference.controllers.registry import twin_of
-from mjxgait.rendering import (
-    brain,
-    grown,
-    strobe,
-    trees,
-)
-from mjxgait.rendering.cast import LOOP_SECONDS, champion_of
-from mjxgait.rendering.curves import Lines, progress_figures
+from mjxgait.reference.controllers import twin_of
+from mjxgait.rendering import brain, filmstrip, genomes
+from mjxgait.rendering.brain import network_of
+from mjxgait.rendering.curves import FORMATS, Figures, Lines, figure, progress_figures, save
 from mjxgait.rendering.filmstrip import draw_filmstrip
 from mjxgait.rendering.gaitplots import gait_figures
-from mjxgait.rendering.network import network_of
-from mjxgait.rendering.style import (
-    FORMATS,
-    Figures,
-    figure,
-    save,
-)
+from mjxgait.rendering.video import LOOP_SECONDS, champion_of
 from mjxgait.rendering.walk import Walk
-from mjxgait.training.disk import disk_errors
 from mjxgait.training.folder import (
     CHAMPION,
     METRICS,
     PLOTS,
+    command,
     open_run,
     read_metrics,
 )
-from mjxgait.training.lock import why_empty
-from mjxgait.training.own import command
+from mjxgait.training.stored import disk_errors, why_empty
 
 
 def plot_run(run: Path, out: Path | None = None, formats: Sequence[str] = FORMATS) -> list[Path]:
@@ -78,33 +66,35 @@ def _of_goals(walk: Walk) -> Figures:
     """Onion-skin picture of the way to a goal or under a bar; empty without one."""
     if walk.marked is None:
         return {}
-    picture = strobe.strobe(walk)
-    shape = strobe.shape(picture)
-    return {"strobe": (shape, lambda drawing: strobe.draw_strobe(drawing, walk, picture))}
+    picture = filmstrip.strobe(walk)
+    shape = filmstrip.strobe_shape(picture)
+    return {"strobe": (shape, lambda drawing: filmstrip.draw_strobe(drawing, walk, picture))}
 
 
 def _of_programs(walk: Walk) -> Figures:
     """Trees of the champion's expressions; empty if it has none."""
     if walk.champion.controller != "program":
         return {}
-    found = trees.expressions_of(walk.creature, walk.champion)
-    return {"expressions": (trees.shape(found), lambda drawing: trees.draw_trees(drawing, found))}
+    found = genomes.expressions_of(walk.creature, walk.champion)
+    return {
+        "expressions": (genomes.shape(found), lambda drawing: genomes.draw_trees(drawing, found))
+    }
 
 
 def _of_grown(run: Path, walk: Walk) -> Figures:
     """Graph and body, brain, and ancestors; empty unless the body grew from a graph."""
     if "graph.half" not in walk.champion.genome:
         return {}
-    row = grown.bodies_of(run, walk.champion)
+    row = genomes.bodies_of(run, walk.champion)
     twin = twin_of(walk.creature, walk.champion, walk.time_step)
     assert isinstance(twin, BrainTwin)
     thoughts = network_of(twin, walk.champion.task in IN_LIGHT)
     return {
-        "graph": ((10, 4.6), lambda drawing: grown.draw_graph(drawing, walk)),
+        "graph": ((10, 4.6), lambda drawing: genomes.draw_graph(drawing, walk)),
         "brain": (brain.shape(thoughts), lambda drawing: brain.draw_brain(drawing, thoughts)),
         "bodies": (
             (2.2 * max(len(row.bodies), 2), 2.4),
-            lambda drawing: grown.draw_bodies(drawing, row),
+            lambda drawing: genomes.draw_bodies(drawing, row),
         ),
     }
 

@@ -1,27 +1,85 @@
 """A champion's undisturbed walk, simulated once in C MuJoCo: the source of every picture, video and
 animation.
 
+They collide with nothing and are in no simulation.
+
 Letters: `T` frames (control steps), `J` joints, `G` geoms, `nq` as in MuJoCo.
 """
 
 import dataclasses
 from functools import cached_property
+from pathlib import Path
 
 import mujoco
 import numpy as np
 
+from mjxgait.certification import judged, outdated, read_certificate
+from mjxgait.certification.acceptance import how_simulated
 from mjxgait.certification.config import CertificateConfig
-from mjxgait.certification.simulate import simulate
-from mjxgait.certification.tasks import how_simulated
+from mjxgait.certification.trials import simulate
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
-from mjxgait.reference.layout import Ground
-from mjxgait.reference.measure import Recording, measure
+from mjxgait.errors import UserError
+from mjxgait.reference.layout import RADIUS, Ground, StartFrame, start_frame
+from mjxgait.reference.measure import Recording, measure, stride_starts
 from mjxgait.reference.outcome import Trajectory
 from mjxgait.reference.starts import Starts, nominal_starts
-from mjxgait.reference.strides import stride_starts
 from mjxgait.reference.terrain import terrain_of
-from mjxgait.rendering.marks import marked
+from mjxgait.training.folder import CERTIFICATE, command
+
+GEOM = mujoco.mjtGeom
+GOAL_COLOUR, BAR_COLOUR, POST_COLOUR = (
+    [0.10, 0.55, 0.50, 1.0],
+    [0.95, 0.70, 0.15, 1.0],
+    [0.55, 0.57, 0.60, 1.0],
+)
+DISC = 0.25, 0.004
+"""Radius in body lengths and half the height in m of a goal."""
+BODY = "marks"
+
+
+def marked(
+    creature: Creature, goals: np.ndarray, floor: np.ndarray, bar: np.ndarray | None
+) -> mujoco.MjSpec:
+    """Return the creature's model with the goals and the bar as its last body.
+
+    Args:
+      goals: [goals] m ahead of the start. floor: [goals] m, height of the floor there. bar: [2] m
+        ahead of the start and above the floor, of its lower edge.
+    """
+    spec, start = mujoco.MjSpec.from_string(creature.files["creature.xml"]), start_frame(creature)
+    body = spec.worldbody.add_body(name=BODY)
+    radius = DISC[0] * creature.frame.body_length
+    for ahead, level in zip(goals, floor, strict=True):
+        place = [*_ahead(start, ahead)[:2], level + DISC[1]]
+        _add(body, GEOM.mjGEOM_CYLINDER, GOAL_COLOUR, pos=place, size=[radius, DISC[1], 0])
+    if bar is not None:
+        _add_bar(body, start, float(bar[0]), float(bar[1]), 1.2 * creature.frame.body_length)
+    return spec
+
+
+def _add_bar(
+    body: mujoco.MjsBody, start: StartFrame, ahead: float, height: float, half: float
+) -> None:
+    """Add a bar on posts that rise above it. half: m, half its width."""
+    middle, up = _ahead(start, ahead), np.array([0.0, 0.0, height + RADIUS])
+    ends = [middle + side * half * start.left for side in (1, -1)]
+    across = np.concatenate([end + up for end in ends])
+    _add(body, GEOM.mjGEOM_CAPSULE, BAR_COLOUR, fromto=across, size=[RADIUS, 0, 0])
+    for end in ends:
+        post = np.concatenate([end, end + 1.15 * up])
+        _add(body, GEOM.mjGEOM_CAPSULE, POST_COLOUR, fromto=post, size=[0.7 * RADIUS, 0, 0])
+
+
+def _ahead(start: StartFrame, distance: float) -> np.ndarray:
+    """Place [3] m on the floor, ahead of the start."""
+    place: np.ndarray = start.place * [1, 1, 0] + distance * start.forward
+    return place
+
+
+def _add(body: mujoco.MjsBody, kind: mujoco.mjtGeom, colour: list[float], **given: object) -> None:
+    body.add_geom(type=kind, rgba=colour, contype=0, conaffinity=0, group=1, **given)
+
 
 WARMUP = 2.0
 """Time for a gait to settle, s; strides are taken from later if there are enough."""
@@ -178,3 +236,27 @@ def _poses(
         where.append(getattr(data, names[0]).copy())
         how.append(getattr(data, names[1]).reshape(-1, 3, 3).copy())
     return np.array(where), np.array(how)
+
+
+def doubt(run: Path, walk: Walk) -> str:
+    """Return one line that gives the reasons why a run's champion is not certified; empty if it is.
+
+    walk: of this champion, freshly simulated.
+    """
+    reasons = [f"it falls after {walk.fell:.1f} s"] if np.isfinite(walk.fell) else []
+    try:
+        document = read_certificate(run / CERTIFICATE)
+    except UserError as error:
+        return f"Not certified: {'; '.join([*reasons, str(error)])}"
+    if document is None:
+        reasons.append(f"it has not been examined, which {command('certify', run, run=run)} does")
+    elif old := outdated(document, walk.champion, walk.creature):
+        reasons.append(old[0].lower() + old[1:].rstrip("."))
+    elif (verdict := judged(document)).certified:
+        return ""
+    elif failed := verdict.failed:
+        names = ", ".join(f"{c.number} {c.name}".strip() for c in failed)
+        reasons.append(f"it fails {'criterion' if len(failed) == 1 else 'criteria'} {names}")
+    else:
+        reasons.append(verdict.reservation or "its certificate has no criteria")
+    return f"Not certified: {'; '.join(reasons)}"

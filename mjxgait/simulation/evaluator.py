@@ -9,8 +9,7 @@ import jax.numpy as jnp
 
 from mjxgait.config.schema import Config
 from mjxgait.simulation.rollout import Episodes, Simulator
-from mjxgait.tasks.base import FINISHED, NONFINITE
-from mjxgait.tasks.score import in_order
+from mjxgait.tasks.base import FINISHED, NONFINITE, in_order
 from mjxgait.tasks.starts import Starts
 from mjxgait.types import Asked, Judged
 

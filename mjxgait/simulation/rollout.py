@@ -18,8 +18,8 @@ from jax.sharding import Mesh, PartitionSpec
 
 from mjxgait.config.schema import Config
 from mjxgait.controllers.base import Controller
-from mjxgait.controllers.drive import Drive, Rules, per_lane
 from mjxgait.controllers.observations import sense
+from mjxgait.controllers.spd import Drive, Rules, per_lane
 from mjxgait.creature.body import Body
 from mjxgait.tasks.base import FINISHED, NONFINITE, Task
 from mjxgait.tasks.starts import Starts

@@ -8,13 +8,12 @@ from typing import Any, ClassVar
 import jax
 import jax.numpy as jnp
 
-from mjxgait.config.rollout import RolloutConfig
+from mjxgait.config.schema import RolloutConfig
 from mjxgait.config.tables import NoSettings
 from mjxgait.creature import Creature
 from mjxgait.creature.body import Body, Ends
 from mjxgait.creature.settings import Termination
-from mjxgait.tasks.base import Tally
-from mjxgait.tasks.falls import why_fallen
+from mjxgait.tasks.base import Tally, why_fallen
 from mjxgait.tasks.starts import Starts, draw_starts
 from mjxgait.types import Sensed
 

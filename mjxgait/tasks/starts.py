@@ -7,9 +7,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from mjxgait.config.rollout import RolloutConfig
+from mjxgait.config.schema import RolloutConfig
 from mjxgait.creature import Creature
-from mjxgait.creature.frame import horizontal_freedoms, start_place
+from mjxgait.creature.creature import horizontal_freedoms, start_place
 from mjxgait.creature.ground.spec import Place, parse_ground
 from mjxgait.creature.ground.surface import (
     DRAWS,

@@ -6,31 +6,22 @@ from functools import partial
 from typing import Any, Protocol
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 from jax.sharding import Mesh
 
-from mjxgait.config.rollout import RolloutConfig
-from mjxgait.config.schema import Config
-from mjxgait.controllers.base import Controller
-from mjxgait.controllers.drive import Drive
+from mjxgait.config.schema import Config, RolloutConfig
+from mjxgait.controllers.base import Bodied, BodiedController, Controller
 from mjxgait.controllers.observations import check_senses
-from mjxgait.controllers.sims_brain.anatomy import anatomy
 from mjxgait.controllers.sims_brain.controller import capacity_of
-from mjxgait.controllers.sims_brain.reference_body.material import (
-    DRAG,
-    FRICTION,
-    GRAVITY,
-    HARDEST,
-)
-from mjxgait.controllers.sized_body import BodiedController
+from mjxgait.controllers.sims_brain.genotype import Capacity
+from mjxgait.controllers.sims_brain.operators import Genotype
+from mjxgait.controllers.sims_brain.phenotype import anatomy, body_of
+from mjxgait.controllers.sims_brain.reference_body import DRAG, FRICTION, GRAVITY, HARDEST
+from mjxgait.controllers.spd import Drive
 from mjxgait.creature import Creature
-from mjxgait.creature.body import (
-    Body,
-    Ends,
-    GivenBody,
-    given_body,
-    given_ends,
-)
+from mjxgait.creature.body import Body, Ends, GivenBody, given_body, given_ends
+from mjxgait.creature.proportions import Proportions, extreme_bodies, proportions
 from mjxgait.creature.settings import Termination
 from mjxgait.kinds import in_water
 from mjxgait.physics import make_plant
@@ -42,13 +33,67 @@ from mjxgait.plugins.registry import what_ends
 from mjxgait.simulation.rollout import AXIS, Simulator
 from mjxgait.tasks.base import Task
 from mjxgait.tasks.starts import Starts
-from mjxgait.training.growth import (
-    GraphGrowth,
-    Growth,
-    SizeGrowth,
-    growth_of,
-)
 from mjxgait.types import ModelPlant, Plant, pytree
+
+
+class Growth(Protocol):
+    """Computation of the simulated body from a genome."""
+
+    def body(self, plant: Any, genome: Any, start: Starts) -> Starts:
+        """Return the start [] with the genome's own body."""
+        ...
+
+
+@dataclasses.dataclass(frozen=True)
+class GraphGrowth:
+    """Modular bodies from graphs."""
+
+    capacity: Capacity
+
+    def body(self, plant: TreePlant, genome: Genotype, start: Starts) -> Starts:
+        """See `Growth`. Parts without a hinge are not bent; on land bodies rest on the ground."""
+        tree = body_of(genome.graph, self.capacity).tree
+        bent = start.qpos[7:] * tree.moves[1:]
+        qpos = plant.rested(tree, jnp.concatenate([start.qpos[:7], bent]))
+        return dataclasses.replace(start, qpos=qpos, numbers=tree)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class SizeGrowth:
+    """Body parameters from evolved sizes, and a start with its height above ground kept."""
+
+    proportions: Proportions
+
+    def body(self, plant: ModelPlant, genome: Bodied, start: Starts) -> Starts:
+        """See `Growth`."""
+        known = self.proportions
+        # The trunk has index -1, where the factor is 1.
+        factors = jnp.exp(jnp.append(genome.sizes, 0.0))[known.size_of]
+        one = plant.parameters
+        if start.heaviness is not None:
+            one = plant.heavier(one, start.heaviness)
+        rises = known.upwards.astype(np.float32)
+        qpos = start.qpos + self._lift(factors) * rises
+        return dataclasses.replace(start, qpos=qpos, numbers=plant.resized(one, factors))
+
+    def _lift(self, factors: jax.Array) -> jax.Array:
+        """Return the rise [] of the trunk in m with these factors [B]."""
+        reach, fixed = (
+            x.astype(np.float32) for x in (self.proportions.reach, self.proportions.fixed)
+        )
+        return jnp.min(fixed + reach.sum(1)) - jnp.min(fixed + jnp.sum(reach * factors, axis=1))
+
+
+def growth_of(creature: Creature, config: Config) -> SizeGrowth | None:
+    """Return the growth of a creature whose sizes evolve; None if they do not.
+
+    Raises:
+      UserError: the smallest or the largest body is impossible.
+    """
+    if not extreme_bodies(creature, config.evolution.body):
+        return None
+    return SizeGrowth(proportions(creature))
+
 
 LANES = 64
 """Simulations of modular bodies per device."""

@@ -1,18 +1,30 @@
-"""Check for finished runs from their folders alone; compiles and simulates nothing."""
+"""Runs that are over: whether one is, and the examination of its last generation."""
 
 import dataclasses
+import io
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
+
+from rich.console import Console
 
 from mjxgait.certification import judged, outdated, read_certificate
 from mjxgait.config.schema import Config
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 from mjxgait.evolution.state import EvolutionState, stop_reason
-from mjxgait.training.examination import due, why_ended
-from mjxgait.training.folder import CERTIFICATE, kept_champion
-from mjxgait.training.own import command
+from mjxgait.plugins.user_code import load_all, loaded
+from mjxgait.processes import one_per_core
+from mjxgait.training.checkpoint import Checkpoints
+from mjxgait.training.examination import Examiner, Exams, due, why_ended
+from mjxgait.training.experiment import build_experiment
+from mjxgait.training.folder import CERTIFICATE, EXAMS, command, kept_champion, open_run
+from mjxgait.training.loop import conclude, versions
+from mjxgait.training.prescreen import tryout_of
+from mjxgait.training.screen import Screen
+from mjxgait.training.stages import prepare_devices
 from mjxgait.training.stored import Stored, read_stored, stored_generations
 
 
@@ -90,3 +102,54 @@ def _onward(run: Path, config: Config, stored: Stored) -> str:
         options += ["--generations", max(2 * generation, 1)]
     options = options or ["--examination.every", 0]
     return f"To go on: {command('train', '--resume', run, *options, run=run)}"
+
+
+def examine(
+    folder: Path,
+    runs: Sequence[Path],
+    again: str,
+    tell: Callable[[int, int], object],
+    stopped: Callable[[], bool],
+) -> bool:
+    """Write champion and certificate to each run folder without one; return whether all are done.
+
+    Each core examines one run at a time.
+
+    folder: contains the run folders. again: command that continues. tell: called with the number
+    of runs done and their total.
+
+    Raises:
+      UserError: a process was killed from outside, or the folder cannot be written.
+    """
+    left = [run for run in runs if not (run / CERTIFICATE).is_file()]
+    done = one_per_core(
+        _examine,
+        left,
+        tell,
+        folder=folder,
+        again=again,
+        prepare=partial(_prepare, loaded()),
+        stopped=stopped,
+    )
+    return done is not None
+
+
+def _prepare(own: Sequence[tuple[str, str]]) -> None:
+    """Prepare a worker process: devices, and the user's code that this process loaded."""
+    prepare_devices()
+    load_all(own)
+
+
+def _examine(folder: Path) -> None:
+    """Examine one run in a worker process, which receives only the run folder."""
+    creature, config = open_run(folder)
+    experiment, store = build_experiment(creature, config), Checkpoints(folder, config.keep_every)
+    try:
+        state = store.restore(experiment.abstract(), creature.digest)
+    finally:
+        store.close()
+    quiet = Screen(Console(file=io.StringIO()))
+    examiner = Examiner(
+        experiment, versions(), quiet.say, Exams(folder / EXAMS), tryout_of(experiment)
+    )
+    conclude(folder, creature, quiet, examiner.best(state))

@@ -3,25 +3,74 @@
 import dataclasses
 import threading
 from collections.abc import Callable, Sequence
+from concurrent.futures import Future
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from mjxgait.certification import (
-    Certificate,
-    Glance,
-    certify,
-    glance,
-    rehearse,
-)
+from mjxgait.certification import Certificate, Glance, certify, glance, rehearse
+from mjxgait.certification.acceptance import demands_of, promising
 from mjxgait.certification.stress import Stress, stress
-from mjxgait.certification.tasks import demands_of, promising
 from mjxgait.champion import Champion
 from mjxgait.config.schema import Config, ExaminationConfig
+from mjxgait.config.tables import STORED, Flag, Index, Text
 from mjxgait.evolution.state import EvolutionState
-from mjxgait.training.disk import disk_errors
-from mjxgait.training.exams import Exams
 from mjxgait.training.experiment import Experiment
+from mjxgait.training.folder import read_records, write_lines
 from mjxgait.training.prescreen import Tryout
+from mjxgait.training.stored import disk_errors
+
+
+@dataclasses.dataclass(frozen=True)
+class _Exam:
+    """Schema of a line."""
+
+    __pydantic_config__ = STORED
+    generation: Index
+    champion: Text
+    passed: Flag
+
+
+@dataclasses.dataclass(frozen=True)
+class Exams:
+    """Append-only file with a line for each champion that a run has examined.
+
+    Examining a champion again gives the same result, so it counts once: a run that is resumed from
+    an earlier checkpoint and repeats its examinations makes no more attempts.
+    """
+
+    path: Path
+
+    def failed(self, champion: str, generation: int) -> bool:
+        """Return whether the champion of this fingerprint has failed up to this generation."""
+        failures = (line for line in self._lines() if not line["passed"])
+        return any(
+            line["champion"] == champion and line["generation"] <= generation for line in failures
+        )
+
+    def taken(self, generation: int) -> int:
+        """Return the number of examinations up to this generation."""
+        return len(self._until(generation))
+
+    def attempt(self, champion: str, generation: int) -> int:
+        """Return the attempt number that this champion has or would have, counted from 1."""
+        before = self._until(generation)
+        return before.index(champion) + 1 if champion in before else len(before) + 1
+
+    def add(self, champion: str, generation: int, passed: bool) -> None:
+        """Record an examination, once for each champion."""
+        if champion in (line["champion"] for line in self._lines()):
+            return
+        line = {"generation": generation, "champion": champion, "passed": passed}
+        write_lines(self.path, [*self._lines(), line])
+
+    def _until(self, generation: int) -> list[str]:
+        lines = sorted(self._lines(), key=lambda line: line["generation"])
+        return [line["champion"] for line in lines if line["generation"] <= generation]
+
+    def _lines(self) -> list[dict[str, Any]]:
+        return read_records(self.path, _Exam)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -233,3 +282,54 @@ def _promising(experiment: Experiment, state: EvolutionState, rank: int) -> bool
     outcome = dict(zip(names, np.asarray(state.outcome[rank]).T, strict=True))
     demands = demands_of(config.use.task, config.wish)
     return promising(demands, outcome, config.rollout.seconds, experiment.creature)
+
+
+class Looks:
+    """Asynchronous validations of one run, one at a time.
+
+    The result is the same as if evolution had waited: a certified individual ends the run in the
+    validated generation, and later generations are discarded.
+    """
+
+    def __init__(self, examiner: Examiner) -> None:
+        self._examiner = examiner
+        self._seen: Future[Examined | None] | None = None
+        self._state: EvolutionState | None = None
+
+    def due(self, state: EvolutionState) -> bool:
+        """Return whether validation of this generation is due and has not begun."""
+        settings = self._examiner.experiment.config.examination
+        return state is not self._state and due(settings, int(state.generation))
+
+    def begin(self, state: EvolutionState) -> None:
+        """Start a validation if it is due; all earlier results must have been `found`."""
+        if not self.due(state):
+            return
+        self._state, self._seen = state, Future()
+        self._examiner.examines.clear()
+        # Two programs that use all devices would block each other, so pre-screening waits here.
+        if self._examiner.tryout is not None:
+            self._look(self._seen, state)
+            return
+        # A daemon thread: a second Ctrl-C does not wait for it.
+        threading.Thread(target=self._look, args=(self._seen, state), daemon=True).start()
+
+    def found(self, wait: bool) -> tuple[Examined, EvolutionState] | None:
+        """Return the certified individual and the state of its generation, once known; else None.
+
+        Args:
+          wait: wait for the result. During an examination it waits anyway: evolution would compete
+            for its cores, and its generations would be discarded if the examination passes.
+        """
+        if self._seen is None or self._state is None:
+            return None
+        if not (wait or self._seen.done() or self._examiner.examines.is_set()):
+            return None
+        examined, self._seen = self._seen.result(), None
+        return None if examined is None else (examined, self._state)
+
+    def _look(self, seen: Future[Examined | None], state: EvolutionState) -> None:
+        try:
+            seen.set_result(self._examiner.early(state))
+        except BaseException as error:
+            seen.set_exception(error)

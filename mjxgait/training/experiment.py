@@ -1,9 +1,11 @@
 """Experiment and batch: one or several runs assembled from creature and config."""
 
+import collections
 import dataclasses
+import hashlib
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from functools import cached_property, partial
-from typing import Any
+from typing import Any, TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -17,14 +19,12 @@ from mjxgait.errors import UserError
 from mjxgait.evolution.chance import key_of
 from mjxgait.evolution.state import EvolutionState, GenerationMetrics
 from mjxgait.plugins import make_task
-from mjxgait.plugins.registry import what_ends
+from mjxgait.plugins.registry import find, what_ends
 from mjxgait.simulation.evaluator import Evaluator
 from mjxgait.simulation.rollout import Episodes, Simulator
 from mjxgait.tasks.starts import Starts
 from mjxgait.training.blueprint import Numbers, Plan, draw_up
-from mjxgait.training.devices import everywhere
 from mjxgait.training.generation import Row, first_state, judge
-from mjxgait.training.shape import shape_of
 from mjxgait.training.stages import (
     Stages,
     Turn,
@@ -32,10 +32,55 @@ from mjxgait.training.stages import (
     begin,
     compile_stages,
     embodied,
+    everywhere,
     lower_stages,
     lowered,
 )
 from mjxgait.types import Asked
+
+
+@dataclasses.dataclass(frozen=True)
+class Shape:
+    """Key of a run's compiled programs.
+
+    body: digest of the creature. settings: their structure; traced numbers may differ. code: the
+    controller and task classes, so that redefining a class in a notebook changes the key.
+    """
+
+    body: str
+    settings: Any
+    code: tuple[Hashable, ...]
+
+    def name(self, *more: Hashable) -> str:
+        """Return a hash of body and settings, the same in all processes; `code` is left out."""
+        return hashlib.sha256(repr((self.body, self.settings, *more)).encode()).hexdigest()[:16]
+
+
+def shape_of(creature: Creature, config: Config) -> Shape:
+    """Return the program key of a creature's run under a config."""
+    code = (find("controller", config.use.controller), find("task", config.use.task))
+    return Shape(creature.digest, jax.tree.structure(traced(config)), code)
+
+
+T = TypeVar("T")
+
+
+class Latest(collections.OrderedDict[Hashable, T]):
+    """Cache of the `count` values used last."""
+
+    def __init__(self, count: int) -> None:
+        super().__init__()
+        self._count = count
+
+    def find(self, key: Hashable, make: Callable[[], T]) -> T:
+        """Return the value of a key; make it if it is missing."""
+        if key not in self:
+            self[key] = make()
+            while len(self) > self._count:
+                self.popitem(last=False)
+        self.move_to_end(key)
+        return self[key]
+
 
 Step = Callable[[EvolutionState], tuple[EvolutionState, GenerationMetrics]]
 """A compiled generation."""

@@ -1,16 +1,21 @@
-"""Run folder: file names, creation and reading."""
+"""Run folder: file names, creation and reading.
+
+A folder may come from anywhere, so its entries are only printed; the user decides to pass them on.
+"""
 
 import dataclasses
 import json
-from collections.abc import Iterable, Mapping
+import shlex
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
 import pydantic
+import tomli_w
 
 from mjxgait.certification.check_body import check_body
 from mjxgait.champion import Champion, DamagedChampion, read_champion
-from mjxgait.config.schema import Config
+from mjxgait.config.schema import Config, UseConfig
 from mjxgait.config.tables import (
     STORED,
     Flag,
@@ -24,20 +29,60 @@ from mjxgait.config.tables import (
 from mjxgait.creature import Creature, load_creature
 from mjxgait.creature.proportions import extreme_bodies
 from mjxgait.errors import NotLoaded, UserError
-from mjxgait.files import (
-    TAKE_OUT,
-    DamagedFile,
-    read_lines,
-    write_text,
-)
+from mjxgait.evolution.state import NOBODY
+from mjxgait.files import TAKE_OUT, DamagedFile, read_lines, write_text
 from mjxgait.plugins import build_config
 from mjxgait.plugins.fit import check_fit
-from mjxgait.training.own import (
-    CONFIG,
-    command,
-    keep_places,
-    with_options,
-)
+from mjxgait.plugins.user_code import KINDS, places_of
+
+CONFIG, OWN = "config.toml", "own.toml"
+"""Files in a run folder: settings; and FILE.py:CLASS of a user-defined controller or task."""
+
+
+def keep_places(folder: Path, use: UseConfig) -> None:
+    """Write the location of the run's user-defined code; nothing if it has none."""
+    if places := places_of(use):
+        write_text(folder / OWN, tomli_w.dumps(places))
+
+
+def own_options(folder: Path) -> list[str]:
+    """Return the options that name a run's user-defined code; empty if it has none.
+
+    Without `own.toml` only the file's name is known, which refers to the current folder.
+    """
+    use, places = _table(folder / CONFIG).get("use"), _table(folder / OWN)
+    options: list[str] = []
+    for kind in KINDS:
+        name = use.get(kind) if isinstance(use, dict) else None
+        if isinstance(name, str) and ":" in name:
+            options += [f"--{kind}", _shown(places.get(kind), name)]
+    return options
+
+
+def command(*words: object, run: Path) -> str:
+    """Return a command as typed in a shell, with the options that the run needs."""
+    return shlex.join(["mjxgait", *map(str, words), *own_options(run)])
+
+
+def with_options(error: NotLoaded, folder: Path) -> NotLoaded:
+    """Return the error with the run folder and the missing options."""
+    return NotLoaded(f"{folder}: {error}", own_options(folder))
+
+
+def _table(path: Path) -> dict[str, object]:
+    try:
+        return dict(read_toml(path))
+    except UserError:
+        return {}
+
+
+def _shown(place: object, name: str) -> str:
+    """Return the shortest path from the current folder; the name if the place is not recorded."""
+    if not isinstance(place, str) or not place.isprintable():
+        return name
+    path = Path(place)
+    return str(path.relative_to(Path.cwd())) if path.is_relative_to(Path.cwd()) else place
+
 
 CREATURE, METRICS, CHAMPION = "creature", "metrics.jsonl", "champion.json"
 CERTIFICATE, STRESS, EXAMS = "certificate.json", "stress.json", "exams.jsonl"
@@ -217,3 +262,21 @@ def truncate_metrics(path: Path, generation: int) -> None:
 def write_lines(path: Path, lines: Iterable[Mapping[str, Any]]) -> None:
     """Write a file at once, with one JSON object per line."""
     write_text(path, "".join(json.dumps(line) + "\n" for line in lines))
+
+
+def mothers_line(lines: Sequence[Mapping[str, Any]], generation: int, place: int) -> dict[int, int]:
+    """Return the places of an individual's maternal ancestors by generation, latest first.
+
+    The line ends at an individual without a mother or a generation without a log line.
+    """
+    known = {line["generation"]: line[MOTHERS] for line in lines if MOTHERS in line}
+    found = {generation: place}
+    while (mother := _mother(known.get(generation, ()), place)) != NOBODY:
+        generation, place = generation - 1, mother
+        found[generation] = place
+    return found
+
+
+def _mother(places: Sequence[int], place: int) -> int:
+    """Return the place of an individual's mother; `NOBODY` if the log does not have it."""
+    return places[place] if 0 <= place < len(places) else NOBODY

@@ -14,17 +14,16 @@ import numpy as np
 
 from mjxgait.config.schema import Config
 from mjxgait.evolution.evolution import Evolution
-from mjxgait.evolution.forced import begun_anew
 from mjxgait.evolution.state import (
     NOBODY,
     EvolutionState,
     GenerationMetrics,
     Proposal,
+    begun_anew,
 )
 from mjxgait.simulation.evaluator import Local
 from mjxgait.simulation.rollout import Simulator
-from mjxgait.tasks.base import Task
-from mjxgait.tasks.score import in_order, score
+from mjxgait.tasks.base import Task, in_order, score
 from mjxgait.tasks.starts import Starts
 from mjxgait.training.blueprint import Numbers, Plan
 from mjxgait.types import Asked, Judged, pytree

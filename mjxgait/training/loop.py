@@ -26,10 +26,8 @@ from mjxgait.files import write_text
 from mjxgait.simulation.evaluator import Evaluator
 from mjxgait.tasks.base import Task
 from mjxgait.training.checkpoint import Checkpoints
-from mjxgait.training.disk import disk_errors
-from mjxgait.training.examination import Examined, Examiner, why_ended
-from mjxgait.training.exams import Exams
-from mjxgait.training.experiment import Experiment, Step, build_experiment
+from mjxgait.training.examination import Examined, Examiner, Exams, Looks, why_ended
+from mjxgait.training.experiment import Experiment, Latest, Step, build_experiment
 from mjxgait.training.folder import (
     BODY,
     CERTIFICATE,
@@ -43,11 +41,10 @@ from mjxgait.training.folder import (
     read_metrics,
     truncate_metrics,
 )
-from mjxgait.training.latest import Latest
 from mjxgait.training.prescreen import tryout_of
 from mjxgait.training.screen import Screen
 from mjxgait.training.stages import Stages
-from mjxgait.training.validation import Looks
+from mjxgait.training.stored import disk_errors
 
 
 def train(

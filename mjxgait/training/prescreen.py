@@ -14,12 +14,12 @@ import jax.numpy as jnp
 import numpy as np
 
 from mjxgait.certification import CertificateConfig
-from mjxgait.certification.tasks import Demands, demands_of
+from mjxgait.certification.acceptance import Demands, demands_of
 from mjxgait.config.schema import Config
 from mjxgait.evolution.state import EvolutionState
 from mjxgait.tasks.starts import Starts
-from mjxgait.training.devices import compiled
 from mjxgait.training.experiment import Batch, Experiment, build_experiment
+from mjxgait.training.stages import compiled
 
 OTHER = 1_000_000
 """Added to a run's seed, for other starts than those of its generations."""

@@ -12,8 +12,8 @@ from rich.status import Status
 from rich.table import Table
 
 from mjxgait.certification import Certificate
-from mjxgait.certification.likeness import in_words
-from mjxgait.certification.tasks import demands_of
+from mjxgait.certification.acceptance import demands_of
+from mjxgait.certification.describe import in_words
 from mjxgait.config.schema import Config
 from mjxgait.creature.ground.spec import FLAT
 from mjxgait.tasks.walk.target_criteria import in_the_way
@@ -23,8 +23,8 @@ from mjxgait.training.folder import (
     CREATURE,
     METRICS,
     PLOT,
+    command,
 )
-from mjxgait.training.own import command
 
 
 class Screen:

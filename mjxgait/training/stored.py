@@ -1,11 +1,23 @@
-"""Checkpoints on disk, read as NumPy arrays independently of the devices that wrote them."""
+"""Run folders on the disk: errors, the lock of the writer, and stored checkpoints.
 
+The operating system holds the lock and releases it when the process ends, even if it is killed. A
+lock file left behind therefore locks nothing. Systems without `flock`, such as Windows, have no
+lock: a live run is not detected there.
+"""
+
+import contextlib
 import dataclasses
+import errno
 import hashlib
+import json
 import math
-from collections.abc import Mapping
+import os
+import socket
+import tempfile
+import time
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 import tensorstore
@@ -13,7 +25,176 @@ import tensorstore
 from mjxgait.config.tables import Index, Text, check
 from mjxgait.errors import UserError
 from mjxgait.files import read_json
-from mjxgait.training.lock import why_empty
+
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+CLOSED = (errno.EROFS, errno.EACCES, errno.EPERM)
+GONE = (errno.ENOENT, errno.EIO, errno.ESTALE, errno.ENODEV, errno.ENXIO)
+"""The folder was removed, or the disk was pulled out or is broken."""
+CURES = (
+    dict.fromkeys(FULL, "make room")
+    | dict.fromkeys(CLOSED, "make it writable")
+    | dict.fromkeys(GONE, "bring it back")
+)
+SAFE, AGAIN = "the run is safe up to its latest checkpoint", "go on with --resume"
+
+
+@contextlib.contextmanager
+def disk_errors(path: Path, safe: str = SAFE, again: str = AGAIN) -> Iterator[None]:
+    """Turn errors of a full, read-only or lost disk into one sentence.
+
+    path: what is being written. safe: what is not lost. again: what to do with room on the disk.
+
+    Raises:
+      UserError: instead of such an error; no other error is touched.
+    """
+    try:
+        yield
+    except Exception as error:
+        code = refusal(error)
+        if code is None:
+            raise
+        reason = f"{os.strerror(code)}; {safe}: {CURES[code]} and {again}"
+        raise UserError(f"{path}: cannot be written: {reason}") from error
+
+
+def require_writable(path: Path) -> None:
+    """Check before long work that a file can be written; leaves nothing behind.
+
+    Raises:
+      UserError: names the file, or the folder that is missing.
+    """
+    if not path.absolute().parent.is_dir():
+        raise UserError(f"{path}: the folder {path.parent} does not exist")
+    there = path.exists()
+    try:
+        path.open("ab").close()
+        if not there:
+            path.unlink()
+    except OSError as error:
+        raise UserError(f"{path}: cannot be written ({error.strerror})") from None
+
+
+def refusal(error: BaseException) -> int | None:
+    """Return the error number of a failed write; None for any other error.
+
+    TensorStore, which Orbax uses, puts its message into the text of a ValueError.
+    """
+    if isinstance(error, OSError):
+        return error.errno if error.errno in CURES else None
+    if isinstance(error, ValueError):
+        return next((code for code in CURES if os.strerror(code) in str(error)), None)
+    return None
+
+
+def try_room(folder: Path, size: int) -> None:
+    """Write a temporary file of this size in bytes.
+
+    Raises:
+      OSError: the disk refuses.
+    """
+    with tempfile.TemporaryFile(dir=folder) as scratch:
+        scratch.write(bytes(size))
+
+
+try:
+    import fcntl
+except ImportError:  # pragma: no cover
+    fcntl = None  # type: ignore[assignment]
+
+LOCK = "running.lock"
+"""File in a folder that is being written; it names the process and is removed with it."""
+TRIES, PAUSE = 5, 0.1
+"""Number of attempts, and s between them: a process that only reads holds the lock briefly."""
+
+
+@contextlib.contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Lock a folder for this process within the block.
+
+    Raises:
+      UserError: another process holds the lock, or the folder cannot be written.
+    """
+    file = _acquired(folder)
+    try:
+        yield
+    finally:
+        with contextlib.suppress(OSError):  # the folder may be gone
+            (folder / LOCK).unlink()
+        file.close()
+
+
+def running(run: Path) -> str | None:
+    """Return a description of the process that writes a run now; None if none does.
+
+    A folder of several runs is locked as a whole.
+    """
+    return next(
+        filter(None, (_holder(folder / LOCK) for folder in (run, run.resolve().parent))), None
+    )
+
+
+def why_empty(run: Path) -> str:
+    """Return why a run has no results yet."""
+    if who := running(run):
+        return f"it runs now ({who}) and has not done its first generation"
+    return "the run ended before its first generation was done"
+
+
+def _acquired(folder: Path) -> BinaryIO:
+    """Return the lock's file, open and locked."""
+    path, own = folder / LOCK, {"pid": os.getpid(), "host": socket.gethostname()}
+    for _ in range(TRIES):
+        with disk_errors(folder):
+            file = path.open("a+b")
+        if not _try(file):
+            file.close()
+            time.sleep(PAUSE)
+        elif not _same(file, path):  # its holder has just ended and removed it
+            file.close()
+        else:
+            with disk_errors(folder):
+                file.truncate(0)
+                file.write(json.dumps(own).encode())
+                file.flush()
+            return file
+    who = _holder(path) or "another process"
+    raise UserError(f"{folder}: {who} works on it now; wait until that has ended, or end it first")
+
+
+def _try(file: BinaryIO, shared: bool = False) -> bool:
+    """Lock an open file; return False if another process holds it. Without `flock` return True."""
+    if fcntl is None:
+        return True
+    try:
+        fcntl.flock(file, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:  # a file system without locks
+        return True
+    return True
+
+
+def _same(file: BinaryIO, path: Path) -> bool:
+    """Return whether the path still leads to this open file."""
+    try:
+        return os.path.samestat(os.fstat(file.fileno()), path.stat())
+    except FileNotFoundError:
+        return False
+
+
+def _holder(path: Path) -> str | None:
+    """Return a description of the process that holds a lock; None if none does."""
+    try:
+        with path.open("rb") as file:
+            if _try(file, shared=True):
+                return None
+            said = json.loads(file.read() or "{}")
+        return f"process {int(said['pid'])} on {said['host']}"
+    except OSError:
+        return None
+    except (ValueError, KeyError, TypeError):
+        return "another process"
+
 
 SCHEMA = 2
 FOLDER = "checkpoints"

@@ -2,15 +2,17 @@
 
 import base64
 import html
+import json
 import math
 import string
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from importlib import resources
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 from mjxgait import files
-from mjxgait.animation.export import WalkLoop, build_glb, walk_loop
+from mjxgait.animation.export import WalkLoop, build_driven, build_glb, walk_loop
 from mjxgait.certification import (
     Verdict,
     criteria_of,
@@ -22,19 +24,11 @@ from mjxgait.certification import (
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
-from mjxgait.rendering.cast import LOOP_SECONDS
-from mjxgait.rendering.curves import draw_fitness
-from mjxgait.rendering.doubt import doubt
+from mjxgait.rendering.curves import Figures, draw_fitness, figure
 from mjxgait.rendering.gaitplots import gait_figures
-from mjxgait.rendering.style import Figures, figure
-from mjxgait.rendering.walk import Walk, record_walk
-from mjxgait.training.folder import (
-    CERTIFICATE,
-    METRICS,
-    STRESS,
-    open_champion,
-    read_metrics,
-)
+from mjxgait.rendering.video import LOOP_SECONDS
+from mjxgait.rendering.walk import Walk, doubt, record_walk
+from mjxgait.training.folder import CERTIFICATE, METRICS, STRESS, open_champion, read_metrics
 
 RATE = 30
 CHECK = (
@@ -55,11 +49,11 @@ def write_page(run: Path, out: Path) -> str:
     creature, champion = open_champion(run)
     walk = record_walk(creature, champion, LOOP_SECONDS)
     page = build_page(walk, walk_loop(walk, RATE), _sections(run, creature, champion, walk))
-    write_text(out, page)
+    save_page(out, page)
     return doubt(run, walk)
 
 
-def write_text(out: Path, page: str) -> None:
+def save_page(out: Path, page: str) -> None:
     """Write a page.
 
     Raises:
@@ -216,3 +210,36 @@ def _is_number(text: str) -> bool:
 
 def _show(value: float) -> str:
     return "none" if math.isnan(value) else f"{value:.3g}"
+
+
+DRIVE_FAR = 3.2
+"""Camera distance in units of the creature's size."""
+KEPT = ("name", "speed", "turn", "duration")
+
+
+def driven_page(
+    loops: Mapping[str, WalkLoop], clips: Sequence[Mapping[str, Any]], of: int, blends: str
+) -> str:
+    """Return the text of the page.
+
+    Args:
+      loops: of one creature, by name; the first stands.
+      clips: for each its name, `speed` in m/s, `turn` in deg/s and `duration` in s.
+      of: number of walks requested.
+      blends: physical validity of the blends, in words.
+    """
+    creature = next(iter(loops.values())).walk.creature
+    glb, apart = build_driven(loops)
+    page = resources.files("mjxgait.web") / "assets" / "drive.html"
+    return string.Template(page.read_text(encoding="utf-8")).substitute(
+        title=html.escape(creature.name.replace("_", " ")),
+        walks=len(clips) - 1,
+        of=of,
+        blends=html.escape(blends),
+        clips=json.dumps([{key: clip[key] for key in KEPT} for clip in clips]),
+        apart=apart,
+        glb=base64.b64encode(glb).decode("ascii"),
+        target=f"0m {0.6 * creature.frame.stand_pos[2]:.3f}m 0m",
+        far=f"{DRIVE_FAR * creature.model.stat.extent:.3f}m",
+        viewer=viewer_script(),
+    )

@@ -3,9 +3,9 @@
 A file of its own, since the processes that judge read it anew.
 """
 
-from mjxgait.experiments.ablation import measures
+from mjxgait.experiments.ablation import rows
 
-measures.SECONDS = 2.0
+rows.SECONDS = 2.0
 
 if __name__ == "__main__":
     from mjxgait.cli import main

@@ -5,9 +5,9 @@ import dataclasses
 import numpy as np
 from helpers import pose_champion
 
-from mjxgait.config.shipped import find_creature
+from mjxgait.config.layers import find_creature
 from mjxgait.creature import load_creature
-from mjxgait.experiments.ablation.measures import walked
+from mjxgait.experiments.ablation.rows import walked
 
 
 def test_who_stands_is_up_where_it_must_walk_and_not_where_it_has_a_goal():

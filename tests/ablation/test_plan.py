@@ -6,8 +6,7 @@ from pathlib import Path
 import pytest
 from helpers import STOOL
 
-from mjxgait.config.layers import resolve_config
-from mjxgait.config.shipped import data_folder
+from mjxgait.config.layers import data_folder, resolve_config
 from mjxgait.config.tables import build
 from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import UserError

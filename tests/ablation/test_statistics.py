@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from mjxgait.experiments.ablation import statistics
-from mjxgait.experiments.ablation.statistics import (
+from mjxgait.experiments.ablation import findings
+from mjxgait.experiments.ablation.findings import (
     Estimate,
     compare,
     estimate,
@@ -28,7 +28,7 @@ def test_the_interquartile_mean_is_the_mean_of_the_middle_half():
 @pytest.fixture
 def fewer_resamples(monkeypatch: pytest.MonkeyPatch) -> None:
     """For studies by the hundred: whatever their number, an error is as frequent as is said."""
-    monkeypatch.setattr(statistics, "RESAMPLES", 999)
+    monkeypatch.setattr(findings, "RESAMPLES", 999)
 
 
 def test_the_interval_covers_the_truth_as_often_as_it_says(fewer_resamples: None):

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from viewing.made_up import treading
 
-from mjxgait.animation.clips.read_bvh import POSITION, read_bvh, rig_of_bvh
+from mjxgait.animation.clips.read_text import POSITION, read_bvh, rig_of_bvh
 from mjxgait.animation.export import WalkLoop, build_bvh, walk_loop
 from mjxgait.animation.export.skeleton import gltf_axes
 from mjxgait.animation.keys import bring
 from mjxgait.cli import main
-from mjxgait.config.shipped import find_creature
+from mjxgait.config.layers import find_creature
 from mjxgait.creature import Creature, load_creature
 from mjxgait.rendering.walk import record_walk
 

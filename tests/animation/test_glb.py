@@ -13,9 +13,8 @@ import pytest
 from viewing.made_up import treading
 
 from mjxgait.animation.export import RATES, build_glb, walk_loop
-from mjxgait.animation.export.limbs import ALONG
 from mjxgait.animation.export.skeleton import gltf_axes, resting
-from mjxgait.animation.export.surface import geom_surface
+from mjxgait.animation.export.surface import ALONG, geom_surface
 from mjxgait.cli import main
 from mjxgait.errors import UserError
 from mjxgait.rendering.walk import record_walk

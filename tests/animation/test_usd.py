@@ -8,8 +8,8 @@ import pytest
 from viewing.made_up import treading
 
 from mjxgait.animation.export import walk_loop
-from mjxgait.animation.export.pieces import pieces_of
 from mjxgait.animation.export.skeleton import gltf_axes, skeleton_of
+from mjxgait.animation.export.surface import pieces_of
 from mjxgait.animation.export.usd import export_usd
 from mjxgait.errors import UserError
 from mjxgait.rendering.walk import record_walk

@@ -15,14 +15,14 @@ import pytest
 from helpers import STOOL, pose_champion, small_config
 
 from mjxgait.bench import contest
-from mjxgait.bench.flops import count_flops
+from mjxgait.bench.machine import count_flops
 from mjxgait.bench.mujoco_peer import DampedSolve, Law, MujocoPeer
 from mjxgait.bench.ours import as_workload
 from mjxgait.bench.scaling import draw
 from mjxgait.bench.workload import Lap, Workload, walking
 from mjxgait.cli import bench
+from mjxgait.config.layers import data_folder, find_creature
 from mjxgait.config.schema import Config
-from mjxgait.config.shipped import data_folder, find_creature
 from mjxgait.controllers.key_poses.reference import READS, PoseTwin
 from mjxgait.creature import load_creature
 from mjxgait.errors import UserError

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from mjxgait.bench import c_peer, contest
-from mjxgait.bench.bare import bare_model
 from mjxgait.bench.c_peer import (
     COMPILERS,
     CPeer,
@@ -16,9 +15,9 @@ from mjxgait.bench.c_peer import (
     build,
 )
 from mjxgait.bench.mujoco_peer import MujocoPeer
-from mjxgait.bench.workload import Workload
+from mjxgait.bench.workload import Workload, bare_model
+from mjxgait.config.layers import find_creature
 from mjxgait.config.schema import Config
-from mjxgait.config.shipped import find_creature
 from mjxgait.creature import load_creature
 
 TUNING = {

@@ -8,13 +8,13 @@ from blocks.made_up import genome_of, one
 
 from mjxgait.controllers.sims_brain.genotype import Capacity, Ranges, random_graph
 from mjxgait.controllers.sims_brain.phenotype import Body, body_of
-from mjxgait.controllers.sims_brain.reference_body.folder import body_files
-from mjxgait.controllers.sims_brain.reference_body.parts import Part, grow
+from mjxgait.controllers.sims_brain.reference_body import Part, grow
+from mjxgait.controllers.sims_brain.reference_files import body_files
 from mjxgait.creature.scale import load_files
 from mjxgait.evolution.chance import key_of
 from mjxgait.physics.batched_trees.plant import TreePlant
 from mjxgait.physics.batched_trees.tree import Surroundings
-from mjxgait.reference.overlap import overlaps
+from mjxgait.reference.sight import overlaps
 from mjxgait.types import BodyState
 
 CAPACITY, COUNT = Capacity(), 80

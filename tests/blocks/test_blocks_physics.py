@@ -18,8 +18,8 @@ from mjxgait.controllers.sims_brain.genotype import (
     random_graph,
 )
 from mjxgait.controllers.sims_brain.phenotype import Body, body_of
-from mjxgait.controllers.sims_brain.reference_body.parts import grow
-from mjxgait.controllers.sims_brain.reference_body.xml import body_xml
+from mjxgait.controllers.sims_brain.reference_body import grow
+from mjxgait.controllers.sims_brain.reference_files import body_xml
 from mjxgait.creature.geometry import DOWN, geom_reach, lowest
 from mjxgait.evolution.chance import key_of
 from mjxgait.physics.batched_trees.plant import TreePlant

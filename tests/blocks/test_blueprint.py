@@ -11,14 +11,13 @@ from mjxgait.cli.train import train_command
 from mjxgait.config.schema import Config
 from mjxgait.controllers.sims_brain.config import BrainConfig
 from mjxgait.controllers.sims_brain.controller import Brains
-from mjxgait.controllers.sims_brain.reference_body.material import DRAG, GRAVITY
+from mjxgait.controllers.sims_brain.reference_body import DRAG, GRAVITY
 from mjxgait.creature import Creature
-from mjxgait.creature.step import at_step
+from mjxgait.creature.scale import at_step
 from mjxgait.errors import UserError
 from mjxgait.kinds import controller_kind, register
 from mjxgait.physics.batched_trees.tree import Surroundings
-from mjxgait.plugins.registry import find
-from mjxgait.plugins.settings import build_config, resolve_config
+from mjxgait.plugins.registry import build_config, find, resolve_config
 from mjxgait.simulation.rollout import Simulator
 from mjxgait.tasks.modular.config import RoamConfig
 from mjxgait.training.blueprint import draw_up

@@ -8,20 +8,22 @@ import numpy as np
 import pytest
 from blocks.made_up import one
 
-from mjxgait.controllers.sims_brain.genotype import Capacity, Graph, Ranges
-from mjxgait.controllers.sims_brain.nerves import NerveRoom, random_centre, random_nerves
-from mjxgait.controllers.sims_brain.neurons import fired
+from mjxgait.controllers.sims_brain.brain import Brain, Perceived, blank, fired, thought, wired
+from mjxgait.controllers.sims_brain.genotype import (
+    Capacity,
+    Graph,
+    NerveRoom,
+    Ranges,
+    random_centre,
+    random_nerves,
+)
 from mjxgait.controllers.sims_brain.operators import Genotype, Kin
 from mjxgait.controllers.sims_brain.phenotype import Body, body_of
 from mjxgait.controllers.sims_brain.reference import BrainTwin, fire
-from mjxgait.controllers.sims_brain.reference_body.material import NEURONS
-from mjxgait.controllers.sims_brain.reference_body.parts import grow
-from mjxgait.controllers.sims_brain.thought import Perceived, blank, thought
-from mjxgait.controllers.sims_brain.wiring import Brain, wired
+from mjxgait.controllers.sims_brain.reference_body import NEURONS, grow
 from mjxgait.evolution.chance import key_of
-from mjxgait.rendering.brain import draw_brain, shape
-from mjxgait.rendering.network import READS, kind_of, network_of
-from mjxgait.rendering.style import figure
+from mjxgait.rendering.brain import READS, draw_brain, kind_of, network_of, shape
+from mjxgait.rendering.curves import figure
 from mjxgait.training.experiment import arrays_of
 
 CAPACITY, ROOM, COUNT, STEP = Capacity(), NerveRoom(), 200, 0.01

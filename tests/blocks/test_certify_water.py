@@ -11,7 +11,7 @@ from mjxgait.controllers.sims_brain.phenotype import body_of
 from mjxgait.evolution.chance import key_of
 from mjxgait.physics.batched_trees.plant import TreePlant
 from mjxgait.physics.batched_trees.tree import Surroundings
-from mjxgait.reference.water import Water
+from mjxgait.reference.bodies import Water
 
 
 @pytest.fixture(scope="module")

@@ -7,12 +7,12 @@ import pytest
 from blocks.made_up import genome_of, one
 
 from mjxgait.controllers.sims_brain.genotype import Capacity, Ranges, random_graph
-from mjxgait.controllers.sims_brain.reference_body.folder import body_files
-from mjxgait.controllers.sims_brain.reference_body.parts import grow
+from mjxgait.controllers.sims_brain.reference_body import grow
+from mjxgait.controllers.sims_brain.reference_files import body_files
 from mjxgait.creature.scale import load_files
 from mjxgait.errors import UserError
 from mjxgait.evolution.chance import key_of
-from mjxgait.reference.overlap import overlaps
+from mjxgait.reference.sight import overlaps
 
 CAPACITY, COUNT = Capacity(), 60
 

@@ -13,16 +13,15 @@ from blocks.made_up import one
 from mjxgait.config.evolution import EvolutionConfig
 from mjxgait.controllers.sims_brain.config import BrainConfig
 from mjxgait.controllers.sims_brain.controller import Brains
-from mjxgait.controllers.sims_brain.genotype import Capacity, Ranges
+from mjxgait.controllers.sims_brain.genotype import Capacity, NerveRoom, Ranges
 from mjxgait.controllers.sims_brain.growth import grown
-from mjxgait.controllers.sims_brain.nerves import NerveRoom
 from mjxgait.controllers.sims_brain.operators import (
     Genotype,
     Kin,
     Rates,
     reachable,
 )
-from mjxgait.controllers.sims_brain.reference_body.material import JOINTS, NEURONS
+from mjxgait.controllers.sims_brain.reference_body import JOINTS, NEURONS
 from mjxgait.evolution.chance import key_of
 
 CAPACITY, ROOM, RANGES, COUNT = Capacity(), NerveRoom(), Ranges(), 2000

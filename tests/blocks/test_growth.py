@@ -21,12 +21,11 @@ from mjxgait.controllers.sims_brain.genotype import (
 from mjxgait.controllers.sims_brain.growth import Parts, grown
 from mjxgait.controllers.sims_brain.operators import Genotype
 from mjxgait.controllers.sims_brain.phenotype import Body, body_of
-from mjxgait.controllers.sims_brain.reference_body.material import JOINTS, ROOM
-from mjxgait.controllers.sims_brain.reference_body.parts import grow
-from mjxgait.controllers.sims_brain.reference_body.xml import body_xml
+from mjxgait.controllers.sims_brain.reference_body import JOINTS, ROOM, grow
+from mjxgait.controllers.sims_brain.reference_files import body_xml
 from mjxgait.evolution.chance import key_of
 from mjxgait.tasks.starts import Starts
-from mjxgait.training.growth import GraphGrowth
+from mjxgait.training.blueprint import GraphGrowth
 
 CAPACITY, COUNT = Capacity(), 1000
 CREATE = jax.jit(jax.vmap(lambda key: random_graph(key, CAPACITY, Ranges())))

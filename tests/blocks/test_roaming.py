@@ -11,24 +11,23 @@ import pytest
 from blocks.made_up import CALM
 
 from mjxgait.api import load_creature
+from mjxgait.certification.acceptance import demands_of, promising
 from mjxgait.certification.config import CertificateConfig
-from mjxgait.certification.simulate import simulate
-from mjxgait.certification.tasks import demands_of, promising
-from mjxgait.config.rollout import RolloutConfig
-from mjxgait.controllers.sims_brain.reference_body.material import LIGHT
+from mjxgait.certification.trials import simulate
+from mjxgait.config.schema import RolloutConfig
+from mjxgait.controllers.sims_brain.reference_body import LIGHT
 from mjxgait.creature import Creature
 from mjxgait.evolution.chance import key_of
 from mjxgait.evolution.state import EvolutionState
-from mjxgait.plugins.settings import build_config
+from mjxgait.plugins.registry import build_config
 from mjxgait.reference.bodies import VELOCITY_STAGE
-from mjxgait.reference.grown import seen_grown
 from mjxgait.reference.outcome import Outcome
+from mjxgait.reference.sight import seen_grown
 from mjxgait.reference.starts import nominal_starts
 from mjxgait.reference.stepping import Stepping
 from mjxgait.tasks.modular.config import JumpConfig, RoamConfig
 from mjxgait.tasks.modular.follow import Following, FollowInWater, FollowOnLand
-from mjxgait.tasks.modular.jump import SPANS, Jump
-from mjxgait.tasks.modular.roam import Roam
+from mjxgait.tasks.modular.task import SPANS, Jump, Roam
 from mjxgait.training.experiment import Experiment, build_experiment
 
 TABLE = {

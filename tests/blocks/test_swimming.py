@@ -11,21 +11,19 @@ import pytest
 from blocks.made_up import CALM
 
 from mjxgait.api import load_creature
-from mjxgait.certification.simulate import simulate
+from mjxgait.certification.trials import simulate
 from mjxgait.champion import read_champion, write_champion
-from mjxgait.controllers.sims_brain.reference_body.material import DRAG
-from mjxgait.controllers.sims_brain.reference_body.parts import grow
+from mjxgait.controllers.sims_brain.reference_body import DRAG, grow
 from mjxgait.evolution.state import EvolutionState
 from mjxgait.inspect.snapshot import read_snapshot
-from mjxgait.plugins.settings import build_config
-from mjxgait.reference.grown import seen_grown
+from mjxgait.plugins.registry import build_config
+from mjxgait.reference.sight import seen_grown
 from mjxgait.reference.starts import nominal_starts
-from mjxgait.rendering.grown import bodies_of, draw_bodies, draw_graph
-from mjxgait.rendering.style import figure
+from mjxgait.rendering.curves import figure
+from mjxgait.rendering.genomes import bodies_of, draw_bodies, draw_graph
 from mjxgait.rendering.walk import record_walk
 from mjxgait.tasks.modular.config import SwimConfig
-from mjxgait.tasks.modular.swim import Swim
-from mjxgait.tasks.modular.task import FASTEST_HINGE, FURTHEST
+from mjxgait.tasks.modular.task import FASTEST_HINGE, FURTHEST, Swim
 from mjxgait.training.checkpoint import Checkpoints
 from mjxgait.training.experiment import Experiment, Step, build_experiment
 from mjxgait.training.folder import METRICS, create_run

@@ -8,13 +8,7 @@ import numpy as np
 import pytest
 from certify_made_up import DOG, make_champion, walk
 
-from mjxgait.certification import (
-    CertificateConfig,
-    certify,
-    draws,
-    glance,
-    rehearse,
-)
+from mjxgait.certification import CertificateConfig, certify, glance, rehearse, trials
 from mjxgait.certification.describe import (
     cost_of_transport,
     describe,
@@ -87,25 +81,25 @@ def test_the_file_is_strict_json_with_value_threshold_and_verdict(certificate):
 def test_every_champion_is_examined_on_a_draw_of_its_own(tiny, trotter):
     config, other = CertificateConfig(), make_champion(tiny)
     mine, again, others, common = (
-        draws.starts(tiny, config, draw, 8).joint_offset
+        trials.starts(tiny, config, draw, 8).joint_offset
         for draw in (
-            draws.own(trotter, config),
-            draws.own(dataclasses.replace(trotter, fitness=3.0, origin={"seed": 4}), config),
-            draws.own(other, config),
-            draws.common(config),
+            trials.own(trotter, config),
+            trials.own(dataclasses.replace(trotter, fitness=3.0, origin={"seed": 4}), config),
+            trials.own(other, config),
+            trials.common(config),
         )
     )
     np.testing.assert_array_equal(mine, again)
     for draw in (others, common):
         assert not np.isin(mine, draw).any()
     reseeded = dataclasses.replace(config, seed=1)
-    for draw in (draws.own(trotter, reseeded), draws.common(reseeded)):
-        assert not np.isin(draws.pushes(tiny, config, draw, 8).push_time, common).any()
-        assert not np.isin(draws.starts(tiny, config, draw, 8).joint_offset, (mine, common)).any()
+    for draw in (trials.own(trotter, reseeded), trials.common(reseeded)):
+        assert not np.isin(trials.pushes(tiny, config, draw, 8).push_time, common).any()
+        assert not np.isin(trials.starts(tiny, config, draw, 8).joint_offset, (mine, common)).any()
 
 
 def test_the_starts_are_disturbed_in_every_way_that_the_settings_name(tiny):
-    starts = draws.starts(tiny, CertificateConfig(), draws.Draw((0,)), 16)
+    starts = trials.starts(tiny, CertificateConfig(), trials.Draw((0,)), 16)
     plain = nominal_starts(tiny, 16)
     changed = {
         field.name

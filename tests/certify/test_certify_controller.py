@@ -9,11 +9,11 @@ from certify_made_up import make_champion
 from helpers import altered
 
 from mjxgait.controllers.key_poses.reference import READS, PoseTwin, pose_cycle
-from mjxgait.reference.drive import Drive
 from mjxgait.reference.layout import start_frame
 from mjxgait.reference.state import (
     ADDED,
     SENSES,
+    Drive,
     State,
     sense,
 )

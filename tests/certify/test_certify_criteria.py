@@ -8,9 +8,8 @@ from certify_made_up import DOG, walk
 
 from mjxgait.certification import CertificateConfig, criteria, describe
 from mjxgait.certification.certificate import half_point
-from mjxgait.certification.criteria import Measure
-from mjxgait.certification.obstacle import obstacle
-from mjxgait.reference import strides
+from mjxgait.certification.criteria import Measure, obstacle
+from mjxgait.reference import measure
 from mjxgait.tasks.walk import criteria as demands
 
 CONFIG = CertificateConfig()
@@ -140,8 +139,8 @@ def aimless():
 def unsteady():
     good = walk()
     # alternately long and short strides; the joints keep their own steady time
-    strides = [np.arange(n) / n for _ in range(14) for n in (190, 130)]
-    phase = np.concatenate(strides)[:4400, None] + np.full(4, 0.5)
+    measure = [np.arange(n) / n for _ in range(14) for n in (190, 130)]
+    phase = np.concatenate(measure)[:4400, None] + np.full(4, 0.5)
     return changed(good, foot_height=0.05 * np.sin(2 * np.pi * phase))
 
 
@@ -323,21 +322,21 @@ def test_margin_is_one_at_best_and_zero_at_the_threshold():
 def test_strides_are_footfalls_whatever_the_joints_do():
     assert {3, 7} <= failures(hidden_vibrator())
     hidden, window = hidden_vibrator().window(2.0), walk().window(2.0)
-    assert strides.stride_frequency(window, 0.03) == pytest.approx(1 / 0.8, rel=0.01)
-    assert strides.stride_frequency(hidden, 0.03) == pytest.approx(6 / 0.8, rel=0.02)
+    assert measure.stride_frequency(window, 0.03) == pytest.approx(1 / 0.8, rel=0.01)
+    assert measure.stride_frequency(hidden, 0.03) == pytest.approx(6 / 0.8, rel=0.02)
 
 
 def test_strides_are_those_of_the_steadiest_foot():
     good = walk().window(2.0)
-    assert set(np.diff(strides.stride_starts(good))) == {160}
+    assert set(np.diff(measure.stride_starts(good))) == {160}
     scuffing = good.foot_height.copy()
     # One foot comes down in between in every other stride, another is late now and then.
     moment = np.arange(4000) % 320
     scuffing[:, 0] = np.where((moment >= 25) & (moment < 35), 0.0, scuffing[:, 0])
     scuffing[:, 1] = np.roll(scuffing[:, 1], 30) * (np.arange(4000) > 1500)
-    falls = strides.footfalls(scuffing[:, 0], strides.SWING * good.dimensions.hip_height)
+    falls = measure.footfalls(scuffing[:, 0], measure.SWING * good.dimensions.hip_height)
     assert len(set(np.diff(falls))) > 1
-    found = strides.stride_starts(changed(good, foot_height=scuffing))
+    found = measure.stride_starts(changed(good, foot_height=scuffing))
     assert set(np.diff(found)) == {160}
 
 
@@ -345,7 +344,7 @@ def test_a_foot_that_moves_once_tells_no_strides():
     good = walk().window(2.0)
     height = good.foot_height.copy()
     height[:, 0] = np.where(np.isin(np.arange(4000), [500, 2500]), 0.1, 0.0)
-    assert set(np.diff(strides.stride_starts(changed(good, foot_height=height)))) == {160}
+    assert set(np.diff(measure.stride_starts(changed(good, foot_height=height)))) == {160}
 
 
 def test_slip_is_summed_over_the_stance_only():

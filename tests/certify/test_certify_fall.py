@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from certify_made_up import make_champion
 
-from mjxgait.certification.simulate import simulate
+from mjxgait.certification.trials import simulate
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 from mjxgait.reference.outcome import Fall

@@ -7,7 +7,7 @@ from certify_made_up import make_champion
 
 from mjxgait.certification.certificate import record
 from mjxgait.certification.config import CertificateConfig
-from mjxgait.certification.simulate import simulate
+from mjxgait.certification.trials import simulate
 from mjxgait.certification.worlds import slippery
 from mjxgait.reference.layout import LowestPoint
 from mjxgait.reference.measure import measure

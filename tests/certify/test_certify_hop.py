@@ -8,22 +8,16 @@ import numpy as np
 import pytest
 from certify_made_up import DOG, make_champion, walk
 
-from mjxgait.certification import (
-    CertificateConfig,
-    draws,
-    rehearse,
-)
-from mjxgait.certification import (
-    trial_run as rehearsal,
-)
-from mjxgait.certification.simulate import simulate
-from mjxgait.certification.tasks import demands_of, promising
+from mjxgait.certification import CertificateConfig, rehearse, trials
+from mjxgait.certification import trials as rehearsal
+from mjxgait.certification.acceptance import demands_of, promising
+from mjxgait.certification.trials import simulate
 from mjxgait.champion import Champion
-from mjxgait.config.rollout import RolloutConfig
+from mjxgait.config.schema import RolloutConfig
 from mjxgait.creature import Creature
 from mjxgait.evolution.chance import key_of
 from mjxgait.reference.measure import Recording
-from mjxgait.reference.outcome import Outcome, Trajectory
+from mjxgait.reference.outcome import Outcome, Trajectory, Watch
 from mjxgait.reference.starts import (
     Starts,
     join,
@@ -31,7 +25,6 @@ from mjxgait.reference.starts import (
     perturbed_starts,
     pushed_starts,
 )
-from mjxgait.reference.watch import Watch
 from mjxgait.tasks.hop import config as evolution
 from mjxgait.tasks.hop.criteria import HopDemands
 from mjxgait.tasks.hop.task import Hop
@@ -307,19 +300,19 @@ def test_who_is_worth_an_examination(tiny: Creature, off: list, seconds: list, w
 # Goals
 
 
-def goals(creature: Creature, draw: draws.Draw) -> np.ndarray:
+def goals(creature: Creature, draw: trials.Draw) -> np.ndarray:
     starts = nominal_starts(creature, 64)
-    return DEMANDS.aimed(starts, CONFIG, draw.generator(draws.AIMS)).goal
+    return DEMANDS.aimed(starts, CONFIG, draw.generator(trials.AIMS)).goal
 
 
 def test_nobody_knows_the_goals_of_the_examination(tiny: Creature, trotter: Champion):
     """Not evolution, and not who has seen the goals by which champions are chosen."""
     task = Hop(tiny, STEP, 1000, tiny.settings.termination)
     trials = task.trials(key_of(0), tiny, RolloutConfig(starts=64)).goal[1:]
-    mine = goals(tiny, draws.own(trotter, CONFIG))
+    mine = goals(tiny, trials.own(trotter, CONFIG))
     assert len(set(mine.tolist())) == 64
-    np.testing.assert_array_equal(mine, goals(tiny, draws.own(trotter, CONFIG)))
-    for known in (trials, goals(tiny, draws.common(CONFIG)), [CONFIG.hop.nominal]):
+    np.testing.assert_array_equal(mine, goals(tiny, trials.own(trotter, CONFIG)))
+    for known in (trials, goals(tiny, trials.common(CONFIG)), [CONFIG.hop.nominal]):
         assert not np.isin(mine.astype(np.float32), np.float32(known)).any()
     low, high = CONFIG.hop.goals
     assert low <= mine.min() < low + 0.2

@@ -9,8 +9,7 @@ from mjxgait.certification import record
 from mjxgait.certification.certificate import recordings
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
-from mjxgait.reference.batch import batch_of
-from mjxgait.reference.starts import Starts, nominal_starts
+from mjxgait.reference.starts import Starts, batch_of, nominal_starts
 from mjxgait.reference.stepping import examined_model
 
 

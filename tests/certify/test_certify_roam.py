@@ -13,11 +13,10 @@ from mjxgait.api import load_creature
 from mjxgait.certification import CertificateConfig, outdated
 from mjxgait.certification.certificate import schema_of
 from mjxgait.creature.geometry import lowest
-from mjxgait.reference.grown import Grown, seen_grown
 from mjxgait.reference.measure import Recording
 from mjxgait.reference.outcome import Outcome, Trajectory
-from mjxgait.tasks.modular.jump_criteria import JumpDemands
-from mjxgait.tasks.modular.roam_criteria import RoamDemands
+from mjxgait.reference.sight import Grown, seen_grown
+from mjxgait.tasks.modular.criteria import JumpDemands, RoamDemands
 
 CONFIG, DEMANDS = CertificateConfig(), RoamDemands()
 FRAMES, STEP, SPEED = 2200, 0.01, 0.4

@@ -17,10 +17,9 @@ from mjxgait.certification import (
     record,
     survival,
 )
-from mjxgait.certification.simulate import simulate
+from mjxgait.certification.trials import simulate
 from mjxgait.controllers.key_poses.reference import PoseTwin
 from mjxgait.errors import UserError
-from mjxgait.reference.drive import Drive
 from mjxgait.reference.layout import start_frame
 from mjxgait.reference.measure import measure
 from mjxgait.reference.outcome import Fall
@@ -31,7 +30,7 @@ from mjxgait.reference.starts import (
     pushed_starts,
     unfamiliar,
 )
-from mjxgait.reference.state import State, sense
+from mjxgait.reference.state import Drive, State, sense
 from mjxgait.reference.stepping import examined_model
 
 SECONDS = 1.5

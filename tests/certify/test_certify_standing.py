@@ -17,7 +17,7 @@ from mjxgait.certification import (
     outdated,
     read_certificate,
 )
-from mjxgait.certification.verify import differences
+from mjxgait.certification.validity import differences
 from mjxgait.champion import read_champion, write_champion
 from mjxgait.config.tables import build
 from mjxgait.errors import UserError

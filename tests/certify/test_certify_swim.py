@@ -10,12 +10,12 @@ from certify_made_up import walk
 
 from mjxgait.api import load_creature
 from mjxgait.certification import CertificateConfig
-from mjxgait.reference.grown import Grown, seen_grown
+from mjxgait.reference.bodies import Water
 from mjxgait.reference.measure import Recording
 from mjxgait.reference.outcome import Outcome, Trajectory
-from mjxgait.reference.water import Water
+from mjxgait.reference.sight import Grown, seen_grown
+from mjxgait.tasks.modular.criteria import SwimDemands
 from mjxgait.tasks.modular.follow_criteria import FollowDemands
-from mjxgait.tasks.modular.swim_criteria import SwimDemands
 
 CONFIG, DEMANDS = CertificateConfig(), SwimDemands()
 FRAMES, STEP, MASS, SPEED = 2200, 0.01, 10.0, 0.4

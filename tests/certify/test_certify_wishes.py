@@ -8,8 +8,8 @@ from certify_made_up import DOG, make_champion, walk
 from test_certify_measures import failed
 
 from mjxgait.certification import CertificateConfig
-from mjxgait.certification.simulate import simulate
-from mjxgait.certification.tasks import demands_of
+from mjxgait.certification.acceptance import demands_of
+from mjxgait.certification.trials import simulate
 from mjxgait.reference.measure import Recording
 from mjxgait.reference.outcome import Outcome, Trajectory
 from mjxgait.reference.starts import nominal_starts

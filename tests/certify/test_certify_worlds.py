@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from certify_made_up import make_champion
 
-from mjxgait.certification.simulate import simulate
+from mjxgait.certification.trials import simulate
 from mjxgait.certification.worlds import slippery, sloping
 from mjxgait.reference.outcome import Fall
 from mjxgait.reference.starts import perturbed_starts

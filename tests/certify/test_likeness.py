@@ -9,14 +9,14 @@ from certify_made_up import DOG, make_champion, walk
 from helpers import small_config
 from test_certify_wishes import CONFIG, missed
 
-from mjxgait.certification.likeness import in_words, likeness
-from mjxgait.certification.simulate import simulate
-from mjxgait.certification.tasks import demands_of
+from mjxgait.certification.acceptance import demands_of
+from mjxgait.certification.describe import in_words, likeness
+from mjxgait.certification.trials import simulate
 from mjxgait.creature import Creature
 from mjxgait.reference.measure import Recording, measure
 from mjxgait.reference.outcome import Outcome
 from mjxgait.reference.starts import nominal_starts
-from mjxgait.tasks.walk import target_terms as evolution
+from mjxgait.tasks.walk import fitness as evolution
 from mjxgait.tasks.walk.config import LIKENESS
 from mjxgait.tasks.walk.gaits import animal_duty, animal_stride
 from mjxgait.tasks.walk.task import Walk

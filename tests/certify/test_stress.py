@@ -15,8 +15,7 @@ from mjxgait.certification.stress import (
     stress,
 )
 from mjxgait.errors import UserError
-from mjxgait.rendering.stressplot import draw_stress
-from mjxgait.rendering.style import figure
+from mjxgait.rendering.curves import draw_stress, figure
 
 SHORT = StressConfig(starts=4, seconds=0.6, long=1.2)
 NAMES = [

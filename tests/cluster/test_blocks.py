@@ -6,12 +6,10 @@ import pytest
 from helpers import small_config
 
 from mjxgait.creature import Creature
-from mjxgait.distributed.chunks import Blocks, block_size
 from mjxgait.distributed.jobs import AdvanceRows
-from mjxgait.distributed.local import Here
-from mjxgait.distributed.programs import Programs
-from mjxgait.distributed.recipe import Recipe
-from mjxgait.distributed.scheduler import Crew
+from mjxgait.distributed.recipe import Programs, Recipe
+from mjxgait.distributed.rows import Blocks, block_size
+from mjxgait.distributed.scheduler import Crew, Here
 from mjxgait.errors import UserError
 from mjxgait.training.experiment import build_experiment
 

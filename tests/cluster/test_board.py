@@ -5,9 +5,8 @@ import io
 import pytest
 from rich.console import Console
 
-from mjxgait.distributed.dashboard import Board, table
-from mjxgait.distributed.local import Here
-from mjxgait.distributed.scheduler import Crew, Worker
+from mjxgait.distributed.evolve import Board, table
+from mjxgait.distributed.scheduler import Crew, Here, Worker
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from helpers import STOOL
 
-from mjxgait.config.shipped import install_command
+from mjxgait.config.layers import install_command
 from mjxgait.distributed.connect import connected
 from mjxgait.errors import UserError
 

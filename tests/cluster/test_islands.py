@@ -13,10 +13,9 @@ import mjxgait
 from mjxgait.champion import read_champion
 from mjxgait.creature import Creature
 from mjxgait.distributed import islands
-from mjxgait.distributed.local import Here
-from mjxgait.distributed.programs import Programs
-from mjxgait.distributed.scheduler import Crew
-from mjxgait.inspect.islands import island_facts
+from mjxgait.distributed.recipe import Programs
+from mjxgait.distributed.scheduler import Crew, Here
+from mjxgait.inspect.sections import island_facts
 from mjxgait.training.folder import Numbered, create_run, read_metrics, read_records
 from mjxgait.training.screen import Screen
 from mjxgait.training.stored import stored_generations

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from mjxgait.config.islands import IslandsConfig
-from mjxgait.distributed.migration import exchanged, gathered, together
-from mjxgait.training.packed import Packed
+from mjxgait.config.evolution import IslandsConfig
+from mjxgait.distributed.islands import exchanged, gathered, together
+from mjxgait.training.checkpoint import Packed
 
 
 def island(*fitness: float) -> Packed:

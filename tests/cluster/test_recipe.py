@@ -7,12 +7,7 @@ import pytest
 from helpers import small_config
 
 from mjxgait.creature import Creature
-from mjxgait.distributed.nodes import (
-    Machine,
-    mismatch,
-    require_same,
-    this,
-)
+from mjxgait.distributed.connect import Machine, mismatch, require_same, this
 from mjxgait.distributed.recipe import OwnPart, Recipe
 from mjxgait.errors import UserError
 from mjxgait.plugins.registry import find

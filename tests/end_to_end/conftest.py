@@ -16,15 +16,15 @@ import pytest
 from end_to_end.unevolved import Unevolved, unevolved
 from end_to_end.walks import SHORTER
 
-import mjxgait.cores
+import mjxgait.processes
 from mjxgait.certification import CertificateConfig
 from mjxgait.certification.stress import StressConfig
 from mjxgait.cli import main
 from mjxgait.config.tables import build
-from mjxgait.distributed import dashboard as board
-from mjxgait.distributed.local import Here
-from mjxgait.distributed.programs import Programs
-from mjxgait.experiments.ablation import measures
+from mjxgait.distributed import evolve as board
+from mjxgait.distributed.recipe import Programs
+from mjxgait.distributed.scheduler import Here
+from mjxgait.experiments.ablation import rows
 from mjxgait.training import loop
 
 COMPILED, CERTIFICATE = loop._compiled, CertificateConfig.__init__
@@ -37,9 +37,9 @@ def short(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """The code of an examination is as shipped; its defaults are few starts and short times."""
     _default(monkeypatch, CertificateConfig, build(CertificateConfig, SHORTER, "short"))
     _default(monkeypatch, StressConfig, StressConfig(starts=4, seconds=1.0, long=2.0))
-    monkeypatch.setattr(measures, "SECONDS", 0.5)
-    monkeypatch.setattr(measures, "STARTS", 2)
-    for module in (mjxgait.cores, measures):
+    monkeypatch.setattr(rows, "SECONDS", 0.5)
+    monkeypatch.setattr(rows, "STARTS", 2)
+    for module in (mjxgait.processes, rows):
         monkeypatch.setattr(module, "process_per_core", _one_thread)
     monkeypatch.setattr(subprocess, "run", _run_here(subprocess.run))
     monkeypatch.chdir(tmp_path)

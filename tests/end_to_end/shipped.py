@@ -11,11 +11,10 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
-from mjxgait.config.layers import over_base
+from mjxgait.config.layers import data_folder, over_base, shipped_configs, shipped_creatures
 from mjxgait.config.schema import UseConfig
-from mjxgait.config.shipped import data_folder, shipped_configs, shipped_creatures
 from mjxgait.creature import Creature, load_creature
-from mjxgait.creature.step import at_step
+from mjxgait.creature.scale import at_step
 from mjxgait.errors import UserError
 from mjxgait.kinds import tasks
 from mjxgait.plugins import resolve_config

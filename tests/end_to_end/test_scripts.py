@@ -22,9 +22,7 @@ from mjxgait.training import (
     loop,
     stages,
 )
-from mjxgait.training import (
-    validation as looks,
-)
+from mjxgait.training import examination as looks
 
 BLENDER = "needs Blender as a module of Python"
 RAY = "needs Ray; tests/cluster/test_ray.py runs what it measures, where Ray is installed"

@@ -8,7 +8,7 @@ import tomli_w
 from end_to_end.shipped import STUDIES, creature_of
 from helpers import STOOL, said_by
 
-from mjxgait.config.shipped import data_folder
+from mjxgait.config.layers import data_folder
 from mjxgait.config.tables import merge
 from mjxgait.experiments.ablation.plan import Study
 

@@ -12,15 +12,13 @@ import numpy as np
 
 from mjxgait.champion import Champion
 from mjxgait.distributed.jobs import Advanced, AdvanceRows
-from mjxgait.distributed.local import Here
-from mjxgait.distributed.programs import Programs
-from mjxgait.distributed.recipe import Recipe
-from mjxgait.distributed.scheduler import Report
+from mjxgait.distributed.recipe import Programs, Recipe
+from mjxgait.distributed.scheduler import Here, Report
 from mjxgait.errors import UserError
 from mjxgait.evolution.state import EvolutionState, GenerationMetrics
 from mjxgait.simulation.evaluator import Evaluator
+from mjxgait.training.checkpoint import pack
 from mjxgait.training.experiment import Experiment
-from mjxgait.training.packed import pack
 
 Step = Callable[[EvolutionState], tuple[EvolutionState, GenerationMetrics]]
 

@@ -9,7 +9,7 @@ import pytest
 from helpers import small_config
 
 from mjxgait.creature import Creature
-from mjxgait.creature.frame import start_place
+from mjxgait.creature.creature import start_place
 from mjxgait.creature.ground.surface import (
     Ground,
     contact,

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 import numpy as np
 import pygltflib as gltf
 
-from mjxgait.animation.export.buffer import Buffer
+from mjxgait.animation.export.gltf import Buffer
 
 Bone = tuple[str, tuple[float, float, float], tuple[float, float, float] | None]
 """Parent, place, and end of what has no bone below it; cm, Y up, forward +Z, left +X."""

@@ -5,7 +5,7 @@ import dataclasses
 import pytest
 
 from mjxgait.creature import Creature
-from mjxgait.importer.hold import Held, hold
+from mjxgait.importer.balance import Held, hold
 
 
 def held(stool: Creature, without: str = "") -> Held:

@@ -12,13 +12,12 @@ import pytest
 from helpers import altered, pose_champion
 from importing.models import BIPED, QUADRUPED, ROLLING
 
-from mjxgait.certification.simulate import simulate
+from mjxgait.certification.trials import simulate
 from mjxgait.champion import Champion
 from mjxgait.cli import main
 from mjxgait.cli.import_ import write_folder
 from mjxgait.cli.train import _layers
-from mjxgait.config.layers import resolve_config
-from mjxgait.config.shipped import find_creature
+from mjxgait.config.layers import find_creature, resolve_config
 from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import UserError
 from mjxgait.importer import ImportChoices, Imported, import_model

@@ -19,11 +19,11 @@ from mjxgait.errors import UserError
 from mjxgait.importer import ImportChoices, import_model
 from mjxgait.importer.convert import Imported
 from mjxgait.importer.portrait import standing
+from mjxgait.physics.derived import sense_layout
 from mjxgait.physics.lane_major import UnsupportedModel, fast_plant
-from mjxgait.physics.lane_major.difference import difference
-from mjxgait.physics.lane_major.support import check_supported
+from mjxgait.physics.lane_major.model import check_supported
+from mjxgait.physics.lane_major.padded import difference
 from mjxgait.physics.lane_major.topology import Topology
-from mjxgait.physics.layout import sense_layout
 
 REFUSED = {
     "r2d2": "wheel",

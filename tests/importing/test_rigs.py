@@ -13,17 +13,15 @@ from importing.rigs import DOG, Bone, bvh, glb, stated_longer
 from scipy.spatial.transform import Rotation
 
 from mjxgait.animation.clips.clip import Clip
-from mjxgait.animation.clips.read_bvh import read_bvh, rig_of_bvh
-from mjxgait.animation.keys.axes import axes_of
-from mjxgait.animation.keys.retarget import retarget
+from mjxgait.animation.clips.read_text import read_bvh, rig_of_bvh
+from mjxgait.animation.keys.retarget import axes_of, retarget
 from mjxgait.cli.import_ import import_command
 from mjxgait.creature import Creature
 from mjxgait.creature.scale import load_files
 from mjxgait.errors import UserError
 from mjxgait.importer import ImportChoices, Imported, import_model
-from mjxgait.importer.hinges import Hinge, hinges_of
-from mjxgait.importer.notes import Notes
-from mjxgait.importer.plan import Plan
+from mjxgait.importer.parts import Notes
+from mjxgait.importer.rig import Hinge, Plan, hinges_of
 from mjxgait.importer.rigged import model_of
 
 FEET = ["LeftHand", "RightHand", "LeftHindPaw", "RightHindPaw"]

@@ -10,8 +10,8 @@ from inspection.made_up import FORCED, LAST, POPULATION, make_state
 
 from mjxgait.champion import write_champion
 from mjxgait.config.evolution import EvolutionConfig
+from mjxgait.config.layers import find_creature
 from mjxgait.config.schema import Config
-from mjxgait.config.shipped import find_creature
 from mjxgait.controllers.key_poses.controller import TUNING
 from mjxgait.creature import load_creature
 from mjxgait.training.checkpoint import Checkpoints

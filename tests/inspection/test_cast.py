@@ -4,7 +4,7 @@ import pytest
 from inspection.made_up import POPULATION
 
 from mjxgait.errors import UserError
-from mjxgait.rendering.cast import champion_of, through_generations, top_of
+from mjxgait.rendering.video import champion_of, through_generations, top_of
 
 
 def test_the_best_of_the_population(finished_run):

@@ -28,7 +28,7 @@ from mjxgait.inspect import (
     text,
 )
 from mjxgait.training.folder import CERTIFICATE, CHAMPION, STRESS
-from mjxgait.training.lock import locked
+from mjxgait.training.stored import locked
 
 
 def tell(capsys, *arguments):
@@ -118,7 +118,7 @@ def test_an_examination_again_ends_with_zero_only_if_all_is_equal(run, capsys, m
     fingerprint = read_champion(run / CHAMPION, read_snapshot(run).creature).fingerprint
     again = made_up_certificate(fingerprint)
     found = SimpleNamespace(document=lambda: again)
-    monkeypatch.setattr("mjxgait.api.look.certify", lambda *_: found)
+    monkeypatch.setattr("mjxgait.api.make.certify", lambda *_: found)
     assert "not there" in said_by(capsys, "inspect", run, "--verify", code=2)
     (run / CERTIFICATE).write_text(json.dumps(again))
     assert "every measure is that" in said_by(capsys, "inspect", run, "--verify", code=0)

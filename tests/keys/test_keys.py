@@ -14,10 +14,9 @@ from mjxgait.animation.clips.clip import NOTE
 from mjxgait.animation.export import WalkLoop, build_glb, export_glb
 from mjxgait.animation.keys import bring
 from mjxgait.animation.keys.bring import Brought
-from mjxgait.animation.keys.cycle import find_cycle
-from mjxgait.animation.keys.fit import fit_poses
-from mjxgait.animation.keys.match import matched
-from mjxgait.config.shipped import find_creature
+from mjxgait.animation.keys.cycle import find_cycle, fit_poses
+from mjxgait.animation.keys.retarget import matched
+from mjxgait.config.layers import find_creature
 from mjxgait.controllers.key_poses.config import TUNING
 from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import UserError

@@ -13,13 +13,15 @@ from PIL import Image
 from viewing.made_up import treading
 
 import mjxgait
-from mjxgait.animation.keys import Brought, bring, front
-from mjxgait.animation.keys.departure import _feet_in_words, departure, departure_of
-from mjxgait.animation.keys.own import Own
+from mjxgait.animation.keys import Brought, bring, refine
+from mjxgait.animation.keys.cycle import Own
 from mjxgait.animation.keys.refine import (
     KEYS,
     Original,
+    _feet_in_words,
     begin,
+    departure,
+    departure_of,
     read_original,
     refining,
 )
@@ -208,18 +210,18 @@ def test_several_that_keep_more_or_less_are_one_picture(
     out = tmp_path / "all"
     for keep in (0.0, 1.0):
         config = refining(small_config(), brought, keep)
-        begin(front.folder_of(out, keep), stool, config, Path("x.csv"), brought)
-    monkeypatch.setattr(front, "LOOP_SECONDS", 2.0)
-    faithful, free = front.runs_in(out)
+        begin(refine.folder_of(out, keep), stool, config, Path("x.csv"), brought)
+    monkeypatch.setattr(refine, "LOOP_SECONDS", 2.0)
+    faithful, free = refine.runs_in(out)
     with pytest.raises(UserError, match="has no certificate yet"):
-        front.draw(out)
+        refine.draw(out)
     ended(faithful, stool, 0.25, passed=False)
     ended(free, stool, 0.75, passed=True)
-    found = {run: front.look(run) for run in front.runs_in(out)}
+    found = {run: refine.look(run) for run in refine.runs_in(out)}
     told = [(one.keep, one.departs, one.stays, one.certified) for one in found.values()]
     assert told[0] == (1.0, 0.0, 0.25, False)
     assert told[1] == (0.0, pytest.approx(15.0, abs=0.01), 0.75, True)
-    monkeypatch.setattr(front, "look", found.get)
+    monkeypatch.setattr(refine, "look", found.get)
     assert "Side by side" in said(capsys, "--resume", out, code=0)
     picture = np.asarray(Image.open(out / "front.png"))
     assert picture.std() > 10

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from many_bodies import XML, compiled, layout_of, moments, one_in_c, stacked, varied
 
-from mjxgait.config.shipped import find_creature
+from mjxgait.config.layers import find_creature
 from mjxgait.creature import load_creature
 from mjxgait.physics import heavier_model
+from mjxgait.physics.derived import sense_layout
 from mjxgait.physics.lane_major import fast_plant
-from mjxgait.physics.layout import sense_layout
 from mjxgait.types import BodyState, Plant
 
 

@@ -10,8 +10,8 @@ import mujoco
 import numpy as np
 import pytest
 
+from mjxgait.physics.derived import SenseLayout
 from mjxgait.physics.lane_major import FastPlant, fast_plant
-from mjxgait.physics.layout import SenseLayout
 from mjxgait.physics.mjx import mjx_plant
 from mjxgait.types import BodyState
 

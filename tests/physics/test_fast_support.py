@@ -7,9 +7,9 @@ import mujoco
 import numpy as np
 import pytest
 
+from mjxgait.physics.derived import SenseLayout
 from mjxgait.physics.lane_major import UnsupportedModel, fast_plant
 from mjxgait.physics.lane_major.lanes import sin_cos
-from mjxgait.physics.layout import SenseLayout
 
 FLAG = '<flag eulerdamp="disable"/>'
 FOOT = '<geom name="foot" type="sphere" size="0.05" pos="0 0 -0.2" contype="0" conaffinity="1"/>'

@@ -11,7 +11,7 @@ import numpy as np
 from many_bodies import SLIM
 
 from mjxgait.creature import Creature
-from mjxgait.creature.frame import start_place
+from mjxgait.creature.creature import start_place
 from mjxgait.creature.ground.surface import lay_ground, named_draws
 from mjxgait.physics import make_plant
 from mjxgait.reference.stepping import examined_model

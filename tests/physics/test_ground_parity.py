@@ -17,8 +17,8 @@ from physics.test_fast_parity import LANES, SLIM, XML, _states
 
 from mjxgait.creature.ground.spec import Place, parse_ground
 from mjxgait.creature.ground.surface import lay_ground, named_draws
+from mjxgait.physics.derived import SenseLayout
 from mjxgait.physics.lane_major import fast_plant
-from mjxgait.physics.layout import SenseLayout
 from mjxgait.physics.mjx import mjx_plant
 from mjxgait.reference.layout import StartFrame
 from mjxgait.reference.terrain import Terrain

@@ -23,12 +23,11 @@ from mjxgait.creature.overlap import (
     neighbours,
     pair_depths,
 )
+from mjxgait.physics.derived import sense_layout
 from mjxgait.physics.lane_major import fast_plant
-from mjxgait.physics.layout import sense_layout
 from mjxgait.physics.mjx import mjx_plant
 from mjxgait.simulation.rollout import CHECK_EVERY, Lane, Simulator
-from mjxgait.tasks.falls import Reason
-from mjxgait.tasks.overlap import DEEP, TOUCHING
+from mjxgait.tasks.base import DEEP, TOUCHING, Reason
 from mjxgait.tasks.walk.config import WalkConfig
 from mjxgait.tasks.walk.fitness import fitness_terms
 from mjxgait.tasks.walk.stats import Judge, Tally
@@ -170,7 +169,7 @@ def test_the_pairs_are_the_same_each_time_and_no_neighbours(shipped: Creature):
 
 
 def test_the_crabs_claws_are_seen_by_its_front_legs():
-    from mjxgait.config.shipped import find_creature
+    from mjxgait.config.layers import find_creature
 
     crab = load_creature(find_creature("crab"))
     qpos = crab.stand_qpos.copy()

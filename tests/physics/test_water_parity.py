@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from many_bodies import SLIM, XML
 
+from mjxgait.physics.derived import SenseLayout
 from mjxgait.physics.lane_major import fast_plant
-from mjxgait.physics.layout import SenseLayout
 from mjxgait.types import BodyState
 
 FLOOR = '<geom name="floor" type="plane" size="0 0 1" contype="1" friction="0.8" margin="0.002"/>'

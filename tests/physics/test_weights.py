@@ -13,8 +13,8 @@ from many_bodies import XML, layout_of, stacked, varied
 
 from mjxgait.creature import Creature
 from mjxgait.physics import heavier_model
+from mjxgait.physics.derived import sense_layout
 from mjxgait.physics.lane_major import fast_plant
-from mjxgait.physics.layout import sense_layout
 from mjxgait.physics.mjx import mjx_plant
 from mjxgait.types import Plant
 

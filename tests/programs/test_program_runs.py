@@ -13,11 +13,11 @@ import pytest
 from helpers import SHORT, STOOL, said_by
 
 import mjxgait
-from mjxgait.certification.simulate import simulate
+from mjxgait.certification.trials import simulate
 from mjxgait.champion import codec_of, read_champion
 from mjxgait.controllers.expressions.config import ProgramConfig
+from mjxgait.controllers.expressions.operators import Trees
 from mjxgait.controllers.expressions.text import EMPTY
-from mjxgait.controllers.expressions.trees import Trees
 from mjxgait.inspect import facts, read_snapshot
 from mjxgait.reference.starts import nominal_starts
 from mjxgait.rendering.plots import plot_run

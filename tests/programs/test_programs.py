@@ -14,17 +14,20 @@ import pytest
 from deap import gp
 
 from mjxgait.controllers.expressions.config import FUNCTIONS, ProgramConfig
-from mjxgait.controllers.expressions.evaluate import evaluator, listed
-from mjxgait.controllers.expressions.grow import Words, half_and_half
+from mjxgait.controllers.expressions.controller import evaluator, listed
 from mjxgait.controllers.expressions.operators import (
+    Trees,
+    Words,
     crossed,
+    depths,
+    half_and_half,
     mutated,
     program_variation,
     spliced,
+    subtree_sizes,
 )
 from mjxgait.controllers.expressions.parse import to_arrays
 from mjxgait.controllers.expressions.reference import read, value_of
-from mjxgait.controllers.expressions.simplify import simplified
 from mjxgait.controllers.expressions.text import (
     ARITY,
     CONSTANT,
@@ -34,9 +37,9 @@ from mjxgait.controllers.expressions.text import (
     Terminal,
     in_text,
     nested,
+    simplified,
     to_text,
 )
-from mjxgait.controllers.expressions.trees import Trees, depths, subtree_sizes
 from mjxgait.errors import UserError
 from mjxgait.evolution.chance import key_of
 

@@ -10,7 +10,7 @@ import pytest
 from helpers import SHORT, STOOL, said_by
 
 import mjxgait
-from mjxgait.config.shipped import find_creature
+from mjxgait.config.layers import find_creature
 from mjxgait.controllers.expressions.parse import Vocabulary, read_programs
 from mjxgait.controllers.expressions.serialize import program_text
 from mjxgait.controllers.expressions.text import EMPTY, terminals
@@ -19,7 +19,7 @@ from mjxgait.creature import Creature, load_creature
 from mjxgait.errors import UserError
 from mjxgait.inspect import read_snapshot
 from mjxgait.plugins import resolve_config
-from mjxgait.plugins.settings import build_config
+from mjxgait.plugins.registry import build_config
 from mjxgait.training.experiment import build_experiment
 from mjxgait.training.folder import METRICS, read_metrics
 

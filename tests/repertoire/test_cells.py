@@ -8,16 +8,17 @@ from helpers import small_config
 from mjxgait.config.traced import traced
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
-from mjxgait.experiments.repertoire.cells import (
+from mjxgait.experiments.repertoire.grid import (
     POSES,
+    Cell,
+    Grid,
     check,
     mirror_image,
     mirrored,
     planted,
     settings_of,
 )
-from mjxgait.experiments.repertoire.grid import Cell, Grid
-from mjxgait.training.packed import Packed
+from mjxgait.training.checkpoint import Packed
 
 STRAIGHT, LEFT = Cell(0.4, 0.0), Cell(0.4, 15.0)
 GRID = Grid.of([0.4, 0.8], [15.0])

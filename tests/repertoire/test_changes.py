@@ -8,18 +8,18 @@ import pytest
 from repertoire.made_up import CERTIFIED, begin, examine
 from viewing.made_up import falling, treading
 
-from mjxgait.certification.simulate import simulate
+from mjxgait.certification.trials import simulate
 from mjxgait.champion import Champion
 from mjxgait.creature import Creature
-from mjxgait.experiments.repertoire.changes import (
+from mjxgait.experiments.repertoire.found import Found
+from mjxgait.experiments.repertoire.neighbours import (
     MOMENTS,
     SECONDS,
     changes,
     succeeds,
     told_headings,
 )
-from mjxgait.experiments.repertoire.found import Found
-from mjxgait.reference.controllers.changing import ChangingTwin
+from mjxgait.reference.changing import ChangingTwin
 from mjxgait.reference.outcome import Trajectory
 from mjxgait.reference.starts import nominal_starts
 from mjxgait.rendering.walk import record_walk

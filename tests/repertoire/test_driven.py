@@ -11,7 +11,7 @@ from helpers import said_by
 from repertoire.made_up import begin, examine
 from viewing.browser import drawn, wait_until, watched_tab
 
-from mjxgait.experiments.repertoire.share import write_driven
+from mjxgait.experiments.repertoire.clips import write_driven
 from mjxgait.training.folder import CERTIFICATE
 
 

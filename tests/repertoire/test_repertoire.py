@@ -17,10 +17,8 @@ from viewing.made_up import treading
 
 from mjxgait.creature import Creature
 from mjxgait.distributed.scheduler import Crew
-from mjxgait.experiments.repertoire.blends import half_way
-from mjxgait.experiments.repertoire.cells import POSES, mirrored
-from mjxgait.experiments.repertoire.evolve import evolve
-from mjxgait.experiments.repertoire.grid import Cell, Grid
+from mjxgait.experiments.repertoire.grid import POSES, Cell, Grid, evolve, mirrored
+from mjxgait.experiments.repertoire.neighbours import half_way
 from mjxgait.training.folder import METRICS, read_metrics
 from mjxgait.training.stored import read_stored, stored_generations
 

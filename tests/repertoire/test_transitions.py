@@ -8,11 +8,9 @@ import pytest
 from viewing.made_up import falling, treading
 
 from mjxgait.animation.export import WalkLoop, build_clips, stride_in_phase
-from mjxgait.certification.simulate import simulate
+from mjxgait.certification.trials import simulate
 from mjxgait.creature import Creature
-from mjxgait.experiments.repertoire.found import Found
-from mjxgait.experiments.repertoire.grid import Cell
-from mjxgait.experiments.repertoire.transitions import (
+from mjxgait.experiments.repertoire.clips import (
     FADES,
     IDLE,
     PLACES,
@@ -22,7 +20,9 @@ from mjxgait.experiments.repertoire.transitions import (
     stop_of,
     transitions,
 )
-from mjxgait.reference.controllers.halting import HaltingTwin
+from mjxgait.experiments.repertoire.found import Found
+from mjxgait.experiments.repertoire.grid import Cell
+from mjxgait.reference.changing import HaltingTwin
 from mjxgait.reference.starts import nominal_starts
 from mjxgait.rendering.walk import Walk, record_walk
 

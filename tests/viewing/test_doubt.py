@@ -10,7 +10,7 @@ from helpers import made_up_certificate, said_by
 from viewing.made_up import falling
 
 from mjxgait.champion import write_champion
-from mjxgait.rendering.doubt import doubt
+from mjxgait.rendering.walk import doubt
 from mjxgait.training.folder import CERTIFICATE, CHAMPION
 
 

@@ -75,7 +75,7 @@ def test_it_follows_the_run(site, run, stool):
 
 
 def test_a_champion_that_falls_is_shown_falling(tmp_path):
-    from mjxgait.config.shipped import find_creature
+    from mjxgait.config.layers import find_creature
     from mjxgait.creature import load_creature
 
     creature = load_creature(find_creature("tall_quadruped"))

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from viewing.made_up import treading
 
-from mjxgait.rendering.camera import Camera
-from mjxgait.rendering.floor import band_width
+from mjxgait.rendering.floor import Camera, band_width
 from mjxgait.rendering.painter import (
     Painter,
     geom_colours,

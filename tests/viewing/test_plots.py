@@ -9,11 +9,10 @@ from PIL import Image
 from viewing.made_up import falling, metrics_line, treading, write_run
 
 from mjxgait.errors import UserError
-from mjxgait.rendering.curves import columns, draw_fitness, plot_fitness
+from mjxgait.rendering.curves import columns, draw_fitness, figure, plot_fitness
 from mjxgait.rendering.filmstrip import filmstrip
 from mjxgait.rendering.gaitplots import gait_window
 from mjxgait.rendering.plots import plot_run
-from mjxgait.rendering.style import figure
 from mjxgait.rendering.walk import record_walk
 from mjxgait.training.folder import METRICS
 
@@ -59,7 +58,7 @@ def test_a_curve_tells_of_a_middle_half_only_where_the_log_does(judged):
 
 
 def test_a_champion_that_falls_can_be_plotted(tmp_path):
-    from mjxgait.config.shipped import find_creature
+    from mjxgait.config.layers import find_creature
     from mjxgait.creature import load_creature
 
     creature = load_creature(find_creature("tall_quadruped"))

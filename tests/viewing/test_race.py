@@ -7,13 +7,11 @@ import pytest
 from viewing.made_up import treading, write_run
 
 from mjxgait.cli import main
-from mjxgait.config.shipped import find_creature
+from mjxgait.config.layers import find_creature
 from mjxgait.creature import load_creature
-from mjxgait.rendering.cast import champions_of
-from mjxgait.rendering.entrant import Entrant
 from mjxgait.rendering.gl import working_backend
-from mjxgait.rendering.stage import Stage
-from mjxgait.rendering.video import Runner, moving_pictures
+from mjxgait.rendering.stage import Entrant, Stage
+from mjxgait.rendering.video import Runner, champions_of, moving_pictures
 from mjxgait.rendering.walk import record_walk
 
 

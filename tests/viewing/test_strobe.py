@@ -8,8 +8,8 @@ from viewing.made_up import treading
 
 from mjxgait.controllers.expressions.text import Expression
 from mjxgait.creature import Creature
-from mjxgait.rendering import strobe, trees
-from mjxgait.rendering.style import figure
+from mjxgait.rendering import filmstrip, genomes
+from mjxgait.rendering.curves import figure
 from mjxgait.rendering.walk import Walk, record_walk
 
 TREE: Expression = ("ifltz", ("-", "s0", 0.25), ("*", "a0", "a1"), "t")
@@ -25,24 +25,24 @@ def sent(walk: Walk, ways: np.ndarray) -> Walk:
 
 def test_moments_are_evenly_far_apart_and_the_last_is_the_farthest(stool_walk: Walk):
     ways = np.concatenate([np.linspace(0, 1, 50) ** 2, np.linspace(1, 0.8, 20)])
-    chosen = strobe.moments(sent(stool_walk, ways))
+    chosen = filmstrip.moments(sent(stool_walk, ways))
     steps = np.diff(ways[chosen])
     assert (chosen[0], chosen[-1]) == (0, 49)
-    spacing = strobe.SPACING * stool_walk.creature.frame.body_length
+    spacing = filmstrip.SPACING * stool_walk.creature.frame.body_length
     assert abs(steps - spacing).max() < 0.2 * spacing
 
 
 def test_a_long_way_has_no_more_moments_than_a_picture_holds(stool_walk: Walk):
-    assert len(strobe.moments(sent(stool_walk, np.linspace(0, 100, 500)))) <= strobe.MOST
+    assert len(filmstrip.moments(sent(stool_walk, np.linspace(0, 100, 500)))) <= filmstrip.MOST
 
 
 def test_who_stays_where_it_is_is_seen_once(stool_walk: Walk):
-    assert strobe.moments(sent(stool_walk, np.zeros(30))).tolist() == [0]
+    assert filmstrip.moments(sent(stool_walk, np.zeros(30))).tolist() == [0]
 
 
 def test_all_of_the_way_is_in_the_picture(stool: Creature):
     walk = record_walk(stool, dataclasses.replace(treading(stool), task="hop"), 0.2)
-    short, long = (strobe.strobe(sent(walk, np.linspace(0, way, 40))) for way in (0.2, 1.5))
+    short, long = (filmstrip.strobe(sent(walk, np.linspace(0, way, 40))) for way in (0.2, 1.5))
     assert (short.height, long.width > 1.5 * short.width) == (long.height, True)
     # The same floor and the same scale: at both ends a body, in the long one between them too.
     pixels = np.asarray(long.convert("L"), int)
@@ -52,7 +52,7 @@ def test_all_of_the_way_is_in_the_picture(stool: Creature):
 
 
 def test_leaves_lie_side_by_side_and_functions_above_their_arguments():
-    nodes, leaves = trees.laid_out(TREE)
+    nodes, leaves = genomes.laid_out(TREE)
     assert (len(nodes), leaves) == (8, 5)
     at = {node.label: (node.place, node.depth, node.above) for node in nodes}
     assert at["s0"] == (0, 2, 0.5)
@@ -66,8 +66,8 @@ def test_leaves_lie_side_by_side_and_functions_above_their_arguments():
 
 def test_every_joint_has_a_tree_with_all_its_nodes():
     found = {"knee": TREE, "hip": 0.5}
-    with figure(trees.shape(found)) as drawing:
-        trees.draw_trees(drawing, found)
+    with figure(genomes.shape(found)) as drawing:
+        genomes.draw_trees(drawing, found)
         titles = [axes.get_title(loc="left") for axes in drawing.axes]
         labels = [text.get_text() for text in drawing.axes[0].texts]
     assert titles == ["knee: 8 nodes", "hip: 1 node"]
@@ -79,6 +79,6 @@ def test_a_figure_grows_with_its_trees(deep: int):
     tree: Expression = "t"
     for _ in range(deep):
         tree = ("+", tree, "t")
-    width, height = trees.shape({"knee": tree})
-    assert height == pytest.approx((deep + 2.2) * trees.LEVEL)
-    assert width == max((deep + 1) * trees.LEAF, trees.NARROWEST)
+    width, height = genomes.shape({"knee": tree})
+    assert height == pytest.approx((deep + 2.2) * genomes.LEVEL)
+    assert width == max((deep + 1) * genomes.LEAF, genomes.NARROWEST)

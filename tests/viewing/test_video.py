@@ -8,9 +8,9 @@ from PIL import Image, ImageSequence
 from viewing.made_up import falling
 
 from mjxgait.cli import main
-from mjxgait.config.shipped import find_creature, install_command
+from mjxgait.config.layers import find_creature, install_command
 from mjxgait.creature import load_creature
-from mjxgait.rendering.camera import VIEWS
+from mjxgait.rendering.floor import VIEWS
 from mjxgait.rendering.stage import Stage, smooth
 from mjxgait.rendering.video import Runner, condition, moving_pictures
 from mjxgait.rendering.walk import record_walk

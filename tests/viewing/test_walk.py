@@ -23,7 +23,7 @@ def test_targets_are_those_of_the_examiner(stool_walk):
 
 
 def test_a_walk_that_falls_ends_soon_after():
-    from mjxgait.config.shipped import find_creature
+    from mjxgait.config.layers import find_creature
     from mjxgait.creature import load_creature
 
     walk = record_walk(

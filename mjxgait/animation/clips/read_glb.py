@@ -1,6 +1,12 @@
-"""Read the animation of a GLB file: nodes, their rest, and the keys of their rotations."""
+"""Read a GLB file: its tree of nodes, its animation, and its skinned skeleton at rest.
 
-from collections.abc import Sequence
+Such files come from strangers, so every failure of the library becomes a one-sentence error.
+"""
+
+import json
+import struct
+import warnings
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,20 +16,123 @@ from scipy.spatial.transform import Rotation, Slerp
 from mjxgait.animation.clips.clip import (
     NOTE,
     Clip,
+    Rig,
     check_numbers,
     check_size,
     check_times,
-)
-from mjxgait.animation.clips.glb import (
-    DAMAGED,
-    name_of,
-    open_glb,
-    placed,
-    shares,
-    tree,
-    values,
+    read_bytes,
 )
 from mjxgait.errors import UserError
+
+MAGIC, HEAD = b"glTF", 20
+"""First bytes of a file; number of bytes before its description, which comes first."""
+MOST_PARTS = 30_000
+"""Largest number of accessors, channels and the like; the library reads them one by one."""
+TYPES = {
+    gltf.BYTE: np.int8,
+    gltf.UNSIGNED_BYTE: np.uint8,
+    gltf.SHORT: np.int16,
+    gltf.UNSIGNED_SHORT: np.uint16,
+    gltf.FLOAT: np.float32,
+}
+WIDTHS = {"SCALAR": 1, "VEC3": 3, "VEC4": 4, "MAT4": 16}
+DAMAGED = (
+    ArithmeticError,
+    AttributeError,
+    LookupError,
+    RecursionError,
+    TypeError,
+    ValueError,
+    struct.error,
+)
+"""Errors raised while reading content that does not follow its format."""
+
+
+def open_glb(path: Path) -> gltf.GLTF2:
+    """Return a file's description with its binary part.
+
+    Raises:
+      UserError: it is no GLB, is cut off, damaged, or has more bones than one creature.
+    """
+    data = read_bytes(path)
+    if len(data) < HEAD or data[:4] != MAGIC:
+        raise UserError(f"{path}: not a GLB file; export as glTF binary (.glb)")
+    if struct.unpack_from("<I", data, 8)[0] > len(data):
+        raise UserError(f"{path}: is cut off: it states more bytes than it has")
+    try:
+        _check_parts(path, data[HEAD : HEAD + struct.unpack_from("<I", data, 12)[0]])
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # about versions and parts that it does not know
+            document = gltf.GLTF2.load_from_bytes(data)
+        if any(buffer.uri for buffer in document.buffers):
+            raise UserError(f"{path}: refers to another file; export as one GLB")
+    except DAMAGED:
+        raise UserError(f"{path}: its description is damaged") from None
+    return document
+
+
+def _check_parts(path: Path, description: bytes) -> None:
+    """Refuse files that would take the library minutes."""
+    lists = json.loads(description)
+    if not isinstance(lists.get("nodes", []), list):
+        raise UserError(f"{path}: its list of nodes is damaged")
+    check_size(path, len(lists.get("nodes", [])), 2)
+    if description.count(b"{") > MOST_PARTS:
+        raise UserError(f"{path}: of more than {MOST_PARTS} parts; export one creature, one clip")
+
+
+def tree(path: Path, nodes: Sequence[gltf.Node]) -> tuple[list[int], list[int]]:
+    """Parent of each node, -1 for none, and an order with parents first."""
+    parents = [-1] * len(nodes)
+    for i, node in enumerate(nodes):
+        for child in node.children or []:
+            parents[child] = i
+    order = [i for i, parent in enumerate(parents) if parent < 0]
+    for node in order:
+        order += [child for child in nodes[node].children or [] if parents[child] == node]
+    if len(order) != len(nodes):
+        raise UserError(f"{path}: its nodes are no tree")
+    return parents, order
+
+
+def name_of(nodes: Sequence[gltf.Node], node: int) -> str:
+    """A node's name, or one made of its number."""
+    name = nodes[node].name
+    return f"node {node}" if name is None else str(name)
+
+
+def placed(node: gltf.Node) -> np.ndarray:
+    """Transform [4, 4] of a node at rest against its parent."""
+    if node.matrix:
+        return np.array(node.matrix, float).reshape(4, 4).T
+    whole = np.eye(4)
+    turned = Rotation.from_quat(np.array(node.rotation or [0, 0, 0, 1], float))
+    whole[:3, :3] = turned.as_matrix() * np.array(node.scale or [1, 1, 1], float)
+    whole[:3, 3] = np.array(node.translation or [0, 0, 0], float)
+    return whole
+
+
+def values(document: gltf.GLTF2, number: int, every: int = 1) -> np.ndarray:
+    """Stored values [n, width] of an accessor. every: take one in this many."""
+    accessor = document.accessors[number]
+    if accessor.bufferView is None or accessor.sparse:
+        raise ValueError("an accessor without plain values")
+    view, blob = document.bufferViews[accessor.bufferView], document.binary_blob() or b""
+    kind, width = np.dtype(TYPES[accessor.componentType]), WIDTHS[accessor.type]
+    start = (view.byteOffset or 0) + (accessor.byteOffset or 0)
+    stride, count = view.byteStride or width * kind.itemsize, accessor.count
+    end = start + (count - 1) * stride + width * kind.itemsize
+    if view.buffer or start < 0 or stride < 1 or count < 1 or end > len(blob):
+        raise ValueError("an accessor beyond the end of the file")
+    return np.ndarray((count, width), kind, blob, start, (stride, kind.itemsize))[::every]
+
+
+def shares(stored: np.ndarray) -> np.ndarray:
+    """Stored values as floats; whole numbers stand for -1 to 1, or 0 to 1."""
+    if stored.dtype.kind == "f":
+        return stored.astype(float)
+    return stored.astype(float) / np.iinfo(stored.dtype).max
+
 
 RATE = 60
 """Frames/s for an animation with keys at different times for different bones."""
@@ -114,3 +223,74 @@ def _sampled(at: np.ndarray, quats: np.ndarray, times: np.ndarray) -> np.ndarray
     if len(at) == 1:
         return np.tile(turns.as_matrix()[0], (len(times), 1, 1))
     return Slerp(at, turns)(np.clip(times, at[0], at[-1])).as_matrix()
+
+
+ENOUGH = 50_000
+"""Approximate number of vertices read from one mesh; of a larger mesh only every n-th."""
+
+
+def rig_of_glb(path: Path) -> Rig:
+    """Return the bones of a file's largest skin.
+
+    Raises:
+      UserError: it is no GLB, is damaged, or has no skin.
+    """
+    document = open_glb(path)
+    if not document.skins:
+        raise UserError(
+            f"{path}: has no skin, which says what its bones are; export the armature with its "
+            "mesh, or as BVH"
+        )
+    try:
+        number = max(range(len(document.skins)), key=lambda s: len(document.skins[s].joints))
+        return _rig(path, document, number)
+    except DAMAGED as error:
+        raise UserError(f"{path}: its content is damaged ({error!r})") from None
+
+
+def _rig(path: Path, document: gltf.GLTF2, number: int) -> Rig:
+    nodes = document.nodes
+    parents, order = tree(path, nodes)
+    world = np.zeros((len(nodes), 4, 4))
+    for node in order:
+        above = np.eye(4) if parents[node] < 0 else world[parents[node]]
+        world[node] = above @ placed(nodes[node])
+    skins = _skins(document, number, world)
+    joints = {int(joint) for joint in document.skins[number].joints}
+    whole = Rig(
+        tuple(name_of(nodes, node) for node in order),
+        tuple(order.index(parents[node]) if parents[node] >= 0 else -1 for node in order),
+        world[order, :3, 3],
+        (np.zeros((0, 3)),) * len(order),
+        tuple(skins.get(node, np.zeros((0, 3))) for node in order),
+        metres=1.0,
+    )
+    return whole.taken([i for i, node in enumerate(order) if node in joints])
+
+
+def _skins(document: gltf.GLTF2, number: int, world: np.ndarray) -> Mapping[int, np.ndarray]:
+    """Vertices [V, 3] that follow each joint most, placed as in the skeleton at rest."""
+    skin = document.skins[number]
+    joints = np.array(skin.joints, int)
+    bound = world[joints]
+    if skin.inverseBindMatrices is not None:
+        stored = values(document, skin.inverseBindMatrices).reshape(-1, 4, 4)
+        bound = bound @ stored.transpose(0, 2, 1)
+    points, followed = [np.zeros((0, 3))], [np.zeros(0, int)]
+    meshes = {node.mesh for node in document.nodes if node.skin == number and node.mesh is not None}
+    for primitive in (part for mesh in meshes for part in document.meshes[mesh].primitives):
+        parts = primitive.attributes
+        if parts.JOINTS_0 is None or parts.WEIGHTS_0 is None or parts.POSITION is None:
+            continue
+        every = 1 + document.accessors[parts.POSITION].count // ENOUGH
+        places, named, weights = (
+            values(document, stored, every)
+            for stored in (parts.POSITION, parts.JOINTS_0, parts.WEIGHTS_0)
+        )
+        most = shares(weights).argmax(1)
+        main = named[np.arange(len(named)), most].astype(int)
+        spots = np.concatenate([places.astype(float), np.ones((len(places), 1))], 1)
+        points.append((bound[main] @ spots[..., None])[:, :3, 0])
+        followed.append(joints[main])
+    every_point, who = np.concatenate(points), np.concatenate(followed)
+    return {int(joint): every_point[who == joint] for joint in joints}

@@ -10,11 +10,13 @@ from mjxgait.animation.export.glb import (
 from mjxgait.animation.export.loop import (
     RATES,
     WalkLoop,
+    falls_of_first_foot,
     resampled,
+    standing_still,
+    stride_in_phase,
     walk_loop,
     walk_take,
 )
-from mjxgait.animation.export.phase import falls_of_first_foot, standing_still, stride_in_phase
 from mjxgait.animation.export.usd import export_usd
 
 __all__ = [

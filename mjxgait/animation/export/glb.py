@@ -5,6 +5,7 @@ linear. Letters: `F` key frames, `B` joints of the skin (the root on the floor, 
 `V` vertices.
 """
 
+import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -12,12 +13,9 @@ import mujoco
 import numpy as np
 import pygltflib as gltf  # type: ignore[import-untyped]
 
-from mjxgait.animation.export.buffer import Buffer
-from mjxgait.animation.export.floor import add_floor, add_tiles
-from mjxgait.animation.export.limbs import along_limbs
+from mjxgait.animation.clips.clip import NOTE
+from mjxgait.animation.export.gltf import Buffer, add_floor, add_tiles
 from mjxgait.animation.export.loop import WalkLoop
-from mjxgait.animation.export.note import note_of
-from mjxgait.animation.export.pieces import Piece, linear, pieces_of
 from mjxgait.animation.export.skeleton import (
     STILL,
     Skeleton,
@@ -28,8 +26,42 @@ from mjxgait.animation.export.skeleton import (
     travel,
     world_poses,
 )
+from mjxgait.animation.export.surface import Piece, along_limbs, linear, pieces_of
+from mjxgait.champion.serializers import codec_of
 from mjxgait.errors import UserError
 from mjxgait.files import write_bytes
+
+SAMPLES = 120
+"""Samples of a cycle's motion, as many as the reader uses."""
+
+
+def note_of(loop: WalkLoop) -> dict[str, str]:
+    """The key poses of a walk and the resulting motion, as one text that editors keep."""
+    champion, creature = loop.walk.champion, loop.walk.creature
+    if champion.controller != "poses" or not loop.strides:
+        return {}
+    joints = creature.joints
+    motion = {
+        name: [round(float(v), 5) for v in _stride(loop, loop.qpos[:, place])]
+        for name, place in zip(joints.names, joints.qpos, strict=True)
+    }
+    known = codec_of("poses").document(champion.genome, champion.settings, creature)
+    document = {
+        "creature": champion.digest,
+        "advance": champion.settings.advance,
+        "motion": motion,
+    }
+    return {NOTE: json.dumps(document | known)}
+
+
+def _stride(loop: WalkLoop, angles: np.ndarray) -> np.ndarray:
+    """The first stride of angles [F], closed: the gap at its end is spread over it."""
+    share = np.linspace(0.0, 1.0, SAMPLES + 1)
+    at = share * (len(angles) - 1) / loop.strides
+    samples = np.interp(at, np.arange(len(angles)), angles)
+    closed: np.ndarray = (samples - share * (samples[-1] - samples[0]))[:-1]
+    return closed
+
 
 ROUGHNESS = 0.75
 

@@ -1,9 +1,22 @@
-"""Triangles for MuJoCo's shapes. Letters: `V` vertices, `F` triangles."""
+"""The surface of a creature as triangles, one piece per colour. Letters: `V` vertices, `F` triangles.
+
+A joint's Y axis leads to the next joint, and its X axis is the axis of the part's hinge. glTF's
+axes: Y up, forward +Z, left +X. A glTF joint has no tail; programs use the way to its child
+instead, so the last joint of a limb gets a child at its tip, the end for inverse kinematics.
+Letters: `B` joints.
+
+glTF's axes: Y up, forward +Z. Letters: `V` points, `F` triangles.
+"""
+
+import dataclasses
+from collections.abc import Mapping
 
 import mujoco
 import numpy as np
 
-from mjxgait.rendering.triangles import mesh_of
+from mjxgait.animation.export.skeleton import Skeleton, world_poses
+from mjxgait.rendering.painter import geom_colours, seen_geoms
+from mjxgait.rendering.shapes import mesh_of
 
 GEOM = mujoco.mjtGeom
 AROUND, RINGS = 20, 10
@@ -146,3 +159,142 @@ def _mesh(points: np.ndarray, faces: np.ndarray) -> Surface:
     keep = length > 1e-14
     normals = np.repeat(normals[keep] / length[keep, None], 3, axis=0)
     return corners[keep].reshape(-1, 3), normals, np.arange(3 * int(keep.sum())).reshape(-1, 3)
+
+
+TIP = "_tip"
+"""Suffix to a part's name for the joint at its end."""
+CLEAR = 0.25
+"""Share of the way to the farthest child; if the mean way is shorter, the bone keeps its axes."""
+ALONG = 0.8
+"""Cosine; an axis nearer than that to the bone is not used as its X axis."""
+LIKED = np.array([1.0, 0.01, 0.1])
+"""Side that a bone's X axis points to: left, else ahead, else up."""
+LEFT, AHEAD = np.eye(3)[0], np.eye(3)[2]
+
+
+def along_limbs(
+    model: mujoco.MjModel, skeleton: Skeleton, rest: np.ndarray, axes: np.ndarray
+) -> Skeleton:
+    """The skeleton with its bones along the limbs of a pose [nq], and with their tips.
+
+    The root keeps its axes, and so does a part with children all around it.
+    """
+    pos, rot = (each[0] for each in world_poses(model, skeleton, rest[None], axes))
+    turn, hinges = skeleton.turn.copy(), _hinges(model, rest, axes)
+    # From the world to a body's own axes.
+    back = skeleton.turn @ rot.transpose(0, 2, 1)
+    tips: dict[int, np.ndarray] = {}
+    for b in range(1, len(skeleton.names)):
+        body = skeleton.bodies[b]
+        below = [c for c, parent in enumerate(skeleton.parent) if parent == b]
+        if not below:
+            tips[b] = axes @ far_end(model, body, rest)
+        ways = pos[below] - pos[b] if below else tips[b][None]
+        way, reach = ways.mean(0), np.linalg.norm(ways, axis=1).max()
+        if np.linalg.norm(way) > CLEAR * reach:
+            turn[b] = back[b] @ _frame(way, hinges.get(body))
+    return _tipped(dataclasses.replace(skeleton, turn=turn), tips, back, axes)
+
+
+def _tipped(
+    skeleton: Skeleton, tips: Mapping[int, np.ndarray], back: np.ndarray, axes: np.ndarray
+) -> Skeleton:
+    """The skeleton with joints at its tips, which look ahead.
+
+    tips: [3] m from the joint above, by its place.
+    """
+    ahead = np.stack([LEFT, AHEAD, np.cross(LEFT, AHEAD)], 1)
+    offset = [axes.T @ back[b] @ way for b, way in tips.items()]
+    return Skeleton(
+        names=(*skeleton.names, *(skeleton.names[b] + TIP for b in tips)),
+        parent=(*skeleton.parent, *tips),
+        bodies=(*skeleton.bodies, *(skeleton.bodies[b] for b in tips)),
+        offset=np.concatenate([skeleton.offset, offset]),
+        turn=np.concatenate([skeleton.turn, back[list(tips)] @ ahead]),
+    )
+
+
+def _hinges(model: mujoco.MjModel, rest: np.ndarray, axes: np.ndarray) -> dict[int, np.ndarray]:
+    """Axis [3] of each body's last hinge: a turn about it changes only the hinge's angle."""
+    data = mujoco.MjData(model)
+    data.qpos[:] = rest
+    mujoco.mj_kinematics(model, data)
+    hinges = np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE)
+    return {int(model.jnt_bodyid[j]): axes @ data.xaxis[j] for j in hinges}
+
+
+def _frame(way: np.ndarray, hinge: np.ndarray | None) -> np.ndarray:
+    """Axes [3, 3] with Y along a way [3] and X along the hinge.
+
+    Without a usable hinge X points to the left, or ahead if the way leads to a side.
+    """
+    y = way / np.linalg.norm(way)
+    sides = [LEFT, AHEAD] if hinge is None else [hinge, LEFT, AHEAD]
+    side = next(axis for axis in sides if abs(axis @ y) < ALONG)
+    x = side - (side @ y) * y
+    x /= np.copysign(np.linalg.norm(x), x @ LIKED)
+    return np.stack([x, y, np.cross(x, y)], 1)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Piece:
+    """A surface of one colour.
+
+    name: of its material. colour: sRGB [4]. points: [V, 3] m. normals: [V, 3]. faces: [F, 3]
+    counterclockwise from outside. joints: [V] places in the skeleton.
+    """
+
+    name: str
+    colour: np.ndarray
+    points: np.ndarray
+    normals: np.ndarray
+    faces: np.ndarray
+    joints: np.ndarray
+
+
+def pieces_of(
+    model: mujoco.MjModel, skeleton: Skeleton, axes: np.ndarray, rest: np.ndarray
+) -> list[Piece]:
+    """The visible surface of the skeleton's bodies in a pose [nq]."""
+    data = mujoco.MjData(model)
+    data.qpos[:] = rest
+    mujoco.mj_kinematics(model, data)
+    colours = geom_colours(model)
+    geoms = [int(g) for g in seen_geoms(model) if int(model.geom_bodyid[g]) in skeleton.bodies]
+    return [
+        _piece(model, data, skeleton, axes, [g for g in geoms if tuple(colours[g]) == colour])
+        for colour in dict.fromkeys(tuple(colours[g]) for g in geoms)
+    ]
+
+
+def linear(colour: np.ndarray) -> np.ndarray:
+    """Convert sRGB [3] to the linear colours of glTF and USD."""
+    return np.where(colour <= 0.04045, colour / 12.92, ((colour + 0.055) / 1.055) ** 2.4)
+
+
+def _piece(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    skeleton: Skeleton,
+    axes: np.ndarray,
+    geoms: list[int],
+) -> Piece:
+    """The piece made of geoms of one colour."""
+    points, normals, faces, joints, count = [], [], [], [], 0
+    for g in geoms:
+        own, facing, triangles = geom_surface(model, g)
+        turn = axes @ data.geom_xmat[g].reshape(3, 3)
+        points.append(own @ turn.T + axes @ data.geom_xpos[g])
+        normals.append(facing @ turn.T)
+        faces.append(triangles + count)
+        joints.append(np.full(len(own), skeleton.bodies.index(int(model.geom_bodyid[g]))))
+        count += len(own)
+    arrays = (np.concatenate(each) for each in (points, normals, faces, joints))
+    return Piece(_name(model, geoms[0]), geom_colours(model)[geoms[0]], *arrays)
+
+
+def _name(model: mujoco.MjModel, geom: int) -> str:
+    """Name of a geom's material, else of its body."""
+    material, body = int(model.geom_matid[geom]), int(model.geom_bodyid[geom])
+    called = model.mat(material).name if material >= 0 else model.body(body).name
+    return str(called) or f"body_{body}"

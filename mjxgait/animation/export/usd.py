@@ -9,9 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from mjxgait.animation.export.limbs import along_limbs
 from mjxgait.animation.export.loop import WalkLoop
-from mjxgait.animation.export.pieces import Piece, linear, pieces_of
 from mjxgait.animation.export.skeleton import (
     Skeleton,
     gltf_axes,
@@ -21,7 +19,8 @@ from mjxgait.animation.export.skeleton import (
     travel,
     world_poses,
 )
-from mjxgait.config.shipped import install_command
+from mjxgait.animation.export.surface import Piece, along_limbs, linear, pieces_of
+from mjxgait.config.layers import install_command
 from mjxgait.errors import UserError
 
 

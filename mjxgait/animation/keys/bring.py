@@ -7,15 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from mjxgait.animation.clips.clip import ELSEWHERE, AngleTrack, Clip
-from mjxgait.animation.clips.read_angles import read_csv, read_json
-from mjxgait.animation.clips.read_bvh import read_bvh
 from mjxgait.animation.clips.read_glb import read_glb
-from mjxgait.animation.keys.axes import axes_of
-from mjxgait.animation.keys.cycle import Cycle, find_cycle
-from mjxgait.animation.keys.fit import Fit, fit_poses
-from mjxgait.animation.keys.match import matched
-from mjxgait.animation.keys.own import Own, own_poses
-from mjxgait.animation.keys.retarget import Retargeted, movers, retarget
+from mjxgait.animation.clips.read_text import read_bvh, read_csv, read_json
+from mjxgait.animation.keys.cycle import Cycle, Fit, Own, find_cycle, fit_poses, own_poses
+from mjxgait.animation.keys.retarget import Retargeted, axes_of, matched, movers, retarget
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError
 

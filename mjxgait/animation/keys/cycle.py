@@ -1,9 +1,19 @@
-"""Search for the cycle in angles over time, and for the mirror symmetry of its halves.
+"""Key poses from a motion: its cycle, the fewest poses that reproduce it, or those noted in the file.
 
 Letters: `F` frames, `J` joints, `N` evenly spaced samples of one cycle.
+
+The controller interpolates linearly from pose to pose (docs/controller.md), so a cycle of poses is
+a sum of hat functions, and linear least squares gives the best poses of a given number. Letters:
+`N` samples of a cycle, `K` key poses, `C` poses of the whole cycle, `J` joints.
+
+A body never reaches its targets exactly: it lags, and bends under its weight. A cycle written by
+`mjxgait export` states both targets and motion; changes to the motion since then are added to the
+targets. Letters: `N` samples of a cycle, `K` key poses, `J` joints.
 """
 
 import dataclasses
+import json
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -109,3 +119,133 @@ def _period(times: np.ndarray, angles: np.ndarray, first: float, last: float) ->
     dips = [i for i in range(1, len(lacks) - 1) if lacks[i - 1] >= lacks[i] <= lacks[i + 1]]
     found = next((i for i in dips if lacks[i] < enough), None)
     return float(length if found is None else (least + found) * length / (4 * count))
+
+
+MOST_POSES = 12
+SEEN = 0.5
+"""deg; a smaller loss at a pose range is not visible."""
+TURNS = 4
+"""Number of places tried for the first pose, within the first 1 / K of the cycle."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Fit:
+    """Key poses fitted to a cycle.
+
+    key_poses: [K, J] rad. error: rad, root mean square over the cycle. starts: the first pose's
+    place as a share of the cycle. clipped: deg by joint, the most that its pose range cuts off.
+    """
+
+    key_poses: np.ndarray
+    error: float
+    starts: float
+    clipped: dict[str, float]
+
+
+def fit_poses(creature: Creature, cycle: Cycle, tolerance: float) -> Fit:
+    """The fewest key poses within a tolerance in rad, root mean square.
+
+    Raises:
+      UserError: even `MOST_POSES` are not within it.
+    """
+    for count in range(2, MOST_POSES + 1):
+        best = min((_fitted(creature, cycle, count, turn) for turn in _turns(count)), key=_error)
+        if best.error <= tolerance:
+            return best
+    raise UserError(
+        f"{MOST_POSES} key poses come no nearer than {np.degrees(best.error):.1f} degrees: the cycle "
+        "is too lively, or --from and --to cut more than one of it; a larger --tolerance accepts it"
+    )
+
+
+def _error(fit: Fit) -> float:
+    return fit.error
+
+
+def _turns(count: int) -> np.ndarray:
+    return np.arange(TURNS) / (TURNS * count)
+
+
+def _fitted(creature: Creature, cycle: Cycle, count: int, starts: float) -> Fit:
+    samples = cycle.angles
+    whole = 2 * count if cycle.mirrored else count
+    place = (np.arange(len(samples)) / len(samples) - starts) % 1.0 * whole
+    hats = np.maximum(0.0, 1.0 - np.abs((place[:, None] - np.arange(whole) + 1) % whole - 1))
+    poses = np.linalg.lstsq(hats, samples, rcond=None)[0]
+    if cycle.mirrored:
+        poses = 0.5 * (poses[:count] + creature.mirror.image(poses[count:]))
+    full = np.concatenate([poses, creature.mirror.image(poses)]) if cycle.mirrored else poses
+    error = float(np.sqrt(np.mean((hats @ full - samples) ** 2)))
+    kept, clipped = within_range(creature, poses)
+    return Fit(kept, error, starts, clipped)
+
+
+def within_range(creature: Creature, poses: np.ndarray) -> tuple[np.ndarray, dict[str, float]]:
+    """Key poses [K, J] within the pose ranges, and the largest visible loss in deg by joint."""
+    joints = creature.joints
+    kept = np.clip(poses, joints.pose_low, joints.pose_high)
+    lost = np.degrees(np.abs(poses - kept).max(0))
+    return kept, {n: float(v) for n, v in zip(joints.names, lost, strict=True) if v > SEEN}
+
+
+UNCHANGED = np.radians(0.5)
+"""rad, root mean square of a joint; smaller differences are no edit and no asymmetry."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Own:
+    """An exported walk with its edits.
+
+    fit: key poses with the changes. cycle: as drawn; mirrored if the walk and the changes are.
+    changed: rad, root mean square. advance: how the target moves on. tuning: genes by name.
+    """
+
+    fit: Fit
+    cycle: Cycle
+    changed: float
+    advance: str
+    tuning: Mapping[str, float]
+
+
+def own_poses(creature: Creature, note: str, cycle: Cycle) -> Own | None:
+    """Read the note of an exported walk of this creature; return None for any other file."""
+    names = creature.joints.names
+    try:
+        document = json.loads(note)
+        if document["creature"] != creature.digest:
+            return None
+        poses = np.array([[pose[n] for n in names] for pose in document["key_poses"]], float)
+        motion = np.array([document["motion"][n] for n in names], float).T
+        tuning = {str(name): float(value) for name, value in document["tuning"].items()}
+        mirrored, advance = bool(document["mirrored"]), str(document["advance"])
+        if not (np.isfinite(poses).all() and np.isfinite(motion).all() and len(motion) > 1):
+            return None
+    except (ValueError, KeyError, TypeError, AttributeError, ArithmeticError, RecursionError):
+        return None
+    motion = _resampled(motion, len(cycle.drawn))
+    shifts = [np.roll(cycle.drawn, -s, axis=0) for s in range(len(motion))]
+    shift = int(np.argmin([np.mean((angles - motion) ** 2) for angles in shifts]))
+    change = shifts[shift] - motion
+    other = creature.mirror.image(np.roll(change, -len(change) // 2, axis=0))
+    if mirrored and _most(change - other) >= UNCHANGED:
+        poses, mirrored = np.concatenate([poses, creature.mirror.image(poses)]), False
+    if _most(change) >= UNCHANGED:
+        whole = len(poses) * (2 if mirrored else 1)
+        poses = poses + change[np.arange(len(poses)) * len(motion) // whole]
+    kept, clipped = within_range(creature, poses)
+    changed = float(np.sqrt(np.mean(change**2)))
+    fit = Fit(kept, changed, shift / len(motion), clipped)
+    drawn = dataclasses.replace(cycle, angles=cycle.drawn, mirrored=mirrored)
+    return Own(fit, drawn, changed, advance, tuning)
+
+
+def _most(change: np.ndarray) -> float:
+    """Change of the joint that changes most over a cycle [N, J]; rad, root mean square."""
+    return float(np.sqrt(np.mean(change**2, 0)).max())
+
+
+def _resampled(motion: np.ndarray, count: int) -> np.ndarray:
+    """A cycle resampled to `count` samples [N, J]."""
+    closed = np.concatenate([motion, motion[:1]])
+    at = np.arange(count) / count * len(motion)
+    return interpolated(at, np.arange(len(closed)), closed)

@@ -1,11 +1,16 @@
-"""Retargeting of bone rotations to a creature's hinges: least squares within their ranges.
+"""Retargeting of bone rotations to a creature's hinges: names, axes, and a least-squares fit.
 
 A bone at rest corresponds to a part in the creature's rest pose. From there both turn equally, each
 relative to the next matched part above it. Letters: `F` frames, `J` actuated joints.
+
+Letters: `F` frames, `B` bones. Axes are [3, 3], from the creature's world to the file's.
 """
 
 import dataclasses
-from collections.abc import Callable, Mapping
+import difflib
+import re
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -15,7 +20,82 @@ from scipy.spatial.transform import Rotation
 from mjxgait.animation.clips.clip import Clip
 from mjxgait.creature import Creature
 from mjxgait.creature.geometry import ancestors
-from mjxgait.errors import UserError
+from mjxgait.errors import UserError, did_you_mean
+
+LIKE = 0.6
+"""Likeness from which two names count as the same."""
+SIDES = {"l": "left", "left": "left", "r": "right", "right": "right"}
+SAME = {
+    "upleg": "thigh",
+    "upperleg": "thigh",
+    "femur": "thigh",
+    "upper": "thigh",
+    "calf": "shin",
+    "lowerleg": "shin",
+    "shank": "shin",
+    "tibia": "shin",
+    "lower": "shin",
+    "rear": "hind",
+    "back": "hind",
+    "fore": "front",
+    "foreleg": "front",
+    "hips": "pelvis",
+    "pelvis": "pelvis",
+    "torso": "trunk",
+    "body": "trunk",
+    "toe": "foot",
+    "toes": "foot",
+    "ankle": "foot",
+}
+"""Names of body parts in rigs, and one common word for each."""
+
+
+def matched(
+    wanted: Iterable[str], found: Iterable[str], table: Mapping[str, Any] | None, where: str
+) -> dict[str, str]:
+    """Name in the file by wanted name, for those with a match.
+
+    Args:
+      table: the user's names in the file by wanted name; it takes precedence over likeness.
+      where: the table's file, for errors.
+
+    Raises:
+      UserError: the table has an unknown name.
+    """
+    wanted, found = list(wanted), list(found)
+    pairs = {}
+    for own, other in (table or {}).items():
+        for name, known in ((own, wanted), (str(other), found)):
+            if name not in known:
+                raise UserError(f'{where}: "{name}" is not there; {did_you_mean(name, known)}')
+        pairs[own] = str(other)
+    pairs |= {name: name for name in wanted if name in found and name not in pairs}
+    words = {name: _words(name) for name in {*wanted, *found}}
+    likely = sorted(
+        ((_likeness(words[a], words[b]), a, b) for a in wanted for b in found), reverse=True
+    )
+    for likeness, own, other in likely:
+        if likeness >= LIKE and own not in pairs and other not in pairs.values():
+            pairs[own] = other
+    return {name: pairs[name] for name in wanted if name in pairs}
+
+
+def _words(name: str) -> tuple[frozenset[str], str]:
+    """Side in a name, and its other words in sorted order."""
+    plain = re.sub(r"^.*:", "", name)
+    plain = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", plain)
+    words = [word for word in re.split(r"[^a-z]+", plain.lower()) if word]
+    joined = re.sub(r"\b(up|upper|lower) leg\b", r"\1leg", " ".join(words)).split()
+    sides = frozenset(SIDES[word] for word in joined if word in SIDES)
+    return sides, " ".join(sorted(SAME.get(word, word) for word in joined if word not in SIDES))
+
+
+def _likeness(one: tuple[frozenset[str], str], other: tuple[frozenset[str], str]) -> float:
+    """Likeness of two names from 0 to 1; 0 for different sides."""
+    if one[0] != other[0]:
+        return 0.0
+    return difflib.SequenceMatcher(None, one[1], other[1]).ratio()
+
 
 ENDLESS = 4 * np.pi
 """rad; limit of a hinge without a range."""
@@ -189,3 +269,59 @@ def _axis(creature: Creature, joint: int) -> tuple[np.ndarray, float]:
     hinge = int(at.type[0]) == int(mujoco.mjtJoint.mjJNT_HINGE)
     zero = float(model.qpos0[creature.joints.qpos[joint]])
     return np.array(at.axis if hinge else np.zeros(3)), zero
+
+
+WAYS = {"z": (0, 0, 1), "-z": (0, 0, -1), "x": (1, 0, 0), "-x": (-1, 0, 0)}
+"""Directions in which the file's creature looks at rest, in the file's axes with Y up."""
+USUAL = "z"
+TRIED = 12
+"""Number of frames on which two guesses are compared."""
+
+
+def axes_of(
+    creature: Creature, clip: Clip, bones: Mapping[str, str], way: str | None
+) -> np.ndarray:
+    """The axes of a file.
+
+    Without a way these are the usual ones, or those of the file that the creature was imported
+    from, if its joints can then follow the motion better.
+
+    Args:
+      bones: bone by the name of the part. way: direction in which the file's creature looks, Y
+        being up.
+    """
+    usual, own = facing(creature, way or USUAL), rig_axes(creature)
+    if way or own is None or np.allclose(own, usual, atol=1e-3):
+        return usual
+    few = np.linspace(0, len(clip.times) - 1, TRIED).astype(int)
+    short = dataclasses.replace(clip, times=clip.times[few], turned=clip.turned[few])
+
+    def lacks(axes: np.ndarray) -> float:
+        errors = retarget(creature, short, bones, axes).errors.values()
+        return float(np.mean(np.square([*errors])))
+
+    return min((usual, own), key=lacks)
+
+
+def facing(creature: Creature, way: str) -> np.ndarray:
+    """The axes of a file with Y up and the creature looking along a way.
+
+    Raises:
+      UserError: there is no such way.
+    """
+    if way not in WAYS:
+        raise UserError(f'forward = "{way}": must be one of {", ".join(WAYS)}')
+    forward, left = creature.frame.start_axes
+    own = np.stack([left, [0.0, 0.0, 1.0], forward])
+    ahead, up = np.array(WAYS[way], float), np.array([0.0, 1.0, 0.0])
+    return np.stack([np.cross(up, ahead), up, ahead], 1) @ own
+
+
+def rig_axes(creature: Creature) -> np.ndarray | None:
+    """The axes of the file that the creature was imported from; None if it was not a rig."""
+    if not creature.is_rig:
+        return None
+    data = mujoco.MjData(creature.model)
+    data.qpos[:] = creature.rest_qpos
+    mujoco.mj_kinematics(creature.model, data)
+    return np.array(data.xmat[creature.trunk].reshape(3, 3).T)

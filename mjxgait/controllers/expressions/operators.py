@@ -1,4 +1,7 @@
-"""Crossover and mutation of programs, within the limits on size and depth."""
+"""Genetic operators of programs: trees in prefix order, initial programs, crossover, mutation.
+
+A tree is `code` [C] and `value` [C] (`text`); beyond its end both are zero.
+"""
 
 import dataclasses
 from functools import partial
@@ -8,22 +11,135 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from mjxgait.controllers.expressions.grow import Words, grown, half_and_half
-from mjxgait.controllers.expressions.text import (
-    ARITY,
-    CONSTANT,
-    EMPTY,
-    FUNCTION_CODES,
-)
-from mjxgait.controllers.expressions.trees import (
-    Trees,
-    arity,
-    canonical,
-    depths,
-    size,
-    subtree_sizes,
-)
+from mjxgait.controllers.expressions.text import ARITY, CONSTANT, EMPTY, FIRST_ADDED, FUNCTION_CODES
 from mjxgait.evolution.variation import Variation
+from mjxgait.types import pytree
+
+
+@pytree
+class Trees:
+    """Trees, one per joint. code: [J, C] integers. value: [J, C] of constants, else zero."""
+
+    code: jax.Array
+    value: jax.Array
+
+
+def arity(code: jax.Array) -> jax.Array:
+    """Return the number of arguments [...] of each node."""
+    taken = jnp.asarray(ARITY)[jnp.minimum(code, FIRST_ADDED - 1)]
+    return jnp.where(code < FIRST_ADDED, taken, 0)
+
+
+def size(code: jax.Array) -> jax.Array:
+    """Return the number of nodes [] of a tree [C]."""
+    return jnp.sum(code != EMPTY)
+
+
+def subtree_sizes(code: jax.Array) -> jax.Array:
+    """Return the number of nodes [C] of the subtree at each place; 0 beyond the end."""
+    places = np.arange(code.shape[0])
+    used = code != EMPTY
+    # A subtree ends when all its arguments are complete.
+    wanted = jnp.cumsum(jnp.where(used, arity(code) - 1, 0))
+    before = wanted - jnp.where(used, arity(code) - 1, 0)
+    complete = (wanted[None, :] - before[:, None] == -1) & (places[None, :] >= places[:, None])
+    return jnp.where(used, jnp.argmax(complete, axis=1) - places + 1, 0)
+
+
+def depths(code: jax.Array) -> jax.Array:
+    """Return the depth [C] of each node: its number of enclosing functions."""
+    places, sizes = np.arange(code.shape[0]), subtree_sizes(code)
+    start, node = places[:, None], places[None, :]
+    within = (start < node) & (node < start + sizes[:, None])
+    return jnp.sum(within & (code != EMPTY)[None, :], axis=0)
+
+
+def canonical(code: jax.Array, value: jax.Array) -> tuple[jax.Array, jax.Array]:
+    """Return code and value with zeros for values that have no meaning."""
+    return code, jnp.where(code == CONSTANT, value, 0.0)
+
+
+@dataclasses.dataclass(frozen=True)
+class Words:
+    """Primitives of a program. functions, senses: codes. capacity: C, most nodes."""
+
+    functions: tuple[int, ...]
+    senses: tuple[int, ...]
+    capacity: int
+
+    @property
+    def terminal_share(self) -> float:
+        """Chance of a terminal in a grown tree: the share of terminals, with constants as one."""
+        ends = len(self.senses) + 1
+        return ends / (ends + len(self.functions))
+
+
+@pytree
+class Growing:
+    """State of growth.
+
+    pending: [C] depths of missing arguments, the next one last. open: [] their number.
+    used: [] nodes so far.
+    """
+
+    pending: jax.Array
+    open: jax.Array
+    used: jax.Array
+
+
+def half_and_half(
+    key: jax.Array, words: Words, depth: tuple[int, int], constants: Any
+) -> tuple[jax.Array, jax.Array]:
+    """Draw a tree [C], full or grown with equal chance, up to a depth drawn from a range."""
+    key_kind, key_depth, key_grow = jax.random.split(key, 3)
+    least, most = depth
+    deep = jax.random.randint(key_depth, (), least, most + 1)
+    full = jax.random.bernoulli(key_kind)
+    return grown(key_grow, words, deep, jnp.where(full, deep, least), constants)
+
+
+def grown(
+    key: jax.Array, words: Words, deep: jax.Array, least: jax.Array, constants: Any
+) -> tuple[jax.Array, jax.Array]:
+    """Draw a tree [C] with depth at most `deep` [] and terminals at depth `least` [] or more.
+
+    Once the capacity is used up, every missing argument becomes a terminal.
+    """
+    capacity = words.capacity
+    begin = Growing(jnp.zeros(capacity, jnp.int32), jnp.int32(1), jnp.int32(0))
+    step = partial(_next_node, words, deep, least, constants)
+    _, (code, value) = jax.lax.scan(step, begin, jax.random.split(key, capacity))
+    return canonical(code, value)
+
+
+def _next_node(
+    words: Words,
+    deep: jax.Array,
+    least: jax.Array,
+    constants: Any,
+    state: Growing,
+    key: jax.Array,
+) -> tuple[Growing, tuple[jax.Array, jax.Array]]:
+    key_end, key_function, key_sense, key_value = jax.random.split(key, 4)
+    alive, here = state.open > 0, state.pending[jnp.maximum(state.open - 1, 0)]
+    function = jax.random.choice(key_function, np.array(words.functions, np.int32))
+    wants = jnp.asarray(ARITY)[function]
+    room = state.used + state.open + wants <= words.capacity
+    ends = (here >= deep) | ~room
+    ends |= (here >= least) & jax.random.bernoulli(key_end, words.terminal_share)
+    # A constant is as likely as any one observation.
+    end = jax.random.choice(key_sense, np.array([CONSTANT, *words.senses], np.int32))
+    code = jnp.where(ends, end, function)
+    value = jax.random.uniform(key_value, (), minval=constants[0], maxval=constants[1])
+    given = jnp.where(ends, 0, wants)
+    places = np.arange(words.capacity)
+    fresh = (places >= state.open - 1) & (places < state.open - 1 + given)
+    after = Growing(
+        jnp.where(fresh, here + 1, state.pending), state.open - 1 + given, state.used + 1
+    )
+    after = jax.tree.map(partial(jnp.where, alive), after, state)
+    return after, (jnp.where(alive, code, EMPTY), jnp.where(alive, value, 0.0))
+
 
 Tree = tuple[jax.Array, jax.Array]
 """Arrays code and value [C]."""

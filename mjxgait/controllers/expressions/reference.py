@@ -12,7 +12,7 @@ import numpy as np
 
 from mjxgait.champion import Champion, codec_of
 from mjxgait.creature import Creature
-from mjxgait.reference.controllers.protocol import Command, Memory
+from mjxgait.reference.controllers import Command, Memory
 
 Expression = str | float | tuple[Any, ...]
 """Name of an observation, a number, or a function with its arguments."""

@@ -13,8 +13,8 @@ from mjxgait.controllers.expressions.text import (
     terminals,
     to_text,
 )
+from mjxgait.inspect.sections import title, titled_table
 from mjxgait.inspect.snapshot import Snapshot, shared
-from mjxgait.inspect.tables import title, titled_table
 
 
 class ProgramView:

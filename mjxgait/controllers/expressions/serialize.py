@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from mjxgait.champion.plain import PlainCodec
+from mjxgait.champion.serializers import PlainCodec
 from mjxgait.config.tables import build
 from mjxgait.controllers.expressions.config import MOST_NODES, ProgramConfig
 from mjxgait.controllers.expressions.parse import (
@@ -14,13 +14,13 @@ from mjxgait.controllers.expressions.parse import (
     read_programs,
     to_arrays,
 )
-from mjxgait.controllers.expressions.simplify import simplified
 from mjxgait.controllers.expressions.text import (
     ADDED,
     HasParts,
     chosen_terminals,
     in_text,
     nested,
+    simplified,
     terminals,
     to_text,
 )

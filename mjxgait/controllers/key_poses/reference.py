@@ -12,7 +12,7 @@ from mjxgait.champion import Champion
 from mjxgait.controllers.key_poses.config import gene_names
 from mjxgait.creature import Creature
 from mjxgait.creature.anatomy import Stepping
-from mjxgait.reference.controllers.protocol import Command, Memory
+from mjxgait.reference.controllers import Command, Memory
 
 READS = ("joint_pos", "heading", "aside", "pitch", "roll", "pitch_rate", "roll_rate")
 STEP_READS = ("foot_height", "foot_place", "nose_vel")

@@ -8,8 +8,8 @@ import numpy as np
 from rich.console import Console
 
 from mjxgait.controllers.key_poses.config import gene_names
+from mjxgait.inspect.sections import print_columns, title, titled_table
 from mjxgait.inspect.snapshot import Snapshot, shared
-from mjxgait.inspect.tables import print_columns, title, titled_table
 
 
 class PoseView:

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from mjxgait.champion.plain import PlainCodec
+from mjxgait.champion.serializers import PlainCodec
 from mjxgait.config.tables import build
 from mjxgait.controllers.key_poses.config import PoseConfig, gene_names
 from mjxgait.creature import Creature

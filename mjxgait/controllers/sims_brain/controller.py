@@ -10,19 +10,12 @@ import numpy as np
 
 from mjxgait.config.evolution import EvolutionConfig
 from mjxgait.controllers.base import Command, Senses
+from mjxgait.controllers.sims_brain.brain import Brain, Mind, Perceived, blank, thought, wired
 from mjxgait.controllers.sims_brain.config import BrainConfig
-from mjxgait.controllers.sims_brain.genotype import Capacity, Ranges
-from mjxgait.controllers.sims_brain.nerves import NerveRoom
+from mjxgait.controllers.sims_brain.genotype import Capacity, NerveRoom, Ranges
 from mjxgait.controllers.sims_brain.operators import Genotype, Kin, Rates
 from mjxgait.controllers.sims_brain.phenotype import body_of
-from mjxgait.controllers.sims_brain.reference_body.parts import grow
-from mjxgait.controllers.sims_brain.thought import (
-    Mind,
-    Perceived,
-    blank,
-    thought,
-)
-from mjxgait.controllers.sims_brain.wiring import Brain, wired
+from mjxgait.controllers.sims_brain.reference_body import grow
 from mjxgait.creature.body import Body
 from mjxgait.evolution.variation import Variation
 

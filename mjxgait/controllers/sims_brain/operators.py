@@ -9,19 +9,19 @@ import dataclasses
 import jax
 import jax.numpy as jnp
 
-from mjxgait.controllers.sims_brain.chance import normal, numbered, numbers
 from mjxgait.controllers.sims_brain.config import BrainConfig
 from mjxgait.controllers.sims_brain.genotype import (
     Capacity,
-    Graph,
-    Ranges,
-    random_graph,
-)
-from mjxgait.controllers.sims_brain.nerves import (
     Centre,
+    Graph,
     NerveRoom,
     Nerves,
+    Ranges,
+    normal,
+    numbered,
+    numbers,
     random_centre,
+    random_graph,
     random_nerves,
 )
 from mjxgait.types import pytree

@@ -1,4 +1,4 @@
-"""Conversion of a grown body's parts to arrays for the physics.
+"""Grown bodies as arrays for the physics, and their facts for controllers and tasks.
 
 Letters: `P` parts, `n` links.
 """
@@ -9,15 +9,11 @@ import numpy as np
 
 from mjxgait.controllers.sims_brain.genotype import Capacity, Graph
 from mjxgait.controllers.sims_brain.growth import HINGES, Parts, grown
-from mjxgait.controllers.sims_brain.reference_body.material import (
-    AXES,
-    DAMPING,
-    DENSITY,
-    ROTOR,
-    STRENGTH,
-)
+from mjxgait.controllers.sims_brain.reference_body import AXES, DAMPING, DENSITY, ROTOR, STRENGTH
+from mjxgait.creature.anatomy import Corrections, Feet, Frame, Gains, Joints, Mirror
+from mjxgait.creature.body import GivenBody
+from mjxgait.physics.batched_trees.dynamics import weighed
 from mjxgait.physics.batched_trees.tree import Tree
-from mjxgait.physics.batched_trees.weights import weighed
 from mjxgait.types import pytree
 
 TURNS_ABOUT = np.array([(*axes, *[2] * (3 - len(axes))) for axes in AXES])
@@ -129,3 +125,45 @@ def _strength(parts: Parts, part: jax.Array) -> jax.Array:
     """Return the strength [n] in N·m, proportional to the child's cross-section at the joint."""
     half = parts.half[part]
     return STRENGTH * 4 * half[:, 1] * half[:, 2]
+
+
+WORLD_AXES = np.eye(3, dtype=np.float32)
+
+
+def anatomy(links: int) -> GivenBody:
+    """Return the facts shared by all bodies with this many links.
+
+    Every link but the root has a hinge, and every link's block is a foot.
+    """
+    hinges, none = links - 1, np.zeros(links - 1, np.float32)
+    endless = np.full(hinges, np.inf, np.float32)
+    frame = Frame(
+        forward=WORLD_AXES[0],
+        left=WORLD_AXES[1],
+        up=WORLD_AXES[2],
+        stand_pos=np.zeros(3, np.float32),
+        stand_rot=WORLD_AXES,
+        start_axes=(WORLD_AXES[0], WORLD_AXES[1]),
+        hip_height=1.0,
+        body_length=1.0,
+        mass=1.0,
+    )
+    names = tuple(f"link{link}" for link in range(1, links))
+    return GivenBody(
+        frame=frame,
+        joints=Joints(
+            none,
+            -endless,
+            endless,
+            -endless,
+            endless,
+            names=names,
+            qpos=tuple(range(7, 7 + hinges)),
+            dofs=tuple(range(6, 6 + hinges)),
+        ),
+        gains=Gains(none, none, endless),
+        mirror=Mirror(none + 1, tuple(range(hinges)), False),
+        corrections=Corrections(none, none, none, none),
+        feet=Feet(("root", *names), tuple(range(links)), tuple(range(links)), ()),
+        nv=6 + hinges,
+    )

@@ -10,10 +10,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mjxgait.champion import Champion
-from mjxgait.controllers.sims_brain.reference_body.material import NEURONS, SENSORS
-from mjxgait.controllers.sims_brain.reference_body.parts import Part, grow
+from mjxgait.controllers.sims_brain.reference_body import NEURONS, SENSORS, Part, grow
 from mjxgait.creature import Creature
-from mjxgait.reference.controllers.protocol import Command, Memory
+from mjxgait.reference.controllers import Command, Memory
 
 CENTRE = -1
 TICKS = 2

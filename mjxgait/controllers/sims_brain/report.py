@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
-from mjxgait.controllers.sims_brain.reference_body.parts import Part, grow
+from mjxgait.controllers.sims_brain.reference_body import Part, grow
+from mjxgait.inspect.sections import title, titled_table
 from mjxgait.inspect.snapshot import Snapshot, shared
-from mjxgait.inspect.tables import title, titled_table
 
 COLUMNS = ("part", "node", "on part", "joint", "size (cm)", "swing (deg)", "strength (N·m)")
 

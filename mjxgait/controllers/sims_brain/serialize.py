@@ -7,9 +7,8 @@ import numpy as np
 
 from mjxgait.config.tables import build
 from mjxgait.controllers.sims_brain.config import BrainConfig
-from mjxgait.controllers.sims_brain.reference_body.folder import body_files
-from mjxgait.controllers.sims_brain.reference_body.material import FRICTION, GRAVITY
-from mjxgait.controllers.sims_brain.reference_body.parts import grow
+from mjxgait.controllers.sims_brain.reference_body import FRICTION, GRAVITY, grow
+from mjxgait.controllers.sims_brain.reference_files import body_files
 from mjxgait.creature import Creature
 from mjxgait.creature.scale import load_files
 from mjxgait.errors import UserError

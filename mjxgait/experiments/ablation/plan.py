@@ -9,9 +9,8 @@ from typing import Annotated, Any, Literal
 
 import pydantic
 
-from mjxgait.config.rollout import GroundText, Physics
-from mjxgait.config.schema import Config
-from mjxgait.config.shipped import data_folder
+from mjxgait.config.layers import data_folder
+from mjxgait.config.schema import Config, GroundText, Physics
 from mjxgait.config.tables import (
     STRICT,
     Count,

@@ -16,13 +16,19 @@ import pyarrow.parquet
 from markdown_it import MarkdownIt
 
 from mjxgait.creature.ground.spec import FLAT
-from mjxgait.experiments.ablation.figures import draw_curves, draw_intervals
-from mjxgait.experiments.ablation.findings import Finding, find, trim_of
-from mjxgait.experiments.ablation.measures import Result
+from mjxgait.experiments.ablation.findings import (
+    Estimate,
+    Finding,
+    draw_curves,
+    draw_intervals,
+    find,
+    share,
+    trim_of,
+)
 from mjxgait.experiments.ablation.plan import Plan
-from mjxgait.experiments.ablation.statistics import Estimate, share
+from mjxgait.experiments.ablation.rows import Result
 from mjxgait.files import replaced, write_text
-from mjxgait.training.disk import disk_errors
+from mjxgait.training.stored import disk_errors
 
 NAMES = {
     "walk": "body lengths per second covered before a fall or the end of 22 s, mean over 16 unseen "

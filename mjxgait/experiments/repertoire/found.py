@@ -13,7 +13,7 @@ from rich.table import Table
 
 from mjxgait.certification import judged, read_certificate
 from mjxgait.experiments.repertoire.grid import Cell, Grid
-from mjxgait.rendering.style import DARK, MIDDLE, PALE
+from mjxgait.rendering.curves import DARK, MIDDLE, PALE
 from mjxgait.training.folder import CERTIFICATE
 
 LINE = 20

@@ -1,17 +1,25 @@
-"""Grid of a repertoire: target walks, their names and their neighbours."""
+"""Grid of requested walks: its cells, their settings, and their evolution.
+
+Each of the two is one program with a row per cell. In every generation a cell evaluates, among its
+offspring, one of the best individuals of each neighbour. Each cell has its own run folder.
+"""
 
 import dataclasses
-from collections.abc import Sequence
-from functools import cached_property
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property, partial
 from pathlib import Path
 
-from mjxgait.config.tables import (
-    STRICT,
-    build,
-    dump_toml,
-    read_toml,
-)
+import numpy as np
+
+from mjxgait.config.schema import Config
+from mjxgait.config.tables import STRICT, build, dump_toml, read_toml
+from mjxgait.creature import Creature
+from mjxgait.distributed.jobs import Advanced
+from mjxgait.distributed.rows import Rows
+from mjxgait.distributed.scheduler import Crew
 from mjxgait.errors import UserError
+from mjxgait.tasks.walk.targets import Wishes, wished
+from mjxgait.training.checkpoint import Packed
 
 GRID = "repertoire.toml"
 
@@ -105,3 +113,107 @@ class Grid:
     def pairs(self) -> list[tuple[Cell, Cell]]:
         """Each pair of neighbours, once."""
         return [(a, b) for a in self.cells for b in self.neighbours(a) if a < b]
+
+
+POSES = "genomes.key_poses"
+GENOMES = (POSES, "genomes.tuning")
+
+
+def check(config: Config) -> None:
+    """Refuse settings that no repertoire can be made of.
+
+    Raises:
+      UserError: another task or controller, or a body that evolves.
+    """
+    if (config.use.task, config.use.controller) != ("walk", "poses"):
+        raise UserError(
+            f"a repertoire is of walks by key poses, and this is to {config.use.task} by "
+            f"{config.use.controller}"
+        )
+    if config.evolution.body != 1:
+        raise UserError("evolution.body: the clips of a repertoire are of one body; leave it at 1")
+    if config.fitness.wish.asked and {"speed", "turn", "steer"} & set(config.fitness.wish.asked):
+        raise UserError("fitness.wish: the grid asks for speeds and turns; leave these out")
+
+
+def has_mirror(creature: Creature) -> bool:
+    """Return whether a right turn is the mirror image of a left turn."""
+    return creature.mirror.symmetric
+
+
+def settings_of(cell: Cell, grid: Grid, creature: Creature, base: Config) -> Config:
+    """Return the settings of a cell's run.
+
+    If the grid has turns, straight cells use the turning cells' controller settings: the turning
+    cells begin with the straight populations.
+    """
+    speed = f"{cell.speed:.6f}"
+    config = wished(base, creature, Wishes(speed=speed, turn=cell.turn or None))
+    if grid.turns:
+        turning = wished(base, creature, Wishes(speed=speed, turn=grid.turns[-1]))
+        config = dataclasses.replace(config, controller=turning.controller)
+    forced = dataclasses.replace(config.evolution.forced, patience=0)
+    # The rows of a program advance together: none may stop early.
+    evolution = dataclasses.replace(config.evolution, target=None, forced=forced)
+    return dataclasses.replace(config, evolution=evolution)
+
+
+def mirror_image(state: Packed, creature: Creature) -> Packed:
+    """Return a population's mirror image: left turns become right turns."""
+    return state.with_arrays({POSES: mirrored(state.arrays[POSES], creature)})
+
+
+def mirrored(poses: np.ndarray, creature: Creature) -> np.ndarray:
+    """Return poses [..., J] with left and right exchanged."""
+    sign = creature.mirror.sign.astype(poses.dtype)
+    swapped: np.ndarray = sign * poses[..., creature.mirror.partner]
+    return swapped
+
+
+def planted(cells: list[Cell], straight: Mapping[float, Packed]) -> dict[str, np.ndarray]:
+    """Return the turning cells' first genomes, [B, P, ...]: the straight ones of the same speed."""
+    return {
+        name: np.stack([straight[cell.speed].arrays[name] for cell in cells]) for name in GENOMES
+    }
+
+
+Tell = Callable[[str, int, int, Advanced | None], object]
+"""Callback with the evolved part, the generation, the last generation, and a result, if any."""
+
+
+def evolve(
+    folder: Path,
+    creature: Creature,
+    grid: Grid,
+    crew: Crew,
+    tell: Tell,
+    stopped: Callable[[], bool],
+) -> bool:
+    """Evolve all cells of a folder, or resume them; return whether all were completed."""
+    straight = [cell for cell in grid.cells if not cell.turn]
+    both = not has_mirror(creature)
+    turning = [cell for cell in grid.cells if cell.turn > 0 or (cell.turn and both)]
+    first = _side(folder, creature, grid, straight)
+    found = first.to_the_end(None, crew, partial(tell, "straight on"), stopped)
+    if found is None or not turning:
+        return found is not None
+    by_speed = {cell.speed: found.row(row) for row, cell in enumerate(straight)}
+    begin = planted(turning, by_speed)
+    second = _side(folder, creature, grid, turning)
+    return second.to_the_end(begin, crew, partial(tell, "turning"), stopped) is not None
+
+
+def _side(folder: Path, creature: Creature, grid: Grid, cells: Sequence[Cell]) -> Rows:
+    """Return cells as rows of one program.
+
+    A symmetric body's right turns are mirror images of its left turns; they have folders, too.
+    """
+    near = [[n for n in grid.neighbours(cell) if n in cells] for cell in cells]
+    sources = [[cells.index(n) for n in known] for known in near]
+    image = partial(mirror_image, creature=creature)
+    images = {
+        folder / cell.name: (folder / cell.mirrored.name, image)
+        for cell in cells
+        if cell.turn and has_mirror(creature)
+    }
+    return Rows(creature, [folder / cell.name for cell in cells], sources, images)

@@ -1,28 +1,47 @@
-"""Mass matrix and bias forces of trees as data; compare `lane_major.dynamics`."""
+"""Dynamics of trees as data: mass matrix, bias forces, water, overlap; compare `lane_major.dynamics`.
 
+Letters: `n` links, `L` lanes.
+"""
+
+import dataclasses
 from collections.abc import Sequence
 
 import jax
 import jax.numpy as jnp
 
-from mjxgait.physics.batched_trees.motion import down, root_motion, up
-from mjxgait.physics.batched_trees.tree import Tree
+from mjxgait.physics.batched_trees.tree import (
+    FAR,
+    Tree,
+    centres,
+    down,
+    frames,
+    motions,
+    posture,
+    root_motion,
+    root_turns,
+    up,
+)
+from mjxgait.physics.derived import inverse_weights
 from mjxgait.physics.lane_major.dynamics import (
     Inertia,
     force_cross,
+    inertias,
     motion_cross,
     pack,
     rooted,
     unpack,
 )
-from mjxgait.physics.lane_major.kinematics import Motion
+from mjxgait.physics.lane_major.kinematics import Motion, Pose
 from mjxgait.physics.lane_major.lanes import (
     Pin,
     cross,
     dot,
     parts,
+    pinned_by,
+    plus,
     scale,
     total,
+    turn_each,
 )
 from mjxgait.physics.lane_major.treematrix import Rows, on_pivot
 
@@ -112,3 +131,97 @@ def _root(turns: jax.Array) -> Motion:
     spin = tuple(turns[:, c] for c in range(3))
     none = jnp.zeros_like(spin[0])
     return Motion((spin[0], spin[1], spin[2]), (none, none, none))
+
+
+def weighed(tree: Tree) -> Tree:
+    """Return one body, arrays without lanes, with the weights of its blocks and hinges."""
+    lane = jax.tree.map(lambda x: jnp.asarray(x, jnp.float32)[..., None], tree)
+    links, like = tree.links, jnp.ones(1, jnp.float32)
+    rest = jnp.zeros((links + 6, 1), jnp.float32).at[3].set(1.0)
+    pin = pinned_by(like)
+    poses = posture(lane, rest, pin)
+    freedom, turns = motions(lane, poses, pin), root_turns(poses)
+    body = inertias(lane, poses, like, pin)
+    rows = mass_rows(lane, turns, freedom, body, pin)
+    lower = jnp.stack([jnp.pad(row[:, 0], (0, len(rows) - len(row))) for row in rows])
+    mass = lower + jnp.tril(lower, -1).T
+    solid = jnp.where(lane.solid > 0, lane.mass, 1.0)[:, 0]
+    centre = jnp.stack([h[:, 0] for h in body.moment], axis=1) / solid[:, None]
+    spin = jnp.concatenate([jnp.zeros((3, 3)), jnp.eye(3), jnp.stack(freedom.spin)[:, 1:, 0].T])
+    shift = jnp.concatenate([jnp.eye(3), jnp.zeros((3, 3)), jnp.stack(freedom.shift)[:, 1:, 0].T])
+    moves = jnp.concatenate([jnp.ones((links, 6)), tree.above[:, 1:]], axis=1)[:, :, None]
+    at_centre = (shift + jnp.cross(spin, centre[:, None])) * moves
+    jacobian = jnp.concatenate([at_centre, jnp.broadcast_to(spin, at_centre.shape) * moves], axis=2)
+    body_weight, dof = inverse_weights(
+        mass,
+        jnp.swapaxes(jacobian, 1, 2),
+        [range(3), range(3, 6), *([j] for j in range(6, 5 + links))],
+    )
+    still = jnp.zeros(1)
+    return dataclasses.replace(
+        tree, body_weight=body_weight[:, 0], dof_weight=jnp.concatenate([still, dof[6:]])
+    )
+
+
+def drag_links(
+    tree: Tree, poses: Sequence[Pose], body: Inertia, moving: jax.Array, drag: float, pin: Pin
+) -> jax.Array:
+    """Water's force on each link, [n, 6, L] about the origin; moving: [n, 6, L].
+
+    Every point of a face is pushed along its normal by `drag` N·s/m³ times its velocity along it.
+    Summed over the six faces of a block, this gives a force against the velocity of its centre and
+    a moment against its rotation, both diagonal in the block's own axes.
+    """
+    velocity = unpack(moving)
+    mass = jnp.where(tree.solid > 0, tree.mass, 1.0)
+    centre = tuple(h / mass for h in body.moment)
+    drift = plus(velocity.shift, cross(velocity.spin, (centre[0], centre[1], centre[2])))
+    rot = frames(poses)
+    push: list[jax.Array] = [jnp.zeros_like(mass)] * 3
+    twist: list[jax.Array] = [jnp.zeros_like(mass)] * 3
+    for k in range(3):
+        axis, (i, j) = turn_each(rot, tree.axes[:, k]), ((k + 1) % 3, (k + 2) % 3)
+        a, b, c = (tree.half[:, n] for n in (k, i, j))
+        slow = -8 * drag * b * c * tree.solid * dot(axis, drift)
+        # A point of face i or j moves along the normal in proportion to its distance from the axis.
+        still = -8 / 3 * drag * a * (b**3 + c**3) * tree.solid * dot(axis, velocity.spin)
+        push = [p + slow * x for p, x in zip(push, axis, strict=True)]
+        twist = [t + still * x for t, x in zip(twist, axis, strict=True)]
+    moment = plus(twist, cross((centre[0], centre[1], centre[2]), (push[0], push[1], push[2])))
+    return pack([*moment, *push], pin)
+
+
+def deepest(tree: Tree, poses: Sequence[Pose]) -> jax.Array:
+    """Largest depth [L] as a share of the smaller block's size; negative if all are apart.
+
+    The size of a block is the cube root of its volume.
+
+    Two blocks are apart if one of their six normals separates them. Blocks that only a line along
+    two edges would separate count as overlapping: the depth is never less than the least way out.
+    """
+    rot, centre = frames(poses), centres(tree, poses)
+    normals = [turn_each(rot, tree.axes[:, k]) for k in range(3)]
+    apart = [c[:, None] - c[None] for c in centre]
+    along = []
+    for k, normal in enumerate(normals):
+        own = [x[:, None] for x in normal]
+        reach = [abs(dot(own, [x[None] for x in other])) for other in normals]
+        other = dot(reach, [tree.half[None, :, j] for j in range(3)])
+        along.append(tree.half[:, None, k] + other - abs(dot(own, apart)))
+    depth = jnp.minimum(jnp.minimum(along[0], along[1]), along[2])
+    depth = jnp.minimum(depth, jnp.swapaxes(depth, 0, 1))
+    size = sizes(tree)
+    share = depth / jnp.minimum(size[:, None], size[None])
+    return jnp.max(jnp.where(_counts(tree), share, -FAR), axis=(0, 1))
+
+
+def sizes(tree: Tree) -> jax.Array:
+    """Cube root [n, L] m of each block's volume."""
+    return 2 * jnp.cbrt(tree.half[:, 0] * tree.half[:, 1] * tree.half[:, 2])
+
+
+def _counts(tree: Tree) -> jax.Array:
+    """Return the pairs [n, n, L] of blocks with two joints or more between them."""
+    joint = tree.solid * tree.moves
+    between = abs(tree.above[:, None] - tree.above[None])
+    return (jnp.sum(between * joint, axis=2) > 1) & (tree.solid[:, None] * tree.solid[None] > 0)

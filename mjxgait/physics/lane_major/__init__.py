@@ -4,8 +4,8 @@ It supports trees of bodies with spheres and capsules that touch one floor. Anyt
 `UnsupportedModel`.
 """
 
-from mjxgait.physics.lane_major.kernel import one_kernel
+from mjxgait.physics.lane_major.lanes import one_kernel
+from mjxgait.physics.lane_major.model import UnsupportedModel
 from mjxgait.physics.lane_major.plant import FastPlant, fast_plant
-from mjxgait.physics.lane_major.support import UnsupportedModel
 
 __all__ = ["FastPlant", "UnsupportedModel", "fast_plant", "one_kernel"]

@@ -1,5 +1,9 @@
 """Contacts with the ground and joint limits as MuJoCo's soft constraints.
 
+Formulas: MuJoCo documentation, "Computation", sections "Constraint model" and "Contact", and MJX's
+constraint.py. Values of contacts are [C, L], of limits [M, L]; a contact's three directions are
+those of `frames`.
+
 A contact of MuJoCo's pyramidal cone has four edges, normal plus or minus friction times each
 tangent. Here it is kept in its three directions (normal, first, second tangent). Edges are
 combinations of these, and friction enters late. Values of all contacts lie side by side in arrays
@@ -7,29 +11,110 @@ combinations of these, and friction enters late. Values of all contacts lie side
 """
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import groupby
 from typing import Any, Protocol
 
 import jax
 import jax.numpy as jnp
+import mujoco
+import numpy as np
 
 from mjxgait.creature.ground.surface import Ground, contact
-from mjxgait.physics.lane_major.carriers import Carriers
 from mjxgait.physics.lane_major.dynamics import root_axes
-from mjxgait.physics.lane_major.footing import Footing, Moves, Touch
-from mjxgait.physics.lane_major.frames import (
+from mjxgait.physics.lane_major.footing import (
     Directions,
+    Footing,
     Frames,
     Level,
+    Moves,
     Tilted,
+    Touch,
     Turned,
 )
 from mjxgait.physics.lane_major.kinematics import Motion, Pose
-from mjxgait.physics.lane_major.lanes import Pin, add, turn
-from mjxgait.physics.lane_major.springs import Springs, contact_terms, limit_terms
+from mjxgait.physics.lane_major.lanes import Pin, Scalar, add, turn
+from mjxgait.physics.lane_major.parameters import Softness
 from mjxgait.physics.lane_major.structure import Structure, scalars
-from mjxgait.physics.lane_major.treematrix import Rows, Sparsity
+from mjxgait.physics.lane_major.treematrix import Carriers, Rows, Sparsity
+from mjxgait.types import Number
+
+SMALLEST_FRICTION = 1e-5
+"""mjMINMU, the lower bound of friction coefficients in MuJoCo's engine."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Springs:
+    """Springs of n constraints.
+
+    softness: [n, 1 or L]. powers: of the impedances, [n] or one for all.
+    inverse: [n, L] inverse mass that they hold.
+    """
+
+    softness: Softness
+    powers: Sequence[float]
+    inverse: Number
+
+
+def contact_terms(
+    springs: Springs,
+    distance: jax.Array,
+    friction: Number,
+    velocity: Directions,
+    pin: Pin,
+    impratio: Scalar = 1.0,
+) -> tuple[jax.Array, Directions, jax.Array]:
+    """Friction, reference and weight of contacts, see `Constraints`; velocity: of their points."""
+    mu = jnp.maximum(friction, SMALLEST_FRICTION)
+    stiffness, damping = springs.softness.stiffness, springs.softness.damping
+    impedance, depth = soften(springs.softness, springs.powers, distance)
+    # Regulariser of all edges (MJX `_efc_contact_pyramidal`): inverse mass along one, by friction.
+    inverse = springs.inverse * (1 + mu * mu) * 2 * mu * mu / impratio
+    normal, first, second = velocity
+    reference = (
+        -damping * normal - stiffness * impedance * depth,
+        -damping * first,
+        -damping * second,
+    )
+    return pin(mu), pin(reference), pin(_weight(impedance, depth, inverse))
+
+
+def limit_terms(
+    springs: Springs, over_low: Number, under_high: Number, velocity: jax.Array, pin: Pin
+) -> tuple[jax.Array, jax.Array, jax.Array]:
+    """Sign, reference and weight of limits, see `Constraints`, from the ways to both ends."""
+    sign = jnp.where(over_low < under_high, 1.0, -1.0)
+    stiffness, damping = springs.softness.stiffness, springs.softness.damping
+    nearer = jnp.minimum(over_low, under_high)
+    impedance, depth = soften(springs.softness, springs.powers, nearer)
+    reference = -damping * sign * velocity - stiffness * impedance * depth
+    return pin(sign), pin(reference), pin(_weight(impedance, depth, springs.inverse))
+
+
+def _weight(impedance: Any, depth: jax.Array, inverse: Number) -> jax.Array:
+    return jnp.where(
+        depth < 0, impedance / jnp.maximum(inverse * (1 - impedance), mujoco.mjMINVAL), 0.0
+    )
+
+
+def soften(
+    softness: Softness, powers: Sequence[float], distance: jax.Array
+) -> tuple[Any, jax.Array]:
+    """Impedance, and distance less margin (computation docs, "Impedance")."""
+    low, high, width, mid = (softness.impedance[:, n] for n in range(4))
+    power = np.array(powers, distance.dtype)[:, None]
+    depth = distance - softness.margin
+    x = jnp.minimum(jnp.abs(depth) / width, 1.0)
+    raised = _power(power)
+    y = jnp.where(
+        x < mid, raised(x) / raised(mid) * mid, 1 - raised(1 - x) / raised(1 - mid) * (1 - mid)
+    )
+    return low + y * (high - low), depth
+
+
+def _power(power: np.ndarray) -> Callable[..., jax.Array]:
+    """Power function; MuJoCo's default 2 needs no transcendental functions."""
+    return (lambda x: x * x) if np.all(power == 2) else (lambda x: jnp.power(x, power))
 
 
 class Limited(Protocol):

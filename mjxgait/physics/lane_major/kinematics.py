@@ -13,6 +13,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from mjxgait.physics.derived import single, whole
 from mjxgait.physics.lane_major.lanes import (
     Pin,
     Scalar,
@@ -21,6 +22,7 @@ from mjxgait.physics.lane_major.lanes import (
     axes,
     cross,
     mul,
+    pinned_by,
     plus,
     rotation,
     scale,
@@ -29,13 +31,8 @@ from mjxgait.physics.lane_major.lanes import (
     table,
     turn,
 )
-from mjxgait.physics.lane_major.slots import (
-    BALL,
-    FREE,
-    HINGE,
-    SLIDE,
-)
-from mjxgait.physics.lane_major.structure import Body, Joint, Structure
+from mjxgait.physics.lane_major.structure import Body, Joint, Structure, scalars
+from mjxgait.physics.lane_major.treematrix import BALL, FREE, HINGE, SLIDE
 
 UNITS: tuple[Vector, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 IDENTITY: Any = tuple(np.eye(3, dtype=np.float32)[:, j : j + 1] for j in range(3))
@@ -183,3 +180,41 @@ def _about(axis: Vector, sin: jax.Array, cos: jax.Array) -> list[tuple[Scalar, .
         )
 
     return [column(unit, axis[j]) for j, unit in enumerate(UNITS)]
+
+
+def bar_places(
+    structure: Structure, qpos: jax.Array, like: jax.Array
+) -> tuple[jax.Array, jax.Array]:
+    """Each bar's middle, from its tree's origin, and from there to one end: [S, 3, L] m.
+
+    Args:
+      qpos: [nq, L]. like: any finite [L].
+    """
+    poses, _ = posture(structure, qpos, pinned_by(like))
+    if structure.topology.open_pairs:
+        return _looked_up(structure, poses, like)
+    bodies = [poses[body] for body in structure.topology.bar_body]
+    bars = structure.exact.bars
+    middles = zip(bodies, scalars(bars.centre), strict=True)
+    ends = zip(bodies, scalars(bars.half), strict=True)
+    return (
+        table([pose.point(local) for pose, local in middles], like),
+        table([turn(pose.rot, local) for pose, local in ends], like),
+    )
+
+
+def _looked_up(
+    structure: Structure, poses: Sequence[Pose], like: jax.Array
+) -> tuple[jax.Array, jax.Array]:
+    """Look up the places of bars with body indices that are numbers of the program."""
+    bars = structure.exact.bars
+    assert bars.body is not None
+    body = whole(bars.body[..., 0])
+    places = table([pose.pos for pose in poses], like)[body]
+    axes = [table([pose.rot[j] for pose in poses], like)[body] for j in range(3)]
+
+    def turned(local: Any) -> jax.Array:
+        x, y, z = (single(local[:, j, None]) for j in range(3))
+        return axes[0] * x + axes[1] * y + axes[2] * z
+
+    return places + turned(bars.centre), turned(bars.half)

@@ -7,23 +7,25 @@ lane, the lanes are one more, innermost axis.
 
 import dataclasses
 
+import jax
+import jax.numpy as jnp
 import mujoco
 import numpy as np
 
 from mjxgait.creature import geometry
 from mjxgait.creature.overlap import Crossings
-from mjxgait.physics.lane_major.fused import Model, geom_weights
+from mjxgait.physics.derived import Bars, SenseLayout, read_bars, resized_bars, whole
 from mjxgait.physics.lane_major.lanes import columns, constants
-from mjxgait.physics.lane_major.slots import HINGE, SLIDE, Ends
-from mjxgait.physics.lane_major.softness import (
+from mjxgait.physics.lane_major.model import (
+    Model,
     Softened,
     contact_softness,
+    geom_weights,
     limit_softness,
     mixed,
 )
-from mjxgait.physics.lane_major.topology import contact_ends, joints_of, limited_joints
-from mjxgait.physics.layout import SenseLayout
-from mjxgait.physics.overlap import Bars, read_bars
+from mjxgait.physics.lane_major.topology import Topology, contact_ends, joints_of, limited_joints
+from mjxgait.physics.lane_major.treematrix import HINGE, SLIDE, Ends
 from mjxgait.types import Number, pytree
 
 
@@ -225,3 +227,46 @@ def _watched(model: Model, layout: SenseLayout) -> Watched:
         box=_snapped(box),
         ellipsoid=_snapped(ellipsoid),
     )
+
+
+def resized(topology: Topology, parameters: Parameters, factor: Number) -> Parameters:
+    """Multiply lengths by factor [B], masses by its cube, inertias by its fifth power.
+
+    The weights are not recomputed yet.
+    """
+    of_world = jnp.append(jnp.asarray(factor, jnp.float32), 1.0)
+    every = of_world[:-1]
+
+    def of(bodies: list[int]) -> Number:
+        return of_world[np.array(bodies, int)]
+
+    joints = [b for b, body in enumerate(topology.bodies) for _ in body.joints]
+    contact = of([slot.body for slot in topology.contacts])
+    seen = of([slot.body for slot in topology.watched])
+    old, contacts, watched = parameters, parameters.contacts, parameters.watched
+    return dataclasses.replace(
+        old,
+        pos=old.pos * of([body.parent for body in topology.bodies])[:, None],
+        mass=old.mass * every**3,
+        com=old.com * every[:, None],
+        inertia=old.inertia * every[:, None] ** 5,
+        joint_anchor=old.joint_anchor * of(joints)[:, None],
+        contacts=dataclasses.replace(
+            contacts, center=contacts.center * contact[:, None], radius=contacts.radius * contact
+        ),
+        watched=dataclasses.replace(
+            watched,
+            pos=watched.pos * seen[:, None],
+            radius=watched.radius * seen,
+            box=watched.box * seen[:, None],
+            ellipsoid=watched.ellipsoid * seen[:, None],
+        ),
+        bars=_bars_resized(topology, old.bars, of_world),
+    )
+
+
+def _bars_resized(topology: Topology, old: Bars, of_world: jax.Array) -> Bars:
+    if old.body is None or old.first is None or old.second is None:
+        factor = of_world[np.array(topology.bar_body, int)]
+        return resized_bars(old, topology.first, topology.second, factor)
+    return resized_bars(old, old.first, old.second, of_world[whole(old.body)])

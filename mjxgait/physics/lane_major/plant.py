@@ -12,20 +12,20 @@ import numpy as np
 
 from mjxgait.creature.ground.surface import Ground, clearance, height
 from mjxgait.creature.overlap import Crossings
+from mjxgait.physics.derived import OtherTopology, SenseLayout, deepest
 from mjxgait.physics.lane_major.constraints import make_constraints, touch
-from mjxgait.physics.lane_major.difference import difference
 from mjxgait.physics.lane_major.dynamics import (
     bias_force,
     inertias,
     mass_rows,
     motion_paths,
+    reweighed,
 )
 from mjxgait.physics.lane_major.footing import Touch
-from mjxgait.physics.lane_major.fused import fuse
-from mjxgait.physics.lane_major.kernel import one_kernel
 from mjxgait.physics.lane_major.kinematics import (
     WORLD,
     Pose,
+    bar_places,
     motions,
     posture,
     unit_quaternion,
@@ -35,6 +35,7 @@ from mjxgait.physics.lane_major.lanes import (
     column,
     cross,
     mul,
+    one_kernel,
     parts,
     pinned_by,
     sin_cos,
@@ -42,25 +43,21 @@ from mjxgait.physics.lane_major.lanes import (
     table,
     turn,
 )
+from mjxgait.physics.lane_major.model import UnsupportedModel, fuse
 from mjxgait.physics.lane_major.newton import Problem, constrained_acceleration
-from mjxgait.physics.lane_major.overlap import bar_places
-from mjxgait.physics.lane_major.parameters import Parameters, read_parameters
-from mjxgait.physics.lane_major.resized import resized
-from mjxgait.physics.lane_major.roomy import make_room
-from mjxgait.physics.lane_major.slots import BALL, FREE
+from mjxgait.physics.lane_major.padded import difference, make_room
+from mjxgait.physics.lane_major.parameters import Parameters, read_parameters, resized
 from mjxgait.physics.lane_major.structure import Geom, Structure, join
-from mjxgait.physics.lane_major.support import UnsupportedModel
 from mjxgait.physics.lane_major.topology import Topology, read_topology
 from mjxgait.physics.lane_major.treematrix import (
+    BALL,
+    FREE,
     Rows,
     factor,
     on_pivot,
     solve,
 )
 from mjxgait.physics.lane_major.water import fluid_force
-from mjxgait.physics.lane_major.weights import reweighed
-from mjxgait.physics.layout import OtherTopology, SenseLayout
-from mjxgait.physics.overlap import deepest
 from mjxgait.types import (
     BodyState,
     Number,

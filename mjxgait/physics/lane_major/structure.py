@@ -13,12 +13,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from mjxgait.creature import geometry
-from mjxgait.physics.lane_major.carriers import Carriers
 from mjxgait.physics.lane_major.lanes import Scalar, Vector
 from mjxgait.physics.lane_major.parameters import Parameters
-from mjxgait.physics.lane_major.slots import ANY, ContactSlot, LimitSlot
 from mjxgait.physics.lane_major.topology import Topology
-from mjxgait.physics.lane_major.treematrix import Sparsity
+from mjxgait.physics.lane_major.treematrix import ANY, Carriers, ContactSlot, LimitSlot, Sparsity
 from mjxgait.types import Number
 
 Frame = tuple[Vector, ...]

@@ -11,21 +11,28 @@ import mujoco
 import numpy as np
 
 from mjxgait.creature.overlap import Crossings
-from mjxgait.physics.lane_major.carriers import Carriers, find_carriers
-from mjxgait.physics.lane_major.fused import Fused, Model
-from mjxgait.physics.lane_major.slots import (
+from mjxgait.physics.derived import SenseLayout
+from mjxgait.physics.lane_major.model import (
+    CAPSULE,
+    Fused,
+    Model,
+    check_supported,
+    contact_softness,
+    limit_softness,
+)
+from mjxgait.physics.lane_major.treematrix import (
     FREEDOMS,
     BodySlot,
+    Carriers,
     ContactSlot,
     Ends,
     JointSlot,
     LimitSlot,
+    Sparsity,
     WatchedSlot,
+    find_carriers,
+    sparsity,
 )
-from mjxgait.physics.lane_major.softness import contact_softness, limit_softness
-from mjxgait.physics.lane_major.support import CAPSULE, check_supported
-from mjxgait.physics.lane_major.treematrix import Sparsity, sparsity
-from mjxgait.physics.layout import SenseLayout
 
 
 @dataclasses.dataclass(frozen=True)

@@ -8,14 +8,14 @@ KINDS = (
         "limbo",
         __name__,
         task="limbo:Limbo",
-        criteria="limbo_criteria:LimboDemands",
+        criteria="criteria:LimboDemands",
         tables=("limbo",),
     ),
     TaskKind(
         "travel",
         __name__,
-        task="travel:Travel",
-        criteria="travel_criteria:TravelDemands",
+        task="task:Travel",
+        criteria="criteria:TravelDemands",
         tables=("travel",),
     ),
 )

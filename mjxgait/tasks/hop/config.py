@@ -5,13 +5,7 @@ from typing import Annotated
 
 import pydantic
 
-from mjxgait.config.tables import (
-    SHAPE,
-    STRICT,
-    Finite,
-    NonNegative,
-    Whole,
-)
+from mjxgait.config.tables import SHAPE, STRICT, Finite, NonNegative, Positive, Whole
 
 GOALS = (0.4, 2.0)
 """Nearest and farthest goal, in m ahead of the start."""
@@ -26,7 +20,7 @@ OnTheWay = Annotated[float, pydantic.Field(gt=0, lt=1)]
 class HopWeights:
     """Weight of each fitness term; all are penalties.
 
-    mjxgait/tasks/hop/fitness.py has the exact definitions. As long as the style terms, all but
+    mjxgait/tasks/hop/stats.py has the exact definitions. As long as the style terms, all but
     `distance` and `missed`, sum up to less than `distance`, getting nearer pays despite its style.
 
     Attributes:
@@ -122,3 +116,45 @@ class TravelConfig(GoalConfig):
 
     __pydantic_config__ = STRICT
     weights: TravelWeights = dataclasses.field(default_factory=TravelWeights)
+
+
+BAR_PLACE = 0.6
+"""m ahead of the start; the bar lies across the path and has no ends."""
+BAR_RADIUS = 0.01
+"""m."""
+LIMBO_GOALS = (1.0, 2.0)
+"""m ahead of the start, as in `hop.config`; at any goal the whole body is beyond the bar."""
+LIMBO_NOMINAL_GOAL = 1.4
+"""Goal of the undisturbed trial, in m."""
+
+
+@dataclasses.dataclass(frozen=True)
+class LimboWeights(HopWeights):
+    """See `HopWeights`.
+
+    Attributes:
+      bar: greatest depth in the bar and in the space above it.
+    """
+
+    __pydantic_config__ = STRICT
+    distance: Finite = 1.5
+    bar: Finite = 0.5
+
+
+@dataclasses.dataclass(frozen=True)
+class LimboConfig(HopConfig):
+    """Parameters of the limbo fitness.
+
+    Attributes:
+      height: m, of the bar's lower edge above the floor.
+      higher: m by which the bar is higher in the first generation.
+      lowering: steps in which the bar comes down from there, one after each generation in which the
+        best individuals have mastered the current height.
+      weights: weight of each term.
+    """
+
+    __pydantic_config__ = STRICT
+    height: Positive = 0.35
+    higher: NonNegative = 0.12
+    lowering: Whole = 12
+    weights: LimboWeights = dataclasses.field(default_factory=LimboWeights)

@@ -1,20 +1,95 @@
-"""Acceptance criteria for hopping: reach the goal, wherever it is, and stay."""
+"""Acceptance criteria of the tasks with a goal: hop, limbo, travel."""
 
+import abc
+import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
+from mjxgait.certification.acceptance import Unasked, to_the_end
 from mjxgait.certification.config import CertificateConfig
-from mjxgait.certification.criteria import Criterion, at_most
-from mjxgait.certification.describe import worst_overlap
-from mjxgait.certification.tasks.staying import to_the_end
+from mjxgait.certification.criteria import Criterion, at_least, at_most, parts, physics
+from mjxgait.certification.describe import buzz, worst_overlap
+from mjxgait.champion import Champion
 from mjxgait.creature import Creature
 from mjxgait.reference.measure import Recording
-from mjxgait.reference.outcome import Outcome
+from mjxgait.reference.outcome import Fall, Outcome
 from mjxgait.reference.starts import Starts
-from mjxgait.tasks.hop.goal_criteria import GoalDemands
-from mjxgait.tasks.hop.thresholds import HopConfig
+from mjxgait.tasks.hop.thresholds import GoalConfig, HopConfig, LimboConfig, TravelConfig
+
+HIGHEST = 1e3
+"""Height limit in standing heights: a hopping trunk may be anywhere, but no part may lie."""
+
+
+class GoalDemands(Unasked, abc.ABC):
+    """See `Demands`. Pushes decide nothing: in half of a hop the body cannot react."""
+
+    drag: float = 0.0
+    pushed: bool = True
+    by_pushes: bool = False
+    grown: bool = False
+    leaps: bool = False
+    worth: float = 1.0
+    share: str
+    """Name of the share in criterion 4."""
+
+    @abc.abstractmethod
+    def wanted(self, config: CertificateConfig) -> GoalConfig:
+        """Thresholds of this task."""
+
+    @abc.abstractmethod
+    def second(self, whole: Recording, config: CertificateConfig) -> Criterion:
+        """Criterion 2: progress on the way."""
+
+    def fall(self, config: CertificateConfig) -> Fall:
+        """See `Demands`: a head or an elbow on the floor, or a base on its edge."""
+        return Fall(min_up=self.wanted(config).min_up, height=(0.0, HIGHEST), touch=True)
+
+    def aimed(
+        self, starts: Starts, config: CertificateConfig, rng: np.random.Generator | None = None
+    ) -> Starts:
+        """See `Demands`: a goal for each simulation without one."""
+        wanted = self.wanted(config)
+        drawn = wanted.nominal if rng is None else rng.uniform(*wanted.goals, len(starts))
+        return dataclasses.replace(starts, goal=np.where(starts.goal > 0, starts.goal, drawn))
+
+    def undisturbed(
+        self, whole: Recording, halved: Recording, config: CertificateConfig
+    ) -> tuple[Criterion, ...]:
+        """See `Demands`: 1 and 2, both at half the time step too, 8, 9; without a warm-up."""
+        basic, repeated = (self.basic(each, config) for each in (whole, halved))
+        failed = sum(not m.passed for c in repeated for m in c.measures)
+        of = " and ".join(str(c.number) for c in basic)
+        return (
+            *basic,
+            Criterion(6, "half the time step", (at_most(f"failures in {of}", failed, 0.0),)),
+            physics(whole, config.physics),
+            parts(whole, config.parts),
+        )
+
+    def kept(
+        self, champion: Champion, whole: Recording, config: CertificateConfig
+    ) -> tuple[Criterion, ...]:
+        """See `Demands`: evolution has promised nothing."""
+        return ()
+
+    def onward(self, goal: np.ndarray, first: np.ndarray, way: np.ndarray) -> np.ndarray:
+        """See `Demands`: the same."""
+        return goal
+
+    def disturbed(
+        self, started: float, pushed: float, config: CertificateConfig
+    ) -> tuple[Criterion, ...]:
+        """See `Demands`: 4. The effect of pushes is only reported."""
+        share = at_least(self.share, started, self.wanted(config).arrive, 1.0)
+        return (Criterion(4, "perturbed starts and other goals", (share,)),)
+
+    def basic(self, whole: Recording, config: CertificateConfig) -> tuple[Criterion, ...]:
+        """Criteria of one recording, at any time step: 1 and 2."""
+        up = at_least("least upright", whole.trunk_up.min(), self.wanted(config).min_up, 1.0)
+        lies = at_most("time on wrong parts", whole.touch.mean(), 0.0)
+        return (Criterion(1, "stays up", (up, lies)), self.second(whole, config))
 
 
 class HopDemands(GoalDemands):
@@ -108,3 +183,134 @@ def farthest(left: np.ndarray, goal: np.ndarray, frames: int) -> np.ndarray:
 def frames_in(seconds: float, time_step: float) -> int:
     """Number of frames in this time, at least one."""
     return max(round(seconds / time_step), 1)
+
+
+ENOUGH = 0.01
+"""m; more clearance is no better."""
+
+
+class LimboDemands(HopDemands):
+    """See `Demands`. Goals lie beyond the bar, so arrival implies passing it."""
+
+    verdict = "it gets to its goal beneath the bar and stays"
+
+    def wanted(self, config: CertificateConfig) -> LimboConfig:
+        """See `GoalDemands`."""
+        return config.limbo
+
+    def aimed(
+        self, starts: Starts, config: CertificateConfig, rng: np.random.Generator | None = None
+    ) -> Starts:
+        """See `Demands`: a goal and a bar for each simulation without one."""
+        bar = np.array([config.limbo.place, config.limbo.height])
+        given = np.where(np.isfinite(starts.bar), starts.bar, bar)
+        return dataclasses.replace(super().aimed(starts, config, rng), bar=given)
+
+    def succeeded(self, outcome: Outcome, starts: Starts, config: CertificateConfig) -> np.ndarray:
+        """See `Demands`: those that stayed up and clear, arrived, and stayed there."""
+        clear: np.ndarray = outcome.clearance > config.limbo.clearance
+        return super().succeeded(outcome, starts, config) & clear
+
+    def lost(self, outcome: Outcome, starts: Starts, steps: int) -> np.ndarray:
+        """See `Demands`: as for hopping, and any contact with the bar."""
+        touched = outcome.clearance <= CertificateConfig().limbo.clearance
+        return super().lost(outcome, starts, steps) | touched
+
+    def basic(self, whole: Recording, config: CertificateConfig) -> tuple[Criterion, ...]:
+        """See `GoalDemands`: 1, 2 and 3."""
+        least, room = _least(whole), config.limbo.clearance
+        clear = at_least("least clearance (m)", least, room, room + ENOUGH)
+        return (*super().basic(whole, config), Criterion(3, "clear of the bar", (clear,)))
+
+    def report(self, whole: Recording, config: CertificateConfig) -> dict[str, Any]:
+        """See `Demands`: as for hopping, and the least clearance."""
+        told = super().report(whole, config)
+        least = _least(whole)
+        bar = f"a bar {config.limbo.height:g} m high {'cleared' if least > 0 else 'touched'}"
+        return told | {"clearance": least, "summary": f"{told['summary']}; {bar}"}
+
+    def managed(
+        self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
+    ) -> np.ndarray:
+        """See `Demands`: as for hopping, and clear of the bar of the certification.
+
+        The bar in evolution may be lower.
+        """
+        clear = outcome["bar"] <= CertificateConfig().limbo.height
+        return super().managed(outcome, seconds, creature) & clear
+
+
+def _least(whole: Recording) -> float:
+    """Least clearance in m over all frames; NaN if one is NaN, or if none was recorded."""
+    return np.nan if whole.clearance is None else float(whole.clearance.min())
+
+
+NEAR = 0.05
+"""Share of the goal spacing within which a goal counts as reached (docs/hop.md)."""
+
+
+class TravelDemands(GoalDemands):
+    """See `Demands`. A goal that is near, or passed, moves on by its first distance."""
+
+    verdict = "it travels from goal to goal"
+    share = "share that travels"
+    revision = 1
+    """A criterion for vibration was added."""
+
+    def wanted(self, config: CertificateConfig) -> TravelConfig:
+        """See `GoalDemands`."""
+        return config.travel
+
+    def onward(self, goal: np.ndarray, first: np.ndarray, way: np.ndarray) -> np.ndarray:
+        """See `Demands`."""
+        reached = goal - way <= NEAR * first
+        return np.where(reached, goal + first, goal)
+
+    def succeeded(self, outcome: Outcome, starts: Starts, config: CertificateConfig) -> np.ndarray:
+        """See `Demands`: those that stayed up and were fast enough."""
+        seconds = outcome.path.shape[1] * outcome.trajectory.time_step
+        return outcome.stayed_up & (outcome.path[:, -1] >= config.travel.speed * seconds)
+
+    def second(self, whole: Recording, config: CertificateConfig) -> Criterion:
+        """See `GoalDemands`: fast enough, and not much slower in the second half."""
+        wanted = config.travel
+        way = whole.trunk_pos[:, 0]
+        half, seconds = len(way) // 2, len(way) * whole.time_step
+        kept = (way[-1] - way[half]) / way[half] if way[half] > 0 else np.nan
+        return Criterion(
+            2,
+            "travels",
+            (
+                at_least("speed (m/s)", way[-1] / seconds, wanted.speed),
+                at_least("second half's speed / first", kept, wanted.second_half, 1.0),
+            ),
+        )
+
+    def undisturbed(
+        self, whole: Recording, halved: Recording, config: CertificateConfig
+    ) -> tuple[Criterion, ...]:
+        """See `Demands`: as for all tasks with a goal, and 7: no motion by vibration."""
+        shakes = at_most("buzz of a joint / joint speed", buzz(whole), config.gait.buzz)
+        return (*super().undisturbed(whole, halved, config), Criterion(7, "gait", (shakes,)))
+
+    def report(self, whole: Recording, config: CertificateConfig) -> dict[str, Any]:
+        """See `Demands`: distance travelled, and number of goals."""
+        way, goal, goals = whole.trunk_pos[:, 0], np.array(whole.goal), 0
+        for place in np.maximum.accumulate(way):
+            ahead = self.onward(goal, np.array(whole.goal), place)
+            goals, goal = goals + int(ahead > goal), ahead
+        seconds = len(way) * whole.time_step
+        return {
+            "goal": whole.goal,
+            "goals": goals,
+            "way": float(way[-1]),
+            "overlap": worst_overlap(whole),
+            "summary": f"{way[-1]:.2f} m and {goals} goals in {seconds:g} s",
+        }
+
+    def managed(
+        self, outcome: Mapping[str, np.ndarray], seconds: float, creature: Creature
+    ) -> np.ndarray:
+        """See `Demands`: no early end, and fast enough."""
+        fast: np.ndarray = outcome["way"] >= CertificateConfig().travel.speed * seconds
+        return to_the_end(outcome, seconds, creature) & fast

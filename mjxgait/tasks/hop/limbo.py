@@ -6,19 +6,55 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
-from mjxgait.config.rollout import RolloutConfig
+from mjxgait.config.schema import RolloutConfig
+from mjxgait.controllers.observations import forward_way
 from mjxgait.creature import Creature
+from mjxgait.creature.body import Body
 from mjxgait.creature.ground.spec import parse_ground
 from mjxgait.errors import UserError
+from mjxgait.tasks.base import ramped
 from mjxgait.tasks.hop import stats as hop
-from mjxgait.tasks.hop.bar import bar_distance, intrusion
-from mjxgait.tasks.hop.fitness import MISSED, fitness_terms
-from mjxgait.tasks.hop.limbo_config import GOALS, NOMINAL_GOAL, LimboConfig
+from mjxgait.tasks.hop.config import (
+    BAR_PLACE,
+    BAR_RADIUS,
+    LIMBO_GOALS,
+    LIMBO_NOMINAL_GOAL,
+    LimboConfig,
+)
+from mjxgait.tasks.hop.stats import MISSED, fitness_terms
 from mjxgait.tasks.hop.task import Hop
-from mjxgait.tasks.score import ramped
 from mjxgait.tasks.starts import Starts
 from mjxgait.types import Sensed, pytree
+
+SLOPES = np.tan(np.radians(np.arange(-80, 81, 10))).astype(np.float32)[:, None]
+"""Slopes [slopes, 1] of the lines that are laid on the body from above."""
+MARGIN = 0.01
+"""Required margin in m: decorative parts stick out of the watched geoms."""
+
+
+def bar_distance(creature: Body, sensed: Sensed) -> jax.Array:
+    """Distance [] in m to the bar along the start's forward axis; negative beyond it."""
+    return BAR_PLACE - forward_way(creature, sensed)
+
+
+def intrusion(creature: Body, sensed: Sensed, height: jax.Array | float) -> jax.Array:
+    """Height [] in m of the body's hull above a bar of this height [] m, at the bar.
+
+    The hull is that of the watched geoms, each taken as a ball of the same height; rods and springs
+    that join them lie within. It is the space below all lines that rest on it from above, of which
+    some are laid (`SLOPES`). Where they miss an edge, the hull is slightly too large. Flying over
+    the bar counts no less than running into it. The floor must be the plane z = 0.
+    """
+    forward, _ = creature.frame.start_axes
+    from_trunk = (sensed.geom_pos - sensed.trunk_pos) @ forward
+    ahead, up = from_trunk - bar_distance(creature, sensed), sensed.geom_pos[:, 2]
+    radius = up - sensed.geom_low + (BAR_RADIUS + MARGIN)
+    lines = up - SLOPES * ahead + jnp.sqrt(1 + SLOPES**2) * radius
+    top = jnp.min(jnp.max(lines, axis=1))
+    return jnp.maximum(top - (height + BAR_RADIUS), 0.0)
+
 
 DEEP = 0.3
 """Depth in the bar, in hip heights, at which the penalty is full."""
@@ -65,7 +101,7 @@ class Limbo(Hop):
     outcomes = (*Hop.outcomes, "bar")
     adds = (*Hop.adds, "bar_distance")
     climbs = True
-    goals, nominal = GOALS, NOMINAL_GOAL
+    goals, nominal = LIMBO_GOALS, LIMBO_NOMINAL_GOAL
 
     def trials(self, key: jax.Array, creature: Creature, settings: RolloutConfig) -> Starts:
         """See `Task`.

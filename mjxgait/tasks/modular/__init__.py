@@ -6,17 +6,15 @@ from mjxgait.kinds import TaskKind
 
 _kind = partial(TaskKind, home=__name__, modular=True)
 KINDS = (
-    _kind(
-        "swim", task="swim:Swim", criteria="swim_criteria:SwimDemands", water=True, tables=("swim",)
-    ),
+    _kind("swim", task="task:Swim", criteria="criteria:SwimDemands", water=True, tables=("swim",)),
     _kind(
         "roam",
-        task="roam:Roam",
-        criteria="roam_criteria:RoamDemands",
+        task="task:Roam",
+        criteria="criteria:RoamDemands",
         called="walk",
         tables=("roam",),
     ),
-    _kind("jump", task="jump:Jump", criteria="jump_criteria:JumpDemands", tables=("jump",)),
+    _kind("jump", task="task:Jump", criteria="criteria:JumpDemands", tables=("jump",)),
     _kind(
         "follow",
         task="follow:FollowInWater",

@@ -1,6 +1,8 @@
-"""Acceptance criteria common to modular bodies: the result of evolution, within physical limits.
+"""Acceptance criteria for modular bodies: swim, roam, jump, within physical limits.
 
 Letters: `T` frames.
+
+Letters: `T` frames, `P` spans of time.
 """
 
 import abc
@@ -9,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from mjxgait.certification.acceptance import StaysUp, to_the_end
 from mjxgait.certification.config import CertificateConfig
 from mjxgait.certification.criteria import (
     Criterion,
@@ -19,14 +22,20 @@ from mjxgait.certification.criteria import (
     steady,
 )
 from mjxgait.certification.describe import worst_overlap
-from mjxgait.certification.tasks.staying import StaysUp, to_the_end
 from mjxgait.champion import Champion
+from mjxgait.controllers.sims_brain.reference_body import DRAG
 from mjxgait.creature import Creature
-from mjxgait.reference.grown import Grown
 from mjxgait.reference.measure import Recording
 from mjxgait.reference.outcome import Fall, Outcome
+from mjxgait.reference.sight import Grown
 from mjxgait.reference.starts import Starts
-from mjxgait.tasks.modular.thresholds import BlocksConfig, GoingConfig
+from mjxgait.tasks.modular.thresholds import (
+    BlocksConfig,
+    GoingConfig,
+    JumpConfig,
+    RoamConfig,
+    SwimConfig,
+)
 
 UNITS = {"speed": "m/s", "height": "m"}
 
@@ -247,3 +256,100 @@ def seen(recording: Recording) -> Grown:
     """Recorded data of a modular body."""
     assert recording.grown is not None
     return recording.grown
+
+
+class SwimDemands(GoingDemands):
+    """See `Demands`. In water there is no up."""
+
+    verdict = "it swims"
+    verb = "swims"
+    drag = DRAG
+
+    def wanted(self, config: CertificateConfig) -> SwimConfig:
+        """See `GoingDemands`."""
+        return config.swim
+
+    def alone(self, window: Recording, config: CertificateConfig) -> tuple[Criterion, ...]:
+        """See `GoingDemands`: 11, the source of the momentum."""
+        return (by_water(window, config.swim),)
+
+
+def by_water(window: Recording, config: SwimConfig) -> Criterion:
+    """11. All momentum comes from the water: not from elsewhere, nor from the error of a step."""
+    water = seen(window)
+    given = np.cumsum(water.push[:-1], axis=0) * window.time_step
+    lacking = np.linalg.norm(water.momentum[1:] - water.momentum[0] - given, axis=1)
+    exchanged = np.linalg.norm(water.push, axis=1).sum() * window.time_step
+    share = lacking.max() / exchanged if exchanged > 0 else np.nan
+    measure = at_most("momentum from elsewhere / exchanged", share, config.elsewhere)
+    return Criterion(11, "by water alone", (measure,))
+
+
+class RoamDemands(GoingDemands):
+    """See `Demands`. Only level distance counts: leaping up gains nothing."""
+
+    verdict = "it walks"
+    verb = "walks"
+    axes = 2
+
+    def wanted(self, config: CertificateConfig) -> RoamConfig:
+        """See `GoingDemands`."""
+        return config.roam
+
+    def alone(self, window: Recording, config: CertificateConfig) -> tuple[Criterion, ...]:
+        """See `GoingDemands`: 1, the side that was up after settling stays up."""
+        return (balanced(window, config.roam),)
+
+
+def balanced(window: Recording, config: RoamConfig) -> Criterion:
+    """1. The body does not tip over from its settled attitude."""
+    up = np.stack([-np.sin(window.pitch), np.sin(window.roll), window.trunk_up], axis=1)
+    upright = (up @ up[0]).min()
+    return Criterion(1, "balance", (at_least("least upright", upright, config.min_up, 1.0),))
+
+
+SPAN = 2.0
+"""Length of a span in s; the body must jump in each. A single highest leap is chance."""
+
+
+class JumpDemands(BlocksDemands):
+    """See `Demands`: it jumps again and again, from perturbed starts too."""
+
+    verdict = "it jumps"
+    verb = "jumps"
+    promised = evidence = "height"
+    leaps = True
+
+    def wanted(self, config: CertificateConfig) -> JumpConfig:
+        """See `BlocksDemands`."""
+        return config.jump
+
+    def second(self, window: Recording, config: CertificateConfig) -> Criterion:
+        """See `BlocksDemands`."""
+        height = at_least("height of the lowest part (m)", self.done(window), config.jump.height)
+        return Criterion(2, "jumps", (height,))
+
+    def done(self, window: Recording) -> float:
+        """See `BlocksDemands`: m, of the lowest part at the best moment, mean of the spans."""
+        return float(np.mean(highest(seen(window).low, window.time_step)))
+
+    def promise(self, champion: Champion, seconds: float, config: CertificateConfig) -> float:
+        """See `BlocksDemands`: for the undisturbed trial, not for all."""
+        return float(champion.origin.get("nominal", {}).get("height", np.nan))
+
+    def succeeded(self, outcome: Outcome, starts: Starts, config: CertificateConfig) -> np.ndarray:
+        """See `Demands`: those with a high enough leap in the median span."""
+        low = counted(outcome.low, outcome, config)
+        middling = np.median(highest(low, outcome.trajectory.time_step), axis=-1)
+        return outcome.stayed_up & (middling >= config.jump.height)
+
+    def enough(self, seconds: float, config: CertificateConfig) -> float:
+        """See `BlocksDemands`: m, a quarter above the threshold."""
+        return 1.25 * config.jump.height
+
+
+def highest(low: np.ndarray, time_step: float) -> np.ndarray:
+    """Greatest height [..., P] in m of the lowest part in each span; low: [..., T] m."""
+    count = max(round(low.shape[-1] * time_step / SPAN), 1)
+    spans = np.array_split(low, count, axis=-1)
+    return np.stack([np.maximum(span.max(axis=-1), 0.0) for span in spans], axis=-1)

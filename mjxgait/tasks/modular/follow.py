@@ -12,12 +12,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from mjxgait.config.rollout import RolloutConfig
-from mjxgait.controllers.sims_brain.reference_body.material import LIGHT
+from mjxgait.config.schema import RolloutConfig
+from mjxgait.controllers.sims_brain.reference_body import LIGHT
 from mjxgait.creature import Creature
-from mjxgait.tasks.modular.roam import Roam
-from mjxgait.tasks.modular.swim import Swim
-from mjxgait.tasks.modular.task import GoingTask, length
+from mjxgait.tasks.modular.task import GoingTask, Roam, Swim, length
 from mjxgait.tasks.starts import Starts
 from mjxgait.types import Sensed
 

@@ -7,13 +7,11 @@ import numpy as np
 from mjxgait.certification.config import CertificateConfig
 from mjxgait.certification.criteria import Criterion, at_least
 from mjxgait.champion import Champion
-from mjxgait.controllers.sims_brain.reference_body.material import DRAG, LIGHT
+from mjxgait.controllers.sims_brain.reference_body import DRAG, LIGHT
 from mjxgait.reference.measure import Recording
 from mjxgait.reference.outcome import Outcome
 from mjxgait.reference.starts import Starts
-from mjxgait.tasks.modular.criteria import BlocksDemands, counted, seen
-from mjxgait.tasks.modular.roam_criteria import balanced
-from mjxgait.tasks.modular.swim_criteria import by_water
+from mjxgait.tasks.modular.criteria import BlocksDemands, balanced, by_water, counted, seen
 from mjxgait.tasks.modular.thresholds import FollowConfig
 
 

@@ -1,7 +1,10 @@
-"""Base classes of the tasks for modular bodies: start at rest, any plausible motion counts.
+"""Tasks for modular bodies: swim, roam, jump; start at rest, any plausible motion counts.
 
 Physically implausible motion ends the episode. Nothing counts until the body has settled. A way is
 that of the centre of mass: bending moves the root, but not the whole body.
+
+Falling over also covers distance, once. So distance counts only after settling, and tipping over
+from there costs.
 """
 
 import dataclasses
@@ -12,13 +15,20 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from mjxgait.config.rollout import RolloutConfig
+from mjxgait.config.schema import RolloutConfig
 from mjxgait.creature import Creature
 from mjxgait.tasks import base as protocol
-from mjxgait.tasks.base import FINISHED
-from mjxgait.tasks.modular.config import BlocksConfig
+from mjxgait.tasks.base import FINISHED, ramp
+from mjxgait.tasks.modular.config import (
+    BlocksConfig,
+    JumpConfig,
+    JumpWeights,
+    RoamConfig,
+    RoamWeights,
+    SwimConfig,
+    SwimWeights,
+)
 from mjxgait.tasks.plain import PlainTask
-from mjxgait.tasks.score import ramp
 from mjxgait.tasks.starts import NEVER, Starts
 from mjxgait.types import Sensed, pytree
 
@@ -141,3 +151,190 @@ def length(vector: jax.Array) -> jax.Array:
 def lost(much: jax.Array) -> jax.Array:
     """Share lost to a flaw of this size; one half at 1."""
     return 1 - 1 / (1 + much * much)
+
+
+LITTLE = 1e-6
+"""Lower bound of the momentum exchanged with the water, in kg·m/s."""
+
+
+@pytree
+class SwimTally(Tally):
+    """See `alive.Tally`.
+
+    began: [3] kg·m/s, momentum of the body when counting began.
+    given: [3] kg·m/s, from the water since then. exchanged: [] the same without directions.
+    lacking: [] kg·m/s, the most that the water did not give.
+    """
+
+    began: jax.Array
+    given: jax.Array
+    exchanged: jax.Array
+    lacking: jax.Array
+
+
+class Swim(GoingTask):
+    """See `Task`: in water, without a floor. The way is a straight line."""
+
+    Settings: ClassVar[type] = SwimConfig
+    terms = tuple(field.name for field in dataclasses.fields(SwimWeights))
+
+    def init(self) -> SwimTally:
+        """See `Task`."""
+        nothing, nowhere = jnp.zeros(()), jnp.zeros(3)
+        return SwimTally(
+            **self.begun(), began=nowhere, given=nowhere, exchanged=nothing, lacking=nothing
+        )
+
+    def update(
+        self, tally: SwimTally, sensed: Sensed, torque: jax.Array, standards: Any, aim: Any
+    ) -> SwimTally:
+        """See `Task`."""
+        assert sensed.momentum is not None
+        assert sensed.washed is not None
+        begins, momentum, push = (
+            tally.steps <= standards,
+            sensed.momentum,
+            sensed.washed * self.step,
+        )
+        began = jnp.where(begins, momentum, tally.began)
+        given = jnp.where(begins, 0.0, tally.given)
+        lacking = jnp.where(
+            begins, 0.0, jnp.maximum(tally.lacking, length(momentum - began - given))
+        )
+        return dataclasses.replace(
+            super().update(tally, sensed, torque, standards, aim),
+            began=began,
+            given=given + push,
+            exchanged=jnp.where(begins, 0.0, tally.exchanged) + length(push),
+            lacking=lacking,
+        )
+
+    def judge(self, tally: SwimTally, settings: SwimConfig) -> Mapping[str, jax.Array]:
+        """See `Task`: the speed; its loss by overlap; the loss of the rest by foreign momentum."""
+        speed = self.speed(tally, settings)
+        earned = jnp.maximum(speed, 0.0)
+        inside = lost(tally.overlap / settings.overlap)
+        share = tally.lacking / jnp.maximum(tally.exchanged, LITTLE)
+        elsewhere = (1 - inside) * lost(share / settings.elsewhere)
+        return {"speed": speed, "overlap": earned * inside, "elsewhere": earned * elsewhere}
+
+
+@pytree
+class RoamTally(Tally):
+    """See `alive.Tally`.
+
+    upwards: [3] direction in the root's axes that was up when counting began.
+    upright: [] least cosine of its angle with the world's up axis since then.
+    """
+
+    upwards: jax.Array
+    upright: jax.Array
+
+
+class Roam(GoingTask):
+    """See `Task`: on land. The way is a straight, level line."""
+
+    Settings: ClassVar[type] = RoamConfig
+    terms = tuple(field.name for field in dataclasses.fields(RoamWeights))
+    axes = 2
+
+    def init(self) -> RoamTally:
+        """See `Task`."""
+        return RoamTally(**self.begun(), upwards=jnp.zeros(3), upright=jnp.ones(()))
+
+    def update(
+        self, tally: RoamTally, sensed: Sensed, torque: jax.Array, standards: Any, aim: Any
+    ) -> RoamTally:
+        """See `Task`."""
+        assert sensed.sunk is not None
+        begins = tally.steps <= standards
+        upwards = jnp.where(begins, sensed.trunk_rot[2], tally.upwards)
+        upright = jnp.sum(sensed.trunk_rot[2] * upwards)
+        return dataclasses.replace(
+            super().update(tally, sensed, torque, standards, aim),
+            overlap=jnp.where(begins, tally.overlap, jnp.maximum(tally.overlap, sensed.sunk)),
+            upwards=upwards,
+            upright=jnp.where(begins, 1.0, jnp.minimum(tally.upright, upright)),
+        )
+
+    def judge(self, tally: RoamTally, settings: RoamConfig) -> Mapping[str, jax.Array]:
+        """See `Task`: the speed; its loss by overlap; the loss of the rest by tipping over.
+
+        Blocks overlap each other or the ground.
+        """
+        speed = self.speed(tally, settings)
+        earned = jnp.maximum(speed, 0.0)
+        inside = lost(tally.overlap / settings.overlap)
+        tilt = jnp.degrees(jnp.arccos(jnp.clip(tally.upright, -1.0, 1.0)))
+        tipped = (1 - inside) * lost(tilt / settings.tilt)
+        return {"speed": speed, "overlap": earned * inside, "balance": earned * tipped}
+
+
+SHARPNESS = 3
+"""Exponent of the cost of depth: small depths cost less than in walking, large ones more.
+
+A fall presses the body into the ground for a moment, to a depth that grows as the square root of
+its height. At the cost of walking no jump above a tenth of a metre would be worth more.
+"""
+
+
+SPANS = 2
+"""Spans of the time that counts; the body must jump in each.
+
+Once in eight seconds some individual leaves the ground by chance, as high as real jumpers, and only
+in the trial that it was selected by.
+"""
+
+
+@pytree
+class JumpTally(protocol.Tally):
+    """See `protocol.Tally`. heights: [SPANS] m, greatest height of the lowest part in each."""
+
+    heights: jax.Array
+
+
+class Jump(BlocksTask):
+    """See `Task`: on land."""
+
+    Settings: ClassVar[type] = JumpConfig
+    terms = tuple(field.name for field in dataclasses.fields(JumpWeights))
+    outcomes = ("height", "seconds")
+
+    def init(self) -> JumpTally:
+        """See `Task`."""
+        none = jnp.zeros((), jnp.int32)
+        return JumpTally(none, none, jnp.zeros(()), jnp.zeros(SPANS))
+
+    def update(
+        self, tally: JumpTally, sensed: Sensed, torque: jax.Array, standards: Any, aim: Any
+    ) -> JumpTally:
+        """See `Task`."""
+        assert sensed.sunk is not None
+        begins, low = tally.steps <= standards, jnp.min(sensed.geom_low)
+        span = SPANS * (tally.steps - standards) // jnp.maximum(self.horizon - standards, 1)
+        now = (jnp.arange(SPANS) == span) & ~begins
+        return dataclasses.replace(
+            tally,
+            steps=tally.steps + 1,
+            overlap=jnp.where(begins, tally.overlap, jnp.maximum(tally.overlap, sensed.sunk)),
+            heights=jnp.where(now, jnp.maximum(tally.heights, low), tally.heights),
+        )
+
+    def judge(self, tally: JumpTally, settings: JumpConfig) -> Mapping[str, jax.Array]:
+        """See `Task`: m; its loss by overlap; the loss of the rest by an early end.
+
+        Blocks overlap each other or the ground. An early end costs, because the wildest leap is the
+        last.
+        """
+        height = jnp.mean(tally.heights)
+        inside = lost((tally.overlap / settings.overlap) ** SHARPNESS)
+        lived = (1 - inside) * tally.steps / self.horizon
+        return {
+            "height": height,
+            "overlap": height * inside,
+            "wild": height * (1 - inside - lived),
+        }
+
+    def outcome(self, tally: JumpTally) -> Mapping[str, jax.Array]:
+        """See `Task`: m, and s until the end."""
+        return {"height": jnp.mean(tally.heights), "seconds": tally.steps * self.step}

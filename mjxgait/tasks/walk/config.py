@@ -75,7 +75,7 @@ class Weights:
 
 @dataclasses.dataclass(frozen=True)
 class WishWeights:
-    """Largest cost of missing each target (mjxgait/tasks/walk/target_terms.py).
+    """Largest cost of missing each target (mjxgait/tasks/walk/fitness.py).
 
     Attributes:
       speed: a speed that is not held.

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from mjxgait.certification.buzz import buzz
+from mjxgait.certification.acceptance import StaysUp, to_the_end
 from mjxgait.certification.config import (
     CertificateConfig,
     GaitConfig,
@@ -22,6 +22,7 @@ from mjxgait.certification.criteria import (
     at_least,
     at_most,
     distance,
+    obstacle,
     parts,
     physics,
     ratio,
@@ -29,15 +30,24 @@ from mjxgait.certification.criteria import (
     steady,
     upright,
 )
-from mjxgait.certification.describe import describe, slip_distance
-from mjxgait.certification.likeness import patter
-from mjxgait.certification.obstacle import obstacle
-from mjxgait.certification.sides import amplitudes_apart, duties_apart, sides
-from mjxgait.certification.tasks.staying import StaysUp, to_the_end
+from mjxgait.certification.describe import (
+    amplitudes_apart,
+    buzz,
+    describe,
+    duties_apart,
+    patter,
+    sides,
+    slip_distance,
+)
 from mjxgait.creature import Creature
-from mjxgait.reference.measure import Dimensions, Recording
+from mjxgait.reference.measure import (
+    Dimensions,
+    Recording,
+    clearances,
+    stride_frequency,
+    stride_starts,
+)
 from mjxgait.reference.outcome import Fall, Outcome
-from mjxgait.reference.strides import clearances, stride_frequency, stride_starts
 from mjxgait.tasks.walk.gaits import gait_of, transition
 from mjxgait.tasks.walk.target_criteria import (
     as_asked,

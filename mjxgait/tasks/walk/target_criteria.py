@@ -17,8 +17,7 @@ from mjxgait.certification.criteria import (
     at_most,
     speed,
 )
-from mjxgait.certification.describe import footfall_phases, gait_name
-from mjxgait.certification.likeness import likeness
+from mjxgait.certification.describe import footfall_phases, gait_name, likeness
 from mjxgait.reference.measure import Dimensions, Recording
 from mjxgait.reference.outcome import Outcome
 from mjxgait.tasks.walk.gaits import SHORTEST, animal_stride, gait_of

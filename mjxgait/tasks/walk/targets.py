@@ -7,14 +7,13 @@ from pathlib import Path
 from typing import Any
 
 from mjxgait.certification import CertificateConfig
-from mjxgait.config.layers import over_base
+from mjxgait.config.layers import data_folder, over_base
 from mjxgait.config.schema import Config
-from mjxgait.config.shipped import data_folder
 from mjxgait.config.tables import build, merge, read_toml
 from mjxgait.controllers.key_poses.config import unhurried
 from mjxgait.creature import Creature
 from mjxgait.errors import UserError, did_you_mean
-from mjxgait.plugins.settings import resolve_config
+from mjxgait.plugins.registry import resolve_config
 from mjxgait.tasks.walk.criteria import SPARE
 from mjxgait.tasks.walk.gaits import (
     AUTO,

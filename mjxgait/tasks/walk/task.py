@@ -7,25 +7,31 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
-from mjxgait.config.rollout import RolloutConfig
+from mjxgait.config.schema import RolloutConfig
 from mjxgait.controllers.observations import sense
 from mjxgait.creature import Creature
 from mjxgait.creature.body import Body, Ends
 from mjxgait.creature.settings import Termination
+from mjxgait.tasks.base import hardness
 from mjxgait.tasks.plain import PlainTask
-from mjxgait.tasks.score import hardness
 from mjxgait.tasks.starts import Starts, draw_starts, milder
 from mjxgait.tasks.walk.config import WalkConfig, WishConfig
-from mjxgait.tasks.walk.fitness import fitness_terms, signed_weights, terms_under
-from mjxgait.tasks.walk.stats import Judge, Tally
-from mjxgait.tasks.walk.target_stats import (
+from mjxgait.tasks.walk.fitness import (
+    fitness_terms,
+    signed_weights,
+    terms_under,
+    wish_weights,
+    wished_terms,
+)
+from mjxgait.tasks.walk.stats import (
+    Judge,
+    Tally,
     WishTally,
     along,
     wish_tally,
     wish_updated,
     wrapped,
 )
-from mjxgait.tasks.walk.target_terms import wish_weights, wished_terms
 from mjxgait.types import Sensed
 
 FALLEN = 0.2

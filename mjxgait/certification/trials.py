@@ -1,0 +1,242 @@
+"""Trials of a champion on C MuJoCo: draws of starts and pushes, steering, and the trial run.
+
+A champion's draw follows from its fingerprint, which exists only once the champion is complete.
+Evolution therefore cannot tune for it, and every examination of a champion uses the same draw.
+
+Letters: `S` simulations, `R` recorded ones (the first of the `S`), `T` control steps.
+"""
+
+import concurrent.futures
+import dataclasses
+import math
+from collections.abc import Sequence
+from functools import partial
+
+import numpy as np
+
+from mjxgait.certification.acceptance import demands_of, how_simulated
+from mjxgait.certification.config import CertificateConfig
+from mjxgait.certification.criteria import Criterion
+from mjxgait.certification.verdict import judge
+from mjxgait.champion import Champion
+from mjxgait.creature import Creature
+from mjxgait.processes import cores
+from mjxgait.reference.controllers import Twin
+from mjxgait.reference.outcome import Fall, Outcome, Trajectory, Watch
+from mjxgait.reference.starts import Starts, join, perturbed_starts, pushed_starts, unfamiliar
+from mjxgait.reference.stepping import Stepping
+
+AIMS = 3
+"""Purpose of the draw of a task's goals."""
+COMMANDS = 4
+"""Purpose of the draw of commanded turns."""
+STEERED_FOR = 12.0
+"""s, length of a steered simulation."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Draw:
+    """Source of all draws of an examination. words: of the seed."""
+
+    words: tuple[int, ...]
+
+    def generator(self, purpose: int) -> np.random.Generator:
+        """Return the generator for a purpose.
+
+        0: starts. 1: pushes. 2: the ladder of larger pushes. Also `AIMS` and `COMMANDS`.
+        """
+        return np.random.default_rng([*self.words, purpose])
+
+
+def common(config: CertificateConfig) -> Draw:
+    """Return the draw shared by all champions."""
+    return Draw((config.seed,))
+
+
+def own(champion: Champion, config: CertificateConfig) -> Draw:
+    """Return the champion's own draw."""
+    return Draw((config.seed, int(champion.fingerprint, 16)))
+
+
+def starts(creature: Creature, config: CertificateConfig, draw: Draw, count: int) -> Starts:
+    """Draw the starts of criterion 4."""
+    noise, rng = config.starts, draw.generator(0)
+    familiar = perturbed_starts(
+        creature, count, rng, noise.joints, noise.velocities, noise.friction, noise.masses
+    )
+    return unfamiliar(
+        familiar,
+        rng,
+        gains=noise.gains,
+        latency=noise.latency,
+        slope=float(np.radians(noise.slope)),
+        floor=noise.floor,
+    )
+
+
+def pushes(creature: Creature, config: CertificateConfig, draw: Draw, count: int) -> Starts:
+    """Draw the pushes of criterion 5."""
+    speed = config.pushes.speed * _unit_speed(creature)
+    return pushed_starts(creature, count, draw.generator(1), speed, config.pushes.window)
+
+
+def ladder(creature: Creature, config: CertificateConfig, draw: Draw) -> list[Starts]:
+    """Draw the larger pushes, a group for each size, all within two seconds.
+
+    Each is watched only for as long as a fall takes.
+    """
+    settings, rng = config.pushes, draw.generator(2)
+    begin, end = settings.window[0], min(settings.window[0] + 2.0, settings.window[1])
+    watched = np.full(settings.ladder_count, end + settings.ladder_seconds)
+    speeds = [size * _unit_speed(creature) for size in settings.ladder]
+    return [
+        dataclasses.replace(
+            pushed_starts(creature, settings.ladder_count, rng, speed, (begin, end)), end=watched
+        )
+        for speed in speeds
+    ]
+
+
+def _unit_speed(creature: Creature) -> float:
+    return float(np.sqrt(creature.gravity * creature.frame.hip_height))
+
+
+def simulate(
+    creature: Creature,
+    champion: Champion,
+    starts: Starts,
+    seconds: float,
+    *,
+    record: int = 0,
+    heading: np.ndarray | None = None,
+    fall: Fall | None = None,
+    threads: int = 0,
+    watch: Watch | None = None,
+    twin: Twin | None = None,
+) -> Outcome:
+    """Simulate the champion from every start; a start without a goal gets the task's nominal one.
+
+    Args:
+      record: R, number of simulations to record, from the first on. These run to the end even
+        after a fall; the others stop there.
+      fall: conditions of a fall; the task's by default.
+      heading: [T] or [S, T] rad, commanded heading at each control step; None takes the task's,
+        mostly straight ahead.
+      threads: 0 takes the machine's cores. The result does not depend on it.
+      watch: receives the simulations that can no longer succeed, and ends all once that decides
+        the result. The distances until then do depend on threads.
+      twin: replaces the champion's own reference controller. One that treats simulations
+        differently needs a single thread.
+    """
+    threads = threads or cores()
+    # Interleaved, so that each thread gets its share of every kind of start.
+    shares = [np.arange(i, len(starts), threads) for i in range(min(threads, len(starts)))]
+    steps = round(seconds / creature.model.opt.timestep)
+    task = how_simulated(champion.task, champion.wish)
+    fall = fall or task.fall(CertificateConfig())
+    starts = task.aimed(starts, CertificateConfig())
+    if heading is None:
+        heading = task.told(steps, creature.model.opt.timestep)
+    told = None if heading is None else np.broadcast_to(heading, (len(starts), steps))
+
+    def run(share: np.ndarray) -> Outcome:
+        mine, kept = starts.rows(share), int((share < record).sum())
+        stepping = Stepping(creature, champion, mine, kept, fall, task, twin)
+        tell = None if watch is None else partial(watch.tell, share)
+        return stepping.to_the_end(steps, None if told is None else told[share], tell)
+
+    with concurrent.futures.ThreadPoolExecutor(len(shares)) as pool:
+        parts = list(pool.map(run, shares))
+    order = np.argsort(np.concatenate(shares))
+    kept = np.argsort(np.concatenate([share[share < record] for share in shares]))
+    fields = ("qpos", "qvel", "torque", "target", "phase")
+    return Outcome(
+        fell=np.concatenate([p.fell for p in parts])[order],
+        travel=np.concatenate([p.travel for p in parts])[order],
+        path=np.concatenate([p.path for p in parts])[order],
+        aside=np.concatenate([p.aside for p in parts])[order],
+        clearance=np.concatenate([p.clearance for p in parts])[order],
+        astray=np.concatenate([p.astray for p in parts])[order],
+        middle=np.concatenate([p.middle for p in parts])[order],
+        low=np.concatenate([p.low for p in parts])[order],
+        trajectory=Trajectory(
+            creature.model.opt.timestep,
+            *(np.concatenate([getattr(p.trajectory, f) for p in parts])[kept] for f in fields),
+        ),
+    )
+
+
+def told_to_turn(
+    creature: Creature, champion: Champion, config: CertificateConfig, draw: Draw, threads: int
+) -> tuple[Criterion, ...]:
+    """Evaluate steering by drawn headings from perturbed starts; empty if none are commanded."""
+    demands, step = demands_of(champion.task, champion.wish), creature.model.opt.timestep
+    steps = round(STEERED_FOR / step)
+    told = demands.commands(config, steps, step, draw.generator(COMMANDS))
+    if told is None:
+        return ()
+    begun = starts(creature, config, draw, len(told))
+    fall = demands.fall(config)
+    outcome = simulate(
+        creature, champion, begun, STEERED_FOR, heading=told, fall=fall, threads=threads
+    )
+    return demands.obeyed(outcome, told, config)
+
+
+def rehearse(
+    creature: Creature,
+    champion: Champion,
+    count: int,
+    config: CertificateConfig | None = None,
+    threads: int = 0,
+    wanted: float = -np.inf,
+    caution: float = 0.0,
+) -> float:
+    """Return the worst margin of criteria 4, 5 and steering on the draw shared by all champions.
+
+    This margin chooses champions; the examination uses another draw. If pushes decide, a trial run
+    ends once the last pushed have had time to fall. Otherwise it lasts as long as the examination:
+    a late arrival at a goal must count here too.
+
+    Args:
+      count: perturbed starts, and as many pushes if pushes decide.
+      wanted: once this margin is out of reach, the simulations stop and the largest margin that
+        is still possible is returned.
+      caution: standard errors that are subtracted from the measured shares. A champion chosen by
+        a share has been lucky more often than not.
+    """
+    config = config or CertificateConfig()
+    draw, demands = common(config), demands_of(champion.task, champion.wish)
+    disturbed = demands.aimed(starts(creature, config, draw, count), config, draw.generator(AIMS))
+    extra: tuple[Starts, ...] = ()
+    seconds = config.seconds
+    if demands.by_pushes:
+        extra = (pushes(creature, config, draw, count),)
+        seconds = min(seconds, config.pushes.window[1] + config.pushes.ladder_seconds)
+    begun = demands.aimed(join(disturbed, *extra), config)
+
+    def margin(well: np.ndarray) -> float:
+        pushed = _cautious(well[count:], caution) if extra else np.nan
+        return _worst(demands.disturbed(_cautious(well[:count], caution), pushed, config))
+
+    watch = Watch(len(begun), lambda lost: margin(~lost) < wanted)
+    fall = demands.fall(config)
+    outcome = simulate(creature, champion, begun, seconds, fall=fall, threads=threads, watch=watch)
+    if watch.over:
+        return margin(~watch.lost)
+    succeeded = demands.succeeded(outcome, begun, config)
+    reached = margin(np.where(np.arange(len(begun)) < count, succeeded, outcome.stayed_up))
+    if reached < wanted:
+        return reached
+    return min(reached, _worst(told_to_turn(creature, champion, config, draw, threads)))
+
+
+def _cautious(well: np.ndarray, caution: float) -> float:
+    """Share of successes [S] minus `caution` standard errors."""
+    share = float(well.mean())
+    return share - caution * math.sqrt(share * (1 - share) / len(well))
+
+
+def _worst(criteria: Sequence[Criterion]) -> float:
+    """Margin of the worst criterion; infinite without criteria, so that it limits nothing."""
+    return judge(criteria).margin if criteria else np.inf

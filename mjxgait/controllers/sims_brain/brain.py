@@ -1,0 +1,221 @@
+"""Brain of a grown body: its neurons, its wiring, and one control step.
+
+A neuron has one number of memory. Inputs are clipped to ±`LOUDEST`, values to ±`MOST`, so that
+nothing overflows.
+
+Letters: `P` parts, `n` links, `Q` and `M` neurons as in `nerves`; `V` values: nothing (0), the
+constant 1, the angles, contacts and light of all links, and all neurons, part by part, the central
+ones last. A part's contact and light are those of the link that carries its block.
+
+Letters: `n` links, `K` neurons.
+"""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from mjxgait.controllers.sims_brain.genotype import Centre, NerveRoom, Nerves
+from mjxgait.controllers.sims_brain.phenotype import Body
+from mjxgait.controllers.sims_brain.reference_body import INPUTS, SENSORS
+from mjxgait.physics.lane_major.lanes import sin_cos
+from mjxgait.types import pytree
+
+MOST, LOUDEST = 10.0, 100.0
+SMALL = 1e-3
+"""Smallest absolute divisor."""
+SMOOTHING = 5.0
+"""1/s; rate at which a smoothing neuron follows its input."""
+
+
+def fired(
+    kind: jax.Array, inputs: jax.Array, memory: jax.Array, step: float
+) -> tuple[jax.Array, jax.Array]:
+    """Return outputs and memories [M] of neurons. inputs: [M, 3], weighted. step: s."""
+    a, b, c = (jnp.clip(inputs[:, i], -LOUDEST, LOUDEST) for i in range(3))
+    integral, phase = memory + step * a, memory + step * b
+    phase = phase - jnp.floor(phase)
+    followed = memory + (a - memory) * (1 - np.exp(-SMOOTHING * step))
+    kept = jnp.where(b > 0, a, memory)
+    turned = phase + a
+    wave = sin_cos(2 * np.pi * (turned - jnp.floor(turned)))[0]
+    saw = 2 * (turned - jnp.floor(turned)) - 1
+    sine, cosine = sin_cos(a)
+    safe = jnp.where(jnp.abs(b) < SMALL, 1.0, b)
+    logarithm = jnp.log(jnp.maximum(jnp.abs(a), SMALL))
+    outputs = [
+        a + b + c,
+        a * b * c,
+        jnp.where(jnp.abs(b) < SMALL, 0.0, a / safe),
+        jnp.where(a + b > c, 1.0, 0.0),
+        jnp.where(a > b, 1.0, 0.0),
+        jnp.sign(a),
+        jnp.minimum(a, b),
+        jnp.maximum(a, b),
+        jnp.abs(a),
+        jnp.where(a > 0, b, c),
+        a + (b - a) * jnp.clip(c, 0.0, 1.0),
+        sine,
+        cosine,
+        jnp.arctan(a),
+        logarithm,
+        jnp.exp(jnp.clip(b * logarithm, -MOST, np.log(MOST))),
+        jax.nn.sigmoid(a),
+        integral,
+        (a - memory) / step,
+        followed,
+        kept,
+        wave,
+        saw,
+    ]
+    memories = {17: integral, 18: a, 19: followed, 20: kept, 21: phase, 22: phase}
+    output, after = outputs[0], memory
+    for number, value in enumerate(outputs[1:], start=1):
+        output = jnp.where(kind == number, value, output)
+    for number, value in memories.items():
+        after = jnp.where(kind == number, value, after)
+    return jnp.clip(output, -MOST, MOST), jnp.clip(after, -MOST, MOST)
+
+
+NOTHING, ONE = 0, 1
+
+
+@pytree
+class Brain:
+    """Brain of a body. kind: [P Q + M]. source: [P Q + M, 3] indices of values; weight: likewise.
+
+    drive: [n] index of the value that drives a link's hinge. gain: [n] its factor. pull: [n] N·m,
+    largest torque (signed). sign: [n] factor from angles to those of the genes. image: [n], -1 in a
+    mirror image.
+    """
+
+    kind: jax.Array
+    source: jax.Array
+    weight: jax.Array
+    drive: jax.Array
+    gain: jax.Array
+    pull: jax.Array
+    sign: jax.Array
+    image: jax.Array
+
+
+def first_neuron(links: int) -> int:
+    """Return the index of the first neuron among the values."""
+    return 2 + links + links + 3 * links
+
+
+def value_count(parts: int, links: int, room: NerveRoom) -> int:
+    """Return V."""
+    return first_neuron(links) + parts * room.local + room.central
+
+
+def wired(nerves: Nerves, centre: Centre, body: Body, room: NerveRoom) -> Brain:
+    """Return the wiring of a body. Wires from missing parts carry nothing."""
+    parts, exists = body.parts, body.parts.exists
+    count, node = len(exists), parts.node
+    places = _places(body, room)
+
+    def found(codes: jax.Array, part: jax.Array) -> jax.Array:
+        return places[part.reshape(-1, *[1] * (codes.ndim - 1)), codes]
+
+    every = jnp.arange(count)
+    source = found(nerves.source[node], every).reshape(-1, INPUTS)
+    central = found(centre.source, jnp.zeros(room.central, int))
+    alive = jnp.repeat(exists, room.local)
+    weight = nerves.weight[node].reshape(-1, INPUTS) * alive[:, None]
+    part, hinge = body.part, body.hinge
+    code = nerves.effect_source[node[part], hinge]
+    return Brain(
+        kind=jnp.concatenate([nerves.kind[node].reshape(-1), centre.kind]),
+        source=jnp.concatenate([source, central]),
+        weight=jnp.concatenate([weight, centre.weight]),
+        drive=places[part, code],
+        gain=nerves.effect_weight[node[part], hinge],
+        pull=body.strength * body.sign,
+        sign=body.sign,
+        image=1.0 - 2.0 * parts.copies[part],
+    )
+
+
+def _places(body: Body, room: NerveRoom) -> jax.Array:
+    """Return the index [P, codes] among the values of each part's sources."""
+    parts, links = body.parts, len(body.part)
+    count, local = len(parts.exists), room.local
+    every = jnp.arange(count)[:, None]
+    moves = body.tree.moves > 0
+    own = (body.part[None, :, None] == every[:, :, None]) & moves[None, :, None]
+    own = own & (body.hinge[None, :, None] == jnp.arange(3))
+    angles = jnp.where(own.any(1), 2 + own.argmax(1), NOTHING)
+    contact = 2 + links + parts.last[:, None]
+    light = 2 + 2 * links + 3 * parts.last[:, None] + jnp.arange(3)
+    first = first_neuron(links)
+
+    def neurons(part: jax.Array, there: jax.Array) -> jax.Array:
+        return jnp.where(there[:, None], first + part[:, None] * local + jnp.arange(local), NOTHING)
+
+    is_child = parts.exists & (jnp.arange(count) > 0)
+    children = is_child & (parts.parent == every)
+    central = (
+        first + count * local + jnp.broadcast_to(jnp.arange(room.central), (count, room.central))
+    )
+    columns = [
+        jnp.full((count, 1), ONE),
+        angles,
+        contact,
+        light,
+        neurons(jnp.arange(count), parts.exists),
+        neurons(parts.parent, is_child),
+        neurons(children.argmax(1), children.any(1)),
+        central,
+    ]
+    found = jnp.concatenate(columns, axis=1)
+    assert found.shape[1] == room.codes == 1 + SENSORS + 3 * local + room.central
+    return found
+
+
+TICKS = 2
+"""Brain steps per command (Sims 1994, section 3.2)."""
+
+
+@pytree
+class Mind:
+    """Memory of a brain: the neurons' values and memories, [K] each."""
+
+    values: jax.Array
+    memory: jax.Array
+
+
+@pytree
+class Perceived:
+    """Observations. angles: [n] rad. contact: [n] 0 or 1. light: [n, 3] direction in block axes."""
+
+    angles: jax.Array
+    contact: jax.Array
+    light: jax.Array
+
+
+def blank(neurons: int) -> Mind:
+    """Return the memory before the first step."""
+    none = jnp.zeros(neurons)
+    return Mind(none, none)
+
+
+def thought(brain: Brain, mind: Mind, perceived: Perceived, step: float) -> tuple[jax.Array, Mind]:
+    """Return the torques [n] in N·m of the hinges, and the next memory. step: s per command.
+
+    All neurons fire at once, on the values of the previous tick.
+    """
+    mirrored = jnp.stack([jnp.ones_like(brain.image), brain.image], axis=1)[:, jnp.array([0, 1, 0])]
+    known = jnp.concatenate(
+        [
+            jnp.array([0.0, 1.0]),
+            perceived.angles * brain.sign,
+            perceived.contact,
+            (perceived.light * mirrored).reshape(-1),
+        ]
+    )
+    values, memory = mind.values, mind.memory
+    for _ in range(TICKS):
+        inputs = jnp.concatenate([known, values])[brain.source] * brain.weight
+        values, memory = fired(brain.kind, inputs, memory, step / TICKS)
+    wanted = jnp.concatenate([known, values])[brain.drive]
+    return brain.pull * jnp.clip(brain.gain * wanted, -1.0, 1.0), Mind(values, memory)

@@ -1,0 +1,155 @@
+"""Export of a grown body to a creature's files, with a MuJoCo model of true blocks and hinges."""
+
+import xml.etree.ElementTree as ET
+from collections.abc import Iterable, Sequence
+
+import mujoco
+import numpy as np
+import tomli_w
+
+from mjxgait.controllers.sims_brain.reference_body import DAMPING, DENSITY, HARDEST, ROTOR, Part
+from mjxgait.creature.geometry import lowest
+from mjxgait.errors import UserError
+
+SPIN, ROLL = 0.005, 0.0001
+"""MuJoCo's default torsional and rolling friction, unused by contacts of three dimensions."""
+
+
+def body_xml(
+    parts: Sequence[Part],
+    step: float,
+    gravity: float,
+    friction: float | None,
+    height: float = 1.0,
+    keyframe: str = "",
+) -> str:
+    """Return the model's text. Parts are named `part0` (the root), …, their hinges `part1_0`, ….
+
+    step: s. gravity: m/s². friction: of a floor at z = 0; None for a floor without contacts.
+    height: m, of the root's middle. keyframe: name of one with all angles at 0.
+    """
+    root = ET.Element("mujoco", model="blocks")
+    ET.SubElement(root, "compiler", angle="radian")
+    down = _text((0, 0, -gravity))
+    option = ET.SubElement(root, "option", timestep=f"{step:g}", gravity=down)
+    ET.SubElement(option, "flag", eulerdamp="disable")
+    world = ET.SubElement(root, "worldbody")
+    sticking = {}
+    if friction is not None:
+        hard = {"solref": _text((HARDEST * step, 1.0))}
+        sticking = {"friction": _text((friction, SPIN, ROLL)), **hard}
+    touched = "0" if friction is None else "1"
+    plane = {"type": "plane", "size": "0 0 1", "contype": "0", "conaffinity": touched}
+    ET.SubElement(world, "geom", {"name": "floor", **plane, **sticking})
+    bodies: list[ET.Element] = []
+    for number, part in enumerate(parts):
+        if part.parent < 0:
+            own = ET.SubElement(world, "body", name="part0", pos=_text((0, 0, height)))
+            ET.SubElement(own, "freejoint", name="root")
+        else:
+            own = ET.SubElement(
+                bodies[part.parent],
+                "body",
+                name=f"part{number}",
+                pos=_text(part.place),
+                quat=_text(_quaternion(part.axes)),
+            )
+        _with_joints_and_block(own, number, part, sticking)
+        bodies.append(own)
+    if keyframe:
+        hinges = sum(len(part.hinges) for part in parts)
+        place = _text((0, 0, height, 1, 0, 0, 0, *[0] * hinges))
+        ET.SubElement(ET.SubElement(root, "keyframe"), "key", name=keyframe, qpos=place)
+    ET.indent(root)
+    return ET.tostring(root, encoding="unicode")
+
+
+def _with_joints_and_block(
+    own: ET.Element, number: int, part: Part, sticking: dict[str, str]
+) -> None:
+    damping = DAMPING * part.strength
+    for hinge, (axis, swing) in enumerate(zip(part.hinges, part.swing, strict=True)):
+        ET.SubElement(
+            own,
+            "joint",
+            name=f"part{number}_{hinge}",
+            axis=_text(np.eye(3)[axis]),
+            limited="true",
+            range=_text((-swing, swing)),
+            armature=_text((ROTOR * damping,)),
+            damping=_text((damping,)),
+        )
+    block = {
+        "name": f"block{number}",
+        "type": "box",
+        "size": _text(part.half),
+        "pos": _text(part.middle),
+        "density": f"{DENSITY:g}",
+        "contype": "1",
+        "conaffinity": "1",
+    }
+    ET.SubElement(own, "geom", {**block, **sticking})
+
+
+def _quaternion(axes: np.ndarray) -> np.ndarray:
+    found = np.zeros(4)
+    mujoco.mju_mat2Quat(found, np.ascontiguousarray(axes, float).reshape(9))
+    return found
+
+
+def _text(values: Iterable[float]) -> str:
+    return " ".join(f"{float(value):.9g}" for value in values)
+
+
+SOFT = 0.01
+"""1/rad: kp of a hinge over its strength. A brain sends torques, so nothing tracks a pose."""
+
+
+def body_files(
+    parts: Sequence[Part],
+    name: str,
+    step: float,
+    gravity: float,
+    friction: float | None,
+    around: str,
+) -> dict[str, str]:
+    """Return `creature.xml` and `creature.toml`. around: its medium, for the description.
+
+    Raises:
+      UserError: the body has no hinge.
+    """
+    joints = [
+        (f"part{number}_{hinge}", part.strength)
+        for number, part in enumerate(parts)
+        for hinge in range(len(part.hinges))
+    ]
+    if not joints:
+        raise UserError(f"{name}: the body that grew has no hinge, so nothing of it moves")
+    height = _resting_height(body_xml(parts, step, gravity, friction))
+    document = {
+        "creature": {
+            "name": name,
+            "description": f"{len(parts)} blocks that evolved to move {around}",
+            "trunk": "part0",
+            "forward": [1, 0, 0],
+            "feet": [f"block{number}" for number in range(len(parts))],
+            "body_length": 1.0,
+        },
+        "joints": {"kp": SOFT, "kd": 0.0, "torque_limit": 1.0},
+        "joint": [
+            {"match": joint, "kp": SOFT * strength, "torque_limit": strength}
+            for joint, strength in joints
+        ],
+        "mirror": {"symmetric": False},
+        "termination": {"min_up": -1.0, "height": [0.0, 1e6], "touch": False},
+    }
+    xml = body_xml(parts, step, gravity, friction, height, keyframe="stand")
+    return {"creature.xml": xml, "creature.toml": tomli_w.dumps(document)}
+
+
+def _resting_height(xml: str) -> float:
+    """Return the root's height in m, with the lowest corner on the ground and all angles at 0."""
+    model = mujoco.MjModel.from_xml_string(xml)
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    return float(data.body("part0").xpos[2] - lowest(model, data))

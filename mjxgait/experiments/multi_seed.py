@@ -1,0 +1,188 @@
+"""Several runs of one creature that differ by their seed, and their champions in one picture."""
+
+import dataclasses
+from collections.abc import Sequence
+from pathlib import Path
+
+from matplotlib.figure import Figure
+from rich.table import Table
+
+from mjxgait.certification import judged, read_certificate
+from mjxgait.config.schema import Config
+from mjxgait.config.tables import STRICT, Whole, build, dump_toml, read_toml
+from mjxgait.creature import Creature
+from mjxgait.errors import UserError
+from mjxgait.files import write_text
+from mjxgait.rendering.stage import Stage
+from mjxgait.rendering.video import champion_of
+from mjxgait.training.folder import (
+    CERTIFICATE,
+    CHAMPION,
+    check_parts,
+    create_run,
+    is_taken,
+    new_run_folder,
+)
+from mjxgait.training.stored import disk_errors
+
+ZOO = "zoo.toml"
+
+
+@dataclasses.dataclass(frozen=True)
+class Seeds:
+    """Seeds of a folder's runs, in order.
+
+    together: number of runs per program, which affects their last bits; 0: all.
+    """
+
+    __pydantic_config__ = STRICT
+    seeds: tuple[int, ...]
+    together: Whole = 0
+
+    def folders(self, zoo: Path) -> list[Path]:
+        """Return a run folder per seed."""
+        return [zoo / f"seed{seed}" for seed in self.seeds]
+
+
+def is_zoo(folder: Path) -> bool:
+    """Return whether a folder holds several runs, not one."""
+    return (folder / ZOO).is_file()
+
+
+def read_seeds(zoo: Path) -> Seeds:
+    """Return the seeds of a folder.
+
+    Raises:
+      UserError: their file cannot be read, or names none.
+    """
+    seeds = build(Seeds, read_toml(zoo / ZOO), str(zoo / ZOO))
+    if not seeds.seeds:
+        raise UserError(f"{zoo / ZOO}: seeds: there is none")
+    return seeds
+
+
+def folders_of(zoo: Path) -> list[Path]:
+    """Return the run folders; see `read_seeds`."""
+    return read_seeds(zoo).folders(zoo)
+
+
+def check_zoo(zoo: Path | None, creature: Creature, config: Config, runs: int) -> Path:
+    """Return the folder for several new runs, by default a new one under runs/; write nothing.
+
+    Raises:
+      UserError: fewer than two runs, or islands, which have rows of their own; see `check_parts`.
+    """
+    if runs < 2:
+        raise UserError(f"--runs {runs}: give 2 or more, or leave it out for a single run")
+    if config.evolution.islands.count > 1:
+        raise UserError(
+            "--runs: runs with islands do not go side by side; start them one by one,"
+            " or give --evolution.islands.count 1"
+        )
+    check_parts(creature, config)
+    zoo = zoo or new_run_folder(f"{creature.name}-zoo", config.seed)
+    if is_taken(zoo):
+        raise UserError(
+            f"{zoo}: holds something already; name another folder with --out, or go on with "
+            f"--resume {zoo}"
+        )
+    return zoo
+
+
+def create_zoo(
+    zoo: Path | None, creature: Creature, config: Config, runs: int, together: int = 0
+) -> Path:
+    """Make a folder, by default under runs/, with a run folder per seed from the config's on.
+
+    together: see `Seeds`.
+
+    Raises:
+      UserError: see `check_zoo` and `check_plan`; or the folder cannot be written.
+    """
+    from mjxgait.training.blueprint import check_plan  # JAX takes a second to import
+
+    zoo = check_zoo(zoo, creature, config, runs)
+    check_plan(creature, config)
+    seeds = Seeds(tuple(range(config.seed, config.seed + runs)), together)
+    for seed, folder in zip(seeds.seeds, seeds.folders(zoo), strict=True):
+        create_run(folder, creature, to_the_last(dataclasses.replace(config, seed=seed)))
+    # Written last: a folder with this file is complete and can be resumed.
+    with disk_errors(zoo):
+        write_text(zoo / ZOO, dump_toml(seeds))
+    return zoo
+
+
+def to_the_last(config: Config) -> Config:
+    """Return the config without early stopping: the rows of a program advance together."""
+    forced = dataclasses.replace(config.evolution.forced, patience=0)
+    examination = dataclasses.replace(config.examination, every=0)
+    evolution = dataclasses.replace(config.evolution, target=None, forced=forced)
+    return dataclasses.replace(config, evolution=evolution, examination=examination)
+
+
+COLUMNS = 4
+SECONDS = 2.0
+"""Time into its motion at which each champion is shown, s."""
+SIZE = (420, 300)
+"""Pixels of each champion's picture."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Found:
+    """Result of one run. summary: the certificate's; margin: None if not examined."""
+
+    folder: Path
+    examined: bool
+    certified: bool
+    summary: str
+    margin: float | None
+    verdict: str
+    """Result in a few words."""
+
+
+def found_in(folders: Sequence[Path]) -> list[Found]:
+    """Return the result of each run."""
+    return [_found(folder) for folder in folders]
+
+
+def table(found: Sequence[Found]) -> Table:
+    """Return the table for the screen, a row per run."""
+    shown = Table(box=None, pad_edge=False)
+    for heading in ("run", "motion", "margin", ""):
+        shown.add_column(heading, justify="right" if heading == "margin" else "left")
+    for one in found:
+        margin = "" if one.margin is None else f"{one.margin:.2f}"
+        shown.add_row(one.folder.name, one.summary, margin, one.verdict)
+    return shown
+
+
+def size(found: Sequence[Found]) -> tuple[float, float]:
+    """Return the picture's width and height in inches."""
+    columns = min(len(found), COLUMNS)
+    return 3.2 * columns, 0.4 + 2.8 * -(-len(found) // columns)
+
+
+def draw_zoo(drawing: Figure, name: str, found: Sequence[Found]) -> None:
+    """Draw all champions as C MuJoCo simulates them, each as large as its picture allows."""
+    columns = min(len(found), COLUMNS)
+    fields = drawing.subplots(-(-len(found) // columns), columns, squeeze=False)
+    for axes in fields.flat:
+        axes.set_axis_off()
+    for axes, one in zip(fields.flat, found, strict=False):
+        if (one.folder / CHAMPION).is_file():
+            stage = Stage([champion_of(one.folder, SECONDS).walk], *SIZE)
+            axes.imshow(stage.picture(stage.frames - 1), interpolation="lanczos")
+        axes.set_title(f"{one.folder.name}: {one.summary}\n{one.verdict}", fontsize=9)
+    count = sum(one.certified for one in found)
+    drawing.suptitle(
+        f"{name.replace('_', ' ')}: {count} of {len(found)} certified; each has a scale of its own",
+        fontsize=11,
+    )
+
+
+def _found(folder: Path) -> Found:
+    document = read_certificate(folder / CERTIFICATE)
+    if document is None:
+        return Found(folder, False, False, "", None, "not examined")
+    verdict, summary = judged(document), document.get("report", {}).get("summary", "")
+    return Found(folder, True, verdict.certified, summary, verdict.margin, verdict.in_words())

@@ -1,1 +1,0 @@
-"""Several runs of one creature with different seeds, and their champions in one picture."""

@@ -1,0 +1,349 @@
+"""Cleaning of MJCF and URDF files for MuJoCo's reader.
+
+Meshes are loaded or dropped, broken inertias mended, degrees and efforts read.
+"""
+
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import numpy as np
+
+from mjxgait.errors import UserError
+from mjxgait.importer.parts import Notes, listed
+from mjxgait.importer.source import (
+    MOST_ELEMENTS,
+    MOST_INCLUDES,
+    Places,
+    Source,
+    load_mesh,
+    lost,
+    numbers,
+    parse_xml,
+    put_stand_in,
+)
+
+DROPPED = {
+    "sensor": "a sensor has no part in walking",
+    "visual": "it only concerns the picture",
+    "statistic": "it only concerns the picture",
+    "size": "memory is sized by what is there",
+    "extension": "plugins are code, and no code of a model is run",
+    "deformable": "soft parts cannot be simulated here",
+}
+INNER = {
+    "plugin": "plugins are code, and no code of a model is run",
+    "composite": "soft or repeated parts cannot be simulated here",
+    "flexcomp": "soft parts cannot be simulated here",
+    "attach": "another model inside the model is not read",
+    "camera": "it is not part of the body",
+    "light": "it is not part of the body",
+    "site": "",
+    "texture": "",
+    "skin": "",
+    "hfield": "the floor is always flat",
+    "model": "another model inside the model is not read",
+}
+COMPILER_FOLDERS = ("meshdir", "texturedir", "assetdir")
+MOST_COPIES = 64
+
+
+def clean_mjcf(source: Source, path: Path, places: Places, notes: Notes) -> None:
+    """Clean `source.tree` in place.
+
+    Raises:
+      UserError: an include that cannot be read.
+    """
+    tree = source.tree
+    _include(tree, path, places, [0, 0])
+    folders = _compiler(tree)
+    source.poses = [
+        n
+        for n in (
+            numbers(e.get("data")) for e in tree.iter("numeric") if e.get("name") == "init_qpos"
+        )
+        if n
+    ]
+    for name, why in DROPPED.items():
+        for element in tree.findall(name):
+            tree.remove(element)
+            if name == "sensor" or name in ("extension", "deformable"):
+                notes.change(f"<{name}> dropped", why)
+    for name in ("custom", "default"):
+        _empty(tree, name)
+    _drop_inner(tree, notes)
+    _drop_unreadable(source, places, folders, notes)
+    for element in tree.iter():
+        for key in [
+            k
+            for k in element.attrib
+            if k.startswith("file") and not (element.tag == "mesh" and k == "file")
+        ]:
+            del element.attrib[key]
+        for key in ("texture", "plugin", "instance"):
+            element.attrib.pop(key, None)
+    known = {material.get("name") for material in tree.iter("material")}
+    for element in tree.iter():
+        if element.get("material") not in known:
+            element.attrib.pop("material", None)
+
+
+def _include(tree: ET.Element, path: Path, places: Places, count: list[int]) -> None:
+    """Put the content of included files in place, as MuJoCo does.
+
+    count: files and elements so far.
+    """
+    for parent in list(tree.iter()):
+        for i, child in reversed(list(enumerate(parent))):
+            if child.tag != "include":
+                continue
+            reference = child.get("file", "")
+            found = places.find(reference)
+            count[0] += 1
+            if found is None or count[0] > MOST_INCLUDES:
+                raise UserError(
+                    f'{path}: <include file="{reference[:200]}"> is missing, outside of the model\'s folder, or one too many; '
+                    "put it beside the model or name its folder with --search"
+                )
+            inner = parse_xml(found)
+            _include(inner, found, places, count)
+            count[1] += sum(1 for _ in inner.iter())
+            if count[1] > MOST_ELEMENTS:
+                raise UserError(f"{path}: its includes hold more than {MOST_ELEMENTS} elements")
+            parent.remove(child)
+            for offset, element in enumerate(inner):
+                parent.insert(i + offset, element)
+
+
+def _compiler(tree: ET.Element) -> list[str]:
+    """Remove folders and file handling from <compiler>; return the mesh folders."""
+    folders = [""]
+    for compiler in tree.findall("compiler"):
+        for key in COMPILER_FOLDERS:
+            value = compiler.attrib.pop(key, None)
+            if value is not None and key != "texturedir":
+                folders.insert(0, value)
+        for key in ("discardvisual", "fusestatic", "strippath", "usethread"):
+            compiler.attrib.pop(key, None)
+    return folders
+
+
+def _empty(tree: ET.Element, name: str) -> None:
+    """Remove <custom>; <default> stays."""
+    for element in tree.findall(name):
+        if name == "custom":
+            tree.remove(element)
+
+
+def _drop_inner(tree: ET.Element, notes: Notes) -> None:
+    # Sites carry tendons, actuators and equality constraints: those stay readable for now and sites
+    # with them.
+    dropped = {k: v for k, v in INNER.items() if k != "site"}
+    total = 1.0
+    parents = [(parent, child) for parent in tree.iter() for child in list(parent)]
+    for parent, child in parents:
+        if child.tag in dropped:
+            parent.remove(child)
+            if dropped[child.tag] and child.tag not in ("camera", "light"):
+                notes.change(
+                    f"<{child.tag}> {child.get('name', '')} dropped".replace("  ", " "),
+                    dropped[child.tag],
+                )
+        elif child.tag == "replicate":
+            copies = numbers(child.get("count"))
+            total *= max(copies[0], 1.0) if copies else MOST_COPIES + 1
+            if total > MOST_COPIES:
+                raise UserError(
+                    f'<replicate count="{child.get("count", "")[:20]}"> is more than a creature needs; write its parts out'
+                )
+
+
+def _drop_unreadable(source: Source, places: Places, folders: list[str], notes: Notes) -> None:
+    """Load meshes, with small ones in place of unreadable ones; remove geoms of height fields."""
+    for asset in source.tree.findall("asset"):
+        for mesh in list(asset.findall("mesh")):
+            reference = mesh.attrib.pop("file", None)
+            if reference is None:
+                continue
+            name = mesh.get("name") or Path(reference).stem
+            mesh.set("name", name)
+            key = load_mesh(source, places, reference, folders, notes)
+            if key is None:
+                put_stand_in(mesh)
+                source.missing[name] = reference
+            else:
+                mesh.set("file", key)
+                mesh.attrib.pop("content_type", None)
+    for parent in list(source.tree.iter()):
+        for geom in parent.findall("geom"):
+            if geom.get("type") in ("hfield", "sdf") or "hfield" in geom.attrib:
+                parent.remove(geom)
+
+
+KEPT = ("link", "joint", "material")
+COMPILER = {
+    "fusestatic": "false",
+    "discardvisual": "false",
+    "strippath": "false",
+    "angle": "radian",
+}
+TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+LEAST_MASS = 1e-6
+"""kg, below which a link counts as massless."""
+LEAST_INERTIA = 1e-12
+"""kg·m², a principal moment below which MuJoCo ignores an inertia."""
+
+
+def clean_urdf(source: Source, path: Path, places: Places, notes: Notes) -> None:
+    """Clean `source.tree` in place.
+
+    Raises:
+      UserError: it is a xacro template, or has no links.
+    """
+    robot = source.tree
+    if any(
+        "xacro" in element.tag or any("${" in v for v in element.attrib.values())
+        for element in robot.iter()
+    ):
+        raise UserError(
+            f"{path}: is a xacro template; run `xacro {path.name} > robot.urdf` first and import "
+            "robot.urdf"
+        )
+    for element in list(robot):
+        if element.tag not in KEPT:
+            robot.remove(element)
+    if not robot.findall("link"):
+        raise UserError(f"{path}: a URDF without a <link>; this is not a robot")
+    for element in robot.iter("material"):
+        for texture in element.findall("texture"):
+            element.remove(texture)
+    for element in robot.iter("origin"):
+        for key in ("xyz", "rpy"):
+            values = numbers(element.get(key))
+            if element.get(key) is not None and (values is None or len(values) != 3):
+                values = ((values or []) + [0.0] * 3)[:3]
+                element.set(key, " ".join(map(repr, values)))
+                notes.change(f"an origin's {key} read as {values}", "it has not three numbers")
+    for link in robot.findall("link"):
+        _shapes(source, link, _inertial(link, notes), places, notes)
+    for joint in robot.findall("joint"):
+        _joint(source, joint, notes)
+    if source.coupled:
+        notes.change(
+            f"joints {listed(source.coupled)} frozen", "they follow other joints (<mimic>)"
+        )
+    extension = ET.Element("mujoco")
+    ET.SubElement(extension, "compiler", COMPILER)
+    robot.insert(0, extension)
+
+
+def _shapes(source: Source, link: ET.Element, stated: bool, places: Places, notes: Notes) -> None:
+    """Load a link's meshes, and drop missing ones.
+
+    Args:
+      stated: whether its mass is; if not, a mesh's mass counts.
+    """
+    for kind in ("visual", "collision"):
+        for shape in link.findall(kind):
+            shape.attrib.pop("name", None)
+            if _empty_shape(shape):
+                link.remove(shape)
+                notes.change(f'a shape of link "{link.get("name", "")}" dropped', "it has no size")
+                continue
+            mesh = shape.find("geometry/mesh")
+            if mesh is None:
+                continue
+            reference = mesh.get("filename", "")
+            key = load_mesh(source, places, reference, [""], notes)
+            if key is None:
+                if kind == "collision" and not stated:
+                    raise lost("", link.get("name", ""), reference)
+                link.remove(shape)
+            else:
+                mesh.set("filename", key)
+
+
+def _empty_shape(shape: ET.Element) -> bool:
+    """Return whether a shape's size is missing or has a part that is not positive."""
+    geometry = shape.find("geometry")
+    if geometry is None or not len(geometry):
+        return True
+    kind = geometry[0]
+    if kind.tag == "mesh":
+        return not kind.get("filename")
+    sizes = [
+        numbers(kind.get(key)) for key in ("size", "radius", "length") if kind.get(key) is not None
+    ]
+    return not sizes or any(not size or min(size) <= 0 for size in sizes)
+
+
+def _inertial(link: ET.Element, notes: Notes) -> bool:
+    """Mend an impossible inertia, not the mass; return whether a mass is stated (zero counts)."""
+    inertial = link.find("inertial")
+    if inertial is None:
+        return False
+    name = link.get("name", "")
+    stated = inertial.find("mass")
+    mass = numbers(stated.get("value")) if stated is not None else None
+    if not mass or mass[0] < 0:
+        link.remove(inertial)
+        notes.change(f'inertia of link "{name}" dropped', "its mass is missing or negative")
+        return False
+    if mass[0] < LEAST_MASS:
+        link.remove(inertial)
+        return True
+    inertia = inertial.find("inertia")
+    values = [
+        numbers((inertia.attrib if inertia is not None else {}).get(key, "0")) or [0.0]
+        for key in TENSOR
+    ]
+    xx, xy, xz, yy, yz, zz = (v[0] for v in values)
+    tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    moments, axes = np.linalg.eigh(tensor)
+    if moments[0] > LEAST_INERTIA and moments[2] <= moments[0] + moments[1] + 1e-12:
+        return True
+    some = moments[2] > LEAST_INERTIA
+    mended = _possible(moments, mass[0]) if some else np.full(3, _ball_inertia(mass[0]))
+    tensor = axes @ np.diag(mended) @ axes.T
+    inertia = inertia if inertia is not None else ET.SubElement(inertial, "inertia")
+    for key, (i, j) in zip(TENSOR, ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)), strict=True):
+        inertia.set(key, repr(float(tensor[i, j])))
+    notes.change(
+        f'inertia of link "{name}" mended: principal moments '
+        f"{np.array2string(mended, precision=3)}",
+        f"no body has the stated ones, {np.array2string(moments, precision=3)} kg m²",
+    )
+    return True
+
+
+def _ball_inertia(mass: float) -> float:
+    """Inertia in kg·m² of a ball of water."""
+    return 0.4 * mass * (3 * mass / (4 * np.pi * 1000.0)) ** (2 / 3)
+
+
+def _possible(moments: np.ndarray, mass: float) -> np.ndarray:
+    """Nearest principal moments [3] kg·m² that some body of this mass in kg can have."""
+    least = max(float(np.abs(moments).max()) * 1e-2, mass * 1e-6)
+    raised = np.maximum(moments, least)
+    raised[2] = min(raised[2], raised[0] + raised[1])
+    if raised[2] < moments[2]:  # the largest is the most reliable: raise the others
+        raised[2] = moments[2]
+        raised[:2] *= 1.0001 * moments[2] / (raised[0] + raised[1])
+    return raised
+
+
+def _joint(source: Source, joint: ET.Element, notes: Notes) -> None:
+    name = joint.get("name", "")
+    limit = joint.find("limit")
+    effort = numbers((limit.attrib if limit is not None else {}).get("effort"))
+    if effort and effort[0] > 0:
+        source.efforts[name] = effort[0]
+    mimic = joint.find("mimic")
+    if mimic is not None:
+        source.coupled.append(name)
+        joint.remove(mimic)
+    for unknown in ("safety_controller", "calibration", "transmission"):
+        for element in joint.findall(unknown):
+            joint.remove(element)
+    if joint.get("type") == "planar":
+        joint.set("type", "fixed")
+        notes.change(f'joint "{name}" fixed', "planar joints are not read inside a body")

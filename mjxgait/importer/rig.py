@@ -1,0 +1,318 @@
+"""Roles of a skeleton's bones at rest, and the hinges between them.
+
+Letters: `B` bones.
+
+A limb swings and spreads where it begins, and bends in one direction below; a spine bends in one
+place. Axes are the file's; angles are deg from rest.
+"""
+
+import dataclasses
+import itertools
+from functools import cached_property
+
+import numpy as np
+
+from mjxgait.animation.clips.clip import Rig
+from mjxgait.importer.parts import Confidence
+
+MIDDLE = 0.02
+"""Share of the skeleton's span within which a bone begins in the middle."""
+SHORT = 0.04
+"""Share of the height below which a bone does not bend on its own."""
+TOE = 0.5
+"""Share of the longest toe's length from which another one is a toe, not a spur."""
+LIMB, LOW = 0.4, 0.1
+"""Share of the longest reach from which a branch is a limb, not an ear; share of the height within
+which a limb ends at the floor.
+"""
+FOOT, ANKLE_HIGH, HEEL = 0.3, 0.1, 0.25
+"""Share of its length by which a foot points forward; share of the height below which an ankle
+lies; distance of the heel behind the ankle, over foot length.
+"""
+
+
+class Plan:
+    """Skeleton in metres and the roles of its limbs. up: number of the axis that points up."""
+
+    def __init__(self, up: int, rig: Rig) -> None:
+        self.up, self.rig = up, rig
+        spots = np.concatenate([rig.places, *rig.ends])
+        self.span = float(np.ptp(spots, axis=0).max())
+        self.height = float(np.ptp(np.concatenate([spots, *rig.skins])[:, up])) or self.span
+        level = [axis for axis in range(3) if axis != up]  # X is the side if both fit equally
+        self.side = min(level, key=self._unlike)
+        self.ahead = next(axis for axis in level if axis != self.side)
+
+    def _unlike(self, axis: int) -> float:
+        """Largest distance in m of a joint from the nearest mirror image across an axis."""
+        places = self.rig.places - self.rig.places[0]
+        images = places * np.where(np.arange(3) == axis, -1.0, 1.0)
+        return float(np.linalg.norm(places[:, None] - images, axis=2).min(1).max())
+
+    def in_middle(self, bone: int) -> bool:
+        """Return whether a bone begins between left and right."""
+        apart = self.rig.places[bone, self.side] - self.rig.places[0, self.side]
+        return abs(float(apart)) < MIDDLE * self.span
+
+    def carries(self, bone: int) -> bool:
+        """Return whether a bone is the root, or in the middle with limbs of both sides below."""
+        return bone == 0 or (self.in_middle(bone) and len(self.sides_below[bone]) > 1)
+
+    @cached_property
+    def sides_below(self) -> list[set[float]]:
+        """Sides of the limbs that begin at each bone or below it."""
+        found: list[set[float]] = [set() for _ in self.rig.names]
+        for bone in self.limbs:
+            apart = self.rig.places[bone, self.side] - self.rig.places[0, self.side]
+            found[bone].add(float(np.sign(apart)))
+        for bone in reversed(range(1, len(found))):
+            found[self.rig.parents[bone]] |= found[bone]
+        return found
+
+    @cached_property
+    def half_width(self) -> float:
+        """Mean distance in m from the middle at which limbs begin."""
+        rig = self.rig
+        apart = np.abs(rig.places[self.limbs, self.side] - rig.places[0, self.side])
+        return float(apart.mean()) if self.limbs else 0.0
+
+    def leaves_middle(self, bone: int) -> bool:
+        """Return whether a limb or an ear leaves the trunk at this bone."""
+        parent = self.rig.parents[bone]
+        return not self.in_middle(bone) and (parent < 0 or self.in_middle(parent))
+
+    def is_limb(self, bone: int) -> bool:
+        """Return whether a limb begins at this bone; shorter branches are ears, eyes or handles."""
+        return self.leaves_middle(bone) and self.reach(bone) > LIMB * self.longest
+
+    @cached_property
+    def limbs(self) -> list[int]:
+        """First bone of each limb."""
+        return [bone for bone in range(len(self.rig.names)) if self.is_limb(bone)]
+
+    @cached_property
+    def longest(self) -> float:
+        """Longest reach in m of a branch that leaves the middle."""
+        firsts = filter(self.leaves_middle, range(len(self.rig.names)))
+        return max(map(self.reach, firsts), default=0.0)
+
+    def reach(self, first: int) -> float:
+        """Distance in m from the beginning of a bone to the end of its limb."""
+        return float(np.linalg.norm(self.tips[first] - self.rig.places[first]))
+
+    @cached_property
+    def tips(self) -> np.ndarray:
+        """End [B, 3] of the limb that each bone belongs to."""
+        found = self.rig.places + [self.way(bone) for bone in range(len(self.rig.names))]
+        for bone in reversed(range(len(found))):
+            if below := self.rig.children(bone):
+                found[bone] = found[max(below, key=self._length)]
+        return found
+
+    def _length(self, bone: int) -> float:
+        return float(np.linalg.norm(self.way(bone)))
+
+    @cached_property
+    def stands(self) -> float:
+        """Total descent in m of the limbs that end at the floor; large if `up` is right."""
+        tips = self.tips[self.limbs, self.up]
+        drops = np.maximum(self.rig.places[self.limbs, self.up] - tips, 0.0)
+        return float(drops[tips - self.floor < LOW * self.height].sum())
+
+    def segments(self, bone: int) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Start and ends [3] of a bone's segments, without those within the trunk."""
+        rig, start = self.rig, self.rig.places[bone]
+        below = rig.children(bone)
+        if self.in_middle(bone):
+            below = [b for b in below if not self.leaves_middle(b)] or below
+        ends = [*rig.places[below], *rig.ends[bone]]
+        if not ends and len(rig.skins[bone]):
+            ends = [start + 1.8 * (rig.skins[bone].mean(0) - start)]
+        return [(start, end) for end in ends if np.linalg.norm(end - start) > 1e-4 * self.span]
+
+    def way(self, bone: int) -> np.ndarray:
+        """Vector [3] in m from a bone's start to its farthest end; zeros if it has none."""
+        ways = [end - start for start, end in self.segments(bone)]
+        return max(ways, key=lambda way: float(way @ way), default=np.zeros(3))
+
+    def limb(self, first: int) -> list[int]:
+        """Bones of a limb from its first one down, along the longest."""
+        chain = [first]
+        while below := self.rig.children(chain[-1]):
+            chain.append(max(below, key=self._length))
+        return chain
+
+    def has_toes(self, bone: int) -> bool:
+        """Return whether a limb splits at this bone into several of about equal reach (toes)."""
+        reaches = sorted(map(self.reach, self.rig.children(bone)), reverse=True)
+        return len(reaches) > 1 and reaches[1] > TOE * reaches[0]
+
+    @cached_property
+    def feet(self) -> list[int]:
+        """Bones below the ankles of a two-footed body, which needs heels to stand; else none."""
+        rig, floor = self.rig, self.floor
+        found = []
+        for first in self.limbs:
+            for bone in self.limb(first):
+                low = rig.places[bone, self.up] - floor < ANKLE_HIGH * self.height
+                if low and toes(self, bone):
+                    found.append(bone)
+                    break
+        return found if len(found) == 2 else []
+
+    @cached_property
+    def floor(self) -> float:
+        """Height in m of the lowest place."""
+        return float(np.concatenate([self.rig.places, *self.rig.ends])[:, self.up].min())
+
+    def capsules(self, bone: int, radius: float) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Ends [3], [3] of a bone's capsules; toes above a sole have none of their own."""
+        above = self.rig.parents[bone]
+        while above >= 0 and above not in self.feet:
+            above = self.rig.parents[above]
+        return [] if above >= 0 else self.sole(bone, radius) or self.segments(bone)
+
+    def sole(self, bone: int, radius: float) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Sole from heel to toe on the floor for a bone below an ankle; empty for other bones."""
+        if bone not in self.feet:
+            return []
+        spots = self.spots_below(bone)
+        ahead = toes(self, bone) * spots[:, self.ahead]
+        heel, toe = spots[0].copy(), spots[ahead.argmax()].copy()
+        heel[self.ahead] -= HEEL * (toe - heel)[self.ahead]
+        if ahead.min() < toes(self, bone) * heel[self.ahead]:
+            heel[self.ahead] = spots[ahead.argmin(), self.ahead]
+        heel[self.up] = toe[self.up] = self.floor + radius
+        return [(heel, toe)]
+
+    def spots_below(self, bone: int) -> np.ndarray:
+        """Starts and ends [n, 3] of a bone and all bones below it."""
+        below = {bone}
+        for other in range(bone + 1, len(self.rig.names)):
+            if self.rig.parents[other] in below:
+                below.add(other)
+        order = sorted(below)
+        return np.concatenate([self.rig.places[order], *[self.rig.ends[b] for b in order]])
+
+    def moves(self, bone: int) -> bool:
+        """Return whether a bone is long enough to bend on its own."""
+        return self._length(bone) > SHORT * self.height
+
+
+def toes(plan: Plan, foot: int) -> float:
+    """Direction of a foot along the forward axis: 1, -1, or 0 if it does not point along it."""
+    way = plan.way(foot)
+    share = float(way[plan.ahead]) / max(float(np.linalg.norm(way)), 1e-9)
+    return float(np.sign(share)) if abs(share) > FOOT else 0.0
+
+
+BENT = np.radians(8.0)
+SWING, SPREAD, SPINE, ANKLE, LOOSE = 60.0, 30.0, 25.0, 45.0, 45.0
+FOLD, STRETCH = 75.0, 3.0
+"""deg that a knee folds from its rest pose; deg that it stays away from straight."""
+KNEE = (5.0, 110.0)
+"""deg that a knee which rests straight bends the wrong way, and the right way."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Hinge:
+    """Hinge of a bone. name: pitch, roll or yaw. axis: [3]. low, high: deg."""
+
+    name: str
+    axis: np.ndarray
+    low: float
+    high: float
+    confidence: Confidence
+    reason: str
+
+
+def hinges_of(plan: Plan) -> list[list[Hinge]]:
+    """Hinges of each bone; none for the root."""
+    found: list[list[Hinge]] = [[] for _ in plan.rig.names]
+    for bone in range(1, len(found)):
+        if plan.is_limb(bone):
+            _limb(plan, bone, found)
+        elif plan.in_middle(bone) and not plan.sides_below[bone] and plan.moves(bone):
+            found[bone] = _spine(plan, "it may nod and turn")
+    for bone in plan.rig.children(0):
+        chain = _spine_below(plan, bone)
+        if chain:
+            found[chain[(len(chain) - 1) // 2]] = _spine(plan, "the trunk bends in one place")
+    return found
+
+
+def _spine_below(plan: Plan, bone: int) -> list[int]:
+    """Bones of the trunk from one on down that are long enough to bend."""
+    chain: list[int] = []
+    following = [bone]
+    while following and plan.carries(following[0]):
+        chain.append(following[0])
+        following = [b for b in plan.rig.children(following[0]) if plan.carries(b)]
+    return [b for b in chain if plan.moves(b)]
+
+
+def _limb(plan: Plan, first: int, found: list[list[Hinge]]) -> None:
+    """Fill in the hinges of a limb, its side branches and toes rigid."""
+    chain = plan.limb(first)
+    ends = (i for i, bone in enumerate(chain) if bone in plan.feet or plan.has_toes(bone))
+    below = next(ends, len(chain))
+    *upper, last = chain[: below + 1]
+    chain = [*filter(plan.moves, upper), *[last] * (plan.reach(last) > SHORT * plan.height)]
+    if not chain:
+        return
+    ways = [plan.way(bone) for bone in chain]
+    if chain[-1] == last and last not in plan.feet:
+        ways[-1] = plan.tips[last] - plan.rig.places[last]
+    along = np.abs(plan.tips[first] - plan.rig.places[first])
+    vertical = int(along.argmax()) == plan.up
+    found[chain[0]] = _hip(plan, int(along.argmax()))
+    for (one, other), bone in zip(itertools.pairwise(ways), chain[1:], strict=True):
+        is_last = bone == chain[-1]
+        found[bone] = [_knee(plan, one, other, is_last, vertical, toes(plan, chain[-1]))]
+
+
+def _hip(plan: Plan, along: int) -> list[Hinge]:
+    """Hinges about the two axes across the limb; the wider one is the stride."""
+    swings = plan.up if along == plan.side else plan.side
+    other = next(axis for axis in (plan.ahead, plan.up, plan.side) if axis not in (along, swings))
+    reason = "a limb swings and spreads where it begins"
+    return [
+        Hinge(_name(plan, swings), np.eye(3)[swings], -SWING, SWING, "medium", reason),
+        Hinge(_name(plan, other), np.eye(3)[other], -SPREAD, SPREAD, "medium", reason),
+    ]
+
+
+def _knee(
+    plan: Plan, one: np.ndarray, other: np.ndarray, last: bool, vertical: bool, forward: float
+) -> Hinge:
+    """Hinge between two bones of a limb with directions [3], across the plane that they span."""
+    across = np.cross(one, other)
+    size = float(np.linalg.norm(one) * np.linalg.norm(other))
+    if float(np.linalg.norm(across)) > np.sin(BENT) * size:
+        number = int(np.abs(across).argmax())
+        axis = np.eye(3)[number]
+        bend = float(np.degrees(np.arctan2(axis @ across, one @ other)))
+        straight = -bend + np.sign(bend) * STRETCH
+        fold = np.sign(bend) * (ANKLE if last else FOLD)
+        low, high = sorted((float(np.clip(straight, -FOLD, FOLD)), float(fold)))
+        reason = "across the plane in which it rests bent, no further than straight"
+        return Hinge(_name(plan, number), axis, low, high, "medium", reason)
+    number = plan.side if vertical else plan.ahead
+    axis = np.eye(3)[number]
+    if last or not vertical or not forward:
+        return Hinge(_name(plan, number), axis, -LOOSE, LOOSE, "low", "it rests straight")
+    back = -np.sign(float(np.cross(axis, other)[plan.ahead]) * forward)
+    low, high = sorted((-back * KNEE[0], back * KNEE[1]))
+    reason = "it rests straight; taken for a knee, which folds away from the toes"
+    return Hinge(_name(plan, number), axis, low, high, "low", reason)
+
+
+def _spine(plan: Plan, reason: str) -> list[Hinge]:
+    return [
+        Hinge(_name(plan, axis), np.eye(3)[axis], -SPINE, SPINE, "low", reason)
+        for axis in (plan.side, plan.up)
+    ]
+
+
+def _name(plan: Plan, axis: int) -> str:
+    return {plan.side: "pitch", plan.ahead: "roll", plan.up: "yaw"}[axis]

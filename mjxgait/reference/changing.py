@@ -1,0 +1,120 @@
+"""Controllers that change or halt during a simulation.
+
+Letters: `S` simulations, `J` actuated joints.
+
+Letters: `S` simulations, `J` actuated joints.
+"""
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+
+from mjxgait.champion import Champion
+from mjxgait.controllers.key_poses.reference import PoseTwin
+from mjxgait.creature import Creature
+from mjxgait.reference.controllers import Command, Memory
+
+ROUNDING = 1e-6
+"""Positions by which a sum of steps may fall short of the next position."""
+
+
+class ChangingTwin:
+    """Blend from one key-pose controller to another; both share one phase.
+
+    Memory: `cycles` [S] done, `steps` [S], and `change` [S] s.
+    changes: [S] s, moment of the command. seconds: duration of the blend.
+    """
+
+    command: ClassVar[Command] = "pose"
+    every: ClassVar[int] = 1
+
+    def __init__(
+        self,
+        creature: Creature,
+        before: Champion,
+        after: Champion,
+        step: float,
+        changes: np.ndarray,
+        seconds: float,
+    ) -> None:
+        self.before, self.after = (
+            PoseTwin(creature, champion, step) for champion in (before, after)
+        )
+        self.reads = tuple(dict.fromkeys((*self.before.reads, *self.after.reads)))
+        self.step, self.changes, self.seconds = step, changes, seconds
+
+    def init(self, count: int) -> Memory:
+        """See `Twin`; `count` must be the number of `changes`."""
+        assert count == len(self.changes), "a change for each simulation"
+        return {
+            "cycles": np.zeros(count),
+            "steps": np.zeros(count, dtype=int),
+            "change": self.changes.copy(),
+        }
+
+    def phase(self, memory: Memory) -> np.ndarray:
+        """See `Twin`."""
+        return memory["cycles"] % 1.0
+
+    def act(self, memory: Memory, senses: Mapping[str, np.ndarray]) -> tuple[np.ndarray, Memory]:
+        """See `Twin`."""
+        since = memory["steps"] * self.step - memory["change"]
+        share = np.clip(since / self.seconds, 0.0, 1.0)
+        old, new = (
+            twin.target(self._position(twin, memory), senses, memory["steps"])
+            for twin in (self.before, self.after)
+        )
+        target = old + share[:, None] * (new - old)
+        slow, fast = (
+            self._rate(twin, target, senses["joint_pos"]) for twin in (self.before, self.after)
+        )
+        cycles = memory["cycles"] + slow + share * (fast - slow)
+        return target, {**memory, "cycles": cycles, "steps": memory["steps"] + 1}
+
+    def _position(self, twin: PoseTwin, memory: Memory) -> np.ndarray:
+        place = np.floor(self.phase(memory) * twin.length + ROUNDING)
+        return place.astype(int) % twin.length
+
+    def _rate(self, twin: PoseTwin, target: np.ndarray, joint_pos: np.ndarray) -> np.ndarray:
+        """Return cycles per step [S]; target, joint_pos: [S, J]."""
+        if twin.settings.advance == "clock":
+            return np.full(len(target), self.step / twin.tuning["period"])
+        error = np.sqrt(((target - joint_pos) ** 2).mean(1))
+        return (error < twin.tuning["threshold"]) / twin.length
+
+
+class HaltingTwin(PoseTwin):
+    """Key-pose controller that stops on command: the cycle freezes, balance continues.
+
+    halts: [S] s, moment of the command. fades: [S] s from the pose at that moment to the standing
+    pose.
+    """
+
+    def __init__(
+        self,
+        creature: Creature,
+        champion: Champion,
+        step: float,
+        halts: np.ndarray,
+        fades: np.ndarray,
+    ) -> None:
+        super().__init__(creature, champion, step)
+        self.halts, self.fades = halts, fades
+
+    def init(self, count: int) -> Memory:
+        """See `Twin`; `count` must be the number of `halts`."""
+        assert count == len(self.halts), "a halt for each simulation"
+        return {**super().init(count), "halt": self.halts.copy(), "fade": self.fades.copy()}
+
+    def act(self, memory: Memory, senses: Mapping[str, np.ndarray]) -> tuple[np.ndarray, Memory]:
+        """See `Twin`."""
+        since = memory["steps"] * self.step - memory["halt"]
+        share = np.clip(since / memory["fade"], 0.0, 1.0)[:, None]
+        planned = self.planned(memory["position"])
+        halted = planned + share * (self.creature.joints.stand - planned)
+        target = self.corrected(halted, senses, memory["steps"])
+        steps = memory["steps"] + 1
+        onward = self.advance(memory["position"], target, senses["joint_pos"], steps)
+        position = np.where(since < 0, onward, memory["position"])
+        return target, {**memory, "position": position, "steps": steps}
