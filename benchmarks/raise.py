@@ -1,4 +1,4 @@
-"""Limits of champions beyond the certificate, in C MuJoCo, as a table for docs/results.md.
+"""Limits of champions beyond the certificate, in C MuJoCo, as a table for docs/research/results.md.
 
     python benchmarks/raise.py runs/every/tall_quadruped-0 runs/every/duck-0 --json raise.json
 
@@ -9,7 +9,8 @@ on the plain floor, up to the fall if there is one. Columns:
 - push: sudden change of the trunk's horizontal velocity, in sqrt(g h), that fells half; from any
   side, between 2 and 4 s, 5 s to fall.
 - plain: the floor of evolution; share that stays up and speed in body lengths/s.
-- bumps: rough ground (docs/ground.md) that rises and falls by at most this share of the hip height;
+- bumps: rough ground (docs/reference/ground.md) that rises and falls by at most this share of the
+  hip height;
   four of them, a quarter of the starts on each. Other parts than feet may touch it.
 - uphill, downhill: steepest slope in degrees on which 90 % stay up and get more than a body length
   forward, all gentler ones included.

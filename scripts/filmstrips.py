@@ -1,4 +1,4 @@
-"""Draw one stride of each champion and write docs/filmstrips.md.
+"""Draw one stride of each champion and write docs/research/filmstrips.md.
 
 python scripts/filmstrips.py runs/every/*-[0-4]
 """
@@ -50,5 +50,10 @@ for run in map(Path, sys.argv[1:]):
     title = f"{creature.name.replace('_', ' ')}, seed {config.seed}"
     picture = strip(run, f"{creature.name}-{config.seed}")
     said = f"{certificate['report']['gait']}, {certificate['report']['speed']:.2f} m/s"
-    lines += [f"## {title}: {said}", "", f"![{title}]({picture.relative_to(DOCS)})", ""]
-(DOCS / "filmstrips.md").write_text("\n".join(lines), encoding="utf-8")
+    lines += [
+        f"## {title}: {said}",
+        "",
+        f"![{title}](../{picture.relative_to(DOCS).as_posix()})",
+        "",
+    ]
+(DOCS / "research" / "filmstrips.md").write_text("\n".join(lines), encoding="utf-8")

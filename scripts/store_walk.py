@@ -1,4 +1,4 @@
-"""Store a champion's undisturbed walk and rewrite docs/worked-example.md from it.
+"""Store a champion's undisturbed walk and rewrite docs/research/worked-example.md from it.
 
     python scripts/store_walk.py RUN
 
@@ -32,7 +32,7 @@ from mjxgait.training.folder import (
 )
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGE, FOLDER = ROOT / "docs" / "worked-example.md", ROOT / "docs" / "data" / "walk"
+PAGE, FOLDER = ROOT / "docs" / "research" / "worked-example.md", ROOT / "docs" / "data" / "walk"
 CODE = re.compile(r"```python\n(.*?)```", re.DOTALL)
 NUMBERS = re.compile(r"(<!-- numbers: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 BY_HAND = (2, 3, 7)

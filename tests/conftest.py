@@ -13,7 +13,8 @@ os.environ.setdefault(
     "JAX_COMPILATION_CACHE_DIR", str(Path(__file__).parents[1] / ".pytest_cache" / "jax")
 )
 os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
-# Compiling is what takes the time in most tests, and in the commands that they start; see `as_shipped`.
+# Compiling is what takes the time in most tests, and in the commands that they start; see
+# `as_shipped`.
 os.environ.setdefault("JAX_DISABLE_MOST_OPTIMIZATIONS", "1")
 # Runs are compared to the bit, and how lanes are dealt to devices decides on the last of them.
 os.environ["JAX_NUM_CPU_DEVICES"] = "2"

@@ -1,4 +1,4 @@
-"""docs/extending.md does what it says."""
+"""docs/guide/your-own-task.md does what it says."""
 
 import csv
 import io
@@ -18,7 +18,7 @@ from mjxgait.cli.view import following
 from mjxgait.training.folder import own_options
 from mjxgait.training.screen import Screen
 
-PAGE = Path(__file__).parents[1] / "docs" / "extending.md"
+PAGE = Path(__file__).parents[1] / "docs" / "guide" / "your-own-task.md"
 SMALL = (
     "--population 6 --generations 1 --rollout.seconds 0.4 --rollout.lanes 4"
     " --examination.candidates 0 --no-plots"

@@ -1,4 +1,4 @@
-"""The pose cycle against its specification, docs/controller.md."""
+"""The pose cycle against its specification, docs/reference/controller.md."""
 
 import dataclasses
 

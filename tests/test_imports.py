@@ -53,7 +53,8 @@ FLOORS = (
     ("errors",),
 )
 """Patterns of modules and packages, from the top down: each may import from the floors below it, and
-from its own. The longest pattern that fits a file decides, so one slice has files on several floors.
+from its own. The longest pattern that fits a file decides, so one slice has files on several
+floors.
 """
 JAX_FREE = (
     "certification/*",

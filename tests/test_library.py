@@ -143,7 +143,7 @@ def test_help_is_a_good_read():
         assert words in text
 
 
-NOTEBOOK = Path(__file__).parents[1] / "docs" / "walk.ipynb"
+NOTEBOOK = Path(__file__).parents[1] / "docs" / "guide" / "walk.ipynb"
 FIRST = 'CREATURE, SETTINGS = "tall_quadruped", {}'
 
 

@@ -118,7 +118,8 @@ def test_the_bodies_of_a_run_weigh_what_their_starts_say(stool: Creature):
     masses = jax.jit(experiment.simulator.plant.heavier)(plain, experiment.starts.heaviness[1])
     for leaf, its in zip(jax.tree.leaves(numbers), jax.tree.leaves(masses), strict=True):
         np.testing.assert_allclose(leaf[1], its, rtol=1e-6)
-    # Nothing else tells the starts apart: where the masses count, everybody moves otherwise in each.
+    # Nothing else tells the starts apart: where the masses count, everybody moves otherwise in
+    # each.
     forward = jax.jit(experiment.simulate)(experiment.init().genomes).tally.forward
     assert np.abs(np.diff(forward, axis=1)).max() > 1e-5
 

@@ -1,6 +1,7 @@
 """Several runs side by side: a run folder for each seed, and all champions in one picture.
 
-Who evolves them are made-up hands; that a row is the run that its seed alone is, the tests of rows say.
+Who evolves them are made-up hands; that a row is the run that its seed alone is, the tests of rows
+say.
 """
 
 import dataclasses

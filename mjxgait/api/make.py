@@ -31,9 +31,9 @@ def load_creature(
     """Load a shipped creature by name, a creature folder, or a model file (MJCF, URDF).
 
     Args:
-      scale: size factors of parts, by name pattern (docs/creature.md).
+      scale: size factors of parts, by name pattern (docs/reference/creature-folder.md).
       tell: called with the notes of the import of a model file.
-      way: forward, back, left or right: the side that becomes the front (docs/wishes.md).
+      way: forward, back, left or right: the side that becomes the front (docs/guide/gaits.md).
 
     Raises:
       UserError: not found or not usable, with the reason.
@@ -80,14 +80,16 @@ def train(
       env: shipped creature, creature folder, or model file. out: the run folder, which must be
         empty or new; by default a new one under runs/.
       config: file with settings, or the name of a shipped config such as wilson.
-      controller, task: a shipped name, or FILE.py:CLASS of your own (docs/extending.md).
-      scale: size factors of parts, such as {"*_shin": 1.2} (docs/creature.md).
-      way: forward, back, left or right: direction in the creature's own frame (docs/wishes.md).
-      speed, gait, turn, steer, style: walk targets (docs/wishes.md): m/s or text such as
+      controller, task: a shipped name, or FILE.py:CLASS of your own (docs/guide/your-own-task.md).
+      scale: size factors of parts, such as {"*_shin": 1.2} (docs/reference/creature-folder.md).
+      way: forward, back, left or right: direction in the creature's own frame
+        (docs/guide/gaits.md). speed, gait, turn, steer, style: walk targets (docs/guide/gaits.md):
+        m/s or text such as
         "0.4bl/s", a name, deg/s to the left, deg/s to either side, a name or a file.
-      certificate: walks, or anywhere (docs/certificate.md).
-      expressions: file of initial programs, for the controller program (docs/programs.md).
-      seed, population, generations: the settings that are changed most often.
+      certificate: walks, or anywhere (docs/reference/certificate.md).
+      expressions: file of initial programs, for the controller program
+        (docs/reference/expressions.md). seed, population, generations: the settings that are
+        changed most often.
       settings: any others, in tables as in a config file: {"rollout": {"seconds": 5.0}}.
       quiet: prints nothing.
 
@@ -139,7 +141,7 @@ def refine(
     settings: Mapping[str, Any] | None = None,
     quiet: bool = False,
 ) -> Run:
-    """Evolve a walk near a hand-made or captured cycle, and return the run (docs/refine.md).
+    """Evolve a walk near a hand-made or captured cycle, and return the run (docs/guide/refine.md).
 
     Does the same as `mjxgait refine`; `Run.departure` reports what physics changed.
 
@@ -240,7 +242,7 @@ def verify(run: Run | Place) -> list[str]:
 def examine_expressions(
     env: Place, file: Place, task: str | None = None, config: Place | None = None
 ) -> Certificate:
-    """Examine a program that was written by hand (docs/programs.md); write nothing.
+    """Examine a program that was written by hand (docs/reference/expressions.md); write nothing.
 
     Args:
       env: shipped creature, creature folder, or model file; its own settings set how often the

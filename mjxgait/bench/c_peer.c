@@ -1,6 +1,6 @@
 // The contest's rival in C: one mjData, one episode after the other, double precision.
 //
-// The controller is docs/controller.md's. A step calls the parts of mj_step one by one, so that
+// The controller is docs/reference/controller.md's. A step calls the parts of mj_step one by one, so that
 // the controller sits between them and nothing is computed twice; what a walker without tendons,
 // cameras and actuators does not need is not called. Compiled and called by c_peer.py, which fills
 // `Work` field by field in this order.
@@ -21,7 +21,7 @@ typedef struct {
   const double *reach;                          // [F, 7]: radius, box, ellipsoid
   const double *axes, *up;                      // [2, 3], [3]: forward and left, up of the trunk
   const double *start, *forward, *left;         // [3] of the standing pose, in the world
-  const double *cycle, *tuning;                 // [N, C, J], [N, 7] as in docs/controller.md
+  const double *cycle, *tuning;                 // [N, C, J], [N, 7] as in docs/reference/controller.md
   const double *qpos, *qvel, *friction, *push;  // [R, ...]
   const double *geom_friction, *pair_friction;  // [ngeom], [npair] of the model: sliding
 } Work;

@@ -1,4 +1,4 @@
-"""NumPy between batched steps of C MuJoCo (`mujoco.batch`): docs/controller.md in NumPy.
+"""NumPy between batched steps of C MuJoCo (`mujoco.batch`): docs/reference/controller.md in NumPy.
 
 It is as fast as Python allows. Each simulation keeps its MjData, so the step ends with the
 velocity stage of the new state and computes nothing twice. An ended simulation takes the next

@@ -1,4 +1,4 @@
-"""Stable-walk certificate, in NumPy and C MuJoCo, free of JAX (docs/certificate.md)."""
+"""Stable-walk certificate, in NumPy and C MuJoCo, free of JAX (docs/reference/certificate.md)."""
 
 from mjxgait.certification.certificate import (
     Certificate,

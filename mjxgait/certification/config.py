@@ -172,7 +172,7 @@ class PartsConfig:
 
 @dataclasses.dataclass(frozen=True)
 class WishesConfig:
-    """Criteria 10 and 11: tolerances of the walk targets (docs/wishes.md).
+    """Criteria 10 and 11: tolerances of the walk targets (docs/guide/gaits.md).
 
     Attributes:
       speed: over the target speed. heading: deg off the commanded heading, mean over a second.

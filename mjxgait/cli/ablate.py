@@ -35,7 +35,7 @@ EXPECTED_SPEED = 0.8e6
 
 @dataclasses.dataclass(frozen=True)
 class AblateOptions:
-    """Run a study, variants times seeds side by side, with a report (docs/ablations.md).
+    """Run a study, variants times seeds side by side, with a report (docs/research/ablations.md).
 
     Writes report.md, report.html, results.csv and generations.parquet into the study folder.
 
@@ -51,7 +51,7 @@ class AblateOptions:
       rows: Runs side by side in one program; by default all, on a cluster 4.
       physics: mjx simulates all runs with MJX itself instead of this program's faster step.
       cluster: Evolve on a Ray cluster: HOST:PORT, or auto for the cluster that this machine belongs
-        to (docs/cluster.md).
+        to (docs/guide/cluster.md).
       resume: Folder of a study to continue unchanged.
       hours: Refuse a study that may take longer.
       dry_run: Only print the planned runs and the estimated time.

@@ -19,9 +19,9 @@ class BenchOptions:
     """Measure useful creature-steps per second against C MuJoCo and DART, by turns in one run.
 
     The contestants are a program in C around MuJoCo's functions, NumPy between batched steps of C
-    MuJoCo, and DART (docs/performance.md). C needs a compiler, DART needs dartpy (the extra peers);
-    without them they are left out. Leave the machine idle meanwhile: the ratios tolerate some load,
-    the rates do not.
+    MuJoCo, and DART (docs/research/performance.md). C needs a compiler, DART needs dartpy (the
+    extra peers); without them they are left out. Leave the machine idle meanwhile: the ratios
+    tolerate some load, the rates do not.
 
     Attributes:
       json: File to write everything to; for several creatures `ratios` by name, and `creatures`.

@@ -15,13 +15,14 @@ from mjxgait.training.stored import disk_errors, require_writable
 
 @dataclasses.dataclass(frozen=True)
 class CertifyOptions:
-    """Test criterion by criterion that the champion of a run truly walks (docs/certificate.md).
+    """Test criterion by criterion that the champion of a run truly walks (docs/reference/certificate.md).
 
     Writes RUN/certificate.json. The exit code is 0 if the examination ran, even if the champion
     fails.
 
-    With --env and --expressions a handwritten program is examined instead (docs/programs.md). Then
-    nothing is written without --out, and the exit code is 0 if the program passes, else 1.
+    With --env and --expressions a handwritten program is examined instead
+    (docs/reference/expressions.md). Then nothing is written without --out, and the exit code is 0
+    if the program passes, else 1.
 
     Other thresholds than the shipped ones (--config) certify nothing: every command shows such a
     certificate as "by other rules", with the differences.

@@ -28,7 +28,7 @@ class InspectOptions:
       all: Show the whole population instead of its best ten.
       diff: Two runs or checkpoints to compare.
       verify: Examine the champion of a run again, and compare every measure with its certificate.
-        The exit code is 0 only if all are equal (docs/certificate.md).
+        The exit code is 0 only if all are equal (docs/reference/certificate.md).
       json: Print JSON for programs.
     """
 

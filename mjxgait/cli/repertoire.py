@@ -37,7 +37,7 @@ class RepertoireOptions:
     """Evolve a grid of walks, speeds by turns, side by side, each seeded from its neighbours.
 
     Examines each walk. Writes the certified ones as clips of one GLB, in phase, with a table of
-    their places in a blend space (docs/repertoire.md).
+    their places in a blend space (docs/guide/repertoire.md).
 
     Attributes:
       env: Name of a shipped creature, path of a creature folder, or a model file (MJCF or URDF).
@@ -59,7 +59,7 @@ class RepertoireOptions:
       travelling: Move the root in the clips; otherwise the creature walks in place.
       blends: Test in C MuJoCo also the blends half way between neighbours, and changes from one to
         the other while walking.
-      cluster: Evolve on a Ray cluster: HOST:PORT, or auto (docs/cluster.md).
+      cluster: Evolve on a Ray cluster: HOST:PORT, or auto (docs/guide/cluster.md).
     """
 
     env: str = "tall_quadruped"

@@ -11,7 +11,7 @@ import tyro
 
 @dataclasses.dataclass(frozen=True)
 class StressOptions:
-    """Test a champion harder than the certificate does (docs/certificate.md).
+    """Test a champion harder than the certificate does (docs/reference/certificate.md).
 
     Bumps, slopes to all sides, a slippery floor, larger pushes, a heavier trunk, ten minutes.
 

@@ -49,21 +49,21 @@ class TrainOptions:
     Settings come in layers, each overriding the one before: configs/default.toml, the creature's
     own [train] table, the file of --config, and the options given here. Every key of the config is
     an option. --controller and --task select the controller and the task, such as poses and walk,
-    or FILE.py:CLASS of your own (docs/extending.md).
+    or FILE.py:CLASS of your own (docs/guide/your-own-task.md).
 
     Attributes:
       env: Name of a shipped creature, path of a creature folder, or a model file (MJCF or URDF) to
         import on the fly.
       config: TOML file with settings, or the name of a shipped config such as wilson.
       scale: Size factors of parts, as PATTERN=FACTOR: '*_shin=1.2' for longer shins, 'trunk=0.9'
-        (docs/creature.md). Lengths, masses and inertias follow, gains do not.
+        (docs/reference/creature-folder.md). Lengths, masses and inertias follow, gains do not.
       way: back, left or right: direction in the creature's own frame; forward by default
-        (docs/wishes.md).
+        (docs/guide/gaits.md).
       expressions: File of handwritten programs as the start of evolution, for --controller program
-        (docs/programs.md).
+        (docs/reference/expressions.md).
       out: Folder for the run; by default a new one under runs/.
       runs: Number of separate runs side by side, with seeds from --seed on: a folder with a run
-        folder each, and a picture of all champions (docs/zoo.md).
+        folder each, and a picture of all champions (docs/guide/several-runs.md).
       resume: Run folder to continue, with its own creature and settings. Only the settings that end
         a run may differ: --generations, --evolution.target, --examination.
       generation: With --resume: the checkpoint to continue from, instead of the latest.
@@ -72,8 +72,9 @@ class TrainOptions:
       evolve_body: Short for --evolution.body: 1.25 lets the parts below the trunk become up to a
         quarter larger or a fifth smaller; the run stores the winning body in body/.
       speed: Target speed: 0.4 (m/s), 0.4bl/s (body lengths per second), or fr0.2 (Froude number).
-        This and the next four are for walking (docs/wishes.md).
-      gait: walk, amble, trot, pace, canter, bound, gallop, hop (four feet), walk, tripod, wave (six),
+        This and the next four are for walking (docs/guide/gaits.md).
+      gait: walk, amble, trot, pace, canter, bound, gallop, hop (four feet), walk, tripod, wave
+        (six),
         walk, waddle, hop (two), natural (an animal's at this speed), or auto (whatever evolves). By
         default the usual gait in creature.toml: natural for both dogs.
       turn: Turn rate while walking, degrees per second to the left.
@@ -81,12 +82,12 @@ class TrainOptions:
         side.
       style: calm, sneaky, heavy, proud, tired, hurried, or a FILE.toml of settings.
       certificate: walks, or anywhere: trains on uneven ground until the walk passes `mjxgait
-        stress` (docs/certificate.md).
+        stress` (docs/reference/certificate.md).
       cluster: Evolve on a Ray cluster: HOST:PORT, or auto for the cluster that this machine belongs
-        to (docs/cluster.md).
+        to (docs/guide/cluster.md).
       ground: Short for --rollout.ground: flat, slope:0.1, steps:0.05, bumps:0.05, rough:0.05.
       physics: Short for --rollout.physics: mjx simulates with MJX itself, auto with this program's
-        faster step where it supports the model (docs/performance.md).
+        faster step where it supports the model (docs/research/performance.md).
       view: Show the best of each generation walking on a page that only this machine can reach.
       plots: Draw all plots at the end of the run (`mjxgait plot`).
       settings: The config, key by key.

@@ -110,7 +110,7 @@ class EvolutionConfig:
       mutation_rate: share of offspring mutated.
       sigma: standard deviation of the gaussian mutation, in units of the range of each joint.
       body: largest factor by which the parts below the trunk may grow or shrink, each mirrored pair
-        by a gene of its own (docs/creature.md); 1 leaves the body unchanged.
+        by a gene of its own (docs/reference/creature-folder.md); 1 leaves the body unchanged.
       tuning_rate: chance that a tuning gene of a mutated offspring changes; likewise a body gene.
       tuning_sigma: size of that change, in units of the gene's range; likewise a body gene's.
       remove_duplicates: of individuals with the same genome only one survives.
@@ -121,7 +121,7 @@ class EvolutionConfig:
       family: largest share of the population that may descend, mother by mother, from one of the
         first generation: keeps one family from taking over.
       forced: a phase of rapid mutation and immigrants when growth stalls.
-      islands: several such populations that exchange their best (docs/cluster.md).
+      islands: several such populations that exchange their best (docs/guide/cluster.md).
     """
 
     __pydantic_config__ = STRICT

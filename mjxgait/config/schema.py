@@ -69,7 +69,7 @@ class RolloutConfig:
       gains: half width of the uniform change of each joint's kp and kd in a perturbed start, as a
         share.
       masses: the same for each part's mass and inertia, which then differ from lane to lane; a step
-        costs a third more (docs/performance.md).
+        costs a third more (docs/research/performance.md).
       latency: most control steps by which the torques of a perturbed start are delayed.
       slope: deg; largest slope of the ground in a perturbed start, to any side. Not with a
         `ground`, which all starts have.
@@ -81,13 +81,14 @@ class RolloutConfig:
       caution: standard errors of its starts' mean subtracted from the score: discounts luck on few
         starts.
       physics: auto takes this program's own step, and MJX for a model outside that step's scope;
-        mjx always takes MJX. Both give the same motion within tolerances (docs/performance.md).
+        mjx always takes MJX. Both give the same motion within tolerances
+        (docs/research/performance.md).
       lanes: simulations in flight per device; 0 lets the program choose.
-      block: most individuals that a machine of a cluster evaluates at once (docs/cluster.md).
+      block: most individuals that a machine of a cluster evaluates at once (docs/guide/cluster.md).
       body: its parameters are constants of the compiled program, which is faster, or inputs: then
         another body of the same topology needs no compilation.
       ground: flat, slope:0.1, steps:0.05, bumps:0.05 or rough:0.05, in hip heights
-        (docs/ground.md).
+        (docs/reference/ground.md).
     """
 
     __pydantic_config__ = STRICT
@@ -153,7 +154,7 @@ class ExaminationConfig:
         best first; 0 takes them by their fitness.
       difference: in units of each gene's range, root mean square; what counts as different.
       level: what ends a run early: a walk that passes the certificate, or one that walks anywhere
-        (docs/certificate.md).
+        (docs/reference/certificate.md).
     """
 
     __pydantic_config__ = STRICT
@@ -174,10 +175,12 @@ class UseConfig:
     """Controller and task of a run.
 
     Attributes:
-      controller: what moves the creature: poses, program (docs/programs.md), brain
-        (docs/blocks.md), or FILE.py:CLASS of your own (docs/extending.md).
+      controller: what moves the creature: poses, program (docs/reference/expressions.md), brain
+        (docs/reference/modular-bodies.md), or FILE.py:CLASS of your own
+        (docs/guide/your-own-task.md).
       task: what the creature is to do: walk, hop, limbo, travel; swim, walk, jump, follow and
-        follow-on-land of bodies that grow (docs/blocks.md); or FILE.py:CLASS of your own.
+        follow-on-land of bodies that grow (docs/reference/modular-bodies.md); or FILE.py:CLASS of
+        your own.
     """
 
     __pydantic_config__ = STRICT

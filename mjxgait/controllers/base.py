@@ -89,7 +89,7 @@ Bounds = Mapping[str, tuple[Any, Any]]
 
 
 class RealController(abc.ABC):
-    """Controller to inherit from (docs/extending.md).
+    """Controller to inherit from (docs/guide/your-own-task.md).
 
     A subclass defines `bounds` and `act`. `reads`: names of the observations passed to `act`.
     `command`: the type of command. `Settings`: a frozen dataclass of numbers that become keys of

@@ -92,7 +92,7 @@ SENSES: Mapping[str, Sense] = {
     "pitch_rate": lambda creature, sensed, time: _rate(creature, sensed, creature.frame.left),
     "roll_rate": lambda creature, sensed, time: _rate(creature, sensed, creature.frame.forward),
 }
-"""Observations by name; shapes and units are in docs/controller.md."""
+"""Observations by name; shapes and units are in docs/reference/controller.md."""
 
 
 def sense(

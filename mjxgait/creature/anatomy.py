@@ -119,7 +119,7 @@ class Stepping:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Corrections:
-    """Weights [J] with which joints steer and balance (docs/controller.md).
+    """Weights [J] with which joints steer and balance (docs/reference/controller.md).
 
     stepping: weights for steps under a fall; None where no joint steps.
     """

@@ -296,7 +296,7 @@ def _check_plane(creature: Creature, data: mujoco.MjData) -> None:
 def _check(creature: Creature, data: mujoco.MjData) -> None:
     """Refuse an empty pose range, and gains outside SPD's stable region.
 
-    The region is `h² kp < (4 I + 2 h kd) / 3` (docs/controller.md).
+    The region is `h² kp < (4 I + 2 h kd) / 3` (docs/reference/controller.md).
     """
     model, h = creature.model, creature.model.opt.timestep
     mass = np.zeros((model.nv, model.nv))

@@ -160,7 +160,7 @@ def _place(address: str) -> str:
         if not address:
             raise UserError(
                 "--cluster auto: this machine is no part of a cluster; start one with "
-                "`ray start --head --node-ip-address 127.0.0.1 --port 6379` (docs/cluster.md)"
+                "`ray start --head --node-ip-address 127.0.0.1 --port 6379` (docs/guide/cluster.md)"
             )
     host, colon, port = address.rpartition(":")
     if not (host and colon and port.isdigit()):

@@ -122,7 +122,7 @@ def _touching(model: mujoco.MjModel, data: mujoco.MjData, may_touch: np.ndarray)
 
 
 MOST = 0.5
-"""rad, where the controller clips the feedback (docs/controller.md)."""
+"""rad, where the controller clips the feedback (docs/reference/controller.md)."""
 SHARES = (1.0, 0.5, 0.25, 0.12, 0.06, 0.0)
 """Shares of the full weight, tried in this order."""
 NUDGE = 0.05

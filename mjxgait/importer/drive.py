@@ -71,7 +71,7 @@ class Drive:
     """Joint roles, gains, torque limits and ranges, and the weights of steering and balance.
 
     role: of each joint. kp, kd, torque: [J]. ranges: [J, 2] deg. The dicts map joint names to
-    weights (docs/controller.md).
+    weights (docs/reference/controller.md).
     """
 
     role: list[str]

@@ -1,4 +1,4 @@
-"""Content of a checkpoint, read without compiling or simulating anything (docs/seeing.md)."""
+"""Content of a checkpoint, read without compiling or simulating anything (docs/guide/seeing.md)."""
 
 from mjxgait.inspect.facts import facts, individual_facts
 from mjxgait.inspect.runs import (

@@ -16,7 +16,7 @@ from mjxgait.physics.lane_major.model import check_supported
 from mjxgait.types import ModelPlant
 
 SLOWER = "15 to 30"
-"""Factor by which plain MJX is slower per creature-step (docs/performance.md)."""
+"""Factor by which plain MJX is slower per creature-step (docs/research/performance.md)."""
 
 
 def make_plant(

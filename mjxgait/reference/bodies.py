@@ -1,6 +1,7 @@
 """Bodies that one thread simulates on C MuJoCo: arrays, observations, falls.
 
-Written from docs/blocks.md. Letters: `S` simulations, `B` blocks, `Q` points of a block's faces.
+Written from docs/reference/modular-bodies.md. Letters: `S` simulations, `B` blocks, `Q` points of a
+block's faces.
 
 Letters: `S` simulations, `J` actuated joints, `F` feet, `nq nv` as in MuJoCo.
 """

@@ -169,7 +169,8 @@ def seen_grown(creature: Creature, qpos: np.ndarray, qvel: np.ndarray, drag: flo
     """Measure a motion [T, nq], [T, nv]; frames after it blew up are NaN.
 
     drag: N·s/m³ of the water; 0 without. The velocity of a block's middle along the normal gives
-    the force on a face (docs/blocks.md); the reference simulator sums points instead.
+    the force on a face (docs/reference/modular-bodies.md); the reference simulator sums points
+    instead.
     """
     model, data = creature.model, mujoco.MjData(creature.model)
     boxes = np.flatnonzero(model.geom_bodyid > 0)

@@ -135,7 +135,8 @@ def unfamiliar(
 ) -> Starts:
     """Add further disturbances, most of which evolution does not use by default.
 
-    docs/certificate.md lists those that are new to a champion, by the settings of its run.
+    docs/reference/certificate.md lists those that are new to a champion, by the settings of its
+    run.
 
     Args:
       gains: half width of each joint's kp and kd, as a share. latency: most control steps of delay.

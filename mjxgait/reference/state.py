@@ -1,4 +1,4 @@
-"""State of simulations at one moment, and observations by name, written from docs/controller.md.
+"""State of simulations at one moment, and observations by name, written from docs/reference/controller.md.
 
 Letters: `S` simulations, `J` actuated joints, `F` feet, `nv` degrees of freedom.
 
@@ -132,7 +132,7 @@ ADDED: Mapping[str, Sense] = {
     "light": lambda creature, state: state.light,
     "bar_distance": lambda creature, state: _left(state, state.bar),
 }
-"""Observations added by shipped tasks (docs/hop.md, docs/limbo.md, docs/follow.md)."""
+"""Observations added by shipped tasks (docs/reference/hop.md, docs/reference/limbo.md, docs/reference/follow.md)."""
 FOOT_SENSES = ("foot_height", "contact", "foot_place")
 """Observations that need `foot_height` or `foot_pos`."""
 

@@ -1,4 +1,4 @@
-"""Ground of the reference simulator, from docs/ground.md: NumPy heights and a MuJoCo height field.
+"""Ground of the reference simulator, from docs/reference/ground.md: NumPy heights and a MuJoCo height field.
 
 It shares only the specification of the ground with the one used in evolution.
 """
@@ -30,7 +30,7 @@ NEAR = 1e-4
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Terrain:
-    """Ground of one creature. start: its origin. hip, level: m, see docs/ground.md."""
+    """Ground of one creature. start: its origin. hip, level: m, see docs/reference/ground.md."""
 
     spec: GroundSpec
     start: StartFrame

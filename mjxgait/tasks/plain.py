@@ -19,7 +19,7 @@ from mjxgait.types import Sensed
 
 
 class PlainTask(abc.ABC):
-    """Base class for user-defined tasks (docs/extending.md).
+    """Base class for user-defined tasks (docs/guide/your-own-task.md).
 
     A subclass needs `counts`, the weight of each fitness term by name, and `judge`. Its own
     statistics of an episode go into a `Tally` of its own. `Settings` is a frozen dataclass of

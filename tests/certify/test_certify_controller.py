@@ -1,4 +1,4 @@
-"""The NumPy controller against docs/controller.md, by hand."""
+"""The NumPy controller against docs/reference/controller.md, by hand."""
 
 import dataclasses
 from types import SimpleNamespace

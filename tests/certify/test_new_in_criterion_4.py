@@ -1,4 +1,4 @@
-"""docs/certificate.md: which disturbances of criterion 4 are new to a champion, by its settings."""
+"""docs/reference/certificate.md: which disturbances of criterion 4 are new to a champion, by its settings."""
 
 from pathlib import Path
 

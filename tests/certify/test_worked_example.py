@@ -1,4 +1,4 @@
-"""docs/worked-example.md: its code, run as it stands, comes to the certificate's numbers, its table
+"""docs/research/worked-example.md: its code, run as it stands, comes to the certificate's numbers, its table
 shows them, and the stored champion walks that walk.
 """
 
@@ -16,7 +16,7 @@ from mjxgait.champion import read_champion
 from mjxgait.creature import load_creature
 
 ROOT = Path(__file__).parents[2]
-PAGE = (ROOT / "docs" / "worked-example.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "research" / "worked-example.md").read_text(encoding="utf-8")
 CODE = re.search(r"```python\n(.*?)```", PAGE, re.DOTALL).group(1)
 FOLDER = ROOT / "docs" / "data" / "walk"
 NOT_STORED = {

@@ -91,7 +91,7 @@ def test_work_that_costs_every_worker_ends_with_a_sentence():
 
 
 def test_nobody_waits_long_for_one_that_stands_still():
-    """The bound that docs/cluster.md states: so many medians, and the time that another takes."""
+    """The bound that docs/guide/cluster.md states: so many medians, and the time that another takes."""
     crew, toys, _ = crew_of([1.0, 1e9])
     assert crew.all(work(*range(8))) == [n**2 for n in range(8)]
     assert [number for number, _ in toys.begun].count(1) == 1

@@ -153,7 +153,8 @@ def test_a_script_ends_as_it_should(name: str, tmp_path: Path, as_it_was, reques
     shutil.copytree(ROOT / where, tmp_path / where)
     (tmp_path / "tests").symlink_to(ROOT / "tests")
     (tmp_path / "docs" / "images").mkdir(parents=True)
-    shutil.copy(ROOT / "docs" / "worked-example.md", tmp_path / "docs")
+    (tmp_path / "docs" / "research").mkdir()
+    shutil.copy(ROOT / "docs/research/worked-example.md", tmp_path / "docs" / "research")
     given = [sys.executable, str(tmp_path / where / name), *FORMS[name](tmp_path)]
     done = subprocess.run(given, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout

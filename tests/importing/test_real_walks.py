@@ -16,7 +16,7 @@ from mjxgait.training.folder import CERTIFICATE
 ASKED = os.environ.get("MJXGAIT_TEST_WALKERS", "")
 """Names of models, by commas. One takes three minutes: only those that are asked for are walked.
 
-`benchmarks/imported.py` walks the whole list; docs/your-own-creature.md has what came of it.
+`benchmarks/imported.py` walks the whole list; docs/guide/your-own-body.md has what came of it.
 """
 pytestmark = [
     pytest.mark.slow,

@@ -24,9 +24,9 @@ from mjxgait.training.experiment import build_experiment
 from mjxgait.training.folder import METRICS, read_metrics
 
 # The program of the lamp that Gritz & Hahn printed, as the transcript of the slides has it: line by
-# line, but for what the transcript lost. It has neither + nor * nor %, so those are ours: each stands
-# where a function is missing there. So is the parenthesis before the last `ifltz` of the elbow, and
-# the `*` in place of a "0" in front of "s0 vx".
+# line, but for what the transcript lost. It has neither + nor * nor %, so those are ours: each
+# stands where a function is missing there. So is the parenthesis before the last `ifltz` of the
+# elbow, and the `*` in place of a "0" in front of "s0 vx".
 SLIDES = """\
 (list (- (ifltz a0 pz a2) (% a1 t))
 (ifltz (- (- (ifltz a0 pz a2) (% a1 t)) (ifltz

@@ -1,6 +1,7 @@
 """A repertoire of the smallest creature, from the first generation to the files for a game engine.
 
-Who evolves it are made-up hands, so that no program is compiled; `test_guests.py` looks at the rows.
+Who evolves it are made-up hands, so that no program is compiled; `test_guests.py` looks at the
+rows.
 """
 
 import dataclasses

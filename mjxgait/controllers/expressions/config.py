@@ -27,7 +27,7 @@ FUNCTIONS = {
     "sin": 1,
     "cos": 1,
 }
-"""Functions with their number of arguments (docs/programs.md).
+"""Functions with their number of arguments (docs/reference/expressions.md).
 
 `/` is protected. `ifltz` returns its second argument if the first is below zero, else its third.
 """
@@ -51,7 +51,8 @@ class ProgramConfig:
     Attributes:
       functions: functions that an expression may use, besides constants and observations.
       every: control steps per evaluation; in between the angles stay.
-      senses: name patterns of the observations that it may use; docs/programs.md lists them.
+      senses: name patterns of the observations that it may use; docs/reference/expressions.md lists
+        them.
       nodes: most nodes of an expression.
       depth: greatest depth of an expression.
       initial_depth: depth range of the first expressions, half of them full and half grown.

@@ -32,7 +32,7 @@ def holds(steps: int) -> int:
 
 @dataclasses.dataclass(frozen=True)
 class TuningRanges:
-    """Ranges of the tuning genes (docs/controller.md); equal ends fix one.
+    """Ranges of the tuning genes (docs/reference/controller.md); equal ends fix one.
 
     Attributes:
       threshold: rad; pose error, root mean square, below which the target advances.
@@ -63,7 +63,7 @@ StaticInterval = Annotated[Interval, SHAPE]
 
 @dataclasses.dataclass(frozen=True)
 class SteppingRanges:
-    """Ranges of the genes for stepping under a fall (docs/controller.md); equal ends fix one.
+    """Ranges of the genes for stepping under a fall (docs/reference/controller.md); equal ends fix one.
 
     Only bodies with weights in `[stepping]` have these genes.
 

@@ -1,4 +1,4 @@
-"""Reference controller for key poses, written from docs/controller.md alone.
+"""Reference controller for key poses, written from docs/reference/controller.md alone.
 
 Letters: `S` simulations, `J` actuated joints, `K` key poses, `C` poses in the cycle.
 """
@@ -125,7 +125,7 @@ class PoseTwin:
     def corrections(
         self, senses: Mapping[str, np.ndarray]
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return `u` (without `steering`), `p` and `r` of docs/controller.md, [S] each."""
+        """Return `u` (without `steering`), `p` and `r` of docs/reference/controller.md, [S] each."""
         gain = self.tuning
         pitch = gain["pitch"] * senses["pitch"] + gain["pitch_rate"] * senses["pitch_rate"]
         roll = gain["roll"] * senses["roll"] + gain["roll_rate"] * senses["roll_rate"]

@@ -2,7 +2,8 @@
 
 All is analytic and without a table: a wave consists of parabolas, which cost five operations where
 a sine costs twenty-five. Numbers and places broadcast against each other, so the same code serves
-one creature ([] and [n]) and lanes innermost ([L] and [n, L]). Kinds of ground: docs/ground.md.
+one creature ([] and [n]) and lanes innermost ([L] and [n, L]). Kinds of ground:
+docs/reference/ground.md.
 """
 
 from typing import Any, NamedTuple, Protocol

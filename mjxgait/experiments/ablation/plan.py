@@ -54,11 +54,13 @@ class Study:
       question: the study's question; the report's title.
       env: creature. config: file or name of a shipped config, laid under the variants.
       seeds: number of seeds, from first_seed on. generations: of every run.
-      measure: measure that compares the variants (docs/ablations.md). threshold: fitness to reach,
+      measure: measure that compares the variants (docs/research/ablations.md). threshold: fitness
+        to reach,
         for the measure `generations`.
       certify: whether every run's champion is examined for its certificate, about 10 s for each
         that may pass.
-      grounds: grounds on which every champion is tested, whatever it evolved on (docs/ground.md);
+      grounds: grounds on which every champion is tested, whatever it evolved on
+        (docs/reference/ground.md);
         `walk`, `up` and `certified` use the first; each further one has its own table.
       paired: whether all variants use the same seeds; else each has its own.
       allow_equal: whether two variants may be equal, as in a test of the method itself.

@@ -246,7 +246,7 @@ def _least(whole: Recording) -> float:
 
 
 NEAR = 0.05
-"""Share of the goal spacing within which a goal counts as reached (docs/hop.md)."""
+"""Share of the goal spacing within which a goal counts as reached (docs/reference/hop.md)."""
 
 
 class TravelDemands(GoalDemands):

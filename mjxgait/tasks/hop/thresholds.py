@@ -65,8 +65,8 @@ class LimboConfig(HopConfig):
 class TravelConfig(GoalConfig):
     """Thresholds for `travel`: goal distances as for `hop`.
 
-    The task defines the distance at which a goal counts as reached (docs/hop.md); it is no
-    threshold.
+    The task defines the distance at which a goal counts as reached (docs/reference/hop.md); it is
+    no threshold.
 
     Attributes:
       speed: m/s, least. second_half: speed of the second half over that of the first.

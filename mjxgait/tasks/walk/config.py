@@ -103,7 +103,7 @@ class WishWeights:
 
 @dataclasses.dataclass(frozen=True)
 class WishConfig:
-    """Walk targets (docs/wishes.md); a key that is not given is free.
+    """Walk targets (docs/guide/gaits.md); a key that is not given is free.
 
     Attributes:
       speed: m/s; slower and faster both miss it.

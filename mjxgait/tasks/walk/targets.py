@@ -1,4 +1,4 @@
-"""Walk targets in words: names for settings, as one layer of them (docs/wishes.md)."""
+"""Walk targets in words: names for settings, as one layer of them (docs/guide/gaits.md)."""
 
 import dataclasses
 import re
