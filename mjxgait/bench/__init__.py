@@ -1,1 +1,1 @@
-"""Benchmark of the simulation: C MuJoCo, DART and the machine's limits (docs/research/performance.md)."""
+"""Benchmark: C MuJoCo, DART and the machine's limits (docs/research/performance.md)."""

@@ -26,7 +26,7 @@ SOURCE = Path(__file__).with_suffix(".c")
 COMPILERS = ("cc", "gcc", "clang")
 FLAGS = ("-O3", "-march=native", "-shared", "-fPIC")
 TUNING = ("threshold", "period", "steer", "pitch", "pitch_rate", "roll", "roll_rate")
-"""In the order of docs/reference/controller.md; repeated here so that a peer's process imports no JAX."""
+"""In the order of docs/reference/controller.md; here so that a peer's process imports no JAX."""
 
 
 class NoCompiler(Exception):

@@ -1,4 +1,4 @@
-"""Stress tests, the second level: uneven ground and larger disturbances (docs/reference/certificate.md).
+"""Stress tests: uneven ground and larger disturbances (docs/reference/certificate.md).
 
 Letters: `S` simulations.
 """

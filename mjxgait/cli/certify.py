@@ -15,7 +15,7 @@ from mjxgait.training.stored import disk_errors, require_writable
 
 @dataclasses.dataclass(frozen=True)
 class CertifyOptions:
-    """Test criterion by criterion that the champion of a run truly walks (docs/reference/certificate.md).
+    """Test each criterion on the champion of a run (docs/reference/certificate.md).
 
     Writes RUN/certificate.json. The exit code is 0 if the examination ran, even if the champion
     fails.

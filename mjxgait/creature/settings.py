@@ -1,4 +1,4 @@
-"""`creature.toml`: settings of a body that its model file cannot hold (docs/reference/creature-folder.md)."""
+"""`creature.toml`: settings that a model file cannot hold (docs/reference/creature-folder.md)."""
 
 import dataclasses
 import re

@@ -1,4 +1,4 @@
-"""Checks of an import: what was dropped, and that masses, inertias, places and axes are the file's."""
+"""Checks of an import: dropped elements; masses, inertias, places and axes as in the file."""
 
 import mujoco
 import numpy as np

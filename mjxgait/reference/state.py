@@ -1,4 +1,4 @@
-"""State of simulations at one moment, and observations by name, written from docs/reference/controller.md.
+"""State of simulations, and observations by name, written from docs/reference/controller.md.
 
 Letters: `S` simulations, `J` actuated joints, `F` feet, `nv` degrees of freedom.
 

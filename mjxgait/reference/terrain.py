@@ -1,4 +1,4 @@
-"""Ground of the reference simulator, from docs/reference/ground.md: NumPy heights and a MuJoCo height field.
+"""Ground of the reference simulator: NumPy heights, a MuJoCo height field (docs/reference/ground.md).
 
 It shares only the specification of the ground with the one used in evolution.
 """

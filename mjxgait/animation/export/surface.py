@@ -1,4 +1,4 @@
-"""The surface of a creature as triangles, one piece per colour. Letters: `V` vertices, `F` triangles.
+"""Surface of a creature as triangles, one piece per colour. Letters: `V` vertices, `F` triangles.
 
 A joint's Y axis leads to the next joint, and its X axis is the axis of the part's hinge. glTF's
 axes: Y up, forward +Z, left +X. A glTF joint has no tail; programs use the way to its child

@@ -1,4 +1,4 @@
-"""Key poses from a motion: its cycle, the fewest poses that reproduce it, or those noted in the file.
+"""Key poses of a motion: its cycle, the fewest poses for it, or those noted in the file.
 
 Letters: `F` frames, `J` joints, `N` evenly spaced samples of one cycle.
 

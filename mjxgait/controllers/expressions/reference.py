@@ -1,4 +1,4 @@
-"""Reference controller for expressions, written from docs/reference/expressions.md: interprets their text.
+"""Reference controller for expressions: interprets their text (docs/reference/expressions.md).
 
 Letters: `S` simulations, `J` actuated joints.
 """

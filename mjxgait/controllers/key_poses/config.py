@@ -63,7 +63,7 @@ StaticInterval = Annotated[Interval, SHAPE]
 
 @dataclasses.dataclass(frozen=True)
 class SteppingRanges:
-    """Ranges of the genes for stepping under a fall (docs/reference/controller.md); equal ends fix one.
+    """Ranges of the genes for stepping under a fall; equal ends fix one.
 
     Only bodies with weights in `[stepping]` have these genes.
 

@@ -1,4 +1,6 @@
-"""Key-pose controller: mirroring, interpolation, corrections, advance (docs/reference/controller.md).
+"""Key-pose controller: mirroring, interpolation, corrections, advance.
+
+Specification: docs/reference/controller.md.
 
 Every function is for one creature; the rollout maps it over its lanes.
 """

@@ -1,4 +1,4 @@
-"""Reference controller for brains of modular bodies, neuron by neuron, from docs/reference/modular-bodies.md.
+"""Reference controller for brains, neuron by neuron, from docs/reference/modular-bodies.md.
 
 Letters: `S` simulations, `J` hinges in the model's order. A neuron is identified by its owner (a
 part number or `CENTRE`) and its index there.

@@ -23,7 +23,7 @@ def body_xml(
     height: float = 1.0,
     keyframe: str = "",
 ) -> str:
-    """Return the model's text. Parts are named `part0` (the root), …, their hinges `part1_0`, ….
+    """Return the model's text; parts are `part0` (the root), …, their hinges `part1_0`, ….
 
     step: s. gravity: m/s². friction: of a floor at z = 0; None for a floor without contacts.
     height: m, of the root's middle. keyframe: name of one with all angles at 0.

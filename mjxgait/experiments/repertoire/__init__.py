@@ -1,1 +1,1 @@
-"""Set of walks that blend: a grid of speeds and turns, evolved together (docs/guide/repertoire.md)."""
+"""Set of walks that blend: a grid of speeds and turns (docs/guide/repertoire.md)."""

@@ -1,4 +1,4 @@
-"""Neighbouring walks of a repertoire: blends half way, and changes from one to the other, in C MuJoCo.
+"""Neighbouring walks of a repertoire in C MuJoCo: blends half way, and changes between them.
 
 An engine blends poses without physics. Here the two controllers are blended and the body is
 simulated: if it walks, the engine's blend is near to what the body can do.

@@ -1,4 +1,4 @@
-"""Dynamics of trees as data: mass matrix, bias forces, water, overlap; compare `lane_major.dynamics`.
+"""Dynamics of trees as data: mass matrix, bias forces, water, overlap (see `lane_major.dynamics`).
 
 Letters: `n` links, `L` lanes.
 """
