@@ -7,6 +7,7 @@ from typing import Any, Protocol
 
 import jax
 import numpy as np
+from typing_extensions import override
 
 from mjxgait.champion import Champion
 from mjxgait.distributed.recipe import Programs, Recipe
@@ -47,7 +48,7 @@ class Advanced:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class AdvanceRows:
+class AdvanceRows(Job):
     """Advance runs side by side to a generation, from a state or from the beginning.
 
     planted: arrays [B, P, ...] of the initial genomes by name, in place of random ones.
@@ -57,8 +58,8 @@ class AdvanceRows:
     until: int
     planted: Mapping[str, np.ndarray] | None = None
 
+    @override
     def do(self, programs: Programs, recipe: Recipe) -> Advanced:
-        """See `Job`."""
         batch = programs.batch(recipe)
         way = _Way(programs.step(recipe), batch, self._begun(batch), self.until)
         champions: dict[int, Champion] = {}
@@ -76,7 +77,7 @@ class AdvanceRows:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class AdvanceIsland:
+class AdvanceIsland(Job):
     """Advance one population of a run to a generation or its end, from a state or anew."""
 
     state: Packed | None
@@ -100,7 +101,7 @@ class AdvanceIsland:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Judge:
+class Judge(Job):
     """Evaluate genomes [1, N, ...] on starts [1, R], with leaves in NumPy.
 
     asked: see `Evaluator`.
@@ -110,8 +111,8 @@ class Judge:
     starts: Starts
     asked: Asked | None = None
 
+    @override
     def do(self, programs: Programs, recipe: Recipe) -> Judged:
-        """See `Job`."""
         judged: Judged = programs.judge(recipe, self.genomes, self.starts, self.asked)
         return judged
 

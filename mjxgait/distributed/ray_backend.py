@@ -22,12 +22,13 @@ import ray
 from ray import cloudpickle
 from ray.exceptions import RayActorError, RayError, RayTaskError
 from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
+from typing_extensions import override
 
 from mjxgait.distributed import connect
 from mjxgait.distributed.connect import Machine
 from mjxgait.distributed.jobs import Job
 from mjxgait.distributed.recipe import Recipe
-from mjxgait.distributed.scheduler import Report, Worker
+from mjxgait.distributed.scheduler import Hands, Report, Worker
 
 ENVIRONMENT = {
     "NPROC": "1",  # XLA's threads
@@ -116,7 +117,7 @@ class Node:
     cores: int
 
 
-class Machines:
+class Machines(Hands):
     """See `Hands`. tell: called with messages for the user.
 
     Raises:
@@ -144,8 +145,8 @@ class Machines:
         for ref in list(self._looking):
             self._meet(ref, refuse=True)
 
+    @override
     def arrivals(self) -> list[Worker]:
-        """See `Hands`."""
         if time.monotonic() - self._looked > EVERY:
             self._look_for_nodes()
         for ref in _ready(self._looking):
@@ -159,8 +160,8 @@ class Machines:
         actor, _ = self._actors[worker]
         self._working[actor.do.remote(self._recipes[recipe.digest], job)] = worker
 
+    @override
     def wait(self, seconds: float) -> list[Report]:
-        """See `Hands`."""
         waited = [*self._working, *self._coming, *self._looking]
         if waited:
             ray.wait(waited, num_returns=1, timeout=seconds)

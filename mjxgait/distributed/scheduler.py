@@ -11,6 +11,8 @@ from functools import partial
 from statistics import median
 from typing import Any, Protocol
 
+from typing_extensions import override
+
 from mjxgait.distributed.jobs import Job
 from mjxgait.distributed.recipe import Programs, Recipe
 from mjxgait.errors import UserError
@@ -218,7 +220,7 @@ class Crew:
             self._tell("nobody is there to work; waiting for machines to join")
 
 
-class Here:
+class Here(Hands):
     """See `Hands`. programs: those that this process has already compiled."""
 
     def __init__(self, programs: Programs | None = None) -> None:
@@ -226,13 +228,13 @@ class Here:
         self._coming = [Worker(0, "here")]
         self._work: tuple[Worker, Recipe, Job] | None = None
 
+    @override
     def arrivals(self) -> list[Worker]:
-        """See `Hands`."""
         coming, self._coming = self._coming, []
         return coming
 
+    @override
     def start(self, worker: Worker, recipe: Recipe, job: Job) -> None:
-        """See `Hands`."""
         self._work = worker, recipe, job
 
     def wait(self, seconds: float) -> list[Report]:

@@ -9,6 +9,7 @@ import numpy as np
 import pydantic
 from rich.console import Console
 from rich.table import Table
+from typing_extensions import override
 
 from mjxgait.config.tables import STORED, Index, Number
 from mjxgait.inspect.snapshot import Snapshot, shared
@@ -85,15 +86,15 @@ class GenomeView(Protocol):
         ...
 
 
-class PlainView:
+class PlainView(GenomeView):
     """Report of named arrays, for every kind without its own report."""
 
+    @override
     def facts(self, snapshot: Snapshot, i: int) -> dict[str, Any]:
-        """See `GenomeView`."""
         return {"genome": {name: array[i].tolist() for name, array in snapshot.genomes.items()}}
 
+    @override
     def spread(self, snapshot: Snapshot) -> dict[str, Any]:
-        """See `GenomeView`."""
         spread = {name: array.std(axis=0).tolist() for name, array in snapshot.genomes.items()}
         return {"genome_spread": spread}
 
@@ -106,16 +107,16 @@ class PlainView:
             "champion_moved": {name: (other[name][0] - mine[name][0]).tolist() for name in alike},
         }
 
+    @override
     def show(
         self, individual: Mapping[str, Any], spread: Mapping[str, Any] | None, console: Console
     ) -> None:
-        """See `GenomeView`."""
         _print_arrays(f"{title(individual)}: genome", individual["genome"], console)
         if spread:
             _print_arrays("spread over the population", spread["genome_spread"], console)
 
+    @override
     def show_difference(self, found: Mapping[str, Any], console: Console) -> None:
-        """See `GenomeView`."""
         if found["same_individuals"] is None:
             console.print("\nThe genomes differ in shape, so they cannot be compared in full.")
         else:

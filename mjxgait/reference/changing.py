@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
+from typing_extensions import override
 
 from mjxgait.champion import Champion
 from mjxgait.controllers.key_poses.reference import PoseTwin
@@ -107,8 +108,8 @@ class HaltingTwin(PoseTwin):
         assert count == len(self.halts), "a halt for each simulation"
         return {**super().init(count), "halt": self.halts.copy(), "fade": self.fades.copy()}
 
+    @override
     def act(self, memory: Memory, senses: Mapping[str, np.ndarray]) -> tuple[np.ndarray, Memory]:
-        """See `Twin`."""
         since = memory["steps"] * self.step - memory["halt"]
         share = np.clip(since / memory["fade"], 0.0, 1.0)[:, None]
         planned = self.planned(memory["position"])

@@ -9,6 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.sharding import Mesh
+from typing_extensions import override
 
 from mjxgait.config.schema import Config, RolloutConfig
 from mjxgait.controllers.base import Bodied, BodiedController, Controller
@@ -45,7 +46,7 @@ class Growth(Protocol):
 
 
 @dataclasses.dataclass(frozen=True)
-class GraphGrowth:
+class GraphGrowth(Growth):
     """Modular bodies from graphs."""
 
     capacity: Capacity
@@ -59,13 +60,13 @@ class GraphGrowth:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class SizeGrowth:
+class SizeGrowth(Growth):
     """Body parameters from evolved sizes, and a start with its height above ground kept."""
 
     proportions: Proportions
 
+    @override
     def body(self, plant: ModelPlant, genome: Bodied, start: Starts) -> Starts:
-        """See `Growth`."""
         known = self.proportions
         # The trunk has index -1, where the factor is 1.
         factors = jnp.exp(jnp.append(genome.sizes, 0.0))[known.size_of]

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 from rich.console import Console
+from typing_extensions import override
 
 from mjxgait.champion import codec_of
 from mjxgait.controllers.expressions.text import (
@@ -13,15 +14,15 @@ from mjxgait.controllers.expressions.text import (
     terminals,
     to_text,
 )
-from mjxgait.inspect.sections import title, titled_table
+from mjxgait.inspect.sections import GenomeView, title, titled_table
 from mjxgait.inspect.snapshot import Snapshot, shared
 
 
-class ProgramView:
+class ProgramView(GenomeView):
     """Expressions by joint; see `GenomeView`."""
 
+    @override
     def facts(self, snapshot: Snapshot, i: int) -> dict[str, Any]:
-        """See `GenomeView`."""
         return {
             "expressions": _texts(snapshot, i),
             "nodes": _nodes(snapshot)[i].tolist(),
@@ -33,8 +34,8 @@ class ProgramView:
         nodes = _nodes(snapshot)
         return {"nodes": {"mean": nodes.mean(0).tolist(), "most": nodes.max(0).tolist()}}
 
+    @override
     def difference(self, a: Snapshot, b: Snapshot) -> dict[str, Any]:
-        """See `GenomeView`."""
         mine, other = _texts(a, 0), _texts(b, 0)
         comparable = a.creature.joints.names == b.creature.joints.names
         alike = a.genomes["code"].shape[1:] == b.genomes["code"].shape[1:]
@@ -47,10 +48,10 @@ class ProgramView:
             },
         }
 
+    @override
     def show(
         self, individual: Mapping[str, Any], spread: Mapping[str, Any] | None, console: Console
     ) -> None:
-        """See `GenomeView`."""
         table = titled_table(f"{title(individual)}: an expression per joint", console)
         for heading in ("joint", "nodes", "that matter", "expression"):
             table.add_column(heading, overflow="fold")
@@ -64,8 +65,8 @@ class ProgramView:
             mean = np.mean(spread["nodes"]["mean"])
             console.print(f"the population's expressions have {mean:.1f} nodes in the mean")
 
+    @override
     def show_difference(self, found: Mapping[str, Any], console: Console) -> None:
-        """See `GenomeView`."""
         if found["same_individuals"] is None:
             console.print("\nThe genomes differ in shape, so they cannot be compared in full.")
         else:

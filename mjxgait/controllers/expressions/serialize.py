@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from typing_extensions import override
 
 from mjxgait.champion.serializers import PlainCodec
 from mjxgait.config.tables import build
@@ -55,8 +56,8 @@ class ProgramCodec(PlainCodec):
         code, value = (np.stack(parts) for parts in zip(*rows, strict=True))
         return {"code": code, "value": value}
 
+    @override
     def genome(self, document: Mapping[str, Any], creature: Creature) -> dict[str, np.ndarray]:
-        """See `Codec`."""
         known, nodes = terminals(creature, tuple(ADDED.values())), int(document["nodes"])
         if not 1 <= nodes <= MOST_NODES:
             raise ValueError(f"nodes = {nodes}: an expression has 1 to {MOST_NODES}")
@@ -70,12 +71,12 @@ class ProgramCodec(PlainCodec):
         code, value = (np.stack(rows) for rows in zip(*pairs, strict=True))
         return {"code": code, "value": value}
 
+    @override
     def settings(self, table: Mapping[str, Any], where: str) -> ProgramConfig:
-        """See `Codec`."""
         return build(ProgramConfig, table, where)
 
+    @override
     def check(self, genome: Mapping[str, np.ndarray], creature: Creature) -> None:
-        """See `Codec`."""
         for j, place in np.argwhere(~np.isfinite(genome["value"])):
             raise UserError(
                 f'the expression of joint "{creature.joints.names[j]}" has a constant that is '
@@ -83,8 +84,8 @@ class ProgramCodec(PlainCodec):
                 "generation"
             )
 
+    @override
     def shapes(self, settings: ProgramConfig, creature: Creature) -> dict[str, tuple[int, ...]]:
-        """See `Codec`."""
         shape = (len(creature.joints.names), settings.nodes)
         return {"code": shape, "value": shape}
 

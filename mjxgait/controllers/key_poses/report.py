@@ -6,17 +6,18 @@ from typing import Any
 
 import numpy as np
 from rich.console import Console
+from typing_extensions import override
 
 from mjxgait.controllers.key_poses.config import gene_names
-from mjxgait.inspect.sections import print_columns, title, titled_table
+from mjxgait.inspect.sections import GenomeView, print_columns, title, titled_table
 from mjxgait.inspect.snapshot import Snapshot, shared
 
 
-class PoseView:
+class PoseView(GenomeView):
     """Key poses by joint, tuning by name; see `GenomeView`."""
 
+    @override
     def facts(self, snapshot: Snapshot, i: int) -> dict[str, Any]:
-        """See `GenomeView`."""
         creature, genomes = snapshot.creature, snapshot.genomes
         ranges = zip(
             creature.joints.names, creature.joints.pose_low, creature.joints.pose_high, strict=True
@@ -57,10 +58,10 @@ class PoseView:
             "champion_tuning": {name: [float(x), float(y)] for name, x, y in pairs},
         }
 
+    @override
     def show(
         self, individual: Mapping[str, Any], spread: Mapping[str, Any] | None, console: Console
     ) -> None:
-        """See `GenomeView`."""
         poses = individual["key_poses_deg"]
         table = titled_table(f"{title(individual)}: key poses in degrees", console)
         headings = [f"pose {k + 1}" for k in range(len(poses))]
@@ -79,8 +80,8 @@ class PoseView:
         tuning = (f"{name} {value:.3g}" for name, value in individual["tuning"].items())
         console.print("tuning: " + ", ".join(tuning))
 
+    @override
     def show_difference(self, found: Mapping[str, Any], console: Console) -> None:
-        """See `GenomeView`."""
         moved = found["champion_moved_deg"]
         if moved is None:
             console.print(

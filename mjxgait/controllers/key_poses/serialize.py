@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from typing_extensions import override
 
 from mjxgait.champion.serializers import PlainCodec
 from mjxgait.config.tables import build
@@ -34,8 +35,8 @@ class PoseCodec(PlainCodec):
             "tuning": dict(zip(names, map(float, genome["tuning"]), strict=True)),
         }
 
+    @override
     def genome(self, document: Mapping[str, Any], creature: Creature) -> dict[str, np.ndarray]:
-        """See `Codec`."""
         poses = [[pose[name] for name in creature.joints.names] for pose in document["key_poses"]]
         if not 1 <= len(poses) <= MOST_POSES:
             raise ValueError(f"{len(poses)} key poses: a cycle has 1 to {MOST_POSES}")
@@ -43,12 +44,12 @@ class PoseCodec(PlainCodec):
         tuning = [genes[name] for name in gene_names(creature.corrections.steps)]
         return {"key_poses": np.array(poses, float), "tuning": np.array(tuning, float)}
 
+    @override
     def settings(self, table: Mapping[str, Any], where: str) -> PoseConfig:
-        """See `Codec`."""
         return build(PoseConfig, table, where)
 
+    @override
     def check(self, genome: Mapping[str, np.ndarray], creature: Creature) -> None:
-        """See `Codec`."""
         poses = genome["key_poses"]
         for place in np.argwhere(~np.isfinite(poses)):
             k, j = map(int, place)
@@ -69,7 +70,7 @@ class PoseCodec(PlainCodec):
                     "of another generation"
                 )
 
+    @override
     def shapes(self, settings: PoseConfig, creature: Creature) -> dict[str, tuple[int, ...]]:
-        """See `Codec`."""
         poses = (settings.key_poses, len(creature.joints.names))
         return {"key_poses": poses, "tuning": (len(gene_names(creature.corrections.steps)),)}

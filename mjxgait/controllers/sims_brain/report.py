@@ -5,15 +5,16 @@ from typing import Any
 
 import numpy as np
 from rich.console import Console
+from typing_extensions import override
 
 from mjxgait.controllers.sims_brain.reference_body import Part, grow
-from mjxgait.inspect.sections import title, titled_table
+from mjxgait.inspect.sections import GenomeView, title, titled_table
 from mjxgait.inspect.snapshot import Snapshot, shared
 
 COLUMNS = ("part", "node", "on part", "joint", "size (cm)", "swing (deg)", "strength (N·m)")
 
 
-class GraphView:
+class GraphView(GenomeView):
     """Grown parts; see `GenomeView`."""
 
     def facts(self, snapshot: Snapshot, i: int) -> dict[str, Any]:
@@ -36,10 +37,10 @@ class GraphView:
             "champion_parts": [[_part(part) for part in _grown(one, 0)] for one in (a, b)],
         }
 
+    @override
     def show(
         self, individual: Mapping[str, Any], spread: Mapping[str, Any] | None, console: Console
     ) -> None:
-        """See `GenomeView`."""
         _print_parts(f"{title(individual)}: the body that grows", individual["parts"], console)
         if spread:
             counts = spread["parts"]
@@ -48,8 +49,8 @@ class GraphView:
                 f"{counts['most']} at most"
             )
 
+    @override
     def show_difference(self, found: Mapping[str, Any], console: Console) -> None:
-        """See `GenomeView`."""
         if found["same_individuals"] is None:
             console.print("\nThe genomes differ in shape, so they cannot be compared in full.")
         else:

@@ -4,7 +4,9 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from typing_extensions import override
 
+from mjxgait.champion.serializers import Codec
 from mjxgait.config.tables import build
 from mjxgait.controllers.sims_brain.config import BrainConfig
 from mjxgait.controllers.sims_brain.reference_body import FRICTION, GRAVITY, grow
@@ -15,7 +17,7 @@ from mjxgait.errors import UserError
 from mjxgait.kinds import in_water
 
 
-class GraphCodec:
+class GraphCodec(Codec):
     """See `Codec`: arrays as nested lists under their names."""
 
     def settled(
@@ -27,22 +29,22 @@ class GraphCodec:
             for name, array in genome.items()
         }
 
+    @override
     def document(
         self, genome: Mapping[str, np.ndarray], settings: BrainConfig, creature: Creature
     ) -> dict[str, Any]:
-        """See `Codec`."""
         return {name: np.asarray(array).tolist() for name, array in genome.items()}
 
+    @override
     def genome(self, document: Mapping[str, Any], creature: Creature) -> dict[str, np.ndarray]:
-        """See `Codec`."""
         return {name: np.array(values) for name, values in document.items()}
 
+    @override
     def settings(self, table: Mapping[str, Any], where: str) -> BrainConfig:
-        """See `Codec`."""
         return build(BrainConfig, table, where)
 
+    @override
     def check(self, genome: Mapping[str, np.ndarray], creature: Creature) -> None:
-        """See `Codec`."""
         for name, array in genome.items():
             if not np.isfinite(array).all():
                 raise UserError(
@@ -50,8 +52,8 @@ class GraphCodec:
                     "take a champion of another generation"
                 )
 
+    @override
     def shapes(self, settings: BrainConfig, creature: Creature) -> dict[str, tuple[int, ...]]:
-        """See `Codec`."""
         each = (settings.nodes, settings.connections)
         return {"graph.half": (settings.nodes, 3), "graph.target": each}
 

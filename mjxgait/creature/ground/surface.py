@@ -10,6 +10,7 @@ from typing import Any, NamedTuple, Protocol
 
 import jax.numpy as jnp
 import numpy as np
+from typing_extensions import override
 
 from mjxgait.creature.ground.spec import GroundSpec, Place
 from mjxgait.types import Number, pytree
@@ -46,7 +47,7 @@ class Ground:
 
 
 @pytree
-class Slope:
+class Slope(Relief):
     """A slope. along, across: [] rise per metre ahead and to the left."""
 
     along: Number
@@ -67,15 +68,15 @@ class Slope:
 
 
 @pytree
-class Steps:
+class Steps(Relief):
     """Stairs. height, tread: [] m of a step. offset: [] share of a tread before the first."""
 
     height: Number
     tread: Number
     offset: Number
 
+    @override
     def rise(self, ahead: Any, left: Any, level: Any) -> tuple[Any, Any, Any]:
-        """See `Relief`."""
         treads = jnp.maximum((ahead - level) / self.tread - self.offset, 0.0)
         whole = jnp.floor(treads)
         up = jnp.clip((treads - whole - (1 - RISER)) / RISER, 0.0, 1.0)
@@ -85,7 +86,7 @@ class Steps:
 
 
 @pytree
-class Waves:
+class Waves(Relief):
     """Plane waves. size: [W] m. along, across: [W] cycles per metre. phase: [W] cycles."""
 
     size: Number
@@ -93,8 +94,8 @@ class Waves:
     across: Number
     phase: Number
 
+    @override
     def rise(self, ahead: Any, left: Any, level: Any) -> tuple[Any, Any, Any]:
-        """See `Relief`."""
         height = by_ahead = by_left = jnp.zeros_like(ahead)
         for w in range(self.size.shape[0]):
             cycles = self.along[w] * ahead + self.across[w] * left + self.phase[w]
@@ -113,14 +114,14 @@ class Waves:
 
 
 @pytree
-class Together:
+class Together(Relief):
     """Waves on a slope: the sum of their heights."""
 
     slope: Slope
     waves: Waves
 
+    @override
     def rise(self, ahead: Any, left: Any, level: Any) -> tuple[Any, Any, Any]:
-        """See `Relief`."""
         height, by_ahead, by_left = self.slope.rise(ahead, left, level)
         more, more_ahead, more_left = self.waves.rise(ahead, left, level)
         return height + more, by_ahead + more_ahead, by_left + more_left

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import jax
 import jax.numpy as jnp
 import numpy as np
+from typing_extensions import override
 
 from mjxgait.physics.batched_trees.dynamics import (
     bias_links,
@@ -51,7 +52,7 @@ from mjxgait.physics.lane_major.newton import Problem, constrained_acceleration
 from mjxgait.physics.lane_major.parameters import Softness
 from mjxgait.physics.lane_major.plant import turned
 from mjxgait.physics.lane_major.treematrix import Rows, factor, on_pivot, solve, sparsity
-from mjxgait.types import BodyState, Sensed, pytree
+from mjxgait.types import BodyState, Plant, Sensed, pytree
 
 CORNERS = 4
 IMPEDANCE = np.array([0.9, 0.95, 0.001, 0.5], np.float32).reshape(1, 4, 1)
@@ -201,19 +202,19 @@ class Moment:
 
 
 @dataclasses.dataclass(frozen=True)
-class TreePlant:
+class TreePlant(Plant):
     """One MuJoCo step of modular bodies; `BodyState.parameters` holds each lane's own tree."""
 
     around: Surroundings
     note: str = ""
     lane_axis: int = -1
 
+    @override
     def forward(self, state: BodyState) -> tuple[Sensed, Moment]:
-        """See `Plant.forward`."""
         return one_kernel(self._forward)(state)
 
+    @override
     def solve_damped(self, workings: Moment, damping: jax.Array, force: jax.Array) -> jax.Array:
-        """See `Plant.solve_damped`."""
         return jnp.stack(one_kernel(_solve_damped)(workings.mass, damping, force))
 
     def overlap(self, state: BodyState) -> jax.Array:
@@ -229,8 +230,8 @@ class TreePlant:
         poses = posture(lane, qpos[:, None], pinned_by(jnp.ones(1)))
         return qpos.at[2].add(-jnp.min(lows(lane, poses)))
 
+    @override
     def advance(self, state: BodyState, workings: Moment, torque: jax.Array) -> BodyState:
-        """See `Plant.advance`."""
         after = one_kernel(self._advance)(state, workings, torque)
         return dataclasses.replace(after, parameters=state.parameters)
 

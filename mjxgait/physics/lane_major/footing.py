@@ -18,6 +18,7 @@ from typing import Protocol
 
 import jax
 import jax.numpy as jnp
+from typing_extensions import override
 
 from mjxgait.physics.lane_major.dynamics import rooted
 from mjxgait.physics.lane_major.kinematics import Motion
@@ -49,63 +50,63 @@ class Frames(Protocol):
 
 
 @pytree
-class Level:
+class Level(Frames):
     """Frames on level ground with the first tangent along the world's x: nothing is turned."""
 
+    @override
     def into(self, vector: Components) -> Directions:
-        """See `Frames`."""
         x, y, z = vector
         return z, x, y
 
+    @override
     def out(self, vector: Directions) -> Components:
-        """See `Frames`."""
         normal, first, second = vector
         return first, second, normal
 
+    @override
     def stiffness(self, along: Sequence[jax.Array]) -> tuple[jax.Array, ...]:
-        """See `Frames`."""
         nn, n1, n2, t1, t2 = along
         return t1, t2, nn, jnp.zeros_like(nn), n1, n2
 
 
 @pytree
-class Turned:
+class Turned(Frames):
     """Frames on level ground. x, y: of the first tangent."""
 
     x: jax.Array
     y: jax.Array
 
+    @override
     def into(self, vector: Components) -> Directions:
-        """See `Frames`."""
         (vx, vy, vz), tx, ty = vector, self.x, self.y
         return vz, vx * tx + vy * ty, vy * tx - vx * ty
 
+    @override
     def out(self, vector: Directions) -> Components:
-        """See `Frames`."""
         (normal, first, second), tx, ty = vector, self.x, self.y
         return first * tx - second * ty, first * ty + second * tx, normal
 
+    @override
     def stiffness(self, along: Sequence[jax.Array]) -> tuple[jax.Array, ...]:
-        """See `Frames`."""
         (nn, n1, n2, t1, t2), tx, ty = along, self.x, self.y
         xx, yy, xy = t1 * tx * tx + t2 * ty * ty, t1 * ty * ty + t2 * tx * tx, (t1 - t2) * tx * ty
         return xx, yy, nn, xy, n1 * tx - n2 * ty, n1 * ty + n2 * tx
 
 
 @pytree
-class Tilted:
+class Tilted(Frames):
     """Frames on other ground. normal, first, second: unit vectors in the world."""
 
     normal: Components
     first: Components
     second: Components
 
+    @override
     def into(self, vector: Components) -> Directions:
-        """See `Frames`."""
         return dot(self.normal, vector), dot(self.first, vector), dot(self.second, vector)
 
+    @override
     def out(self, vector: Directions) -> Components:
-        """See `Frames`."""
         normal, first, second = vector
         x, y, z = (
             self.normal[i] * normal + self.first[i] * first + self.second[i] * second
@@ -113,8 +114,8 @@ class Tilted:
         )
         return x, y, z
 
+    @override
     def stiffness(self, along: Sequence[jax.Array]) -> tuple[jax.Array, ...]:
-        """See `Frames`."""
         nn, n1, n2, t1, t2 = along
         n, a, b = self.normal, self.first, self.second
         # Response along the three directions to a shift along each axis of the world.

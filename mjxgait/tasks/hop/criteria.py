@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from typing_extensions import override
 
 from mjxgait.certification.acceptance import Unasked, to_the_end
 from mjxgait.certification.config import CertificateConfig
@@ -103,8 +104,8 @@ class HopDemands(GoalDemands):
     verdict = "it gets to its goal and stays"
     share = "share that arrives and stays"
 
+    @override
     def wanted(self, config: CertificateConfig) -> HopConfig:
-        """See `GoalDemands`."""
         return config.hop
 
     def succeeded(self, outcome: Outcome, starts: Starts, config: CertificateConfig) -> np.ndarray:
@@ -194,8 +195,8 @@ class LimboDemands(HopDemands):
 
     verdict = "it gets to its goal beneath the bar and stays"
 
+    @override
     def wanted(self, config: CertificateConfig) -> LimboConfig:
-        """See `GoalDemands`."""
         return config.limbo
 
     def aimed(
@@ -257,12 +258,12 @@ class TravelDemands(GoalDemands):
     revision = 1
     """A criterion for vibration was added."""
 
+    @override
     def wanted(self, config: CertificateConfig) -> TravelConfig:
-        """See `GoalDemands`."""
         return config.travel
 
+    @override
     def onward(self, goal: np.ndarray, first: np.ndarray, way: np.ndarray) -> np.ndarray:
-        """See `Demands`."""
         reached = goal - way <= NEAR * first
         return np.where(reached, goal + first, goal)
 

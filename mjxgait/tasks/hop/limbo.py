@@ -7,6 +7,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+from typing_extensions import override
 
 from mjxgait.config.schema import RolloutConfig
 from mjxgait.controllers.observations import forward_way
@@ -114,8 +115,8 @@ class Limbo(Hop):
         starts = super().trials(key, creature, settings)
         return dataclasses.replace(starts, raised=jnp.zeros(settings.starts))
 
+    @override
     def levels(self, settings: Any) -> jax.Array | int:
-        """See `Task`."""
         steps: jax.Array | int = settings.lowering
         return steps
 
@@ -129,36 +130,36 @@ class Limbo(Hop):
         """See `Task`: at the goal in the end, and hardly in the bar."""
         return (terms[MISSED] <= THERE) & (terms["bar"] <= BENEATH)
 
+    @override
     def aim(self, trial: Starts) -> Any:
-        """See `Task`."""
         return Aim(super().aim(trial), jnp.asarray(trial.raised))
 
+    @override
     def standards(self, settings: Any) -> Any:
-        """See `Task`."""
         height = jnp.asarray(settings.height, jnp.float32)
         return Standards(**vars(super().standards(settings)), height=height)
 
+    @override
     def senses(self, aim: Any, sensed: Sensed) -> dict[str, jax.Array]:
-        """See `Task`."""
         return super().senses(aim.goal, sensed) | {
             "bar_distance": bar_distance(self.creature, sensed)
         }
 
+    @override
     def init(self) -> Tally:
-        """See `Task`."""
         none = jnp.zeros(())
         return Tally(**vars(super().init()), bar=none, raised=none, height=none)
 
+    @override
     def update(
         self, tally: Any, sensed: Sensed, torque: jax.Array, standards: Any, aim: Any
     ) -> Any:
-        """See `Task`."""
         after: Any = super().update(tally, sensed, torque, standards, aim.goal)
         deepest = jnp.maximum(tally.bar, intrusion(self.creature, sensed, standards.height))
         return dataclasses.replace(after, bar=deepest, raised=aim.raised, height=standards.height)
 
+    @override
     def judge(self, tally: Any, settings: Any) -> dict[str, jax.Array]:
-        """See `Task`."""
         deep = jnp.maximum(tally.bar - tally.raised, 0.0)
         bar = jnp.minimum(deep / (DEEP * self.creature.frame.hip_height), 1.0)
         return fitness_terms(self.creature, self.horizon, tally, {"bar": bar})

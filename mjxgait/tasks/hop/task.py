@@ -5,6 +5,7 @@ from typing import Any, ClassVar
 
 import jax
 import jax.numpy as jnp
+from typing_extensions import override
 
 from mjxgait.config.schema import RolloutConfig
 from mjxgait.creature import Creature
@@ -61,8 +62,8 @@ class Hop(PlainTask):
         return cls(body, step, horizon, ends, settings)
 
     @property
+    @override
     def terms(self) -> tuple[str, ...]:
-        """See `Task`."""
         return terms_under(self.settings.weights)
 
     @property
@@ -83,29 +84,29 @@ class Hop(PlainTask):
         """See `Task`: the goal [] in m ahead of the start."""
         return jnp.asarray(trial.goal)
 
+    @override
     def standards(self, settings: Any) -> Any:
-        """See `Task`."""
         return Standards(jnp.round(settings.rest / self.step))
 
+    @override
     def senses(self, aim: jax.Array, sensed: Sensed) -> dict[str, jax.Array]:
-        """See `Task`."""
         return {"goal_distance": goal_distance(self.creature, aim, sensed)}
 
+    @override
     def init(self) -> Tally:
-        """See `Task`."""
         energy = "energy" in self.terms
         return empty(self.creature, self.horizon, energy, len(self.sub_goals))
 
+    @override
     def update(
         self, tally: Tally, sensed: Sensed, torque: jax.Array, standards: Any, aim: jax.Array
     ) -> Tally:
-        """See `Task`."""
         after = updated(self.creature, self.step, tally, sensed, aim)
         after = with_extras(after, sensed, torque, self.step, self.sub_goals)
         return rested(after, self.horizon, standards.rest, touches(self.creature, sensed))
 
+    @override
     def judge(self, tally: Tally, settings: HopConfig) -> dict[str, jax.Array]:
-        """See `Task`."""
         return fitness_terms(self.creature, self.horizon, tally)
 
     def outcome(self, tally: Tally) -> dict[str, jax.Array]:
@@ -118,8 +119,8 @@ class Hop(PlainTask):
             "seconds": tally.steps * self.step,
         }
 
+    @override
     def weights(self, settings: HopConfig, generation: jax.Array) -> dict[str, jax.Array]:
-        """See `Task`."""
         return signed_weights(settings, generation)
 
 
@@ -158,18 +159,18 @@ class Travel(Hop):
         reached = left <= NEAR * aim.spacing
         return dataclasses.replace(aim, goal=aim.goal + jnp.where(reached, aim.spacing, 0.0))
 
+    @override
     def senses(self, aim: Any, sensed: Sensed) -> dict[str, jax.Array]:
-        """See `Task`."""
         return super().senses(aim.goal, sensed)
 
+    @override
     def init(self) -> TravelTally:
-        """See `Task`."""
         return TravelTally(**vars(super().init()), reached=jnp.zeros((), jnp.int32))
 
+    @override
     def update(
         self, tally: Any, sensed: Sensed, torque: jax.Array, standards: Any, aim: Any
     ) -> Any:
-        """See `Task`."""
         after: Any = super().update(tally, sensed, torque, standards, aim.goal)
         reached = jnp.round(aim.goal / aim.spacing).astype(jnp.int32) - 1
         return dataclasses.replace(after, reached=reached)
@@ -189,8 +190,8 @@ class Travel(Hop):
             "seconds": tally.steps * self.step,
         }
 
+    @override
     def weights(self, settings: Any, generation: jax.Array) -> dict[str, jax.Array]:
-        """See `Task`."""
         return signed_weights(settings, generation)
 
     def _way(self, tally: Any) -> jax.Array:

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from typing_extensions import override
 
 from mjxgait.certification.acceptance import StaysUp, to_the_end
 from mjxgait.certification.config import CertificateConfig
@@ -159,11 +160,11 @@ class GoingDemands(BlocksDemands):
     """Number of world axes along which distance counts: two if height does not."""
 
     @abc.abstractmethod
-    def wanted(self, config: CertificateConfig) -> GoingConfig:
-        """See `BlocksDemands`."""
+    @override
+    def wanted(self, config: CertificateConfig) -> GoingConfig: ...
 
+    @override
     def second(self, window: Recording, config: CertificateConfig) -> Criterion:
-        """See `BlocksDemands`."""
         return gets_on(self.verb, self._middle(window), window.time_step, self.wanted(config))
 
     def done(self, window: Recording) -> float:
@@ -265,8 +266,8 @@ class SwimDemands(GoingDemands):
     verb = "swims"
     drag = DRAG
 
+    @override
     def wanted(self, config: CertificateConfig) -> SwimConfig:
-        """See `GoingDemands`."""
         return config.swim
 
     def alone(self, window: Recording, config: CertificateConfig) -> tuple[Criterion, ...]:
@@ -292,8 +293,8 @@ class RoamDemands(GoingDemands):
     verb = "walks"
     axes = 2
 
+    @override
     def wanted(self, config: CertificateConfig) -> RoamConfig:
-        """See `GoingDemands`."""
         return config.roam
 
     def alone(self, window: Recording, config: CertificateConfig) -> tuple[Criterion, ...]:
@@ -320,12 +321,12 @@ class JumpDemands(BlocksDemands):
     promised = evidence = "height"
     leaps = True
 
+    @override
     def wanted(self, config: CertificateConfig) -> JumpConfig:
-        """See `BlocksDemands`."""
         return config.jump
 
+    @override
     def second(self, window: Recording, config: CertificateConfig) -> Criterion:
-        """See `BlocksDemands`."""
         height = at_least("height of the lowest part (m)", self.done(window), config.jump.height)
         return Criterion(2, "jumps", (height,))
 

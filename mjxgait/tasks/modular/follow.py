@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 import jax
 import jax.numpy as jnp
 import numpy as np
+from typing_extensions import override
 
 from mjxgait.config.schema import RolloutConfig
 from mjxgait.controllers.sims_brain.reference_body import LIGHT
@@ -55,15 +56,15 @@ class Following(GoingTask):
         there = there / jnp.sqrt(jnp.sum(there**2, axis=1, keepdims=True))
         return {"light": jnp.sum(sensed.geom_rot * there[:, None], axis=2)}
 
+    @override
     def update(
         self, tally: Any, sensed: Sensed, torque: jax.Array, standards: Any, aim: jax.Array
     ) -> Any:
-        """See `Task`."""
         after = super().update(tally, sensed, torque, standards, aim)
         return dataclasses.replace(after, light=aim, since=standards)
 
+    @override
     def way(self, tally: Any) -> jax.Array:
-        """See `GoingTask`."""
         before, now = (
             length((tally.light - place)[: self.axes]) for place in (tally.settled, tally.place)
         )

@@ -3,6 +3,7 @@
 import dataclasses
 
 import numpy as np
+from typing_extensions import override
 
 from mjxgait.certification.config import CertificateConfig
 from mjxgait.certification.criteria import Criterion, at_least
@@ -26,12 +27,12 @@ class FollowDemands(BlocksDemands):
         self.drag = drag
         self.axes = 3 if drag else 2
 
+    @override
     def wanted(self, config: CertificateConfig) -> FollowConfig:
-        """See `BlocksDemands`."""
         return config.follow
 
+    @override
     def second(self, window: Recording, config: CertificateConfig) -> Criterion:
-        """See `BlocksDemands`."""
         nearer = at_least("speed towards it (m/s)", self.done(window), config.follow.speed)
         return Criterion(2, "follows", (nearer,))
 
@@ -52,8 +53,8 @@ class FollowDemands(BlocksDemands):
         way = champion.origin.get("nominal", {}).get("way", np.nan)
         return float(way / (seconds - self.since(champion, config)))
 
+    @override
     def since(self, champion: Champion, config: CertificateConfig) -> float:
-        """See `BlocksDemands`."""
         return float(champion.origin.get("nominal", {}).get("since", config.warmup))
 
     def aimed(

@@ -14,6 +14,7 @@ from typing import Any, ClassVar
 import jax
 import jax.numpy as jnp
 import numpy as np
+from typing_extensions import override
 
 from mjxgait.config.schema import RolloutConfig
 from mjxgait.creature import Creature
@@ -76,8 +77,8 @@ class BlocksTask(PlainTask):
         """See `Task`: the first step [] that counts."""
         return jnp.round(settings.settle / self.step).astype(jnp.int32)
 
+    @override
     def ended(self, sensed: Sensed, aim: Any) -> jax.Array:
-        """See `Task`."""
         speed = jnp.sqrt(jnp.sum(sensed.trunk_vel**2))
         wild = (jnp.max(jnp.abs(sensed.joint_vel)) > FASTEST_HINGE) | (speed > FASTEST)
         assert sensed.past is not None
@@ -178,17 +179,17 @@ class Swim(GoingTask):
     Settings: ClassVar[type] = SwimConfig
     terms = tuple(field.name for field in dataclasses.fields(SwimWeights))
 
+    @override
     def init(self) -> SwimTally:
-        """See `Task`."""
         nothing, nowhere = jnp.zeros(()), jnp.zeros(3)
         return SwimTally(
             **self.begun(), began=nowhere, given=nowhere, exchanged=nothing, lacking=nothing
         )
 
+    @override
     def update(
         self, tally: SwimTally, sensed: Sensed, torque: jax.Array, standards: Any, aim: Any
     ) -> SwimTally:
-        """See `Task`."""
         assert sensed.momentum is not None
         assert sensed.washed is not None
         begins, momentum, push = (
@@ -238,14 +239,14 @@ class Roam(GoingTask):
     terms = tuple(field.name for field in dataclasses.fields(RoamWeights))
     axes = 2
 
+    @override
     def init(self) -> RoamTally:
-        """See `Task`."""
         return RoamTally(**self.begun(), upwards=jnp.zeros(3), upright=jnp.ones(()))
 
+    @override
     def update(
         self, tally: RoamTally, sensed: Sensed, torque: jax.Array, standards: Any, aim: Any
     ) -> RoamTally:
-        """See `Task`."""
         assert sensed.sunk is not None
         begins = tally.steps <= standards
         upwards = jnp.where(begins, sensed.trunk_rot[2], tally.upwards)
@@ -300,15 +301,15 @@ class Jump(BlocksTask):
     terms = tuple(field.name for field in dataclasses.fields(JumpWeights))
     outcomes = ("height", "seconds")
 
+    @override
     def init(self) -> JumpTally:
-        """See `Task`."""
         none = jnp.zeros((), jnp.int32)
         return JumpTally(none, none, jnp.zeros(()), jnp.zeros(SPANS))
 
+    @override
     def update(
         self, tally: JumpTally, sensed: Sensed, torque: jax.Array, standards: Any, aim: Any
     ) -> JumpTally:
-        """See `Task`."""
         assert sensed.sunk is not None
         begins, low = tally.steps <= standards, jnp.min(sensed.geom_low)
         span = SPANS * (tally.steps - standards) // jnp.maximum(self.horizon - standards, 1)

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from typing_extensions import override
 
 from mjxgait.certification.acceptance import StaysUp, to_the_end
 from mjxgait.certification.config import (
@@ -81,18 +82,18 @@ class WalkDemands(StaysUp):
     def __init__(self, wish: Mapping[str, Any] | None = None) -> None:
         self.wish = dict(wish or {})
 
+    @override
     def asked(self, wish: Mapping[str, Any]) -> "WalkDemands":
-        """See `Demands`."""
         return WalkDemands(wish) if wish else self
 
+    @override
     def told(self, steps: int, time_step: float) -> np.ndarray | None:
-        """See `Demands`."""
         return told_heading(self.wish, steps, time_step)
 
+    @override
     def commands(
         self, config: CertificateConfig, steps: int, time_step: float, rng: np.random.Generator
     ) -> np.ndarray | None:
-        """See `Demands`."""
         if "steer" not in self.wish:
             return None
         return draw_commands(self.wish["steer"], config.wishes.commands, steps, time_step, rng)

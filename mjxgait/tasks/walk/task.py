@@ -6,6 +6,7 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+from typing_extensions import override
 
 from mjxgait.config.schema import RolloutConfig
 from mjxgait.controllers.observations import sense
@@ -56,8 +57,8 @@ class Walk(PlainTask):
         self.settings = settings or WalkConfig()
 
     @property
+    @override
     def terms(self) -> tuple[str, ...]:
-        """See `Task`."""
         return terms_under(self.settings.weights)
 
     @classmethod
@@ -70,12 +71,12 @@ class Walk(PlainTask):
         return cls(body, step, horizon, ends, settings)
 
     @property
+    @override
     def climbs(self) -> bool:
-        """See `Task`."""
         return self.settings.hardening > 0
 
+    @override
     def levels(self, settings: WalkConfig) -> int:
-        """See `Task`."""
         return settings.hardening
 
     def harder(self, trials: Starts, settings: WalkConfig, level: jax.Array) -> Starts:
@@ -94,18 +95,18 @@ class Walk(PlainTask):
         """See `Task`: the wanted clearance [] of each swing in m."""
         return jnp.asarray(settings.clearance * self.creature.frame.hip_height, jnp.float32)
 
+    @override
     def init(self) -> Any:
-        """See `Task`."""
         return self._keeper.init()
 
+    @override
     def update(
         self, tally: Any, sensed: Sensed, torque: jax.Array, standards: jax.Array, aim: Any
     ) -> Any:
-        """See `Task`."""
         return self._keeper.update(tally, sensed, torque, standards)
 
+    @override
     def judge(self, tally: Any, settings: WalkConfig) -> dict[str, jax.Array]:
-        """See `Task`."""
         return fitness_terms(self.creature, settings, self.step, self.horizon, tally)
 
     def outcome(self, tally: Tally) -> dict[str, jax.Array]:
@@ -116,8 +117,8 @@ class Walk(PlainTask):
             "seconds": tally.steps * self.step,
         }
 
+    @override
     def weights(self, settings: WalkConfig, generation: jax.Array) -> dict[str, jax.Array]:
-        """See `Task`."""
         return signed_weights(settings, generation)
 
 
@@ -134,8 +135,8 @@ class AskedWalk(Walk):
         return self.settings.wish
 
     @property
+    @override
     def terms(self) -> tuple[str, ...]:
-        """See `Task`."""
         return (*super().terms, *wish_weights(self.wish))
 
     def trials(self, key: jax.Array, creature: Creature, settings: RolloutConfig) -> Starts:
@@ -161,8 +162,8 @@ class AskedWalk(Walk):
             return ()
         return jnp.zeros(()), trial.turn * self.step
 
+    @override
     def onward(self, aim: Any, sensed: Sensed) -> Any:
-        """See `Task`."""
         return (aim[0] + aim[1], aim[1]) if aim else aim
 
     def senses(self, aim: Any, sensed: Sensed) -> dict[str, jax.Array]:
@@ -172,24 +173,24 @@ class AskedWalk(Walk):
         heading = sense(self.creature, sensed, jnp.zeros(()), ["heading"])["heading"]
         return {"heading": wrapped(heading - aim[0]), "aside": jnp.zeros(())}
 
+    @override
     def init(self) -> WishTally:
-        """See `Task`."""
         return wish_tally(super().init(), len(self.creature.feet.names))
 
+    @override
     def update(
         self, tally: WishTally, sensed: Sensed, torque: jax.Array, standards: jax.Array, aim: Any
     ) -> WishTally:
-        """See `Task`."""
         plain = self._keeper.update(tally, sensed, torque, standards)
         after = wish_updated(self.creature, tally, plain, sensed)
         return along(tally, after, aim[0], self.horizon // 2) if aim else after
 
+    @override
     def judge(self, tally: WishTally, settings: WalkConfig) -> dict[str, jax.Array]:
-        """See `Task`."""
         return wished_terms(self.creature, settings, self.step, self.horizon, tally)
 
+    @override
     def weights(self, settings: WalkConfig, generation: jax.Array) -> dict[str, jax.Array]:
-        """See `Task`."""
         wished = wish_weights(settings.wish)
         return super().weights(settings, generation) | {
             n: -jnp.float32(w) for n, w in wished.items()
