@@ -53,7 +53,7 @@ def test_a_config_survives_its_own_file(tmp_path: Path):
         ({"evolution": {"remember": True}}, "remember is for an elite"),
         ({"rollout": {"slope": 5.0, "ground": "rough:0.1"}}, "slope and rough are for a flat one"),
         ({"evolution": {"elite": 1.0, "survival": "children"}}, "leaves no room for children"),
-        ({"rollout": {"variety": 2}}, "rollout.variety = 2: who has been judged on other starts"),
+        ({"rollout": {"variety": 2}}, "rollout.variety = 2: individuals evaluated on other starts"),
         ({"rollout": {"physics": "warp"}}, "rollout.physics = 'warp'"),
         ({"rollout": {"seconds": float("nan")}}, "rollout.seconds"),
         ({"controller": {"tuning": {"threshold": [0.2, 0.1]}}}, "the first must not be the larger"),

@@ -17,7 +17,7 @@ from mjxgait.training.screen import Screen, duration
     ("best", "forward", "said"),
     [
         (1.5, 3.25, ("1.500 in generation 4", "forward 3.25 per episode")),
-        (None, None, ("nobody could be judged",)),
+        (None, None, ("no individual had a finite fitness",)),
     ],
     ids=["judged", "nobody judged"],
 )

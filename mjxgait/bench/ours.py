@@ -61,8 +61,8 @@ class Ours:
             != self.experiment.config.evolution.population
         ):
             raise ValueError(
-                "laps need growth = 2: as many are judged in a generation as there are in the "
-                "population"
+                "laps need growth = 2: each generation must evaluate as many individuals "
+                "as the population has"
             )
         self.first = self.experiment.place(dataclasses.replace(self.first, genomes=genomes))
 

@@ -187,7 +187,7 @@ def _plain(values: Mapping[str, Any]) -> Mapping[str, Any]:
     for name, value in values.items():
         kind = str if name == "gait" else (int, float)
         if not isinstance(value, kind) or isinstance(value, bool):
-            raise ValueError(f"{name} = {value!r} cannot be asked of a walk")
+            raise ValueError(f"{name} = {value!r} is no target of a walk")
         if name != "gait" and not np.isfinite(value):
             raise ValueError(f"{name} = {value!r} is not a finite number")
     if values.get("speed", 1.0) <= 0:

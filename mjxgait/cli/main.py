@@ -18,8 +18,8 @@ COMMANDS = {
     "train": "evolve a walk: mjxgait train --env tall_quadruped",
     "refine": "make a hand-made cycle walk: mjxgait refine --env duck --keys walk.glb",
     "certify": "examine a champion in C MuJoCo: mjxgait certify RUN",
-    "stress": "ask more of a walk: bumps, slopes, pushes, ten minutes: mjxgait stress RUN",
-    "inspect": "tell what a run or a checkpoint holds: mjxgait inspect RUN",
+    "stress": "test a walk on bumps and slopes, by pushes, for ten minutes: mjxgait stress RUN",
+    "inspect": "show what a run or a checkpoint holds: mjxgait inspect RUN",
     "plot": "draw a run: fitness, footfalls, joints, a filmstrip: mjxgait plot RUN",
     "render": "make a video of a walk or a race: mjxgait render RUN --out walk.webp",
     "export": "write a walk as an animation file: mjxgait export RUN --out walk.glb",
@@ -46,7 +46,7 @@ Evolve a stable walk for any creature.
 
 {commands}
 
-`mjxgait SUBCOMMAND --help` tells the options of each."""
+`mjxgait SUBCOMMAND --help` lists the options of each."""
 
 
 def _with_own_parts(given: Sequence[str]) -> list[str]:

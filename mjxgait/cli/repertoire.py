@@ -221,7 +221,7 @@ def _leave(
     if changed:
         told = sum(change.share == 1 for change in changed)
         console.print(
-            f"told on the way to walk as a neighbour does, it always succeeds in {told} of "
+            f"when commanded to change to a neighbouring walk, it always succeeds in {told} of "
             f"{len(changed)} changes; from {np.mean([c.share for c in changed]):.0%} of the moments"
         )
     if loops := clips_of(folder, found, options.rate):

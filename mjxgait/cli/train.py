@@ -275,8 +275,7 @@ def _layers(arguments: Sequence[str]) -> tuple[Creature, Config]:
     if given.resume:
         if any(asked.values()):
             raise UserError(
-                f"{given.resume}: a resumed run keeps its settings; what is asked of a walk needs a "
-                "new run"
+                f"{given.resume}: a resumed run keeps its settings; other targets need a new run"
             )
         folder = Path(given.resume)
         return open_run(folders_of(folder)[0] if is_zoo(folder) else folder)

@@ -176,7 +176,9 @@ class EvolutionConfig:
                 'elite is for survival = "children": of the best all live on anyway; set it to 0'
             )
         if self.remember and not self.elite:
-            raise ValueError("remember is for an elite: nobody else is judged more than once")
+            raise ValueError(
+                "remember is for an elite: no other individual is evaluated more than once"
+            )
         if self.elites >= self.offspring:
             raise ValueError(f"elite = {self.elite} leaves no room for children")
 

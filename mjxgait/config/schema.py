@@ -221,8 +221,8 @@ class Config:
     def __post_init__(self) -> None:
         if self.rollout.variety > 1 and not self.evolution.elite:
             raise ValueError(
-                f"rollout.variety = {self.rollout.variety}: who has been judged on other starts "
-                'does not compare; set evolution.survival = "children" and evolution.elite'
+                f"rollout.variety = {self.rollout.variety}: individuals evaluated on other "
+                'starts do not compare; set evolution.survival = "children" and evolution.elite'
             )
 
     @property

@@ -174,6 +174,6 @@ def _must_answer(address: str, host: str, port: str) -> None:
         socket.create_connection((host, int(port)), PATIENCE).close()
     except (OSError, OverflowError) as error:
         raise UserError(
-            f"--cluster {address}: nobody answers at {host}:{port} ({error}); is the head running, "
+            f"--cluster {address}: no answer from {host}:{port} ({error}); is the head running, "
             "and the port open for this machine?"
         ) from None

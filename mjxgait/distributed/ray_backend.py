@@ -226,8 +226,8 @@ class Machines(Hands):
         self._tags[node.id] = found.tag
         if self._kinds and found.tag not in self._kinds:
             self._tell(
-                f"{node.name} is of another kind than {next(iter(self._kinds.values()))}: who "
-                "computes what then decides on the last bits"
+                f"{node.name} is of another kind than {next(iter(self._kinds.values()))}: the "
+                "last bits then depend on which machine computes what"
             )
         self._kinds.setdefault(found.tag, node.name)
         for _ in range(node.cores):

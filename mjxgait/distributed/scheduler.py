@@ -217,7 +217,7 @@ class Crew:
             self._alone_since = self._clock()
         elif self._alone_since is not None and self._clock() - self._alone_since > ALONE:
             self._alone_since = None
-            self._tell("nobody is there to work; waiting for machines to join")
+            self._tell("no worker is connected; waiting for machines to join")
 
 
 class Here(Hands):

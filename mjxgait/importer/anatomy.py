@@ -102,7 +102,7 @@ def up_axis(
     """Up unit vector [3] in the file's world."""
     gravity = model.opt.gravity
     if up:
-        notes.guess("up", up, "high", "as told")
+        notes.guess("up", up, "high", "as given")
         return UP_AXES[up]
     strongest = int(np.abs(gravity).argmax())
     if abs(gravity[strongest]) > 1 and strongest != 2:

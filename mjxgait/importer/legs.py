@@ -55,7 +55,7 @@ def movable_joints(
             "the controller's key poses are angles; a sliding limb keeps its length",
         )
     if told:
-        notes.change(f"joints {listed(told)} frozen", "as told by --freeze")
+        notes.change(f"joints {listed(told)} frozen", "as given by --freeze")
     if followers:
         notes.change(
             f"joints {listed([model.joint(j).name for j in sorted(followers)])} frozen",

@@ -48,7 +48,7 @@ def find_forward(puppet: Puppet, q: np.ndarray, told: str | None, notes: Notes) 
     """Forward unit vector [3] in the world of the pose."""
     xpos, _ = puppet.pose(q)
     if told:
-        notes.guess("forward", told, "high", "as told")
+        notes.guess("forward", told, "high", "as given")
         return FORWARDS[told]
     name, sure, why = _axis(puppet, q)
     sign, evidence = _front(puppet, xpos, FORWARDS[name])

@@ -47,7 +47,7 @@ def model_of(
     """
     rig = _bare(RIGS[path.suffix.lower()](path))
     _check(path, rig)
-    upward = Guess("up", up, "high", "as told") if up else _upward(rig)
+    upward = Guess("up", up, "high", "as given") if up else _upward(rig)
     axis = "xyz".index(upward.value)
     plan = Plan(axis, _measured(path, rig, axis, height, notes))
     if not plan.limbs:
@@ -125,7 +125,7 @@ def _measured(path: Path, rig: Rig, up: int, height: float | None, notes: Notes)
     if height is not None:
         if not (0.0 < height < 1e3 and tall > 1e-9):
             raise UserError(f"--height {height:g}: must be the metres that it is tall at rest")
-        notes.guess("height", f"{height:g} m", "high", "as told")
+        notes.guess("height", f"{height:g} m", "high", "as given")
         return rig.scaled(height / tall)
     if rig.metres is not None:
         notes.guess("height", f"{rig.metres * tall:.3g} m", "high", "glTF counts in metres")

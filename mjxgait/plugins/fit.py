@@ -18,8 +18,8 @@ def check_fit(creature: Creature, config: Config) -> None:
     grows, kind = controller_kind(controller).grows, known_task(task)
     if config.examination.level != "walks" and task != "walk":
         raise UserError(
-            f"examination.level = {config.examination.level}: only who is to walk can walk there, and "
-            f"this is to {task}"
+            f"examination.level = {config.examination.level}: it is for walks, and this task is "
+            f"{task}"
         )
     if config.evolution.family < 1 and config.evolution.islands.count > 1:
         raise UserError(
@@ -62,7 +62,7 @@ def check_fit(creature: Creature, config: Config) -> None:
     if config.rollout.step not in (0.0, step):
         raise UserError(
             f"{name}: rollout.step = {config.rollout.step:g}, but its creature.xml has {step:g} s; "
-            "whoever is compared or goes on has one step"
+            "runs that are compared or resumed have one step"
         )
     _check_settings(name, config)
 

@@ -205,7 +205,7 @@ def duration(seconds: float) -> str:
 def _best(last: Mapping[str, Any]) -> str:
     """Return the best fitness in words; none if no individual could be evaluated."""
     if last["best"] is None:
-        return f"none: nobody could be judged in generation {last['generation']}"
+        return f"none: no individual had a finite fitness in generation {last['generation']}"
     return f"{last['best']:.3f} in generation {last['generation']}"
 
 

@@ -161,7 +161,7 @@ def _anywhere(run: Path, champion: Champion) -> str:
         [t["name"], f"{t['share']:.0%}", "pass" if t["passed"] else "fails"]
         for t in document["trials"]
     ]
-    return f"<p>{verdict}</p>" + _table(("asked for more", "of the starts", "verdict"), rows)
+    return f"<p>{verdict}</p>" + _table(("stress test", "of the starts", "verdict"), rows)
 
 
 def _origin(creature: Creature, champion: Champion) -> str:

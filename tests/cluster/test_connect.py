@@ -28,7 +28,7 @@ def test_where_nobody_answers_is_said_soon():
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         address = f"127.0.0.1:{free.getsockname()[1]}"
-    assert f"nobody answers at {address}" in refusal(address)
+    assert f"no answer from {address}" in refusal(address)
 
 
 def test_auto_is_the_cluster_that_this_machine_belongs_to(

@@ -158,7 +158,7 @@ def test_that_nobody_is_there_is_said_once():
     crew, toys, said = crew_of([])
     crew.submit(0, lambda: (None, 0))
     assert crew.next(lambda: toys.clock.now > 500) is None
-    assert said == ["nobody is there to work; waiting for machines to join"]
+    assert said == ["no worker is connected; waiting for machines to join"]
 
 
 @pytest.mark.parametrize("seed", range(4))

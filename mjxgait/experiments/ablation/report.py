@@ -197,10 +197,7 @@ def _cautions(plan: Plan, results: Sequence[Result]) -> list[str]:
             )
     broken = [f"{_plain(r.variant)}, seed {r.seed}" for r in results if not r.finite]
     if broken:
-        found.append(
-            "Runs in which nobody could be judged (not finite), counted as the worst: "
-            f"{'; '.join(broken)}."
-        )
+        found.append(f"Runs without a finite fitness, counted as the worst: {'; '.join(broken)}.")
     steps = {
         name: np.mean([r.steps for r in results if r.variant == name]) for name in plan.variants
     }

@@ -257,7 +257,7 @@ def _entry(name: str, loop: WalkLoop, one: Found | None) -> dict[str, Any]:
         "strides": loop.strides,
     }
     if one is None:
-        return entry | {"certified": False, "note": "the standing pose; nobody has simulated it"}
+        return entry | {"certified": False, "note": "the standing pose; it was not simulated"}
     asked = {"speed": one.cell.speed, "turn": one.cell.turn}
     return entry | {
         "asked": asked,

@@ -72,8 +72,8 @@ def draw_map(drawing: Figure, creature: str, grid: Grid, found: list[Found]) -> 
     turns = sorted({cell.turn for cell in grid.cells}, reverse=True)
     for one in found:
         _field(axes, one, turns.index(one.cell.turn), grid.speeds.index(one.cell.speed))
-    axes.set(xlim=(0, len(turns)), ylim=(0, len(grid.speeds)), ylabel="speed asked for (m/s)")
-    axes.set_xlabel("turn asked for (deg/s), to the left on the left")
+    axes.set(xlim=(0, len(turns)), ylim=(0, len(grid.speeds)), ylabel="target speed (m/s)")
+    axes.set_xlabel("target turn (deg/s), to the left on the left")
     axes.set_xticks(np.arange(len(turns)) + 0.5, [f"{turn:+g}" for turn in turns])
     axes.set_yticks(np.arange(len(grid.speeds)) + 0.5, [f"{speed:.2f}" for speed in grid.speeds])
     axes.grid(visible=False)

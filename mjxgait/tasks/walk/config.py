@@ -138,7 +138,7 @@ class WishConfig:
 
     def __post_init__(self) -> None:
         if self.turn is not None and self.steer is not None:
-            raise ValueError("turn and steer: who turns all the time is not steered; give one")
+            raise ValueError("turn and steer exclude each other; give one")
 
     @property
     def asked(self) -> tuple[str, ...]:

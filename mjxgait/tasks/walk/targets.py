@@ -159,7 +159,7 @@ def speed_of(text: str, creature: Creature) -> float:
         )
     value = float(plain.removeprefix("fr").removesuffix("bl/s").removesuffix("m/s"))
     if not value > 0:
-        raise UserError(f"--speed {text}: must be more than 0; who is to stand still needs no walk")
+        raise UserError(f"--speed {text}: must be more than 0")
     if plain.startswith("fr"):
         return float((value * creature.gravity * creature.frame.hip_height) ** 0.5)
     return value * creature.frame.body_length if plain.endswith("bl/s") else value
